@@ -80,6 +80,11 @@ impl Tape {
     pub fn is_empty(&self) -> bool {
         self.code.instructions.is_empty()
     }
+
+    /// Number of registers: inputs, constants and temporaries.
+    pub fn registers(&self) -> usize {
+        self.code.registers
+    }
 }
 
 #[derive(Debug, Default)]

@@ -189,11 +189,8 @@ fn steps(graph: &Graph, residuals: &[Node]) -> Vec<Node> {
     let mut found = vec![];
     for node in graph.reachable(residuals) {
         match graph.op(node) {
-            Op::Unary(Unary::Sign | Unary::Floor | Unary::Not, _) => found.push(node),
-            Op::Binary(
-                Binary::Less | Binary::LessEq | Binary::Equal | Binary::And | Binary::Or,
-                ..,
-            ) => found.push(node),
+            Op::Unary(op, _) if op.jumps() => found.push(node),
+            Op::Binary(op, ..) if op.jumps() => found.push(node),
             // the cut of the angle
             Op::Binary(Binary::Atan2, y, x) => {
                 let behind = graph.binary(Binary::LessEq, x, zero);
@@ -236,7 +233,7 @@ impl Implicit {
     /// # Errors
     /// Why no root was found.
     pub(crate) fn root(&self, p: &[f64]) -> Result<Vec<f64>, String> {
-        let mut search = Search::new(self, p);
+        let mut search = Newton::new(self, p);
         let first = search.newton(self.start());
         if search.is_root(&first) {
             return Ok(first);
@@ -287,7 +284,8 @@ impl Implicit {
     }
 }
 
-struct Search<'a> {
+/// Newton's method on one function at one p.
+struct Newton<'a> {
     function: &'a Implicit,
     residual: Evaluator,
     slopes: Evaluator,
@@ -295,7 +293,7 @@ struct Search<'a> {
     at: Vec<f64>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> Newton<'a> {
     fn new(function: &'a Implicit, p: &[f64]) -> Self {
         let mut at = function.start().to_vec();
         at.extend(p);

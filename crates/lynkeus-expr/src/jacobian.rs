@@ -168,7 +168,7 @@ fn choice_tangent(
         .collect()
 }
 
-/// A dx = db − dA x, for each input that A or b depend on.
+/// Of a linear system, A dx = db − dA x, for each input that A or b depend on.
 fn solve_tangents(
     graph: &Graph,
     node: Node,
@@ -255,7 +255,7 @@ fn adjoints(graph: &Graph, output: Node, inputs: &[Node]) -> BTreeMap<Node, Node
     adjoints
 }
 
-/// With Aᵀλ = x̄: b̄ += λ and Ā −= λ xᵀ.
+/// Of a linear system, with Aᵀλ = x̄: b̄ += λ and Ā −= λ xᵀ.
 fn solve_adjoints(
     graph: &Graph,
     node: Node,
@@ -389,7 +389,7 @@ fn sum_tangent(
     sum
 }
 
-/// dz for each input that p depends on.
+/// Of an implicit function, g_z dz = −g_p dp: dz for each input that p depends on.
 fn implicit_tangents(
     graph: &Graph,
     node: Node,
@@ -419,7 +419,7 @@ fn implicit_tangents(
         .collect()
 }
 
-/// With g_zᵀ λ = z̄: p̄ −= g_pᵀ λ.
+/// Of an implicit function, with g_zᵀ λ = z̄: p̄ −= g_pᵀ λ.
 fn implicit_adjoints(
     graph: &Graph,
     node: Node,
@@ -450,7 +450,7 @@ fn solve(graph: &Graph, matrix: &[Node], right: &[Node]) -> Vec<Node> {
     }
 }
 
-/// When each node stays what it is along a direction, whatever its slopes: where the direction has
+/// Along which directions nothing moves: when each node stays what it is along a direction, whatever its slopes: where the direction has
 /// no part in anything that the node depends on there. (That a product with a slope is 0 is not
 /// enough: √(x²) has no derivative at 0, although that of x² is 0.)
 struct Still<'g> {

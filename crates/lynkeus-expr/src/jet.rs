@@ -66,7 +66,7 @@ impl<A: Algebra> Jets<'_, A> {
     }
 
     /// x − y, where what is none is zero.
-    fn less(&self, x: Option<&A::Value>, y: Option<A::Value>) -> A::Value {
+    fn difference(&self, x: Option<&A::Value>, y: Option<A::Value>) -> A::Value {
         match (x, y) {
             (Some(x), None) => x.clone(),
             (Some(x), Some(y)) => self.two(Binary::Sub, x, &y),
@@ -115,7 +115,7 @@ impl<A: Algebra> Jets<'_, A> {
                 0 => None,
                 _ => self.convolution(y, &q, k, 1, k),
             };
-            let numerator = self.less(x.get(k), known);
+            let numerator = self.difference(x.get(k), known);
             q.push(self.two(Binary::Div, &numerator, &y[0]));
         }
         q
@@ -129,7 +129,7 @@ impl<A: Algebra> Jets<'_, A> {
             let known = (k > 1)
                 .then(|| self.convolution(&s, &s, k, 1, k - 1))
                 .flatten();
-            let numerator = self.less(x.get(k), known);
+            let numerator = self.difference(x.get(k), known);
             s.push(self.two(Binary::Div, &numerator, &twice));
         }
         s
@@ -262,7 +262,7 @@ impl<A: Algebra> Jets<'_, A> {
             let g = function.residual(&Jets { inner, order }, &at);
             let right: Vec<A::Value> = g
                 .iter()
-                .map(|g| self.less(None, g.get(order).cloned()))
+                .map(|g| self.difference(None, g.get(order).cloned()))
                 .collect();
             let (next, _) = inner.solve(&matrix, &right);
             for (jet, value) in at.iter_mut().zip(next) {
@@ -387,7 +387,7 @@ impl<A: Algebra> Algebra for Jets<'_, A> {
                     let known = (1..=k).flat_map(|j| (0..n).map(move |l| (j, l)));
                     let terms = known
                         .filter_map(|(j, l)| Some(self.mul(a[i * n + l].get(j)?, &x[l][k - j])));
-                    self.less(b[i].get(k), self.sum(terms))
+                    self.difference(b[i].get(k), self.sum(terms))
                 })
                 .collect();
             let (xk, estimate) = self.inner.solve(&a0, &right);

@@ -91,6 +91,11 @@ impl Unary {
             Tanh, Not,
         ]
     };
+
+    /// Whether the value jumps where the argument does not.
+    pub(crate) fn jumps(self) -> bool {
+        matches!(self, Self::Sign | Self::Floor | Self::Not)
+    }
 }
 
 impl Binary {
@@ -101,6 +106,12 @@ impl Binary {
             Add, Sub, Mul, Div, Pow, Atan2, Min, Max, Less, LessEq, Equal, And, Or,
         ]
     };
+
+    /// Whether the value jumps where the arguments do not, other than at the cut of the angle.
+    pub(crate) fn jumps(self) -> bool {
+        use Binary::*;
+        matches!(self, Less | LessEq | Equal | And | Or)
+    }
 
     /// True where exchanging the arguments gives the same value.
     pub(crate) fn commutes(self) -> bool {

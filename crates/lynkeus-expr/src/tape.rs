@@ -402,9 +402,9 @@ mod tests {
         let tape = Tape::new(&g, &[x.node()], &[sum.node()]).unwrap();
         assert_eq!(tape.len(), 100);
         assert!(
-            tape.code.registers <= 1 + 3 + 2,
+            tape.registers() <= 1 + 3 + 2,
             "{} registers",
-            tape.code.registers
+            tape.registers()
         );
     }
 

@@ -18,16 +18,10 @@ const LARGEST: usize = 1_000_000;
 /// evaluator has a frame of its own.
 const LARGEST_PLACE: usize = 1 << 28;
 
-/// A tape as machine code. A clone shares the code.
+/// A tape as machine code, for one group of lanes or for many one after the other. A clone shares the
+/// code.
 #[derive(Clone, Debug)]
 pub struct Function<const LANES: usize> {
-    compiled: Arc<Compiled>,
-}
-
-/// A tape as machine code that goes over many groups of lanes: the first inputs are common to all
-/// groups, and the outputs of the groups stand at a distance from each other. A clone shares the code.
-#[derive(Clone, Debug)]
-pub struct Sweep<const LANES: usize> {
     compiled: Arc<Compiled>,
 }
 
@@ -35,10 +29,10 @@ pub struct Sweep<const LANES: usize> {
 struct Compiled {
     inputs: usize,
     outputs: usize,
-    /// number of inputs that groups have in common, of a [`Sweep`]
+    /// number of first inputs that groups have in common
     shared: usize,
-    /// from the outputs of one group to those of the next
-    spacing: usize,
+    /// from the outputs of one group to those of the next; none of code for one group
+    spacing: Option<usize>,
     constants: Vec<f64>,
     /// length of the frame, in values
     frame: usize,
@@ -51,8 +45,26 @@ impl<const LANES: usize> Function<LANES> {
     /// x86-64 with AVX2 and FMA), where the system does not let programs make code, for tapes with
     /// operations that are not compiled, and for other numbers of lanes.
     pub fn compile(tape: &Tape) -> Option<Self> {
-        let program = recorded::<LANES>(tape)?;
-        let compiled = Arc::new(Compiled::new::<LANES>(&program, 0, None)?);
+        Self::of(tape, 0, None)
+    }
+
+    /// Compiles a tape that goes over many groups of lanes: the first `shared` inputs are common to
+    /// all groups, and from the outputs of one group to those of the next there are `spacing` values.
+    /// None as of [`Function::compile`], and where the inputs or `spacing` are too few.
+    pub fn sweeping(tape: &Tape, shared: usize, spacing: usize) -> Option<Self> {
+        if shared > tape.inputs() || spacing < tape.outputs() {
+            return None;
+        }
+        Self::of(tape, shared, Some(spacing))
+    }
+
+    fn of(tape: &Tape, shared: usize, spacing: Option<usize>) -> Option<Self> {
+        let is_compiled_for = (LANES == 1 || LANES == 4) && is_supported();
+        if !is_compiled_for || tape.len() > LARGEST {
+            return None;
+        }
+        let program = Program::record(tape)?;
+        let compiled = Arc::new(Compiled::new::<LANES>(&program, shared, spacing)?);
         Some(Self { compiled })
     }
 
@@ -63,32 +75,6 @@ impl<const LANES: usize> Function<LANES> {
             compiled: self.compiled.clone(),
         }
     }
-}
-
-impl<const LANES: usize> Sweep<LANES> {
-    /// Compiles a tape whose first `shared` inputs are common to all groups; from the outputs of one
-    /// group to those of the next there are `spacing` values. None as of [`Function::compile`].
-    pub fn compile(tape: &Tape, shared: usize, spacing: usize) -> Option<Self> {
-        if shared > tape.inputs() || spacing < tape.outputs() {
-            return None;
-        }
-        let program = recorded::<LANES>(tape)?;
-        let compiled = Arc::new(Compiled::new::<LANES>(&program, shared, Some(spacing))?);
-        Some(Self { compiled })
-    }
-
-    /// An evaluator with its own working memory.
-    pub fn evaluator(&self) -> Sweeper<LANES> {
-        Sweeper {
-            frame: self.compiled.frame(),
-            compiled: self.compiled.clone(),
-        }
-    }
-}
-
-fn recorded<const LANES: usize>(tape: &Tape) -> Option<Program> {
-    let is_compiled_for = (LANES == 1 || LANES == 4) && is_supported();
-    (is_compiled_for && tape.len() <= LARGEST).then(|| Program::record(tape))?
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -121,7 +107,7 @@ impl Compiled {
             inputs: program.inputs,
             outputs: program.outputs.len(),
             shared,
-            spacing: spacing.unwrap_or(program.outputs.len()),
+            spacing,
             code: Executable::new(&emitted.code)?,
             constants: emitted.constants,
             frame: emitted.frame,
@@ -157,34 +143,19 @@ impl<const LANES: usize> Evaluator<LANES> {
     /// # Panics
     /// If the slices have not the tape's numbers of inputs and outputs.
     pub fn eval(&mut self, inputs: &[[f64; LANES]], outputs: &mut [[f64; LANES]]) {
-        let compiled = &*self.compiled;
-        assert_eq!(inputs.len(), compiled.inputs, "one value per input");
-        assert_eq!(outputs.len(), compiled.outputs, "one place per output");
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: the code was emitted for these numbers of inputs, outputs and places of the
-        // frame, of LANES numbers each, for one group and nothing shared, and the lengths were
-        // compared
-        unsafe {
-            let frame = self.frame.values_mut();
-            compiled.code.run(inputs, outputs, frame, &[], 1);
-        }
+        assert_eq!(inputs.len(), self.compiled.inputs, "one value per input");
+        let places = self.compiled.outputs;
+        assert_eq!(outputs.len(), places, "one place per output");
+        self.sweep(1, &[], inputs, outputs);
     }
-}
 
-/// Evaluates a [`Sweep`] again and again, without allocating.
-#[derive(Clone, Debug)]
-pub struct Sweeper<const LANES: usize> {
-    compiled: Arc<Compiled>,
-    frame: Buffer<LANES>,
-}
-
-impl<const LANES: usize> Sweeper<LANES> {
     /// For each of `groups` groups: writes the outputs at the shared inputs and its own ones, which
     /// stand one group after the other.
     ///
     /// # Panics
-    /// If the slices are too short for so many groups.
-    pub fn eval(
+    /// If the slices are too short for so many groups, and for more than one group of code that was
+    /// compiled for one.
+    pub fn sweep(
         &mut self,
         groups: usize,
         shared: &[[f64; LANES]],
@@ -196,13 +167,18 @@ impl<const LANES: usize> Sweeper<LANES> {
         let Some(before) = groups.checked_sub(1) else {
             return;
         };
+        assert!(
+            before == 0 || compiled.spacing.is_some(),
+            "code for one group"
+        );
         assert_eq!(shared.len(), compiled.shared, "one value per shared input");
         assert!(inputs.len() >= groups * own, "inputs of every group");
-        let needed = before * compiled.spacing + compiled.outputs;
+        let needed = before * compiled.spacing.unwrap_or(0) + compiled.outputs;
         assert!(outputs.len() >= needed, "outputs of every group");
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the code was emitted for these numbers of inputs, outputs and places of the
-        // frame, of LANES numbers each, and there is room for so many groups
+        // frame, of LANES numbers each, and there is room for so many groups, of which code
+        // without spacing has one
         unsafe {
             let frame = self.frame.values_mut();
             compiled.code.run(inputs, outputs, frame, shared, groups);

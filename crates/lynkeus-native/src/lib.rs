@@ -44,4 +44,4 @@ mod memory;
 #[cfg(target_arch = "x86_64")]
 mod registers;
 
-pub use function::{Buffer, Evaluator, Function, Sweep, Sweeper};
+pub use function::{Buffer, Evaluator, Function};

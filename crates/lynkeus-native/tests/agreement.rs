@@ -2,7 +2,7 @@
 
 use lynkeus_expr::lanes::Lanes;
 use lynkeus_expr::{Binary, Graph, Node, Tape, Unary};
-use lynkeus_native::{Function, Sweep};
+use lynkeus_native::Function;
 use proptest::prelude::*;
 
 /// One step of a random program: what to do with which earlier values.
@@ -114,14 +114,14 @@ fn sweeps_agree(draws: &[Draw], rows: &[[f64; 5]; 4]) -> Result<(), TestCaseErro
     let outputs = build(&g, &inputs, draws);
     let tape = Tape::new(&g, &inputs, &outputs).expect("all inputs are there");
     let spacing = outputs.len() + SPARE;
-    let Some(sweep) = Sweep::<4>::compile(&tape, 2, spacing) else {
+    let Some(sweep) = Function::<4>::sweeping(&tape, 2, spacing) else {
         return Ok(());
     };
     let [u, v, a, b, c] = std::array::from_fn(|i| rows.map(|row| row[i]));
     let own = [[a, b, c], [b, c, a], [c, c, b]];
     let mut found = vec![[7.0; 4]; 3 * spacing];
     let mut sweeper = sweep.evaluator();
-    sweeper.eval(3, &[u, v], own.as_flattened(), &mut found);
+    sweeper.sweep(3, &[u, v], own.as_flattened(), &mut found);
     for (group, [a, b, c]) in own.into_iter().enumerate() {
         let expected = tape.eval_in(&Lanes::<4>, &[u, v, a, b, c]);
         let (values, spare) = found[group * spacing..][..spacing].split_at(outputs.len());

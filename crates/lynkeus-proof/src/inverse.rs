@@ -1,5 +1,9 @@
 //! Enclosures of inverses: an approximate inverse is a proposal, of which the residual is
 //! enclosed (Neumaier 1990, *Interval methods for systems of equations*, section 4.1).
+//!
+//! [`interval::solve`] encloses the solutions of a system, and so the columns of an inverse.
+//! [`Inverse`] keeps A⁻¹ = R(I + E)⁻¹ as a product instead: in B A⁻¹ the numbers of R meet those
+//! of B before anything is bounded.
 
 use lynkeus_expr::{Interval, interval};
 use nalgebra::DMatrix;

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::{Graph, ImplicitCall, Inner, Key, LinearSystem, Solution};
-use crate::{Binary, Implicit, Node, Nodes, Op, Unary};
+use crate::{Implicit, Node, Nodes, Op};
 
 impl ImplicitCall {
     /// (z, p): the results of the node and its arguments.
@@ -107,10 +107,9 @@ impl Graph {
 
     /// Whether the value of a node may jump where its arguments do not.
     pub fn jumps(&self, node: Node) -> bool {
-        use Binary::{And, Equal, Less, LessEq, Or};
         match self.op(node) {
-            Op::Unary(op, _) => matches!(op, Unary::Sign | Unary::Floor | Unary::Not),
-            Op::Binary(op, ..) => matches!(op, Less | LessEq | Equal | And | Or),
+            Op::Unary(op, _) => op.jumps(),
+            Op::Binary(op, ..) => op.jumps(),
             Op::Implicit(_) => self
                 .implicit_call(node)
                 .is_some_and(|call| call.function.steps()),

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::lanes::{self, Lanes, Portable};
 use lynkeus_expr::{Evaluator, Graph, MissingInput, Node, Op, Tape};
-use lynkeus_native::{Function, Sweep, Sweeper};
+use lynkeus_native::Function;
 
 use crate::closed_loop::Loop;
 use crate::integrator::{check_interval, fixed_steps, pieces};
@@ -205,7 +205,7 @@ const LARGEST: usize = 200_000;
 pub(crate) struct Code {
     tapes: Divided,
     common: Option<Function<LANES>>,
-    own: Option<Sweep<LANES>>,
+    own: Option<Function<LANES>>,
     /// from the outputs of one group of lanes to those of the next
     spacing: usize,
 }
@@ -215,7 +215,7 @@ impl Code {
         let is_wanted = |tape: &Tape| Backend::compiles_at_once() && tape.len() <= LARGEST;
         let compiled = is_wanted(&tapes.common).then(|| Function::compile(&tapes.common));
         let shared = tapes.common.outputs();
-        let sweep = is_wanted(&tapes.own).then(|| Sweep::compile(&tapes.own, shared, spacing));
+        let sweep = is_wanted(&tapes.own).then(|| Function::sweeping(&tapes.own, shared, spacing));
         Self {
             common: compiled.flatten(),
             own: sweep.flatten(),
@@ -235,20 +235,17 @@ impl Code {
     }
 
     pub fn runner(&self) -> Runner {
-        let engine = |tape: &Tape| Box::new(tape.evaluator_in(Lanes));
+        let engine = |tape: &Tape, compiled: &Option<Function<LANES>>| match compiled {
+            Some(function) => Engine::Native(function.evaluator()),
+            None => Engine::Interpreted(Box::new(tape.evaluator_in(Lanes))),
+        };
         Runner {
             spacing: self.spacing,
             own_inputs: self.tapes.own.inputs() - self.shared(),
             outputs: self.tapes.own.outputs(),
             scratch: vec![[0.0; LANES]; self.tapes.own.inputs()],
-            common: match &self.common {
-                Some(function) => Engine::Native(function.evaluator()),
-                None => Engine::Interpreted(engine(&self.tapes.common)),
-            },
-            own: match &self.own {
-                Some(sweep) => Engine::Native(sweep.evaluator()),
-                None => Engine::Interpreted(engine(&self.tapes.own)),
-            },
+            common: engine(&self.tapes.common, &self.common),
+            own: engine(&self.tapes.own, &self.own),
         }
     }
 }
@@ -256,8 +253,8 @@ impl Code {
 /// Runs one [`Code`] again and again, without allocating.
 #[derive(Debug)]
 pub(crate) struct Runner {
-    common: Engine<lynkeus_native::Evaluator<LANES>>,
-    own: Engine<Sweeper<LANES>>,
+    common: Engine,
+    own: Engine,
     spacing: usize,
     own_inputs: usize,
     outputs: usize,
@@ -266,8 +263,8 @@ pub(crate) struct Runner {
 
 /// Machine code, or a tape.
 #[derive(Debug)]
-enum Engine<N> {
-    Native(N),
+enum Engine {
+    Native(lynkeus_native::Evaluator<LANES>),
     Interpreted(Box<Evaluator<Lanes<LANES>>>),
 }
 
@@ -291,7 +288,7 @@ impl Runner {
     /// The outputs of every group of lanes, from what is shared and what is its own.
     pub fn sweep(&mut self, groups: usize, shared: &[Lane], inputs: &[Lane], outputs: &mut [Lane]) {
         match &mut self.own {
-            Engine::Native(native) => native.eval(groups, shared, inputs, outputs),
+            Engine::Native(native) => native.sweep(groups, shared, inputs, outputs),
             Engine::Interpreted(tape) => {
                 let arguments = &mut self.scratch[..shared.len() + self.own_inputs];
                 arguments[..shared.len()].copy_from_slice(shared);
