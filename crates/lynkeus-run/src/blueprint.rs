@@ -51,7 +51,7 @@ impl Blueprint {
     pub fn flow(&self) -> &System {
         match self {
             Self::Sampled { observer, .. } => &observer.system,
-            Self::Filter { model, .. } => model.flow(),
+            Self::Filter { model, .. } => model.flow().system(),
         }
     }
 

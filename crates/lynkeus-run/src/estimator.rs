@@ -121,7 +121,7 @@ impl Estimator {
         let told = system.outputs().len().saturating_sub(count);
         let outputs = system.outputs().iter().take(told).cloned();
         let mut systems = vec![system.clone()];
-        systems.extend(observer.errors.iter().map(|e| e.flow().clone()));
+        systems.extend(observer.errors.iter().map(|e| e.flow().system().clone()));
         let noises = observer.errors.as_ref().map(|e| e.noises());
         let mut settings = format!(
             "{method:?} {} {:?} {noises:?}",

@@ -45,7 +45,7 @@ impl Machine {
             "x",
             Kind::Real,
             &states.join(", "),
-            model.flow().start().to_vec(),
+            model.flow().system().start().to_vec(),
         );
         self.field("inputs", Kind::Real, &inputs.join(", "), room);
         self.root(model.initial_variance());
@@ -75,7 +75,6 @@ impl Machine {
         self.judge(model, settings, &holds);
         let free = Linear {
             flow: model.flow(),
-            entries: model.flow_entries(),
             noise: model.process_noise(),
             is_tuned: !device.tunables.is_empty(),
         };
@@ -89,7 +88,6 @@ impl Machine {
         if let Some(confined) = confined {
             let inside = Linear {
                 flow: &confined.flow,
-                entries: &confined.entries,
                 noise: model.process_noise(),
                 is_tuned: free.is_tuned,
             };
@@ -116,7 +114,7 @@ impl Machine {
         arguments: &Arguments,
         holds: &[&str],
     ) -> Result<&'static str, Refusal> {
-        let n = free.flow.states().len();
+        let n = free.flow.system().states().len();
         match kind {
             FilterKind::MovingHorizon(..) => Err(Refusal::Window),
             FilterKind::Extended => {
@@ -141,12 +139,14 @@ impl Machine {
         kind: &FilterKind,
     ) -> Result<(), Refusal> {
         let (n, m) = (model.dimension(), model.sensors().len());
-        refuse_jumps(model.output_map())?;
-        let tape = model.output_map().output_tape();
+        let output_map = model.output_map();
+        refuse_jumps(output_map.system())?;
+        let tape = output_map.system().output_tape();
         let mut targets = vec![Target::all("h", m)];
         let mut outputs = 0..m;
         if *kind == FilterKind::Extended {
-            let places = model.output_entries().iter().map(|(i, j)| i * n + j);
+            let entries = output_map.jacobians().output.places();
+            let places = entries.iter().map(|(i, j)| i * n + j);
             targets.push(Target {
                 name: "c",
                 places: places.collect(),
@@ -205,7 +205,7 @@ impl Machine {
         arguments: &Arguments,
         about: &[&str],
     ) -> Result<(), Refusal> {
-        let n = free.flow.states().len();
+        let n = free.flow.system().states().len();
         let has_limits = about.contains(&"limits");
         let sensors = self.sizes.iter().find(|size| size.0 == "SENSORS");
         self.size("LARGER", sensors.map_or(n, |size| size.1.max(n)));
@@ -217,7 +217,7 @@ impl Machine {
             true => self.linear(Which::Free, free, arguments)?,
             false => self.add(FIELD),
         }
-        self.flow(free.flow, arguments)?;
+        self.flow(free.flow.system(), arguments)?;
         self.add(&exchanged(INTEGRATE, |word| match word {
             "integrate" => Some("integrate_point".to_owned()),
             "DIMENSION" => Some("STATES".to_owned()),

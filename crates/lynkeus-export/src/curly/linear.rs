@@ -1,6 +1,6 @@
 //! A flow with its Jacobian: the covariance along an estimate.
 
-use lynkeus_run::{Level, System};
+use lynkeus_run::{Level, Linearised};
 
 use super::function::{Arguments, Target, draft};
 use super::machine::{FIELD, Kind, Machine, code, refuse_jumps};
@@ -17,8 +17,7 @@ const PREDICT: &str = include_str!("runtime/predict.c");
 
 /// A flow with its Jacobian and the densities of the noise on its states.
 pub(super) struct Linear<'a> {
-    pub flow: &'a System,
-    pub entries: &'a [(usize, usize)],
+    pub flow: &'a Linearised,
     pub noise: &'a [f64],
     /// the densities are multiplied by a number that may be changed
     pub is_tuned: bool,
@@ -132,10 +131,11 @@ impl Machine {
     ) -> Result<(), Refusal> {
         let Linear {
             flow,
-            entries,
             noise,
             is_tuned,
         } = linear;
+        let entries = flow.jacobians().state.places();
+        let flow = flow.system();
         refuse_jumps(flow)?;
         let n = flow.states().len();
         let scale = noise.iter().fold(0.0_f64, |m, q| m.max(*q));

@@ -1,7 +1,7 @@
 //! Observers whose sensors report when they do.
 
 use lynkeus_run::credible::By;
-use lynkeus_run::{ErrorModel, Level, SampledObserver};
+use lynkeus_run::{ErrorModel, Jacobians, Level, SampledObserver};
 
 use super::device::Device;
 use super::function::{Arguments, Target, draft};
@@ -105,40 +105,39 @@ impl Machine {
     fn spread(&mut self, errors: &ErrorModel, arguments: &Arguments) -> Result<(), Refusal> {
         let noise = errors.noise();
         let flow = errors.flow();
-        let n = flow.states().len();
+        let n = flow.system().states().len();
         self.root(&noise.initial);
         self.noises(noise.sensors.iter().copied());
         self.size("LARGER", n);
         let linear = Linear {
             flow,
-            entries: errors.flow_entries(),
             noise: &noise.process,
             is_tuned: false,
         };
         self.linear(Which::Free, &linear, arguments)?;
         self.carried(Which::Free, &linear);
-        let tape = flow.output_tape();
-        let estimates = errors.flow_entries().len();
-        let readings = estimates + errors.estimate_entries().len();
-        for (about, name, outputs, entries) in [
+        let tape = flow.system().output_tape();
+        let Jacobians {
+            estimate, output, ..
+        } = flow.jacobians();
+        for (about, name, jacobian) in [
             (
                 "The derivatives of the estimates by x, row by row.",
                 "estimate_slopes",
-                estimates..readings,
-                errors.estimate_entries(),
+                estimate,
             ),
             (
                 "The derivatives of what is expected of the sensors by x, row by row.",
                 "reading_slopes",
-                readings..tape.outputs(),
-                errors.reading_entries(),
+                output,
             ),
         ] {
-            let places = entries.iter().map(|(i, j)| i * n + j);
+            let places = jacobian.places().iter().map(|(i, j)| i * n + j);
             let target = Target {
                 name: "c",
                 places: places.collect(),
             };
+            let outputs = jacobian.outputs();
             let code = code(&[Part { tape, outputs }])?;
             self.add(&draft(about, name, &code, arguments, &[target])?);
         }

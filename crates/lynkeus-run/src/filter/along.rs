@@ -8,7 +8,7 @@ use super::taylor::Moments;
 use super::variation::Variation;
 use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Error, Method, Step, System};
+use crate::{Error, Linearised, Method, Step};
 
 /// Up to so many states x̂, Φ and W are integrated together, and wherever steps are given: these are
 /// then the steps of all three.
@@ -33,26 +33,13 @@ enum Way {
 }
 
 impl Along {
-    /// Of a flow whose first outputs are the entries of its Jacobian, and the densities of the
-    /// noise on its states.
-    pub fn new(
-        flow: &System,
-        entries: &[(usize, usize)],
-        process_noise: &[f64],
-        method: Method,
-    ) -> Result<Self, Error> {
-        let n = flow.states().len();
+    /// Of a flow with F, and the densities of the noise on its states.
+    pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self, Error> {
+        let n = flow.system().states().len();
         let is_given = matches!(method, Method::Rk4(Step::AtMost(_) | Step::Substeps(_)));
-        let outputs = flow.outputs().len();
         let way = match n <= FEW || is_given {
-            true => {
-                let joint = Joint::new(n, outputs, entries, process_noise, method)?;
-                Way::Joint(Box::new(joint))
-            }
-            false => {
-                let variation = Variation::new(n, outputs, entries, process_noise, method)?;
-                Way::Variation(Box::new(variation))
-            }
+            true => Way::Joint(Box::new(Joint::new(flow, process_noise, method)?)),
+            false => Way::Variation(Box::new(Variation::new(flow, process_noise, method)?)),
         };
         Ok(Self {
             way,

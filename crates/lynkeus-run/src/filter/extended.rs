@@ -11,7 +11,7 @@ use super::spanned::Rows;
 use super::stage::Stage;
 use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Error, EstimatorSettings, System};
+use crate::{Error, EstimatorSettings, Linearised};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Extended {
@@ -25,18 +25,16 @@ pub(crate) struct Extended {
 }
 
 impl Extended {
-    /// Of a flow whose first outputs are the entries of its Jacobian, and the densities of the
-    /// noise on its states.
+    /// Of a flow with F, and the densities of the noise on its states.
     pub fn new(
-        flow: &System,
-        entries: &[(usize, usize)],
+        flow: &Linearised,
         process_noise: &[f64],
         run: EstimatorSettings,
     ) -> Result<Self, Error> {
-        let n = flow.states().len();
+        let n = flow.system().states().len();
         Ok(Self {
-            driven: Driven::new(flow, run.between),
-            along: Along::new(flow, entries, process_noise, run.method)?,
+            driven: Driven::new(flow.system(), run.between),
+            along: Along::new(flow, process_noise, run.method)?,
             x: vec![0.0; n],
             rows: vec![],
             sums: vec![0.0; n],

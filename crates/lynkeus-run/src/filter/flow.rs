@@ -7,7 +7,7 @@ use super::taylor::Moments;
 use crate::driven::Driven;
 use crate::relays::Guards;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Integrator, Method, Slopes};
+use crate::{Dynamics, Error, Integrator, Linearised, Method, Slopes};
 
 /// x̂, Φ and W by one integration, for flows with few states.
 #[derive(Clone, Debug)]
@@ -20,28 +20,23 @@ pub(super) struct Joint {
     noise: Vec<f64>,
     /// q, the largest entry of Q
     scale: f64,
-    /// the state of [`Linearised`]
+    /// the state of [`Variational`]
     z: Vec<f64>,
 }
 
 impl Joint {
-    pub fn new(
-        n: usize,
-        outputs: usize,
-        entries: &[(usize, usize)],
-        process_noise: &[f64],
-        method: Method,
-    ) -> Result<Self, Error> {
+    pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self, Error> {
+        let n = flow.system().states().len();
         let scale = process_noise.iter().fold(0.0_f64, |m, q| m.max(*q));
         let noise = match scale > 0.0 {
             true => process_noise.iter().map(|q| q / scale).collect(),
             false => vec![],
         };
-        let dimension = n + n * Linearised::width(n, scale > 0.0);
+        let dimension = n + n * Variational::width(n, scale > 0.0);
         Ok(Self {
             integrator: Integrator::new(method, dimension)?,
-            entries: entries.to_vec(),
-            slopes: vec![0.0; outputs],
+            entries: flow.jacobians().state.places().to_vec(),
+            slopes: vec![0.0; flow.system().outputs().len()],
             curvature: Curvature::default(),
             noise,
             scale,
@@ -60,9 +55,9 @@ impl Joint {
     ) -> Result<(), Error> {
         let n = x.len();
         let noisy = !self.noise.is_empty();
-        let width = Linearised::width(n, noisy);
-        Linearised::begin(x, noisy, &mut self.z);
-        let mut flow = Linearised {
+        let width = Variational::width(n, noisy);
+        Variational::begin(x, noisy, &mut self.z);
+        let mut flow = Variational {
             driven,
             entries: &self.entries,
             slopes: &mut self.slopes,
@@ -96,7 +91,7 @@ impl Persist for Joint {
 /// In this form no error of the integration makes P indefinite. The state is x̂, then the
 /// rows of (Φ W); W is left out where Q = 0. q is the largest entry of Q: tolerances then see
 /// W in units of time.
-struct Linearised<'a> {
+struct Variational<'a> {
     driven: &'a mut Driven,
     entries: &'a [(usize, usize)],
     /// values of the entries of F
@@ -106,7 +101,7 @@ struct Linearised<'a> {
     noise: &'a [f64],
 }
 
-impl Linearised<'_> {
+impl Variational<'_> {
     /// Entries of a row of (Φ W).
     fn width(n: usize, noisy: bool) -> usize {
         if noisy { 2 * n } else { n }
@@ -125,7 +120,7 @@ impl Linearised<'_> {
     }
 }
 
-impl Dynamics for Linearised<'_> {
+impl Dynamics for Variational<'_> {
     fn dimension(&self) -> usize {
         let n = self.driven.dimension();
         n + n * Self::width(n, !self.noise.is_empty())
@@ -216,8 +211,8 @@ impl Dynamics for Linearised<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{BetweenSamples, Function, System};
-    use lynkeus_expr::{Graph, Node, jacobian};
+    use crate::{BetweenSamples, Function};
+    use lynkeus_expr::Graph;
 
     /// The Jacobian of x̂, Φ and W together against differences, where F depends on x̂ and W is
     /// not even symmetric; with and without W.
@@ -231,20 +226,17 @@ mod tests {
             (x[0] * 3.0).sin(),
             x[2] * x[2] * x[0] - x[1],
         ];
-        let symbols = x.map(|x| x.node());
         let derivatives = dx.map(|dx| dx.node());
-        let F = jacobian::forward(&g, &derivatives, &symbols).entries;
-        let entries: Vec<(usize, usize)> = F.iter().map(|e| (e.0, e.1)).collect();
-        let outputs: Vec<(String, Node)> = F.iter().map(|e| (String::new(), e.2)).collect();
         let states = x.map(|x| ("x".to_owned(), x.node(), 0.0));
         let signals = [("w".to_owned(), w.node())];
-        let flow = System::new(&g, time.node(), &states, &signals, &derivatives, &outputs);
-        let mut driven = Driven::new(&flow.unwrap(), BetweenSamples::Hold);
+        let flow = Linearised::flow(&g, time.node(), &states, &signals, &derivatives).unwrap();
+        let entries = flow.jacobians().state.places();
+        let mut driven = Driven::new(flow.system(), BetweenSamples::Hold);
         driven.start(&[0.7]);
         for noise in [vec![], vec![0.3, 1.0, 0.5]] {
-            let mut linearised = Linearised {
+            let mut linearised = Variational {
                 driven: &mut driven,
-                entries: &entries,
+                entries,
                 slopes: &mut vec![0.0; entries.len()],
                 curvature: &mut Curvature::default(),
                 noise: &noise,

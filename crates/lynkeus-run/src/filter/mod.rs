@@ -61,7 +61,7 @@ mod unscented;
 mod variation;
 
 pub use health::{Health, Innovation, Reading, SensorHealth};
-pub use model::{Confined, ConfinedFlow, FilterModel, FilterPlant, Limits, Sensor};
+pub use model::{Confined, FilterModel, FilterPlant, Limits, Sensor};
 pub use smooth::Smoothed;
 pub use unscented::{SigmaPoints, Weights};
 
@@ -147,19 +147,12 @@ enum Engine {
     MovingHorizon(Box<Horizon>),
 }
 
-/// For intervals on which the plant has no value where the estimate is.
-#[derive(Clone, Debug)]
-struct Spare {
-    engine: Extended,
-    bounds: Vec<Bounds>,
-}
-
 /// A filter under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Filter {
     engine: Engine,
-    /// the same inside the declared ranges
-    spare: Option<Spare>,
+    /// inside the declared ranges, for intervals on which the plant has no value where the estimate is
+    spare: Option<Confined<Extended>>,
     belief: Belief,
     projection: Option<Projection>,
     sensing: Sensing,
@@ -202,7 +195,6 @@ impl Filter {
         let engine = match settings.kind {
             FilterKind::Extended => Engine::Extended(Box::new(Extended::new(
                 &model.flow,
-                &model.flow_entries,
                 &model.process_noise,
                 run,
             )?)),
@@ -215,15 +207,11 @@ impl Filter {
                 Engine::MovingHorizon(Box::new(horizon))
             }
         };
-        let x = model.flow.start().to_vec();
+        let x = model.flow.system().start().to_vec();
         let spare = match &model.confined {
             None => None,
-            Some(ConfinedFlow {
-                flow,
-                entries,
-                bounds,
-            }) => Some(Spare {
-                engine: Extended::new(flow, entries, &model.process_noise, run)?,
+            Some(Confined { flow, bounds }) => Some(Confined {
+                flow: Extended::new(flow, &model.process_noise, run)?,
                 bounds: bounds.clone(),
             }),
         };
@@ -277,10 +265,10 @@ impl Filter {
                 // a flow that failed has left the belief as it was
                 self.sensing.health.confined += 1;
                 confine(&mut self.belief.x, &spare.bounds);
-                let driven = &mut spare.engine.driven;
+                let driven = &mut spare.flow.driven;
                 driven.start(&self.inputs);
                 driven.aim(from, to, inputs);
-                spare.engine.predict(&mut self.belief, from, to, keep)
+                spare.flow.predict(&mut self.belief, from, to, keep)
             }
             (result, _) => result,
         }

@@ -11,7 +11,7 @@ impl Persist for Filter {
             Engine::MovingHorizon(horizon) => horizon.walk(walk)?,
         }
         if let Some(spare) = &mut self.spare {
-            spare.engine.walk(walk)?;
+            spare.flow.walk(walk)?;
         }
         self.belief.walk(walk)?;
         self.sensing.walk(walk)?;

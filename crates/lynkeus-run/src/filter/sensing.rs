@@ -5,8 +5,9 @@ use super::extended::Room;
 use super::health::{Health, Innovation, Reading};
 use super::model::{FilterModel, Limits, Sensor};
 use super::smooth::Correction;
+use crate::Error;
+use crate::linearised::OutputMap;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Evaluation};
 
 /// After so many rejections in a row the next reading is believed: a gate must not lock the
 /// filter out for ever.
@@ -79,12 +80,9 @@ struct Lockout {
 
 #[derive(Clone, Debug)]
 pub(super) struct Sensing {
-    output_map: Evaluation,
+    output_map: OutputMap,
     states: Vec<String>,
     sensors: Vec<Sensor>,
-    output_entries: Vec<(usize, usize)>,
-    /// h, then the entries of C
-    values: Vec<f64>,
     gate: Option<f64>,
     /// of readings that only stand for others ([`super::FilterSettings::foresees`])
     foresees: bool,
@@ -106,11 +104,9 @@ impl Sensing {
     ) -> Self {
         let count = model.sensors.len();
         Self {
-            output_map: model.output_map.evaluation(),
+            output_map: OutputMap::new(&model.output_map),
             states: model.states().to_vec(),
             sensors: model.sensors.clone(),
-            output_entries: model.output_entries.clone(),
-            values: vec![0.0; count + model.output_entries.len()],
             gate,
             foresees,
             lockouts: vec![Lockout::default(); count],
@@ -132,27 +128,21 @@ impl Sensing {
             .unwrap_or_default()
     }
 
-    /// h(t, x, u), and the entries of C there.
+    /// h(t, x, u), and C there.
     pub fn evaluate(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64], Error> {
-        self.values_at(t, x, u, self.values.len())
+        self.output_map.evaluate(t, x, u);
+        match self.output_map.is_finite() {
+            true => Ok(self.output_map.outputs()),
+            false => Err(self.output_map.not_finite(t)),
+        }
     }
 
     /// h(t, x, u), whether or not C has values there.
     pub fn predict(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64], Error> {
-        self.values_at(t, x, u, self.sensors.len())
-    }
-
-    /// h, where the first `needed` values are finite.
-    fn values_at(&mut self, t: f64, x: &[f64], u: &[f64], needed: usize) -> Result<&[f64], Error> {
-        let signals = self.output_map.signals_mut();
-        let (own, known) = signals.split_at_mut(x.len());
-        own.copy_from_slice(x);
-        known.copy_from_slice(u);
-        self.output_map.enter(t);
-        self.output_map.outputs(t, &[], &mut self.values);
-        match self.values[..needed].iter().all(|v| v.is_finite()) {
-            true => Ok(&self.values[..self.sensors.len()]),
-            false => Err(self.output_map.not_finite(t, &[])),
+        self.output_map.evaluate(t, x, u);
+        match self.output_map.outputs().iter().all(|v| v.is_finite()) {
+            true => Ok(self.output_map.outputs()),
+            false => Err(self.output_map.not_finite(t)),
         }
     }
 
@@ -165,13 +155,7 @@ impl Sensing {
 
     /// The same with room for it.
     pub fn write_slopes(&self, i: usize, row: &mut [f64]) {
-        row.fill(0.0);
-        let values = &self.values[self.sensors.len()..];
-        for (&(output, state), value) in self.output_entries.iter().zip(values) {
-            if output == i {
-                row[state] = *value;
-            }
-        }
+        self.output_map.write_slopes(i, row);
     }
 
     /// Decides what becomes of a reading where the model predicts a value with a variance `spread`; what

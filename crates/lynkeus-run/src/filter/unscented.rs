@@ -112,16 +112,11 @@ impl Unscented {
     ) -> Result<Self, Error> {
         let (n, noise) = (model.dimension(), &model.process_noise);
         let along = match noise.iter().any(|q| *q > 0.0) {
-            true => Some(Along::new(
-                &model.flow,
-                &model.flow_entries,
-                noise,
-                run.method,
-            )?),
+            true => Some(Along::new(&model.flow, noise, run.method)?),
             false => None,
         };
         Ok(Self {
-            driven: Driven::new(&model.flow, run.between),
+            driven: Driven::new(model.flow.system(), run.between),
             integrator: Integrator::new(run.method, n)?,
             weights: points.weights(n)?,
             along,

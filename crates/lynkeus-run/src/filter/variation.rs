@@ -15,7 +15,7 @@ use super::taylor::{Moments, Series};
 use crate::adaptive::resolution;
 use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Integrator, Method};
+use crate::{Dynamics, Error, Integrator, Linearised, Method};
 
 /// Tolerance with fixed steps, whose error nobody states.
 const FIXED: f64 = 1e-8;
@@ -74,13 +74,8 @@ struct Course {
 }
 
 impl Variation {
-    pub fn new(
-        n: usize,
-        outputs: usize,
-        entries: &[(usize, usize)],
-        process_noise: &[f64],
-        method: Method,
-    ) -> Result<Self, Error> {
+    pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self, Error> {
+        let n = flow.system().states().len();
         let tolerance = match method {
             Method::Adaptive(t) | Method::Explicit(t) | Method::Stiff(t) => t.relative,
             Method::Rk4(_) => FIXED,
@@ -88,7 +83,7 @@ impl Variation {
         let noisy = process_noise.iter().any(|q| *q > 0.0);
         Ok(Self {
             integrator: Integrator::new(method, n)?,
-            entries: entries.to_vec(),
+            entries: flow.jacobians().state.places().to_vec(),
             process_noise: if noisy {
                 process_noise.to_vec()
             } else {
@@ -99,7 +94,7 @@ impl Variation {
             series: Series::default(),
             step: f64::INFINITY,
             units: vec![],
-            slopes: vec![0.0; outputs],
+            slopes: vec![0.0; flow.system().outputs().len()],
             derivatives: vec![0.0; n],
         })
     }

@@ -96,12 +96,12 @@ impl Horizon {
             return Err(Error::setting("bounds", expected, bounds.len()));
         }
         Ok(Self {
-            engine: Extended::new(&model.flow, &model.flow_entries, &model.process_noise, run)?,
+            engine: Extended::new(&model.flow, &model.process_noise, run)?,
             length,
             sensors: model.sensors.len(),
             bounds,
             prior: Belief {
-                x: model.flow.start().to_vec(),
+                x: model.flow.system().start().to_vec(),
                 root: Root::diagonal(&model.initial_variance),
             },
             rows: VecDeque::new(),

@@ -3,19 +3,13 @@
 use super::*;
 use crate::filter::flow::Joint;
 use crate::filter::root::Root;
-use crate::{BetweenSamples, System, Tolerances};
-use lynkeus_expr::{Expr, Graph, jacobian};
+use crate::{BetweenSamples, Tolerances};
+use lynkeus_expr::{Expr, Graph};
 
 /// x_i' from x_{i−1} (or the input), x_i, x_{i+1} (or x_i at the end) and the input.
 type Law = for<'g> fn([Expr<'g>; 4], usize) -> Expr<'g>;
 
-struct Chain {
-    flow: System,
-    entries: Vec<(usize, usize)>,
-    n: usize,
-}
-
-fn chain(n: usize, law: Law) -> Chain {
+fn chain(n: usize, law: Law) -> Linearised {
     let g = Graph::new();
     let (time, u) = (g.symbol("time"), g.symbol("u"));
     let x: Vec<_> = (0..n).map(|i| g.symbol(&format!("x{i}"))).collect();
@@ -25,21 +19,11 @@ fn chain(n: usize, law: Law) -> Chain {
             law([left, x[i], x[(i + 1).min(n - 1)], u], i).node()
         })
         .collect();
-    let symbols: Vec<_> = x.iter().map(|x| x.node()).collect();
-    let F = jacobian::forward(&g, &dx, &symbols).entries;
-    let outputs: Vec<_> = F
-        .iter()
-        .map(|e| (format!("{},{}", e.0, e.1), e.2))
-        .collect();
     let states: Vec<_> = (0..n)
-        .map(|i| (format!("x{i}"), symbols[i], 0.3 + 0.1 * (i % 5) as f64))
+        .map(|i| (format!("x{i}"), x[i].node(), 0.3 + 0.1 * (i % 5) as f64))
         .collect();
     let signals = [("u".to_string(), u.node())];
-    Chain {
-        flow: System::new(&g, time.node(), &states, &signals, &dx, &outputs).unwrap(),
-        entries: F.iter().map(|e| (e.0, e.1)).collect(),
-        n,
-    }
+    Linearised::flow(&g, time.node(), &states, &signals, &dx).unwrap()
 }
 
 fn tight(relative: f64) -> Tolerances {
@@ -51,17 +35,16 @@ fn tight(relative: f64) -> Tolerances {
 }
 
 /// x̂, Φ and W over three samples by both ways; the largest relative difference.
-fn differ(chain: &Chain, step: f64, ours: Method, reference: Method) -> f64 {
-    let n = chain.n;
+fn differ(chain: &Linearised, step: f64, ours: Method, reference: Method) -> f64 {
+    let n = chain.system().states().len();
     let noise: Vec<f64> = (0..n)
         .map(|i| 0.01 * f64::from(u8::from(i % 3 != 1)))
         .collect();
-    let outputs = chain.flow.outputs().len();
-    let mut variation = Variation::new(n, outputs, &chain.entries, &noise, ours).unwrap();
-    let mut joint = Joint::new(n, outputs, &chain.entries, &noise, reference).unwrap();
+    let mut variation = Variation::new(chain, &noise, ours).unwrap();
+    let mut joint = Joint::new(chain, &noise, reference).unwrap();
     let mut worst = 0.0_f64;
-    let mut x = chain.flow.start().to_vec();
-    let mut driven = Driven::new(&chain.flow, BetweenSamples::Linear);
+    let mut x = chain.system().start().to_vec();
+    let mut driven = Driven::new(chain.system(), BetweenSamples::Linear);
     driven.start(&[0.5]);
     for k in 0..3 {
         let (from, to) = (step * f64::from(k), step * f64::from(k + 1));
