@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, HashMap};
 use lynkeus_expr::{Graph, Node, jacobian};
 
 use crate::filter::Belief;
-use crate::filter::extended::Extended;
+use crate::filter::ekf::Ekf;
+use crate::filter::kalman::Kalman;
 use crate::filter::root::Root;
 use crate::linearised::OutputMap;
 use crate::snapshot::{Damaged, Persist, Walk};
@@ -271,7 +272,7 @@ impl ErrorModel {
 /// The covariance of an observer's states, and of its innovations, along its run.
 #[derive(Clone, Debug)]
 pub(crate) struct Spread {
-    engine: Extended,
+    engine: Ekf,
     belief: Belief,
     /// the covariance from an exact start, where readings are judged
     settled: Option<Root>,
@@ -298,7 +299,7 @@ impl Spread {
     pub fn new(model: &ErrorModel, between: BetweenSamples, method: Method) -> Result<Self, Error> {
         let run = EstimatorSettings { between, method };
         Ok(Self {
-            engine: Extended::new(&model.flow, &model.noise.process, run)?,
+            engine: Ekf::new(&model.flow, &model.noise.process, run)?,
             belief: Belief {
                 x: model.flow.system().start().to_vec(),
                 root: Root::diagonal(&model.noise.initial),

@@ -1,13 +1,13 @@
 //! The unscented Kalman filter.
 
-use super::Belief;
-use super::along::Along;
-use super::factor::{Factor, factor, substitute};
+use super::belief::Belief;
+use super::kalman::Kalman;
 use super::model::FilterModel;
-use super::root::{Root, dot};
+use super::profile::{Profile, Skyline};
+use super::root::{Factor, Root, dot, factor, substitute};
 use super::sensing::{Believed, Sensing};
-use super::smooth::Correction;
-use super::spanned::{Rows, Spanned};
+use super::smoother::Correction;
+use super::transition::Along;
 use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings, Integrator};
@@ -79,7 +79,7 @@ impl SigmaPoints {
 
 /// The filter between its samples.
 #[derive(Clone, Debug)]
-pub(super) struct Unscented {
+pub(crate) struct Ukf {
     pub driven: Driven,
     integrator: Integrator,
     weights: Weights,
@@ -104,7 +104,7 @@ struct Room {
     factor: Factor,
 }
 
-impl Unscented {
+impl Ukf {
     pub fn new(
         model: &FilterModel,
         points: SigmaPoints,
@@ -122,100 +122,6 @@ impl Unscented {
             along,
             room: Room::default(),
         })
-    }
-
-    /// Each point through the flow; P⁻ = Σ W(…)(…)ᵀ + W, W what the process noise comes to along
-    /// the estimate ([`Along`]), which is exact on linear plants. Where it is to be kept, the transition
-    /// of the linear flow that carries the points best is returned: Φ = DᵀP⁻¹ with the covariance D
-    /// of the points before and after (S. Särkkä, "Unscented Rauch–Tung–Striebel smoother", *IEEE
-    /// Transactions on Automatic Control* 53 (2008) 845–849).
-    pub fn predict(
-        &mut self,
-        belief: &mut Belief,
-        from: f64,
-        to: f64,
-        keep: bool,
-    ) -> Result<Rows, Error> {
-        let Self {
-            driven,
-            integrator,
-            weights,
-            along,
-            room,
-        } = self;
-        let n = belief.x.len();
-        draw(belief, weights.spread, &mut room.points);
-        let (centre, others) = room.points.split_at_mut(n);
-        match along {
-            None => integrator.advance(driven, from, to, centre)?,
-            Some(along) => {
-                room.centre.clone_from(&belief.x);
-                along.advance(driven, belief, from, to, &mut room.centre)?;
-                centre.copy_from_slice(&room.centre);
-            }
-        }
-        for point in others.chunks_exact_mut(n) {
-            integrator.advance(driven, from, to, point)?;
-        }
-        let transition = match keep {
-            true => {
-                let rows = (0..n).flat_map(|i| weights.row(&belief.root, &room.points, n, i));
-                Rows::of(&Spanned::dense(n, rows.collect()))
-            }
-            false => Rows::default(),
-        };
-        weights.centre(&mut room.points, n, &mut belief.x);
-        room.extra.clear();
-        if let Some(along) = along {
-            along.push_root(&mut room.extra);
-        }
-        weights.spread(room, &mut belief.root);
-        Ok(transition)
-    }
-
-    /// The points drawn again from x̂⁻, P⁻; K = P_xz P_zz⁻¹ over the readings that are believed. For
-    /// each of those at an end of their sensor's range they are drawn once more.
-    pub fn correct(
-        &mut self,
-        sensing: &mut Sensing,
-        belief: &mut Belief,
-        t: f64,
-        readings: &[f64],
-        inputs: &[f64],
-    ) -> Result<(), Error> {
-        self.show(sensing, belief, t, inputs)?;
-        let m = readings.len();
-        let (mut inside, mut at_ends) = (vec![], vec![]);
-        for (i, reading) in readings.iter().enumerate() {
-            let spread = self.weights.moment(&self.room.shown, m, i, i);
-            let believed = sensing.judge(i, *reading, self.room.expected[i], spread);
-            if let Some(believed) = believed.filter(|b| spread + b.variance > 0.0) {
-                match believed.end {
-                    None => inside.push(believed),
-                    Some(_) => at_ends.push((believed, self.room.expected[i])),
-                }
-            }
-        }
-        let mut is_moved = false;
-        if !inside.is_empty() {
-            self.take(sensing, belief, m, &inside);
-            is_moved = true;
-        }
-        for (mut believed, before) in at_ends {
-            if is_moved && self.show(sensing, belief, t, inputs).is_err() {
-                // the sensors' model has no value about the estimate as it is now: the others count
-                break;
-            }
-            let i = believed.sensor;
-            let spread = self.weights.moment(&self.room.shown, m, i, i);
-            let moved = self.room.expected[i] - before;
-            if let Some((innovation, noise)) = believed.weighed(moved, spread) {
-                (believed.innovation, believed.variance) = (innovation, noise);
-                self.take(sensing, belief, m, &[believed]);
-                is_moved = true;
-            }
-        }
-        Ok(())
     }
 
     /// Points of the belief beside their mean, and what the sensors show of them.
@@ -302,6 +208,106 @@ impl Unscented {
                 .extend(gain.iter().map(|k| k[a] * b.variance.sqrt()));
         }
         weights.spread(room, &mut belief.root);
+    }
+}
+
+impl Kalman for Ukf {
+    fn driven(&mut self) -> &mut Driven {
+        &mut self.driven
+    }
+
+    /// Each point through the flow; P⁻ = Σ W(…)(…)ᵀ + W, W what the process noise comes to along
+    /// the estimate ([`Along`]), which is exact on linear plants. Where it is to be kept, the transition
+    /// of the linear flow that carries the points best is returned: Φ = DᵀP⁻¹ with the covariance D
+    /// of the points before and after (S. Särkkä, "Ukf Rauch–Tung–Striebel smoother", *IEEE
+    /// Transactions on Automatic Control* 53 (2008) 845–849).
+    fn predict(
+        &mut self,
+        belief: &mut Belief,
+        from: f64,
+        to: f64,
+        keep: bool,
+    ) -> Result<Skyline, Error> {
+        let Self {
+            driven,
+            integrator,
+            weights,
+            along,
+            room,
+        } = self;
+        let n = belief.x.len();
+        draw(belief, weights.spread, &mut room.points);
+        let (centre, others) = room.points.split_at_mut(n);
+        match along {
+            None => integrator.advance(driven, from, to, centre)?,
+            Some(along) => {
+                room.centre.clone_from(&belief.x);
+                along.advance(driven, belief, from, to, &mut room.centre)?;
+                centre.copy_from_slice(&room.centre);
+            }
+        }
+        for point in others.chunks_exact_mut(n) {
+            integrator.advance(driven, from, to, point)?;
+        }
+        let transition = match keep {
+            true => {
+                let rows = (0..n).flat_map(|i| weights.row(&belief.root, &room.points, n, i));
+                Skyline::of(&Profile::dense(n, rows.collect()))
+            }
+            false => Skyline::default(),
+        };
+        weights.centre(&mut room.points, n, &mut belief.x);
+        room.extra.clear();
+        if let Some(along) = along {
+            along.push_root(&mut room.extra);
+        }
+        weights.spread(room, &mut belief.root);
+        Ok(transition)
+    }
+
+    /// The points drawn again from x̂⁻, P⁻; K = P_xz P_zz⁻¹ over the readings that are believed. For
+    /// each of those at an end of their sensor's range they are drawn once more.
+    fn correct(
+        &mut self,
+        sensing: &mut Sensing,
+        belief: &mut Belief,
+        t: f64,
+        readings: &[f64],
+        inputs: &[f64],
+    ) -> Result<(), Error> {
+        self.show(sensing, belief, t, inputs)?;
+        let m = readings.len();
+        let (mut inside, mut at_ends) = (vec![], vec![]);
+        for (i, reading) in readings.iter().enumerate() {
+            let spread = self.weights.moment(&self.room.shown, m, i, i);
+            let believed = sensing.judge(i, *reading, self.room.expected[i], spread);
+            if let Some(believed) = believed.filter(|b| spread + b.variance > 0.0) {
+                match believed.end {
+                    None => inside.push(believed),
+                    Some(_) => at_ends.push((believed, self.room.expected[i])),
+                }
+            }
+        }
+        let mut is_moved = false;
+        if !inside.is_empty() {
+            self.take(sensing, belief, m, &inside);
+            is_moved = true;
+        }
+        for (mut believed, before) in at_ends {
+            if is_moved && self.show(sensing, belief, t, inputs).is_err() {
+                // the sensors' model has no value about the estimate as it is now: the others count
+                break;
+            }
+            let i = believed.sensor;
+            let spread = self.weights.moment(&self.room.shown, m, i, i);
+            let moved = self.room.expected[i] - before;
+            if let Some((innovation, noise)) = believed.weighed(moved, spread) {
+                (believed.innovation, believed.variance) = (innovation, noise);
+                self.take(sensing, belief, m, &[believed]);
+                is_moved = true;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -410,7 +416,7 @@ impl Weights {
     }
 }
 
-impl Persist for Unscented {
+impl Persist for Ukf {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.driven.walk(walk)?;
         self.integrator.walk(walk)?;

@@ -6,14 +6,11 @@
 //! constant F are doubled up. Everything is in units of the states' own deviations (rounded to
 //! powers of two), so that an error means the same for all of them.
 
-mod stiff;
-
-use super::Belief;
-use super::nodes::{FINE, Lobatto, ODD, meets};
-use super::spanned::Entry;
-use super::taylor::{Moments, Series};
+use super::series::{Dense, Moments, Series};
 use crate::adaptive::resolution;
 use crate::driven::Driven;
+use crate::filter::belief::Belief;
+use crate::filter::profile::Entry;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Integrator, Linearised, Method};
 
@@ -33,7 +30,7 @@ const GROWTH: f64 = 1.25;
 const SWEEPS: usize = 8;
 
 #[derive(Clone, Debug)]
-pub(super) struct Variation {
+pub(crate) struct Piecewise {
     integrator: Integrator,
     entries: Vec<(usize, usize)>,
     process_noise: Vec<f64>,
@@ -73,7 +70,7 @@ struct Course {
     polynomial: Option<Vec<Vec<Entry>>>,
 }
 
-impl Variation {
+impl Piecewise {
     pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self, Error> {
         let n = flow.system().states().len();
         let tolerance = match method {
@@ -307,11 +304,243 @@ impl Variation {
 }
 
 /// Units are chosen anew for every interval, and series keep room only.
-impl Persist for Variation {
+impl Persist for Piecewise {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.integrator.walk(walk)?;
         walk.number(&mut self.step)
     }
+}
+
+/// What the covariance of a stiff flow may be wrong by at least.
+const STIFF: f64 = 1e-5;
+
+/// Most halvings of a piece of a stiff flow.
+const MOST_HALVINGS: usize = 16;
+
+/// A piece of a stiff interval with a constant F.
+struct Leaf {
+    result: Dense,
+    /// F changes on it
+    varies: bool,
+    end: Vec<f64>,
+}
+
+impl Piecewise {
+    /// The rest of a stiff segment.
+    fn stiff(
+        &mut self,
+        driven: &mut Driven,
+        piece: Piece,
+        x: &mut Vec<f64>,
+        moments: &mut Moments,
+    ) -> Result<(), Error> {
+        let n = x.len();
+        let whole = self.leaf(driven, piece, x)?;
+        let result = self.refined(driven, piece, x, whole, MOST_HALVINGS)?;
+        *moments = Dense::of(moments, n).then(&result.result).into_moments(n);
+        *x = result.end;
+        Ok(())
+    }
+
+    /// A piece in halves until halving it changes nothing.
+    fn refined(
+        &mut self,
+        driven: &mut Driven,
+        piece: Piece,
+        x: &[f64],
+        coarse: Leaf,
+        halvings: usize,
+    ) -> Result<Leaf, Error> {
+        if !coarse.varies || halvings == 0 || piece.length() <= 512.0 * resolution(piece.to) {
+            return Ok(coarse);
+        }
+        let half = piece.at(0.5);
+        let (left, right) = (
+            Piece { to: half, ..piece },
+            Piece {
+                from: half,
+                ..piece
+            },
+        );
+        let first = self.leaf(driven, left, x)?;
+        let second = self.leaf(driven, right, &first.end)?;
+        let both = first.result.then(&second.result);
+        // of a method of order 2, what is better is a quarter as wrong
+        let error = both.distance(&coarse.result) / 3.0;
+        let (first, second) = if error <= self.tolerance.max(STIFF) {
+            (first, second)
+        } else {
+            let first = self.refined(driven, left, x, first, halvings - 1)?;
+            let second = self.leaf(driven, right, &first.end)?;
+            let middle = first.end.clone();
+            (
+                first,
+                self.refined(driven, right, &middle, second, halvings - 1)?,
+            )
+        };
+        Ok(Leaf {
+            result: first.result.then(&second.result),
+            varies: true,
+            end: second.end,
+        })
+    }
+
+    /// A piece with F as it is there on average (Simpson's rule).
+    fn leaf(&mut self, driven: &mut Driven, piece: Piece, x: &[f64]) -> Result<Leaf, Error> {
+        let h = piece.length();
+        let half = piece.at(0.5);
+        let first = self.scaled(driven, piece.from, x, h)?;
+        let mut middle = x.to_vec();
+        self.integrator
+            .advance(driven, piece.from, half, &mut middle)?;
+        let between = self.scaled(driven, half, &middle, h)?;
+        let mut end = middle.clone();
+        self.integrator.advance(driven, half, piece.to, &mut end)?;
+        let last = self.scaled(driven, piece.to, &end, h)?;
+        let three = first.iter().zip(&between).zip(&last);
+        let mean = three.map(|((a, b), c)| (a + 4.0 * b + c) / 6.0);
+        let mean = self.sparse(&mean.collect::<Vec<f64>>());
+        let ends = first.iter().zip(&between).zip(&last);
+        let varies = ends
+            .map(|((a, b), c)| (a - b).abs().max((a - c).abs()) / a.abs().max(1.0))
+            .any(|change| change > STIFF);
+        let drive = self.drive(h);
+        let result = Dense::constant(x.len(), &mean, &drive, &mut self.series);
+        let result = result.ok_or_else(|| driven.not_finite(piece.from, x))?;
+        Ok(Leaf {
+            result,
+            varies,
+            end,
+        })
+    }
+}
+
+/// Lobatto's five nodes on [0, 1]; the first, the third and the last are his three.
+const FINE: [f64; 5] = [
+    0.0,
+    0.172_673_164_646_011_43,
+    0.5,
+    0.827_326_835_353_988_6,
+    1.0,
+];
+
+/// How much of what is left out counts where it is odd about the middle: over the piece it comes
+/// to nothing, and an estimate from every other coefficient is too large.
+const ODD: f64 = 0.1;
+
+/// What rounding makes of a value of a polynomial, as a share of it.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// Interpolation of a vector that is known at the nodes.
+#[derive(Clone, Debug)]
+struct Lobatto {
+    /// coefficients of the polynomials that are 1 at one of the nodes and 0 at the others
+    coarse: Vec<Vec<f64>>,
+    fine: Vec<Vec<f64>>,
+}
+
+impl Lobatto {
+    pub fn new() -> Self {
+        Self {
+            coarse: basis(&[FINE[0], FINE[2], FINE[4]]),
+            fine: basis(&FINE),
+        }
+    }
+
+    /// Coefficients of 1, s, s² through three nodes; none where more nodes are needed for an
+    /// error of `tolerance`. Legendre's coefficients tell, which of a smooth function fall
+    /// geometrically; of one that is odd about the middle there is none of s² to tell by, so that
+    /// what is found has to [meet](meets) the function elsewhere, too.
+    pub fn coarse(&self, values: &[Vec<f64>], tolerance: f64) -> Option<Vec<Vec<f64>>> {
+        let fit = combined(&self.coarse, values);
+        let last = largest(fit[2].iter().map(|c| c / 6.0));
+        let before = largest(fit[1].iter().zip(&fit[2]).map(|(b, c)| 0.5 * (b + c)));
+        accepted(fit, &[beyond(before, last)], tolerance)
+    }
+
+    /// … of 1 … s⁴ through five nodes. Of an odd function every other coefficient falls.
+    pub fn fine(&self, values: &[Vec<f64>], tolerance: f64) -> Option<Vec<Vec<f64>>> {
+        let fit = combined(&self.fine, values);
+        let last = largest(fit[4].iter().map(|c| c / 70.0));
+        let before = largest(fit[3].iter().zip(&fit[4]).map(|(b, c)| b / 20.0 + c / 10.0));
+        let pairs = (fit[1].iter().zip(&fit[2])).zip(fit[3].iter().zip(&fit[4]));
+        let first = largest(pairs.map(|((a, b), (c, d))| 0.5 * (a + b) + 0.45 * c + 0.4 * d));
+        let next = [beyond(before, last), ODD * beyond(first, before)];
+        accepted(fit, &next, tolerance)
+    }
+}
+
+/// Whether a polynomial of s is this close to the values at s.
+fn meets(fit: &[Vec<f64>], s: f64, values: &[f64], tolerance: f64) -> bool {
+    values.iter().enumerate().all(|(i, value)| {
+        let found = fit.iter().rev().fold(0.0, |sum, c| sum * s + c[i]);
+        (found - value).abs() <= tolerance.max(ROUNDING * value.abs())
+    })
+}
+
+/// The next one of coefficients that fall geometrically.
+fn beyond(before: f64, last: f64) -> f64 {
+    match last < before {
+        true => last * last / before,
+        false => last,
+    }
+}
+
+/// The polynomial, where what is left out of it is within the tolerance.
+fn accepted(mut fit: Vec<Vec<f64>>, next: &[f64], tolerance: f64) -> Option<Vec<Vec<f64>>> {
+    // false of what is not a number
+    if !next.iter().all(|next| *next <= tolerance) {
+        return None;
+    }
+    // what is far below the tolerance is rounding, and would make sparse products dense
+    for coefficient in fit.iter_mut().skip(1).flatten() {
+        if coefficient.abs() <= 1e-3 * tolerance {
+            *coefficient = 0.0;
+        }
+    }
+    while fit.len() > 1 && fit.last().is_some_and(|c| c.iter().all(|c| *c == 0.0)) {
+        fit.pop();
+    }
+    Some(fit)
+}
+
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(0.0, |m: f64, v| if v.abs() <= m { m } else { v.abs() })
+}
+
+fn combined(basis: &[Vec<f64>], values: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let size = values.first().map_or(0, Vec::len);
+    let mut fit = vec![vec![0.0; size]; basis.len()];
+    for (polynomial, values) in basis.iter().zip(values) {
+        for (into, factor) in fit.iter_mut().zip(polynomial) {
+            for (into, value) in into.iter_mut().zip(values) {
+                *into += factor * value;
+            }
+        }
+    }
+    fit
+}
+
+/// Π (s − c_j)/(c_i − c_j) over j ≠ i, for each node c_i.
+fn basis(nodes: &[f64]) -> Vec<Vec<f64>> {
+    let one = |i: usize| {
+        let mut polynomial = vec![1.0];
+        for c in nodes
+            .iter()
+            .enumerate()
+            .filter(|(j, _)| *j != i)
+            .map(|n| n.1)
+        {
+            let scale = 1.0 / (nodes[i] - c);
+            polynomial.push(0.0);
+            for k in (0..polynomial.len()).rev() {
+                let lower = if k > 0 { polynomial[k - 1] } else { 0.0 };
+                polynomial[k] = scale * (lower - c * polynomial[k]);
+            }
+        }
+        polynomial
+    };
+    (0..nodes.len()).map(one).collect()
 }
 
 #[cfg(test)]

@@ -6,29 +6,28 @@
 //!
 //! with min ≤ x_i ≤ max, φ the flow between samples and x̄, P̄ what the filter knew before the
 //! window. Each Gauss–Newton step is the minimum of the problem linearised along the present
-//! trajectory ([`problem`]), found by Kalman smoothers, so that its band structure is used and no
+//! trajectory ([`quadratic`]), found by Kalman smoothers, so that its band structure is used and no
 //! noise need be invertible. Steps that do not shrink are shortened (P. Deuflhard, *Newton Methods
 //! for Nonlinear Problems*, 2004, 4.3: the natural monotonicity test).
 
-mod pass;
-mod problem;
-mod row;
+mod quadratic;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::extended::Extended;
+use super::belief::{Belief, Bounds, confine};
+use super::ekf::Ekf;
+use super::kalman::Kalman;
 use super::model::FilterModel;
-use super::root::Root;
-use super::sensing::Sensing;
-use super::smooth::Step;
-use super::stage::Stage;
-use super::{Belief, Bounds, confine};
+use super::profile::Skyline;
+use super::root::{Root, dot};
+use super::sensing::{Believed, Sensing};
+use super::smoother::Step;
+use super::transition::Stage;
+use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings};
-use pass::{Linear, Pass, Pin, Way, corrected, judged, seen};
-use problem::{Problem, Solution};
-use row::Row;
+use quadratic::{Linear, Met, Pass, Pin, Problem, Seen, Solution, Way, corrected};
 
 /// Most Gauss–Newton steps per sample,
 const STEPS: usize = 40;
@@ -40,8 +39,8 @@ const SMALL: f64 = 1e-6;
 const NOISE: f64 = 1e-3;
 
 #[derive(Clone, Debug)]
-pub(super) struct Horizon {
-    pub engine: Extended,
+pub(crate) struct Mhe {
+    pub engine: Ekf,
     length: usize,
     sensors: usize,
     bounds: Vec<Bounds>,
@@ -56,14 +55,14 @@ pub(super) struct Horizon {
 
 /// What a correction leaves for a smoother.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Done {
+pub(crate) struct Done {
     /// the states of the window, row after row
     pub window: Vec<f64>,
     /// the row that left
     pub left: Option<Step>,
 }
 
-impl Persist for Horizon {
+impl Persist for Mhe {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.engine.walk(walk)?;
         self.prior.walk(walk)?;
@@ -80,7 +79,7 @@ impl Persist for Horizon {
     }
 }
 
-impl Horizon {
+impl Mhe {
     pub fn new(
         model: &FilterModel,
         length: usize,
@@ -96,7 +95,7 @@ impl Horizon {
             return Err(Error::setting("bounds", expected, bounds.len()));
         }
         Ok(Self {
-            engine: Extended::new(&model.flow, &model.process_noise, run)?,
+            engine: Ekf::new(&model.flow, &model.process_noise, run)?,
             length,
             sensors: model.sensors.len(),
             bounds,
@@ -108,46 +107,6 @@ impl Horizon {
             keep,
             done: Done::default(),
         })
-    }
-
-    /// The new row's readings are judged by what the filter expects, then the window is solved.
-    pub fn correct(
-        &mut self,
-        sensing: &mut Sensing,
-        belief: &mut Belief,
-        t: f64,
-        readings: &[f64],
-        inputs: &[f64],
-    ) -> Result<(), Error> {
-        self.done = Done::default();
-        let taken = judged(sensing, belief, t, readings, inputs)?;
-        let mut guess = belief.x.clone();
-        confine(&mut guess, &self.bounds);
-        self.rows.push_back(Row {
-            t,
-            inputs: inputs.to_vec(),
-            readings: taken,
-            guess,
-            ..Row::default()
-        });
-        let solved = self.solve(sensing)?;
-        sensing.health.unsolved += usize::from(!solved.is_minimum);
-        if let Some(newest) = self.rows.back() {
-            belief.x.copy_from_slice(&newest.guess);
-        }
-        // A bound that is met says where the estimate is, and not how sure it is: taken for an exact
-        // reading it would leave no variance, and a gate that keeps every later reading out.
-        belief.root.clone_from(&solved.root);
-        if self.keep {
-            let guesses = self.rows.iter().flat_map(|row| &row.guess);
-            self.done.window = guesses.copied().collect();
-        }
-        if self.rows.len() > self.length {
-            self.shorten(solved);
-        }
-        // the flow goes on from the newest row
-        self.engine.driven.start(inputs);
-        Ok(())
     }
 
     /// What the last correction leaves for a smoother.
@@ -328,8 +287,68 @@ impl Horizon {
     }
 }
 
+impl Kalman for Mhe {
+    fn driven(&mut self) -> &mut Driven {
+        &mut self.engine.driven
+    }
+
+    /// By the extended filter, the estimate within its bounds.
+    fn predict(
+        &mut self,
+        belief: &mut Belief,
+        from: f64,
+        to: f64,
+        keep: bool,
+    ) -> Result<Skyline, Error> {
+        let result = self.engine.predict(belief, from, to, keep);
+        confine(&mut belief.x, &self.bounds);
+        result
+    }
+
+    /// The new row's readings are judged by what the filter expects, then the window is solved.
+    fn correct(
+        &mut self,
+        sensing: &mut Sensing,
+        belief: &mut Belief,
+        t: f64,
+        readings: &[f64],
+        inputs: &[f64],
+    ) -> Result<(), Error> {
+        self.done = Done::default();
+        let mut taken = vec![];
+        sensing.judge_all(belief, t, readings, inputs, &mut taken)?;
+        let mut guess = belief.x.clone();
+        confine(&mut guess, &self.bounds);
+        self.rows.push_back(Row {
+            t,
+            inputs: inputs.to_vec(),
+            readings: taken,
+            guess,
+            ..Row::default()
+        });
+        let solved = self.solve(sensing)?;
+        sensing.health.unsolved += usize::from(!solved.is_minimum);
+        if let Some(newest) = self.rows.back() {
+            belief.x.copy_from_slice(&newest.guess);
+        }
+        // A bound that is met says where the estimate is, and not how sure it is: taken for an exact
+        // reading it would leave no variance, and a gate that keeps every later reading out.
+        belief.root.clone_from(&solved.root);
+        if self.keep {
+            let guesses = self.rows.iter().flat_map(|row| &row.guess);
+            self.done.window = guesses.copied().collect();
+        }
+        if self.rows.len() > self.length {
+            self.shorten(solved);
+        }
+        // the flow goes on from the newest row
+        self.engine.driven.start(inputs);
+        Ok(())
+    }
+}
+
 /// The way between two rows, about the guess at the first.
-fn between(engine: &mut Extended, from: &Row, to: &Row, last: &Pass) -> Result<Stage, Error> {
+fn between(engine: &mut Ekf, from: &Row, to: &Row, last: &Pass) -> Result<Stage, Error> {
     engine.driven.start(&from.inputs);
     engine.driven.aim(from.t, to.t, &to.inputs);
     let about = Belief {
@@ -363,6 +382,71 @@ struct Solved {
     passes: Vec<Pass>,
     rows: Vec<Linear>,
     is_minimum: bool,
+}
+
+/// A sample in the window.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Row {
+    pub t: f64,
+    pub inputs: Vec<f64>,
+    pub readings: Vec<Believed>,
+    /// the trajectory about which the problem is linearised
+    pub guess: Vec<f64>,
+    pub met: Vec<Met>,
+    /// the way from the row before, about a guess from which the present one differs by no more than the
+    /// last step: the next window begins with it
+    pub stage: Option<Arc<Stage>>,
+    /// Φ from the row before, which has left; where a smoother will ask for it
+    pub entered: Option<Skyline>,
+}
+
+impl Row {
+    /// Of so many inputs and states, for a walk over it.
+    pub fn make_room(&mut self, inputs: usize, states: usize) {
+        self.inputs.resize(inputs, 0.0);
+        self.guess.resize(states, 0.0);
+    }
+
+    /// Of a plant with so many sensors.
+    pub fn walk(&mut self, walk: &mut Walk<'_>, sensors: usize) -> Result<(), Damaged> {
+        let states = self.guess.len();
+        walk.number(&mut self.t)?;
+        walk.numbers(&mut self.inputs)?;
+        walk.numbers(&mut self.guess)?;
+        let count = walk.length(self.readings.len())?;
+        self.readings.resize(count, Believed::default());
+        for believed in &mut self.readings {
+            believed.walk(walk, sensors)?;
+        }
+        let count = walk.length(self.met.len())?;
+        self.met.resize(count, Met::default());
+        for met in &mut self.met {
+            walk.below(&mut met.state, states)?;
+            walk.number(&mut met.bound)?;
+        }
+        walk.optional(&mut self.stage, |walk, stage| {
+            Arc::make_mut(stage).walk(walk, states)
+        })?;
+        walk.optional(&mut self.entered, |walk, entered| {
+            entered.walk(walk, states)
+        })
+    }
+}
+
+/// The readings of a row, h linearised at its guess.
+pub(crate) fn seen(sensing: &mut Sensing, row: &Row) -> Result<Vec<Seen>, Error> {
+    let h = sensing.evaluate(row.t, &row.guess, &row.inputs)?.to_vec();
+    let seen = |believed: &Believed| {
+        let slopes = sensing.slopes(believed.sensor);
+        let offset = h[believed.sensor] - dot(&slopes, &row.guess);
+        let (value, variance) = believed.about(h[believed.sensor])?;
+        Some(Seen {
+            value: value - offset,
+            variance,
+            slopes,
+        })
+    };
+    Ok(row.readings.iter().filter_map(seen).collect())
 }
 
 #[cfg(test)]
