@@ -8,7 +8,7 @@ use super::profile::Skyline;
 use super::root::{Gain, Root, dot};
 use super::sensing::{Believed, Sensing};
 use super::smoother::Correction;
-use super::transition::{Along, Stage, push_carried};
+use super::transition::{Propagation, Stage, push_carried};
 use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings, Linearised};
@@ -16,7 +16,7 @@ use crate::{Error, EstimatorSettings, Linearised};
 #[derive(Clone, Debug)]
 pub(crate) struct Ekf {
     pub driven: Driven,
-    along: Along,
+    propagation: Propagation,
     /// x̂⁻
     x: Vec<f64>,
     /// rows whose sum of squares is P⁻
@@ -42,7 +42,7 @@ impl Ekf {
         let n = flow.system().states().len();
         Ok(Self {
             driven: Driven::new(flow.system(), run.between),
-            along: Along::new(flow, process_noise, run.method)?,
+            propagation: Propagation::new(flow, process_noise, run.method)?,
             x: vec![0.0; n],
             rows: vec![],
             sums: vec![0.0; n],
@@ -58,8 +58,8 @@ impl Ekf {
     pub fn carry(&mut self, root: &mut Root) {
         self.rows.clear();
         // the rows of W come first: their zeros are spared in the reflections
-        self.along.push_root(&mut self.rows);
-        let transition = self.along.transition().rows();
+        self.propagation.push_root(&mut self.rows);
+        let transition = self.propagation.transition().rows();
         push_carried(transition, root, &mut self.rows, &mut self.sums);
         root.of_rows_with(&mut self.rows, &mut self.sums);
     }
@@ -69,13 +69,13 @@ impl Ekf {
     pub(super) fn stage(&mut self, about: Belief, from: f64, to: f64) -> Result<Stage, Error> {
         self.x.clone_from(&about.x);
         let (driven, x) = (&mut self.driven, &mut self.x);
-        self.along.advance(driven, &about, from, to, x)?;
+        self.propagation.advance(driven, &about, from, to, x)?;
         let mut noise = vec![];
-        self.along.push_root(&mut noise);
+        self.propagation.push_root(&mut noise);
         Ok(Stage {
             about: about.x,
             end: self.x.clone(),
-            transition: Arc::new(Skyline::of(self.along.transition())),
+            transition: Arc::new(Skyline::of(self.propagation.transition())),
             noise,
         })
     }
@@ -96,11 +96,11 @@ impl Kalman for Ekf {
     ) -> Result<Skyline, Error> {
         self.x.clone_from(&belief.x);
         let (driven, x) = (&mut self.driven, &mut self.x);
-        self.along.advance(driven, belief, from, to, x)?;
+        self.propagation.advance(driven, belief, from, to, x)?;
         belief.x.clone_from(&self.x);
         self.carry(&mut belief.root);
         Ok(match keep {
-            true => Skyline::of(self.along.transition()),
+            true => Skyline::of(self.propagation.transition()),
             false => Skyline::default(),
         })
     }
@@ -154,6 +154,6 @@ impl Kalman for Ekf {
 impl Persist for Ekf {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.driven.walk(walk)?;
-        self.along.walk(walk)
+        self.propagation.walk(walk)
     }
 }

@@ -407,9 +407,7 @@ impl Filter {
             return;
         };
         if let Engine::MovingHorizon(horizon) = &mut self.engine {
-            let done = horizon.take_done();
-            history.push_window(done.window);
-            done.left.into_iter().for_each(|step| history.push(step));
+            horizon.leave(history);
             return;
         }
         history.push(Step {

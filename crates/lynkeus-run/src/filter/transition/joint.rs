@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use super::series::Moments;
+use super::series::Transition;
 use crate::driven::Driven;
+use crate::filter::profile::Profile;
 use crate::relays::Guards;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Integrator, Linearised, Method, Place, Slopes};
@@ -50,7 +51,7 @@ impl Joint {
         from: f64,
         to: f64,
         x: &mut [f64],
-        moments: &mut Moments,
+        transition: &mut Transition<Profile>,
     ) -> Result<(), Error> {
         let n = x.len();
         let noisy = !self.noise.is_empty();
@@ -70,8 +71,8 @@ impl Joint {
             let entries = rows.flat_map(move |row| &row[first..first + n]);
             entries.map(move |e| scale * e)
         };
-        moments.transition.fill(columns(0, 1.0));
-        if let Some(noise) = &mut moments.noise {
+        transition.matrix.fill(columns(0, 1.0));
+        if let Some(noise) = &mut transition.noise {
             noise.fill(columns(n, self.scale));
         }
         Ok(())

@@ -15,7 +15,7 @@ use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, Linearised, Method, Step};
 use joint::Joint;
 use piecewise::Piecewise;
-use series::Moments;
+use series::Transition;
 
 /// Up to so many states x̂, Φ and W are integrated together, and wherever steps are given: these are
 /// then the steps of all three.
@@ -24,9 +24,9 @@ const FEW: usize = 8;
 /// Φ' = FΦ and W' = FW + WFᵀ + Q along the estimate, from Φ = I and W = 0 at a sample: the
 /// transition, and W = ∫ Φ(T,s) Q Φ(T,s)ᵀ ds, what the process noise comes to at the next sample.
 #[derive(Clone, Debug)]
-pub(crate) struct Along {
-    way: Way,
-    moments: Moments,
+pub(crate) struct Propagation {
+    way: Scheme,
+    transition: Transition<Profile>,
     /// of W
     factor: Factor,
     n: usize,
@@ -34,23 +34,23 @@ pub(crate) struct Along {
 
 /// How Φ and W are found.
 #[derive(Clone, Debug)]
-enum Way {
+enum Scheme {
     Joint(Box<Joint>),
     Piecewise(Box<Piecewise>),
 }
 
-impl Along {
+impl Propagation {
     /// Of a flow with F, and the densities of the noise on its states.
     pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self, Error> {
         let n = flow.system().states().len();
         let is_given = matches!(method, Method::Rk4(Step::AtMost(_) | Step::Substeps(_)));
         let way = match n <= FEW || is_given {
-            true => Way::Joint(Box::new(Joint::new(flow, process_noise, method)?)),
-            false => Way::Piecewise(Box::new(Piecewise::new(flow, process_noise, method)?)),
+            true => Scheme::Joint(Box::new(Joint::new(flow, process_noise, method)?)),
+            false => Scheme::Piecewise(Box::new(Piecewise::new(flow, process_noise, method)?)),
         };
         Ok(Self {
             way,
-            moments: Moments::start(n, process_noise.iter().any(|q| *q > 0.0)),
+            transition: Transition::start(n, process_noise.iter().any(|q| *q > 0.0)),
             factor: Factor::default(),
             n,
         })
@@ -66,9 +66,9 @@ impl Along {
         x: &mut Vec<f64>,
     ) -> Result<(), Error> {
         match &mut self.way {
-            Way::Joint(joint) => joint.advance(driven, from, to, x, &mut self.moments)?,
-            Way::Piecewise(variation) => {
-                self.moments = variation.advance(driven, belief, from, to, x)?;
+            Scheme::Joint(joint) => joint.advance(driven, from, to, x, &mut self.transition)?,
+            Scheme::Piecewise(variation) => {
+                self.transition = variation.advance(driven, belief, from, to, x)?;
             }
         }
         Ok(())
@@ -76,12 +76,12 @@ impl Along {
 
     /// Φ of the last way.
     pub fn transition(&self) -> &Profile {
-        &self.moments.transition
+        &self.transition.matrix
     }
 
     /// Adds the rows of Lᵀ, W = LLᵀ.
     pub fn push_root(&mut self, rows: &mut Vec<f64>) {
-        let Some(noise) = &self.moments.noise else {
+        let Some(noise) = &self.transition.noise else {
             return;
         };
         let n = self.n;
@@ -97,11 +97,11 @@ impl Along {
     }
 }
 
-impl Persist for Along {
+impl Persist for Propagation {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         match &mut self.way {
-            Way::Joint(joint) => joint.walk(walk),
-            Way::Piecewise(variation) => variation.walk(walk),
+            Scheme::Joint(joint) => joint.walk(walk),
+            Scheme::Piecewise(variation) => variation.walk(walk),
         }
     }
 }

@@ -6,11 +6,13 @@
 //! constant F are doubled up. Everything is in units of the states' own deviations (rounded to
 //! powers of two), so that an error means the same for all of them.
 
-use super::series::{Dense, Moments, Series};
+use nalgebra::DMatrix;
+
+use super::series::{Series, Transition};
 use crate::adaptive::resolution;
 use crate::driven::Driven;
 use crate::filter::belief::Belief;
-use crate::filter::profile::Entry;
+use crate::filter::profile::{Entry, Profile};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Integrator, Linearised, Method};
 
@@ -62,14 +64,6 @@ impl Piece {
     }
 }
 
-/// The estimate and its linearisation over a piece.
-struct Course {
-    /// x̂ at the end
-    end: Vec<f64>,
-    /// F·h as a polynomial in the share of the piece; none where it changes too much for one
-    polynomial: Option<Vec<Vec<Entry>>>,
-}
-
 impl Piecewise {
     pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self, Error> {
         let n = flow.system().states().len();
@@ -104,13 +98,13 @@ impl Piecewise {
         from: f64,
         to: f64,
         x: &mut Vec<f64>,
-    ) -> Result<Moments, Error> {
+    ) -> Result<Transition<Profile>, Error> {
         let n = x.len();
         let mut stops = vec![];
         driven.switches(from, to, &mut stops)?;
         stops.sort_unstable_by(f64::total_cmp);
         stops.push(to);
-        let mut moments = Moments::start(n, !self.process_noise.is_empty());
+        let mut transition = Transition::start(n, !self.process_noise.is_empty());
         let mut start = from;
         for end in stops {
             // two detectors may find one switch, a rounding error apart
@@ -125,15 +119,15 @@ impl Piecewise {
             if start == from {
                 self.choose_units(driven, belief, segment, x)?;
             }
-            self.segment(driven, segment, x, &mut moments)?;
+            self.segment(driven, segment, x, &mut transition)?;
             start = end;
         }
         let units = &self.units;
-        moments.transition.scale(|i| units[i], |j| 1.0 / units[j]);
-        if let Some(noise) = &mut moments.noise {
+        transition.matrix.scale(|i| units[i], |j| 1.0 / units[j]);
+        if let Some(noise) = &mut transition.noise {
             noise.scale(|i| units[i], |j| units[j]);
         }
-        Ok(moments)
+        Ok(transition)
     }
 
     /// What each state's error is about, here and after the flow has carried it on.
@@ -204,10 +198,10 @@ impl Piecewise {
         driven: &mut Driven,
         segment: Piece,
         x: &mut Vec<f64>,
-        moments: &mut Moments,
+        transition: &mut Transition<Profile>,
     ) -> Result<(), Error> {
         if self.rates(driven, segment, x)? > MOST_RATES {
-            return self.stiff(driven, segment, x, moments);
+            return self.stiff(driven, segment, x, transition);
         }
         let mut t = segment.from;
         while t < segment.to {
@@ -218,14 +212,15 @@ impl Piecewise {
                 step => t + step,
             };
             let piece = Piece { from: t, to };
-            let Course { end, polynomial } = self.polynomial(driven, piece, x)?;
+            let mut end = vec![];
+            let polynomial = self.polynomial(driven, piece, x, &mut end)?;
             let n = x.len();
             let drive = self.drive(piece.length());
             let shortest = piece.length() <= 256.0 * resolution(to);
             if let Some(polynomial) = &polynomial
                 && self
                     .series
-                    .advance(polynomial, &drive, moments, n, 0.1 * self.tolerance)
+                    .advance(polynomial, &drive, transition, n, 0.1 * self.tolerance)
             {
                 *x = end;
                 t = to;
@@ -239,7 +234,7 @@ impl Piecewise {
                     to: segment.to,
                 };
                 self.step = f64::INFINITY;
-                return self.stiff(driven, rest, x, moments);
+                return self.stiff(driven, rest, x, transition);
             }
             self.step = 0.5 * piece.length();
         }
@@ -256,28 +251,26 @@ impl Piecewise {
         Ok(sums.into_iter().fold(0.0, f64::max))
     }
 
-    /// x̂ at the end of a piece, and F·h as a polynomial in its share of the piece; none where
-    /// F changes too much for one.
+    /// Writes x̂ at the end of a piece; F·h as a polynomial in the share of the piece, none where F
+    /// changes too much for one.
     fn polynomial(
         &mut self,
         driven: &mut Driven,
         piece: Piece,
         x: &[f64],
-    ) -> Result<Course, Error> {
+        end: &mut Vec<f64>,
+    ) -> Result<Option<Vec<Vec<Entry>>>, Error> {
         let h = piece.length();
         let first = self.scaled(driven, piece.from, x, h)?;
-        let (mut middle, mut end) = (x.to_vec(), vec![]);
+        let mut middle = x.to_vec();
         let half = piece.at(0.5);
         let mut values = vec![first];
         if h <= 256.0 * resolution(piece.to) {
             // too short for nodes inside
             self.integrator
                 .advance(driven, piece.from, piece.to, &mut middle)?;
-            let polynomial = Some(vec![self.sparse(&values[0])]);
-            return Ok(Course {
-                end: middle,
-                polynomial,
-            });
+            *end = middle;
+            return Ok(Some(vec![self.sparse(&values[0])]));
         }
         let node = piece.at(FINE[1]);
         self.integrator
@@ -286,7 +279,7 @@ impl Piecewise {
         self.integrator.advance(driven, node, half, &mut middle)?;
         values.push(self.scaled(driven, half, &middle, h)?);
         end.extend_from_slice(&middle);
-        self.integrator.advance(driven, half, piece.to, &mut end)?;
+        self.integrator.advance(driven, half, piece.to, end)?;
         values.push(self.scaled(driven, piece.to, &end, h)?);
         let coarse = self.lobatto.coarse(&values, self.tolerance);
         let within = self.tolerance / ODD;
@@ -298,8 +291,7 @@ impl Piecewise {
             values.insert(3, self.scaled(driven, node, &middle, h)?);
             fit = self.lobatto.fine(&values, self.tolerance);
         }
-        let polynomial = fit.map(|fit| fit.iter().map(|c| self.sparse(c)).collect());
-        Ok(Course { end, polynomial })
+        Ok(fit.map(|fit| fit.iter().map(|c| self.sparse(c)).collect()))
     }
 }
 
@@ -319,7 +311,7 @@ const MOST_HALVINGS: usize = 16;
 
 /// A piece of a stiff interval with a constant F.
 struct Leaf {
-    result: Dense,
+    result: Transition<DMatrix<f64>>,
     /// F changes on it
     varies: bool,
     end: Vec<f64>,
@@ -332,12 +324,14 @@ impl Piecewise {
         driven: &mut Driven,
         piece: Piece,
         x: &mut Vec<f64>,
-        moments: &mut Moments,
+        transition: &mut Transition<Profile>,
     ) -> Result<(), Error> {
         let n = x.len();
         let whole = self.leaf(driven, piece, x)?;
         let result = self.refined(driven, piece, x, whole, MOST_HALVINGS)?;
-        *moments = Dense::of(moments, n).then(&result.result).into_moments(n);
+        *transition = Transition::dense(transition, n)
+            .then(&result.result)
+            .into_profiles(n);
         *x = result.end;
         Ok(())
     }
@@ -405,7 +399,7 @@ impl Piecewise {
             .map(|((a, b), c)| (a - b).abs().max((a - c).abs()) / a.abs().max(1.0))
             .any(|change| change > STIFF);
         let drive = self.drive(h);
-        let result = Dense::constant(x.len(), &mean, &drive, &mut self.series);
+        let result = Transition::constant(x.len(), &mean, &drive, &mut self.series);
         let result = result.ok_or_else(|| driven.not_finite(piece.from, x))?;
         Ok(Leaf {
             result,

@@ -11,34 +11,37 @@ const MOST_TERMS: usize = 60;
 /// Terms may exceed the result so many times: what cancels then is lost in rounding.
 const MOST_CANCELLED: f64 = 1e4;
 
-/// Φ and W, or a term of their series; no W where nothing disturbs the states.
+/// The state-transition matrix Φ of an interval and the covariance W of what noise comes to over it, or
+/// a term of their series.
 #[derive(Clone, Debug)]
-pub(crate) struct Moments {
-    pub transition: Profile,
-    pub noise: Option<Profile>,
+pub(crate) struct Transition<M> {
+    /// Φ
+    pub matrix: M,
+    /// W; none where nothing disturbs the states
+    pub noise: Option<M>,
 }
 
-impl Moments {
+impl Transition<Profile> {
     pub fn start(n: usize, noisy: bool) -> Self {
         Self {
-            transition: Profile::identity(n),
+            matrix: Profile::identity(n),
             noise: noisy.then(|| Profile::zero(n)),
         }
     }
 
     fn like(other: &Self, n: usize) -> Self {
         Self {
-            transition: Profile::zero(n),
+            matrix: Profile::zero(n),
             noise: other.noise.as_ref().map(|_| Profile::zero(n)),
         }
     }
 
     fn both(&self) -> impl Iterator<Item = &Profile> {
-        std::iter::once(&self.transition).chain(&self.noise)
+        std::iter::once(&self.matrix).chain(&self.noise)
     }
 
     fn both_mut(&mut self) -> impl Iterator<Item = &mut Profile> {
-        std::iter::once(&mut self.transition).chain(&mut self.noise)
+        std::iter::once(&mut self.matrix).chain(&mut self.noise)
     }
 
     /// The larger of both norms; not a number where one is none.
@@ -66,31 +69,31 @@ impl Moments {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Series {
     /// the newest terms, the newest first
-    recent: Vec<Moments>,
-    spare: Vec<Moments>,
+    recent: Vec<Transition<Profile>>,
+    spare: Vec<Transition<Profile>>,
 }
 
 impl Series {
-    /// Takes `moments` from s = 0 to 1; false, and unchanged, where the series is too long or
+    /// Takes `transition` from s = 0 to 1; false, and unchanged, where the series is too long or
     /// cancels too much.
     pub fn advance(
         &mut self,
         polynomial: &[Vec<Entry>],
         drive: &[f64],
-        moments: &mut Moments,
+        transition: &mut Transition<Profile>,
         n: usize,
         tolerance: f64,
     ) -> bool {
-        let size = moments.norm().max(1.0);
-        let mut sum = self.empty(moments, n);
-        sum.copy_from(moments);
-        let mut first = self.empty(moments, n);
-        first.copy_from(moments);
+        let size = transition.norm().max(1.0);
+        let mut sum = self.empty(transition, n);
+        sum.copy_from(transition);
+        let mut first = self.empty(transition, n);
+        first.copy_from(transition);
         self.recent.push(first);
         let mut small = 0;
         let mut converged = false;
         for k in 0..MOST_TERMS {
-            let mut next = self.empty(moments, n);
+            let mut next = self.empty(transition, n);
             self.term(k, polynomial, drive, &mut next);
             let term = next.norm();
             if term.is_nan() || term > MOST_CANCELLED * size {
@@ -113,24 +116,30 @@ impl Series {
         }
         self.spare.append(&mut self.recent);
         if converged {
-            std::mem::swap(moments, &mut sum);
+            std::mem::swap(transition, &mut sum);
         }
         self.spare.push(sum);
         converged
     }
 
-    fn empty(&mut self, like: &Moments, n: usize) -> Moments {
+    fn empty(&mut self, like: &Transition<Profile>, n: usize) -> Transition<Profile> {
         match self.spare.pop() {
-            Some(mut moments) => {
-                moments.both_mut().for_each(Profile::clear);
-                moments
+            Some(mut transition) => {
+                transition.both_mut().for_each(Profile::clear);
+                transition
             }
-            None => Moments::like(like, n),
+            None => Transition::like(like, n),
         }
     }
 
     /// The term after the k-th.
-    fn term(&self, k: usize, polynomial: &[Vec<Entry>], drive: &[f64], next: &mut Moments) {
+    fn term(
+        &self,
+        k: usize,
+        polynomial: &[Vec<Entry>],
+        drive: &[f64],
+        next: &mut Transition<Profile>,
+    ) {
         let share = 1.0 / (k + 1) as f64;
         for (sparse, earlier) in polynomial.iter().zip(&self.recent) {
             for (into, from) in next.both_mut().zip(earlier.both()) {
@@ -155,15 +164,7 @@ const MOST_DOUBLINGS: u32 = 60;
 /// Terms of the series from which the doublings start are wrong by less than this.
 const START_TOLERANCE: f64 = 1e-15;
 
-/// Φ and W, dense.
-#[derive(Clone, Debug)]
-pub(crate) struct Dense {
-    pub transition: DMatrix<f64>,
-    /// empty where nothing disturbs the states
-    pub noise: Option<DMatrix<f64>>,
-}
-
-impl Dense {
+impl Transition<DMatrix<f64>> {
     /// Over one time unit of Φ' = GΦ, W' = GW + WGᵀ + V with constant G: the series over 2⁻ᵏ of
     /// it, then k times Φ ← ΦΦ, W ← W + ΦWΦᵀ. Sums of what is not negative: decay does not
     /// cancel. None where G is too fast to double up from.
@@ -184,14 +185,14 @@ impl Dense {
         };
         let small: Vec<Entry> = g.iter().map(shared).collect();
         let drive: Vec<f64> = drive.iter().map(|v| share * v).collect();
-        let mut moments = Moments::start(n, !drive.is_empty());
-        if !series.advance(&[small], &drive, &mut moments, n, START_TOLERANCE) {
+        let mut transition = Transition::start(n, !drive.is_empty());
+        if !series.advance(&[small], &drive, &mut transition, n, START_TOLERANCE) {
             return None;
         }
         let dense = |m: &Profile| DMatrix::from_row_slice(n, n, m.entries());
         let mut result = Self {
-            transition: dense(&moments.transition),
-            noise: moments.noise.as_ref().map(dense),
+            matrix: dense(&transition.matrix),
+            noise: transition.noise.as_ref().map(dense),
         };
         for _ in 0..doublings {
             result = result.then(&result);
@@ -203,8 +204,8 @@ impl Dense {
     pub fn then(&self, next: &Self) -> Self {
         let noise = self.noise.as_ref().zip(next.noise.as_ref());
         Self {
-            transition: &next.transition * &self.transition,
-            noise: noise.map(|(w, v)| v + &next.transition * w * next.transition.transpose()),
+            matrix: &next.matrix * &self.matrix,
+            noise: noise.map(|(w, v)| v + &next.matrix * w * next.matrix.transpose()),
         }
     }
 
@@ -216,22 +217,24 @@ impl Dense {
         };
         let noises = self.noise.as_ref().zip(other.noise.as_ref());
         let noise = noises.map_or(0.0, |(a, b)| apart(a, b));
-        apart(&self.transition, &other.transition).max(noise)
+        apart(&self.matrix, &other.matrix).max(noise)
     }
 
-    pub fn into_moments(self, n: usize) -> Moments {
+    /// The same as profile matrices.
+    pub fn into_profiles(self, n: usize) -> Transition<Profile> {
         let spanned = |m: DMatrix<f64>| Profile::dense(n, m.transpose().as_slice().to_vec());
-        Moments {
-            transition: spanned(self.transition),
+        Transition {
+            matrix: spanned(self.matrix),
             noise: self.noise.map(spanned),
         }
     }
 
-    pub fn of(moments: &Moments, n: usize) -> Self {
+    /// Of profile matrices.
+    pub fn dense(transition: &Transition<Profile>, n: usize) -> Self {
         let dense = |m: &Profile| DMatrix::from_row_slice(n, n, m.entries());
         Self {
-            transition: dense(&moments.transition),
-            noise: moments.noise.as_ref().map(dense),
+            matrix: dense(&transition.matrix),
+            noise: transition.noise.as_ref().map(dense),
         }
     }
 }

@@ -54,7 +54,7 @@ fn differ(chain: &Linearised, step: f64, ours: Method, reference: Method) -> f64
         };
         driven.aim(from, to, &[0.5 + 0.3 * f64::from(k)]);
         let mut other = x.clone();
-        let mut expected = Moments::start(n, true);
+        let mut expected = Transition::start(n, true);
         joint
             .advance(&mut driven.clone(), from, to, &mut other, &mut expected)
             .unwrap();
@@ -64,7 +64,7 @@ fn differ(chain: &Linearised, step: f64, ours: Method, reference: Method) -> f64
         driven.arrive();
         let pairs = [
             (x.as_slice(), other.as_slice()),
-            (found.transition.entries(), expected.transition.entries()),
+            (found.matrix.entries(), expected.matrix.entries()),
             (
                 found.noise.as_ref().unwrap().entries(),
                 expected.noise.as_ref().unwrap().entries(),
