@@ -280,7 +280,7 @@ impl Piecewise {
         values.push(self.scaled(driven, half, &middle, h)?);
         end.extend_from_slice(&middle);
         self.integrator.advance(driven, half, piece.to, end)?;
-        values.push(self.scaled(driven, piece.to, &end, h)?);
+        values.push(self.scaled(driven, piece.to, end, h)?);
         let coarse = self.lobatto.coarse(&values, self.tolerance);
         let within = self.tolerance / ODD;
         let mut fit = coarse.filter(|fit| meets(fit, FINE[1], &inside, within));
