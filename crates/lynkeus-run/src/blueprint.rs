@@ -84,7 +84,7 @@ impl Blueprint {
                 } = &**observer;
                 system.tell(&mut digest);
                 if let Some(errors) = errors {
-                    errors.flow().tell(&mut digest);
+                    errors.flow().system().tell(&mut digest);
                 }
                 if let Some(tuned) = tuned {
                     tuned.system.tell(&mut digest);
@@ -110,7 +110,7 @@ impl Blueprint {
     pub fn flow(&self) -> &System {
         match self {
             Self::Sampled { observer, .. } => &observer.system,
-            Self::Filter { model, .. } => model.flow(),
+            Self::Filter { model, .. } => model.flow().system(),
         }
     }
 

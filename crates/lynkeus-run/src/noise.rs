@@ -7,8 +7,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
+use lynkeus_expr::{Binary, real};
+
 use crate::Error;
-use crate::filter::Limits;
 
 mod draws;
 
@@ -106,6 +107,30 @@ impl Level {
             }
         }
         noise(high)
+    }
+}
+
+/// The range that a sensor can show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// its lower end
+    pub low: f64,
+    /// its upper end
+    pub high: f64,
+}
+
+impl Limits {
+    /// What the sensor shows of a value.
+    #[must_use]
+    pub fn shown(self, value: f64) -> f64 {
+        let capped = real::binary(Binary::Min, value, self.high);
+        real::binary(Binary::Max, capped, self.low)
+    }
+
+    /// Whether a reading only says "at most" or "at least".
+    #[must_use]
+    pub fn ends(self, reading: f64) -> bool {
+        reading <= self.low || reading >= self.high
     }
 }
 

@@ -5,11 +5,14 @@ use std::collections::{BTreeMap, HashMap};
 use lynkeus_expr::{Graph, Node, jacobian};
 
 use crate::filter::Belief;
-use crate::filter::extended::Extended;
+use crate::filter::ekf::Ekf;
+use crate::filter::kalman::Kalman;
 use crate::filter::root::Root;
+use crate::linearised::OutputMap;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{
-    BetweenSamples, Dynamics, Error, EstimatorSettings, Evaluation, Level, Method, System,
+    BetweenSamples, Dynamics, Error, EstimatorSettings, Jacobian, Jacobians, Level, Linearised,
+    Method,
 };
 
 /// The linearised error of a [sampled observer](crate::SampledObserver) z' = F(t, z, u, w), x̂ = g(z),
@@ -25,22 +28,14 @@ use crate::{
 /// of a filter is.
 #[derive(Clone, Debug)]
 pub struct ErrorModel {
-    /// the observer; its outputs are the entries of its Jacobian in (z, ν), then those of ∂g/∂z, then
-    /// those of ∂h/∂z
-    flow: System,
-    flow_entries: Vec<(usize, usize)>,
-    estimate_entries: Vec<(usize, usize)>,
-    reading_entries: Vec<(usize, usize)>,
-    estimates: usize,
-    process_noise: Vec<f64>,
-    initial_variance: Vec<f64>,
+    /// the observer with its Jacobian in (z, ν), ∂g/∂z and ∂h/∂z
+    flow: Linearised,
+    noise: ErrorNoise,
     /// place of the lag
     lag: Option<usize>,
-    noise: Vec<Level>,
-    /// what each sensor should read: without states, its signals are z and the observer's signals,
-    /// its outputs h(x̂), then the entries of ∂h/∂z; none where readings are not judged
-    expected: Option<System>,
-    expected_entries: Vec<(usize, usize)>,
+    estimates: usize,
+    /// what each sensor should read, h(x̂) by z; none where readings are not judged
+    expected: Option<Linearised>,
 }
 
 /// What acts on an observer's error.
@@ -164,6 +159,12 @@ impl ErrorEquations<'_> {
     }
 }
 
+/// Entries in the order of their places.
+fn listed(entries: Entries) -> Vec<(usize, usize, Node)> {
+    let entries = entries.into_iter();
+    entries.map(|((i, j), node)| (i, j, node)).collect()
+}
+
 impl ErrorModel {
     /// Compiles the linearisation of an observer.
     ///
@@ -188,27 +189,19 @@ impl ErrorModel {
                 return Err(Error::setting(what, expected, count));
             }
         }
-        let views = equations.views();
-        let all = [equations.flow(), equations.slopes(estimates), views];
-        let outputs: Vec<(String, Node)> = all
-            .iter()
-            .flatten()
-            .map(|((i, j), node)| (format!("{i},{j}"), *node))
-            .collect();
-        let [flow_entries, estimate_entries, reading_entries] =
-            all.map(|entries| entries.into_keys().collect());
+        // C first: nodes are made in this order
+        let output = listed(equations.views());
+        let jacobians = Jacobians {
+            state: listed(equations.flow()),
+            estimate: listed(equations.slopes(estimates)),
+            output,
+        };
         Ok(Self {
-            flow: System::new(graph, time, states, signals, derivatives, &outputs)?,
-            flow_entries,
-            estimate_entries,
-            reading_entries,
-            estimates: estimates.len(),
-            process_noise: noise.process,
-            initial_variance: noise.initial,
+            flow: Linearised::new(graph, time, states, signals, derivatives, &[], &jacobians)?,
+            noise,
             lag: equations.lag.map(|lag| lag.state),
-            noise: noise.sensors,
+            estimates: estimates.len(),
             expected: None,
-            expected_entries: vec![],
         })
     }
 
@@ -225,47 +218,18 @@ impl ErrorModel {
         signals: &[(String, Node)],
         outputs: &[Node],
     ) -> Result<Self, Error> {
-        let symbols: Vec<Node> = states.iter().map(|s| s.1).collect();
-        let slopes = jacobian::forward(graph, outputs, &symbols);
-        let values = outputs.iter().chain(slopes.entries.iter().map(|e| &e.2));
-        let values: Vec<(String, Node)> = values
-            .enumerate()
-            .map(|(i, node)| (format!("{i}"), *node))
-            .collect();
-        let own = states.iter().map(|(name, node, _)| (name.clone(), *node));
-        let read: Vec<(String, Node)> = own.chain(signals.iter().cloned()).collect();
+        let outputs = outputs.iter().enumerate();
+        let outputs: Vec<_> = outputs.map(|(i, node)| (format!("{i}"), *node)).collect();
+        let expected = Linearised::output_map(graph, time, states, signals, &outputs)?;
         Ok(Self {
-            expected: Some(System::new(graph, time, &[], &read, &[], &values)?),
-            expected_entries: slopes.entries.iter().map(|e| (e.0, e.1)).collect(),
+            expected: Some(expected),
             ..self
         })
     }
-}
 
-impl ErrorModel {
-    /// The observer; its outputs are the entries of its Jacobian, then those of ∂g/∂z, then of ∂h/∂z.
-    pub fn flow(&self) -> &System {
+    /// The observer with its Jacobian in states and innovations, ∂g/∂z and ∂h/∂z.
+    pub fn flow(&self) -> &Linearised {
         &self.flow
-    }
-
-    /// Places (row, column) of the entries of the Jacobian, by states and innovations.
-    pub fn flow_entries(&self) -> &[(usize, usize)] {
-        &self.flow_entries
-    }
-
-    /// Places of the entries of ∂g/∂z.
-    pub fn estimate_entries(&self) -> &[(usize, usize)] {
-        &self.estimate_entries
-    }
-
-    /// Places of the entries of ∂h/∂z.
-    pub fn reading_entries(&self) -> &[(usize, usize)] {
-        &self.reading_entries
-    }
-
-    /// Number of estimates, the rows of ∂g/∂z.
-    pub fn estimates(&self) -> usize {
-        self.estimates
     }
 
     /// The same that judges no reading.
@@ -273,14 +237,13 @@ impl ErrorModel {
     pub fn without_readings(self) -> Self {
         Self {
             expected: None,
-            expected_entries: vec![],
             ..self
         }
     }
 
     /// The covariance from an exact start: of the lag alone.
     fn settled(&self) -> Root {
-        let starts = self.initial_variance.iter().enumerate();
+        let starts = self.noise.initial.iter().enumerate();
         let starts = starts.map(|(i, v)| if Some(i) == self.lag { *v } else { 0.0 });
         Root::diagonal(&starts.collect::<Vec<f64>>())
     }
@@ -291,49 +254,34 @@ impl ErrorModel {
     }
 
     /// What acts on the error.
-    pub fn noise(&self) -> ErrorNoise {
-        ErrorNoise {
-            process: self.process_noise.clone(),
-            initial: self.initial_variance.clone(),
-            sensors: self.noise.clone(),
-        }
+    pub fn noise(&self) -> &ErrorNoise {
+        &self.noise
     }
 
-    /// What acts on the error, as text.
+    /// The same as text.
     pub(crate) fn noises(&self) -> String {
-        format!(
-            "{:?} {:?} {:?}",
-            self.process_noise, self.initial_variance, self.noise
-        )
+        let ErrorNoise {
+            process,
+            initial,
+            sensors,
+        } = &self.noise;
+        format!("{process:?} {initial:?} {sensors:?}")
     }
 }
 
 /// The covariance of an observer's states, and of its innovations, along its run.
 #[derive(Clone, Debug)]
 pub(crate) struct Spread {
-    engine: Extended,
+    engine: Ekf,
     belief: Belief,
     /// the covariance from an exact start, where readings are judged
     settled: Option<Root>,
-    /// of ∂g/∂z
-    estimates: Vec<(usize, usize)>,
-    /// of ∂h/∂z
-    readings: Vec<(usize, usize)>,
-    /// entries of the Jacobian, which come before
-    skipped: usize,
+    jacobians: Jacobians<Jacobian>,
+    /// of the flow's outputs
     values: Vec<f64>,
     noise: Vec<Level>,
-    expected: Option<Expected>,
+    expected: Option<OutputMap>,
     pub deviations: Vec<f64>,
-}
-
-/// What sensors should read.
-#[derive(Clone, Debug)]
-struct Expected {
-    evaluation: Evaluation,
-    entries: Vec<(usize, usize)>,
-    /// h(x̂), then the entries of ∂h/∂z
-    values: Vec<f64>,
 }
 
 impl Persist for Spread {
@@ -351,22 +299,16 @@ impl Spread {
     pub fn new(model: &ErrorModel, between: BetweenSamples, method: Method) -> Result<Self, Error> {
         let run = EstimatorSettings { between, method };
         Ok(Self {
-            engine: Extended::new(&model.flow, &model.flow_entries, &model.process_noise, run)?,
+            engine: Ekf::new(&model.flow, &model.noise.process, run)?,
             belief: Belief {
-                x: model.flow.start().to_vec(),
-                root: Root::diagonal(&model.initial_variance),
+                x: model.flow.system().start().to_vec(),
+                root: Root::diagonal(&model.noise.initial),
             },
             settled: model.expects().then(|| model.settled()),
-            estimates: model.estimate_entries.clone(),
-            readings: model.reading_entries.clone(),
-            skipped: model.flow_entries.len(),
-            values: vec![0.0; model.flow.outputs().len()],
-            noise: model.noise.clone(),
-            expected: model.expected.as_ref().map(|system| Expected {
-                evaluation: system.evaluation(),
-                entries: model.expected_entries.clone(),
-                values: vec![0.0; system.outputs().len()],
-            }),
+            jacobians: model.flow.jacobians().clone(),
+            values: vec![0.0; model.flow.system().outputs().len()],
+            noise: model.noise.sensors.clone(),
+            expected: model.expected.as_ref().map(OutputMap::new),
             deviations: vec![0.0; model.estimates],
         })
     }
@@ -400,14 +342,12 @@ impl Spread {
         let evaluation = &mut self.engine.driven.evaluation;
         evaluation.enter(t);
         evaluation.outputs(t, z, &mut self.values);
-        let views = &self.values[self.skipped + self.estimates.len()..];
         for (sensor, reading) in readings.iter().enumerate() {
             if !reading.is_finite() {
                 continue;
             }
-            let own = self.readings.iter().zip(views);
-            let own = own.filter(|((i, _), _)| *i == sensor);
-            let own: Vec<(usize, f64)> = own.map(|((_, j), c)| (*j, *c)).collect();
+            let views = self.jacobians.output.row(&self.values, sensor);
+            let own: Vec<(usize, f64)> = views.collect();
             let state = self.belief.root.n - self.noise.len() + sensor;
             let deviation = self.noise[sensor].variance(*reading).sqrt();
             for root in std::iter::once(&mut self.belief.root).chain(&mut self.settled) {
@@ -423,28 +363,14 @@ impl Spread {
         let (Some(expected), Some(settled)) = (&mut self.expected, &self.settled) else {
             return vec![];
         };
-        let read = expected.evaluation.signals_mut();
-        let (own, others) = read.split_at_mut(z.len());
-        own.copy_from_slice(z);
-        others.copy_from_slice(signals);
-        expected.evaluation.enter(t);
-        expected.evaluation.outputs(t, &[], &mut expected.values);
-        if expected.values.iter().any(|v| !v.is_finite()) {
+        expected.evaluate(t, z, signals);
+        if !expected.is_finite() {
             return vec![];
         }
-        let (values, slopes) = expected.values.split_at(self.noise.len());
         let n = self.belief.root.n;
-        let mut projected = vec![0.0; n];
+        let (mut row, mut projected) = (vec![0.0; n], vec![0.0; n]);
         let each = |(i, (value, noise)): (usize, (&f64, &Level))| {
-            let mut row = vec![0.0; n];
-            for (&(_, j), slope) in expected
-                .entries
-                .iter()
-                .zip(slopes)
-                .filter(|(e, _)| e.0 == i)
-            {
-                row[j] = *slope;
-            }
+            expected.write_slopes(i, &mut row);
             let mut deviation = |root: &Root| {
                 root.transposed_times(&row, &mut projected);
                 let own: f64 = projected.iter().map(|p| p * p).sum();
@@ -452,12 +378,8 @@ impl Spread {
             };
             [*value, deviation(&self.belief.root), deviation(settled)]
         };
-        values
-            .iter()
-            .zip(&self.noise)
-            .enumerate()
-            .map(each)
-            .collect()
+        let values = expected.outputs().iter().zip(&self.noise);
+        values.enumerate().map(each).collect()
     }
 
     /// The standard deviations of the estimates at (t, z).
@@ -466,13 +388,9 @@ impl Spread {
         evaluation.enter(t);
         evaluation.outputs(t, z, &mut self.values);
         let n = self.belief.root.n;
-        let mut projected = vec![0.0; n];
+        let (mut row, mut projected) = (vec![0.0; n], vec![0.0; n]);
         for (i, deviation) in self.deviations.iter_mut().enumerate() {
-            let mut row = vec![0.0; n];
-            let values = self.estimates.iter().zip(&self.values[self.skipped..]);
-            for (&(_, j), value) in values.filter(|((estimate, _), _)| *estimate == i) {
-                row[j] = *value;
-            }
+            self.jacobians.estimate.write_row(&self.values, i, &mut row);
             self.belief.root.transposed_times(&row, &mut projected);
             *deviation = projected.iter().map(|p| p * p).sum::<f64>().sqrt();
         }

@@ -215,7 +215,7 @@ fn model(
         process_noise: noise::densities(prepared, span, notes),
         initial_variance: tuning.initial_variance.clone(),
         confined: Some(Confined {
-            derivatives: tuning.confined.clone(),
+            flow: tuning.confined.clone(),
             bounds: extended.states.iter().map(bounds).collect(),
         }),
     };

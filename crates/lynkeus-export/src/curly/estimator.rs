@@ -2,7 +2,9 @@
 
 use lynkeus_run::credible::{By, CHANCE, CLIP, ENOUGH, FEW};
 use lynkeus_run::filter::{FilterKind, FilterModel, FilterSettings, Limits, Sensor, SigmaPoints};
-use lynkeus_run::{BetweenSamples, Blueprint, ErrorModel, Level, SampledObserver, Tuned};
+use lynkeus_run::{
+    BetweenSamples, Blueprint, ErrorModel, Jacobians, Level, SampledObserver, Tuned,
+};
 
 use super::device::{Device, Entry, FirstReading};
 use super::draft::{Arguments, Target, draft, number, table};
@@ -168,40 +170,39 @@ impl Machine {
     fn spread(&mut self, errors: &ErrorModel, arguments: &Arguments) -> Result<(), Refusal> {
         let noise = errors.noise();
         let flow = errors.flow();
-        let n = flow.states().len();
+        let n = flow.system().states().len();
         self.root(&noise.initial);
         self.noises(noise.sensors.iter().copied());
         self.size("LARGER", n);
         let linear = Linear {
             flow,
-            entries: errors.flow_entries(),
             noise: &noise.process,
             is_tuned: false,
         };
         self.linear(Which::Free, &linear, arguments)?;
         self.carried(Which::Free, &linear);
-        let tape = flow.output_tape();
-        let estimates = errors.flow_entries().len();
-        let readings = estimates + errors.estimate_entries().len();
-        for (about, name, outputs, entries) in [
+        let tape = flow.system().output_tape();
+        let Jacobians {
+            estimate, output, ..
+        } = flow.jacobians();
+        for (about, name, jacobian) in [
             (
                 "The derivatives of the estimates by x, row by row.",
                 "estimate_slopes",
-                estimates..readings,
-                errors.estimate_entries(),
+                estimate,
             ),
             (
                 "The derivatives of what is expected of the sensors by x, row by row.",
                 "reading_slopes",
-                readings..tape.outputs(),
-                errors.reading_entries(),
+                output,
             ),
         ] {
-            let places = entries.iter().map(|(i, j)| i * n + j);
+            let places = jacobian.places().iter().map(|(i, j)| i * n + j);
             let target = Target {
                 name: "c",
                 places: places.collect(),
             };
+            let outputs = jacobian.outputs();
             let code = code(&[Part { tape, outputs }])?;
             self.add(&draft(about, name, &code, arguments, &[target])?);
         }
@@ -241,7 +242,7 @@ impl Machine {
             "x",
             Type::Real,
             &states.join(", "),
-            model.flow().start().to_vec(),
+            model.flow().system().start().to_vec(),
         );
         self.field("inputs", Type::Real, &inputs.join(", "), room);
         self.root(model.initial_variance());
@@ -271,7 +272,6 @@ impl Machine {
         self.judge(model, settings, &holds);
         let free = Linear {
             flow: model.flow(),
-            entries: model.flow_entries(),
             noise: model.process_noise(),
             is_tuned: !device.tunables.is_empty(),
         };
@@ -285,7 +285,6 @@ impl Machine {
         if let Some(confined) = confined {
             let inside = Linear {
                 flow: &confined.flow,
-                entries: &confined.entries,
                 noise: model.process_noise(),
                 is_tuned: free.is_tuned,
             };
@@ -312,7 +311,7 @@ impl Machine {
         arguments: &Arguments,
         holds: &[&str],
     ) -> Result<&'static str, Refusal> {
-        let n = free.flow.states().len();
+        let n = free.flow.system().states().len();
         match kind {
             FilterKind::MovingHorizon(..) => Err(Refusal::Window),
             FilterKind::Extended => {
@@ -337,12 +336,14 @@ impl Machine {
         kind: &FilterKind,
     ) -> Result<(), Refusal> {
         let (n, m) = (model.dimension(), model.sensors().len());
-        refuse_jumps(model.output_map())?;
-        let tape = model.output_map().output_tape();
+        let output_map = model.output_map();
+        refuse_jumps(output_map.system())?;
+        let tape = output_map.system().output_tape();
         let mut targets = vec![Target::all("h", m)];
         let mut outputs = 0..m;
         if *kind == FilterKind::Extended {
-            let places = model.output_entries().iter().map(|(i, j)| i * n + j);
+            let entries = output_map.jacobians().output.places();
+            let places = entries.iter().map(|(i, j)| i * n + j);
             targets.push(Target {
                 name: "c",
                 places: places.collect(),
@@ -401,7 +402,7 @@ impl Machine {
         arguments: &Arguments,
         about: &[&str],
     ) -> Result<(), Refusal> {
-        let n = free.flow.states().len();
+        let n = free.flow.system().states().len();
         let has_limits = about.contains(&"limits");
         let sensors = self.sizes.iter().find(|size| size.0 == "SENSORS");
         self.size("LARGER", sensors.map_or(n, |size| size.1.max(n)));
@@ -413,7 +414,7 @@ impl Machine {
             true => self.linear(Which::Free, free, arguments)?,
             false => self.add(FIELD),
         }
-        self.flow(free.flow, arguments)?;
+        self.flow(free.flow.system(), arguments)?;
         self.add(&exchanged(INTEGRATE, |word| match word {
             "integrate" => Some("integrate_point".to_owned()),
             "DIMENSION" => Some("STATES".to_owned()),

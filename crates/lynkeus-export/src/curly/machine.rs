@@ -1,7 +1,7 @@
 //! A draft under way: its state, its tables, and how it goes along a flow, alone or with its Jacobian and the
 //! covariance along an estimate.
 
-use lynkeus_run::{Level, Method, Step, System};
+use lynkeus_run::{Level, Linearised, Method, Step, System};
 
 use super::draft::{Arguments, Target, draft, places, table};
 use super::syntax::Type;
@@ -159,8 +159,7 @@ pub(super) const NOISE_FACTOR: &str = "w[INPUTS]";
 
 /// A flow with its Jacobian and the densities of the noise on its states.
 pub(super) struct Linear<'a> {
-    pub flow: &'a System,
-    pub entries: &'a [(usize, usize)],
+    pub flow: &'a Linearised,
     pub noise: &'a [f64],
     /// the densities are multiplied by a number that may be changed
     pub is_tuned: bool,
@@ -274,10 +273,11 @@ impl Machine {
     ) -> Result<(), Refusal> {
         let Linear {
             flow,
-            entries,
             noise,
             is_tuned,
         } = linear;
+        let entries = flow.jacobians().state.places();
+        let flow = flow.system();
         refuse_jumps(flow)?;
         let n = flow.states().len();
         let scale = noise.iter().fold(0.0_f64, |m, q| m.max(*q));

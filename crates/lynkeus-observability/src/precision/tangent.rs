@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use lynkeus_expr::{Budget, Node, jacobian};
-use lynkeus_run::{Error, Method, System};
+use lynkeus_run::{Error, Jacobians, Linearised, Method};
 use nalgebra::DMatrix;
 
 use super::deviations::Information;
@@ -28,14 +28,10 @@ const TRUST: f64 = 30.0;
 struct Tangent {
     /// number of states
     states: usize,
-    /// derivatives as they are; outputs: the entries of ∂f/∂z
-    flow: System,
-    /// (state, quantity) of these entries
-    slopes: Vec<(usize, usize)>,
-    /// outputs: the sensors, then the entries of ∂h/∂z
-    sight: System,
-    /// (sensor, quantity) of these entries
-    views: Vec<(usize, usize)>,
+    /// x' = f with ∂f/∂z
+    flow: Linearised,
+    /// the sensors with ∂h/∂z
+    sight: Linearised,
     /// of states and unknown inputs
     scales: Vec<f64>,
     /// of the states: what they are integrated in, so that the absolute tolerance is small beside small ones
@@ -54,19 +50,19 @@ impl Tangent {
         let symbols: Vec<Node> = experiment.quantities().map(|q| q.node).collect();
         let seen: Vec<Node> = experiment.sensors.iter().map(|s| s.node).collect();
         let graph = experiment.graph;
-        let f = jacobian::forward(graph, &experiment.derivatives, &symbols).entries;
-        let h = jacobian::forward(graph, &seen, &symbols).entries;
+        let flow = Jacobians {
+            state: jacobian::forward(graph, &experiment.derivatives, &symbols).entries,
+            ..Jacobians::default()
+        };
+        let sight = Jacobians {
+            output: jacobian::forward(graph, &seen, &symbols).entries,
+            ..Jacobians::default()
+        };
         let (relative, absolute) = tolerances(experiment.method);
         Ok(Self {
             states: experiment.states.len(),
-            flow: system(experiment, &experiment.derivatives, nodes(&f))?,
-            slopes: f.iter().map(|&(i, j, _)| (i, j)).collect(),
-            sight: system(
-                experiment,
-                &experiment.derivatives,
-                seen.into_iter().chain(nodes(&h)),
-            )?,
-            views: h.iter().map(|&(i, j, _)| (i, j)).collect(),
+            flow: linearised(experiment, &[], flow)?,
+            sight: linearised(experiment, &seen, sight)?,
             scales: experiment.quantities().map(|q| q.scale).collect(),
             units: experiment.states.iter().map(|q| q.scale.min(1.0)).collect(),
             floor: absolute / relative,
@@ -92,35 +88,42 @@ impl Tangent {
     }
 }
 
-fn nodes(entries: &[(usize, usize, Node)]) -> impl Iterator<Item = Node> + '_ {
-    entries.iter().map(|&(.., node)| node)
-}
-
-/// The plant under its inputs, with these outputs.
-fn system(
+/// The plant under its inputs, with these outputs and Jacobians.
+fn linearised(
     experiment: &Experiment<'_>,
-    derivatives: &[Node],
-    outputs: impl Iterator<Item = Node>,
-) -> Result<System, Error> {
+    outputs: &[Node],
+    mut jacobians: Jacobians<Vec<(usize, usize, Node)>>,
+) -> Result<Linearised, Error> {
     let courses: HashMap<Node, Node> = experiment.inputs.iter().copied().collect();
     let graph = experiment.graph;
-    let outputs: Vec<Node> = outputs.collect();
-    let outputs = graph.substitute(&outputs, &courses).into_iter();
+    for entries in [&mut jacobians.state, &mut jacobians.output] {
+        let nodes: Vec<Node> = entries.iter().map(|entry| entry.2).collect();
+        let nodes = graph.substitute(&nodes, &courses);
+        entries
+            .iter_mut()
+            .zip(nodes)
+            .for_each(|(entry, node)| entry.2 = node);
+    }
+    let outputs = graph.substitute(outputs, &courses).into_iter();
+    let outputs: Vec<(String, Node)> = outputs
+        .enumerate()
+        .map(|(i, node)| (format!("o{}", i + 1), node))
+        .collect();
     let states: Vec<(String, Node, f64)> = experiment
         .states
         .iter()
         .map(|q| (q.name.clone(), q.node, q.start))
         .collect();
-    System::new(
+    let derivatives = graph.substitute(&experiment.derivatives, &courses);
+    let time = experiment.time;
+    Linearised::new(
         graph,
-        experiment.time,
+        time,
         &states,
         &[],
-        &graph.substitute(derivatives, &courses),
-        &outputs
-            .enumerate()
-            .map(|(i, node)| (format!("o{}", i + 1), node))
-            .collect::<Vec<_>>(),
+        &derivatives,
+        &outputs,
+        &jacobians,
     )
 }
 

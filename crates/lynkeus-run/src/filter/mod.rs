@@ -37,46 +37,40 @@
 //! # Ok::<(), lynkeus_run::Error>(())
 //! ```
 
-mod along;
-mod censored;
-mod curvature;
-mod doubling;
-pub(crate) mod extended;
-mod factor;
-mod flow;
+mod belief;
+pub(crate) mod ekf;
 mod health;
-mod hindsight;
-mod horizon;
+pub(crate) mod kalman;
+mod mhe;
 mod model;
-mod nodes;
-mod persist;
-mod project;
+mod profile;
 pub(crate) mod root;
 mod sensing;
-mod smooth;
-mod spanned;
-mod stage;
-mod taylor;
-mod unscented;
-mod variation;
+mod smoother;
+mod transition;
+mod ukf;
 
+pub use crate::noise::Limits;
+pub(crate) use belief::Belief;
+pub use belief::Bounds;
 pub use health::{Health, Innovation, Reading, SensorHealth};
-pub use model::{Confined, ConfinedFlow, FilterModel, FilterPlant, Limits, Sensor};
-pub use smooth::Smoothed;
-pub use unscented::{SigmaPoints, Weights};
+pub use model::{Confined, FilterModel, FilterPlant, Sensor};
+pub use smoother::Smoothed;
+pub use ukf::{SigmaPoints, Weights};
 
 use crate::divergence::{Bound, deviation_diverged};
 use crate::runner::{Runner, Sample};
-use crate::system::Driven;
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings};
-use extended::Extended;
-use horizon::Horizon;
-use project::Projection;
-use root::Root;
+use belief::{Projection, confine};
+use ekf::Ekf;
+use kalman::Kalman;
+use mhe::Mhe;
+use profile::Skyline;
+use root::{Packed, Root};
 use sensing::Sensing;
-use smooth::History;
-use spanned::Rows;
-use unscented::Unscented;
+use smoother::{History, Step};
+use ukf::Ukf;
 
 /// Which filter.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,15 +83,6 @@ pub enum FilterKind {
     /// moving-horizon estimation over so many samples, the states within bounds (one pair per
     /// state)
     MovingHorizon(usize, Vec<Bounds>),
-}
-
-/// Where a state can be.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// smallest value
-    pub low: f64,
-    /// largest value
-    pub high: f64,
 }
 
 /// How a filter works.
@@ -132,33 +117,29 @@ impl FilterSettings {
     }
 }
 
-/// What is believed of the state: its mean and a root of its covariance.
-#[derive(Clone, Debug)]
-pub(crate) struct Belief {
-    pub(crate) x: Vec<f64>,
-    pub(crate) root: Root,
-}
-
 #[derive(Clone, Debug)]
 enum Engine {
-    Extended(Box<Extended>),
-    Unscented(Box<Unscented>),
-    MovingHorizon(Box<Horizon>),
+    Extended(Box<Ekf>),
+    Unscented(Box<Ukf>),
+    MovingHorizon(Box<Mhe>),
 }
 
-/// For intervals on which the plant has no value where the estimate is.
-#[derive(Clone, Debug)]
-struct Spare {
-    engine: Extended,
-    bounds: Vec<Bounds>,
+impl Engine {
+    fn kalman(&mut self) -> &mut dyn Kalman {
+        match self {
+            Self::Extended(ekf) => &mut **ekf,
+            Self::Unscented(ukf) => &mut **ukf,
+            Self::MovingHorizon(mhe) => &mut **mhe,
+        }
+    }
 }
 
 /// A filter under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Filter {
     engine: Engine,
-    /// the same inside the declared ranges
-    spare: Option<Spare>,
+    /// inside the declared ranges, for intervals on which the plant has no value where the estimate is
+    spare: Option<Confined<Ekf>>,
     belief: Belief,
     projection: Option<Projection>,
     sensing: Sensing,
@@ -167,7 +148,7 @@ pub(crate) struct Filter {
     bound: Bound,
     history: Option<History>,
     /// the transition since the last update, for the smoother
-    pending: Option<Rows>,
+    pending: Option<Skyline>,
 }
 
 impl Filter {
@@ -199,30 +180,23 @@ impl Filter {
         let is_window = matches!(settings.kind, FilterKind::MovingHorizon(..));
         let keep_corrections = settings.keep_history && !is_window;
         let engine = match settings.kind {
-            FilterKind::Extended => Engine::Extended(Box::new(Extended::new(
-                &model.flow,
-                &model.flow_entries,
-                &model.process_noise,
-                run,
-            )?)),
+            FilterKind::Extended => {
+                Engine::Extended(Box::new(Ekf::new(&model.flow, &model.process_noise, run)?))
+            }
             FilterKind::Unscented(points) => {
-                Engine::Unscented(Box::new(Unscented::new(model, points, run)?))
+                Engine::Unscented(Box::new(Ukf::new(model, points, run)?))
             }
             FilterKind::MovingHorizon(length, bounds) => {
                 let keep = settings.keep_history;
-                let horizon = Horizon::new(model, length, bounds, run, keep)?;
+                let horizon = Mhe::new(model, length, bounds, run, keep)?;
                 Engine::MovingHorizon(Box::new(horizon))
             }
         };
-        let x = model.flow.start().to_vec();
+        let x = model.flow.system().start().to_vec();
         let spare = match &model.confined {
             None => None,
-            Some(ConfinedFlow {
-                flow,
-                entries,
-                bounds,
-            }) => Some(Spare {
-                engine: Extended::new(flow, entries, &model.process_noise, run)?,
+            Some(Confined { flow, bounds }) => Some(Confined {
+                flow: Ekf::new(flow, &model.process_noise, run)?,
                 bounds: bounds.clone(),
             }),
         };
@@ -248,38 +222,22 @@ impl Filter {
         &self.belief.x
     }
 
-    fn driven(&mut self) -> &mut Driven {
-        match &mut self.engine {
-            Engine::Extended(engine) => &mut engine.driven,
-            Engine::Unscented(engine) => &mut engine.driven,
-            Engine::MovingHorizon(horizon) => &mut horizon.engine.driven,
-        }
-    }
-
     /// To the next sample; the transition is what the smoother needs of it. Where the plant has no
     /// value on the way, inside the declared ranges.
-    fn predict(&mut self, from: f64, to: f64, inputs: &[f64]) -> Result<Rows, Error> {
-        self.driven().aim(from, to, inputs);
+    fn predict(&mut self, from: f64, to: f64, inputs: &[f64]) -> Result<Skyline, Error> {
         let keep = self.keeps_transitions();
-        let belief = &mut self.belief;
-        let result = match &mut self.engine {
-            Engine::Extended(engine) => engine.predict(belief, from, to, keep),
-            Engine::Unscented(engine) => engine.predict(belief, from, to, keep),
-            Engine::MovingHorizon(horizon) => {
-                let result = horizon.engine.predict(belief, from, to, keep);
-                confine(&mut belief.x, horizon.bounds());
-                result
-            }
-        };
+        let engine = self.engine.kalman();
+        engine.driven().aim(from, to, inputs);
+        let result = engine.predict(&mut self.belief, from, to, keep);
         match (result, &mut self.spare) {
             (Err(error), Some(spare)) if is_undefined(&error) => {
                 // a flow that failed has left the belief as it was
                 self.sensing.health.confined += 1;
                 confine(&mut self.belief.x, &spare.bounds);
-                let driven = &mut spare.engine.driven;
+                let driven = &mut spare.flow.driven;
                 driven.start(&self.inputs);
                 driven.aim(from, to, inputs);
-                spare.engine.predict(&mut self.belief, from, to, keep)
+                spare.flow.predict(&mut self.belief, from, to, keep)
             }
             (result, _) => result,
         }
@@ -312,18 +270,9 @@ impl Filter {
     }
 
     fn correct_here(&mut self, t: f64, readings: &[f64]) -> Result<(), Error> {
-        let Self {
-            sensing,
-            belief,
-            inputs,
-            engine,
-            ..
-        } = self;
-        match engine {
-            Engine::Extended(_) => extended::correct(sensing, belief, t, readings, inputs),
-            Engine::Unscented(engine) => engine.correct(sensing, belief, t, readings, inputs),
-            Engine::MovingHorizon(horizon) => horizon.correct(sensing, belief, t, readings, inputs),
-        }
+        let (sensing, belief) = (&mut self.sensing, &mut self.belief);
+        let engine = self.engine.kalman();
+        engine.correct(sensing, belief, t, readings, &self.inputs)
     }
 }
 
@@ -335,7 +284,7 @@ impl Runner for Filter {
     fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
         self.bound.see(&self.inputs);
         let transition = self.predict(from, sample.t, sample.inputs)?;
-        self.driven().arrive();
+        self.engine.kalman().driven().arrive();
         self.keep_inside();
         if self.keeps_transitions() {
             self.pending = Some(match self.pending.take() {
@@ -351,7 +300,7 @@ impl Runner for Filter {
         // those of an update that failed
         self.sensing.take_corrections();
         self.inputs.copy_from_slice(sample.inputs);
-        self.driven().start(sample.inputs);
+        self.engine.kalman().driven().start(sample.inputs);
         self.correct(sample.t, sample.readings)?;
         self.keep_inside();
         Ok(())
@@ -394,9 +343,83 @@ fn is_undefined(error: &Error) -> bool {
     )
 }
 
-fn confine(x: &mut [f64], bounds: &[Bounds]) {
-    for (x, bounds) in x.iter_mut().zip(bounds) {
-        *x = x.max(bounds.low).min(bounds.high);
+impl Persist for Filter {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.engine.kalman().walk(walk)?;
+        if let Some(spare) = &mut self.spare {
+            spare.flow.walk(walk)?;
+        }
+        self.belief.walk(walk)?;
+        self.sensing.walk(walk)?;
+        walk.numbers(&mut self.inputs)?;
+        walk.numbers(&mut self.deviations)?;
+        self.bound.walk(walk)?;
+        let n = self.belief.x.len();
+        walk.optional(&mut self.pending, |walk, pending| pending.walk(walk, n))
+    }
+}
+
+impl Filter {
+    /// What the smoother keeps.
+    pub fn walk_history(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        let n = self.belief.x.len();
+        match &mut self.history {
+            Some(history) => history.walk(walk, n),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Filter {
+    /// The estimate at each update given later ones, up to `lag` of them; none without history,
+    /// and where a window reaches back less far than `lag`.
+    pub fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Option<Vec<Smoothed>> {
+        let history = self.history.as_ref()?;
+        let Engine::MovingHorizon(horizon) = &self.engine else {
+            return Some(history.smoothed(&[], lag, deviations));
+        };
+        if lag.is_some_and(|lag| lag > horizon.length()) {
+            return None;
+        }
+        let newest = horizon.steps(&self.sensing)?;
+        let mut rows = history.smoothed(&newest, lag, deviations);
+        if let Some(lag) = lag {
+            // as it was known then: the rows kept are linearised about what was known later
+            for (row, x) in rows
+                .iter_mut()
+                .zip(history.in_windows(self.belief.x.len(), lag))
+            {
+                row.estimate.copy_from_slice(x);
+            }
+        }
+        for row in &mut rows {
+            confine(&mut row.estimate, horizon.bounds());
+        }
+        Some(rows)
+    }
+
+    /// Keeps the last update for the smoother.
+    pub fn remember(&mut self) {
+        let corrections = self.sensing.take_corrections();
+        let transition = self.pending.take();
+        let Some(history) = &mut self.history else {
+            return;
+        };
+        if let Engine::MovingHorizon(horizon) = &mut self.engine {
+            horizon.leave(history);
+            return;
+        }
+        history.push(Step {
+            transition,
+            x: self.belief.x.clone(),
+            root: Packed::of(&self.belief.root),
+            corrections,
+        });
+    }
+
+    /// Whether the smoother needs the transition between two updates; a window finds its own.
+    pub(super) fn keeps_transitions(&self) -> bool {
+        self.history.is_some() && !matches!(self.engine, Engine::MovingHorizon(_))
     }
 }
 

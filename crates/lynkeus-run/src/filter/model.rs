@@ -1,9 +1,10 @@
 //! A plant with its sensors and noises, compiled for filters.
 
-use lynkeus_expr::{Binary, Graph, Node, jacobian, real};
+use lynkeus_expr::{Graph, Node};
 
-use super::Bounds;
-use crate::{Error, Level, System};
+use super::belief::Bounds;
+use crate::noise::{Level, Limits};
+use crate::{Error, Linearised, System};
 
 /// What a filter has to know: x' = f(t, x, u) + w, y_i = h_i(t, x, u) + v_i.
 #[derive(Clone, Debug)]
@@ -26,14 +27,14 @@ pub struct FilterPlant<'g> {
     /// variance of the first estimate
     pub initial_variance: Vec<f64>,
     /// f and where the states can be, for where f has no value outside; none without ranges
-    pub confined: Option<Confined>,
+    pub confined: Option<Confined<Vec<Node>>>,
 }
 
-/// The plant inside its declared ranges.
+/// A flow x' = f and the ranges to which f limits the states: its equations, compiled, or in a filter.
 #[derive(Clone, Debug)]
-pub struct Confined {
+pub struct Confined<F> {
     /// f of the states limited to their ranges
-    pub derivatives: Vec<Node>,
+    pub flow: F,
     /// one pair per state
     pub bounds: Vec<Bounds>,
 }
@@ -51,59 +52,18 @@ pub struct Sensor {
     pub limits: Option<Limits>,
 }
 
-/// The range that a sensor can show.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    /// its lower end
-    pub low: f64,
-    /// its upper end
-    pub high: f64,
-}
-
-impl Limits {
-    /// What the sensor shows of a value.
-    #[must_use]
-    pub fn shown(self, value: f64) -> f64 {
-        let capped = real::binary(Binary::Min, value, self.high);
-        real::binary(Binary::Max, capped, self.low)
-    }
-
-    /// Whether a reading only says "at most" or "at least".
-    #[must_use]
-    pub fn ends(self, reading: f64) -> bool {
-        reading <= self.low || reading >= self.high
-    }
-}
-
 /// A [`FilterPlant`], compiled: cheap to clone, independent of its graph.
 #[derive(Clone, Debug)]
 pub struct FilterModel {
-    /// x' = f; its outputs are the entries of F = ∂f/∂x
-    pub(super) flow: System,
-    /// no states; signals x, u; outputs h, then the entries of C = ∂h/∂x
-    pub(super) output_map: System,
-    /// places (row, column) of the entries of F
-    pub(super) flow_entries: Vec<(usize, usize)>,
-    /// places of the entries of C
-    pub(super) output_entries: Vec<(usize, usize)>,
+    /// x' = f with F = ∂f/∂x
+    pub(super) flow: Linearised,
+    /// h with C = ∂h/∂x
+    pub(super) output_map: Linearised,
     pub(super) sensors: Vec<Sensor>,
     pub(super) process_noise: Vec<f64>,
     pub(super) initial_variance: Vec<f64>,
-    pub(super) confined: Option<ConfinedFlow>,
+    pub(super) confined: Option<Confined<Linearised>>,
 }
-
-/// [`Confined`], compiled.
-#[derive(Clone, Debug)]
-pub struct ConfinedFlow {
-    /// x' = f of the states limited to their ranges; its outputs are the entries of its Jacobian
-    pub flow: System,
-    /// places (row, column) of these entries
-    pub entries: Vec<(usize, usize)>,
-    /// one pair per state
-    pub bounds: Vec<Bounds>,
-}
-
-type Entries = Vec<(usize, usize)>;
 
 impl FilterModel {
     /// Compiles a plant with its Jacobians.
@@ -113,43 +73,27 @@ impl FilterModel {
     /// for a plant without states, a noise or a variance that is negative or not finite, and for wrong numbers of them.
     pub fn new(plant: &FilterPlant<'_>) -> Result<Self, Error> {
         check(plant)?;
-        let graph = plant.graph;
-        let symbols: Vec<Node> = plant.states.iter().map(|s| s.1).collect();
-        let h: Vec<Node> = plant.sensors.iter().map(|s| s.output).collect();
-        let C = jacobian::forward(graph, &h, &symbols);
-        let entry = |(i, j, node): &(usize, usize, Node)| (format!("{i},{j}"), *node);
-        let (flow, flow_entries) = linear(plant, &plant.derivatives)?;
+        let FilterPlant {
+            graph,
+            time,
+            states,
+            inputs,
+            ..
+        } = plant;
+        let flow = |f: &[Node]| Linearised::flow(graph, *time, states, inputs, f);
         let confined = match &plant.confined {
             None => None,
-            Some(Confined {
-                derivatives,
-                bounds,
-            }) => {
-                let (flow, entries) = linear(plant, derivatives)?;
-                let bounds = bounds.clone();
-                Some(ConfinedFlow {
-                    flow,
-                    entries,
-                    bounds,
-                })
-            }
+            Some(confined) => Some(Confined {
+                flow: flow(&confined.flow)?,
+                bounds: confined.bounds.clone(),
+            }),
         };
-        let states = plant
-            .states
-            .iter()
-            .map(|(name, node, _)| (name.clone(), *node));
-        let signals: Vec<(String, Node)> = states.chain(plant.inputs.iter().cloned()).collect();
         let outputs = plant.sensors.iter().map(|s| (s.name.clone(), s.output));
-        let outputs: Vec<(String, Node)> = outputs.chain(C.entries.iter().map(entry)).collect();
-        let output_map = System::new(graph, plant.time, &[], &signals, &[], &outputs)?;
-        let places =
-            |entries: &[(usize, usize, Node)]| entries.iter().map(|e| (e.0, e.1)).collect();
+        let outputs: Vec<(String, Node)> = outputs.collect();
         Ok(Self {
-            flow,
-            output_map,
-            flow_entries,
+            flow: flow(&plant.derivatives)?,
+            output_map: Linearised::output_map(graph, *time, states, inputs, &outputs)?,
             confined,
-            output_entries: places(&C.entries),
             sensors: plant.sensors.clone(),
             process_noise: plant.process_noise.clone(),
             initial_variance: plant.initial_variance.clone(),
@@ -159,13 +103,13 @@ impl FilterModel {
     /// Number of states.
     #[must_use]
     pub fn dimension(&self) -> usize {
-        self.flow.states().len()
+        self.flow.system().states().len()
     }
 
     /// Names of the states.
     #[must_use]
     pub fn states(&self) -> &[String] {
-        self.flow.states()
+        self.flow.system().states()
     }
 
     /// What is measured.
@@ -177,31 +121,19 @@ impl FilterModel {
     /// Names of the known inputs.
     #[must_use]
     pub fn inputs(&self) -> &[String] {
-        self.flow.signals()
+        self.flow.system().signals()
     }
 
-    /// x' = f; its outputs are the entries of F = ∂f/∂x.
+    /// x' = f with F = ∂f/∂x.
     #[must_use]
-    pub fn flow(&self) -> &System {
+    pub fn flow(&self) -> &Linearised {
         &self.flow
     }
 
-    /// Places (row, column) of the entries of F.
+    /// h with C = ∂h/∂x: no states, signals x, u.
     #[must_use]
-    pub fn flow_entries(&self) -> &[(usize, usize)] {
-        &self.flow_entries
-    }
-
-    /// No states; signals x, u; outputs h, then the entries of C = ∂h/∂x.
-    #[must_use]
-    pub fn output_map(&self) -> &System {
+    pub fn output_map(&self) -> &Linearised {
         &self.output_map
-    }
-
-    /// Places of the entries of C.
-    #[must_use]
-    pub fn output_entries(&self) -> &[(usize, usize)] {
-        &self.output_entries
     }
 
     /// Spectral density of the noise on each derivative.
@@ -218,14 +150,15 @@ impl FilterModel {
 
     /// The plant inside its declared ranges, for where it has no value outside.
     #[must_use]
-    pub fn confined(&self) -> Option<&ConfinedFlow> {
+    pub fn confined(&self) -> Option<&Confined<Linearised>> {
         self.confined.as_ref()
     }
 
     /// What is compiled.
     pub(crate) fn systems(&self) -> impl Iterator<Item = &System> {
         let confined = self.confined.iter().map(|c| &c.flow);
-        [&self.flow, &self.output_map].into_iter().chain(confined)
+        let all = [&self.flow, &self.output_map].into_iter().chain(confined);
+        all.map(Linearised::system)
     }
 
     /// Noises, limits and bounds, as text.
@@ -244,24 +177,6 @@ impl FilterModel {
         self.flow = self.flow.with_start(start)?;
         Ok(self)
     }
-}
-
-/// A flow whose outputs are the entries of its Jacobian, and their places.
-fn linear(plant: &FilterPlant<'_>, derivatives: &[Node]) -> Result<(System, Entries), Error> {
-    let symbols: Vec<Node> = plant.states.iter().map(|s| s.1).collect();
-    let F = jacobian::forward(plant.graph, derivatives, &symbols);
-    let entry = |(i, j, node): &(usize, usize, Node)| (format!("{i},{j}"), *node);
-    let outputs: Vec<(String, Node)> = F.entries.iter().map(entry).collect();
-    let (states, inputs) = (&plant.states, &plant.inputs);
-    let flow = System::new(
-        plant.graph,
-        plant.time,
-        states,
-        inputs,
-        derivatives,
-        &outputs,
-    )?;
-    Ok((flow, F.entries.iter().map(|e| (e.0, e.1)).collect()))
 }
 
 fn check(plant: &FilterPlant<'_>) -> Result<(), Error> {

@@ -224,7 +224,7 @@ fn an_estimate_without_a_value_of_the_plant_is_put_back() {
         confined,
     };
     let inside = Confined {
-        derivatives: vec![(-x.max(g.constant(0.01)).sqrt()).node()],
+        flow: vec![(-x.max(g.constant(0.01)).sqrt()).node()],
         bounds: vec![Bounds {
             low: 0.01,
             high: 2.0,

@@ -1,7 +1,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::*;
-use crate::{Estimator, SampledObserver, Tolerances};
+use crate::{Estimator, SampledObserver, System, Tolerances};
 
 /// x' = A x + b + ξ, y = C x + v with two states and one output, and x̂' = A x̂ + b + K (w − C x̂).
 #[derive(Clone, Copy)]

@@ -221,9 +221,11 @@ fn starts(made: &Made<'_>) -> Vec<Start> {
             let own = states.len().saturating_sub(observer.sensors.len());
             (states, observer.system.start(), own)
         }
-        Blueprint::Filter { model, .. } => {
-            (model.states(), model.flow().start(), model.states().len())
-        }
+        Blueprint::Filter { model, .. } => (
+            model.states(),
+            model.flow().system().start(),
+            model.states().len(),
+        ),
     };
     let first = made.device.first_readings;
     let pairs = names.iter().zip(values).take(own).enumerate();

@@ -45,7 +45,7 @@ impl<'t> Batch<'t> {
     ) -> Result<Self, Error> {
         let n = tangent.states;
         let mut x = vec![0.0; n * (1 + columns.len())];
-        let start = tangent.flow.start().iter().zip(&tangent.units);
+        let start = tangent.flow.system().start().iter().zip(&tangent.units);
         x.iter_mut()
             .zip(start)
             .for_each(|(x, (start, unit))| *x = start / unit);
@@ -53,13 +53,13 @@ impl<'t> Batch<'t> {
             dynamics: Variation {
                 tangent,
                 columns: columns.clone(),
-                flow: tangent.flow.evaluation(),
-                slopes: vec![0.0; tangent.slopes.len()],
+                flow: tangent.flow.system().evaluation(),
+                slopes: vec![0.0; tangent.flow.jacobians().state.places().len()],
                 states: vec![0.0; n],
                 budget: tangent.budget.clone(),
             },
             columns,
-            sight: tangent.sight.evaluation(),
+            sight: tangent.sight.system().evaluation(),
             integrator: Integrator::new(experiment.method, x.len())?,
             x,
             states: vec![0.0; n],
@@ -118,7 +118,8 @@ impl<'t> Batch<'t> {
         if seen.iter().any(|v| !v.is_finite()) {
             return Err(self.sight.not_finite(self.t, states));
         }
-        let sensors = seen.len() - tangent.views.len();
+        let jacobian = &tangent.sight.jacobians().output;
+        let sensors = jacobian.outputs().start;
         let (values, views) = seen.split_at(sensors);
         let first = piece.slopes.len();
         piece.values.extend(values);
@@ -128,7 +129,7 @@ impl<'t> Batch<'t> {
         piece
             .gross
             .resize(first + sensors * self.columns.len(), 0.0);
-        for (&(c, i), &slope) in tangent.views.iter().zip(views) {
+        for (&(c, i), &slope) in jacobian.places().iter().zip(views) {
             for (place, &j) in self.columns.iter().enumerate() {
                 let (sensitivity, floor) = match i < tangent.states {
                     true => {
@@ -178,7 +179,8 @@ impl Dynamics for Variation<'_> {
         let units = d_states.iter_mut().zip(&tangent.units);
         units.for_each(|(x, unit)| *x /= unit);
         d_columns.fill(0.0);
-        for (&(i, j), &slope) in tangent.slopes.iter().zip(&self.slopes) {
+        let places = tangent.flow.jacobians().state.places();
+        for (&(i, j), &slope) in places.iter().zip(&self.slopes) {
             let unit = tangent.units[i];
             for (place, &own) in self.columns.iter().enumerate() {
                 let sensitivity = match j < n {

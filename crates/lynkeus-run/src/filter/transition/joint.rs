@@ -1,17 +1,17 @@
-//! The estimate and how its error spreads, integrated together.
+//! The estimate and its variational equation, integrated together.
 
 use std::sync::Arc;
 
-use super::curvature::{Curvature, Layout};
-use super::taylor::Moments;
+use super::series::Transition;
+use crate::filter::profile::Profile;
 use crate::relays::Guards;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::system::Driven;
-use crate::{Dynamics, Error, Integrator, Method, Slopes};
+use crate::{Dynamics, Error, Integrator, Linearised, Method, Place, Slopes};
 
 /// x̂, Φ and W by one integration, for flows with few states.
 #[derive(Clone, Debug)]
-pub(super) struct Joint {
+pub(crate) struct Joint {
     integrator: Integrator,
     entries: Vec<(usize, usize)>,
     slopes: Vec<f64>,
@@ -20,28 +20,23 @@ pub(super) struct Joint {
     noise: Vec<f64>,
     /// q, the largest entry of Q
     scale: f64,
-    /// the state of [`Linearised`]
+    /// the state of [`Variational`]
     z: Vec<f64>,
 }
 
 impl Joint {
-    pub fn new(
-        n: usize,
-        outputs: usize,
-        entries: &[(usize, usize)],
-        process_noise: &[f64],
-        method: Method,
-    ) -> Result<Self, Error> {
+    pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self, Error> {
+        let n = flow.system().states().len();
         let scale = process_noise.iter().fold(0.0_f64, |m, q| m.max(*q));
         let noise = match scale > 0.0 {
             true => process_noise.iter().map(|q| q / scale).collect(),
             false => vec![],
         };
-        let dimension = n + n * Linearised::width(n, scale > 0.0);
+        let dimension = n + n * Variational::width(n, scale > 0.0);
         Ok(Self {
             integrator: Integrator::new(method, dimension)?,
-            entries: entries.to_vec(),
-            slopes: vec![0.0; outputs],
+            entries: flow.jacobians().state.places().to_vec(),
+            slopes: vec![0.0; flow.system().outputs().len()],
             curvature: Curvature::default(),
             noise,
             scale,
@@ -56,13 +51,13 @@ impl Joint {
         from: f64,
         to: f64,
         x: &mut [f64],
-        moments: &mut Moments,
+        transition: &mut Transition<Profile>,
     ) -> Result<(), Error> {
         let n = x.len();
         let noisy = !self.noise.is_empty();
-        let width = Linearised::width(n, noisy);
-        Linearised::begin(x, noisy, &mut self.z);
-        let mut flow = Linearised {
+        let width = Variational::width(n, noisy);
+        Variational::begin(x, noisy, &mut self.z);
+        let mut flow = Variational {
             driven,
             entries: &self.entries,
             slopes: &mut self.slopes,
@@ -76,8 +71,8 @@ impl Joint {
             let entries = rows.flat_map(move |row| &row[first..first + n]);
             entries.map(move |e| scale * e)
         };
-        moments.transition.fill(columns(0, 1.0));
-        if let Some(noise) = &mut moments.noise {
+        transition.matrix.fill(columns(0, 1.0));
+        if let Some(noise) = &mut transition.noise {
             noise.fill(columns(n, self.scale));
         }
         Ok(())
@@ -96,7 +91,7 @@ impl Persist for Joint {
 /// In this form no error of the integration makes P indefinite. The state is x̂, then the
 /// rows of (Φ W); W is left out where Q = 0. q is the largest entry of Q: tolerances then see
 /// W in units of time.
-struct Linearised<'a> {
+struct Variational<'a> {
     driven: &'a mut Driven,
     entries: &'a [(usize, usize)],
     /// values of the entries of F
@@ -106,7 +101,7 @@ struct Linearised<'a> {
     noise: &'a [f64],
 }
 
-impl Linearised<'_> {
+impl Variational<'_> {
     /// Entries of a row of (Φ W).
     fn width(n: usize, noisy: bool) -> usize {
         if noisy { 2 * n } else { n }
@@ -125,7 +120,7 @@ impl Linearised<'_> {
     }
 }
 
-impl Dynamics for Linearised<'_> {
+impl Dynamics for Variational<'_> {
     fn dimension(&self) -> usize {
         let n = self.driven.dimension();
         n + n * Self::width(n, !self.noise.is_empty())
@@ -213,11 +208,106 @@ impl Dynamics for Linearised<'_> {
     }
 }
 
+/// How the right-hand sides f, FΦ and FW + WFᵀ depend on x̂, Φ and W: F on each column, and
+/// through ∂F/∂x on x̂.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Curvature {
+    /// ∂F/∂x: its rows are the entries of F
+    pub second: Slopes,
+    /// where the entries of ∂F/∂x were when the terms were made
+    known: Option<Arc<[Place]>>,
+    places: Arc<[Place]>,
+    terms: Vec<Term>,
+}
+
+/// One entry.
+#[derive(Clone, Copy, Debug)]
+enum Term {
+    /// an entry of F
+    First(usize),
+    /// an entry of ∂F/∂x times a number of the state
+    Second { entry: usize, of: usize },
+}
+
+/// Where x̂, Φ and W are in the state.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layout {
+    pub n: usize,
+    /// numbers in a row of (Φ W)
+    pub width: usize,
+}
+
+impl Layout {
+    /// An entry of (Φ W).
+    pub fn at(self, row: usize, column: usize) -> usize {
+        self.n + row * self.width + column
+    }
+}
+
+impl Curvature {
+    /// Writes the Jacobian at the state z, where F has these values at its places and ∂F/∂x is
+    /// [`Curvature::second`].
+    pub fn write(
+        &mut self,
+        layout: Layout,
+        entries: &[(usize, usize)],
+        first: &[f64],
+        z: &[f64],
+        slopes: &mut Slopes,
+    ) {
+        let second = self.second.places();
+        if self.known.as_ref().is_none_or(|k| !Arc::ptr_eq(k, second)) {
+            self.known = Some(second.clone());
+            self.arrange(layout, entries);
+        }
+        let values = slopes.at(&self.places);
+        for (value, term) in values.iter_mut().zip(&self.terms) {
+            *value = match *term {
+                Term::First(entry) => first[entry],
+                Term::Second { entry, of } => self.second.values()[entry] * z[of],
+            };
+        }
+    }
+
+    fn arrange(&mut self, layout: Layout, entries: &[(usize, usize)]) {
+        let mut all: Vec<(Place, Term)> = vec![];
+        let mut add = |row, column, term| all.push((Place { row, column }, term));
+        for (entry, &(i, j)) in entries.iter().enumerate() {
+            add(i, j, Term::First(entry));
+            for (row, of) in affected(layout, i, j) {
+                add(row, of, Term::First(entry));
+            }
+        }
+        // outputs that are no entries of F may follow them
+        let places = self.second.places().iter().enumerate();
+        for (entry, at) in places.filter(|(_, at)| at.row < entries.len()) {
+            let (i, j) = entries[at.row];
+            for (row, of) in affected(layout, i, j) {
+                add(row, at.column, Term::Second { entry, of });
+            }
+        }
+        self.places = all.iter().map(|(place, _)| *place).collect();
+        self.terms = all.into_iter().map(|(_, term)| term).collect();
+    }
+}
+
+/// Which derivatives the entry (i, j) of F adds to, and of what it adds its multiple: (FΦ)ᵢ꜀ has
+/// Φⱼ꜀, and so has (FW)ᵢ꜀ and its mirror image.
+fn affected(layout: Layout, i: usize, j: usize) -> impl Iterator<Item = (usize, usize)> {
+    let n = layout.n;
+    let transition = (0..n).map(move |c| (layout.at(i, c), layout.at(j, c)));
+    let noise = (0..layout.width - n).flat_map(move |c| {
+        let of = layout.at(j, n + c);
+        [(layout.at(i, n + c), of), (layout.at(c, n + i), of)]
+    });
+    transition.chain(noise)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{BetweenSamples, Function, System};
-    use lynkeus_expr::{Graph, Node, jacobian};
+    use crate::{BetweenSamples, Function};
+    use lynkeus_expr::Graph;
 
     /// The Jacobian of x̂, Φ and W together against differences, where F depends on x̂ and W is
     /// not even symmetric; with and without W.
@@ -231,20 +321,17 @@ mod tests {
             (x[0] * 3.0).sin(),
             x[2] * x[2] * x[0] - x[1],
         ];
-        let symbols = x.map(|x| x.node());
         let derivatives = dx.map(|dx| dx.node());
-        let F = jacobian::forward(&g, &derivatives, &symbols).entries;
-        let entries: Vec<(usize, usize)> = F.iter().map(|e| (e.0, e.1)).collect();
-        let outputs: Vec<(String, Node)> = F.iter().map(|e| (String::new(), e.2)).collect();
         let states = x.map(|x| ("x".to_owned(), x.node(), 0.0));
         let signals = [("w".to_owned(), w.node())];
-        let flow = System::new(&g, time.node(), &states, &signals, &derivatives, &outputs);
-        let mut driven = Driven::new(&flow.unwrap(), BetweenSamples::Hold);
+        let flow = Linearised::flow(&g, time.node(), &states, &signals, &derivatives).unwrap();
+        let entries = flow.jacobians().state.places();
+        let mut driven = Driven::new(flow.system(), BetweenSamples::Hold);
         driven.start(&[0.7]);
         for noise in [vec![], vec![0.3, 1.0, 0.5]] {
-            let mut linearised = Linearised {
+            let mut linearised = Variational {
                 driven: &mut driven,
-                entries: &entries,
+                entries,
                 slopes: &mut vec![0.0; entries.len()],
                 curvature: &mut Curvature::default(),
                 noise: &noise,

@@ -1,13 +1,13 @@
 //! The unscented Kalman filter.
 
-use super::Belief;
-use super::along::Along;
-use super::factor::{Factor, factor, substitute};
+use super::belief::Belief;
+use super::kalman::Kalman;
 use super::model::FilterModel;
-use super::root::{Root, dot};
+use super::profile::{Profile, Skyline};
+use super::root::{Factor, Root, dot, factor, substitute};
 use super::sensing::{Believed, Sensing};
-use super::smooth::Correction;
-use super::spanned::{Rows, Spanned};
+use super::smoother::Correction;
+use super::transition::Propagation;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::system::Driven;
 use crate::{Error, EstimatorSettings, Integrator};
@@ -79,18 +79,12 @@ impl SigmaPoints {
 
 /// The filter between its samples.
 #[derive(Clone, Debug)]
-pub(super) struct Unscented {
+pub(crate) struct Ukf {
     pub driven: Driven,
     integrator: Integrator,
     weights: Weights,
     /// what the process noise comes to; none without noise
-    along: Option<Along>,
-    room: Room,
-}
-
-/// Room for points and what is made of them, kept from sample to sample.
-#[derive(Clone, Debug, Default)]
-struct Room {
+    propagation: Option<Propagation>,
     /// x̂ at the end of the way
     centre: Vec<f64>,
     points: Vec<f64>,
@@ -104,123 +98,32 @@ struct Room {
     factor: Factor,
 }
 
-impl Unscented {
+impl Ukf {
     pub fn new(
         model: &FilterModel,
         points: SigmaPoints,
         run: EstimatorSettings,
     ) -> Result<Self, Error> {
         let (n, noise) = (model.dimension(), &model.process_noise);
-        let along = match noise.iter().any(|q| *q > 0.0) {
-            true => Some(Along::new(
-                &model.flow,
-                &model.flow_entries,
-                noise,
-                run.method,
-            )?),
+        let propagation = match noise.iter().any(|q| *q > 0.0) {
+            true => Some(Propagation::new(&model.flow, noise, run.method)?),
             false => None,
         };
         Ok(Self {
-            driven: Driven::new(&model.flow, run.between),
+            driven: Driven::new(model.flow.system(), run.between),
             integrator: Integrator::new(run.method, n)?,
             weights: points.weights(n)?,
-            along,
-            room: Room::default(),
+            propagation,
+            centre: vec![],
+            points: vec![],
+            mean: vec![],
+            shown: vec![],
+            expected: vec![],
+            rows: vec![],
+            extra: vec![],
+            sums: vec![],
+            factor: Factor::default(),
         })
-    }
-
-    /// Each point through the flow; P⁻ = Σ W(…)(…)ᵀ + W, W what the process noise comes to along
-    /// the estimate ([`Along`]), which is exact on linear plants. Where it is to be kept, the transition
-    /// of the linear flow that carries the points best is returned: Φ = DᵀP⁻¹ with the covariance D
-    /// of the points before and after (S. Särkkä, "Unscented Rauch–Tung–Striebel smoother", *IEEE
-    /// Transactions on Automatic Control* 53 (2008) 845–849).
-    pub fn predict(
-        &mut self,
-        belief: &mut Belief,
-        from: f64,
-        to: f64,
-        keep: bool,
-    ) -> Result<Rows, Error> {
-        let Self {
-            driven,
-            integrator,
-            weights,
-            along,
-            room,
-        } = self;
-        let n = belief.x.len();
-        draw(belief, weights.spread, &mut room.points);
-        let (centre, others) = room.points.split_at_mut(n);
-        match along {
-            None => integrator.advance(driven, from, to, centre)?,
-            Some(along) => {
-                room.centre.clone_from(&belief.x);
-                along.advance(driven, belief, from, to, &mut room.centre)?;
-                centre.copy_from_slice(&room.centre);
-            }
-        }
-        for point in others.chunks_exact_mut(n) {
-            integrator.advance(driven, from, to, point)?;
-        }
-        let transition = match keep {
-            true => {
-                let rows = (0..n).flat_map(|i| weights.row(&belief.root, &room.points, n, i));
-                Rows::of(&Spanned::dense(n, rows.collect()))
-            }
-            false => Rows::default(),
-        };
-        weights.centre(&mut room.points, n, &mut belief.x);
-        room.extra.clear();
-        if let Some(along) = along {
-            along.push_root(&mut room.extra);
-        }
-        weights.spread(room, &mut belief.root);
-        Ok(transition)
-    }
-
-    /// The points drawn again from x̂⁻, P⁻; K = P_xz P_zz⁻¹ over the readings that are believed. For
-    /// each of those at an end of their sensor's range they are drawn once more.
-    pub fn correct(
-        &mut self,
-        sensing: &mut Sensing,
-        belief: &mut Belief,
-        t: f64,
-        readings: &[f64],
-        inputs: &[f64],
-    ) -> Result<(), Error> {
-        self.show(sensing, belief, t, inputs)?;
-        let m = readings.len();
-        let (mut inside, mut at_ends) = (vec![], vec![]);
-        for (i, reading) in readings.iter().enumerate() {
-            let spread = self.weights.moment(&self.room.shown, m, i, i);
-            let believed = sensing.judge(i, *reading, self.room.expected[i], spread);
-            if let Some(believed) = believed.filter(|b| spread + b.variance > 0.0) {
-                match believed.end {
-                    None => inside.push(believed),
-                    Some(_) => at_ends.push((believed, self.room.expected[i])),
-                }
-            }
-        }
-        let mut is_moved = false;
-        if !inside.is_empty() {
-            self.take(sensing, belief, m, &inside);
-            is_moved = true;
-        }
-        for (mut believed, before) in at_ends {
-            if is_moved && self.show(sensing, belief, t, inputs).is_err() {
-                // the sensors' model has no value about the estimate as it is now: the others count
-                break;
-            }
-            let i = believed.sensor;
-            let spread = self.weights.moment(&self.room.shown, m, i, i);
-            let moved = self.room.expected[i] - before;
-            if let Some((innovation, noise)) = believed.weighed(moved, spread) {
-                (believed.innovation, believed.variance) = (innovation, noise);
-                self.take(sensing, belief, m, &[believed]);
-                is_moved = true;
-            }
-        }
-        Ok(())
     }
 
     /// Points of the belief beside their mean, and what the sensors show of them.
@@ -231,29 +134,29 @@ impl Unscented {
         t: f64,
         inputs: &[f64],
     ) -> Result<(), Error> {
-        let (room, weights) = (&mut self.room, &self.weights);
+        let weights = self.weights;
         let n = belief.x.len();
-        draw(belief, weights.spread, &mut room.points);
-        room.shown.clear();
+        draw(belief, weights.spread, &mut self.points);
+        self.shown.clear();
         let mut m = 0;
-        for point in room.points.chunks_exact(n) {
+        for point in self.points.chunks_exact(n) {
             let shown = sensing.predict(t, point, inputs)?;
             m = shown.len();
-            room.shown.extend_from_slice(shown);
+            self.shown.extend_from_slice(shown);
         }
-        weights.centre(&mut room.points, n, &mut room.mean);
-        weights.centre(&mut room.shown, m, &mut room.expected);
+        weights.centre(&mut self.points, n, &mut self.mean);
+        weights.centre(&mut self.shown, m, &mut self.expected);
         Ok(())
     }
 
     /// Corrects by readings of `m` sensors, together.
     fn take(&mut self, sensing: &mut Sensing, belief: &mut Belief, m: usize, taken: &[Believed]) {
-        let (room, weights) = (&mut self.room, &self.weights);
+        let weights = self.weights;
         let (n, count) = (belief.x.len(), taken.len());
         let mut variance = vec![0.0; count * count];
         for (a, one) in taken.iter().enumerate() {
             for (b, other) in taken.iter().enumerate() {
-                variance[a * count + b] = weights.moment(&room.shown, m, one.sensor, other.sensor);
+                variance[a * count + b] = weights.moment(&self.shown, m, one.sensor, other.sensor);
             }
             variance[a * count + a] += one.variance;
         }
@@ -261,8 +164,8 @@ impl Unscented {
         let gain: Vec<Vec<f64>> = (0..n)
             .map(|s| {
                 let cross = taken.iter().map(|b| {
-                    let states = room.points.iter().skip(s).step_by(n);
-                    let shown = room.shown.iter().skip(b.sensor).step_by(m);
+                    let states = self.points.iter().skip(s).step_by(n);
+                    let shown = self.shown.iter().skip(b.sensor).step_by(m);
                     weights.sum(states.zip(shown))
                 });
                 solved(&lower, count, cross.collect())
@@ -273,7 +176,7 @@ impl Unscented {
         if let Some(corrections) = &mut sensing.corrections {
             let slopes = taken
                 .iter()
-                .map(|b| weights.row(&belief.root, &room.shown, m, b.sensor));
+                .map(|b| weights.row(&belief.root, &self.shown, m, b.sensor));
             corrections.push(Correction {
                 slopes: slopes.collect(),
                 gains: (0..count).map(column).collect(),
@@ -292,8 +195,8 @@ impl Unscented {
         }
         // P⁺ = Σ W (dx − K dz)(…)ᵀ + K R Kᵀ, which is P⁻ − K P_zz Kᵀ
         let mut dz = vec![0.0; count];
-        let points = room.points.chunks_exact_mut(n);
-        for (dx, shown) in points.zip(room.shown.chunks_exact(m)) {
+        let points = self.points.chunks_exact_mut(n);
+        for (dx, shown) in points.zip(self.shown.chunks_exact(m)) {
             for (dz, b) in dz.iter_mut().zip(taken) {
                 *dz = shown[b.sensor];
             }
@@ -301,12 +204,146 @@ impl Unscented {
                 *dx -= dot(gain, &dz);
             }
         }
-        room.extra.clear();
+        self.extra.clear();
         for (a, b) in taken.iter().enumerate() {
-            room.extra
+            self.extra
                 .extend(gain.iter().map(|k| k[a] * b.variance.sqrt()));
         }
-        weights.spread(room, &mut belief.root);
+        self.spread(&mut belief.root);
+    }
+}
+
+impl Ukf {
+    /// The lower root of Σ W d dᵀ + Σ e eᵀ over points and extra rows. Where the first weight is
+    /// negative the sum is formed, and what it lacks of being definite taken as nothing.
+    fn spread(&mut self, root: &mut Root) {
+        let n = root.n;
+        let Self {
+            weights,
+            points,
+            extra,
+            rows,
+            sums,
+            factor,
+            ..
+        } = self;
+        rows.clear();
+        if weights.centre >= 0.0 {
+            let weighed = points.chunks_exact(n).enumerate();
+            rows.extend(weighed.flat_map(|(k, d)| {
+                let weight = weights.of(k).sqrt();
+                d.iter().map(move |x| weight * x)
+            }));
+            rows.extend_from_slice(extra);
+            sums.resize(n, 0.0);
+            root.of_rows_with(rows, sums);
+            return;
+        }
+        rows.resize(n * n, 0.0);
+        let points = points.chunks_exact(n).enumerate();
+        let points = points.map(|(k, d)| (weights.of(k), d));
+        for (w, d) in points.chain(extra.chunks_exact(n).map(|e| (1.0, e))) {
+            for (k, entry) in rows.iter_mut().enumerate() {
+                *entry += w * d[k / n] * d[k % n];
+            }
+        }
+        root.entries.copy_from_slice(factor.of(rows, n));
+    }
+}
+
+impl Kalman for Ukf {
+    fn driven(&mut self) -> &mut Driven {
+        &mut self.driven
+    }
+
+    /// Each point through the flow; P⁻ = Σ W(…)(…)ᵀ + W, W what the process noise comes to along
+    /// the estimate ([`Propagation`]), which is exact on linear plants. Where it is to be kept, the transition
+    /// of the linear flow that carries the points best is returned: Φ = DᵀP⁻¹ with the covariance D
+    /// of the points before and after (S. Särkkä, "Ukf Rauch–Tung–Striebel smoother", *IEEE
+    /// Transactions on Automatic Control* 53 (2008) 845–849).
+    fn predict(
+        &mut self,
+        belief: &mut Belief,
+        from: f64,
+        to: f64,
+        keep: bool,
+    ) -> Result<Skyline, Error> {
+        let weights = self.weights;
+        let n = belief.x.len();
+        draw(belief, weights.spread, &mut self.points);
+        let (centre, others) = self.points.split_at_mut(n);
+        match &mut self.propagation {
+            None => self
+                .integrator
+                .advance(&mut self.driven, from, to, centre)?,
+            Some(propagation) => {
+                self.centre.clone_from(&belief.x);
+                propagation.advance(&mut self.driven, belief, from, to, &mut self.centre)?;
+                centre.copy_from_slice(&self.centre);
+            }
+        }
+        for point in others.chunks_exact_mut(n) {
+            self.integrator.advance(&mut self.driven, from, to, point)?;
+        }
+        let transition = match keep {
+            true => {
+                let rows = (0..n).flat_map(|i| weights.row(&belief.root, &self.points, n, i));
+                Skyline::of(&Profile::dense(n, rows.collect()))
+            }
+            false => Skyline::default(),
+        };
+        weights.centre(&mut self.points, n, &mut belief.x);
+        self.extra.clear();
+        if let Some(propagation) = &mut self.propagation {
+            propagation.push_root(&mut self.extra);
+        }
+        self.spread(&mut belief.root);
+        Ok(transition)
+    }
+
+    /// The points drawn again from x̂⁻, P⁻; K = P_xz P_zz⁻¹ over the readings that are believed. For
+    /// each of those at an end of their sensor's range they are drawn once more.
+    fn correct(
+        &mut self,
+        sensing: &mut Sensing,
+        belief: &mut Belief,
+        t: f64,
+        readings: &[f64],
+        inputs: &[f64],
+    ) -> Result<(), Error> {
+        self.show(sensing, belief, t, inputs)?;
+        let m = readings.len();
+        let (mut inside, mut at_ends) = (vec![], vec![]);
+        for (i, reading) in readings.iter().enumerate() {
+            let spread = self.weights.moment(&self.shown, m, i, i);
+            let believed = sensing.judge(i, *reading, self.expected[i], spread);
+            if let Some(believed) = believed.filter(|b| spread + b.variance > 0.0) {
+                match believed.end {
+                    None => inside.push(believed),
+                    Some(_) => at_ends.push((believed, self.expected[i])),
+                }
+            }
+        }
+        let mut is_moved = false;
+        if !inside.is_empty() {
+            self.take(sensing, belief, m, &inside);
+            is_moved = true;
+        }
+        for (mut believed, before) in at_ends {
+            if is_moved && self.show(sensing, belief, t, inputs).is_err() {
+                // the sensors' model has no value about the estimate as it is now: the others count
+                break;
+            }
+            let i = believed.sensor;
+            let spread = self.weights.moment(&self.shown, m, i, i);
+            let moved = self.expected[i] - before;
+            if let Some((innovation, noise)) = believed.weighed(moved, spread) {
+                (believed.innovation, believed.variance) = (innovation, noise);
+                self.take(sensing, belief, m, &[believed]);
+                is_moved = true;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -378,49 +415,14 @@ impl Weights {
         let halves: Vec<f64> = apart.map(|d| 0.5 * d / self.spread).collect();
         root.against(&halves)
     }
-
-    /// The lower root of Σ W d dᵀ + Σ e eᵀ over points and extra rows. Where the first weight is
-    /// negative the sum is formed, and what it lacks of being definite taken as nothing.
-    fn spread(&self, room: &mut Room, root: &mut Root) {
-        let n = root.n;
-        let Room {
-            points,
-            extra,
-            rows,
-            sums,
-            factor,
-            ..
-        } = room;
-        rows.clear();
-        if self.centre >= 0.0 {
-            let weighed = points.chunks_exact(n).enumerate();
-            rows.extend(weighed.flat_map(|(k, d)| {
-                let weight = self.of(k).sqrt();
-                d.iter().map(move |x| weight * x)
-            }));
-            rows.extend_from_slice(extra);
-            sums.resize(n, 0.0);
-            root.of_rows_with(rows, sums);
-            return;
-        }
-        rows.resize(n * n, 0.0);
-        let points = points.chunks_exact(n).enumerate();
-        let points = points.map(|(k, d)| (self.of(k), d));
-        for (w, d) in points.chain(extra.chunks_exact(n).map(|e| (1.0, e))) {
-            for (k, entry) in rows.iter_mut().enumerate() {
-                *entry += w * d[k / n] * d[k % n];
-            }
-        }
-        root.entries.copy_from_slice(factor.of(rows, n));
-    }
 }
 
-impl Persist for Unscented {
+impl Persist for Ukf {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.driven.walk(walk)?;
         self.integrator.walk(walk)?;
-        match &mut self.along {
-            Some(along) => along.walk(walk),
+        match &mut self.propagation {
+            Some(propagation) => propagation.walk(walk),
             None => Ok(()),
         }
     }

@@ -1,12 +1,12 @@
 //! Smoothers: the estimate at a sample given later ones.
 
+use super::profile::Skyline;
 use super::root::{Packed, Root, dot};
-use super::spanned::Rows;
 use crate::snapshot::{Damaged, Persist, Walk};
 
 /// What readings did that were taken together.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Correction {
+pub(crate) struct Correction {
     /// their rows of C
     pub slopes: Vec<Vec<f64>>,
     /// their columns of K
@@ -31,9 +31,9 @@ impl Correction {
 
 /// What one sample did.
 #[derive(Clone, Debug)]
-pub(super) struct Step {
+pub(crate) struct Step {
     /// Φ from the sample before; none at the first and at repeated times
-    pub transition: Option<Rows>,
+    pub transition: Option<Skyline>,
     /// x̂⁺ and a root of P⁺
     pub x: Vec<f64>,
     pub root: Packed,
@@ -107,7 +107,7 @@ impl Step {
         walk.numbers(&mut self.x)?;
         self.root.walk(walk)?;
         let transition = &mut self.transition;
-        walk.optional(transition, |walk, transition: &mut Rows| {
+        walk.optional(transition, |walk, transition: &mut Skyline| {
             transition.walk(walk, n)
         })?;
         let count = walk.length(self.corrections.len())?;
@@ -128,14 +128,14 @@ pub struct Smoothed {
 }
 
 #[derive(Clone, Debug, Default)]
-pub(super) struct History {
+pub(crate) struct History {
     steps: Vec<Step>,
     /// of a moving horizon: the states of the window at each sample, row after row
     windows: Vec<Vec<f64>>,
 }
 
 /// What later samples say: x̂ˢ = x̂⁺ − P⁺λ, Pˢ = P⁺ − P⁺ΛP⁺.
-pub(super) struct Adjoint {
+pub(crate) struct Adjoint {
     pub vector: Vec<f64>,
     /// Λ, row by row; empty where no deviations are asked for
     matrix: Vec<f64>,
@@ -255,7 +255,7 @@ impl Adjoint {
     }
 
     /// Φᵀλ.
-    pub fn vector_through(&mut self, transition: &Rows) {
+    pub fn vector_through(&mut self, transition: &Skyline) {
         self.vector = transition.transposed_times(&self.vector);
     }
 
@@ -301,7 +301,7 @@ impl Adjoint {
         }
     }
 
-    fn through(&mut self, transition: &Rows) {
+    fn through(&mut self, transition: &Skyline) {
         let n = self.vector.len();
         self.vector_through(transition);
         if self.matrix.is_empty() {
@@ -309,7 +309,7 @@ impl Adjoint {
         }
         // ΦᵀΛ, then its rows times Φ
         let mut half = vec![0.0; n * n];
-        for ((first, row), from) in transition.iter().zip(self.matrix.chunks_exact(n)) {
+        for ((first, row), from) in transition.rows().zip(self.matrix.chunks_exact(n)) {
             for (phi, into) in row.iter().zip(half.chunks_exact_mut(n).skip(first)) {
                 for (into, from) in into.iter_mut().zip(from) {
                     *into += phi * from;

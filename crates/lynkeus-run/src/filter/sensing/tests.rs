@@ -111,7 +111,7 @@ fn innovations_near_an_end_have_the_size_that_is_said() {
                 reading: Reading::Taken,
                 ..Innovation::default()
             };
-            judge(ALL, End::of(ALL, reading), &mut innovation);
+            judge_near_an_end(ALL, End::of(ALL, reading), &mut innovation);
             if innovation.reading == Reading::Taken {
                 let density = (-0.5 * u * u).exp();
                 let z = innovation.value / innovation.deviation;
@@ -139,7 +139,7 @@ fn limits_out_of_reach_change_nothing() {
         ..Innovation::default()
     };
     let mut innovation = plain;
-    judge(ALL, End::of(ALL, 0.5), &mut innovation);
+    judge_near_an_end(ALL, End::of(ALL, 0.5), &mut innovation);
     assert_eq!(innovation, plain);
     assert_eq!(End::of(ALL, f64::NAN), None);
 }

@@ -6,7 +6,7 @@
 use lynkeus_expr::Graph;
 use nalgebra::{DMatrix, DVector};
 
-use crate::filter::factor::factor;
+use crate::filter::root::factor;
 use crate::filter::tests::exact;
 use crate::filter::{Bounds, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor};
 use crate::{Estimator, Level};

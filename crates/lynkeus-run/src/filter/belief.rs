@@ -1,21 +1,50 @@
-//! An estimate that is kept in its declared ranges, by the covariance's metric.
-//!
-//! min (x − x̂)ᵀP⁻¹(x − x̂) with low ≤ x ≤ high: what is correlated with a state at its bound moves
-//! along. With multipliers μ that vanish but at bounds the solution is x = x̂ + Pμ, so that P, which may be
-//! singular, is never inverted (D. Simon, *IET Control Theory & Applications* 4 (2010) 1303–1318, section 2.4). The
-//! bounds that are met are found as C. L. Lawson and R. J. Hanson do (*Solving Least Squares Problems*,
-//! 1974, chapter 23), on the multipliers: one at a time, those that would pull inward let go.
+//! What is believed of the state, and the ranges in which it is kept.
 
-use super::Bounds;
-use super::factor::{Factor, substitute};
-use super::root::{Root, dot};
+use super::root::{Factor, Root, dot, substitute};
+use crate::snapshot::{Damaged, Persist, Walk};
+
+/// What is believed of the state: its mean and a root of its covariance.
+#[derive(Clone, Debug)]
+pub(crate) struct Belief {
+    pub(crate) x: Vec<f64>,
+    pub(crate) root: Root,
+}
+
+impl Persist for Belief {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.numbers(&mut self.x)?;
+        self.root.walk(walk)
+    }
+}
+
+/// Where a state can be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// smallest value
+    pub low: f64,
+    /// largest value
+    pub high: f64,
+}
+
+/// The nearest place inside, state by state.
+pub(crate) fn confine(x: &mut [f64], bounds: &[Bounds]) {
+    for (x, bounds) in x.iter_mut().zip(bounds) {
+        *x = x.max(bounds.low).min(bounds.high);
+    }
+}
 
 /// A bound that is exceeded by less than this share of a deviation is met.
 const SLACK: f64 = 1e-12;
 
-/// Room for a projection.
+/// Keeps an estimate in its declared ranges, by the covariance's metric.
+///
+/// min (x − x̂)ᵀP⁻¹(x − x̂) with low ≤ x ≤ high: what is correlated with a state at its bound moves
+/// along. With multipliers μ that vanish but at bounds the solution is x = x̂ + Pμ, so that P, which may be
+/// singular, is never inverted (D. Simon, *IET Control Theory & Applications* 4 (2010) 1303–1318, section 2.4). The
+/// bounds that are met are found as C. L. Lawson and R. J. Hanson do (*Solving Least Squares Problems*,
+/// 1974, chapter 23), on the multipliers: one at a time, those that would pull inward let go.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Projection {
+pub(crate) struct Projection {
     bounds: Vec<Bounds>,
     /// P, row by row
     covariance: Vec<f64>,

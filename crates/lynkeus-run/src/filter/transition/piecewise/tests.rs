@@ -1,21 +1,15 @@
 //! Series and doubling against one integration of everything.
 
 use super::*;
-use crate::filter::flow::Joint;
 use crate::filter::root::Root;
-use crate::{BetweenSamples, System, Tolerances};
-use lynkeus_expr::{Expr, Graph, jacobian};
+use crate::filter::transition::joint::Joint;
+use crate::{BetweenSamples, Tolerances};
+use lynkeus_expr::{Expr, Graph};
 
 /// x_i' from x_{i−1} (or the input), x_i, x_{i+1} (or x_i at the end) and the input.
 type Law = for<'g> fn([Expr<'g>; 4], usize) -> Expr<'g>;
 
-struct Chain {
-    flow: System,
-    entries: Vec<(usize, usize)>,
-    n: usize,
-}
-
-fn chain(n: usize, law: Law) -> Chain {
+fn chain(n: usize, law: Law) -> Linearised {
     let g = Graph::new();
     let (time, u) = (g.symbol("time"), g.symbol("u"));
     let x: Vec<_> = (0..n).map(|i| g.symbol(&format!("x{i}"))).collect();
@@ -25,21 +19,11 @@ fn chain(n: usize, law: Law) -> Chain {
             law([left, x[i], x[(i + 1).min(n - 1)], u], i).node()
         })
         .collect();
-    let symbols: Vec<_> = x.iter().map(|x| x.node()).collect();
-    let F = jacobian::forward(&g, &dx, &symbols).entries;
-    let outputs: Vec<_> = F
-        .iter()
-        .map(|e| (format!("{},{}", e.0, e.1), e.2))
-        .collect();
     let states: Vec<_> = (0..n)
-        .map(|i| (format!("x{i}"), symbols[i], 0.3 + 0.1 * (i % 5) as f64))
+        .map(|i| (format!("x{i}"), x[i].node(), 0.3 + 0.1 * (i % 5) as f64))
         .collect();
     let signals = [("u".to_string(), u.node())];
-    Chain {
-        flow: System::new(&g, time.node(), &states, &signals, &dx, &outputs).unwrap(),
-        entries: F.iter().map(|e| (e.0, e.1)).collect(),
-        n,
-    }
+    Linearised::flow(&g, time.node(), &states, &signals, &dx).unwrap()
 }
 
 fn tight(relative: f64) -> Tolerances {
@@ -51,17 +35,16 @@ fn tight(relative: f64) -> Tolerances {
 }
 
 /// x̂, Φ and W over three samples by both ways; the largest relative difference.
-fn differ(chain: &Chain, step: f64, ours: Method, reference: Method) -> f64 {
-    let n = chain.n;
+fn differ(chain: &Linearised, step: f64, ours: Method, reference: Method) -> f64 {
+    let n = chain.system().states().len();
     let noise: Vec<f64> = (0..n)
         .map(|i| 0.01 * f64::from(u8::from(i % 3 != 1)))
         .collect();
-    let outputs = chain.flow.outputs().len();
-    let mut variation = Variation::new(n, outputs, &chain.entries, &noise, ours).unwrap();
-    let mut joint = Joint::new(n, outputs, &chain.entries, &noise, reference).unwrap();
+    let mut variation = Piecewise::new(chain, &noise, ours).unwrap();
+    let mut joint = Joint::new(chain, &noise, reference).unwrap();
     let mut worst = 0.0_f64;
-    let mut x = chain.flow.start().to_vec();
-    let mut driven = Driven::new(&chain.flow, BetweenSamples::Linear);
+    let mut x = chain.system().start().to_vec();
+    let mut driven = Driven::new(chain.system(), BetweenSamples::Linear);
     driven.start(&[0.5]);
     for k in 0..3 {
         let (from, to) = (step * f64::from(k), step * f64::from(k + 1));
@@ -71,7 +54,7 @@ fn differ(chain: &Chain, step: f64, ours: Method, reference: Method) -> f64 {
         };
         driven.aim(from, to, &[0.5 + 0.3 * f64::from(k)]);
         let mut other = x.clone();
-        let mut expected = Moments::start(n, true);
+        let mut expected = Transition::start(n, true);
         joint
             .advance(&mut driven.clone(), from, to, &mut other, &mut expected)
             .unwrap();
@@ -81,7 +64,7 @@ fn differ(chain: &Chain, step: f64, ours: Method, reference: Method) -> f64 {
         driven.arrive();
         let pairs = [
             (x.as_slice(), other.as_slice()),
-            (found.transition.entries(), expected.transition.entries()),
+            (found.matrix.entries(), expected.matrix.entries()),
             (
                 found.noise.as_ref().unwrap().entries(),
                 expected.noise.as_ref().unwrap().entries(),
@@ -161,4 +144,56 @@ fn stiff_flows_are_doubled_up() {
     });
     let off = differ(&bent, 1.0, Method::Adaptive(tight(1e-9)), reference);
     assert!(off < 1e-4, "{off}");
+}
+
+fn at(nodes: &[f64], f: impl Fn(f64) -> f64) -> Vec<Vec<f64>> {
+    nodes.iter().map(|s| vec![f(*s)]).collect()
+}
+
+#[test]
+fn polynomials_are_found_and_others_refused() {
+    let lobatto = Lobatto::new();
+    let line = lobatto.coarse(&at(&[0.0, 0.5, 1.0], |s| 2.0 - 3.0 * s), 1e-12);
+    let line = line.unwrap();
+    assert_eq!(line.len(), 2);
+    assert!((line[0][0] - 2.0).abs() < 1e-15 && (line[1][0] + 3.0).abs() < 1e-14);
+    assert!(
+        lobatto
+            .coarse(&at(&[0.0, 0.5, 1.0], f64::exp), 1e-3)
+            .is_none()
+    );
+    let wave = |s: f64| (0.2 * s).sin();
+    let fit = lobatto.fine(&at(&FINE, wave), 1e-8).unwrap();
+    for k in 0..=10 {
+        let s = 0.1 * f64::from(k);
+        let value: f64 = fit.iter().rev().fold(0.0, |sum, c| sum * s + c[0]);
+        assert!((value - wave(s)).abs() < 1e-8, "{s}");
+    }
+    assert!(
+        lobatto
+            .fine(&at(&FINE, |s| (s - 0.4).abs()), 1e-3)
+            .is_none()
+    );
+    assert!(lobatto.fine(&at(&FINE, |_| f64::NAN), 1e-3).is_none());
+}
+
+/// What is odd about the middle has no even coefficients to fall: its own tell, and what three
+/// nodes take for a line does not meet it elsewhere.
+#[test]
+fn a_wave_that_is_odd_about_the_middle_is_no_line() {
+    let lobatto = Lobatto::new();
+    let three = [FINE[0], FINE[2], FINE[4]];
+    for rate in [1.0, std::f64::consts::TAU] {
+        let wave = |s: f64| (rate * (s - 0.5)).sin();
+        let line = lobatto.coarse(&at(&three, wave), 1e-9).unwrap();
+        assert!(line.len() <= 2);
+        assert!(!meets(&line, FINE[1], &[wave(FINE[1])], 1e-4));
+        assert!(lobatto.fine(&at(&FINE, wave), 1e-6).is_none());
+    }
+    let slow = |s: f64| (0.02 * (s - 0.5)).sin();
+    let line = lobatto.coarse(&at(&three, slow), 1e-6).unwrap();
+    assert!(meets(&line, FINE[1], &[slow(FINE[1])], 1e-6));
+    let fit = lobatto.fine(&at(&FINE, slow), 1e-9).unwrap();
+    assert!(meets(&fit, 0.3, &[slow(0.3)], 1e-9));
+    assert!(!meets(&fit, 0.3, &[f64::NAN], 1e-9));
 }

@@ -7,7 +7,7 @@ use crate::snapshot::{Damaged, Walk};
 
 /// An entry of a sparse matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Entry {
+pub(crate) struct Entry {
     pub row: usize,
     pub column: usize,
     pub value: f64,
@@ -16,13 +16,13 @@ pub(super) struct Entry {
 /// n × n, row by row; what is outside the span of a row is 0 and never touched. The powers of a
 /// banded matrix are of this kind, and grow with their exponent only.
 #[derive(Clone, Debug)]
-pub(super) struct Spanned {
+pub(crate) struct Profile {
     n: usize,
     entries: Vec<f64>,
     spans: Vec<Range<usize>>,
 }
 
-impl Spanned {
+impl Profile {
     pub fn zero(n: usize) -> Self {
         Self {
             n,
@@ -63,6 +63,11 @@ impl Spanned {
     pub fn row(&self, i: usize) -> &[f64] {
         let span = self.span(i);
         &self.entries[i * self.n + span.start..i * self.n + span.end]
+    }
+
+    /// Each row: its first column, and its entries from there.
+    pub fn rows(&self) -> impl Iterator<Item = (usize, &[f64])> {
+        (0..self.n).map(|i| (self.spans[i].start, self.row(i)))
     }
 
     /// All entries, row by row.
@@ -158,22 +163,22 @@ impl Spanned {
 
 /// A matrix of which only the spans are stored.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Rows {
+pub(crate) struct Skyline {
     /// first column of each row, and where its entries begin
     begins: Vec<(usize, usize)>,
     entries: Vec<f64>,
 }
 
-impl Rows {
-    pub(super) fn of(matrix: &Spanned) -> Self {
-        let count = (0..matrix.n).map(|i| matrix.row(i).len()).sum();
+impl Skyline {
+    pub(super) fn of(matrix: &Profile) -> Self {
+        let count = matrix.rows().map(|(_, row)| row.len()).sum();
         let mut rows = Self {
             begins: Vec::with_capacity(matrix.n),
             entries: Vec::with_capacity(count),
         };
-        for i in 0..matrix.n {
-            rows.begins.push((matrix.span(i).start, rows.entries.len()));
-            rows.entries.extend_from_slice(matrix.row(i));
+        for (first, row) in matrix.rows() {
+            rows.begins.push((first, rows.entries.len()));
+            rows.entries.extend_from_slice(row);
         }
         rows
     }
@@ -186,7 +191,7 @@ impl Rows {
     }
 
     /// Each row: its first column, and its entries from there.
-    pub fn iter(&self) -> impl Iterator<Item = (usize, &[f64])> {
+    pub fn rows(&self) -> impl Iterator<Item = (usize, &[f64])> {
         self.begins.iter().enumerate().map(|(i, &(first, begin))| {
             let end = self.begins.get(i + 1).map_or(self.entries.len(), |b| b.1);
             (first, &self.entries[begin..end])
@@ -196,13 +201,13 @@ impl Rows {
     /// What `earlier` and then this one do: their product.
     pub fn after(&self, earlier: &Self) -> Self {
         let n = self.begins.len();
-        let mut product = Spanned::zero(n);
-        let mut dense = Spanned::zero(n);
-        for (i, (first, row)) in earlier.iter().enumerate() {
+        let mut product = Profile::zero(n);
+        let mut dense = Profile::zero(n);
+        for (i, (first, row)) in earlier.rows().enumerate() {
             let entries = row.iter().enumerate();
             entries.for_each(|(k, entry)| dense.add_at(i, first + k, *entry));
         }
-        for (i, (first, row)) in self.iter().enumerate() {
+        for (i, (first, row)) in self.rows().enumerate() {
             let entries = row.iter().enumerate();
             entries.for_each(|(k, entry)| product.add_row(i, *entry, &dense, first + k));
         }
@@ -211,7 +216,7 @@ impl Rows {
 
     /// Of n rows and columns.
     pub fn walk(&mut self, walk: &mut Walk<'_>, n: usize) -> Result<(), Damaged> {
-        let spans = self.iter().map(|(first, row)| first..first + row.len());
+        let spans = self.rows().map(|(first, row)| first..first + row.len());
         let mut spans: Vec<Range<usize>> = spans.collect();
         spans.resize(n, 0..0);
         self.begins.resize(n, (0, 0));
@@ -229,7 +234,7 @@ impl Rows {
     /// Mᵀv.
     pub fn transposed_times(&self, v: &[f64]) -> Vec<f64> {
         let mut result = vec![0.0; v.len()];
-        for (factor, (first, row)) in v.iter().zip(self.iter()) {
+        for (factor, (first, row)) in v.iter().zip(self.rows()) {
             for (into, entry) in result[first..].iter_mut().zip(row) {
                 *into += factor * entry;
             }
@@ -249,10 +254,10 @@ mod tests {
     #[test]
     fn spans_grow_with_products_and_hold_what_dense_ones_do() {
         let sparse = [entry(0, 1, 2.0), entry(1, 1, -1.0), entry(2, 0, 3.0)];
-        let mut once = Spanned::zero(3);
-        once.add_product(1.0, &sparse, &Spanned::identity(3));
+        let mut once = Profile::zero(3);
+        once.add_product(1.0, &sparse, &Profile::identity(3));
         assert_eq!(once.span(0), 1..2);
-        let mut twice = Spanned::zero(3);
+        let mut twice = Profile::zero(3);
         twice.add_product(0.5, &sparse, &once);
         // ½A² for A = [[0, 2, 0], [0, −1, 0], [3, 0, 0]]
         assert_eq!(
@@ -266,7 +271,7 @@ mod tests {
         );
         assert!((twice.norm() - 21.0_f64.sqrt()).abs() < 1e-15);
         assert_eq!(
-            Rows::of(&twice).transposed_times(&[1.0, 2.0, 3.0]),
+            Skyline::of(&twice).transposed_times(&[1.0, 2.0, 3.0]),
             [-2.0, 10.0, 6.0]
         );
         twice.clear();
@@ -277,11 +282,11 @@ mod tests {
     #[test]
     fn one_after_the_other_is_the_product() {
         let rows = |entries: &[Entry]| {
-            let mut matrix = Spanned::zero(3);
+            let mut matrix = Profile::zero(3);
             entries
                 .iter()
                 .for_each(|e| matrix.add_at(e.row, e.column, e.value));
-            Rows::of(&matrix)
+            Skyline::of(&matrix)
         };
         let later = rows(&[entry(0, 1, 2.0), entry(1, 1, -1.0), entry(2, 0, 3.0)]);
         let earlier = rows(&[
@@ -299,7 +304,7 @@ mod tests {
         assert_eq!(column(0), [8.0, 0.0, 10.0]);
         assert_eq!(column(1), [-4.0, 0.0, -5.0]);
         assert_eq!(column(2), [3.0, 0.0, 0.0]);
-        let identity = Rows::of(&Spanned::identity(3));
+        let identity = Skyline::of(&Profile::identity(3));
         assert_eq!(identity.after(&identity), identity);
     }
 }

@@ -6,29 +6,28 @@
 //!
 //! with min ≤ x_i ≤ max, φ the flow between samples and x̄, P̄ what the filter knew before the
 //! window. Each Gauss–Newton step is the minimum of the problem linearised along the present
-//! trajectory ([`problem`]), found by Kalman smoothers, so that its band structure is used and no
+//! trajectory ([`quadratic`]), found by Kalman smoothers, so that its band structure is used and no
 //! noise need be invertible. Steps that do not shrink are shortened (P. Deuflhard, *Newton Methods
 //! for Nonlinear Problems*, 2004, 4.3: the natural monotonicity test).
 
-mod pass;
-mod problem;
-mod row;
+mod quadratic;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::extended::Extended;
+use super::belief::{Belief, Bounds, confine};
+use super::ekf::Ekf;
+use super::kalman::Kalman;
 use super::model::FilterModel;
-use super::root::Root;
-use super::sensing::Sensing;
-use super::smooth::Step;
-use super::stage::Stage;
-use super::{Belief, Bounds, confine};
+use super::profile::Skyline;
+use super::root::{Root, dot};
+use super::sensing::{Believed, Sensing};
+use super::smoother::{History, Step};
+use super::transition::Stage;
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::system::Driven;
 use crate::{Error, EstimatorSettings};
-use pass::{Linear, Pass, Pin, Way, corrected, judged, seen};
-use problem::{Problem, Solution};
-use row::Row;
+use quadratic::{Linear, Pass, Pin, Problem, Seen, Solution, carried, corrected};
 
 /// Most Gauss–Newton steps per sample,
 const STEPS: usize = 40;
@@ -40,8 +39,8 @@ const SMALL: f64 = 1e-6;
 const NOISE: f64 = 1e-3;
 
 #[derive(Clone, Debug)]
-pub(super) struct Horizon {
-    pub engine: Extended,
+pub(crate) struct Mhe {
+    pub engine: Ekf,
     length: usize,
     sensors: usize,
     bounds: Vec<Bounds>,
@@ -50,20 +49,13 @@ pub(super) struct Horizon {
     rows: VecDeque<Row>,
     /// what a smoother needs is kept
     keep: bool,
-    /// what the last correction leaves for a smoother
-    done: Done,
+    /// the states of the last window, row after row, for a smoother
+    window: Vec<f64>,
+    /// the row that left it
+    left: Option<Step>,
 }
 
-/// What a correction leaves for a smoother.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Done {
-    /// the states of the window, row after row
-    pub window: Vec<f64>,
-    /// the row that left
-    pub left: Option<Step>,
-}
-
-impl Persist for Horizon {
+impl Persist for Mhe {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.engine.walk(walk)?;
         self.prior.walk(walk)?;
@@ -80,7 +72,7 @@ impl Persist for Horizon {
     }
 }
 
-impl Horizon {
+impl Mhe {
     pub fn new(
         model: &FilterModel,
         length: usize,
@@ -96,71 +88,35 @@ impl Horizon {
             return Err(Error::setting("bounds", expected, bounds.len()));
         }
         Ok(Self {
-            engine: Extended::new(&model.flow, &model.flow_entries, &model.process_noise, run)?,
+            engine: Ekf::new(&model.flow, &model.process_noise, run)?,
             length,
             sensors: model.sensors.len(),
             bounds,
             prior: Belief {
-                x: model.flow.start().to_vec(),
+                x: model.flow.system().start().to_vec(),
                 root: Root::diagonal(&model.initial_variance),
             },
             rows: VecDeque::new(),
             keep,
-            done: Done::default(),
+            window: vec![],
+            left: None,
         })
     }
 
-    /// The new row's readings are judged by what the filter expects, then the window is solved.
-    pub fn correct(
-        &mut self,
-        sensing: &mut Sensing,
-        belief: &mut Belief,
-        t: f64,
-        readings: &[f64],
-        inputs: &[f64],
-    ) -> Result<(), Error> {
-        self.done = Done::default();
-        let taken = judged(sensing, belief, t, readings, inputs)?;
-        let mut guess = belief.x.clone();
-        confine(&mut guess, &self.bounds);
-        self.rows.push_back(Row {
-            t,
-            inputs: inputs.to_vec(),
-            readings: taken,
-            guess,
-            ..Row::default()
-        });
-        let solved = self.solve(sensing)?;
-        sensing.health.unsolved += usize::from(!solved.is_minimum);
-        if let Some(newest) = self.rows.back() {
-            belief.x.copy_from_slice(&newest.guess);
-        }
-        // A bound that is met says where the estimate is, and not how sure it is: taken for an exact
-        // reading it would leave no variance, and a gate that keeps every later reading out.
-        belief.root.clone_from(&solved.root);
-        if self.keep {
-            let guesses = self.rows.iter().flat_map(|row| &row.guess);
-            self.done.window = guesses.copied().collect();
-        }
-        if self.rows.len() > self.length {
-            self.shorten(solved);
-        }
-        // the flow goes on from the newest row
-        self.engine.driven.start(inputs);
-        Ok(())
-    }
-
-    /// What the last correction leaves for a smoother.
-    pub fn take_done(&mut self) -> Done {
-        std::mem::take(&mut self.done)
+    /// Leaves to a smoother what the last correction has.
+    pub fn leave(&mut self, history: &mut History) {
+        history.push_window(std::mem::take(&mut self.window));
+        self.left
+            .take()
+            .into_iter()
+            .for_each(|step| history.push(step));
     }
 
     /// The rows of the window for a smoother; none where the problem has no value about them.
     pub fn steps(&self, sensing: &Sensing) -> Option<Vec<Step>> {
         let mut own = self.clone();
         let problem = own.linearise(&mut sensing.clone()).ok()?;
-        let pins = self.rows.iter().map(|row| row.met.iter().copied());
-        let pins: Vec<Vec<Pin>> = pins.map(|met| met.map(Pin::from).collect()).collect();
+        let pins: Vec<Vec<Pin>> = self.rows.iter().map(|row| row.met.clone()).collect();
         let passes = problem.forward(&pins);
         let mut steps: Vec<Step> = passes.into_iter().map(Pass::kept).collect();
         if let (Some(first), Some(row)) = (steps.first_mut(), self.rows.front()) {
@@ -180,8 +136,14 @@ impl Horizon {
 
     /// The first row leaves. What is known before the second are the states as the window has
     /// them. A bound that was met there told where the state is, and not that it will never leave.
-    fn shorten(&mut self, solved: Solved) {
-        let Solved { passes, rows, .. } = solved;
+    fn shorten(&mut self, solved: GaussNewtonStep) {
+        let GaussNewtonStep {
+            solution,
+            rows,
+            free,
+            ..
+        } = solved;
+        let passes = solution.passes.unwrap_or(free);
         let (mut passes, mut rows) = (passes.into_iter(), rows.into_iter().skip(1));
         let (Some(first), Some(second), Some(linear)) = (passes.next(), passes.next(), rows.next())
         else {
@@ -198,7 +160,7 @@ impl Horizon {
         };
         self.prior = match met {
             false => second.before,
-            true => linear.way.carry(&self.prior, Some(&free)).0,
+            true => carried(linear.stage.as_ref(), &self.prior, Some(&free)).0,
         };
         let left = self.rows.pop_front();
         if let Some(first) = self.rows.front_mut() {
@@ -206,15 +168,15 @@ impl Horizon {
         }
         if self.keep {
             step.transition = left.and_then(|row| row.entered);
-            self.done.left = Some(step);
+            self.left = Some(step);
             self.rows[0].entered = second.transition.map(Arc::unwrap_or_clone);
         }
     }
 
     /// Gauss–Newton steps from the guesses to the minimum.
-    fn solve(&mut self, sensing: &mut Sensing) -> Result<Solved, Error> {
+    fn solve(&mut self, sensing: &mut Sensing) -> Result<GaussNewtonStep, Error> {
         let mut share = 1.0;
-        let mut best: Option<Tried> = None;
+        let mut best: Option<GaussNewtonStep> = None;
         for _ in 0..STEPS {
             let tried = match (self.tried(sensing), &best) {
                 // the plant has no value along a step that was too long
@@ -243,7 +205,7 @@ impl Horizon {
     }
 
     /// One step from the guesses.
-    fn tried(&mut self, sensing: &mut Sensing) -> Result<Tried, Error> {
+    fn tried(&mut self, sensing: &mut Sensing) -> Result<GaussNewtonStep, Error> {
         let met = self.rows.iter().map(|row| row.met.clone()).collect();
         let problem = self.linearise(sensing)?;
         let solution = problem.solve(met);
@@ -255,7 +217,7 @@ impl Horizon {
                 step = step.max((new - old).abs() / deviation);
             }
         }
-        Ok(Tried {
+        Ok(GaussNewtonStep {
             from: self.rows.iter().map(|row| row.guess.clone()).collect(),
             step,
             solution,
@@ -265,7 +227,7 @@ impl Horizon {
     }
 
     /// A share of a step from where it was tried.
-    fn go(&mut self, tried: &Tried, share: f64) {
+    fn go(&mut self, tried: &GaussNewtonStep, share: f64) {
         let all = self.rows.iter_mut().zip(&tried.from);
         for ((row, from), (x, met)) in all.zip(tried.solution.x.iter().zip(&tried.solution.met)) {
             for (guess, (from, to)) in row.guess.iter_mut().zip(from.iter().zip(x)) {
@@ -282,20 +244,16 @@ impl Horizon {
         }
     }
 
-    fn settle(&mut self, tried: Tried, converged: bool) -> Solved {
-        self.go(&tried, 1.0);
+    /// To the end of the last step.
+    fn settle(&mut self, mut last: GaussNewtonStep, converged: bool) -> GaussNewtonStep {
+        self.go(&last, 1.0);
         if converged {
-            for (row, linear) in self.rows.iter_mut().zip(&tried.rows) {
-                row.stage = linear.way.stage();
+            for (row, linear) in self.rows.iter_mut().zip(&last.rows) {
+                row.stage.clone_from(&linear.stage);
             }
         }
-        let root = tried.free.last().map(|pass| pass.after.root.clone());
-        Solved {
-            root: root.unwrap_or_else(|| self.prior.root.clone()),
-            passes: tried.solution.passes.unwrap_or(tried.free),
-            rows: tried.rows,
-            is_minimum: converged && tried.solution.is_least,
-        }
+        last.solution.is_least &= converged;
+        last
     }
 
     /// The problem about the guesses, and the Kalman filter of it without bounds.
@@ -304,20 +262,23 @@ impl Horizon {
         let mut rows: Vec<Linear> = Vec::with_capacity(count);
         let mut free: Vec<Pass> = Vec::with_capacity(count);
         for (k, row) in self.rows.iter().enumerate() {
-            let way = match (k.checked_sub(1).map(|k| &self.rows[k]), free.last()) {
-                (Some(from), Some(_)) if row.t <= from.t => Way::Same,
-                (Some(from), Some(last)) => match &row.stage {
-                    Some(stage) => Way::Over(Arc::clone(stage)),
-                    None => Way::Over(Arc::new(between(&mut self.engine, from, row, last)?)),
-                },
-                _ => Way::First,
+            let stage = match (k.checked_sub(1).map(|k| &self.rows[k]), free.last()) {
+                (Some(from), Some(last)) if row.t > from.t => Some(match &row.stage {
+                    Some(stage) => Arc::clone(stage),
+                    None => Arc::new(between(&mut self.engine, from, row, last)?),
+                }),
+                _ => None,
             };
-            let before = way.carry(&self.prior, free.last());
+            let before = carried(stage.as_ref(), &self.prior, free.last());
             let spread = (0..row.guess.len()).map(|i| before.0.root.deviation(i));
             let spread: Vec<f64> = spread.collect();
             let seen = seen(sensing, row)?;
             free.push(corrected(&seen, &spread, &[], before));
-            rows.push(Linear { way, seen, spread });
+            rows.push(Linear {
+                stage,
+                seen,
+                spread,
+            });
         }
         Ok(Problem {
             prior: &self.prior,
@@ -328,8 +289,69 @@ impl Horizon {
     }
 }
 
+impl Kalman for Mhe {
+    fn driven(&mut self) -> &mut Driven {
+        &mut self.engine.driven
+    }
+
+    /// By the extended filter, the estimate within its bounds.
+    fn predict(
+        &mut self,
+        belief: &mut Belief,
+        from: f64,
+        to: f64,
+        keep: bool,
+    ) -> Result<Skyline, Error> {
+        let result = self.engine.predict(belief, from, to, keep);
+        confine(&mut belief.x, &self.bounds);
+        result
+    }
+
+    /// The new row's readings are judged by what the filter expects, then the window is solved.
+    fn correct(
+        &mut self,
+        sensing: &mut Sensing,
+        belief: &mut Belief,
+        t: f64,
+        readings: &[f64],
+        inputs: &[f64],
+    ) -> Result<(), Error> {
+        (self.window, self.left) = (vec![], None);
+        let mut taken = vec![];
+        sensing.judge_all(belief, t, readings, inputs, &mut taken)?;
+        let mut guess = belief.x.clone();
+        confine(&mut guess, &self.bounds);
+        self.rows.push_back(Row {
+            t,
+            inputs: inputs.to_vec(),
+            readings: taken,
+            guess,
+            ..Row::default()
+        });
+        let solved = self.solve(sensing)?;
+        sensing.health.unsolved += usize::from(!solved.solution.is_least);
+        if let Some(newest) = self.rows.back() {
+            belief.x.copy_from_slice(&newest.guess);
+        }
+        // A bound that is met says where the estimate is, and not how sure it is: taken for an exact
+        // reading it would leave no variance, and a gate that keeps every later reading out.
+        let newest = solved.free.last().map(|pass| &pass.after.root);
+        belief.root.clone_from(newest.unwrap_or(&self.prior.root));
+        if self.keep {
+            let guesses = self.rows.iter().flat_map(|row| &row.guess);
+            self.window = guesses.copied().collect();
+        }
+        if self.rows.len() > self.length {
+            self.shorten(solved);
+        }
+        // the flow goes on from the newest row
+        self.engine.driven.start(inputs);
+        Ok(())
+    }
+}
+
 /// The way between two rows, about the guess at the first.
-fn between(engine: &mut Extended, from: &Row, to: &Row, last: &Pass) -> Result<Stage, Error> {
+fn between(engine: &mut Ekf, from: &Row, to: &Row, last: &Pass) -> Result<Stage, Error> {
     engine.driven.start(&from.inputs);
     engine.driven.aim(from.t, to.t, &to.inputs);
     let about = Belief {
@@ -340,7 +362,7 @@ fn between(engine: &mut Extended, from: &Row, to: &Row, last: &Pass) -> Result<S
 }
 
 /// A Gauss–Newton step.
-struct Tried {
+struct GaussNewtonStep {
     from: Vec<Vec<f64>>,
     /// its length, in deviations
     step: f64,
@@ -349,20 +371,77 @@ struct Tried {
     free: Vec<Pass>,
 }
 
-impl Tried {
+impl GaussNewtonStep {
     /// Whether it is no more than the integration's own error.
     fn is_last(&self, before: f64) -> bool {
         self.step < SMALL || (self.step < NOISE && self.step > 0.5 * before)
     }
 }
 
-/// A window that is solved, as well as it can be.
-struct Solved {
-    /// of the newest row's covariance by the readings alone
-    root: Root,
-    passes: Vec<Pass>,
-    rows: Vec<Linear>,
-    is_minimum: bool,
+/// A sample in the window.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Row {
+    pub t: f64,
+    pub inputs: Vec<f64>,
+    pub readings: Vec<Believed>,
+    /// the trajectory about which the problem is linearised
+    pub guess: Vec<f64>,
+    /// bounds that are met
+    pub met: Vec<Pin>,
+    /// the way from the row before, about a guess from which the present one differs by no more than the
+    /// last step: the next window begins with it
+    pub stage: Option<Arc<Stage>>,
+    /// Φ from the row before, which has left; where a smoother will ask for it
+    pub entered: Option<Skyline>,
+}
+
+impl Row {
+    /// Of so many inputs and states, for a walk over it.
+    pub fn make_room(&mut self, inputs: usize, states: usize) {
+        self.inputs.resize(inputs, 0.0);
+        self.guess.resize(states, 0.0);
+    }
+
+    /// Of a plant with so many sensors.
+    pub fn walk(&mut self, walk: &mut Walk<'_>, sensors: usize) -> Result<(), Damaged> {
+        let states = self.guess.len();
+        walk.number(&mut self.t)?;
+        walk.numbers(&mut self.inputs)?;
+        walk.numbers(&mut self.guess)?;
+        let count = walk.length(self.readings.len())?;
+        self.readings.resize(count, Believed::default());
+        for believed in &mut self.readings {
+            believed.walk(walk, sensors)?;
+        }
+        let count = walk.length(self.met.len())?;
+        self.met.resize(count, Pin::default());
+        for met in &mut self.met {
+            walk.below(&mut met.state, states)?;
+            walk.number(&mut met.value)?;
+        }
+        walk.optional(&mut self.stage, |walk, stage| {
+            Arc::make_mut(stage).walk(walk, states)
+        })?;
+        walk.optional(&mut self.entered, |walk, entered| {
+            entered.walk(walk, states)
+        })
+    }
+}
+
+/// The readings of a row, h linearised at its guess.
+pub(crate) fn seen(sensing: &mut Sensing, row: &Row) -> Result<Vec<Seen>, Error> {
+    let h = sensing.evaluate(row.t, &row.guess, &row.inputs)?.to_vec();
+    let seen = |believed: &Believed| {
+        let slopes = sensing.slopes(believed.sensor);
+        let offset = h[believed.sensor] - dot(&slopes, &row.guess);
+        let (value, variance) = believed.about(h[believed.sensor])?;
+        Some(Seen {
+            value: value - offset,
+            variance,
+            slopes,
+        })
+    };
+    Ok(row.readings.iter().filter_map(seen).collect())
 }
 
 #[cfg(test)]

@@ -7,9 +7,13 @@
 //! minimum as one likes, whatever the bounds: each of its steps is a smoother in which every bounded
 //! state is drawn to a value with some variance. Sets then go on from what it ends with.
 
-use super::pass::{Linear, Pass, Pin, Smooth, backward, corrected};
-use super::row::Met;
-use crate::filter::{Belief, Bounds};
+use std::sync::Arc;
+
+use crate::filter::belief::{Belief, Bounds, confine};
+use crate::filter::profile::Skyline;
+use crate::filter::root::{Packed, Root, dot};
+use crate::filter::smoother::{Adjoint, Correction, Step};
+use crate::filter::transition::Stage;
 
 /// Most changes of a set before it is taken to go round.
 const CHANGES: usize = 12;
@@ -24,7 +28,7 @@ const GAP: f64 = 1e-10;
 const SHORT: f64 = 0.995;
 
 /// The problem.
-pub(super) struct Problem<'a> {
+pub(crate) struct Problem<'a> {
     pub prior: &'a Belief,
     pub bounds: &'a [Bounds],
     pub rows: Vec<Linear>,
@@ -33,11 +37,11 @@ pub(super) struct Problem<'a> {
 }
 
 /// What solves it.
-pub(super) struct Solution {
+pub(crate) struct Solution {
     /// the states, row by row
     pub x: Vec<Vec<f64>>,
     /// the bounds that they meet
-    pub met: Vec<Vec<Met>>,
+    pub met: Vec<Vec<Pin>>,
     /// the filter with these for exact readings; none where there are none
     pub passes: Option<Vec<Pass>>,
     /// whether its cost is the least one
@@ -66,7 +70,7 @@ struct Change {
 
 impl Problem<'_> {
     /// The least cost, from a first guess at the bounds that are met.
-    pub fn solve(&self, met: Vec<Vec<Met>>) -> Solution {
+    pub fn solve(&self, met: Vec<Vec<Pin>>) -> Solution {
         let free = backward(&self.free);
         if self.are_inside(&free) {
             let met = vec![vec![]; self.rows.len()];
@@ -81,7 +85,7 @@ impl Problem<'_> {
         }
         Solution {
             x,
-            passes: Some(self.forward(&pins(&met))),
+            passes: Some(self.forward(&met)),
             met,
             is_least,
         }
@@ -91,7 +95,7 @@ impl Problem<'_> {
     pub fn forward(&self, pins: &[Vec<Pin>]) -> Vec<Pass> {
         let mut passes: Vec<Pass> = vec![];
         for (linear, pins) in self.rows.iter().zip(pins) {
-            let before = linear.way.carry(self.prior, passes.last());
+            let before = carried(linear.stage.as_ref(), self.prior, passes.last());
             passes.push(corrected(&linear.seen, &linear.spread, pins, before));
         }
         passes
@@ -105,9 +109,9 @@ impl Problem<'_> {
     }
 
     /// By sets; none where they go round, or do not hold the states.
-    fn by_sets(&self, mut met: Vec<Vec<Met>>) -> Option<Solution> {
+    fn by_sets(&self, mut met: Vec<Vec<Pin>>) -> Option<Solution> {
         for _ in 0..CHANGES {
-            let passes = self.forward(&pins(&met));
+            let passes = self.forward(&met);
             let found = backward(&passes);
             if !self.change(&mut met, &found) {
                 let holds = self.are_inside(&found);
@@ -118,17 +122,15 @@ impl Problem<'_> {
     }
 
     /// Bounds that are exceeded are met from now on; those that pull inward are let go.
-    fn change(&self, met: &mut [Vec<Met>], found: &[Smooth]) -> bool {
+    fn change(&self, met: &mut [Vec<Pin>], found: &[Smooth]) -> bool {
         let mut changed = false;
-        for (met, Smooth { x, forces }) in met.iter_mut().zip(found) {
+        for (met, Smooth { x, pushes }) in met.iter_mut().zip(found) {
             let before = met.len();
-            let mut place = 0;
-            met.retain(|&Met { state, bound }| {
-                let force = forces.iter().find(|f| f.place == place);
-                let force = force.map_or(0.0, |f| f.push);
-                place += 1;
-                let Bounds { low, high } = self.bounds[state];
-                let outward = if bound == low { -force } else { force };
+            let mut pushes = pushes.iter();
+            met.retain(|pin| {
+                let force = pushes.next().copied().unwrap_or(0.0);
+                let Bounds { low, high } = self.bounds[pin.state];
+                let outward = if pin.value == low { -force } else { force };
                 // a single value pushes either way
                 low == high || outward <= 0.0
             });
@@ -138,7 +140,7 @@ impl Problem<'_> {
                     continue;
                 };
                 if !met.iter().any(|m| m.state == state) {
-                    met.push(Met { state, bound });
+                    met.push(Pin::at(state, bound));
                     changed = true;
                 }
             }
@@ -148,7 +150,7 @@ impl Problem<'_> {
 
     /// By an interior point method: the states, the bounds that they meet, and whether the cost is
     /// the least one.
-    fn by_interior_point(&self, free: Vec<Smooth>) -> (Vec<Vec<f64>>, Vec<Vec<Met>>, bool) {
+    fn by_interior_point(&self, free: Vec<Smooth>) -> (Vec<Vec<f64>>, Vec<Vec<Pin>>, bool) {
         let mut x: Vec<Vec<f64>> = free.into_iter().map(|row| row.x).collect();
         let mut sides = self.sides(&mut x);
         let mut off = 1.0;
@@ -187,26 +189,20 @@ impl Problem<'_> {
         is_least &= all.all(|(x, bounds)| exceeded(*x, *bounds).is_none());
         let mut met = self.single();
         for side in sides.iter().filter(|s| s.force > s.room) {
-            met[side.row].push(Met {
-                state: side.state,
-                bound: side.bound,
-            });
+            met[side.row].push(Pin::at(side.state, side.bound));
             x[side.row][side.state] = side.bound;
         }
         for row in &mut x {
-            super::confine(row, self.bounds);
+            confine(row, self.bounds);
         }
         (x, met, is_least)
     }
 
     /// The bounds of states that have one value alone.
-    fn single(&self) -> Vec<Vec<Met>> {
+    fn single(&self) -> Vec<Vec<Pin>> {
         let states = self.bounds.iter().enumerate();
         let single = states.filter(|(_, b)| b.low == b.high);
-        let met = single.map(|(state, b)| Met {
-            state,
-            bound: b.low,
-        });
+        let met = single.map(|(state, b)| Pin::at(state, b.low));
         vec![met.collect(); self.rows.len()]
     }
 
@@ -248,8 +244,7 @@ impl Problem<'_> {
         sides: &[Side],
         product: impl Fn(usize) -> f64,
     ) -> Vec<Vec<f64>> {
-        let single = self.single();
-        let mut all = pins(&single);
+        let mut all = self.single();
         let mut k = 0;
         while let Some(first) = sides.get(k) {
             // both sides of a state draw at it together
@@ -273,7 +268,7 @@ impl Problem<'_> {
 }
 
 impl Solution {
-    fn least(found: Vec<Smooth>, met: Vec<Vec<Met>>, passes: Option<Vec<Pass>>) -> Self {
+    fn least(found: Vec<Smooth>, met: Vec<Vec<Pin>>, passes: Option<Vec<Pass>>) -> Self {
         Self {
             x: found.into_iter().map(|smooth| smooth.x).collect(),
             met,
@@ -310,11 +305,6 @@ fn longest(sides: &[Side], changes: &[Change]) -> f64 {
     share
 }
 
-fn pins(met: &[Vec<Met>]) -> Vec<Vec<Pin>> {
-    let row = |met: &Vec<Met>| met.iter().copied().map(Pin::from).collect();
-    met.iter().map(row).collect()
-}
-
 /// The bound that a state is beyond, by more than rounding.
 fn exceeded(x: f64, Bounds { low, high }: Bounds) -> Option<f64> {
     let slack = 1e-9 * (high - low).min(x.abs().max(1e-3));
@@ -323,4 +313,189 @@ fn exceeded(x: f64, Bounds { low, high }: Bounds) -> Option<f64> {
         (_, true) => Some(high),
         _ => None,
     }
+}
+
+/// What is left of a state's deviation where the window holds it by other means: another reading of it
+/// says nothing, and its gain would be rounding.
+const HELD: f64 = 1e-9;
+
+/// A row given the whole window.
+pub(crate) struct Smooth {
+    pub x: Vec<f64>,
+    /// how hard each of its pins pushes its state upward
+    pub pushes: Vec<f64>,
+}
+
+/// A row of the linearised problem.
+pub(crate) struct Linear {
+    /// the way from the row before; none to the first, and to one at the same instant
+    pub stage: Option<Arc<Stage>>,
+    pub seen: Vec<Seen>,
+    /// deviations of the states by all readings up to the row before, without bounds
+    pub spread: Vec<f64>,
+}
+
+/// A reading: cᵀx = value, with noise.
+pub(crate) struct Seen {
+    pub slopes: Vec<f64>,
+    pub value: f64,
+    pub variance: f64,
+}
+
+/// A state that is drawn to a value.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pin {
+    pub state: usize,
+    pub value: f64,
+    /// 0 where it is held there
+    pub variance: f64,
+}
+
+impl Pin {
+    /// Held at a bound.
+    pub fn at(state: usize, bound: f64) -> Self {
+        Self {
+            state,
+            value: bound,
+            variance: 0.0,
+        }
+    }
+}
+
+/// One row of a forward pass.
+pub(crate) struct Pass {
+    pub before: Belief,
+    pub after: Belief,
+    /// the root before the pins, where there are any
+    pub by_readings: Option<Root>,
+    /// Φ from the row before; none of the first
+    pub transition: Option<Arc<Skyline>>,
+    pub readings: Vec<Correction>,
+    /// what each pin did; none of a state that is held by other means
+    pub pins: Vec<Option<Correction>>,
+}
+
+impl Pass {
+    /// The root by the readings alone.
+    pub fn by_readings(&self) -> &Root {
+        self.by_readings.as_ref().unwrap_or(&self.after.root)
+    }
+
+    /// What a smoother keeps of a row that stays in the window: the bounds that it meets are
+    /// exact readings.
+    pub fn kept(self) -> Step {
+        let pins = self.pins.into_iter().flatten();
+        Step {
+            transition: self.transition.map(Arc::unwrap_or_clone),
+            x: self.after.x,
+            root: Packed::of(&self.after.root),
+            corrections: self.readings.into_iter().chain(pins).collect(),
+        }
+    }
+
+    /// The same of a row that leaves the window: the bounds that it met have moved the estimate,
+    /// and told no more than that.
+    pub fn leaving(&self) -> Step {
+        Step {
+            transition: self.transition.as_deref().cloned(),
+            x: self.after.x.clone(),
+            root: Packed::of(self.by_readings()),
+            corrections: self.readings.clone(),
+        }
+    }
+}
+
+/// What is believed at a row before its readings, and Φ. No stage leads over to the first row, where it is
+/// the prior, and to one at the instant of the row before.
+pub(crate) fn carried(
+    stage: Option<&Arc<Stage>>,
+    prior: &Belief,
+    last: Option<&Pass>,
+) -> (Belief, Option<Arc<Skyline>>) {
+    match (stage, last) {
+        (Some(stage), Some(last)) => {
+            let transition = Arc::clone(&stage.transition);
+            (stage.carry(&last.after), Some(transition))
+        }
+        (None, Some(last)) => {
+            let after = last.after.clone();
+            let identity = Skyline::identity(after.x.len());
+            (after, Some(Arc::new(identity)))
+        }
+        (_, None) => (prior.clone(), None),
+    }
+}
+
+/// A row by its readings, then by its pins.
+pub(crate) fn corrected(
+    seen: &[Seen],
+    spread: &[f64],
+    pins: &[Pin],
+    (before, transition): (Belief, Option<Arc<Skyline>>),
+) -> Pass {
+    let mut after = before.clone();
+    let mut readings = Vec::with_capacity(seen.len());
+    for s in seen {
+        readings.extend(take(&mut after, &s.slopes, s.value, s.variance, 0.0));
+    }
+    let by_readings = (!pins.is_empty()).then(|| after.root.clone());
+    let mut at = vec![];
+    for pin in pins {
+        let mut c = vec![0.0; after.x.len()];
+        c[pin.state] = 1.0;
+        let least = HELD * spread[pin.state];
+        at.push(take(&mut after, &c, pin.value, pin.variance, least));
+    }
+    Pass {
+        before,
+        after,
+        by_readings,
+        transition,
+        readings,
+        pins: at,
+    }
+}
+
+/// Corrects by cᵀx = y with noise of variance r; not where what is predicted has a deviation of no more
+/// than `least`.
+fn take(belief: &mut Belief, c: &[f64], y: f64, r: f64, least: f64) -> Option<Correction> {
+    let mut projected = vec![0.0; c.len()];
+    belief.root.transposed_times(c, &mut projected);
+    let own = dot(&projected, &projected);
+    if own <= least * least && least > 0.0 {
+        return None;
+    }
+    let innovation = y - dot(c, &belief.x);
+    let gain = belief.root.update(&projected, r)?;
+    for (x, k) in belief.x.iter_mut().zip(&gain) {
+        *x += k * innovation;
+    }
+    Some(Correction::single(c.to_vec(), innovation, own + r, gain))
+}
+
+/// The window's rows given all of it.
+pub(crate) fn backward(passes: &[Pass]) -> Vec<Smooth> {
+    let n = passes.first().map_or(0, |p| p.after.x.len());
+    let mut adjoint = Adjoint::nothing(n);
+    let mut rows = Vec::with_capacity(passes.len());
+    for pass in passes.iter().rev() {
+        let shift = pass.after.root.covariance_times(&adjoint.vector);
+        let x = pass.after.x.iter().zip(&shift).map(|(x, s)| x - s);
+        let x = x.collect();
+        let mut pushes = vec![0.0; pass.pins.len()];
+        for (push, pin) in pushes.iter_mut().zip(&pass.pins).rev() {
+            if let Some(correction) = pin {
+                *push = adjoint.over_vector(correction).iter().sum();
+            }
+        }
+        rows.push(Smooth { x, pushes });
+        for reading in pass.readings.iter().rev() {
+            adjoint.over_vector(reading);
+        }
+        if let Some(transition) = &pass.transition {
+            adjoint.vector_through(transition);
+        }
+    }
+    rows.reverse();
+    rows
 }

@@ -1,0 +1,229 @@
+//! Systems that are compiled with their Jacobians.
+
+use std::ops::Range;
+
+use lynkeus_expr::{Graph, Node, jacobian};
+
+use crate::snapshot::{Damaged, Persist, Walk};
+use crate::{Dynamics, Error, Evaluation, System};
+
+/// A [`System`] x' = f(t, x, w), y = h(t, x, w), x̂ = g(t, x, w) with those of its Jacobians F = ∂f/∂x,
+/// G = ∂g/∂x and C = ∂h/∂x that are asked for.
+///
+/// They are sparse: the system's outputs are the entries of F, the values of h, the entries of G and those
+/// of C, so that one evaluation along a trajectory gives all of them.
+#[derive(Clone, Debug)]
+pub struct Linearised {
+    system: System,
+    jacobians: Jacobians<Jacobian>,
+}
+
+/// One of each Jacobian, empty where it is not asked for.
+#[derive(Clone, Debug, Default)]
+pub struct Jacobians<J> {
+    /// F, of the derivatives
+    pub state: J,
+    /// G, of the estimates
+    pub estimate: J,
+    /// C, of the outputs
+    pub output: J,
+}
+
+/// The entries of a sparse Jacobian among the outputs of a system.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Jacobian {
+    /// the output that is the first of them
+    first: usize,
+    /// (row, column) of each
+    places: Vec<(usize, usize)>,
+}
+
+/// Entries (row, column, value) of a matrix.
+type Entries = Vec<(usize, usize, Node)>;
+
+impl Linearised {
+    /// Compiles a system, as [`System::new`], with Jacobians that are derived already.
+    ///
+    /// # Errors
+    /// As [`System::new`].
+    pub fn new(
+        graph: &Graph,
+        time: Node,
+        states: &[(String, Node, f64)],
+        signals: &[(String, Node)],
+        derivatives: &[Node],
+        outputs: &[(String, Node)],
+        jacobians: &Jacobians<Entries>,
+    ) -> Result<Self, Error> {
+        let Jacobians {
+            state,
+            estimate,
+            output,
+        } = jacobians;
+        let mut all = vec![];
+        let state = Jacobian::among(&mut all, state);
+        all.extend_from_slice(outputs);
+        let jacobians = Jacobians {
+            state,
+            estimate: Jacobian::among(&mut all, estimate),
+            output: Jacobian::among(&mut all, output),
+        };
+        let system = System::new(graph, time, states, signals, derivatives, &all)?;
+        Ok(Self { system, jacobians })
+    }
+
+    /// A flow x' = f with F, by its states.
+    ///
+    /// # Errors
+    /// As [`System::new`].
+    pub(crate) fn flow(
+        graph: &Graph,
+        time: Node,
+        states: &[(String, Node, f64)],
+        signals: &[(String, Node)],
+        derivatives: &[Node],
+    ) -> Result<Self, Error> {
+        let symbols: Vec<Node> = states.iter().map(|s| s.1).collect();
+        let jacobians = Jacobians {
+            state: jacobian::forward(graph, derivatives, &symbols).entries,
+            ..Jacobians::default()
+        };
+        Self::new(graph, time, states, signals, derivatives, &[], &jacobians)
+    }
+
+    /// Outputs h with C by x: a system without states, whose signals are x and w.
+    ///
+    /// # Errors
+    /// As [`System::new`].
+    pub(crate) fn output_map(
+        graph: &Graph,
+        time: Node,
+        states: &[(String, Node, f64)],
+        signals: &[(String, Node)],
+        outputs: &[(String, Node)],
+    ) -> Result<Self, Error> {
+        let symbols: Vec<Node> = states.iter().map(|s| s.1).collect();
+        let h: Vec<Node> = outputs.iter().map(|output| output.1).collect();
+        let jacobians = Jacobians {
+            output: jacobian::forward(graph, &h, &symbols).entries,
+            ..Jacobians::default()
+        };
+        let states = states.iter().map(|(name, node, _)| (name.clone(), *node));
+        let read: Vec<(String, Node)> = states.chain(signals.iter().cloned()).collect();
+        Self::new(graph, time, &[], &read, &[], outputs, &jacobians)
+    }
+
+    /// What is compiled.
+    #[must_use]
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// Where the entries of its Jacobians are.
+    #[must_use]
+    pub fn jacobians(&self) -> &Jacobians<Jacobian> {
+        &self.jacobians
+    }
+
+    /// The same from other start values.
+    ///
+    /// # Errors
+    /// As [`System::with_start`].
+    pub fn with_start(mut self, start: Vec<f64>) -> Result<Self, Error> {
+        self.system = self.system.with_start(start)?;
+        Ok(self)
+    }
+}
+
+impl Jacobian {
+    /// Of these entries, which become further outputs.
+    fn among(outputs: &mut Vec<(String, Node)>, entries: &Entries) -> Self {
+        let first = outputs.len();
+        outputs.extend(entries.iter().map(|(i, j, e)| (format!("{i},{j}"), *e)));
+        Self {
+            first,
+            places: entries.iter().map(|e| (e.0, e.1)).collect(),
+        }
+    }
+
+    /// (row, column) of each entry.
+    #[must_use]
+    pub fn places(&self) -> &[(usize, usize)] {
+        &self.places
+    }
+
+    /// The outputs of the system that its entries are.
+    #[must_use]
+    pub fn outputs(&self) -> Range<usize> {
+        self.first..self.first + self.places.len()
+    }
+
+    /// The entries of a row, by columns, where the system has these outputs.
+    pub(crate) fn row(&self, outputs: &[f64], row: usize) -> impl Iterator<Item = (usize, f64)> {
+        let entries = self.places.iter().zip(&outputs[self.outputs()]);
+        let own = entries.filter(move |((i, _), _)| *i == row);
+        own.map(|((_, j), entry)| (*j, *entry))
+    }
+
+    /// The same with its zeros.
+    pub(crate) fn write_row(&self, outputs: &[f64], row: usize, into: &mut [f64]) {
+        into.fill(0.0);
+        self.row(outputs, row)
+            .for_each(|(j, entry)| into[j] = entry);
+    }
+}
+
+/// y = h(t, x, u) and C where they were evaluated last.
+#[derive(Clone, Debug)]
+pub(crate) struct OutputMap {
+    evaluation: Evaluation,
+    jacobian: Jacobian,
+    /// h, then the entries of C
+    values: Vec<f64>,
+}
+
+impl OutputMap {
+    /// Of a [`Linearised::output_map`].
+    pub fn new(map: &Linearised) -> Self {
+        Self {
+            evaluation: map.system.evaluation(),
+            jacobian: map.jacobians.output.clone(),
+            values: vec![0.0; map.system.outputs().len()],
+        }
+    }
+
+    /// Evaluates h and C; values may not be finite.
+    pub fn evaluate(&mut self, t: f64, x: &[f64], u: &[f64]) {
+        let (own, known) = self.evaluation.signals_mut().split_at_mut(x.len());
+        own.copy_from_slice(x);
+        known.copy_from_slice(u);
+        self.evaluation.enter(t);
+        self.evaluation.outputs(t, &[], &mut self.values);
+    }
+
+    /// h.
+    pub fn outputs(&self) -> &[f64] {
+        &self.values[..self.jacobian.first]
+    }
+
+    /// Whether C has finite entries, too.
+    pub fn is_finite(&self) -> bool {
+        self.values.iter().all(|v| v.is_finite())
+    }
+
+    /// Writes row i of C.
+    pub fn write_slopes(&self, i: usize, row: &mut [f64]) {
+        self.jacobian.write_row(&self.values, i, row);
+    }
+
+    /// Names the operation that has no value.
+    pub fn not_finite(&mut self, t: f64) -> Error {
+        self.evaluation.not_finite(t, &[])
+    }
+}
+
+impl Persist for OutputMap {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.evaluation.walk(walk)
+    }
+}
