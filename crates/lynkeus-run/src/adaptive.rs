@@ -6,8 +6,8 @@ mod factors;
 mod radau;
 
 use crate::error::state_text;
+use crate::events::{Ahead, Filippov, Glance, Span};
 use crate::method::resolution;
-use crate::relays::{Ahead, Glance, Span, Switched};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Method, Tolerances, spectral_radius};
 
@@ -131,7 +131,7 @@ impl Adaptive {
     /// the budget. Where an error ends it early, `x` is the last state reached.
     pub(crate) fn advance(
         &mut self,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         from: f64,
         to: f64,
         x: &mut [f64],
@@ -160,7 +160,7 @@ impl Adaptive {
     /// True every so often, where the other method is the better one.
     fn should_change(
         &mut self,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         t: f64,
         x: &[f64],
         step: f64,
@@ -191,7 +191,7 @@ impl Adaptive {
     /// Steps of the explicit method; false where the other one fits better from there.
     fn run_explicit(
         &mut self,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
     ) -> Result<bool, Error> {
         if leg.at_the_end() || leg.x.is_empty() {
@@ -210,7 +210,7 @@ impl Adaptive {
     fn explicit_steps(
         &mut self,
         method: &mut Dop853,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
     ) -> Result<bool, Error> {
         let tolerances = self.tolerances;
@@ -246,7 +246,7 @@ impl Adaptive {
     fn accepted_step(
         &mut self,
         method: &mut Dop853,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
     ) -> Result<f64, Error> {
         loop {
@@ -272,7 +272,7 @@ impl Adaptive {
     /// Steps of the implicit method; false where the other one fits better from there.
     fn run_implicit(
         &mut self,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
     ) -> Result<bool, Error> {
         if leg.at_the_end() || leg.x.is_empty() {
@@ -289,7 +289,7 @@ impl Adaptive {
     fn implicit_steps(
         &mut self,
         radau: &mut Radau,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
     ) -> Result<bool, Error> {
         if self.pace.next <= 0.0 {
@@ -381,7 +381,7 @@ impl Leg<'_> {
     fn explicit_to_event(
         &mut self,
         method: &mut Dop853,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         step: f64,
         tolerances: &Tolerances,
     ) -> Result<f64, Error> {
@@ -409,7 +409,7 @@ impl Leg<'_> {
             }
             _ => Ahead::Nothing,
         };
-        let attempt = |f: &mut Switched<'_, _>, step: f64| {
+        let attempt = |f: &mut Filippov<'_, _>, step: f64| {
             let tried = method.attempt(f, (t, &start), step, tolerances);
             tried.is_ok().then(|| method.reached().to_vec())
         };
@@ -427,7 +427,7 @@ impl Leg<'_> {
     fn implicit_to_event(
         &mut self,
         radau: &mut Radau,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         start: &[f64],
         step: f64,
         tolerances: &Tolerances,
@@ -443,7 +443,7 @@ impl Leg<'_> {
             return Ok(step);
         }
         let mut has_tried = false;
-        let attempt = |f: &mut Switched<'_, _>, step: f64| {
+        let attempt = |f: &mut Filippov<'_, _>, step: f64| {
             has_tried = true;
             let mut x = start.to_vec();
             radau.restart(f, t, &x);
@@ -463,7 +463,7 @@ impl Leg<'_> {
         Ok(event.step)
     }
 
-    fn check_start(&self, f: &mut Switched<'_, impl Dynamics>) -> Result<(), Error> {
+    fn check_start(&self, f: &mut Filippov<'_, impl Dynamics>) -> Result<(), Error> {
         let mut dx = vec![0.0; self.x.len()];
         f.derivatives(self.t, self.x, &mut dx);
         if dx.iter().all(|v| v.is_finite()) {
@@ -473,7 +473,7 @@ impl Leg<'_> {
     }
 
     /// Pays for one step.
-    fn spend(&mut self, f: &mut Switched<'_, impl Dynamics>) -> Result<(), Error> {
+    fn spend(&mut self, f: &mut Filippov<'_, impl Dynamics>) -> Result<(), Error> {
         if f.is_over() {
             return Err(Error::Cancelled { time: self.t });
         }
@@ -492,7 +492,7 @@ impl Leg<'_> {
 
     fn check_step(
         &self,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         step: f64,
         bad: Option<&(f64, Vec<f64>)>,
     ) -> Result<(), Error> {
@@ -515,13 +515,13 @@ impl Leg<'_> {
     /// across the surface is accurate.
     fn crossing<D: Dynamics>(
         &mut self,
-        f: &mut Switched<'_, D>,
+        f: &mut Filippov<'_, D>,
         span: &Span<'_>,
         ahead: Ahead,
-        mut attempt: impl FnMut(&mut Switched<'_, D>, f64) -> Option<Vec<f64>>,
+        mut attempt: impl FnMut(&mut Filippov<'_, D>, f64) -> Option<Vec<f64>>,
     ) -> Result<Option<Reach>, Error> {
         let (t, step) = (span.from.0, span.step);
-        let reach = |f: &mut Switched<'_, D>, step: f64, x: Vec<f64>| {
+        let reach = |f: &mut Filippov<'_, D>, step: f64, x: Vec<f64>| {
             let mut margins = vec![];
             f.margins(t + step, &x, &mut margins);
             Reach { step, x, margins }

@@ -4,9 +4,7 @@ use crate::filter::{FilterModel, FilterSettings};
 use crate::integrator::AUTO_PRODUCT;
 use crate::spectral::fastest;
 use crate::system::Evaluation;
-use crate::{
-    Dynamics, Error, Estimator, EstimatorSettings, Method, SampledObserver, System, Tuned,
-};
+use crate::{Error, Estimator, EstimatorSettings, Events, Method, SampledObserver, System, Tuned};
 
 /// An observer with all that says how it is run: an [`Estimator`] is made of one, and what runs
 /// elsewhere (another language, a device) is printed from one.

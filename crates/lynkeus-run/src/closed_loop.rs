@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use lynkeus_expr::Tape;
 
+use crate::events::Guards;
 use crate::joint::Parts;
 use crate::noise::Sensors;
-use crate::relays::Guards;
 use crate::routine::Runner;
-use crate::{Dynamics, Error, Evaluation, Role, Simulation, Slopes, System, Trajectory};
+use crate::{Dynamics, Error, Evaluation, Events, Role, Simulation, Slopes, System, Trajectory};
 
 /// Where a signal of the observer comes from.
 #[derive(Clone, Copy, Debug)]
@@ -207,7 +207,7 @@ impl Loop {
         self.sensors.disturbances().count()
     }
 
-    /// The values of what jumps with time, since the last [`Dynamics::enter`].
+    /// The values of what jumps with time, since the last [`Events::enter`].
     pub(crate) fn modes(&self) -> &[f64] {
         &self.arguments[1 + self.dimension() + self.disturbances()..]
     }
@@ -339,70 +339,8 @@ impl Dynamics for Loop {
         self.joint.step(&mut self.arguments, h, next)
     }
 
-    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
-        self.inputs.switches(from, to, times)?;
-        self.plant.switches(from, to, times)?;
-        match &mut self.observer {
-            Some(observer) => observer.switches(from, to, times),
-            None => Ok(()),
-        }
-    }
-
-    fn enter(&mut self, t: f64) {
-        self.inputs.enter(t);
-        self.plant.enter(t);
-        if let Some(observer) = &mut self.observer {
-            observer.enter(t);
-        }
-        self.settle();
-    }
-
-    fn surfaces(&self) -> usize {
-        self.plant.surfaces() + self.observer.as_ref().map_or(0, Dynamics::surfaces)
-    }
-
-    fn surface_names(&self) -> Vec<String> {
-        let of_observer = self.observer.as_ref().map(Dynamics::surface_names);
-        [self.plant.surface_names(), of_observer.unwrap_or_default()].concat()
-    }
-
-    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
-        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
-        let (of_plant, of_observer) = values.split_at_mut(self.plant.surfaces());
-        self.connect(t, plant_x);
-        self.plant.read_surfaces(t, plant_x, of_plant);
-        if let Some(observer) = &mut self.observer {
-            observer.read_surfaces(t, observer_x, of_observer);
-        }
-    }
-
-    fn hold(&mut self, sides: Option<&[f64]>) {
-        self.is_held = sides.is_some();
-        let parts = sides.map(|sides| sides.split_at(self.plant.surfaces()));
-        self.plant.hold(parts.map(|(plant, _)| plant));
-        if let Some(observer) = &mut self.observer {
-            observer.hold(parts.map(|(_, observer)| observer));
-        }
-    }
-
-    fn guards(&self) -> Option<Arc<Guards>> {
-        self.guards.clone()
-    }
-
-    fn beside(&mut self, _t: f64, values: &mut Vec<[f64; 2]>) {
-        let first = 1 + self.dimension();
-        let observer = self
-            .observer
-            .as_ref()
-            .map_or(&[][..], Evaluation::held_modes);
-        let held = self.plant.held_modes().iter().chain(observer);
-        values.clear();
-        values.extend(
-            self.arguments[first..]
-                .iter()
-                .chain(held)
-                .map(|&v| [v, 0.0]),
-        );
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        Some(self)
     }
 
     fn names(&self) -> Vec<String> {
@@ -433,4 +371,68 @@ impl Dynamics for Loop {
             _ => self.plant.not_finite(t, plant_x),
         }
     }
+}
+
+impl Events for Loop {
+    fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
+        self.inputs.instants(from, to, times)?;
+        self.plant.instants(from, to, times)?;
+        match &mut self.observer {
+            Some(observer) => observer.instants(from, to, times),
+            None => Ok(()),
+        }
+    }
+
+    fn enter(&mut self, t: f64) {
+        self.inputs.enter(t);
+        self.plant.enter(t);
+        if let Some(observer) = &mut self.observer {
+            observer.enter(t);
+        }
+        self.settle();
+    }
+
+    fn guards(&self) -> Option<Arc<Guards>> {
+        self.guards.clone()
+    }
+
+    fn indicators(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
+        let (of_plant, of_observer) = values.split_at_mut(surfaces(&self.plant));
+        self.connect(t, plant_x);
+        self.plant.indicators(t, plant_x, of_plant);
+        if let Some(observer) = &mut self.observer {
+            observer.indicators(t, observer_x, of_observer);
+        }
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        self.is_held = sides.is_some();
+        let parts = sides.map(|sides| sides.split_at(surfaces(&self.plant)));
+        self.plant.hold(parts.map(|(plant, _)| plant));
+        if let Some(observer) = &mut self.observer {
+            observer.hold(parts.map(|(_, observer)| observer));
+        }
+    }
+
+    fn beside(&mut self, _t: f64, values: &mut Vec<[f64; 2]>) {
+        let first = 1 + self.dimension();
+        let observer = self
+            .observer
+            .as_ref()
+            .map_or(&[][..], Evaluation::held_modes);
+        let held = self.plant.held_modes().iter().chain(observer);
+        values.clear();
+        values.extend(
+            self.arguments[first..]
+                .iter()
+                .chain(held)
+                .map(|&v| [v, 0.0]),
+        );
+    }
+}
+
+/// How many surfaces a part jumps on.
+fn surfaces(part: &Evaluation) -> usize {
+    part.guards().map_or(0, |guards| guards.surfaces())
 }

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::relays::Guards;
+use crate::events::Guards;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{BetweenSamples, Dynamics, Error, Evaluation, Slopes, System};
+use crate::{BetweenSamples, Dynamics, Error, Evaluation, Events, Slopes, System};
 
 /// A system with its signals between two samples.
 #[derive(Clone, Debug)]
@@ -94,33 +94,39 @@ impl Dynamics for Driven {
         self.between == BetweenSamples::Hold && self.evaluation.step(t, h, x, next)
     }
 
-    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
-        self.evaluation.switches(from, to, times)
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        Some(self)
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.evaluation.names()
+    }
+
+    fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
+        self.evaluation.not_finite(t, x)
+    }
+}
+
+impl Events for Driven {
+    fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
+        self.evaluation.instants(from, to, times)
     }
 
     fn enter(&mut self, t: f64) {
         self.evaluation.enter(t);
     }
 
-    fn surfaces(&self) -> usize {
-        self.evaluation.surfaces()
+    fn guards(&self) -> Option<Arc<Guards>> {
+        self.evaluation.guards()
     }
 
-    fn surface_names(&self) -> Vec<String> {
-        self.evaluation.surface_names()
-    }
-
-    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+    fn indicators(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
         self.read_signals(t);
-        self.evaluation.read_surfaces(t, x, values);
+        self.evaluation.indicators(t, x, values);
     }
 
     fn hold(&mut self, sides: Option<&[f64]>) {
         self.evaluation.hold(sides);
-    }
-
-    fn guards(&self) -> Option<Arc<Guards>> {
-        self.evaluation.guards()
     }
 
     fn beside(&mut self, t: f64, values: &mut Vec<[f64; 2]>) {
@@ -132,13 +138,5 @@ impl Dynamics for Driven {
                 *speed = (next - last) / (self.to - self.from);
             }
         }
-    }
-
-    fn names(&self) -> Vec<String> {
-        self.evaluation.names()
-    }
-
-    fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
-        self.evaluation.not_finite(t, x)
     }
 }

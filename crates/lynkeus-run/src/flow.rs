@@ -6,7 +6,7 @@ use crate::filter::Health;
 use crate::intake::Sample;
 use crate::runner::Runner;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, EstimatorSettings, Integrator, StepAdvice, System};
+use crate::{Dynamics, Error, EstimatorSettings, Events, Integrator, StepAdvice, System};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Flow {

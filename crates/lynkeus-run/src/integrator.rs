@@ -1,8 +1,8 @@
 //! One integrator for every method, stopping at every switch.
 
 use crate::adaptive::Adaptive;
+use crate::events::{Filippov, Sides};
 use crate::method::resolution;
-use crate::relays::{Sides, Switched};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Method, Rk4, Step, spectral_radius};
 
@@ -121,9 +121,11 @@ impl Integrator {
         check_interval(from, to)?;
         let mut instants = std::mem::take(&mut self.instants);
         instants.clear();
-        let result = f
-            .switches(from, to, &mut instants)
-            .and_then(|()| self.segments(f, from, to, &mut instants, x));
+        let found = match f.events() {
+            Some(events) => events.instants(from, to, &mut instants),
+            None => Ok(()),
+        };
+        let result = found.and_then(|()| self.segments(f, from, to, &mut instants, x));
         self.instants = instants;
         result.map_err(|error| self.explained(error, f, x))
     }
@@ -160,12 +162,14 @@ impl Integrator {
         }
         let whole = to - from;
         for (start, end) in pieces(from, to, instants) {
-            f.enter(start + 0.5 * (end - start));
+            if let Some(events) = f.events() {
+                events.enter(start + 0.5 * (end - start));
+            }
             match &mut self.stepper {
                 Stepper::Adaptive(adaptive) => {
                     let at = (start, &*x);
-                    let mut switched = Switched::new(f, &mut self.sides, at, end - start);
-                    adaptive.advance(&mut switched, start, end, x)?;
+                    let mut system = Filippov::new(f, &mut self.sides, at, end - start);
+                    adaptive.advance(&mut system, start, end, x)?;
                 }
                 Stepper::Fixed(fixed) => fixed.advance(f, start, end, whole, x)?,
             }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use lynkeus_expr::{Expr, Graph, Node, Nodes, Tape};
 
 use crate::closed_loop::Source;
+use crate::events::{Guards, Surfaces};
 use crate::filter::Limits;
 use crate::noise::{Disturbed, Sensors};
-use crate::relays::{Guards, Watched};
 use crate::routine::Routine;
 use crate::{Error, System};
 
@@ -52,15 +52,12 @@ impl Parts<'_> {
         let g = Graph::new();
         let symbols = Symbols::new(&g, self);
         let (u, w) = symbols.inputs(self);
-        let mut watched = Watched::default();
+        let (mut surfaces, mut bends) = (Surfaces::default(), vec![]);
         let mut take = |system: &System, eval: &dyn Fn(&Tape) -> Vec<Node>| {
-            if let Some((tape, counts)) = system.surfaces() {
-                watched.surfaces.extend(eval(tape));
-                watched.counts.extend(counts);
+            if let Some((tape, guards)) = system.surfaces() {
+                surfaces.extend(eval(tape), guards);
             }
-            watched
-                .bends
-                .extend(system.bends().map(eval).unwrap_or_default());
+            bends.extend(system.bends().map(eval).unwrap_or_default());
         };
         take(self.plant, &|tape| nodes(&symbols.held_plant(tape, &w)));
         if let Some(observer) = self.observer {
@@ -75,7 +72,7 @@ impl Parts<'_> {
         ]
         .concat();
         let states = symbols.plant_x.len() + symbols.observer_x.len();
-        Ok(Guards::new(&g, &inputs, states, &watched)?)
+        Ok(Guards::new(&g, &inputs, states, surfaces, &bends)?)
     }
 
     /// The values of a row, in the order of the columns of a run, as functions of the same.

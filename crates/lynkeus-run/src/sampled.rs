@@ -7,7 +7,7 @@ use crate::intake::Sample;
 use crate::runner::Runner;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::spread::{ErrorModel, Spread};
-use crate::{BetweenSamples, Dynamics, Error, Integrator, Method, System};
+use crate::{BetweenSamples, Dynamics, Error, Events, Integrator, Method, System};
 
 /// An observer z' = F(t, z, u, w) whose measurements are states of their own: w jumps to a
 /// reading when the sensor reports, and in between stays (`hold`) or follows the model,

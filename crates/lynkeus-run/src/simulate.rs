@@ -6,7 +6,7 @@ use crate::closed_loop::{Loop, table};
 use crate::divergence::Bound;
 use crate::itinerary::{Itinerary, Stop};
 use crate::noise::Sensors;
-use crate::{Dynamics, Error, Integrator, Interrupted, Method, Noise, System, Trajectory};
+use crate::{Error, Events, Integrator, Interrupted, Method, Noise, System, Trajectory};
 
 /// A plant under known inputs and, if wished, an observer of its measured
 /// outputs.

@@ -7,10 +7,9 @@ use std::sync::{Arc, Mutex};
 
 use lynkeus_expr::{Graph, Node, Tape};
 
-use crate::relays::{Guards, Held, Taken, Watched, bends, take};
+use crate::events::{Extracted, Guards, Jumps, Taken, TimeEvents, extract};
 use crate::routine::Routine;
 use crate::snapshot::Digest;
-use crate::switches::Switches;
 use crate::{Error, Margin};
 pub use evaluation::Evaluation;
 
@@ -34,7 +33,7 @@ struct Code {
     outputs: Vec<String>,
     derivatives_at: Arc<Routine>,
     outputs_at: Arc<Routine>,
-    switches: Switches,
+    switches: TimeEvents,
     modes: usize,
     /// the same with what jumps with the state held; none where nothing does
     held: Option<HeldCode>,
@@ -51,18 +50,24 @@ struct Code {
 struct HeldCode {
     derivatives_at: Arc<Routine>,
     outputs_at: Arc<Routine>,
-    held: Held,
+    jumps: Jumps,
     /// number of these operations
     modes: usize,
 }
 
 impl HeldCode {
-    fn new(graph: &Graph, inputs: &[Node], taken: Taken, states: usize) -> Result<Self, Error> {
+    fn new(
+        graph: &Graph,
+        inputs: &[Node],
+        taken: Taken<Jumps>,
+        states: usize,
+    ) -> Result<Self, Error> {
         let (dx, y) = taken.roots.split_at(states);
+        let inputs = [inputs, &taken.modes].concat();
         Ok(Self {
-            derivatives_at: Routine::new(Tape::new(graph, inputs, dx)?),
-            outputs_at: Routine::new(Tape::new(graph, inputs, y)?),
-            held: taken.held,
+            derivatives_at: Routine::new(Tape::new(graph, &inputs, dx)?),
+            outputs_at: Routine::new(Tape::new(graph, &inputs, y)?),
+            jumps: taken.events,
             modes: taken.modes.len(),
         })
     }
@@ -108,41 +113,26 @@ impl System {
         let image = own.copied(graph, &all);
         let mut inputs: Vec<Node> = symbols.iter().map(|s| image[s]).collect();
         let roots: Vec<Node> = roots.iter().map(|r| image[r]).collect();
-        let extracted = Switches::extract(&own, image[&time], &roots)?;
-        let moving = inputs.clone();
-        inputs.extend(&extracted.modes);
-        let jumping = take(&own, &moving, &inputs, &extracted.roots, derivatives.len())?;
-        let modes = jumping.as_ref().map_or(&[][..], |taken| &taken.modes);
-        let all = [&inputs[..], modes].concat();
-        let smooth = jumping.as_ref().map_or(&extracted.roots, |t| &t.roots);
-        let bends = bends(&own, &moving[1..], &smooth[..derivatives.len()]);
-        let bends_at = match bends.is_empty() {
-            true => None,
-            false => Some(Tape::new(&own, &all, &bends)?),
-        };
-        let mut watched = Watched {
+        let Extracted {
+            time,
+            state,
+            guards,
             bends,
-            ..Watched::default()
-        };
-        if let Some(taken) = &jumping {
-            (watched.surfaces, watched.counts) =
-                (taken.surfaces.clone(), taken.held.counts.clone());
-        }
-        let guards = Guards::new(&own, &all, states.len(), &watched)?;
-        let held = |taken| HeldCode::new(&own, &all, taken, derivatives.len());
-        let held = jumping.map(held).transpose()?;
-        let (dx, y) = extracted.roots.split_at(derivatives.len());
+        } = extract(&own, &inputs, &roots, derivatives.len())?;
+        inputs.extend(&time.modes);
+        let held = state.map(|taken| HeldCode::new(&own, &inputs, taken, derivatives.len()));
+        let (dx, y) = time.roots.split_at(derivatives.len());
         let code = Code {
             states: states.iter().map(|(name, ..)| name.clone()).collect(),
             signals: signals.iter().map(|(name, _)| name.clone()).collect(),
             outputs: outputs.iter().map(|(name, _)| name.clone()).collect(),
             derivatives_at: Routine::new(Tape::new(&own, &inputs, dx)?),
             outputs_at: Routine::new(Tape::new(&own, &inputs, y)?),
-            modes: extracted.modes.len(),
-            switches: extracted.switches,
-            held,
+            modes: time.modes.len(),
+            switches: time.events,
+            held: held.transpose()?,
             guards,
-            bends_at,
+            bends_at: bends,
             graph: Mutex::new(own),
         };
         let start = states.iter().map(|(.., value)| *value).collect();
@@ -227,7 +217,7 @@ impl System {
             for routine in [&code.derivatives_at, &code.outputs_at] {
                 let _ = write!(digest, "{:?}", routine.tape());
             }
-            let _ = write!(digest, "{:?}", code.held);
+            let _ = write!(digest, "{:?}", code.jumps);
         }
         digest.numbers(&self.start);
     }
@@ -248,10 +238,10 @@ impl System {
         held.map_or(self.output_tape(), |held| held.outputs_at.tape())
     }
 
-    /// What vanishes on the surfaces, of the same inputs, and which of them belong to a `floor`.
-    pub(crate) fn surfaces(&self) -> Option<(&Tape, &[bool])> {
-        let held = &self.code.held.as_ref()?.held;
-        Some((&held.surfaces, &held.counts))
+    /// What vanishes on the surfaces, of the same inputs, and what else is known of them.
+    pub(crate) fn surfaces(&self) -> Option<(&Tape, &Guards)> {
+        let held = self.code.held.as_ref()?;
+        Some((&held.jumps.indicators, self.code.guards.as_ref()?))
     }
 
     /// What vanishes where x' bends with the state, of the same inputs.

@@ -7,7 +7,7 @@
 use nalgebra::{Complex, DVector};
 
 use super::factors::{Factors, Shifted};
-use crate::relays::Poly;
+use crate::events::Poly;
 use crate::{Dynamics, Slopes, Tolerances};
 
 const SQRT_6: f64 = 2.449_489_742_783_178;

@@ -6,7 +6,7 @@ use super::health::{Health, Innovation, Reading};
 use super::model::{FilterModel, Limits, Sensor};
 use super::smooth::Correction;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Evaluation};
+use crate::{Dynamics, Error, Evaluation, Events};
 
 /// After so many rejections in a row the next reading is believed: a gate must not lock the
 /// filter out for ever.

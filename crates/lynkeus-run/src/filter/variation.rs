@@ -15,7 +15,7 @@ use super::taylor::{Moments, Series};
 use crate::driven::Driven;
 use crate::method::resolution;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Integrator, Method};
+use crate::{Dynamics, Error, Events, Integrator, Method};
 
 /// Tolerance with fixed steps, whose error nobody states.
 const FIXED: f64 = 1e-8;
@@ -115,7 +115,7 @@ impl Variation {
     ) -> Result<Moments, Error> {
         let n = x.len();
         let mut stops = vec![];
-        driven.switches(from, to, &mut stops)?;
+        driven.instants(from, to, &mut stops)?;
         stops.sort_unstable_by(f64::total_cmp);
         stops.push(to);
         let mut moments = Moments::start(n, !self.process_noise.is_empty());

@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use nalgebra::DMatrix;
 
 use crate::spectral::fastest;
-use crate::{Dynamics, Noise, Role, Simulation, Slopes};
+use crate::{Dynamics, Events, Noise, Role, Simulation, Slopes};
 
 /// A variance of a state at the end of the run may be off by this share.
 const OFF: f64 = 0.02;

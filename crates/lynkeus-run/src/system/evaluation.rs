@@ -6,19 +6,18 @@ use lynkeus_expr::Evaluator;
 
 use super::System;
 use crate::error::state_text;
-use crate::relays::Guards;
+use crate::events::{Guards, TimeEvents};
 use crate::routine::Runner;
 use crate::singular::Place;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::switches::Switches;
-use crate::{Dynamics, Error, Margin, Slopes};
+use crate::{Dynamics, Error, Events, Margin, Slopes};
 
 /// Evaluates a system on known sides of the surfaces on which it jumps.
 #[derive(Clone, Debug)]
 struct HeldEvaluation {
     derivatives: Runner,
     outputs: Runner,
-    surfaces: Evaluator,
+    indicators: Evaluator,
     modes: Vec<f64>,
     /// those of the system, then the modes
     inputs: Vec<f64>,
@@ -39,7 +38,7 @@ pub struct Evaluation {
     system: System,
     derivatives: Runner,
     outputs: Runner,
-    switches: Switches,
+    switches: TimeEvents,
     /// t, x, w, modes
     inputs: Vec<f64>,
     held: Option<HeldEvaluation>,
@@ -57,7 +56,7 @@ impl Evaluation {
             held: code.held.as_ref().map(|held| HeldEvaluation {
                 derivatives: held.derivatives_at.runner(),
                 outputs: held.outputs_at.runner(),
-                surfaces: held.held.surfaces.evaluator(),
+                indicators: held.jumps.indicators.evaluator(),
                 modes: vec![0.0; held.modes],
                 inputs: vec![],
                 is_held: false,
@@ -86,7 +85,7 @@ impl Evaluation {
 
     /// Writes the outputs at (t, x) to `y`, in the order of [`System::outputs`].
     ///
-    /// Modes are those of the last [`Dynamics::enter`].
+    /// Modes are those of the last [`Events::enter`].
     pub fn outputs(&mut self, t: f64, x: &[f64], y: &mut [f64]) {
         self.place(t, x);
         match &mut self.held {
@@ -143,7 +142,7 @@ impl Evaluation {
         .explained(error)
     }
 
-    /// Values of the switches at the last [`Dynamics::enter`].
+    /// Values of the switches at the last [`Events::enter`].
     pub(crate) fn modes(&self) -> &[f64] {
         &self.inputs[self.inputs.len() - self.system.code.modes..]
     }
@@ -193,45 +192,6 @@ impl Dynamics for Evaluation {
         }
     }
 
-    fn surfaces(&self) -> usize {
-        let held = self.system.code.held.as_ref();
-        held.map_or(0, |held| held.held.names.len())
-    }
-
-    fn surface_names(&self) -> Vec<String> {
-        let held = self.system.code.held.as_ref();
-        held.map_or_else(Vec::new, |held| held.held.names.clone())
-    }
-
-    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
-        self.place(t, x);
-        if let Some(held) = &mut self.held {
-            held.place(&self.inputs);
-            held.surfaces.eval(&held.inputs, values);
-        }
-    }
-
-    fn hold(&mut self, sides: Option<&[f64]>) {
-        let (Some(evaluation), Some(code)) = (&mut self.held, &self.system.code.held) else {
-            return;
-        };
-        evaluation.is_held = sides.is_some();
-        if let Some(sides) = sides {
-            code.held.modes(sides, &mut evaluation.modes);
-        }
-    }
-
-    fn guards(&self) -> Option<Arc<Guards>> {
-        self.system.code.guards.clone()
-    }
-
-    fn beside(&mut self, _t: f64, values: &mut Vec<[f64; 2]>) {
-        let first = 1 + self.system.states().len();
-        let held = self.held_modes();
-        values.clear();
-        values.extend(self.inputs[first..].iter().chain(held).map(|&v| [v, 0.0]));
-    }
-
     fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
         if self.held.as_ref().is_some_and(|held| held.is_held) {
             return false;
@@ -240,13 +200,8 @@ impl Dynamics for Evaluation {
         self.derivatives.step(&mut self.inputs, h, next)
     }
 
-    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
-        self.switches.between(from, to, times)
-    }
-
-    fn enter(&mut self, t: f64) {
-        let first = self.inputs.len() - self.system.code.modes;
-        self.switches.modes_at(t, &mut self.inputs[first..]);
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        Some(self)
     }
 
     fn names(&self) -> Vec<String> {
@@ -267,5 +222,45 @@ impl Dynamics for Evaluation {
             operation: named.unwrap_or_else(|| "a value overflows".to_owned()),
             state: state_text(self.system.states(), x),
         }
+    }
+}
+
+impl Events for Evaluation {
+    fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
+        self.switches.instants(from, to, times)
+    }
+
+    fn enter(&mut self, t: f64) {
+        let first = self.inputs.len() - self.system.code.modes;
+        self.switches.modes_at(t, &mut self.inputs[first..]);
+    }
+
+    fn guards(&self) -> Option<Arc<Guards>> {
+        self.system.code.guards.clone()
+    }
+
+    fn indicators(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        self.place(t, &x[..self.dimension()]);
+        if let Some(held) = &mut self.held {
+            held.place(&self.inputs);
+            held.indicators.eval(&held.inputs, values);
+        }
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        let (Some(evaluation), Some(code)) = (&mut self.held, &self.system.code.held) else {
+            return;
+        };
+        evaluation.is_held = sides.is_some();
+        if let Some(sides) = sides {
+            code.jumps.modes(sides, &mut evaluation.modes);
+        }
+    }
+
+    fn beside(&mut self, _t: f64, values: &mut Vec<[f64; 2]>) {
+        let first = 1 + self.system.states().len();
+        let held = self.held_modes();
+        values.clear();
+        values.extend(self.inputs[first..].iter().chain(held).map(|&v| [v, 0.0]));
     }
 }
