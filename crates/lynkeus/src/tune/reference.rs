@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
-use lynkeus_run::{Column, Dynamics, Events, Level, Noise, Role, Trajectory};
+use lynkeus_run::{Column, Events, Level, Noise, Role, Trajectory};
 
 use crate::prepare::Prepared;
 use crate::simulate::{ended_early, open_loop, settings, within};
