@@ -6,8 +6,7 @@ use lynkeus_expr::{Expr, Graph, Node, Nodes, Tape};
 
 use crate::closed_loop::Source;
 use crate::events::{Guards, Surfaces};
-use crate::filter::Limits;
-use crate::noise::{Disturbed, Sensors};
+use crate::noise::{Level, Limits, Sensors};
 use crate::routine::Routine;
 use crate::{Error, System};
 
@@ -178,10 +177,10 @@ impl<'g> Symbols<'g> {
 
     /// What a sensor shows.
     fn measured(&self, parts: &Parts<'_>, y: &[Expr<'g>], i: usize) -> Expr<'g> {
-        let disturbed = match parts.sensors.disturbed(i) {
-            Disturbed::Not => y[i],
-            Disturbed::Added => y[i] + self.noise[i],
-            Disturbed::Multiplied => y[i] * self.noise[i],
+        let disturbed = match parts.sensors.level(i) {
+            None => y[i],
+            Some(Level::Relative(_)) => y[i] * self.noise[i],
+            Some(Level::Absolute(_) | Level::Uniform(_)) => y[i] + self.noise[i],
         };
         match parts.sensors.limits(i) {
             None => disturbed,

@@ -80,14 +80,14 @@ pub fn process_draws(simulation: &Simulation) -> ProcessDraws {
 }
 
 /// The plant about one point.
-enum Place {
+enum Linearisation {
     Small(DMatrix<f64>),
     /// its fastest mode
     Large(f64),
 }
 
 /// The plant along its run without noise, as far as that goes, and about it.
-fn linearised(simulation: &Simulation, densities: &[f64]) -> Vec<Place> {
+fn linearised(simulation: &Simulation, densities: &[f64]) -> Vec<Linearisation> {
     let quiet = Simulation {
         observer: None,
         record_outputs: false,
@@ -114,9 +114,9 @@ fn linearised(simulation: &Simulation, densities: &[f64]) -> Vec<Place> {
         places.push(match n <= SMALL {
             true => {
                 slopes.look(&mut plant, t, &x);
-                Place::Small(slopes.dense(n))
+                Linearisation::Small(slopes.dense(n))
             }
-            false => Place::Large(fastest(&mut plant, t, &x, &[]).radius),
+            false => Linearisation::Large(fastest(&mut plant, t, &x, &[]).radius),
         });
         if n <= SMALL {
             let mut slope = |x: &[f64]| {
@@ -140,7 +140,7 @@ fn about(
     q: f64,
     time: f64,
     slope: &mut dyn FnMut(&[f64]) -> DMatrix<f64>,
-) -> Vec<Place> {
+) -> Vec<Linearisation> {
     let mut at = |s: f64| {
         let mut x = x.to_vec();
         x[i] += s;
@@ -158,13 +158,13 @@ fn about(
         }
         let F = at(sign * AWAY * s);
         if F.iter().all(|x| x.is_finite()) {
-            found.push(Place::Small(F));
+            found.push(Linearisation::Small(F));
         }
     }
     found
 }
 
-impl Place {
+impl Linearisation {
     /// How often a sampling interval has to be halved; `most` where that is too often, 0 where the
     /// plant has no slopes.
     fn halvings(&self, densities: &[f64], sample: f64, samples: f64, most: usize) -> usize {
@@ -298,7 +298,7 @@ mod tests {
 
     fn needed(F: &[f64], densities: &[f64], samples: f64) -> usize {
         let n = densities.len();
-        Place::Small(DMatrix::from_row_slice(n, n, F)).halvings(densities, 1.0, samples, 30)
+        Linearisation::Small(DMatrix::from_row_slice(n, n, F)).halvings(densities, 1.0, samples, 30)
     }
 
     /// x' = −ax + w: tanh(aδ/2)/(aδ/2) is within 2 % of 1 where aδ is below 0.496.
