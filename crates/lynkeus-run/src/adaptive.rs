@@ -6,7 +6,7 @@ mod factors;
 mod radau;
 
 use crate::error::state_text;
-use crate::events::{Ahead, Filippov, Glance, Span};
+use crate::events::{Ahead, Filippov, Span};
 use crate::method::resolution;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Method, Tolerances, spectral_radius};
@@ -49,7 +49,12 @@ pub(crate) struct Adaptive {
     implicit: bool,
     explicit: Option<Box<Dop853>>,
     radau: Option<Radau>,
-    pace: Pace,
+    /// step proposed for the next step; 0 before the first
+    next: f64,
+    /// accepted steps since the last look
+    since_look: usize,
+    /// looks in a row that spoke for a change
+    agreeing: usize,
     budget: Budget,
 }
 
@@ -64,17 +69,6 @@ struct Budget {
     of_run: usize,
     /// spent in the run before this interval
     spent: usize,
-}
-
-/// What is known about the steps that the solution wants.
-#[derive(Clone, Copy, Debug, Default)]
-struct Pace {
-    /// step proposed for the next step; 0 before the first
-    next: f64,
-    /// accepted steps since the last look
-    since_look: usize,
-    /// looks in a row that spoke for a change
-    agreeing: usize,
 }
 
 /// Progress of one call: where it is and what it may still spend.
@@ -102,7 +96,9 @@ impl Adaptive {
             implicit: matches!(method, Method::Stiff(_)),
             explicit: None,
             radau: None,
-            pace: Pace::default(),
+            next: 0.0,
+            since_look: 0,
+            agreeing: 0,
             budget: Budget {
                 granted: 0,
                 left: 0,
@@ -165,25 +161,25 @@ impl Adaptive {
         x: &[f64],
         step: f64,
     ) -> bool {
-        self.pace.since_look += 1;
-        if !self.may_change || self.pace.since_look < LOOK_EVERY {
+        self.since_look += 1;
+        if !self.may_change || self.since_look < LOOK_EVERY {
             return false;
         }
-        self.pace.since_look = 0;
+        self.since_look = 0;
         let product = spectral_radius(f, t, x) * step;
         let speaks_for_change = if self.implicit {
             product < STIFF_BELOW
         } else {
             product > STIFF_ABOVE
         };
-        self.pace.agreeing = if speaks_for_change {
-            self.pace.agreeing + 1
+        self.agreeing = if speaks_for_change {
+            self.agreeing + 1
         } else {
             0
         };
-        let change = self.pace.agreeing >= LOOKS;
+        let change = self.agreeing >= LOOKS;
         if change {
-            self.pace.agreeing = 0;
+            self.agreeing = 0;
         }
         change
     }
@@ -214,17 +210,17 @@ impl Adaptive {
         leg: &mut Leg<'_>,
     ) -> Result<bool, Error> {
         let tolerances = self.tolerances;
-        self.pace.next = self.pace.next.min(leg.to - leg.t);
+        self.next = self.next.min(leg.to - leg.t);
         loop {
             method.bad = None;
             if !method.begin(f, leg.t, leg.x) {
                 return Err(f.not_finite(leg.t, leg.x));
             }
-            if self.pace.next == 0.0 {
+            if self.next == 0.0 {
                 let span = leg.to - leg.t;
                 let first = method.first_step(f, (leg.t, leg.x), span, &tolerances);
                 // a guess that time does not resolve is too careful: it may be longer all the same
-                self.pace.next = first.max(2.0 * resolution(leg.t)).min(span);
+                self.next = first.max(2.0 * resolution(leg.t)).min(span);
             }
             let mut step = self.accepted_step(method, f, leg)?;
             if f.is_unwatched() {
@@ -250,15 +246,15 @@ impl Adaptive {
         leg: &mut Leg<'_>,
     ) -> Result<f64, Error> {
         loop {
-            let proposed = self.pace.next;
+            let proposed = self.next;
             let step = leg.step(proposed);
             leg.check_step(f, step, method.bad.as_ref())?;
             leg.spend(f)?;
             match method.attempt(f, (leg.t, &*leg.x), step, &self.tolerances) {
-                Err(shorter) => self.pace.next = shorter,
+                Err(shorter) => self.next = shorter,
                 Ok(next) => {
                     // a step cut short by a stop says nothing about the next one
-                    self.pace.next = if step < proposed {
+                    self.next = if step < proposed {
                         proposed.max(next)
                     } else {
                         next
@@ -292,12 +288,12 @@ impl Adaptive {
         f: &mut Filippov<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
     ) -> Result<bool, Error> {
-        if self.pace.next <= 0.0 {
-            self.pace.next = radau.first_step(leg.x, leg.to - leg.t, &self.tolerances);
+        if self.next <= 0.0 {
+            self.next = radau.first_step(leg.x, leg.to - leg.t, &self.tolerances);
         }
         let mut rejected = true;
         loop {
-            let proposed = self.pace.next;
+            let proposed = self.next;
             let step = leg.step(proposed);
             leg.check_step(f, step, radau.bad.as_ref())?;
             leg.spend(f)?;
@@ -305,16 +301,16 @@ impl Adaptive {
             let next = match radau.attempt(f, (leg.t, leg.x), step, rejected, &self.tolerances) {
                 Ok(next) => next,
                 Err(shorter) => {
-                    self.pace.next = shorter;
+                    self.next = shorter;
                     rejected = true;
                     continue;
                 }
             };
             // after a rejection the step must not grow at once
-            self.pace.next = if rejected { next.min(step) } else { next };
+            self.next = if rejected { next.min(step) } else { next };
             // a step cut short by a stop says nothing about the next one
             if step < proposed {
-                self.pace.next = self.pace.next.max(proposed);
+                self.next = self.next.max(proposed);
             }
             rejected = false;
             let step = match f.is_unwatched() {
@@ -337,9 +333,9 @@ impl Adaptive {
 impl Persist for Adaptive {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         walk.flag(&mut self.implicit)?;
-        walk.number(&mut self.pace.next)?;
-        walk.count(&mut self.pace.since_look)?;
-        walk.count(&mut self.pace.agreeing)?;
+        walk.number(&mut self.next)?;
+        walk.count(&mut self.since_look)?;
+        walk.count(&mut self.agreeing)?;
         walk.count(&mut self.budget.granted)?;
         walk.count(&mut self.budget.left)?;
         walk.count(&mut self.budget.before)?;
@@ -385,15 +381,13 @@ impl Leg<'_> {
         step: f64,
         tolerances: &Tolerances,
     ) -> Result<f64, Error> {
-        let glance = f.glance(
-            &Span {
-                from: (self.t, self.x),
-                step,
-                to: method.reached(),
-            },
-            |state| method.fastest(state),
-        );
-        if glance == Glance::Clear {
+        let span = Span {
+            from: (self.t, self.x),
+            step,
+            to: method.reached(),
+        };
+        let is_near = f.is_near(&span, |state| method.fastest(state));
+        if !is_near && !f.has_bound() {
             self.x.copy_from_slice(method.reached());
             return Ok(step);
         }
@@ -403,11 +397,9 @@ impl Leg<'_> {
             step,
             to: &reached,
         };
-        let ahead = match glance {
-            Glance::Near if method.look_inside(f, (t, &start), step) => {
-                f.ahead(&span, |state| method.between(state, start[state], step))
-            }
-            _ => Ahead::Nothing,
+        let ahead = match is_near && method.look_inside(f, (t, &start), step) {
+            true => f.ahead(&span, |state| method.between(state, start[state], step)),
+            false => Ahead::Nothing,
         };
         let attempt = |f: &mut Filippov<'_, _>, step: f64| {
             let tried = method.attempt(f, (t, &start), step, tolerances);

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use lynkeus_expr::Tape;
 use nalgebra::{DMatrix, DVector};
 
-use super::guards::{Ahead, Guard, Guards, Input, Poly, SHORTEST};
+use super::guards::{Ahead, Guard, Guards, Poly, SHORTEST};
 use crate::method::resolution;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Slopes};
@@ -131,17 +131,6 @@ pub(crate) struct Span<'a> {
     pub step: f64,
     /// the state at the end
     pub to: &'a [f64],
-}
-
-/// A first look at a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Glance {
-    /// nothing is near
-    Clear,
-    /// nothing that is free is near; what the state slides along or rests on is seen at the ends
-    Ends,
-    /// only the course between the ends tells
-    Near,
 }
 
 /// A system on known sides of its surfaces.
@@ -463,52 +452,40 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         self.guards.is_none()
     }
 
-    /// Whether a step that nowhere was faster than `fastest` may have met a surface or a bend.
-    pub fn glance(&mut self, span: &Span<'_>, fastest: impl Fn(usize) -> f64) -> Glance {
+    /// A first look: whether a step that nowhere was faster than `fastest` may have met a bend, or a
+    /// surface that is left by passing it.
+    pub fn is_near(&mut self, span: &Span<'_>, fastest: impl Fn(usize) -> f64) -> bool {
         let Some(guards) = self.guards.clone() else {
-            return Glance::Ends;
+            return false;
         };
         let (t, h) = (span.from.0, span.step);
         self.look_beside(t);
         let half = 0.5 * h;
+        let state = |k: usize| {
+            let (a, b) = (span.from.1[k], span.to[k]);
+            let reach = (FASTER * half * fastest(k)).max(0.5 * (b - a).abs());
+            [0.5 * (a + b), reach]
+        };
+        let beside = |[value, speed]: [f64; 2]| [value + speed * half, (speed * half).abs()];
         self.at.boxes.clear();
-        for &i in &guards.reads {
-            self.at.boxes.push(match guards.kind(i) {
-                Input::Time => [t + half, half],
-                Input::State(k) => {
-                    let (a, b) = (span.from.1[k], span.to[k]);
-                    let reach = (FASTER * half * fastest(k)).max(0.5 * (b - a).abs());
-                    [0.5 * (a + b), reach]
-                }
-                Input::Beside(k) => {
-                    let [value, speed] = self.at.beside[k];
-                    [value + speed * half, (speed * half).abs()]
-                }
-            });
-        }
-        let free = |(i, guard): (usize, &Guard)| {
-            if self.is_bound(i) {
-                return false;
-            }
+        let boxes = guards.inputs([t + half, half], state, &self.at.beside, beside);
+        self.at.boxes.extend(boxes);
+        let boxes = &self.at.boxes;
+        let passes = |(i, guard): (usize, &Guard)| {
             let (side, level) = (self.at.sides[i], self.at.levels[i]);
-            let lowest = guard
-                .over(&self.at.boxes)
-                .map(|[low, high]| match side > 0.0 {
-                    true => low - level,
-                    false => level - high,
-                });
+            let lowest = guard.over(boxes).map(|[low, high]| match side > 0.0 {
+                true => low - level,
+                false => level - high,
+            });
             lowest.is_some_and(|lowest| lowest.is_nan() || lowest < 0.0)
         };
         let bends = |guard: &Guard| {
-            guard
-                .over(&self.at.boxes)
-                .is_some_and(|[low, high]| !(low > 0.0 || high < 0.0))
+            let over = guard.over(boxes);
+            over.is_some_and(|[low, high]| !(low > 0.0 || high < 0.0))
         };
-        match guards.surfaces.iter().enumerate().any(free) || guards.bends.iter().any(bends) {
-            true => Glance::Near,
-            false if self.has_bound() => Glance::Ends,
-            false => Glance::Clear,
-        }
+        let surfaces = guards.surfaces.iter().enumerate();
+        let mut free = surfaces.filter(|(i, _)| !self.is_bound(*i));
+        free.any(passes) || guards.bends.iter().any(bends)
     }
 
     /// What comes first between the ends of a step whose states are these polynomials.
@@ -516,8 +493,12 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         let Some(guards) = self.guards.clone() else {
             return Ahead::Nothing;
         };
-        let path: Vec<Poly> = self.path(&guards, span, states);
-        let shortest = SHORTEST.max(resolution(span.from.0 + span.step) / span.step);
+        let (t, h) = (span.from.0, span.step);
+        self.look_beside(t);
+        let beside = |[value, speed]: [f64; 2]| Poly::line(value, speed * h);
+        let path = guards.inputs(Poly::line(t, h), states, &self.at.beside, beside);
+        let path: Vec<Poly> = path.collect();
+        let shortest = SHORTEST.max(resolution(t + h) / h);
         let mut first = Ahead::Nothing;
         for (i, guard) in guards.surfaces.iter().enumerate() {
             if self.is_bound(i) {
@@ -546,26 +527,6 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     /// Whether a surface is not left by passing it: the state slides along it, or stays there.
     fn is_bound(&self, i: usize) -> bool {
         self.at.sliding[i] || self.at.sides[i] == 0.0
-    }
-
-    /// What the guards read, along a step.
-    fn path(
-        &mut self,
-        guards: &Guards,
-        span: &Span<'_>,
-        states: impl Fn(usize) -> Poly,
-    ) -> Vec<Poly> {
-        let (t, h) = (span.from.0, span.step);
-        self.look_beside(t);
-        let read = guards.reads.iter().map(|&i| match guards.kind(i) {
-            Input::Time => Poly::line(t, h),
-            Input::State(k) => states(k),
-            Input::Beside(k) => {
-                let [value, speed] = self.at.beside[k];
-                Poly::line(value, speed * h)
-            }
-        });
-        read.collect()
     }
 
     /// Reads what the guards read beside time and states.

@@ -32,7 +32,7 @@ pub struct Guards {
     /// states among the inputs, after time
     states: usize,
     /// which inputs are read, in order
-    pub(super) reads: Vec<usize>,
+    reads: Vec<usize>,
     /// one for each surface
     pub(super) surfaces: Vec<Guard>,
     /// as of [`Surfaces`]
@@ -96,21 +96,21 @@ impl Guards {
         self.surfaces.len()
     }
 
-    /// What the input at a place is.
-    pub(super) fn kind(&self, place: usize) -> Input {
-        match place {
-            0 => Input::Time,
-            _ if place <= self.states => Input::State(place - 1),
-            _ => Input::Beside(place - 1 - self.states),
-        }
+    /// What there is for each input that is read: for time, for a state, or for what is read beside
+    /// them.
+    pub(super) fn inputs<T: Copy>(
+        &self,
+        time: T,
+        state: impl Fn(usize) -> T,
+        values: &[[f64; 2]],
+        beside: impl Fn([f64; 2]) -> T,
+    ) -> impl Iterator<Item = T> {
+        self.reads.iter().map(move |&place| match place {
+            0 => time,
+            _ if place <= self.states => state(place - 1),
+            _ => beside(values[place - 1 - self.states]),
+        })
     }
-}
-
-/// An input of the code.
-pub(super) enum Input {
-    Time,
-    State(usize),
-    Beside(usize),
 }
 
 /// A function of some of the inputs that are read.

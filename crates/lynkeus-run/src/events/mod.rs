@@ -11,7 +11,7 @@ mod time;
 
 pub use extract::first_jump;
 pub(crate) use extract::{Extracted, Taken, extract};
-pub(crate) use filippov::{Filippov, Glance, Jumps, Sides, Span};
+pub(crate) use filippov::{Filippov, Jumps, Sides, Span};
 pub use guards::Guards;
 pub(crate) use guards::{Ahead, COEFFICIENTS, Poly, Surfaces};
 pub(crate) use time::TimeEvents;

@@ -177,7 +177,7 @@ impl Linearisation {
                 }
             }
             Self::Small(F) if F.iter().all(|f| f.is_finite()) => {
-                let flow = Flow::new(F, densities, sample, samples);
+                let flow = LinearPlant::new(F, densities, sample, samples);
                 (0..most).find(|j| flow.fits(*j)).unwrap_or(most)
             }
             Self::Small(_) => 0,
@@ -186,13 +186,13 @@ impl Linearisation {
 }
 
 /// Φ = exp(Fh), ∫ exp(Fs) ds and W = ∫ exp(Fs) Q exp(Fᵀs) ds over h.
-struct Step {
+struct Transition {
     transition: DMatrix<f64>,
     integral: DMatrix<f64>,
     noise: DMatrix<f64>,
 }
 
-impl Step {
+impl Transition {
     /// Over a step in which F turns little: by series.
     fn short(F: &DMatrix<f64>, Q: &DMatrix<f64>, h: f64) -> Self {
         const TERMS: usize = 12;
@@ -232,25 +232,25 @@ impl Step {
 
 /// A linear plant x' = Fx + w over 1/2^k of a sampling interval, then over the interval, then over more
 /// and more of them.
-struct Flow {
+struct LinearPlant {
     Q: DMatrix<f64>,
     /// the shortest first
-    steps: Vec<Step>,
+    steps: Vec<Transition>,
     /// which of them is the interval, and its length
     sample: usize,
     interval: f64,
 }
 
-impl Flow {
+impl LinearPlant {
     fn new(F: &DMatrix<f64>, densities: &[f64], interval: f64, samples: f64) -> Self {
         let Q = DMatrix::from_diagonal(&densities.to_vec().into());
         let turn = (F.norm() * interval).max(f64::MIN_POSITIVE);
         let halvings = (turn / 0.125).log2().ceil().clamp(0.0, DOUBLINGS as f64) as usize;
         let h = interval / 2.0_f64.powi(halvings as i32);
-        let mut steps = vec![Step::short(F, &Q, h)];
+        let mut steps = vec![Transition::short(F, &Q, h)];
         let all = halvings + (samples.log2().ceil() as usize).min(DOUBLINGS);
         while steps.len() <= all {
-            let Some(next) = steps.last().map(Step::doubled) else {
+            let Some(next) = steps.last().map(Transition::doubled) else {
                 break;
             };
             let size = next.noise.norm() + next.transition.norm();
