@@ -117,3 +117,8 @@ impl Step {
         }
     }
 }
+
+/// Steps shorter than this do not move time reliably.
+pub(crate) fn resolution(t: f64) -> f64 {
+    (16.0 * f64::EPSILON * t.abs()).max(f64::MIN_POSITIVE)
+}

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use crate::closed_loop::{Loop, table};
 use crate::divergence::Bound;
 use crate::noise::Sensors;
-use crate::{Dynamics, Error, Integrator, Interrupted, Simulation, Trajectory, process_draws};
+use crate::{Error, Events, Integrator, Interrupted, Simulation, Trajectory, process_draws};
 
 impl Simulation {
     /// Runs to the end.

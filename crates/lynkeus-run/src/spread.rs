@@ -8,9 +8,7 @@ use crate::filter::Belief;
 use crate::filter::extended::Extended;
 use crate::filter::root::Root;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{
-    BetweenSamples, Dynamics, Error, EstimatorSettings, Evaluation, Level, Method, System,
-};
+use crate::{BetweenSamples, Error, EstimatorSettings, Evaluation, Events, Level, Method, System};
 
 /// The linearised error of a [sampled observer](crate::SampledObserver) z' = F(t, z, u, w), x̂ = g(z),
 /// driven by the declared noises of plant and sensors.

@@ -1,11 +1,9 @@
 //! The explicit method of Dormand and Prince of order 8 with its error estimate of orders 5
 //! and 3 (DOP853 of Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I,
-//! section II.10). The further stages of its dense output are for steps that may cross something: runs
-//! stop at every row.
+//! section II.10), with the interpolant of order 7 of the same book. Its three further stages are for
+//! steps that may cross something: runs stop at every row.
 
-mod between;
-
-use super::Point;
+use crate::events::{COEFFICIENTS, Poly};
 use crate::{Dynamics, Tolerances};
 
 const STAGES: usize = 12;
@@ -137,14 +135,105 @@ const THIRD: Row = &[
     (11, 2.205_882_352_941_176_6E-2),
 ];
 
-/// What came of a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Tried {
-    /// the new state is in [`Dop853::reached`]; the factor on the next step
-    Accepted(f64),
-    /// the error is too large; the factor on the step
-    Rejected(f64),
-}
+/// The derivative at the end of the step, and those of the further stages.
+const FURTHER: usize = 4;
+
+/// Nodes of the further stages.
+const C_BETWEEN: [f64; FURTHER - 1] = [0.1, 0.2, 7.0 / 9.0];
+
+/// What they take of the stages before them, the derivative at the end among them.
+const A_BETWEEN: [Row; FURTHER - 1] = [
+    &[
+        (0, 0.056_167_502_283_047_954),
+        (6, 0.253_500_210_216_624_83),
+        (7, -0.246_239_037_470_802_5),
+        (8, -0.124_191_423_263_816_37),
+        (9, 0.153_291_798_278_765_68),
+        (10, 0.008_201_052_295_634_69),
+        (11, 0.007_567_897_660_545_699),
+        (12, -0.008_298),
+    ],
+    &[
+        (0, 0.031_834_648_163_502_14),
+        (5, 0.028_300_909_672_366_776),
+        (6, 0.053_541_988_307_438_566),
+        (7, -0.054_923_748_571_390_99),
+        (10, -0.000_108_347_328_697_249_32),
+        (11, 0.000_382_571_090_835_658_4),
+        (12, -0.000_340_465_008_687_404_56),
+        (13, 0.141_312_443_674_632_5),
+    ],
+    &[
+        (0, -0.428_896_301_583_791_94),
+        (5, -4.697_621_415_361_164),
+        (6, 7.683_421_196_062_599),
+        (7, 4.068_989_818_397_11),
+        (8, 0.356_727_187_455_281_1),
+        (12, -0.001_399_024_165_159_014_5),
+        (13, 2.947_514_789_152_772_4),
+        (14, -9.150_958_472_179_87),
+    ],
+];
+
+/// The highest four terms.
+const D: [Row; 4] = [
+    &[
+        (0, -8.428_938_276_109_013),
+        (5, 0.566_714_953_519_377_7),
+        (6, -3.068_949_945_949_891_7),
+        (7, 2.384_667_656_512_07),
+        (8, 2.117_034_582_445_028),
+        (9, -0.871_391_583_777_973),
+        (10, 2.240_437_430_260_788_3),
+        (11, 0.631_578_778_769_468_8),
+        (12, -0.088_990_336_451_333_31),
+        (13, 18.148_505_520_854_727),
+        (14, -9.194_632_392_478_356),
+        (15, -4.436_036_387_594_894),
+    ],
+    &[
+        (0, 10.427_508_642_579_134),
+        (5, 242.283_491_775_258_17),
+        (6, 165.200_451_717_270_28),
+        (7, -374.546_754_722_690_2),
+        (8, -22.113_666_853_125_306),
+        (9, 7.733_432_668_472_264),
+        (10, -30.674_084_731_089_398),
+        (11, -9.332_130_526_430_229),
+        (12, 15.697_238_121_770_845),
+        (13, -31.139_403_219_565_178),
+        (14, -9.352_924_358_844_48),
+        (15, 35.816_841_486_394_08),
+    ],
+    &[
+        (0, 19.985_053_242_002_433),
+        (5, -387.037_308_749_351_8),
+        (6, -189.178_138_195_167_58),
+        (7, 527.808_159_205_423_6),
+        (8, -11.573_902_539_959_63),
+        (9, 6.881_232_694_696_3),
+        (10, -1.000_605_096_691_083_8),
+        (11, 0.777_713_779_805_344_3),
+        (12, -2.778_205_752_353_508),
+        (13, -60.196_695_231_264_12),
+        (14, 84.320_405_506_677_16),
+        (15, 11.992_291_136_182_79),
+    ],
+    &[
+        (0, -25.693_933_462_703_75),
+        (5, -154.189_748_690_236_43),
+        (6, -231.529_379_176_045_5),
+        (7, 357.639_117_910_614_1),
+        (8, 93.405_324_183_624_32),
+        (9, -37.458_323_136_451_63),
+        (10, 104.099_649_508_962_3),
+        (11, 29.840_293_426_660_5),
+        (12, -43.533_456_590_011_14),
+        (13, 96.324_553_959_188_28),
+        (14, -39.177_261_675_615_44),
+        (15, -149.726_836_257_985_64),
+    ],
+];
 
 /// Working memory of the method; nothing is allocated from step to step.
 #[derive(Clone, Debug)]
@@ -156,9 +245,11 @@ pub(super) struct Dop853 {
     segment: Vec<f64>,
     reached: Vec<f64>,
     /// those of the dense output, once they were needed
-    further: [Vec<f64>; between::FURTHER],
+    further: [Vec<f64>; FURTHER],
     /// a step before this one was rejected
     is_retry: bool,
+    /// the last point at which a stage had no finite derivative
+    pub bad: Option<(f64, Vec<f64>)>,
 }
 
 impl Dop853 {
@@ -170,6 +261,7 @@ impl Dop853 {
             reached: vec![0.0; dimension],
             further: Default::default(),
             is_retry: false,
+            bad: None,
         }
     }
 
@@ -185,16 +277,19 @@ impl Dop853 {
         &self.reached
     }
 
-    /// Tries a step from where [`Dop853::begin`] was called. A stage without finite
-    /// derivative rejects it and is written to `bad`.
+    /// Tries a step from where [`Dop853::begin`] was called. Where it is accepted the new state is
+    /// in [`Dop853::reached`].
+    ///
+    /// # Errors
+    /// The step to retry with, for a step with too large an error or a stage without finite
+    /// derivative; else the step to go on with.
     pub fn attempt(
         &mut self,
         f: &mut impl Dynamics,
         (t, x): (f64, &[f64]),
         h: f64,
         tolerances: &Tolerances,
-        bad: &mut Option<Point>,
-    ) -> Tried {
+    ) -> Result<f64, f64> {
         for (i, (c, row)) in C.iter().zip(A).enumerate() {
             self.stage.copy_from_slice(x);
             for &(j, a) in row {
@@ -203,32 +298,32 @@ impl Dop853 {
             let at = t + c * h;
             f.derivatives(at, &self.stage, &mut self.slopes[i + 1]);
             if !finite(&self.slopes[i + 1]) {
-                *bad = Some((at, self.stage.clone()));
-                return self.rejected(LEAST);
+                self.bad = Some((at, self.stage.clone()));
+                return self.rejected(h * LEAST);
             }
         }
         combine(&mut self.segment, B, &self.slopes);
         self.reached.copy_from_slice(x);
         add(&mut self.reached, h, &self.segment);
         if !finite(&self.reached) {
-            return self.rejected(FAR);
+            return self.rejected(h * FAR);
         }
         let error = self.error(x, h, tolerances);
         if error.is_nan() {
-            return self.rejected(LEAST);
+            return self.rejected(h * LEAST);
         }
         let factor = (SAFETY * error.powf(-1.0 / ORDER)).clamp(LEAST, MOST);
         if error > 1.0 {
-            return self.rejected(factor);
+            return self.rejected(h * factor);
         }
         // after a rejection the step does not grow at once
         let limit = if self.is_retry { 1.0 } else { MOST };
-        Tried::Accepted(factor.min(limit))
+        Ok(h * factor.min(limit))
     }
 
-    fn rejected(&mut self, factor: f64) -> Tried {
+    fn rejected(&mut self, shorter: f64) -> Result<f64, f64> {
         self.is_retry = true;
-        Tried::Rejected(factor)
+        Err(shorter)
     }
 
     /// The estimate of the error over the step, in tolerances: 1 is just allowed.
@@ -280,6 +375,67 @@ impl Dop853 {
         };
         (h * 100.0).min(wanted).min(span)
     }
+
+    /// The largest derivative of a state at any stage of the step tried last.
+    pub fn fastest(&self, state: usize) -> f64 {
+        let slopes = self.slopes.iter().map(|slope| slope[state].abs());
+        slopes.fold(0.0, f64::max)
+    }
+
+    /// Finds what is between the ends of the step tried last; false where a derivative is not finite.
+    pub fn look_inside(&mut self, f: &mut impl Dynamics, (t, x): (f64, &[f64]), h: f64) -> bool {
+        for slope in &mut self.further {
+            slope.resize(x.len(), 0.0);
+        }
+        let [end, ..] = &mut self.further;
+        f.derivatives(t + h, &self.reached, end);
+        for (i, (c, row)) in C_BETWEEN.iter().zip(A_BETWEEN).enumerate() {
+            self.stage.copy_from_slice(x);
+            for &(j, a) in row {
+                let slope = self
+                    .slopes
+                    .get(j)
+                    .unwrap_or_else(|| &self.further[j - STAGES]);
+                add(&mut self.stage, a * h, slope);
+            }
+            f.derivatives(t + c * h, &self.stage, &mut self.further[i + 1]);
+        }
+        self.further.iter().all(|slope| finite(slope))
+    }
+
+    /// What a state is between the ends of a step, after [`Dop853::look_inside`].
+    pub fn between(&self, state: usize, from: f64, h: f64) -> Poly {
+        let slope = |j: usize| match self.slopes.get(j) {
+            Some(slope) => slope[state],
+            None => self.further[j - STAGES][state],
+        };
+        let rise = self.reached[state] - from;
+        let (begins, ends) = (h * slope(0), h * slope(STAGES));
+        let mut terms = [
+            rise,
+            begins - rise,
+            2.0 * rise - begins - ends,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        ];
+        for (term, row) in terms[3..].iter_mut().zip(D) {
+            *term = h * row.iter().map(|&(j, d)| d * slope(j)).sum::<f64>();
+        }
+        // terms[0]·s + terms[1]·s(1 − s) + terms[2]·s²(1 − s) + …, from the last to the first
+        let mut c = [0.0; COEFFICIENTS];
+        for (k, term) in terms.iter().enumerate().rev() {
+            c[0] += term;
+            let before = c;
+            for i in (0..COEFFICIENTS).rev() {
+                let lower = if i == 0 { 0.0 } else { before[i - 1] };
+                c[i] = if k % 2 == 0 { lower } else { before[i] - lower };
+            }
+        }
+        c[0] += from;
+        Poly(c)
+    }
 }
 
 fn finite(values: &[f64]) -> bool {
@@ -326,8 +482,8 @@ mod tests {
         };
         let mut method = Dop853::new(1);
         assert!(method.begin(&mut f, 0.0, &[1.0]));
-        let tried = method.attempt(&mut f, (0.0, &[1.0]), h, &loose, &mut None);
-        assert!(matches!(tried, Tried::Accepted(_)), "{tried:?}");
+        let tried = method.attempt(&mut f, (0.0, &[1.0]), h, &loose);
+        assert!(tried.is_ok(), "{tried:?}");
         (method.reached()[0] - h.sin().exp()).abs()
     }
 
@@ -352,17 +508,40 @@ mod tests {
     fn a_stage_without_value_rejects_the_step() {
         let mut f = Function::new(1, |_, x: &[f64], dx: &mut [f64]| dx[0] = -x[0].sqrt());
         let mut method = Dop853::new(1);
-        let mut bad = None;
         assert!(method.begin(&mut f, 0.0, &[1e-4]));
-        let tried = method.attempt(
-            &mut f,
-            (0.0, &[1e-4]),
-            9.0,
-            &Tolerances::default(),
-            &mut bad,
-        );
-        assert_eq!(tried, Tried::Rejected(LEAST));
-        assert!(bad.is_some_and(|(_, x)| x[0] < 0.0));
+        let tried = method.attempt(&mut f, (0.0, &[1e-4]), 9.0, &Tolerances::default());
+        assert_eq!(tried, Err(9.0 * LEAST));
+        assert!(method.bad.take().is_some_and(|(_, x)| x[0] < 0.0));
         assert!(!method.begin(&mut f, 0.0, &[-1.0]));
+    }
+
+    /// The largest error between the ends of a step of x' = x·cos t, against exp(sin t).
+    fn error_between(h: f64) -> f64 {
+        let mut f = Function::new(1, |t: f64, x: &[f64], dx: &mut [f64]| {
+            dx[0] = x[0] * t.cos()
+        });
+        assert_eq!(f.dimension(), 1);
+        let loose = Tolerances {
+            relative: 1.0,
+            absolute: 1.0,
+            ..Tolerances::default()
+        };
+        let mut method = Dop853::new(1);
+        assert!(method.begin(&mut f, 0.0, &[1.0]));
+        assert!(method.attempt(&mut f, (0.0, &[1.0]), h, &loose).is_ok());
+        assert!(method.look_inside(&mut f, (0.0, &[1.0]), h));
+        let between = method.between(0, 1.0, h);
+        let error = |k: i32| {
+            let s = f64::from(k) / 50.0;
+            (between.at(s) - (s * h).sin().exp()).abs()
+        };
+        (0..=50).map(error).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn what_is_between_the_ends_is_of_order_eight() {
+        let order = (error_between(0.8) / error_between(0.4)).log2();
+        assert!((7.2..9.5).contains(&order), "{order}");
+        assert!(error_between(0.2) < 1e-8);
     }
 }

@@ -11,7 +11,7 @@
 //! has the variance R + S(1/δ − 1): by none, where the model expects y far beyond.
 
 use super::health::{Innovation, Reading};
-use super::model::Limits;
+use crate::noise::Limits;
 
 /// Ends that are so many deviations away do not matter: less than 10⁻¹⁸ of readings get there.
 pub(super) const FAR: f64 = 9.0;

@@ -60,8 +60,9 @@ mod taylor;
 mod unscented;
 mod variation;
 
+pub use crate::noise::Limits;
 pub use health::{Health, Innovation, Reading, SensorHealth};
-pub use model::{Confined, ConfinedFlow, FilterModel, FilterPlant, Limits, Sensor};
+pub use model::{Confined, ConfinedFlow, FilterModel, FilterPlant, Sensor};
 pub use smooth::Smoothed;
 pub use unscented::{SigmaPoints, Weights};
 

@@ -1,8 +1,9 @@
 //! A plant with its sensors and noises, compiled for filters.
 
-use lynkeus_expr::{Binary, Graph, Node, jacobian, real};
+use lynkeus_expr::{Graph, Node, jacobian};
 
 use super::Bounds;
+use crate::noise::Limits;
 use crate::{Error, Level, System};
 
 /// What a filter has to know: x' = f(t, x, u) + w, y_i = h_i(t, x, u) + v_i.
@@ -49,30 +50,6 @@ pub struct Sensor {
     pub noise: Level,
     /// a reading at one of them only says "at most" or "at least"
     pub limits: Option<Limits>,
-}
-
-/// The range that a sensor can show.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    /// its lower end
-    pub low: f64,
-    /// its upper end
-    pub high: f64,
-}
-
-impl Limits {
-    /// What the sensor shows of a value.
-    #[must_use]
-    pub fn shown(self, value: f64) -> f64 {
-        let capped = real::binary(Binary::Min, value, self.high);
-        real::binary(Binary::Max, capped, self.low)
-    }
-
-    /// Whether a reading only says "at most" or "at least".
-    #[must_use]
-    pub fn ends(self, reading: f64) -> bool {
-        reading <= self.low || reading >= self.high
-    }
 }
 
 /// A [`FilterPlant`], compiled: cheap to clone, independent of its graph.

@@ -3,10 +3,11 @@
 use super::censored::{self, End};
 use super::extended::Room;
 use super::health::{Health, Innovation, Reading};
-use super::model::{FilterModel, Limits, Sensor};
+use super::model::{FilterModel, Sensor};
 use super::smooth::Correction;
+use crate::noise::Limits;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Evaluation};
+use crate::{Dynamics, Error, Evaluation, Events};
 
 /// After so many rejections in a row the next reading is believed: a gate must not lock the
 /// filter out for ever.

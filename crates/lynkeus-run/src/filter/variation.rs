@@ -12,10 +12,10 @@ use super::Belief;
 use super::nodes::{FINE, Lobatto, ODD, meets};
 use super::spanned::Entry;
 use super::taylor::{Moments, Series};
-use crate::adaptive::resolution;
+use crate::method::resolution;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::system::Driven;
-use crate::{Dynamics, Error, Integrator, Method};
+use crate::{Dynamics, Error, Events, Integrator, Method};
 
 /// Tolerance with fixed steps, whose error nobody states.
 const FIXED: f64 = 1e-8;
@@ -115,7 +115,7 @@ impl Variation {
     ) -> Result<Moments, Error> {
         let n = x.len();
         let mut stops = vec![];
-        driven.switches(from, to, &mut stops)?;
+        driven.instants(from, to, &mut stops)?;
         stops.sort_unstable_by(f64::total_cmp);
         stops.push(to);
         let mut moments = Moments::start(n, !self.process_noise.is_empty());

@@ -1,9 +1,9 @@
 //! Stiff flows.
 
 use super::{Piece, Variation};
-use crate::adaptive::resolution;
 use crate::filter::doubling::Dense;
 use crate::filter::taylor::Moments;
+use crate::method::resolution;
 use crate::system::Driven;
 use crate::{Dynamics, Error};
 
