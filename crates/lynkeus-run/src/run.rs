@@ -13,7 +13,7 @@ impl Simulation {
     ///
     /// The columns are the plant's states, its inputs, its outputs if recorded
     /// ([`Role::Output`], [`Role::Measured`]), and what the observer reports
-    /// ([`System::estimates`]), each in the order of its system.
+    /// ([`System::estimates`](crate::System::estimates)), each in the order of its system.
     ///
     /// [`Role::Output`]: crate::Role::Output
     /// [`Role::Measured`]: crate::Role::Measured
