@@ -6,8 +6,8 @@ mod factors;
 mod radau;
 
 use crate::error::state_text;
+use crate::events::{Ahead, Filippov, Span};
 use crate::method::resolution;
-use crate::relays::{Ahead, Glance, Span, Switched};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Method, Tolerances, spectral_radius};
 
@@ -49,7 +49,12 @@ pub(crate) struct Adaptive {
     implicit: bool,
     explicit: Option<Box<Dop853>>,
     radau: Option<Radau>,
-    pace: Pace,
+    /// step proposed for the next step; 0 before the first
+    next: f64,
+    /// accepted steps since the last look
+    since_look: usize,
+    /// looks in a row that spoke for a change
+    agreeing: usize,
     budget: Budget,
 }
 
@@ -64,17 +69,6 @@ struct Budget {
     of_run: usize,
     /// spent in the run before this interval
     spent: usize,
-}
-
-/// What is known about the steps that the solution wants.
-#[derive(Clone, Copy, Debug, Default)]
-struct Pace {
-    /// step proposed for the next step; 0 before the first
-    next: f64,
-    /// accepted steps since the last look
-    since_look: usize,
-    /// looks in a row that spoke for a change
-    agreeing: usize,
 }
 
 /// Progress of one call: where it is and what it may still spend.
@@ -102,7 +96,9 @@ impl Adaptive {
             implicit: matches!(method, Method::Stiff(_)),
             explicit: None,
             radau: None,
-            pace: Pace::default(),
+            next: 0.0,
+            since_look: 0,
+            agreeing: 0,
             budget: Budget {
                 granted: 0,
                 left: 0,
@@ -131,7 +127,7 @@ impl Adaptive {
     /// the budget. Where an error ends it early, `x` is the last state reached.
     pub(crate) fn advance(
         &mut self,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         from: f64,
         to: f64,
         x: &mut [f64],
@@ -160,30 +156,30 @@ impl Adaptive {
     /// True every so often, where the other method is the better one.
     fn should_change(
         &mut self,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         t: f64,
         x: &[f64],
         step: f64,
     ) -> bool {
-        self.pace.since_look += 1;
-        if !self.may_change || self.pace.since_look < LOOK_EVERY {
+        self.since_look += 1;
+        if !self.may_change || self.since_look < LOOK_EVERY {
             return false;
         }
-        self.pace.since_look = 0;
+        self.since_look = 0;
         let product = spectral_radius(f, t, x) * step;
         let speaks_for_change = if self.implicit {
             product < STIFF_BELOW
         } else {
             product > STIFF_ABOVE
         };
-        self.pace.agreeing = if speaks_for_change {
-            self.pace.agreeing + 1
+        self.agreeing = if speaks_for_change {
+            self.agreeing + 1
         } else {
             0
         };
-        let change = self.pace.agreeing >= LOOKS;
+        let change = self.agreeing >= LOOKS;
         if change {
-            self.pace.agreeing = 0;
+            self.agreeing = 0;
         }
         change
     }
@@ -191,7 +187,7 @@ impl Adaptive {
     /// Steps of the explicit method; false where the other one fits better from there.
     fn run_explicit(
         &mut self,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
     ) -> Result<bool, Error> {
         if leg.at_the_end() || leg.x.is_empty() {
@@ -210,21 +206,21 @@ impl Adaptive {
     fn explicit_steps(
         &mut self,
         method: &mut Dop853,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
     ) -> Result<bool, Error> {
         let tolerances = self.tolerances;
-        self.pace.next = self.pace.next.min(leg.to - leg.t);
+        self.next = self.next.min(leg.to - leg.t);
         loop {
             method.bad = None;
             if !method.begin(f, leg.t, leg.x) {
                 return Err(f.not_finite(leg.t, leg.x));
             }
-            if self.pace.next == 0.0 {
+            if self.next == 0.0 {
                 let span = leg.to - leg.t;
                 let first = method.first_step(f, (leg.t, leg.x), span, &tolerances);
                 // a guess that time does not resolve is too careful: it may be longer all the same
-                self.pace.next = first.max(2.0 * resolution(leg.t)).min(span);
+                self.next = first.max(2.0 * resolution(leg.t)).min(span);
             }
             let mut step = self.accepted_step(method, f, leg)?;
             if f.is_unwatched() {
@@ -246,19 +242,19 @@ impl Adaptive {
     fn accepted_step(
         &mut self,
         method: &mut Dop853,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
     ) -> Result<f64, Error> {
         loop {
-            let proposed = self.pace.next;
+            let proposed = self.next;
             let step = leg.step(proposed);
             leg.check_step(f, step, method.bad.as_ref())?;
             leg.spend(f)?;
             match method.attempt(f, (leg.t, &*leg.x), step, &self.tolerances) {
-                Err(shorter) => self.pace.next = shorter,
+                Err(shorter) => self.next = shorter,
                 Ok(next) => {
                     // a step cut short by a stop says nothing about the next one
-                    self.pace.next = if step < proposed {
+                    self.next = if step < proposed {
                         proposed.max(next)
                     } else {
                         next
@@ -272,7 +268,7 @@ impl Adaptive {
     /// Steps of the implicit method; false where the other one fits better from there.
     fn run_implicit(
         &mut self,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
     ) -> Result<bool, Error> {
         if leg.at_the_end() || leg.x.is_empty() {
@@ -289,15 +285,15 @@ impl Adaptive {
     fn implicit_steps(
         &mut self,
         radau: &mut Radau,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
     ) -> Result<bool, Error> {
-        if self.pace.next <= 0.0 {
-            self.pace.next = radau.first_step(leg.x, leg.to - leg.t, &self.tolerances);
+        if self.next <= 0.0 {
+            self.next = radau.first_step(leg.x, leg.to - leg.t, &self.tolerances);
         }
         let mut rejected = true;
         loop {
-            let proposed = self.pace.next;
+            let proposed = self.next;
             let step = leg.step(proposed);
             leg.check_step(f, step, radau.bad.as_ref())?;
             leg.spend(f)?;
@@ -305,16 +301,16 @@ impl Adaptive {
             let next = match radau.attempt(f, (leg.t, leg.x), step, rejected, &self.tolerances) {
                 Ok(next) => next,
                 Err(shorter) => {
-                    self.pace.next = shorter;
+                    self.next = shorter;
                     rejected = true;
                     continue;
                 }
             };
             // after a rejection the step must not grow at once
-            self.pace.next = if rejected { next.min(step) } else { next };
+            self.next = if rejected { next.min(step) } else { next };
             // a step cut short by a stop says nothing about the next one
             if step < proposed {
-                self.pace.next = self.pace.next.max(proposed);
+                self.next = self.next.max(proposed);
             }
             rejected = false;
             let step = match f.is_unwatched() {
@@ -337,9 +333,9 @@ impl Adaptive {
 impl Persist for Adaptive {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         walk.flag(&mut self.implicit)?;
-        walk.number(&mut self.pace.next)?;
-        walk.count(&mut self.pace.since_look)?;
-        walk.count(&mut self.pace.agreeing)?;
+        walk.number(&mut self.next)?;
+        walk.count(&mut self.since_look)?;
+        walk.count(&mut self.agreeing)?;
         walk.count(&mut self.budget.granted)?;
         walk.count(&mut self.budget.left)?;
         walk.count(&mut self.budget.before)?;
@@ -381,19 +377,17 @@ impl Leg<'_> {
     fn explicit_to_event(
         &mut self,
         method: &mut Dop853,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         step: f64,
         tolerances: &Tolerances,
     ) -> Result<f64, Error> {
-        let glance = f.glance(
-            &Span {
-                from: (self.t, self.x),
-                step,
-                to: method.reached(),
-            },
-            |state| method.fastest(state),
-        );
-        if glance == Glance::Clear {
+        let span = Span {
+            from: (self.t, self.x),
+            step,
+            to: method.reached(),
+        };
+        let is_near = f.is_near(&span, |state| method.fastest(state));
+        if !is_near && !f.has_bound() {
             self.x.copy_from_slice(method.reached());
             return Ok(step);
         }
@@ -403,13 +397,11 @@ impl Leg<'_> {
             step,
             to: &reached,
         };
-        let ahead = match glance {
-            Glance::Near if method.look_inside(f, (t, &start), step) => {
-                f.ahead(&span, |state| method.between(state, start[state], step))
-            }
-            _ => Ahead::Nothing,
+        let ahead = match is_near && method.look_inside(f, (t, &start), step) {
+            true => f.ahead(&span, |state| method.between(state, start[state], step)),
+            false => Ahead::Nothing,
         };
-        let attempt = |f: &mut Switched<'_, _>, step: f64| {
+        let attempt = |f: &mut Filippov<'_, _>, step: f64| {
             let tried = method.attempt(f, (t, &start), step, tolerances);
             tried.is_ok().then(|| method.reached().to_vec())
         };
@@ -427,7 +419,7 @@ impl Leg<'_> {
     fn implicit_to_event(
         &mut self,
         radau: &mut Radau,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         start: &[f64],
         step: f64,
         tolerances: &Tolerances,
@@ -443,7 +435,7 @@ impl Leg<'_> {
             return Ok(step);
         }
         let mut has_tried = false;
-        let attempt = |f: &mut Switched<'_, _>, step: f64| {
+        let attempt = |f: &mut Filippov<'_, _>, step: f64| {
             has_tried = true;
             let mut x = start.to_vec();
             radau.restart(f, t, &x);
@@ -463,7 +455,7 @@ impl Leg<'_> {
         Ok(event.step)
     }
 
-    fn check_start(&self, f: &mut Switched<'_, impl Dynamics>) -> Result<(), Error> {
+    fn check_start(&self, f: &mut Filippov<'_, impl Dynamics>) -> Result<(), Error> {
         let mut dx = vec![0.0; self.x.len()];
         f.derivatives(self.t, self.x, &mut dx);
         if dx.iter().all(|v| v.is_finite()) {
@@ -473,7 +465,7 @@ impl Leg<'_> {
     }
 
     /// Pays for one step.
-    fn spend(&mut self, f: &mut Switched<'_, impl Dynamics>) -> Result<(), Error> {
+    fn spend(&mut self, f: &mut Filippov<'_, impl Dynamics>) -> Result<(), Error> {
         if f.is_over() {
             return Err(Error::Cancelled { time: self.t });
         }
@@ -492,7 +484,7 @@ impl Leg<'_> {
 
     fn check_step(
         &self,
-        f: &mut Switched<'_, impl Dynamics>,
+        f: &mut Filippov<'_, impl Dynamics>,
         step: f64,
         bad: Option<&(f64, Vec<f64>)>,
     ) -> Result<(), Error> {
@@ -515,13 +507,13 @@ impl Leg<'_> {
     /// across the surface is accurate.
     fn crossing<D: Dynamics>(
         &mut self,
-        f: &mut Switched<'_, D>,
+        f: &mut Filippov<'_, D>,
         span: &Span<'_>,
         ahead: Ahead,
-        mut attempt: impl FnMut(&mut Switched<'_, D>, f64) -> Option<Vec<f64>>,
+        mut attempt: impl FnMut(&mut Filippov<'_, D>, f64) -> Option<Vec<f64>>,
     ) -> Result<Option<Reach>, Error> {
         let (t, step) = (span.from.0, span.step);
-        let reach = |f: &mut Switched<'_, D>, step: f64, x: Vec<f64>| {
+        let reach = |f: &mut Filippov<'_, D>, step: f64, x: Vec<f64>| {
             let mut margins = vec![];
             f.margins(t + step, &x, &mut margins);
             Reach { step, x, margins }

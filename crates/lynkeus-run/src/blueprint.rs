@@ -7,7 +7,7 @@ use crate::integrator::AUTO_PRODUCT;
 use crate::jacobian::fastest;
 use crate::snapshot::Digest;
 use crate::system::Evaluation;
-use crate::{Dynamics, EstimatorSettings, Method, SampledObserver, System, Tuned};
+use crate::{EstimatorSettings, Events, Method, SampledObserver, System, Tuned};
 
 /// An observer with all that says how it is run: every [`Estimator`](crate::Estimator) is made of
 /// one, and what runs elsewhere (another language, a device) is printed from one.

@@ -5,10 +5,9 @@ use std::sync::{Arc, Mutex};
 use lynkeus_expr::{Expr, Graph, Node};
 
 use crate::equations::{Equations, Roots};
-use crate::filter::Limits;
-use crate::noise::{Disturbed, Sensors};
-use crate::relays::Guards;
-use crate::{Dynamics, Error, Evaluation, Role, Simulation, Slopes, System, Trajectory};
+use crate::events::Guards;
+use crate::noise::{Level, Limits, Sensors};
+use crate::{Dynamics, Error, Evaluation, Events, Role, Simulation, Slopes, System, Trajectory};
 
 /// The place of a name among those that a system can read.
 fn place(
@@ -246,10 +245,10 @@ impl<'g> Symbols<'g> {
     fn shown(&self, sensors: &Sensors, y: &[Node]) -> Vec<Node> {
         let shown = |(i, &y): (usize, &Node)| {
             let (y, noise) = (self.graph.expr(y), self.graph.expr(self.noise[i]));
-            let disturbed = match sensors.disturbed(i) {
-                Disturbed::Not => y,
-                Disturbed::Added => y + noise,
-                Disturbed::Multiplied => y * noise,
+            let disturbed = match sensors.level(i) {
+                None => y,
+                Some(Level::Relative(_)) => y * noise,
+                Some(Level::Absolute(_) | Level::Uniform(_)) => y + noise,
             };
             let limited = |Limits { low, high }| -> Expr<'_> {
                 let capped = disturbed.min(self.graph.constant(high));
@@ -336,7 +335,7 @@ impl Loop {
         (names, &x[self.wiring.plant.states().len()..])
     }
 
-    /// The values of what jumps with time, since the last [`Dynamics::enter`].
+    /// The values of what jumps with time, since the last [`Events::enter`].
     pub(crate) fn modes(&self) -> &[f64] {
         self.joined.modes()
     }
@@ -448,38 +447,8 @@ impl Dynamics for Loop {
         self.joined.step(t, h, x, next)
     }
 
-    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
-        self.joined.switches(from, to, times)
-    }
-
-    fn enter(&mut self, t: f64) {
-        self.joined.enter(t);
-        self.disturb();
-    }
-
-    fn surfaces(&self) -> usize {
-        self.joined.surfaces()
-    }
-
-    fn surface_names(&self) -> Vec<String> {
-        self.joined.surface_names()
-    }
-
-    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
-        self.joined.read_surfaces(t, x, values);
-    }
-
-    fn hold(&mut self, sides: Option<&[f64]>) {
-        self.is_held = sides.is_some();
-        self.joined.hold(sides);
-    }
-
-    fn guards(&self) -> Option<Arc<Guards>> {
-        self.joined.guards()
-    }
-
-    fn beside(&mut self, t: f64, values: &mut Vec<[f64; 2]>) {
-        self.joined.beside(t, values);
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        Some(self)
     }
 
     fn names(&self) -> Vec<String> {
@@ -501,5 +470,33 @@ impl Dynamics for Loop {
             }
             _ => parts.plant.not_finite(t, plant_x),
         }
+    }
+}
+
+impl Events for Loop {
+    fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
+        self.joined.instants(from, to, times)
+    }
+
+    fn enter(&mut self, t: f64) {
+        self.joined.enter(t);
+        self.disturb();
+    }
+
+    fn guards(&self) -> Option<Arc<Guards>> {
+        self.joined.guards()
+    }
+
+    fn indicators(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        self.joined.indicators(t, x, values);
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        self.is_held = sides.is_some();
+        self.joined.hold(sides);
+    }
+
+    fn beside(&mut self, t: f64, values: &mut Vec<[f64; 2]>) {
+        self.joined.beside(t, values);
     }
 }

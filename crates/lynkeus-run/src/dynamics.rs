@@ -3,11 +3,10 @@
 use std::sync::Arc;
 
 use crate::error::state_text;
-use crate::relays::Guards;
+use crate::events::Guards;
 use crate::{Error, Slopes};
 
-/// A right-hand side x' = f(t, x), with the instants at which f jumps because
-/// of time alone.
+/// A right-hand side x' = f(t, x), with its [`Events`].
 ///
 /// A derivative that is NaN or infinite is a statement ("f is not defined
 /// here"), never a value: integrators shorten the step or stop.
@@ -30,48 +29,10 @@ pub trait Dynamics {
         false
     }
 
-    /// Appends every instant strictly inside (`from`, `to`) at which f jumps or
-    /// has a kink because of time, in any order.
-    ///
-    /// # Errors
-    /// [`Error::TooManySwitches`] where there is no bounded number of them,
-    /// [`Error::UnresolvedSwitches`] where rounding errors hide them.
-    fn switches(&mut self, _from: f64, _to: f64, _times: &mut Vec<f64>) -> Result<(), Error> {
-        Ok(())
-    }
-
-    /// Freezes what depends on time by jumps (relations, `floor`, `sign`) at its
-    /// value at `t`, so that f is smooth on a whole segment, ends included.
-    fn enter(&mut self, _t: f64) {}
-
-    /// Number of surfaces on which f jumps with the state. Where there are some,
-    /// [`Dynamics::read_surfaces`] and [`Dynamics::hold`] belong to them.
-    fn surfaces(&self) -> usize {
-        0
-    }
-
-    /// How the surfaces read, for messages.
-    fn surface_names(&self) -> Vec<String> {
-        vec![]
-    }
-
-    /// Writes the functions that vanish on the surfaces at (t, x), one per surface.
-    fn read_surfaces(&mut self, _t: f64, _x: &[f64], _values: &mut [f64]) {}
-
-    /// Holds f, from here on, as it is on one side of each surface: where its function is
-    /// positive for 1, negative for −1; both surfaces of a `floor` tell its value. With none f is
-    /// what the state says again.
-    fn hold(&mut self, _sides: Option<&[f64]>) {}
-
-    /// The functions of the surfaces and of where f bends, as code, so that they can be enclosed over a
-    /// step. With none a crossing is seen by the ends of a step alone.
-    fn guards(&self) -> Option<Arc<Guards>> {
+    /// The instants and surfaces at which f is not smooth; none where it is smooth everywhere.
+    fn events(&mut self) -> Option<&mut dyn Events> {
         None
     }
-
-    /// Writes what the code of the guards reads beside time and states at `t`, and how fast each of it
-    /// changes: until the next stop everything is a straight line.
-    fn beside(&mut self, _t: f64, _values: &mut Vec<[f64; 2]>) {}
 
     /// Asked at every step: true ends the run with [`Error::Cancelled`].
     fn is_over(&mut self) -> bool {
@@ -93,66 +54,41 @@ pub trait Dynamics {
     }
 }
 
-impl<D: Dynamics + ?Sized> Dynamics for &mut D {
-    fn dimension(&self) -> usize {
-        (**self).dimension()
+/// The events of a right-hand side f: instants and surfaces at which it jumps or bends.
+pub trait Events {
+    /// Appends every instant strictly inside (`from`, `to`) at which f jumps or
+    /// has a kink because of time, in any order.
+    ///
+    /// # Errors
+    /// [`Error::TooManySwitches`] where there is no bounded number of them,
+    /// [`Error::UnresolvedSwitches`] where rounding errors hide them.
+    fn instants(&mut self, _from: f64, _to: f64, _times: &mut Vec<f64>) -> Result<(), Error> {
+        Ok(())
     }
 
-    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
-        (**self).derivatives(t, x, dx);
-    }
+    /// Freezes what depends on time by jumps (relations, `floor`, `sign`) at its
+    /// value at `t`, so that f is smooth on a whole segment, ends included.
+    fn enter(&mut self, _t: f64) {}
 
-    fn slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
-        (**self).slopes(t, x, slopes)
-    }
-
-    fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
-        (**self).step(t, h, x, next)
-    }
-
-    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
-        (**self).switches(from, to, times)
-    }
-
-    fn enter(&mut self, t: f64) {
-        (**self).enter(t);
-    }
-
-    fn surfaces(&self) -> usize {
-        (**self).surfaces()
-    }
-
-    fn surface_names(&self) -> Vec<String> {
-        (**self).surface_names()
-    }
-
-    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
-        (**self).read_surfaces(t, x, values);
-    }
-
-    fn hold(&mut self, sides: Option<&[f64]>) {
-        (**self).hold(sides);
-    }
-
+    /// The functions of the surfaces on which f jumps with the state, and of where it bends, as code,
+    /// so that they can be enclosed over a step. Where there are some, the methods below belong to
+    /// them.
     fn guards(&self) -> Option<Arc<Guards>> {
-        (**self).guards()
+        None
     }
 
-    fn beside(&mut self, t: f64, values: &mut Vec<[f64; 2]>) {
-        (**self).beside(t, values);
-    }
+    /// Writes the event indicators: the functions that vanish on the surfaces at (t, x), one per
+    /// surface. States that a wrapper adds may follow those of f in `x`.
+    fn indicators(&mut self, _t: f64, _x: &[f64], _values: &mut [f64]) {}
 
-    fn is_over(&mut self) -> bool {
-        (**self).is_over()
-    }
+    /// Holds f, from here on, as it is on one side of each surface: where its function is
+    /// positive for 1, negative for −1; both surfaces of a `floor` tell its value. With none f is
+    /// what the state says again.
+    fn hold(&mut self, _sides: Option<&[f64]>) {}
 
-    fn names(&self) -> Vec<String> {
-        (**self).names()
-    }
-
-    fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
-        (**self).not_finite(t, x)
-    }
+    /// Writes what the code of the guards reads beside time and states at `t`, and how fast each of it
+    /// changes: until the next stop everything is a straight line.
+    fn beside(&mut self, _t: f64, _values: &mut Vec<[f64; 2]>) {}
 }
 
 /// A closure (t, x, dx) as dynamics, for plain functions.

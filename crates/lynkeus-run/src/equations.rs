@@ -5,8 +5,7 @@ use std::sync::{Mutex, MutexGuard};
 
 use lynkeus_expr::{Graph, MissingInput, Node};
 
-use crate::relays::{Held, bends, take};
-use crate::switches::Switches;
+use crate::events::{Jumps, Surfaces, TimeEvents, extract};
 
 /// x' = f(t, x, w) and y = h(t, x, w), with all that jumps taken out, in a graph of their own.
 #[derive(Debug)]
@@ -18,12 +17,12 @@ pub(crate) struct Equations {
     /// the symbols of time, states, signals, modes and held modes
     pub inputs: Vec<Node>,
     /// what jumps or bends with time alone, of each part of the system
-    pub switches: Vec<Switches>,
+    pub switches: Vec<TimeEvents>,
     /// how many values each of them has, which are the modes
     pub modes: Vec<usize>,
     /// what jumps with the state, of each part in which something does; the values of these
     /// operations are the held modes
-    pub held: Vec<Held>,
+    pub held: Vec<Jumps>,
     pub graph: Mutex<Graph>,
 }
 
@@ -55,37 +54,36 @@ impl Equations {
         let image = own.copied(graph, &[symbols, &roots].concat());
         let moving: Vec<Node> = symbols.iter().map(|s| image[s]).collect();
         let roots: Vec<Node> = roots.iter().map(|r| image[r]).collect();
-        let extracted = Switches::extract(&own, moving[0], &roots)?;
-        let mut inputs = [&moving[..], &extracted.modes].concat();
-        let taken = take(&own, &moving, &extracted.roots, derivatives.len());
+        let extracted = extract(&own, &moving, &roots, derivatives.len())?;
+        let time = extracted.time;
+        let mut inputs = [&moving[..], &time.modes].concat();
         let parted = |roots: &[Node]| {
             let (dx, y) = roots.split_at(derivatives.len());
             (dx.to_vec(), y.to_vec())
         };
-        let (derivatives, outputs) = parted(&extracted.roots);
+        let (derivatives, outputs) = parted(&time.roots);
         let mut roots = Roots {
             held_derivatives: derivatives.clone(),
             held_outputs: outputs.clone(),
             derivatives,
             outputs,
-            ..Roots::default()
+            surfaces: extracted.surfaces,
+            bends: extracted.bends,
         };
         let mut held = vec![];
-        if let Some(taken) = taken {
+        if let Some(taken) = extracted.state {
             inputs.extend(&taken.modes);
             (roots.held_derivatives, roots.held_outputs) = parted(&taken.roots);
-            roots.surfaces = taken.surfaces;
-            held.push(taken.held);
+            held.push(taken.events);
         }
-        roots.bends = bends(&own, &moving[1..], &roots.held_derivatives);
         Ok(Self {
             states: vec![],
             signals: vec![],
             outputs: vec![],
             roots,
             inputs,
-            modes: vec![extracted.modes.len()],
-            switches: vec![extracted.switches],
+            modes: vec![time.modes.len()],
+            switches: vec![time.events],
             held,
             graph: Mutex::new(own),
         })
@@ -107,12 +105,14 @@ impl Equations {
         1 + self.states.len() + self.signals.len() + self.modes.iter().sum::<usize>()
     }
 
-    /// The surfaces that are one of two of a `floor`.
-    pub fn counts(&self) -> Vec<bool> {
-        self.held
-            .iter()
-            .flat_map(|held| held.counts.clone())
-            .collect()
+    /// The surfaces on which it jumps with the state.
+    pub fn surfaces(&self) -> Surfaces {
+        let held = self.held.iter();
+        Surfaces {
+            nodes: self.roots.surfaces.clone(),
+            names: held.clone().flat_map(|jumps| jumps.names.clone()).collect(),
+            counts: held.flat_map(|jumps| jumps.counts.clone()).collect(),
+        }
     }
 
     /// The same expressions in another graph, `arguments` in the place of the inputs.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use lynkeus_expr::{Graph, Node, jacobian};
 
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Evaluation, System};
+use crate::{Dynamics, Error, Evaluation, Events, System};
 
 /// A [`System`] x' = f(t, x, w), y = h(t, x, w), x̂ = g(t, x, w) with those of its Jacobians F = ∂f/∂x,
 /// G = ∂g/∂x and C = ∂h/∂x that are asked for.

@@ -3,11 +3,10 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
+use lynkeus_expr::{Binary, real};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
-
-use lynkeus_expr::{Binary, real};
 
 use crate::Error;
 
@@ -138,10 +137,12 @@ impl Limits {
 #[derive(Clone, Debug)]
 pub(crate) struct Sensors {
     channels: Vec<Option<Channel>>,
-    process: Vec<Option<Wander>>,
+    /// what moves each state besides the plant
+    process: Vec<Option<Channel>>,
     limits: Vec<Option<Limits>>,
 }
 
+/// What is drawn for one output or state.
 #[derive(Clone, Debug)]
 struct Channel {
     level: Level,
@@ -149,12 +150,32 @@ struct Channel {
     deviate: f64,
 }
 
-/// What moves a state besides the plant.
-#[derive(Clone, Debug)]
-struct Wander {
-    deviation: f64,
-    stream: ChaCha8Rng,
-    deviate: f64,
+impl Channel {
+    fn new(level: Level, seed: u64, name: &str) -> Self {
+        Self {
+            level,
+            stream: stream(seed, name),
+            deviate: 0.0,
+        }
+    }
+
+    fn draw(&mut self) {
+        self.deviate = match self.level {
+            Level::Absolute(_) | Level::Relative(_) => StandardNormal.sample(&mut self.stream),
+            Level::Uniform(_) => {
+                let share: f64 = StandardUniform.sample(&mut self.stream);
+                2.0 * share - 1.0
+            }
+        };
+    }
+
+    /// What is added at present, or multiplied with where the level is relative.
+    fn disturbance(&self) -> f64 {
+        match self.level {
+            Level::Absolute(size) | Level::Uniform(size) => size * self.deviate,
+            Level::Relative(fraction) => 1.0 + fraction * self.deviate,
+        }
+    }
 }
 
 fn stream(seed: u64, name: &str) -> ChaCha8Rng {
@@ -179,78 +200,39 @@ impl Sensors {
         hold: f64,
     ) -> Result<Self, Error> {
         for (name, level) in &noise.levels {
-            if !outputs.contains(name) {
-                let expected = format!("one of the outputs: {}", outputs.join(", "));
-                return Err(Error::setting("noise of", expected, format!("'{name}'")));
-            }
-            let value = level.size();
-            if !(value >= 0.0 && value.is_finite()) {
-                let what = format!("noise of '{name}'");
-                return Err(Error::setting(what, "a finite number, 0 or above", value));
+            check_name("noise", name, "outputs", outputs)?;
+            check_size("noise", name, level.size())?;
+        }
+        for (name, &density) in &noise.process {
+            check_name("process noise", name, "states", states)?;
+            check_size("process noise", name, density)?;
+        }
+        for (name, Limits { low, high }) in &noise.limits {
+            check_name("limits", name, "outputs", outputs)?;
+            if low.partial_cmp(high) != Some(Ordering::Less) {
+                let what = format!("limits of '{name}'");
+                let found = format!("[{low}, {high}]");
+                let expected = "a lower end below the upper one";
+                return Err(Error::setting(what, expected, found));
             }
         }
         let channel = |name: &String| {
-            Some(Channel {
-                level: *noise.levels.get(name)?,
-                stream: stream(noise.seed, name),
-                deviate: 0.0,
-            })
+            let level = *noise.levels.get(name)?;
+            Some(Channel::new(level, noise.seed, name))
         };
-        let wander = |name: &String| {
+        let process = |name: &String| {
             let density = *noise.process.get(name).filter(|density| **density > 0.0)?;
-            Some(Wander {
-                deviation: (density / hold).sqrt(),
-                stream: stream(noise.seed, &format!("'{name}")),
-                deviate: 0.0,
-            })
+            let level = Level::Absolute((density / hold).sqrt());
+            Some(Channel::new(level, noise.seed, &format!("'{name}")))
         };
-        Self::check_process(&noise.process, states)?;
-        Self::check_limits(&noise.limits, outputs)?;
         Ok(Self {
             limits: outputs
                 .iter()
                 .map(|o| noise.limits.get(o).copied())
                 .collect(),
             channels: outputs.iter().map(channel).collect(),
-            process: states.iter().map(wander).collect(),
+            process: states.iter().map(process).collect(),
         })
-    }
-
-    fn check_process(process: &BTreeMap<String, f64>, states: &[String]) -> Result<(), Error> {
-        for (name, &density) in process {
-            if !states.contains(name) {
-                let expected = format!("one of the states: {}", states.join(", "));
-                return Err(Error::setting(
-                    "process noise of",
-                    expected,
-                    format!("'{name}'"),
-                ));
-            }
-            if !(density >= 0.0 && density.is_finite()) {
-                let what = format!("process noise of '{name}'");
-                return Err(Error::setting(what, "a finite number, 0 or above", density));
-            }
-        }
-        Ok(())
-    }
-
-    fn check_limits(limits: &BTreeMap<String, Limits>, outputs: &[String]) -> Result<(), Error> {
-        for (name, Limits { low, high }) in limits {
-            if !outputs.contains(name) {
-                let expected = format!("one of the outputs: {}", outputs.join(", "));
-                return Err(Error::setting("limits of", expected, format!("'{name}'")));
-            }
-            if low.partial_cmp(high) != Some(Ordering::Less) {
-                let what = format!("limits of '{name}'");
-                let found = format!("[{low}, {high}]");
-                return Err(Error::setting(
-                    what,
-                    "a lower end below the upper one",
-                    found,
-                ));
-            }
-        }
-        Ok(())
     }
 
     /// True where no output is noisy and nothing but the plant moves its states.
@@ -261,13 +243,14 @@ impl Sensors {
     /// The states that noise moves, by place.
     pub(crate) fn moved(&self) -> impl Iterator<Item = usize> + '_ {
         let process = self.process.iter().enumerate();
-        process.filter_map(|(i, wander)| wander.is_some().then_some(i))
+        process.filter_map(|(i, channel)| channel.is_some().then_some(i))
     }
 
     /// What noise adds to the derivative of a state at present.
     pub(crate) fn drive(&self, state: usize) -> f64 {
-        let wander = self.process[state].as_ref();
-        wander.map_or(0.0, |wander| wander.deviation * wander.deviate)
+        self.process[state]
+            .as_ref()
+            .map_or(0.0, Channel::disturbance)
     }
 
     /// What noise does at every sensor, then to every moved state, at present.
@@ -278,33 +261,23 @@ impl Sensors {
 
     /// Draws what moves the states from here on.
     pub(crate) fn stir(&mut self) {
-        for wander in self.process.iter_mut().flatten() {
-            wander.deviate = StandardNormal.sample(&mut wander.stream);
-        }
+        let drawn = self.process.iter_mut().flatten();
+        drawn.for_each(Channel::draw);
     }
 
     /// Draws the next sample of every channel, and what moves the states.
     pub(crate) fn draw(&mut self) {
         self.stir();
-        for channel in self.channels.iter_mut().flatten() {
-            channel.deviate = match channel.level {
-                Level::Absolute(_) | Level::Relative(_) => {
-                    StandardNormal.sample(&mut channel.stream)
-                }
-                Level::Uniform(_) => {
-                    let share: f64 = StandardUniform.sample(&mut channel.stream);
-                    2.0 * share - 1.0
-                }
-            };
-        }
+        let drawn = self.channels.iter_mut().flatten();
+        drawn.for_each(Channel::draw);
     }
 
     /// What sensor `index` shows of the value.
     pub(crate) fn measured(&self, index: usize, value: f64) -> f64 {
-        let disturbed = match self.disturbed(index) {
-            Disturbed::Not => value,
-            Disturbed::Added => value + self.disturbance(index),
-            Disturbed::Multiplied => value * self.disturbance(index),
+        let disturbed = match self.level(index) {
+            None => value,
+            Some(Level::Relative(_)) => value * self.disturbance(index),
+            Some(Level::Absolute(_) | Level::Uniform(_)) => value + self.disturbance(index),
         };
         self.limits(index)
             .map_or(disturbed, |limits| limits.shown(disturbed))
@@ -315,33 +288,38 @@ impl Sensors {
         self.limits[index]
     }
 
-    /// What noise does at sensor `index`.
-    pub(crate) fn disturbed(&self, index: usize) -> Disturbed {
-        match self.channels[index].as_ref().map(|channel| channel.level) {
-            None => Disturbed::Not,
-            Some(Level::Absolute(_) | Level::Uniform(_)) => Disturbed::Added,
-            Some(Level::Relative(_)) => Disturbed::Multiplied,
-        }
+    /// The noise at sensor `index`, where there is some.
+    pub(crate) fn level(&self, index: usize) -> Option<Level> {
+        self.channels[index].as_ref().map(|channel| channel.level)
     }
 
     /// The number that is added at sensor `index` at present, or multiplied with.
     pub(crate) fn disturbance(&self, index: usize) -> f64 {
-        self.channels[index].as_ref().map_or(0.0, |channel| {
-            let Channel { level, deviate, .. } = channel;
-            match level {
-                Level::Absolute(size) | Level::Uniform(size) => size * deviate,
-                Level::Relative(fraction) => 1.0 + fraction * deviate,
-            }
-        })
+        self.channels[index]
+            .as_ref()
+            .map_or(0.0, Channel::disturbance)
     }
 }
 
-/// How noise meets a value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Disturbed {
-    Not,
-    Added,
-    Multiplied,
+/// # Errors
+/// [`Error::Setting`] if the name is not among those that are known.
+fn check_name(what: &str, name: &str, kind: &str, known: &[String]) -> Result<(), Error> {
+    if known.iter().any(|k| k == name) {
+        return Ok(());
+    }
+    let expected = format!("one of the {kind}: {}", known.join(", "));
+    let found = format!("'{name}'");
+    Err(Error::setting(format!("{what} of"), expected, found))
+}
+
+/// # Errors
+/// [`Error::Setting`] for what is no size of a noise.
+fn check_size(what: &str, name: &str, size: f64) -> Result<(), Error> {
+    if size >= 0.0 && size.is_finite() {
+        return Ok(());
+    }
+    let what = format!("{what} of '{name}'");
+    Err(Error::setting(what, "a finite number, 0 or above", size))
 }
 
 /// 64-bit FNV-1a.

@@ -6,14 +6,14 @@ use std::ops::ControlFlow;
 use crate::closed_loop::{Loop, table};
 use crate::divergence::Bound;
 use crate::noise::Sensors;
-use crate::{Dynamics, Error, Integrator, Interrupted, Simulation, Trajectory, process_draws};
+use crate::{Error, Events, Integrator, Interrupted, Simulation, Trajectory, process_draws};
 
 impl Simulation {
     /// Runs to the end.
     ///
     /// The columns are the plant's states, its inputs, its outputs if recorded
     /// ([`Role::Output`], [`Role::Measured`]), and what the observer reports
-    /// ([`System::estimates`]), each in the order of its system.
+    /// ([`System::estimates`](crate::System::estimates)), each in the order of its system.
     ///
     /// [`Role::Output`]: crate::Role::Output
     /// [`Role::Measured`]: crate::Role::Measured

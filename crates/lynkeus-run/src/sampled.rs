@@ -6,7 +6,7 @@ use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::spread::{ErrorModel, Spread};
 use crate::system::Driven;
-use crate::{BetweenSamples, Dynamics, Error, Integrator, Method, StepAdvice, System};
+use crate::{BetweenSamples, Dynamics, Error, Events, Integrator, Method, StepAdvice, System};
 
 /// An observer z' = F(t, z, u, w) whose measurements are states of their own: w jumps to a
 /// reading when the sensor reports, and in between stays (`hold`) or follows the model,

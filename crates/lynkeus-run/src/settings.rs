@@ -14,7 +14,7 @@ pub enum BetweenSamples {
     Linear,
 }
 
-/// How an [`Estimator`] goes from sample to sample.
+/// How an [`Estimator`](crate::Estimator) goes from sample to sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatorSettings {
     /// the signals between samples

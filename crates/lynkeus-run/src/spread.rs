@@ -11,7 +11,7 @@ use crate::filter::root::Root;
 use crate::linearised::OutputMap;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{
-    BetweenSamples, Dynamics, Error, EstimatorSettings, Jacobian, Jacobians, Level, Linearised,
+    BetweenSamples, Error, EstimatorSettings, Events, Jacobian, Jacobians, Level, Linearised,
     Method,
 };
 

@@ -8,11 +8,10 @@ use lynkeus_expr::{Evaluator, Graph, Node, Tape};
 use crate::divergence::explained;
 use crate::equations::Equations;
 use crate::error::state_text;
-use crate::relays::{Guards, Watched};
+use crate::events::{Guards, TimeEvents};
 use crate::routine::{Routine, Runner};
 use crate::snapshot::{Damaged, Digest, Persist, Walk};
-use crate::switches::Switches;
-use crate::{BetweenSamples, Dynamics, Error, Margin, Slopes};
+use crate::{BetweenSamples, Dynamics, Error, Events, Margin, Slopes};
 
 /// A compiled system x' = f(t, x, w), y = h(t, x, w): a plant, an observer, or
 /// (without states) inputs as functions of time.
@@ -43,7 +42,8 @@ struct Code {
 struct HeldCode {
     derivatives_at: Arc<Routine>,
     outputs_at: Arc<Routine>,
-    surfaces: Tape,
+    /// the event indicators: what vanishes on the surfaces
+    indicators: Tape,
 }
 
 impl System {
@@ -94,14 +94,10 @@ impl System {
     pub(crate) fn compiled(equations: Equations, start: Vec<f64>) -> Result<Self, Error> {
         let equations = Arc::new(equations);
         let Equations { roots, inputs, .. } = &*equations;
-        let watched = Watched {
-            surfaces: roots.surfaces.clone(),
-            counts: equations.counts(),
-            bends: roots.bends.clone(),
-        };
         let guards = {
             let graph = equations.graph();
-            Guards::new(&graph, inputs, equations.states.len(), &watched)?
+            let states = equations.states.len();
+            Guards::new(&graph, inputs, states, equations.surfaces(), &roots.bends)?
         };
         let held = match equations.held.is_empty() {
             true => None,
@@ -112,7 +108,7 @@ impl System {
                     roots.held_derivatives.clone(),
                 )?,
                 outputs_at: Routine::new(&equations, inputs.len(), roots.held_outputs.clone())?,
-                surfaces: Tape::new(&equations.graph(), inputs, &roots.surfaces)?,
+                indicators: Tape::new(&equations.graph(), inputs, &roots.surfaces)?,
             }),
         };
         let smooth = equations.smooth_inputs();
@@ -210,8 +206,8 @@ impl System {
         {
             let _ = write!(digest, "{:?}", routine.tape());
         }
-        let surfaces = code.held.as_ref().map(|held| &held.surfaces);
-        let _ = write!(digest, "{surfaces:?}");
+        let indicators = code.held.as_ref().map(|held| &held.indicators);
+        let _ = write!(digest, "{indicators:?}");
         digest.numbers(&self.start);
     }
 
@@ -259,7 +255,7 @@ impl System {
 struct HeldEvaluation {
     derivatives: Runner,
     outputs: Runner,
-    surfaces: Evaluator,
+    indicators: Evaluator,
     modes: Vec<f64>,
     /// those of the system, then the modes
     inputs: Vec<f64>,
@@ -281,7 +277,7 @@ pub struct Evaluation {
     derivatives: Runner,
     outputs: Runner,
     /// of each part of the system
-    switches: Vec<Switches>,
+    switches: Vec<TimeEvents>,
     /// t, x, w, modes
     inputs: Vec<f64>,
     held: Option<HeldEvaluation>,
@@ -298,7 +294,7 @@ impl Evaluation {
             held: code.held.as_ref().map(|held| HeldEvaluation {
                 derivatives: held.derivatives_at.runner(),
                 outputs: held.outputs_at.runner(),
-                surfaces: held.surfaces.evaluator(),
+                indicators: held.indicators.evaluator(),
                 modes: vec![0.0; code.equations.held_modes()],
                 inputs: vec![],
                 is_held: false,
@@ -327,7 +323,7 @@ impl Evaluation {
 
     /// Writes the outputs at (t, x) to `y`, in the order of [`System::outputs`].
     ///
-    /// Modes are those of the last [`Dynamics::enter`].
+    /// Modes are those of the last [`Events::enter`].
     pub fn outputs(&mut self, t: f64, x: &[f64], y: &mut [f64]) {
         self.place(t, x);
         match &mut self.held {
@@ -378,7 +374,7 @@ impl Evaluation {
         explained(error, system.states(), x, scale, &margins)
     }
 
-    /// Values of the switches at the last [`Dynamics::enter`].
+    /// Values of the switches at the last [`Events::enter`].
     pub(crate) fn modes(&self) -> &[f64] {
         &self.inputs[self.inputs.len() - self.system.modes()..]
     }
@@ -440,50 +436,6 @@ impl Dynamics for Evaluation {
         }
     }
 
-    fn surfaces(&self) -> usize {
-        self.system.code.equations.roots.surfaces.len()
-    }
-
-    fn surface_names(&self) -> Vec<String> {
-        let held = self.system.code.equations.held.iter();
-        held.flat_map(|held| held.names.clone()).collect()
-    }
-
-    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
-        self.place(t, x);
-        if let Some(held) = &mut self.held {
-            held.place(&self.inputs);
-            held.surfaces.eval(&held.inputs, values);
-        }
-    }
-
-    fn hold(&mut self, sides: Option<&[f64]>) {
-        let Some(evaluation) = &mut self.held else {
-            return;
-        };
-        evaluation.is_held = sides.is_some();
-        let Some(mut sides) = sides else {
-            return;
-        };
-        let mut modes = &mut evaluation.modes[..];
-        for held in &self.system.code.equations.held {
-            let (own, rest) = sides.split_at(held.names.len());
-            modes = held.modes(own, modes);
-            sides = rest;
-        }
-    }
-
-    fn guards(&self) -> Option<Arc<Guards>> {
-        self.system.code.guards.clone()
-    }
-
-    fn beside(&mut self, _t: f64, values: &mut Vec<[f64; 2]>) {
-        let first = 1 + self.system.states().len();
-        let held = self.held_modes();
-        values.clear();
-        values.extend(self.inputs[first..].iter().chain(held).map(|&v| [v, 0.0]));
-    }
-
     fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
         if self.held.as_ref().is_some_and(|held| held.is_held) {
             return false;
@@ -492,23 +444,8 @@ impl Dynamics for Evaluation {
         self.derivatives.step(&mut self.inputs, h, next)
     }
 
-    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
-        let mut switches = self.switches.iter_mut();
-        switches.try_for_each(|switches| switches.between(from, to, times))
-    }
-
-    fn enter(&mut self, t: f64) {
-        let first = self.inputs.len() - self.system.modes();
-        let mut modes = &mut self.inputs[first..];
-        for (switches, &count) in self
-            .switches
-            .iter_mut()
-            .zip(&self.system.code.equations.modes)
-        {
-            let (own, rest) = modes.split_at_mut(count);
-            switches.modes_at(t, own);
-            modes = rest;
-        }
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        Some(self)
     }
 
     fn names(&self) -> Vec<String> {
@@ -527,6 +464,62 @@ impl Dynamics for Evaluation {
             operation: named.unwrap_or_else(|| "a value overflows".to_owned()),
             state: state_text(self.system.states(), x),
         }
+    }
+}
+
+impl Events for Evaluation {
+    fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
+        let mut switches = self.switches.iter_mut();
+        switches.try_for_each(|switches| switches.instants(from, to, times))
+    }
+
+    fn enter(&mut self, t: f64) {
+        let first = self.inputs.len() - self.system.modes();
+        let mut modes = &mut self.inputs[first..];
+        for (switches, &count) in self
+            .switches
+            .iter_mut()
+            .zip(&self.system.code.equations.modes)
+        {
+            let (own, rest) = modes.split_at_mut(count);
+            switches.modes_at(t, own);
+            modes = rest;
+        }
+    }
+
+    fn guards(&self) -> Option<Arc<Guards>> {
+        self.system.code.guards.clone()
+    }
+
+    fn indicators(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        self.place(t, &x[..self.dimension()]);
+        if let Some(held) = &mut self.held {
+            held.place(&self.inputs);
+            held.indicators.eval(&held.inputs, values);
+        }
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        let Some(evaluation) = &mut self.held else {
+            return;
+        };
+        evaluation.is_held = sides.is_some();
+        let Some(mut sides) = sides else {
+            return;
+        };
+        let mut modes = &mut evaluation.modes[..];
+        for jumps in &self.system.code.equations.held {
+            let (own, rest) = sides.split_at(jumps.names.len());
+            modes = jumps.modes(own, modes);
+            sides = rest;
+        }
+    }
+
+    fn beside(&mut self, _t: f64, values: &mut Vec<[f64; 2]>) {
+        let first = 1 + self.system.states().len();
+        let held = self.held_modes();
+        values.clear();
+        values.extend(self.inputs[first..].iter().chain(held).map(|&v| [v, 0.0]));
     }
 }
 
@@ -618,33 +611,39 @@ impl Dynamics for Driven {
         self.between == BetweenSamples::Hold && self.evaluation.step(t, h, x, next)
     }
 
-    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
-        self.evaluation.switches(from, to, times)
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        Some(self)
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.evaluation.names()
+    }
+
+    fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
+        self.evaluation.not_finite(t, x)
+    }
+}
+
+impl Events for Driven {
+    fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
+        self.evaluation.instants(from, to, times)
     }
 
     fn enter(&mut self, t: f64) {
         self.evaluation.enter(t);
     }
 
-    fn surfaces(&self) -> usize {
-        self.evaluation.surfaces()
+    fn guards(&self) -> Option<Arc<Guards>> {
+        self.evaluation.guards()
     }
 
-    fn surface_names(&self) -> Vec<String> {
-        self.evaluation.surface_names()
-    }
-
-    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+    fn indicators(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
         self.read_signals(t);
-        self.evaluation.read_surfaces(t, x, values);
+        self.evaluation.indicators(t, x, values);
     }
 
     fn hold(&mut self, sides: Option<&[f64]>) {
         self.evaluation.hold(sides);
-    }
-
-    fn guards(&self) -> Option<Arc<Guards>> {
-        self.evaluation.guards()
     }
 
     fn beside(&mut self, t: f64, values: &mut Vec<[f64; 2]>) {
@@ -656,14 +655,6 @@ impl Dynamics for Driven {
                 *speed = (next - last) / (self.to - self.from);
             }
         }
-    }
-
-    fn names(&self) -> Vec<String> {
-        self.evaluation.names()
-    }
-
-    fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
-        self.evaluation.not_finite(t, x)
     }
 }
 

@@ -10,7 +10,7 @@ mod normal;
 
 use std::path::Path;
 
-use lynkeus::run::{Dynamics, Estimator, Evaluation, Rk4, System};
+use lynkeus::run::{Estimator, Evaluation, Events, Rk4, System};
 use lynkeus::{Study, prepare};
 
 use normal::Normal;

@@ -3,7 +3,7 @@
 //! section II.10), with the interpolant of order 7 of the same book. Its three further stages are for
 //! steps that may cross something: runs stop at every row.
 
-use crate::relays::{COEFFICIENTS, Poly};
+use crate::events::{COEFFICIENTS, Poly};
 use crate::{Dynamics, Tolerances};
 
 const STAGES: usize = 12;

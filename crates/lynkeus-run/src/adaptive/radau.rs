@@ -7,7 +7,7 @@
 use nalgebra::{Complex, DVector};
 
 use super::factors::{Factors, Shifted};
-use crate::relays::Poly;
+use crate::events::Poly;
 use crate::{Dynamics, Slopes, Tolerances};
 
 const SQRT_6: f64 = 2.449_489_742_783_178;
@@ -287,9 +287,7 @@ impl Radau {
         h: f64,
         error: f64,
     ) -> bool {
-        for i in 0..x.len() {
-            self.stage[i] = x[i] + self.z[2][i];
-        }
+        self.place(x, 2);
         f.derivatives(t + h, self.stage.as_slice(), self.f0.as_mut_slice());
         if self.f0.iter().any(|v| !v.is_finite()) {
             self.bad = Some((t + h, self.stage.as_slice().to_vec()));
@@ -373,9 +371,7 @@ impl Radau {
     /// K = f at the stages; false where it is not finite.
     fn evaluate_stages(&mut self, f: &mut impl Dynamics, (t, x): (f64, &[f64]), h: f64) -> bool {
         for (stage, c) in C.iter().enumerate() {
-            for i in 0..x.len() {
-                self.stage[i] = x[i] + self.z[stage][i];
-            }
+            self.place(x, stage);
             let t = t + c * h;
             f.derivatives(t, self.stage.as_slice(), self.k[stage].as_mut_slice());
             if self.k[stage].iter().any(|v| !v.is_finite()) {
@@ -384,6 +380,14 @@ impl Radau {
             }
         }
         true
+    }
+
+    /// The state of a stage.
+    fn place(&mut self, x: &[f64], stage: usize) {
+        let moved = x.iter().zip(&self.z[stage]);
+        for (to, (x, z)) in self.stage.iter_mut().zip(moved) {
+            *to = x + z;
+        }
     }
 
     /// Adds Newton's correction to W; its size in the error norm.

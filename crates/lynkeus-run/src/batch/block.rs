@@ -8,8 +8,8 @@ use super::plan::{Event, LANES, Lane, Leg, Program, Runner};
 use crate::Error;
 use crate::divergence::Bound;
 use crate::error::state_text;
+use crate::integrator::instant;
 use crate::noise::Sensors;
-use crate::rk4::instant;
 
 /// Bytes that the states of a block may take, twice: they should stay in the first cache.
 const CACHE: usize = 16 * 1024;

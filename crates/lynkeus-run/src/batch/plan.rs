@@ -11,7 +11,7 @@ use crate::integrator::{check_interval, fixed_steps, pieces};
 use crate::noise::Sensors;
 use crate::routine::Backend;
 use crate::run::{Itinerary, Stop};
-use crate::{Column, Dynamics, Error, Method, Simulation, Step};
+use crate::{Column, Dynamics, Error, Events, Method, Simulation, Step};
 
 /// What all trajectories do next.
 #[derive(Debug)]
@@ -110,7 +110,7 @@ impl Plan {
     ///
     /// # Errors
     /// [`Error::Setting`] for intervals that are too short or have too many steps, and those of
-    /// [`Dynamics::switches`].
+    /// [`Events::instants`].
     pub fn next(&mut self, rows: usize) -> Result<Vec<Event>, Error> {
         let (mut events, mut recorded) = (vec![], 0);
         while recorded < rows && events.len() < AHEAD {
@@ -133,7 +133,7 @@ impl Plan {
     fn legs(&mut self, from: f64, to: f64, events: &mut Vec<Event>) -> Result<(), Error> {
         check_interval(from, to)?;
         self.instants.clear();
-        self.clock.switches(from, to, &mut self.instants)?;
+        self.clock.instants(from, to, &mut self.instants)?;
         let length = self.step.length(to - from).unwrap_or(to - from);
         for (start, end) in pieces(from, to, &mut self.instants) {
             self.clock.enter(start + 0.5 * (end - start));

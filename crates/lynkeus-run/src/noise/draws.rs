@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use nalgebra::DMatrix;
 
 use crate::jacobian::fastest;
-use crate::{Dynamics, Noise, Role, Simulation, Slopes};
+use crate::{Dynamics, Events, Noise, Role, Simulation, Slopes};
 
 /// A variance of a state at the end of the run may be off by this share.
 const OFF: f64 = 0.02;
@@ -80,14 +80,14 @@ pub fn process_draws(simulation: &Simulation) -> ProcessDraws {
 }
 
 /// The plant about one point.
-enum Place {
+enum Linearisation {
     Small(DMatrix<f64>),
     /// its fastest mode
     Large(f64),
 }
 
 /// The plant along its run without noise, as far as that goes, and about it.
-fn linearised(simulation: &Simulation, densities: &[f64]) -> Vec<Place> {
+fn linearised(simulation: &Simulation, densities: &[f64]) -> Vec<Linearisation> {
     let quiet = Simulation {
         observer: None,
         record_outputs: false,
@@ -114,9 +114,9 @@ fn linearised(simulation: &Simulation, densities: &[f64]) -> Vec<Place> {
         places.push(match n <= SMALL {
             true => {
                 slopes.look(&mut plant, t, &x);
-                Place::Small(slopes.dense(n))
+                Linearisation::Small(slopes.dense(n))
             }
-            false => Place::Large(fastest(&mut plant, t, &x, &[]).radius),
+            false => Linearisation::Large(fastest(&mut plant, t, &x, &[]).radius),
         });
         if n <= SMALL {
             let mut slope = |x: &[f64]| {
@@ -140,7 +140,7 @@ fn about(
     q: f64,
     time: f64,
     slope: &mut dyn FnMut(&[f64]) -> DMatrix<f64>,
-) -> Vec<Place> {
+) -> Vec<Linearisation> {
     let mut at = |s: f64| {
         let mut x = x.to_vec();
         x[i] += s;
@@ -158,13 +158,13 @@ fn about(
         }
         let F = at(sign * AWAY * s);
         if F.iter().all(|x| x.is_finite()) {
-            found.push(Place::Small(F));
+            found.push(Linearisation::Small(F));
         }
     }
     found
 }
 
-impl Place {
+impl Linearisation {
     /// How often a sampling interval has to be halved; `most` where that is too often, 0 where the
     /// plant has no slopes.
     fn halvings(&self, densities: &[f64], sample: f64, samples: f64, most: usize) -> usize {
@@ -177,7 +177,7 @@ impl Place {
                 }
             }
             Self::Small(F) if F.iter().all(|f| f.is_finite()) => {
-                let flow = Flow::new(F, densities, sample, samples);
+                let flow = LinearPlant::new(F, densities, sample, samples);
                 (0..most).find(|j| flow.fits(*j)).unwrap_or(most)
             }
             Self::Small(_) => 0,
@@ -186,13 +186,13 @@ impl Place {
 }
 
 /// Φ = exp(Fh), ∫ exp(Fs) ds and W = ∫ exp(Fs) Q exp(Fᵀs) ds over h.
-struct Step {
+struct Transition {
     transition: DMatrix<f64>,
     integral: DMatrix<f64>,
     noise: DMatrix<f64>,
 }
 
-impl Step {
+impl Transition {
     /// Over a step in which F turns little: by series.
     fn short(F: &DMatrix<f64>, Q: &DMatrix<f64>, h: f64) -> Self {
         const TERMS: usize = 12;
@@ -232,25 +232,25 @@ impl Step {
 
 /// A linear plant x' = Fx + w over 1/2^k of a sampling interval, then over the interval, then over more
 /// and more of them.
-struct Flow {
+struct LinearPlant {
     Q: DMatrix<f64>,
     /// the shortest first
-    steps: Vec<Step>,
+    steps: Vec<Transition>,
     /// which of them is the interval, and its length
     sample: usize,
     interval: f64,
 }
 
-impl Flow {
+impl LinearPlant {
     fn new(F: &DMatrix<f64>, densities: &[f64], interval: f64, samples: f64) -> Self {
         let Q = DMatrix::from_diagonal(&densities.to_vec().into());
         let turn = (F.norm() * interval).max(f64::MIN_POSITIVE);
         let halvings = (turn / 0.125).log2().ceil().clamp(0.0, DOUBLINGS as f64) as usize;
         let h = interval / 2.0_f64.powi(halvings as i32);
-        let mut steps = vec![Step::short(F, &Q, h)];
+        let mut steps = vec![Transition::short(F, &Q, h)];
         let all = halvings + (samples.log2().ceil() as usize).min(DOUBLINGS);
         while steps.len() <= all {
-            let Some(next) = steps.last().map(Step::doubled) else {
+            let Some(next) = steps.last().map(Transition::doubled) else {
                 break;
             };
             let size = next.noise.norm() + next.transition.norm();
@@ -298,7 +298,7 @@ mod tests {
 
     fn needed(F: &[f64], densities: &[f64], samples: f64) -> usize {
         let n = densities.len();
-        Place::Small(DMatrix::from_row_slice(n, n, F)).halvings(densities, 1.0, samples, 30)
+        Linearisation::Small(DMatrix::from_row_slice(n, n, F)).halvings(densities, 1.0, samples, 30)
     }
 
     /// x' = −ax + w: tanh(aδ/2)/(aδ/2) is within 2 % of 1 where aδ is below 0.496.

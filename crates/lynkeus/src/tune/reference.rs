@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
-use lynkeus_run::{Column, Dynamics, Level, Noise, Role, Trajectory};
+use lynkeus_run::{Column, Events, Level, Noise, Role, Trajectory};
 
 use crate::crew::within;
 use crate::prepare::Prepared;
@@ -131,7 +131,7 @@ fn starts(study: &Study, plant: &Plant) -> Result<Vec<f64>, Error> {
     let mut instants = vec![settings.start];
     systems::of_time(plant, &inputs)?
         .evaluation()
-        .switches(settings.start, settings.until, &mut instants)
+        .instants(settings.start, settings.until, &mut instants)
         .map_err(|error| Error::from_source(error).at(&study.file))?;
     instants.sort_by(f64::total_cmp);
     instants.dedup();

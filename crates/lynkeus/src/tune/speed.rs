@@ -1,7 +1,7 @@
 //! How fast an observer is along a run, and the steps that this allows.
 
 use lynkeus_observers::{Monitor, Observer};
-use lynkeus_run::{Dynamics, System, spectral_radius};
+use lynkeus_run::{Events, System, spectral_radius};
 
 /// |λ|·h up to which the classical Runge–Kutta method is stable, with a little air.
 const STABLE: f64 = 2.7;

@@ -1,7 +1,7 @@
 //! One value of an observer in simulation.
 
 use lynkeus_observers::Design;
-use lynkeus_run::{Dynamics, Role, Simulation, Trajectory};
+use lynkeus_run::{Events, Role, Simulation, Trajectory};
 
 use super::Row;
 use super::disturbed::disturbed;

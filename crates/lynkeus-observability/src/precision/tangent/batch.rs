@@ -1,7 +1,7 @@
 //! Some columns of the sensitivity, integrated along with the states.
 
 use lynkeus_expr::Budget;
-use lynkeus_run::{Dynamics, Error, Evaluation, Integrator};
+use lynkeus_run::{Dynamics, Error, Evaluation, Events, Integrator};
 
 use super::super::Experiment;
 use super::Tangent;
@@ -193,12 +193,8 @@ impl Dynamics for Variation<'_> {
         }
     }
 
-    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
-        self.flow.switches(from, to, times)
-    }
-
-    fn enter(&mut self, t: f64) {
-        self.flow.enter(t);
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        Some(self)
     }
 
     fn is_over(&mut self) -> bool {
@@ -219,5 +215,16 @@ impl Dynamics for Variation<'_> {
         let tangent = self.tangent;
         tangent.in_own_units(&x[..tangent.states], &mut self.states);
         self.flow.not_finite(t, &self.states)
+    }
+}
+
+/// Those of time: what jumps with the state is as the state says.
+impl Events for Variation<'_> {
+    fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
+        self.flow.instants(from, to, times)
+    }
+
+    fn enter(&mut self, t: f64) {
+        self.flow.enter(t);
     }
 }

@@ -4,10 +4,9 @@ use std::sync::Arc;
 
 use super::series::Transition;
 use crate::filter::profile::Profile;
-use crate::relays::Guards;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::system::Driven;
-use crate::{Dynamics, Error, Integrator, Linearised, Method, Place, Slopes};
+use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place, Slopes};
 
 /// x̂, Φ and W by one integration, for flows with few states.
 #[derive(Clone, Debug)]
@@ -165,37 +164,8 @@ impl Dynamics for Variational<'_> {
         true
     }
 
-    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
-        self.driven.switches(from, to, times)
-    }
-
-    fn enter(&mut self, t: f64) {
-        self.driven.enter(t);
-    }
-
-    fn surfaces(&self) -> usize {
-        self.driven.surfaces()
-    }
-
-    fn surface_names(&self) -> Vec<String> {
-        self.driven.surface_names()
-    }
-
-    fn read_surfaces(&mut self, t: f64, z: &[f64], values: &mut [f64]) {
-        let n = self.driven.dimension();
-        self.driven.read_surfaces(t, &z[..n], values);
-    }
-
-    fn hold(&mut self, sides: Option<&[f64]>) {
-        self.driven.hold(sides);
-    }
-
-    fn guards(&self) -> Option<Arc<Guards>> {
-        self.driven.guards()
-    }
-
-    fn beside(&mut self, t: f64, values: &mut Vec<[f64; 2]>) {
-        self.driven.beside(t, values);
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        self.driven.events()
     }
 
     fn names(&self) -> Vec<String> {

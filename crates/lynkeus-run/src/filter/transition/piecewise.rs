@@ -14,7 +14,7 @@ use crate::filter::profile::{Entry, Profile};
 use crate::method::resolution;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::system::Driven;
-use crate::{Dynamics, Error, Integrator, Linearised, Method};
+use crate::{Dynamics, Error, Events, Integrator, Linearised, Method};
 
 /// Tolerance with fixed steps, whose error nobody states.
 const FIXED: f64 = 1e-8;
@@ -101,7 +101,7 @@ impl Piecewise {
     ) -> Result<Transition<Profile>, Error> {
         let n = x.len();
         let mut stops = vec![];
-        driven.switches(from, to, &mut stops)?;
+        driven.instants(from, to, &mut stops)?;
         stops.sort_unstable_by(f64::total_cmp);
         stops.push(to);
         let mut transition = Transition::start(n, !self.process_noise.is_empty());

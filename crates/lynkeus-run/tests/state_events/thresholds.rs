@@ -1,9 +1,7 @@
 //! What rests on a surface, surfaces that move with others, and what looking for them costs.
 
-use std::sync::Arc;
-
 use lynkeus_expr::{Binary, Expr, Graph};
-use lynkeus_run::{Dynamics, Evaluation, Guards, Integrator, Method, System};
+use lynkeus_run::{Dynamics, Evaluation, Events, Integrator, Method, System};
 
 use super::{close, methods, run};
 
@@ -145,24 +143,8 @@ impl Dynamics for Counted {
         self.0.derivatives(t, x, dx);
     }
 
-    fn surfaces(&self) -> usize {
-        self.0.surfaces()
-    }
-
-    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
-        self.0.read_surfaces(t, x, values);
-    }
-
-    fn hold(&mut self, sides: Option<&[f64]>) {
-        self.0.hold(sides);
-    }
-
-    fn guards(&self) -> Option<Arc<Guards>> {
-        self.0.guards()
-    }
-
-    fn beside(&mut self, t: f64, values: &mut Vec<[f64; 2]>) {
-        self.0.beside(t, values);
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        self.0.events()
     }
 }
 

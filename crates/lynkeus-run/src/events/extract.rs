@@ -1,0 +1,458 @@
+//! Which operations jump or bend, with time and with the state, and the expressions with what jumps
+//! taken out.
+//!
+//! An operation that jumps is replaced by a *mode*: an input of its own, constant between two
+//! events, so that both one-sided limits at an event are right and an integrator never steps across
+//! a jump. What depends on nothing but time is a time event; the others are state events. Where
+//! something bends, an integrator stops too, but no mode is needed.
+
+use std::collections::{HashMap, HashSet};
+
+use lynkeus_expr::{Binary, Graph, MissingInput, Node, Op, Tape, Unary};
+
+use super::filippov::{Jump, Jumps};
+use super::guards::Surfaces;
+use super::time::{Indicator, TimeEvents};
+
+/// Characters of an expression in the label of a mode that changes with time,
+const SHOWN: usize = 80;
+
+/// and of one that changes with the state.
+const SHOWN_OF_STATE: usize = 60;
+
+/// Expressions in which each jump is an input of its own, and when these change.
+pub(crate) struct Taken<E> {
+    pub roots: Vec<Node>,
+    /// the symbols of these inputs
+    pub modes: Vec<Node>,
+    pub events: E,
+}
+
+/// The events of a system.
+pub(crate) struct Extracted {
+    /// what jumps with time taken out
+    pub time: Taken<TimeEvents>,
+    /// then what jumps with the state, over the inputs and the modes of time; none where nothing does
+    pub state: Option<Taken<Jumps>>,
+    /// what vanishes on the surfaces on which it jumps, over the inputs and both kinds of modes
+    pub surfaces: Vec<Node>,
+    /// what vanishes where it bends, over the same
+    pub bends: Vec<Node>,
+}
+
+/// Takes what jumps out of `roots`, derivatives of so many `states` first. The inputs are time, the
+/// states, and what else the roots read.
+pub(crate) fn extract(
+    graph: &Graph,
+    inputs: &[Node],
+    roots: &[Node],
+    states: usize,
+) -> Result<Extracted, MissingInput> {
+    let time = time_events(graph, inputs[0], roots)?;
+    let (state, surfaces) = state_events(graph, inputs, &time.roots, states).unzip();
+    let smooth = state.as_ref().map_or(&time.roots, |taken| &taken.roots);
+    Ok(Extracted {
+        bends: bends(graph, &inputs[1..], &smooth[..states]),
+        surfaces: surfaces.unwrap_or_default(),
+        time,
+        state,
+    })
+}
+
+/// The first operation of the roots that jumps with one of `inputs`, as it reads.
+pub fn first_jump(graph: &Graph, inputs: &[Node], roots: &[Node]) -> Option<String> {
+    let jumps = |node: &Node| {
+        let operation = Operation::of(graph, *node);
+        operation.is_some_and(Operation::has_sides) && depends(graph, *node, inputs)
+    };
+    let found = graph.reachable(roots).into_iter().find(jumps)?;
+    Some(graph.render(found, SHOWN_OF_STATE))
+}
+
+/// An operation that jumps or bends where a quantity passes zero; a `floor`, a whole number.
+#[derive(Clone, Copy, Debug)]
+enum Operation {
+    Floor(Node),
+    Sign(Node),
+    Relation(Binary, Node, Node),
+    Abs(Node),
+    /// `Min` or `Max`
+    Extreme(Binary, Node, Node),
+}
+
+impl Operation {
+    fn of(graph: &Graph, node: Node) -> Option<Self> {
+        Some(match graph.op(node) {
+            Op::Unary(Unary::Floor, a) => Self::Floor(a),
+            Op::Unary(Unary::Sign, a) => Self::Sign(a),
+            Op::Unary(Unary::Abs, a) => Self::Abs(a),
+            Op::Binary(op @ (Binary::Less | Binary::LessEq | Binary::Equal), a, b) => {
+                Self::Relation(op, a, b)
+            }
+            Op::Binary(op @ (Binary::Min | Binary::Max), a, b) => Self::Extreme(op, a, b),
+            _ => return None,
+        })
+    }
+
+    /// Whether it jumps and does not only bend.
+    fn jumps(self) -> bool {
+        matches!(self, Self::Floor(_) | Self::Sign(_) | Self::Relation(..))
+    }
+
+    /// Whether it jumps from one side of a surface to the other: what is equal is so on the surface alone.
+    fn has_sides(self) -> bool {
+        self.jumps() && !matches!(self, Self::Relation(Binary::Equal, ..))
+    }
+
+    /// The same with what jumps inside replaced.
+    fn within(self, graph: &Graph, map: &HashMap<Node, Node>) -> Self {
+        let one = |a: Node| graph.substitute(&[a], map).first().copied().unwrap_or(a);
+        match self {
+            Self::Floor(a) => Self::Floor(one(a)),
+            Self::Sign(a) => Self::Sign(one(a)),
+            Self::Abs(a) => Self::Abs(one(a)),
+            Self::Relation(op, a, b) => Self::Relation(op, one(a), one(b)),
+            Self::Extreme(op, a, b) => Self::Extreme(op, one(a), one(b)),
+        }
+    }
+
+    /// The smooth function whose passing zero (`Floor`: an integer) changes it. A relation holds
+    /// where it is positive.
+    fn quantity(self, graph: &Graph) -> Node {
+        match self {
+            Self::Floor(a) | Self::Sign(a) | Self::Abs(a) => a,
+            Self::Relation(_, a, b) => graph.binary(Binary::Sub, b, a),
+            Self::Extreme(_, a, b) => graph.binary(Binary::Sub, a, b),
+        }
+    }
+
+    /// What it is where the quantity is positive and where it is negative, if it bends.
+    fn branches(self, graph: &Graph) -> Option<[Node; 2]> {
+        match self {
+            Self::Abs(a) => Some([a, graph.unary(Unary::Neg, a)]),
+            Self::Extreme(Binary::Min, a, b) => Some([b, a]),
+            Self::Extreme(_, a, b) => Some([a, b]),
+            Self::Floor(_) | Self::Sign(_) | Self::Relation(..) => None,
+        }
+    }
+
+    /// Its values below, on and above the surface; none for a `floor`, whose value is held. What bends
+    /// is told by whether it is above: both branches are the same on the surface.
+    fn values(self) -> Option<[f64; 3]> {
+        match self {
+            Self::Floor(_) => None,
+            Self::Sign(_) => Some([-1.0, 0.0, 1.0]),
+            Self::Relation(Binary::Less, ..) => Some([0.0, 0.0, 1.0]),
+            Self::Relation(..) | Self::Abs(_) | Self::Extreme(..) => Some([0.0, 1.0, 1.0]),
+        }
+    }
+
+    /// What is constant between two instants at which it jumps or bends with time.
+    fn mode(self, graph: &Graph) -> Node {
+        match self {
+            Self::Floor(a) => graph.unary(Unary::Floor, a),
+            Self::Sign(a) | Self::Abs(a) => graph.unary(Unary::Sign, a),
+            Self::Relation(op, a, b) => graph.binary(op, a, b),
+            Self::Extreme(_, a, b) => graph.binary(Binary::Less, a, b),
+        }
+    }
+
+    /// The operation over this mode, smooth where the mode stays.
+    fn over_mode(self, graph: &Graph, mode: Node) -> Node {
+        match self {
+            Self::Floor(_) | Self::Sign(_) | Self::Relation(..) => mode,
+            Self::Abs(a) => graph.binary(Binary::Mul, mode, a),
+            Self::Extreme(Binary::Min, a, b) => graph.select(mode, a, b),
+            Self::Extreme(_, a, b) => graph.select(mode, b, a),
+        }
+    }
+}
+
+/// Replaces what jumps with `time` alone in `roots` by modes.
+fn time_events(
+    graph: &Graph,
+    time: Node,
+    roots: &[Node],
+) -> Result<Taken<TimeEvents>, MissingInput> {
+    let of_time = functions_of_time(graph, time, roots);
+    let (mut outer, mut inner) = (HashMap::new(), HashMap::new());
+    let (mut jumps, mut modes, mut found, mut indicators) = (vec![], vec![], vec![], vec![]);
+    for node in graph.reachable(roots) {
+        let known = of_time.get(&node) == Some(&true);
+        let Some(operation) = known.then(|| Operation::of(graph, node)).flatten() else {
+            continue;
+        };
+        let expression = graph.render(node, SHOWN);
+        let symbol = graph.fresh(format!("({expression})")).node();
+        let operation = operation.within(graph, &inner);
+        indicators.push(Indicator::new(
+            graph,
+            time,
+            &found,
+            [operation.mode(graph), operation.quantity(graph)],
+            expression,
+            matches!(operation, Operation::Floor(_)),
+        )?);
+        inner.insert(node, operation.over_mode(graph, symbol));
+        found.push(symbol);
+        if operation.jumps() {
+            outer.insert(node, symbol);
+            jumps.push(node);
+            modes.push(symbol);
+        }
+    }
+    let values = Tape::new(graph, &[time], &jumps)?;
+    Ok(Taken {
+        roots: graph.substitute(roots, &outer),
+        modes,
+        events: TimeEvents::new(indicators, &values),
+    })
+}
+
+/// Nodes whose value is a function of time alone: true where time is used,
+/// false for constants.
+fn functions_of_time(graph: &Graph, time: Node, roots: &[Node]) -> HashMap<Node, bool> {
+    let mut uses: HashMap<Node, bool> = HashMap::new();
+    for node in graph.reachable(roots) {
+        if node == time {
+            uses.insert(node, true);
+            continue;
+        }
+        if let Op::Symbol(_) = graph.op(node) {
+            continue;
+        }
+        let arguments = graph.arguments(node);
+        let known: Option<Vec<bool>> = arguments.iter().map(|a| uses.get(a).copied()).collect();
+        if let Some(known) = known {
+            uses.insert(node, known.contains(&true));
+        }
+    }
+    uses
+}
+
+/// Takes every `sign`, `<` and `≤` that depends on one of `inputs` out of the roots, and every `floor`
+/// that one of the first `moving` roots reads; none where there is none. Several that change on one
+/// surface change together. Returns what vanishes on the surfaces, too.
+fn state_events(
+    graph: &Graph,
+    inputs: &[Node],
+    roots: &[Node],
+    moving: usize,
+) -> Option<(Taken<Jumps>, Vec<Node>)> {
+    let mut replaced: HashMap<Node, Node> = HashMap::new();
+    let (mut jumps, mut modes) = (vec![], vec![]);
+    let mut surfaces = Surfaces::default();
+    let moves: HashSet<Node> = graph.reachable(&roots[..moving]).into_iter().collect();
+    for node in graph.reachable(roots) {
+        let Some(operation) = Operation::of(graph, node).filter(|o| o.has_sides()) else {
+            continue;
+        };
+        let is_floor = matches!(operation, Operation::Floor(_));
+        // the steps of a reading do not stop the state
+        if is_floor && !moves.contains(&node) || !depends(graph, node, inputs) {
+            continue;
+        }
+        let quantity = operation.within(graph, &replaced).quantity(graph);
+        let mode = graph.fresh(graph.render(node, SHOWN_OF_STATE)).node();
+        let place = match is_floor {
+            true => surfaces.counting(quantity),
+            false => surfaces.place(graph, quantity),
+        };
+        jumps.push(Jump::new(place, operation.values()));
+        modes.push(mode);
+        replaced.insert(node, mode);
+    }
+    if jumps.is_empty() {
+        return None;
+    }
+    // a kink on a surface that is located is smooth on each side, and no step is rejected for it
+    for node in graph.reachable(roots) {
+        let Some(operation) = Operation::of(graph, node) else {
+            continue;
+        };
+        let operation = operation.within(graph, &replaced);
+        let Some([above, below]) = operation.branches(graph) else {
+            continue;
+        };
+        let Some(place) = surfaces.known(graph, operation.quantity(graph)) else {
+            continue;
+        };
+        let mode = graph.fresh(graph.render(node, SHOWN_OF_STATE)).node();
+        jumps.push(Jump::new(place, operation.values()));
+        modes.push(mode);
+        replaced.insert(node, graph.select(mode, above, below));
+    }
+    let names = surfaces.nodes.iter().zip(&surfaces.counts);
+    let name = |(&quantity, &counts): (&Node, &bool)| {
+        let level = if counts { "a whole number" } else { "0" };
+        format!("{} = {level}", graph.render(quantity, SHOWN_OF_STATE))
+    };
+    let names = names.map(name).collect();
+    let taken = Taken {
+        roots: graph.substitute(roots, &replaced),
+        modes,
+        events: Jumps::new(jumps, names, surfaces.counts),
+    };
+    Some((taken, surfaces.nodes))
+}
+
+/// What vanishes where one of the roots bends with one of `inputs`, each once.
+fn bends(graph: &Graph, inputs: &[Node], roots: &[Node]) -> Vec<Node> {
+    let mut found = vec![];
+    for node in graph.reachable(roots) {
+        let bends = Operation::of(graph, node).filter(|o| !o.jumps());
+        let Some(operation) = bends.filter(|_| depends(graph, node, inputs)) else {
+            continue;
+        };
+        let (quantity, _) = bare(graph, operation.quantity(graph));
+        if !found.contains(&quantity) {
+            found.push(quantity);
+        }
+    }
+    found
+}
+
+fn depends(graph: &Graph, node: Node, inputs: &[Node]) -> bool {
+    graph.symbols_of(&[node]).iter().any(|s| inputs.contains(s))
+}
+
+impl Surfaces {
+    /// The place of a surface, and whether it stands there with the other sign; a new one where it
+    /// is none yet.
+    fn place(&mut self, graph: &Graph, quantity: Node) -> (usize, bool) {
+        self.known(graph, quantity).unwrap_or_else(|| {
+            let (quantity, is_reversed) = bare(graph, quantity);
+            self.nodes.push(quantity);
+            self.counts.push(false);
+            (self.nodes.len() - 1, is_reversed)
+        })
+    }
+
+    /// Two new ones, for the whole numbers that a quantity meets next; the place of the first.
+    fn counting(&mut self, quantity: Node) -> (usize, bool) {
+        self.nodes.extend([quantity, quantity]);
+        self.counts.extend([true, true]);
+        (self.nodes.len() - 2, false)
+    }
+
+    fn known(&self, graph: &Graph, quantity: Node) -> Option<(usize, bool)> {
+        let (quantity, is_reversed) = bare(graph, quantity);
+        let known = |sought: Node| {
+            let mut all = self.nodes.iter().zip(&self.counts);
+            all.position(|(&known, counts)| known == sought && !counts)
+        };
+        let same = known(quantity).map(|surface| (surface, is_reversed));
+        same.or_else(|| match graph.op(quantity) {
+            Op::Binary(Binary::Sub, a, b) => {
+                let opposite = graph.binary(Binary::Sub, b, a);
+                known(opposite).map(|surface| (surface, !is_reversed))
+            }
+            _ => None,
+        })
+    }
+}
+
+/// A quantity without its constant factors, and whether they change its sign: multiples of one
+/// another vanish on one surface.
+fn bare(graph: &Graph, mut quantity: Node) -> (Node, bool) {
+    let factor = |node: Node| graph.constant_value(node).filter(|c| c.is_normal());
+    let is_zero = |node: Node| graph.constant_value(node) == Some(0.0);
+    let mut is_reversed = false;
+    loop {
+        let (inner, sign) = match graph.op(quantity) {
+            Op::Unary(Unary::Neg, a) => (a, -1.0),
+            Op::Binary(Binary::Mul, a, b) => match (factor(a), factor(b)) {
+                (Some(c), _) => (b, c),
+                (_, Some(c)) => (a, c),
+                _ => return (quantity, is_reversed),
+            },
+            Op::Binary(Binary::Div, a, b) => match factor(b) {
+                Some(c) => (a, c),
+                None => return (quantity, is_reversed),
+            },
+            Op::Binary(Binary::Add | Binary::Sub, a, b) if is_zero(b) => (a, 1.0),
+            Op::Binary(Binary::Add, a, b) if is_zero(a) => (b, 1.0),
+            Op::Binary(Binary::Sub, a, b) if is_zero(a) => (b, -1.0),
+            _ => return (quantity, is_reversed),
+        };
+        is_reversed ^= sign < 0.0;
+        quantity = inner;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lynkeus_expr::Expr;
+
+    fn instants(build: fn(Expr<'_>) -> Expr<'_>, from: f64, to: f64) -> Vec<f64> {
+        let g = Graph::new();
+        let time = g.symbol("time");
+        let root = build(time).node();
+        let mut extracted = time_events(&g, time.node(), &[root]).unwrap();
+        let mut times = vec![];
+        extracted.events.instants(from, to, &mut times).unwrap();
+        times.sort_unstable_by(f64::total_cmp);
+        times
+    }
+
+    #[test]
+    fn affine_relations_are_solved_to_the_last_bit() {
+        fn relation(t: Expr<'_>) -> Expr<'_> {
+            (20.0 - t * 2.0).less_eq(t * 3.0 + 10.0)
+        }
+        let found = instants(|t| relation(t) * 3.0, 0.0, 10.0);
+        assert!(
+            found.len() == 1 && (found[0] - 2.0).abs() <= f64::EPSILON,
+            "{found:?}"
+        );
+        assert_eq!(instants(|t| relation(t) * 3.0, 2.0, 10.0), []);
+        assert_eq!(instants(|t| (t * 0.5).floor(), 0.0, 6.0), [2.0, 4.0]);
+        assert_eq!(instants(|t| (1.0 - t).sign(), 0.0, 6.0), [1.0]);
+        assert_eq!(instants(|t| t.sin(), 0.0, 6.0), []);
+    }
+
+    #[test]
+    fn kinks_are_stops_too() {
+        assert_eq!(instants(|t| (t - 3.0).abs(), 0.0, 6.0), [3.0]);
+        assert_eq!(
+            instants(|t| (t / 5.0).min(t.graph().constant(0.5)), 0.0, 6.0),
+            [2.5]
+        );
+    }
+
+    #[test]
+    fn other_relations_are_bisected_to_the_last_bit() {
+        let found = instants(|t| t.sin().less(t.graph().constant(0.5)), 0.0, 7.0);
+        let expected = [
+            std::f64::consts::FRAC_PI_6,
+            5.0 * std::f64::consts::FRAC_PI_6,
+            13.0 * std::f64::consts::FRAC_PI_6,
+        ];
+        assert_eq!(found.len(), 3);
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 4e-15, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn relations_of_states_are_left_alone() {
+        let g = Graph::new();
+        let [time, x] = ["time", "x"].map(|name| g.symbol(name));
+        let root = (x.less(time) + x.floor()).node();
+        let extracted = time_events(&g, time.node(), &[root]).unwrap();
+        assert_eq!((extracted.modes.len(), extracted.roots), (0, vec![root]));
+    }
+
+    #[test]
+    fn modes_do_not_take_names_in_use() {
+        let g = Graph::new();
+        let time = g.symbol("time");
+        let relation = time.less(g.constant(2.0));
+        let taken = g.symbol("(time < 2)");
+        let extracted = time_events(&g, time.node(), &[(taken + relation).node()]).unwrap();
+        assert_ne!(extracted.modes[0], taken.node());
+        let expected = (taken + g.expr(extracted.modes[0])).node();
+        assert_eq!(extracted.roots, [expected]);
+    }
+}

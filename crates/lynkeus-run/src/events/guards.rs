@@ -1,0 +1,585 @@
+//! Guards: the functions that change their sign where a right-hand side jumps or bends with the
+//! state, enclosed along a step.
+//!
+//! Whether a step crosses a surface is not asked of its ends alone: the function is enclosed by
+//! interval arithmetic along the polynomial that the method has between them, stretch by stretch,
+//! so that a pulse is found however short it is beside the step.
+
+use std::sync::Arc;
+
+use lynkeus_expr::interval::Intervals;
+use lynkeus_expr::{
+    Binary, Graph, Interval, Jets, MissingInput, Node, Op, Reals, Tape, Unary, jacobian,
+};
+
+/// Stretches that are looked at for one function in a step.
+const LOOKS: usize = 2000;
+
+/// What they have to cover of the way for the step to end there; else the rest is sampled.
+const USEFUL: f64 = 1e-3;
+const SAMPLES: usize = 64;
+
+/// Stretches shorter than this part of a step are not cut any more.
+pub(super) const SHORTEST: f64 = 1e-13;
+
+/// A bend this near to an end of a step is at the end.
+const AT_THE_END: f64 = 1e-9;
+
+/// Everything that is watched of a system, over the inputs of its code: time, states, and what
+/// [`Events::beside`](crate::Events::beside) tells of.
+#[derive(Debug, Default)]
+pub struct Guards {
+    /// states among the inputs, after time
+    states: usize,
+    /// which inputs are read, in order
+    reads: Vec<usize>,
+    /// one for each surface
+    pub(super) surfaces: Vec<Guard>,
+    /// as of [`Surfaces`]
+    pub(super) names: Vec<String>,
+    pub(super) counts: Vec<bool>,
+    /// where something bends and does not jump
+    pub(super) bends: Vec<Guard>,
+}
+
+/// The surfaces on which a right-hand side jumps, by the nodes that vanish there.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Surfaces {
+    pub nodes: Vec<Node>,
+    /// how they read
+    pub names: Vec<String>,
+    /// the ones that are one of two on which a `floor` jumps: at even integers and, next, at odd ones
+    pub counts: Vec<bool>,
+}
+
+impl Guards {
+    /// Of surfaces, and of nodes that vanish where something bends, as functions of `inputs`, time
+    /// and so many states first; none where there is nothing to watch.
+    pub(crate) fn new(
+        graph: &Graph,
+        inputs: &[Node],
+        states: usize,
+        surfaces: Surfaces,
+        bends: &[Node],
+    ) -> Result<Option<Arc<Self>>, MissingInput> {
+        if surfaces.nodes.is_empty() && bends.is_empty() {
+            return Ok(None);
+        }
+        let all = [&surfaces.nodes, bends].concat();
+        let symbols = graph.symbols_of(&all);
+        let reads: Vec<usize> = (0..inputs.len())
+            .filter(|&i| symbols.contains(&inputs[i]))
+            .collect();
+        let guard = |&node: &Node| Guard::new(graph, inputs, &reads, node);
+        let guards = |nodes: &[Node]| nodes.iter().map(guard).collect::<Result<_, _>>();
+        Ok(Some(Arc::new(Self {
+            surfaces: guards(&surfaces.nodes)?,
+            names: surfaces.names,
+            counts: surfaces.counts,
+            bends: guards(bends)?,
+            states,
+            reads,
+        })))
+    }
+
+    /// How many surfaces there are.
+    pub fn surfaces(&self) -> usize {
+        self.surfaces.len()
+    }
+
+    /// What there is for each input that is read: for time, for a state, or for what is read beside
+    /// them.
+    pub(super) fn inputs<T: Copy>(
+        &self,
+        time: T,
+        state: impl Fn(usize) -> T,
+        values: &[[f64; 2]],
+        beside: impl Fn([f64; 2]) -> T,
+    ) -> impl Iterator<Item = T> {
+        self.reads.iter().map(move |&place| match place {
+            0 => time,
+            _ if place <= self.states => state(place - 1),
+            _ => beside(values[place - 1 - self.states]),
+        })
+    }
+}
+
+/// A function of some of the inputs that are read.
+#[derive(Debug)]
+pub(super) struct Guard {
+    /// places among what is read
+    reads: Vec<usize>,
+    form: Form,
+}
+
+#[derive(Debug)]
+enum Form {
+    /// a constant and the weights of what is read
+    Affine(f64, Vec<f64>),
+    /// has slopes everywhere, but for bends
+    Smooth(Tape),
+    /// may jump
+    Any(Tape),
+}
+
+impl Guard {
+    fn new(
+        graph: &Graph,
+        inputs: &[Node],
+        known: &[usize],
+        node: Node,
+    ) -> Result<Self, MissingInput> {
+        let symbols = graph.symbols_of(&[node]);
+        let reads: Vec<usize> = (0..known.len())
+            .filter(|&i| symbols.contains(&inputs[known[i]]))
+            .collect();
+        let read: Vec<Node> = reads.iter().map(|&i| inputs[known[i]]).collect();
+        let tape = Tape::new(graph, &read, &[node])?;
+        let jumps = |op: Op| match op {
+            Op::Unary(op, _) => matches!(op, Unary::Floor | Unary::Sign),
+            Op::Binary(op, ..) => matches!(
+                op,
+                Binary::Less | Binary::LessEq | Binary::Equal | Binary::Atan2
+            ),
+            _ => false,
+        };
+        let chooses = |op: Op| {
+            matches!(
+                op,
+                Op::Select(..)
+                    | Op::Unary(Unary::Not, _)
+                    | Op::Binary(Binary::And | Binary::Or, ..)
+            )
+        };
+        let operations: Vec<Op> = graph
+            .reachable(&[node])
+            .iter()
+            .map(|&n| graph.op(n))
+            .collect();
+        let form = match () {
+            () if operations.iter().any(|&op| jumps(op)) => Form::Any(tape),
+            () if operations.iter().any(|&op| chooses(op)) => Form::Smooth(tape),
+            () => match weights(graph, &read, node) {
+                Some(weights) => Form::Affine(point(&tape, &vec![0.0; read.len()]), weights),
+                None => Form::Smooth(tape),
+            },
+        };
+        Ok(Self { reads, form })
+    }
+
+    /// An enclosure for what is read in such boxes (centre and radius of each).
+    pub fn over(&self, boxes: &[[f64; 2]]) -> Option<[f64; 2]> {
+        match &self.form {
+            Form::Affine(constant, weights) => {
+                let (mut middle, mut radius, mut size) = (*constant, 0.0, constant.abs());
+                for (&i, weight) in self.reads.iter().zip(weights) {
+                    let [centre, reach] = boxes[i];
+                    middle += weight * centre;
+                    radius += weight.abs() * reach;
+                    size += (weight * centre).abs();
+                }
+                let radius = radius + 8.0 * f64::EPSILON * size;
+                Some([middle - radius, middle + radius])
+            }
+            Form::Smooth(tape) | Form::Any(tape) => {
+                let read = self.reads.iter().map(|&i| {
+                    let [centre, reach] = boxes[i];
+                    interval(centre - reach, centre + reach)
+                });
+                let read: Vec<Interval> = read.collect();
+                bounds(tape.eval_in(&Intervals, &read)[0])
+            }
+        }
+    }
+
+    /// The function along a path, what the guards read as polynomials.
+    fn along<'a>(&'a self, path: &'a [Poly]) -> Along<'a> {
+        match &self.form {
+            Form::Affine(constant, weights) => {
+                let parts = self.reads.iter().map(|&i| &path[i]).zip(weights);
+                Along::Polynomial(Poly::combined(*constant, parts))
+            }
+            Form::Smooth(tape) => Along::Code(self, tape, path, true),
+            Form::Any(tape) => Along::Code(self, tape, path, false),
+        }
+    }
+
+    /// Where the function leaves a side first, before `limit`; nobody asks which side it is so close
+    /// to its level as `band`.
+    pub fn passage(
+        &self,
+        path: &[Poly],
+        (side, level): (f64, f64),
+        band: f64,
+        shortest: f64,
+        limit: f64,
+    ) -> Ahead {
+        let search = Search {
+            along: self.along(path),
+            side,
+            level,
+            band,
+            shortest,
+        };
+        search.first(0.0, limit)
+    }
+
+    /// Where something bends first, before `limit`.
+    pub fn bend(&self, path: &[Poly], shortest: f64, limit: f64) -> Option<f64> {
+        let along = self.along(path);
+        let [a, b] = [0.0, 1.0].map(|s| along.at(s).abs());
+        let band = 1e-13 * a.max(b);
+        // where a step begins at a bend what follows tells the side
+        let from = if a <= 1e-10 * a.max(b) {
+            AT_THE_END
+        } else {
+            0.0
+        };
+        let side = if along.at(from) < 0.0 { -1.0 } else { 1.0 };
+        let search = Search {
+            along,
+            side,
+            level: 0.0,
+            band,
+            shortest,
+        };
+        let at = search.first(from, limit).at();
+        (at > AT_THE_END && at < 1.0 - AT_THE_END).then_some(at)
+    }
+}
+
+/// The derivatives by what is read, where all of them are constants.
+fn weights(graph: &Graph, read: &[Node], node: Node) -> Option<Vec<f64>> {
+    let mut weights = vec![0.0; read.len()];
+    for (_, column, entry) in jacobian::forward(graph, &[node], read).entries {
+        weights[column] = graph.constant_value(entry)?;
+    }
+    Some(weights)
+}
+
+fn point(tape: &Tape, read: &[f64]) -> f64 {
+    tape.eval_in(&Reals, read)[0]
+}
+
+/// [a, b], or every number where that is none.
+fn interval(a: f64, b: f64) -> Interval {
+    Interval::new(a, b).unwrap_or(Interval::ENTIRE)
+}
+
+/// The ends of an enclosure of the values that there are; none where there is no value.
+fn bounds(value: Interval) -> Option<[f64; 2]> {
+    (!value.is_empty()).then(|| [value.lo(), value.hi()])
+}
+
+/// A function along a path, of the part of it that is done.
+enum Along<'a> {
+    Polynomial(Poly),
+    /// the last: slopes are those of the function
+    Code(&'a Guard, &'a Tape, &'a [Poly], bool),
+}
+
+impl Along<'_> {
+    /// The value where a part of the path is done.
+    fn at(&self, part: f64) -> f64 {
+        match self {
+            Self::Polynomial(p) => p.at(part),
+            Self::Code(guard, tape, path, _) => {
+                let read: Vec<f64> = guard.reads.iter().map(|&i| path[i].at(part)).collect();
+                point(tape, &read)
+            }
+        }
+    }
+
+    /// An enclosure of the values over a stretch.
+    fn range(&self, stretch: Stretch) -> Option<[f64; 2]> {
+        match self {
+            Self::Polynomial(p) => Some(p.range(stretch)),
+            Self::Code(guard, tape, path, _) => {
+                let read = guard.reads.iter().map(|&i| path[i].range(stretch));
+                let read: Vec<Interval> = read.map(|[a, b]| interval(a, b)).collect();
+                bounds(tape.eval_in(&Intervals, &read)[0])
+            }
+        }
+    }
+
+    /// An enclosure of the slopes over a stretch, where there are some.
+    fn slope(&self, stretch: Stretch) -> Option<[f64; 2]> {
+        match self {
+            Self::Polynomial(p) => Some(p.slope(stretch)),
+            Self::Code(_, _, _, false) => None,
+            Self::Code(guard, tape, path, true) => {
+                let jet = |&i: &usize| {
+                    let (value, slope) = (path[i].range(stretch), path[i].slope(stretch));
+                    [value, slope].map(|[a, b]| interval(a, b)).to_vec()
+                };
+                let read: Vec<Vec<Interval>> = guard.reads.iter().map(jet).collect();
+                let jets = Jets {
+                    inner: &Intervals,
+                    order: 1,
+                };
+                let series = tape.eval_in(&jets, &read).swap_remove(0);
+                let slope = series.get(1).copied().unwrap_or(Interval::ZERO);
+                // one end of it where the function has no value everywhere
+                slope.is_defined().then(|| [slope.lo(), slope.hi()])
+            }
+        }
+    }
+}
+
+/// What comes first in a step, in parts of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Ahead {
+    Nothing,
+    /// a surface is crossed, and the state certainly on the other side at `beyond`
+    Jump {
+        at: f64,
+        beyond: f64,
+    },
+    /// something bends there; or what comes after that is too much to be looked at
+    Stop {
+        at: f64,
+    },
+}
+
+impl Ahead {
+    pub(super) fn at(self) -> f64 {
+        match self {
+            Self::Nothing => 1.0,
+            Self::Jump { at, .. } | Self::Stop { at } => at,
+        }
+    }
+}
+
+/// The search for where a function leaves its side.
+struct Search<'a> {
+    along: Along<'a>,
+    side: f64,
+    level: f64,
+    /// nobody asks which side it is so close
+    band: f64,
+    shortest: f64,
+}
+
+impl Search<'_> {
+    fn margin(&self, s: f64) -> f64 {
+        self.side * (self.along.at(s) - self.level)
+    }
+
+    /// Bounds of the margin, from those of the function.
+    fn margins(&self, [low, high]: [f64; 2]) -> [f64; 2] {
+        match self.side > 0.0 {
+            true => [low - self.level, high - self.level],
+            false => [self.level - high, self.level - low],
+        }
+    }
+
+    /// The first passage in [from, limit], stretch by stretch from left to right.
+    fn first(mut self, from: f64, limit: f64) -> Ahead {
+        // what velocities have put on a side may have to go some way to it
+        let begins = self.margin(from);
+        if begins < 0.0 {
+            self.band = self.band.max(-2.0 * begins);
+        }
+        let mut left = vec![(from, limit)];
+        for _ in 0..LOOKS {
+            let Some((from, to)) = left.pop() else {
+                return Ahead::Nothing;
+            };
+            match self.look(Stretch { from, to }) {
+                Look::Clear => {}
+                Look::Beyond(beyond) => {
+                    let at = self.root(0.0, beyond);
+                    return Ahead::Jump { at, beyond };
+                }
+                Look::Open => {
+                    let middle = 0.5 * (from + to);
+                    left.extend([(middle, to), (from, middle)]);
+                }
+            }
+        }
+        match left.pop() {
+            None => Ahead::Nothing,
+            // so far nothing is passed: the next step goes on from there
+            Some((at, _)) if at - from > USEFUL * (limit - from) => Ahead::Stop { at },
+            Some((at, _)) => self.sampled(at, limit),
+        }
+    }
+
+    /// Of what cannot be enclosed, as an algebraic loop that is searched, samples tell.
+    fn sampled(&self, from: f64, to: f64) -> Ahead {
+        let samples = (1..=SAMPLES).map(|k| from + (to - from) * k as f64 / SAMPLES as f64);
+        let mut passed = samples.filter(|&s| self.margin(s) < -self.band);
+        passed.next().map_or(Ahead::Nothing, |beyond| Ahead::Jump {
+            at: self.root(0.0, beyond),
+            beyond,
+        })
+    }
+
+    fn look(&self, stretch: Stretch) -> Look {
+        let Stretch { from, to } = stretch;
+        let is_short = to - from <= self.shortest;
+        let sampled = |s: f64| match self.margin(s) < -self.band {
+            true => Look::Beyond(s),
+            false => Look::Clear,
+        };
+        match self.along.range(stretch).map(|r| self.margins(r)) {
+            // no value anywhere
+            None => return Look::Clear,
+            Some([low, _]) if low >= -self.band => return Look::Clear,
+            Some([_, high]) if high < -self.band => return Look::Beyond(to),
+            _ if is_short => return sampled(stretch.middle()),
+            _ => {}
+        }
+        let Some([least, most]) = self.along.slope(stretch) else {
+            return Look::Open;
+        };
+        if least >= 0.0 || most <= 0.0 {
+            return match (sampled(from), sampled(to)) {
+                (Look::Clear, at_end) => at_end,
+                (beyond, _) => beyond,
+            };
+        }
+        let reach = least.abs().max(most.abs()) * stretch.radius();
+        match self.margin(stretch.middle()) - reach >= -self.band {
+            true => Look::Clear,
+            false => Look::Open,
+        }
+    }
+
+    /// Where the margin ends before `beyond`, at which it is negative and up to which it ends once.
+    fn root(&self, mut from: f64, mut beyond: f64) -> f64 {
+        if self.margin(from) < 0.0 {
+            return from;
+        }
+        while beyond - from > self.shortest {
+            let middle = 0.5 * (from + beyond);
+            match self.margin(middle) < 0.0 {
+                true => beyond = middle,
+                false => from = middle,
+            }
+        }
+        beyond
+    }
+}
+
+enum Look {
+    /// nothing is passed
+    Clear,
+    /// it is passed before there
+    Beyond(f64),
+    Open,
+}
+
+/// Coefficients of the polynomials: the interpolant of the explicit method has degree 7.
+pub(crate) const COEFFICIENTS: usize = 8;
+
+/// A polynomial in the part of a step that is done, 0 … 1, lowest power first.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Poly(pub [f64; COEFFICIENTS]);
+
+/// A stretch of the step, in parts of it.
+#[derive(Clone, Copy, Debug)]
+struct Stretch {
+    from: f64,
+    to: f64,
+}
+
+impl Stretch {
+    fn middle(self) -> f64 {
+        0.5 * (self.from + self.to)
+    }
+
+    fn radius(self) -> f64 {
+        0.5 * (self.to - self.from)
+    }
+}
+
+impl Poly {
+    /// a + b·s
+    pub fn line(a: f64, b: f64) -> Self {
+        let mut poly = Self::default();
+        [poly.0[0], poly.0[1]] = [a, b];
+        poly
+    }
+
+    /// A constant and weighted polynomials.
+    fn combined<'a>(constant: f64, parts: impl Iterator<Item = (&'a Self, &'a f64)>) -> Self {
+        let mut sum = Self::line(constant, 0.0);
+        for (part, weight) in parts {
+            for (sum, c) in sum.0.iter_mut().zip(part.0) {
+                *sum += weight * c;
+            }
+        }
+        sum
+    }
+
+    pub fn at(&self, s: f64) -> f64 {
+        self.0.iter().rev().fold(0.0, |value, c| value * s + c)
+    }
+
+    /// The coefficients about another point.
+    fn about(&self, middle: f64) -> [f64; COEFFICIENTS] {
+        let mut c = self.0;
+        for first in 0..COEFFICIENTS - 1 {
+            for k in (first..COEFFICIENTS - 1).rev() {
+                c[k] += middle * c[k + 1];
+            }
+        }
+        c
+    }
+
+    /// What rounding may have changed of what moves.
+    fn rounding(&self) -> f64 {
+        32.0 * f64::EPSILON * self.0[1..].iter().map(|c| c.abs()).sum::<f64>()
+    }
+
+    /// An enclosure over a stretch.
+    fn range(&self, stretch: Stretch) -> [f64; 2] {
+        let (c, r) = (self.about(stretch.middle()), stretch.radius());
+        let spread = c[1..].iter().rev().fold(0.0, |sum, c| (sum + c.abs()) * r);
+        let spread = spread + self.rounding() + 4.0 * f64::EPSILON * c[0].abs();
+        [c[0] - spread, c[0] + spread]
+    }
+
+    /// An enclosure of the slope over a stretch.
+    fn slope(&self, stretch: Stretch) -> [f64; 2] {
+        let (c, r) = (self.about(stretch.middle()), stretch.radius());
+        let mut spread = 0.0;
+        for k in (2..COEFFICIENTS).rev() {
+            spread = (spread + k as f64 * c[k].abs()) * r;
+        }
+        let spread = spread + COEFFICIENTS as f64 * self.rounding();
+        [c[1] - spread, c[1] + spread]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn enclosures_hold_what_they_are_of() {
+        let p = Poly([0.3, -2.0, 5.0, -1.5, 0.2, 3.0, -4.0, 1.0]);
+        let derivative = |s: f64| (p.at(s + 1e-6) - p.at(s - 1e-6)) / 2e-6;
+        for i in 0..10 {
+            for j in i + 1..=10 {
+                let stretch = Stretch {
+                    from: 0.1 * f64::from(i),
+                    to: 0.1 * f64::from(j),
+                };
+                let ([low, high], [least, most]) = (p.range(stretch), p.slope(stretch));
+                for k in 0..=20 {
+                    let s = stretch.from + f64::from(k) / 20.0 * (stretch.to - stretch.from);
+                    assert!((low..=high).contains(&p.at(s)));
+                    assert!((least - 1e-6..=most + 1e-6).contains(&derivative(s)));
+                }
+            }
+        }
+        let short = Stretch {
+            from: 0.499,
+            to: 0.501,
+        };
+        let [low, high] = p.range(short);
+        assert!(high - low < 0.01, "{low} {high}");
+    }
+}

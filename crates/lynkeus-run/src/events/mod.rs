@@ -1,0 +1,17 @@
+//! Events: instants and surfaces at which a right-hand side jumps or bends.
+//!
+//! Some are decided by time alone, others by the state. Both are found in the expressions of a
+//! system, what jumps is taken out of them, and integrators are told of them by
+//! [`Events`](crate::Events). At an event the state goes on as it is.
+
+mod extract;
+mod filippov;
+mod guards;
+mod time;
+
+pub(crate) use extract::extract;
+pub use extract::first_jump;
+pub(crate) use filippov::{Filippov, Jumps, Sides, Span};
+pub use guards::Guards;
+pub(crate) use guards::{Ahead, COEFFICIENTS, Poly, Surfaces};
+pub(crate) use time::TimeEvents;

@@ -1,0 +1,705 @@
+//! Time events: instants at which an expression jumps or bends because of time alone.
+//!
+//! The argument of each such operation is enclosed by interval arithmetic, with its derivatives,
+//! between the instants of those inside it. A stretch of time on which the enclosure stays on one
+//! side has no event; one on which the function is proved monotone, or falls into monotone parts
+//! because a higher derivative keeps its sign, has its events bisected to the last bit; any other
+//! is cut in two. So no pulse is too short to be seen. What rounding errors hide, and what switches
+//! too often, is refused by name.
+
+use lynkeus_expr::interval::Intervals;
+use lynkeus_expr::{Evaluator, Graph, Interval, Jets, MissingInput, Node, Reals, Tape};
+
+use crate::Error;
+use crate::snapshot::{Damaged, Persist, Walk};
+
+/// Switching instants allowed in one interval, over all indicators of a system.
+const SWITCHES: usize = 100_000;
+
+/// Stretches that may be looked at for them.
+const LOOKS: usize = 500_000;
+
+/// What a run may have in all, in multiples of what an interval may.
+const INTERVALS: usize = 4;
+
+/// What each interval adds to that of the run.
+const MORE_SWITCHES: usize = 1000;
+const MORE_LOOKS: usize = 4000;
+
+/// Part of the interval in which rounding errors may hide the mode.
+const DOUBTFUL: f64 = 1e-6;
+
+/// Highest derivative that is looked at: a function whose k-th derivative keeps its
+/// sign falls into at most k monotone parts.
+const ORDER: usize = 3;
+
+/// The time events of a system: what jumps is a *mode*, constant between two instants.
+#[derive(Clone, Debug)]
+pub(crate) struct TimeEvents {
+    /// each after those that it reads
+    indicators: Vec<Indicator>,
+    /// the modes as functions of time alone
+    values: Evaluator,
+    /// what was found in the interval asked for last, as `indicators`
+    timelines: Vec<Timeline>,
+    /// what the intervals to come may cost
+    allowance: Allowance,
+}
+
+impl TimeEvents {
+    /// Of indicators, each after those that it reads, and of the modes as functions of time.
+    pub(super) fn new(indicators: Vec<Indicator>, values: &Tape) -> Self {
+        Self {
+            timelines: vec![Timeline::default(); indicators.len()],
+            indicators,
+            values: values.evaluator(),
+            allowance: Allowance::default(),
+        }
+    }
+
+    /// Writes the modes' values at `t`.
+    pub(crate) fn modes_at(&mut self, t: f64, modes: &mut [f64]) {
+        if !modes.is_empty() {
+            self.values.eval(&[t], modes);
+        }
+    }
+
+    /// Whether there is nothing to find.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.indicators.is_empty()
+    }
+
+    /// Appends the instants of the events strictly inside (`from`, `to`).
+    pub(crate) fn instants(
+        &mut self,
+        from: f64,
+        to: f64,
+        times: &mut Vec<f64>,
+    ) -> Result<(), Error> {
+        if self.indicators.is_empty() {
+            return Ok(());
+        }
+        let mut effort = self.allowance.effort(from, to);
+        for (i, indicator) in self.indicators.iter_mut().enumerate() {
+            let (before, rest) = self.timelines.split_at_mut(i);
+            if let Some(timeline) = rest.first_mut() {
+                indicator.follow(&mut effort, before, timeline)?;
+                times.extend_from_slice(timeline.instants());
+            }
+        }
+        self.allowance.pay(&effort);
+        Ok(())
+    }
+}
+
+impl Persist for TimeEvents {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        let Allowance {
+            since,
+            switches,
+            granted,
+            looks,
+        } = &mut self.allowance;
+        walk.optional(since, Walk::number)?;
+        walk.count(switches)?;
+        walk.count(granted)?;
+        walk.count(looks)
+    }
+}
+
+/// What following the switches over all intervals of a run may still cost.
+#[derive(Clone, Debug)]
+struct Allowance {
+    /// start of the first interval
+    since: Option<f64>,
+    switches: usize,
+    /// switches found and left
+    granted: usize,
+    looks: usize,
+}
+
+impl Default for Allowance {
+    fn default() -> Self {
+        Self {
+            since: None,
+            switches: INTERVALS * SWITCHES,
+            granted: INTERVALS * SWITCHES,
+            looks: INTERVALS * LOOKS,
+        }
+    }
+}
+
+impl Allowance {
+    /// What the interval may cost.
+    fn effort(&mut self, from: f64, to: f64) -> Effort {
+        let since = *self.since.get_or_insert(from);
+        self.switches = self.switches.saturating_add(MORE_SWITCHES);
+        self.granted = self.granted.saturating_add(MORE_SWITCHES);
+        self.looks = self.looks.saturating_add(MORE_LOOKS);
+        let (counted_from, limit) = match self.switches < SWITCHES {
+            true => (since, self.granted),
+            false => (from, SWITCHES),
+        };
+        Effort {
+            from,
+            to,
+            switches: self.switches.min(SWITCHES),
+            looks: self.looks.min(LOOKS),
+            counted_from,
+            limit,
+            doubtful: DOUBTFUL * (to - from),
+        }
+    }
+
+    /// Takes what the interval cost.
+    fn pay(&mut self, effort: &Effort) {
+        let spent = |left: usize, most: usize, now: usize| left - (left.min(most) - now);
+        self.switches = spent(self.switches, SWITCHES, effort.switches);
+        self.looks = spent(self.looks, LOOKS, effort.looks);
+    }
+}
+
+/// What following the switches over an interval may still cost.
+#[derive(Debug)]
+struct Effort {
+    from: f64,
+    to: f64,
+    switches: usize,
+    looks: usize,
+    /// where the switches that the limit is for begin
+    counted_from: f64,
+    limit: usize,
+    /// length of time on which rounding errors may still hide a mode
+    doubtful: f64,
+}
+
+impl Effort {
+    /// Pays for one look.
+    fn look(&mut self, at: f64, expression: &str) -> Result<(), Error> {
+        self.looks = self
+            .looks
+            .checked_sub(1)
+            .ok_or_else(|| unresolved(at, expression))?;
+        Ok(())
+    }
+
+    /// Pays for a stretch at `at` on which the mode is not certain.
+    fn doubt(&mut self, at: f64, width: f64, expression: &str) -> Result<(), Error> {
+        // around a simple zero some last bits are always in doubt
+        if width > 64.0 * apart(at) {
+            self.doubtful -= width;
+        }
+        if self.doubtful < 0.0 {
+            return Err(unresolved(at, expression));
+        }
+        Ok(())
+    }
+
+    /// Refuses more than the switches that are left.
+    fn check(&self, count: f64, expression: &str) -> Result<(), Error> {
+        if count <= self.switches as f64 {
+            return Ok(());
+        }
+        Err(Error::TooManySwitches {
+            expression: expression.to_owned(),
+            from: self.counted_from,
+            to: self.to,
+            limit: self.limit,
+        })
+    }
+
+    /// Pays for a switch.
+    fn switch(&mut self, expression: &str) -> Result<(), Error> {
+        self.check(1.0, expression)?;
+        self.switches -= 1;
+        Ok(())
+    }
+}
+
+fn unresolved(time: f64, expression: &str) -> Error {
+    Error::UnresolvedSwitches {
+        expression: expression.to_owned(),
+        time,
+    }
+}
+
+/// The values of one mode over an interval.
+#[derive(Clone, Debug, Default)]
+struct Timeline {
+    /// where the value changes, increasing
+    instants: Vec<f64>,
+    /// one more than instants
+    values: Vec<f64>,
+}
+
+impl Timeline {
+    fn clear(&mut self) {
+        self.instants.clear();
+        self.values.clear();
+    }
+
+    /// Where the value changes, increasing.
+    fn instants(&self) -> &[f64] {
+        &self.instants
+    }
+
+    /// The mode is `value` from `t` on (from the start, for the first value).
+    fn push(&mut self, t: f64, value: f64) {
+        match self.values.last() {
+            Some(&last) if same(last, value) => return,
+            Some(_) => self.instants.push(t),
+            None => {}
+        }
+        self.values.push(value);
+    }
+
+    /// The value at `t`, which is no instant; NaN before the first value is known.
+    fn at(&self, t: f64) -> f64 {
+        let place = self.instants.partition_point(|&instant| instant <= t);
+        self.values.get(place).copied().unwrap_or(f64::NAN)
+    }
+}
+
+/// Equality for which NaN, "not defined here", equals NaN.
+fn same(a: f64, b: f64) -> bool {
+    a == b || (a.is_nan() && b.is_nan())
+}
+
+/// Two instants closer than this are one: rounding put them apart.
+fn apart(t: f64) -> f64 {
+    4.0 * f64::EPSILON * t.abs()
+}
+
+/// A mode and the function of time that decides it. Both read time and the modes
+/// inside it, between whose instants the function is smooth.
+#[derive(Clone, Debug)]
+pub(super) struct Indicator {
+    /// how it reads, for messages
+    expression: String,
+    /// true where passing any integer, not only zero, changes the mode
+    counts: bool,
+    /// the mode, over time and the modes read
+    mode: Tape,
+    /// what decides it, over the same
+    quantity: Tape,
+    /// which of the indicators before are read
+    reads: Vec<usize>,
+    evaluator: Evaluator,
+    /// t, modes read
+    inputs: Vec<f64>,
+}
+
+impl Indicator {
+    /// Of a mode and the quantity that decides it, which may read the symbols of the modes found
+    /// before.
+    pub(super) fn new(
+        graph: &Graph,
+        time: Node,
+        found: &[Node],
+        [mode, quantity]: [Node; 2],
+        expression: String,
+        counts: bool,
+    ) -> Result<Self, MissingInput> {
+        let symbols = graph.symbols_of(&[mode, quantity]);
+        let reads: Vec<usize> = (0..found.len())
+            .filter(|&i| symbols.contains(&found[i]))
+            .collect();
+        let mut inputs = vec![time];
+        inputs.extend(reads.iter().map(|&i| found[i]));
+        let mode = Tape::new(graph, &inputs, &[mode])?;
+        Ok(Self {
+            expression,
+            counts,
+            evaluator: mode.evaluator(),
+            mode,
+            quantity: Tape::new(graph, &inputs, &[quantity])?,
+            inputs: vec![0.0; inputs.len()],
+            reads,
+        })
+    }
+
+    /// Writes the mode over the interval of `effort` to `timeline`; `before` are the
+    /// timelines of the indicators before.
+    fn follow(
+        &mut self,
+        effort: &mut Effort,
+        before: &[Timeline],
+        timeline: &mut Timeline,
+    ) -> Result<(), Error> {
+        timeline.clear();
+        let mut ends: Vec<f64> = self
+            .reads
+            .iter()
+            .flat_map(|&i| before[i].instants())
+            .copied()
+            .collect();
+        ends.sort_unstable_by(f64::total_cmp);
+        ends.push(effort.to);
+        let mut start = effort.from;
+        for end in ends {
+            if end - start <= apart(end) {
+                continue;
+            }
+            let middle = start + 0.5 * (end - start);
+            for (input, &i) in self.inputs[1..].iter_mut().zip(&self.reads) {
+                *input = before[i].at(middle);
+            }
+            self.piece(start, end, effort, timeline)?;
+            start = end;
+        }
+        Ok(())
+    }
+
+    /// Over a piece on which the modes inside stay.
+    fn piece(
+        &mut self,
+        start: f64,
+        end: f64,
+        effort: &mut Effort,
+        timeline: &mut Timeline,
+    ) -> Result<(), Error> {
+        let instants = Isolation::new(self, start, end, effort).run()?;
+        let mut from = start;
+        for to in instants.into_iter().chain([end]) {
+            let value = self.value(from + 0.5 * (to - from));
+            timeline.push(from, value);
+            from = to;
+        }
+        Ok(())
+    }
+
+    /// The mode at `t`, as computed.
+    fn value(&mut self, t: f64) -> f64 {
+        self.inputs[0] = t;
+        let mut value = [0.0];
+        self.evaluator.eval(&self.inputs, &mut value);
+        value[0]
+    }
+
+    /// Whether the mode is certainly the same all over `stretch`.
+    fn is_constant(&self, stretch: Interval) -> bool {
+        let inputs: Vec<Interval> = std::iter::once(stretch)
+            .chain(self.inputs[1..].iter().map(|&mode| Interval::point(mode)))
+            .collect();
+        let values = self.mode.eval_in(&Intervals, &inputs);
+        values
+            .iter()
+            .all(|v| v.is_empty() || (v.is_point() && v.is_defined()))
+    }
+
+    /// Whether a mode decided by a quantity in `enclosure` can have one value only.
+    fn decides(&self, enclosure: Interval) -> bool {
+        let image = if self.counts {
+            enclosure.floor()
+        } else {
+            enclosure.sign()
+        };
+        enclosure.is_defined() && image.is_point()
+    }
+
+    /// The first Taylor coefficients of the quantity, enclosed over `stretch`.
+    fn series<const N: usize>(&self, stretch: Interval) -> [Interval; N] {
+        let mut time = vec![stretch, Interval::ONE];
+        time.truncate(N);
+        let inputs: Vec<Vec<Interval>> = std::iter::once(time)
+            .chain(
+                self.inputs[1..]
+                    .iter()
+                    .map(|&mode| vec![Interval::point(mode)]),
+            )
+            .collect();
+        let jets = Jets {
+            inner: &Intervals,
+            order: N.saturating_sub(1),
+        };
+        let series = self.quantity.eval_in(&jets, &inputs).swap_remove(0);
+        std::array::from_fn(|k| series.get(k).copied().unwrap_or(Interval::ZERO))
+    }
+
+    /// The Taylor coefficient of power `k` at `t`.
+    fn coefficient(&self, k: usize, t: f64) -> f64 {
+        let inputs: Vec<Vec<f64>> = std::iter::once(vec![t, 1.0])
+            .chain(self.inputs[1..].iter().map(|&mode| vec![mode]))
+            .collect();
+        let jets = Jets {
+            inner: &Reals,
+            order: k,
+        };
+        let series = self.quantity.eval_in(&jets, &inputs).swap_remove(0);
+        series.get(k).copied().unwrap_or(0.0)
+    }
+}
+
+/// The sweep over one stretch, from left to right.
+struct Isolation<'a> {
+    indicator: &'a mut Indicator,
+    effort: &'a mut Effort,
+    start: f64,
+    end: f64,
+    /// the last time at which the mode was certain, and the mode there
+    certain: Option<(f64, f64)>,
+    instants: Vec<f64>,
+}
+
+/// What is known of a cell.
+enum Cell {
+    /// the mode stays
+    Constant,
+    /// the quantity is monotone between these times, ends included
+    Monotone(Vec<f64>),
+    Unknown,
+}
+
+impl<'a> Isolation<'a> {
+    fn new(indicator: &'a mut Indicator, start: f64, end: f64, effort: &'a mut Effort) -> Self {
+        Self {
+            indicator,
+            effort,
+            start,
+            end,
+            certain: None,
+            instants: vec![],
+        }
+    }
+
+    /// The instants strictly inside, increasing.
+    fn run(mut self) -> Result<Vec<f64>, Error> {
+        let mut cells = vec![(self.start, self.end)];
+        while let Some((a, b)) = cells.pop() {
+            self.effort.look(a, &self.indicator.expression)?;
+            match self.cell(a, b) {
+                Cell::Constant => self.settle(a + 0.5 * (b - a), a)?,
+                Cell::Monotone(times) => {
+                    for pair in times.windows(2) {
+                        self.monotone(pair[0], pair[1])?;
+                    }
+                }
+                Cell::Unknown if self.is_hidden(a, b)? => {
+                    if self.is_certain(b) {
+                        self.arrive(b)?;
+                    }
+                }
+                Cell::Unknown => {
+                    let middle = a + 0.5 * (b - a);
+                    cells.extend([(middle, b), (a, middle)]);
+                }
+            }
+        }
+        Ok(self.instants)
+    }
+
+    fn cell(&self, a: f64, b: f64) -> Cell {
+        let stretch = interval(a, b);
+        if self.indicator.is_constant(stretch) {
+            return Cell::Constant;
+        }
+        let slope = self.indicator.series::<2>(stretch)[1];
+        if slope == Interval::ZERO {
+            return Cell::Constant;
+        }
+        if slope.is_defined() && keeps_sign(slope) {
+            return Cell::Monotone(vec![a, b]);
+        }
+        if slope.is_defined() && self.excluded(a, b, slope) {
+            return Cell::Constant;
+        }
+        let series = self.indicator.series::<{ ORDER + 1 }>(stretch);
+        let defined = series.iter().take_while(|c| c.is_defined()).count();
+        let order = (2..defined).find(|&k| keeps_sign(series[k]));
+        order.map_or(Cell::Unknown, |k| Cell::Monotone(self.parts(a, b, k)))
+    }
+
+    /// Whether the mean value form, with the derivative enclosed in `slope`, shows
+    /// that the mode stays.
+    fn excluded(&self, a: f64, b: f64, slope: Interval) -> bool {
+        let middle = a + 0.5 * (b - a);
+        let offset = interval(a, b) - Interval::point(middle);
+        let [value] = self.indicator.series::<1>(Interval::point(middle));
+        self.indicator.decides(value + slope * offset)
+    }
+
+    /// The ends and the extrema between them where derivative `order` keeps its sign:
+    /// derivative k is monotone between the zeros of derivative k + 1.
+    fn parts(&self, a: f64, b: f64, order: usize) -> Vec<f64> {
+        debug_assert!(order <= ORDER);
+        let mut times = vec![a, b];
+        for k in (1..order).rev() {
+            let zeros = times
+                .windows(2)
+                .filter_map(|pair| self.zero(k, pair[0], pair[1]));
+            let zeros: Vec<f64> = zeros.collect();
+            times.extend(zeros);
+            times.sort_unstable_by(f64::total_cmp);
+            times.dedup();
+        }
+        times
+    }
+
+    /// The zero of derivative `k`, monotone in [a, b], by regula falsi (Illinois). It
+    /// ends early: near an extremum the function itself is flat.
+    fn zero(&self, k: usize, mut a: f64, mut b: f64) -> Option<f64> {
+        let close = 1e-10 * (b - a);
+        let mut at_a = self.indicator.coefficient(k, a);
+        let mut at_b = self.indicator.coefficient(k, b);
+        let opposite = (at_a < 0.0 && at_b > 0.0) || (at_a > 0.0 && at_b < 0.0);
+        if !opposite {
+            return None;
+        }
+        for round in 0..100 {
+            let middle = a + 0.5 * (b - a);
+            let secant = (a * at_b - b * at_a) / (at_b - at_a);
+            // every third cut in the middle, so that the end is in sight
+            let t = if round % 3 < 2 && a < secant && secant < b {
+                secant
+            } else {
+                middle
+            };
+            let value = self.indicator.coefficient(k, t);
+            if value == 0.0 || b - a <= close || middle <= a || middle >= b {
+                return Some(t);
+            }
+            if (value < 0.0) == (at_a < 0.0) {
+                (a, at_a, at_b) = (t, value, 0.5 * at_b);
+            } else {
+                (b, at_b, at_a) = (t, value, 0.5 * at_a);
+            }
+        }
+        Some(a + 0.5 * (b - a))
+    }
+
+    /// Whether a cell that nothing is known of is not worth another cut: time does not
+    /// resolve it, or rounding errors hide the mode in it.
+    fn is_hidden(&mut self, a: f64, b: f64) -> Result<bool, Error> {
+        let width = b - a;
+        if width <= apart(self.start.abs().max(self.end.abs())) {
+            return Ok(true);
+        }
+        let middle = a + 0.5 * width;
+        if width > 0.5 * DOUBTFUL * (self.effort.to - self.effort.from)
+            || [a, middle, b].iter().any(|&t| self.is_certain(t))
+        {
+            return Ok(false);
+        }
+        let expression = &self.indicator.expression;
+        self.effort.doubt(a, width, expression)?;
+        Ok(true)
+    }
+
+    /// Whether the mode at `t` is beyond rounding errors.
+    fn is_certain(&self, t: f64) -> bool {
+        self.indicator.is_constant(Interval::point(t))
+    }
+
+    /// Finds the switches of a part on which the quantity is monotone.
+    fn monotone(&mut self, a: f64, b: f64) -> Result<(), Error> {
+        if self.indicator.counts {
+            let levels = (self.indicator.value(b) - self.indicator.value(a)).abs();
+            self.effort
+                .check(levels.max(0.0), &self.indicator.expression)?;
+        }
+        let expression = &self.indicator.expression;
+        let (Some(first), Some(last)) = (self.probe(a, b), self.probe(b, a)) else {
+            return self.effort.doubt(a, b - a, expression);
+        };
+        self.effort.doubt(a, first - a, expression)?;
+        self.effort.doubt(b, b - last, expression)?;
+        self.arrive(first)?;
+        if first < last {
+            self.arrive(last)?;
+        }
+        Ok(())
+    }
+
+    /// The time nearest to `end` at which the mode is certain, on the way to `other`.
+    fn probe(&self, end: f64, other: f64) -> Option<f64> {
+        let shares = (1..=17).rev().map(|k| 0.5_f64.powi(3 * k));
+        std::iter::once(0.0)
+            .chain(shares)
+            .chain([0.5])
+            .map(|share| end + share * (other - end))
+            .find(|&t| self.is_certain(t))
+    }
+
+    /// The mode is certain at `t`.
+    fn arrive(&mut self, t: f64) -> Result<(), Error> {
+        let value = self.indicator.value(t);
+        self.reach(t, value)
+    }
+
+    /// The mode is what it is at `inside` from `t` on.
+    fn settle(&mut self, inside: f64, t: f64) -> Result<(), Error> {
+        let value = self.indicator.value(inside);
+        self.reach(t, value)?;
+        self.certain = Some((inside, value));
+        Ok(())
+    }
+
+    /// Finds every switch between the last certain time and `t`, where the mode is `value`.
+    fn reach(&mut self, t: f64, value: f64) -> Result<(), Error> {
+        while let Some((left, current)) = self.certain
+            && !same(current, value)
+        {
+            let switch = self.bisect(left, t, current);
+            self.push(switch)?;
+            let next = if switch < t {
+                self.indicator.value(switch)
+            } else {
+                value
+            };
+            self.certain = Some((switch, next));
+        }
+        self.certain = Some((t, value));
+        Ok(())
+    }
+
+    fn push(&mut self, switch: f64) -> Result<(), Error> {
+        let last = self.instants.last().copied().unwrap_or(self.start);
+        if switch - last <= apart(switch) || self.end - switch <= apart(self.end) {
+            return Ok(());
+        }
+        self.effort.switch(&self.indicator.expression)?;
+        self.instants.push(switch);
+        Ok(())
+    }
+
+    /// The first float after the mode's value `current` ends in (`left`, `right`].
+    fn bisect(&mut self, mut left: f64, mut right: f64, current: f64) -> f64 {
+        loop {
+            let middle = left + 0.5 * (right - left);
+            if middle <= left || middle >= right {
+                return right;
+            }
+            if same(self.indicator.value(middle), current) {
+                left = middle;
+            } else {
+                right = middle;
+            }
+        }
+    }
+}
+
+fn keeps_sign(c: Interval) -> bool {
+    c.lo() >= 0.0 || c.hi() <= 0.0
+}
+
+/// [a, b] for a ≤ b.
+fn interval(a: f64, b: f64) -> Interval {
+    Interval::new(a, b).unwrap_or(Interval::ENTIRE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_changes_are_instants() {
+        let mut line = Timeline::default();
+        for (t, value) in [(0.0, 1.0), (1.0, 1.0), (2.0, f64::NAN), (3.0, f64::NAN)] {
+            line.push(t, value);
+        }
+        line.push(4.0, 0.0);
+        assert_eq!(line.instants(), [2.0, 4.0]);
+        assert_eq!((line.at(0.5), line.at(5.0)), (1.0, 0.0));
+        assert!(line.at(2.5).is_nan() && Timeline::default().at(0.0).is_nan());
+    }
+}
