@@ -1,7 +1,9 @@
 //! What can be guaranteed about an observer, and why.
 
 use lynkeus_expr::{Interval, MissingInput, Node, Spent};
-use lynkeus_structure::{Dimension, Extended, Measurement, Region, Side, Standing, range, short};
+use lynkeus_structure::{
+    AugmentedPlant, Dimension, Measurement, Region, Side, Standing, range, short,
+};
 use nalgebra::DMatrix;
 
 use crate::statement::{proved, standing, sufficient, undecided};
@@ -10,14 +12,14 @@ use crate::{Check, Statement};
 /// What a guarantee may take for granted beside the plant's equations.
 #[derive(Clone, Debug)]
 pub struct Assumptions {
-    /// the box in which plant and estimate stay: extended states, known inputs, time
+    /// the box in which plant and estimate stay: augmented states, known inputs, time
     pub region: Region,
-    /// per extended state: a bound of |x' − f(x, u)|, that is of what acts on the
+    /// per augmented state: a bound of |x' − f(x, u)|, that is of what acts on the
     /// plant and the observer does not know (disturbances; v' of an unknown input)
     pub drift: Vec<f64>,
     /// per measured output: a bound of the measurement error, in the output's unit
     pub noise: Vec<f64>,
-    /// per extended state: the spectral density of white noise on x'
+    /// per augmented state: the spectral density of white noise on x'
     pub process_noise: Vec<f64>,
     /// per known input: bounds of |u'|, |u''|, …, as many as are known
     pub input_derivatives: Vec<Vec<f64>>,
@@ -25,7 +27,7 @@ pub struct Assumptions {
     regularity: Check,
     /// no reading is beyond what its sensor can show; none where every sensor shows everything
     within_limits: Option<Check>,
-    /// of the extended states, then of the measured outputs
+    /// of the augmented states, then of the measured outputs
     names: Vec<String>,
     time: Node,
 }
@@ -37,21 +39,21 @@ impl Assumptions {
     ///
     /// # Errors
     /// [`MissingInput`] where the plant has parameters without value.
-    pub fn new(extended: &Extended<'_>, region: Region) -> Result<Self, MissingInput> {
+    pub fn new(augmented: &AugmentedPlant<'_>, region: Region) -> Result<Self, MissingInput> {
         Ok(Self {
-            drift: vec![0.0; extended.states.len()],
-            noise: vec![0.0; extended.outputs.len()],
-            process_noise: vec![0.0; extended.states.len()],
-            input_derivatives: extended.input_derivatives.clone(),
+            drift: vec![0.0; augmented.states.len()],
+            noise: vec![0.0; augmented.outputs.len()],
+            process_noise: vec![0.0; augmented.states.len()],
+            input_derivatives: augmented.input_derivatives.clone(),
             within_limits: None,
-            time: extended.plant.time,
-            names: extended
+            time: augmented.plant.time,
+            names: augmented
                 .states
                 .iter()
-                .chain(extended.outputs.iter().map(|o| &o.variable))
+                .chain(augmented.outputs.iter().map(|o| &o.variable))
                 .map(|v| v.name.clone())
                 .collect(),
-            regularity: Statement::PlantIsRegular.with(extended.regularity(&region)?),
+            regularity: Statement::PlantIsRegular.with(augmented.regularity(&region)?),
             region,
         })
     }
@@ -77,14 +79,14 @@ impl Assumptions {
         any.then(|| sufficient(Statement::WhatActs, open.is_empty(), detail))
     }
 
-    /// With bounds of what acts on the plant, one per extended state.
+    /// With bounds of what acts on the plant, one per augmented state.
     #[must_use]
     pub fn with_drift(mut self, drift: Vec<f64>) -> Self {
         self.drift = drift;
         self
     }
 
-    /// With the spectral densities of white noise on the derivatives, one per extended state.
+    /// With the spectral densities of white noise on the derivatives, one per augmented state.
     #[must_use]
     pub fn with_process_noise(mut self, densities: Vec<f64>) -> Self {
         self.process_noise = densities;
@@ -130,15 +132,15 @@ impl Assumptions {
     /// [`MissingInput`] where an output reads what has no range.
     pub fn with_limits(
         mut self,
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         limits: &[Option<Interval>],
     ) -> Result<Self, MissingInput> {
         let mut beyond = vec![];
-        for (j, output) in extended.outputs.iter().enumerate() {
+        for (j, output) in augmented.outputs.iter().enumerate() {
             let Some(limits) = limits.get(j).copied().flatten() else {
                 continue;
             };
-            let reading = self.reading(extended, j, output)?;
+            let reading = self.reading(augmented, j, output)?;
             let is_shown = reading.is_defined() && reading.is_subset(limits);
             self.within_limits.get_or_insert_with(|| {
                 proved(
@@ -169,11 +171,11 @@ impl Assumptions {
 
     fn reading(
         &self,
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         j: usize,
         output: &Measurement,
     ) -> Result<Interval, MissingInput> {
-        let values = range(extended.graph(), output.variable.node, &self.region)?.enclosure;
+        let values = range(augmented.graph(), output.variable.node, &self.region)?.enclosure;
         Ok(match self.noise.get(j).copied().unwrap_or(0.0) {
             0.0 => values,
             error => values.inflate(error),
@@ -228,7 +230,7 @@ impl Constant {
 /// What the error of a quantity ends within.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UltimateBound {
-    /// name of the extended state
+    /// name of the augmented state
     pub name: String,
     /// of the absolute value, in the state's unit
     pub value: f64,
@@ -245,7 +247,7 @@ impl From<(String, f64)> for UltimateBound {
 pub struct Bounds {
     /// of the Euclidean norm
     pub norm: f64,
-    /// per extended state
+    /// per augmented state
     pub states: Vec<UltimateBound>,
 }
 
@@ -263,7 +265,7 @@ pub struct Certificate {
     /// guaranteed bound of the Euclidean norm of the error as t → ∞, under the
     /// assumed drift and noise; only where proved
     pub ultimate_bound: Option<f64>,
-    /// the same per extended state; empty where not known
+    /// the same per augmented state; empty where not known
     pub ultimate: Vec<UltimateBound>,
     /// where process noise moves the plant, what √(E|x̂ − x|²) ends within: of such an error nothing
     /// else has a bound
@@ -275,7 +277,7 @@ pub struct Certificate {
     /// the numbers of the proof
     pub constants: Vec<Constant>,
     /// P of the Lyapunov function V = eᵀPe, V' ≤ −2·rate·V, in the order of the
-    /// extended states; only where the proof has one
+    /// augmented states; only where the proof has one
     pub lyapunov: Option<DMatrix<f64>>,
     /// what the reader should know, in words
     pub notes: Vec<String>,

@@ -10,7 +10,8 @@ use lynkeus_proof::hurwitz;
 use lynkeus_proof::hurwitz::Stability;
 use lynkeus_structure::sign::Sign;
 use lynkeus_structure::{
-    ChainRequest, Extended, Finding, Point, Region, Regularity, Verdict, has_value_at, short, sign,
+    AugmentedPlant, ChainRequest, Finding, Point, Region, Regularity, Verdict, has_value_at, short,
+    sign,
 };
 
 use crate::statement::proved;
@@ -18,22 +19,22 @@ use crate::{Check, DesignError, KeySpec, Shape, Statement, Tuning, TuningError};
 
 /// ∂f_row/∂x_column with the verdict on its sign.
 fn partial(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     row: usize,
     column: usize,
     region: &Region,
 ) -> Result<(Node, Sign), DesignError> {
-    let graph = extended.graph();
+    let graph = augmented.graph();
     // where the pattern has the dependency, a missing derivative is a step function's
-    let node = extended
+    let node = augmented
         .partial(row, column)
         .unwrap_or_else(|| graph.constant(0.0).node());
     let mut found = sign::keeps_sign(graph, node, region)?;
     // log(x) has a derivative at x < 0, where it has no value: no witness lies there
     if let Verdict::Refuted(witness) = &found.finding.verdict
-        && !has_value_at(graph, extended.derivatives[row], witness, region)?
+        && !has_value_at(graph, augmented.derivatives[row], witness, region)?
     {
-        let f = &extended.states[row].name;
+        let f = &augmented.states[row].name;
         found.finding.detail = format!("{}, but where f({f}) has no value", found.finding.detail);
         let place = region.restricted(&graph.symbols_of(&[node])).place();
         found.finding.verdict = Verdict::Undecided(place);
@@ -71,20 +72,20 @@ impl Partial {
 
 /// The partials along a chain with the verdicts on their signs.
 pub(crate) fn partials(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     states: &[usize],
     region: &Region,
 ) -> Result<(Vec<Partial>, Vec<Check>), DesignError> {
     let (mut found, mut checks) = (vec![], vec![]);
     for pair in states.windows(2) {
-        lasts(extended)?;
-        let (node, verdict) = partial(extended, pair[0], pair[1], region)?;
+        lasts(augmented)?;
+        let (node, verdict) = partial(augmented, pair[0], pair[1], region)?;
         found.push(Partial {
             node,
             sign: verdict.sign,
             bounds: verdict.bounds,
         });
-        let name = |i: usize| extended.states[i].name.clone();
+        let name = |i: usize| augmented.states[i].name.clone();
         let statement = Statement::PartialKeepsSign {
             of: name(pair[0]),
             by: name(pair[1]),
@@ -97,12 +98,12 @@ pub(crate) fn partials(
 /// The slope of an output in its state must not vanish; nothing to check where
 /// it is a number.
 pub(crate) fn output_slope(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     i: usize,
     region: &Region,
 ) -> Result<Option<Check>, DesignError> {
-    let graph = extended.graph();
-    let output = &extended.outputs[i];
+    let graph = augmented.graph();
+    let output = &augmented.outputs[i];
     let Some((state, slope, _)) = output.state else {
         return Ok(None);
     };
@@ -111,36 +112,36 @@ pub(crate) fn output_slope(
     }
     let statement = Statement::OutputKeepsSign {
         output: output.variable.name.clone(),
-        state: extended.states[state].name.clone(),
+        state: augmented.states[state].name.clone(),
     };
     let found = sign::keeps_sign(graph, slope, region)?.finding;
     Ok(Some(statement.with(found)))
 }
 
-pub(crate) fn names(extended: &Extended<'_>, states: &[usize]) -> Vec<String> {
+pub(crate) fn names(augmented: &AugmentedPlant<'_>, states: &[usize]) -> Vec<String> {
     states
         .iter()
-        .map(|&i| extended.states[i].name.clone())
+        .map(|&i| augmented.states[i].name.clone())
         .collect()
 }
 
 /// Gains on the error of the state that output `i` shows as gains on ŷ − y: divided by
 /// the output's slope in that state, where it is a number.
 pub(crate) fn on_output(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     i: usize,
     states: &[usize],
     gains: &[f64],
 ) -> Vec<(String, f64)> {
-    let shown = extended.outputs[i].state;
-    let slope = shown.and_then(|(_, slope, _)| extended.graph().constant_value(slope));
+    let shown = augmented.outputs[i].state;
+    let slope = shown.and_then(|(_, slope, _)| augmented.graph().constant_value(slope));
     let gains = gains.iter().map(|k| k / slope.unwrap_or(1.0));
-    names(extended, states).into_iter().zip(gains).collect()
+    names(augmented, states).into_iter().zip(gains).collect()
 }
 
 /// Ends a form or a design whose budget is spent: it would not count.
-pub(crate) fn lasts(extended: &Extended<'_>) -> Result<(), DesignError> {
-    match extended.graph().spent() {
+pub(crate) fn lasts(augmented: &AugmentedPlant<'_>) -> Result<(), DesignError> {
+    match augmented.graph().spent() {
         None => Ok(()),
         Some(spent) => Err(DesignError::Spent(spent)),
     }
@@ -148,25 +149,28 @@ pub(crate) fn lasts(extended: &Extended<'_>) -> Result<(), DesignError> {
 
 /// H3 i): the right-hand side is Lipschitz on the box. Never a refusal: outside
 /// of a bounded set nothing nonlinear is, and `clamp` prolongs f as the paper does.
-pub(crate) fn lipschitz(extended: &Extended<'_>, region: &Region) -> Result<Check, DesignError> {
-    let graph = extended.graph();
-    let symbols = extended.symbols();
-    let jacobian = lynkeus_expr::jacobian::forward(graph, &extended.derivatives, &symbols);
-    let regularity = Regularity::of(graph, &extended.derivatives, &symbols, region)?;
+pub(crate) fn lipschitz(
+    augmented: &AugmentedPlant<'_>,
+    region: &Region,
+) -> Result<Check, DesignError> {
+    let graph = augmented.graph();
+    let symbols = augmented.symbols();
+    let jacobian = lynkeus_expr::jacobian::forward(graph, &augmented.derivatives, &symbols);
+    let regularity = Regularity::of(graph, &augmented.derivatives, &symbols, region)?;
     if !regularity.holds() {
         return Ok(Statement::Lipschitz.with(regularity.finding()));
     }
     let entries: Vec<_> = jacobian.entries.iter().map(|entry| entry.2).collect();
     let at_once = sign::bounded_at_once(graph, &entries, region)?;
     for (&(row, column, node), at_once) in jacobian.entries.iter().zip(at_once) {
-        lasts(extended)?;
+        lasts(augmented)?;
         if at_once || sign::bounded(graph, node, region)? {
             continue;
         }
         let detail = format!(
             "∂f({})/∂{} = {} is not known to be bounded; declare min and max, and mind divisions and roots at the edges of the box",
-            extended.states[row].name,
-            extended.states[column].name,
+            augmented.states[row].name,
+            augmented.states[column].name,
             graph.render(node, 60)
         );
         let used = region.restricted(&graph.symbols_of(&[node]));
@@ -189,15 +193,15 @@ pub(crate) const CHAINS: KeySpec = KeySpec {
 /// What the study says about the chains: their names, or the lengths of the
 /// lists under `key`.
 pub(crate) fn chain_request(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     tuning: &Tuning,
     key: &str,
     lengths: Option<Vec<usize>>,
 ) -> Result<ChainRequest, TuningError> {
     let names = tuning.name_lists(CHAINS.name)?;
     let mut mentioned = names.iter().flatten().flatten();
-    if let Some(name) = mentioned.find(|n| extended.state_index(n).is_none()) {
-        let states: Vec<&str> = extended.states.iter().map(|s| s.name.as_str()).collect();
+    if let Some(name) = mentioned.find(|n| augmented.state_index(n).is_none()) {
+        let states: Vec<&str> = augmented.states.iter().map(|s| s.name.as_str()).collect();
         let expected = format!("names of states and unknown inputs ({})", states.join(", "));
         return Err(TuningError::new(
             CHAINS.name,
@@ -205,7 +209,7 @@ pub(crate) fn chain_request(
             format!("\"{name}\""),
         ));
     }
-    let count = extended.outputs.len();
+    let count = augmented.outputs.len();
     if let Some(lengths) = &lengths
         && lengths.len() != count
     {

@@ -2,7 +2,7 @@
 //! everything that led to it, or why there is none.
 
 use lynkeus_expr::{MissingInput, Spent};
-use lynkeus_structure::{Extended, Region, Standing};
+use lynkeus_structure::{AugmentedPlant, Region, Standing};
 
 use crate::statement::standing;
 use crate::{Check, Observer, Statement, TuningError};
@@ -47,16 +47,16 @@ enum PlantFit {
 impl Examination {
     /// What a family finds in a plant that has its form. The fit is that of the
     /// conditions, of which the first is always that the plant is [regular](
-    /// Extended::regularity) on the box.
+    /// AugmentedPlant::regularity) on the box.
     pub(crate) fn new(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         region: &Region,
         family: &'static str,
         summary: String,
         chains: Vec<Vec<String>>,
         checks: Vec<Check>,
     ) -> Result<Self, MissingInput> {
-        let regularity = Statement::PlantIsRegular.with(extended.regularity(region)?);
+        let regularity = Statement::PlantIsRegular.with(augmented.regularity(region)?);
         Ok(Self {
             family,
             summary,

@@ -17,7 +17,7 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{Expr, Graph, Node};
 use lynkeus_model::Variable;
-use lynkeus_structure::{Extended, Measurement, Region};
+use lynkeus_structure::{AugmentedPlant, Measurement, Region};
 
 use crate::conditions::Partial;
 use crate::tuning::is_or_has;
@@ -49,8 +49,8 @@ impl Common {
 
 /// The plant's expressions over the estimate.
 pub(crate) struct PlantCopy<'e, 'p> {
-    pub extended: &'e Extended<'p>,
-    /// x̂, one per extended state
+    pub augmented: &'e AugmentedPlant<'p>,
+    /// x̂, one per augmented state
     pub hats: Vec<Signal>,
     /// y, one per measured output
     pub measured: Vec<Signal>,
@@ -60,19 +60,19 @@ pub(crate) struct PlantCopy<'e, 'p> {
 }
 
 impl<'e, 'p> PlantCopy<'e, 'p> {
-    pub fn new(extended: &'e Extended<'p>, common: &'e Common) -> Self {
-        let graph = extended.graph();
+    pub fn new(augmented: &'e AugmentedPlant<'p>, common: &'e Common) -> Self {
+        let graph = augmented.graph();
         let hat = |state: &Variable| Signal::fresh(graph, "estimate of", &state.name);
         let y = |o: &Measurement| Signal::fresh(graph, "measured", &o.variable.name);
         let mut copy = Self {
-            extended,
-            hats: extended.states.iter().map(hat).collect(),
-            measured: extended.outputs.iter().map(y).collect(),
+            augmented,
+            hats: augmented.states.iter().map(hat).collect(),
+            measured: augmented.outputs.iter().map(y).collect(),
             seen: HashMap::new(),
             common,
         };
         let seen =
-            |(i, hat): (usize, &Signal)| (extended.states[i].node, copy.seen_as(i, hat.symbol));
+            |(i, hat): (usize, &Signal)| (augmented.states[i].node, copy.seen_as(i, hat.symbol));
         copy.seen = copy.hats.iter().enumerate().map(seen).collect();
         copy
     }
@@ -80,23 +80,23 @@ impl<'e, 'p> PlantCopy<'e, 'p> {
     /// How the plant's functions see a state whose estimate is `hat`.
     pub fn seen_as(&self, state: usize, hat: Node) -> Node {
         match self.common.clamp || self.common.prolong {
-            true => limited(self.extended.graph(), hat, &self.extended.states[state]),
+            true => limited(self.augmented.graph(), hat, &self.augmented.states[state]),
             false => hat,
         }
     }
 
     /// Expressions of the plant at the estimate: f(x̂, u) from f(x, u).
     pub fn at_estimate(&self, expressions: &[Node]) -> Vec<Node> {
-        self.extended.graph().substitute(expressions, &self.seen)
+        self.augmented.graph().substitute(expressions, &self.seen)
     }
 
     /// The same where some states, by their places, have another estimate.
     pub fn at_estimate_with(&self, expressions: &[Node], others: &[(usize, Node)]) -> Vec<Node> {
         let mut seen = self.seen.clone();
         let image =
-            |&(i, hat): &(usize, Node)| (self.extended.states[i].node, self.seen_as(i, hat));
+            |&(i, hat): &(usize, Node)| (self.augmented.states[i].node, self.seen_as(i, hat));
         seen.extend(others.iter().map(image));
-        self.extended.graph().substitute(expressions, &seen)
+        self.augmented.graph().substitute(expressions, &seen)
     }
 
     /// x̂ with its starts: the named value, else the default, else the plant's
@@ -119,7 +119,7 @@ impl<'e, 'p> PlantCopy<'e, 'p> {
                 .or(variable.start)
                 .unwrap_or_else(|| middle(variable))
         };
-        let states = self.hats.iter().zip(&self.extended.states);
+        let states = self.hats.iter().zip(&self.augmented.states);
         Ok(states
             .map(|(hat, variable)| (hat.clone(), start(variable)))
             .collect())
@@ -127,11 +127,11 @@ impl<'e, 'p> PlantCopy<'e, 'p> {
 
     /// The estimates where the observer's first states are x̂ itself.
     pub fn estimates(&self) -> Vec<Estimate> {
-        let pairs = self.hats.iter().zip(&self.extended.states).enumerate();
+        let pairs = self.hats.iter().zip(&self.augmented.states).enumerate();
         let estimate = |(i, (hat, variable)): (usize, (&Signal, &Variable))| Estimate {
             variable: variable.clone(),
             node: hat.symbol,
-            unknown_input: i >= self.extended.plant_states(),
+            unknown_input: i >= self.augmented.plant_states(),
         };
         pairs.map(estimate).collect()
     }
@@ -141,8 +141,8 @@ impl PlantCopy<'_, '_> {
     /// The measured value of the state that output `i` shows: y = slope·x + offset
     /// solved for x. None where the output is no affine function of one state.
     pub fn measured_state(&self, i: usize) -> Option<(usize, Node)> {
-        let graph = self.extended.graph();
-        let output = &self.extended.outputs[i];
+        let graph = self.augmented.graph();
+        let output = &self.augmented.outputs[i];
         let (state, slope, offset) = output.state?;
         let x = (graph.expr(self.measured[i].symbol) - graph.expr(offset)) / graph.expr(slope);
         Some((state, x.node()))
@@ -150,7 +150,7 @@ impl PlantCopy<'_, '_> {
 
     /// x̂ − x as measured, for the state that output `i` shows.
     pub fn innovation(&self, i: usize) -> Option<Node> {
-        let graph = self.extended.graph();
+        let graph = self.augmented.graph();
         let (state, measured) = self.measured_state(i)?;
         let innovation = graph.expr(self.hats[state].symbol) - graph.expr(measured);
         Some(innovation.node())
@@ -168,10 +168,10 @@ impl PlantCopy<'_, '_> {
         };
         Ok(Observer {
             family,
-            time: self.extended.plant.time,
+            time: self.augmented.plant.time,
             states: self.states()?,
             derivatives,
-            inputs: self.extended.inputs.iter().map(signal).collect(),
+            inputs: self.augmented.inputs.iter().map(signal).collect(),
             input_derivatives: vec![],
             generated: vec![],
             measured: self.measured.clone(),
@@ -224,14 +224,14 @@ pub(crate) fn prolong(
     if !copy.common.prolong {
         return Ok(());
     }
-    let graph = copy.extended.graph();
+    let graph = copy.augmented.graph();
     for (pair, partial) in states.windows(2).zip(partials) {
         let (row, next) = (pair[0], pair[1]);
-        let variable = &copy.extended.states[next];
+        let variable = &copy.augmented.states[next];
         let Some(slope) = partial.nominal() else {
             let expected = format!(
                 "∂f({})/∂{} with known bounds away from zero, to continue with; declare min and max",
-                copy.extended.states[row].name, variable.name
+                copy.augmented.states[row].name, variable.name
             );
             let found = format!("bounds {} and {}", partial.bounds.0, partial.bounds.1);
             return Err(TuningError::new(PROLONG.name, expected, found));
@@ -259,13 +259,13 @@ pub(crate) fn refuse(common: &Common, observer: &str) -> Result<(), TuningError>
 ///
 /// Everywhere only where the box of the proof is the one that the observer projects on and
 /// takes its slopes from: a smaller one of states (`tube`) or of inputs has other bounds.
-pub(crate) fn note(common: &Common, extended: &Extended<'_>, region: &Region) -> String {
+pub(crate) fn note(common: &Common, augmented: &AugmentedPlant<'_>, region: &Region) -> String {
     let whole = |variable: &Variable| {
         let mut sides = region.dimensions.iter();
         let side = sides.find(|d| d.symbol == variable.node);
         side.is_none_or(|d| d.min <= variable.min && d.max >= variable.max)
     };
-    let declared = extended.plant.states.iter().chain(&extended.plant.inputs);
+    let declared = augmented.plant.states.iter().chain(&augmented.plant.inputs);
     match (common.prolong, declared.into_iter().all(whole)) {
         (true, true) => "The guarantee holds for every start of the estimate, while the plant stays in the box: outside of it the functions are prolonged with the same bounds of their slopes ('prolong').".into(),
         (true, false) => "The guarantee holds while plant and estimate stay in the box, which is smaller than the declared one that the functions are prolonged from ('prolong'): on the declared box it would hold for every start of the estimate.".into(),
@@ -292,7 +292,7 @@ impl Speed {
         meaning: String,
     ) -> Self {
         let name = name.into();
-        let graph = copy.extended.graph();
+        let graph = copy.augmented.graph();
         Self {
             value,
             symbol: copy
@@ -306,7 +306,7 @@ impl Speed {
 
     /// θ of each chain, in the order of the measured outputs.
     pub fn of_chains(copy: &PlantCopy<'_, '_>, θ: &[f64]) -> Vec<Self> {
-        let outputs = copy.extended.outputs.iter();
+        let outputs = copy.augmented.outputs.iter();
         let each = outputs.zip(θ).enumerate().map(|(i, (output, value))| {
             let output = &output.variable.name;
             match θ {

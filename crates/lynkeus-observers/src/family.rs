@@ -1,7 +1,7 @@
 //! What a family is: settings read once, the form found, the design and the theorem
 //! from both. What the [`Family`] trait offers is made of these stages, the same for all.
 
-use lynkeus_structure::{Extended, Region, Standing};
+use lynkeus_structure::{AugmentedPlant, Region, Standing};
 
 use crate::design::{Found, Searched};
 use crate::{
@@ -32,7 +32,8 @@ pub(crate) trait Stages: Sync {
     const IS_FILTER: bool = false;
 
     /// The settings of a study.
-    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self::Settings, TuningError>;
+    fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning)
+    -> Result<Self::Settings, TuningError>;
 
     /// The keys whose wrong values `read` leaves to later stages.
     ///
@@ -44,21 +45,21 @@ pub(crate) trait Stages: Sync {
 
     /// The form with its conditions on `region`.
     fn form<'e, 'p>(
-        extended: &'e Extended<'p>,
+        augmented: &'e AugmentedPlant<'p>,
         settings: &Self::Settings,
         region: &Region,
     ) -> Searched<Self::Form<'e, 'p>>;
 
     /// The observer; no condition of the form is refuted.
     fn design<'e, 'p>(
-        extended: &'e Extended<'p>,
+        augmented: &'e AugmentedPlant<'p>,
         settings: &Self::Settings,
         found: Found<Self::Form<'e, 'p>>,
     ) -> Result<Design, DesignError>;
 
     /// What the theorem guarantees.
     fn theorem<'e, 'p>(
-        extended: &'e Extended<'p>,
+        augmented: &'e AugmentedPlant<'p>,
         settings: &Self::Settings,
         found: Found<Self::Form<'e, 'p>>,
         assumptions: &Assumptions,
@@ -67,10 +68,10 @@ pub(crate) trait Stages: Sync {
 
 /// Work whose result counts only where the budget lasted.
 fn lasting<T>(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     work: impl FnOnce() -> Result<T, DesignError>,
 ) -> Result<T, DesignError> {
-    let graph = extended.graph();
+    let graph = augmented.graph();
     graph.budgeted(graph.budget().part(1.0), work)?
 }
 
@@ -95,18 +96,18 @@ impl<S: Stages> Family for S {
         S::KEYS.iter().copied().flatten().collect()
     }
 
-    fn verify(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<(), TuningError> {
-        S::late(&S::read(extended, tuning)?)
+    fn verify(&self, augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<(), TuningError> {
+        S::late(&S::read(augmented, tuning)?)
     }
 
     fn examine(
         &self,
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
-        let settings = S::read(extended, tuning)?;
-        let examined = lasting(extended, || {
-            Ok(match S::form(extended, &settings, &extended.region())? {
+        let settings = S::read(augmented, tuning)?;
+        let examined = lasting(augmented, || {
+            Ok(match S::form(augmented, &settings, &augmented.region())? {
                 Ok(Found { examination, .. }) | Err(examination) => examination,
             })
         });
@@ -116,13 +117,17 @@ impl<S: Stages> Family for S {
         }
     }
 
-    fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
-        let settings = S::read(extended, tuning)?;
-        match lasting(extended, || {
-            S::form(extended, &settings, &extended.region())
+    fn design(
+        &self,
+        augmented: &AugmentedPlant<'_>,
+        tuning: &Tuning,
+    ) -> Result<Design, DesignError> {
+        let settings = S::read(augmented, tuning)?;
+        match lasting(augmented, || {
+            S::form(augmented, &settings, &augmented.region())
         })? {
             Ok(found) if found.examination.fit() != Standing::Refuted => {
-                lasting(extended, || S::design(extended, &settings, found))
+                lasting(augmented, || S::design(augmented, &settings, found))
             }
             Ok(Found { examination, .. }) | Err(examination) => {
                 Err(DesignError::Refused(Box::new(examination)))
@@ -132,11 +137,11 @@ impl<S: Stages> Family for S {
 
     fn theorem(
         &self,
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         tuning: &Tuning,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        match theorem::<S>(extended, tuning, assumptions) {
+        match theorem::<S>(augmented, tuning, assumptions) {
             Err(DesignError::Spent(spent)) => Ok(Certificate::ended(S::BASIS, assumptions, spent)),
             found => found.map(|certificate| certificate.under(assumptions)),
         }
@@ -144,19 +149,19 @@ impl<S: Stages> Family for S {
 }
 
 fn theorem<S: Stages>(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     tuning: &Tuning,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
-    let settings = S::read(extended, tuning)?;
+    let settings = S::read(augmented, tuning)?;
     let region = match S::FORM_ON_ASSUMED_BOX {
         true => assumptions.region.clone(),
-        false => extended.region(),
+        false => augmented.region(),
     };
     let refuted = |found: &Found<_>| found.examination.fit() == Standing::Refuted;
-    match lasting(extended, || S::form(extended, &settings, &region))? {
-        Ok(found) if !(S::FORM_ON_ASSUMED_BOX && refuted(&found)) => lasting(extended, || {
-            S::theorem(extended, &settings, found, assumptions)
+    match lasting(augmented, || S::form(augmented, &settings, &region))? {
+        Ok(found) if !(S::FORM_ON_ASSUMED_BOX && refuted(&found)) => lasting(augmented, || {
+            S::theorem(augmented, &settings, found, assumptions)
         }),
         Ok(Found { examination, .. }) | Err(examination) if examination.refuted().is_some() => {
             Ok(Certificate::new(S::BASIS, assumptions, examination.checks))
@@ -188,19 +193,26 @@ pub trait Family: Sync {
     ///
     /// # Errors
     /// The first key that cannot be used.
-    fn verify(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<(), TuningError>;
+    fn verify(&self, augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<(), TuningError>;
     /// Does the plant have the form, and do the conditions hold on the box?
     ///
     /// # Errors
     /// Tuning keys that cannot be used; parameters without value.
-    fn examine(&self, extended: &Extended<'_>, tuning: &Tuning)
-    -> Result<Examination, DesignError>;
+    fn examine(
+        &self,
+        augmented: &AugmentedPlant<'_>,
+        tuning: &Tuning,
+    ) -> Result<Examination, DesignError>;
     /// The observer.
     ///
     /// # Errors
     /// [`DesignError::Refused`] where the family does not fit; tuning keys that
     /// cannot be used.
-    fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError>;
+    fn design(
+        &self,
+        augmented: &AugmentedPlant<'_>,
+        tuning: &Tuning,
+    ) -> Result<Design, DesignError>;
     /// What the paper's theorem guarantees for this plant and tuning: its
     /// hypotheses with verdicts, its constants (θ0 among them), and where all hold
     /// the rate and the ultimate bound.
@@ -209,7 +221,7 @@ pub trait Family: Sync {
     /// As [`Family::design`].
     fn theorem(
         &self,
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         tuning: &Tuning,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError>;

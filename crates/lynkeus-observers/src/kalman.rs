@@ -15,7 +15,7 @@
 
 use lynkeus_model::Variable;
 use lynkeus_run::filter::{Bounds, FilterKind, SigmaPoints};
-use lynkeus_structure::{Extended, Region, Standing};
+use lynkeus_structure::{AugmentedPlant, Region, Standing};
 
 use crate::design::{Found, Searched};
 use crate::estimate::{Common, PlantCopy, Speed, limited};
@@ -50,7 +50,7 @@ trait Kalman: Sync {
     const WORDS: &'static str;
     const KEYS: &'static [&'static [KeySpec]];
 
-    fn kind(extended: &Extended<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError>;
+    fn kind(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError>;
 }
 
 impl Kalman for Ekf {
@@ -59,7 +59,7 @@ impl Kalman for Ekf {
     const WORDS: &'static str = "extended Kalman filter";
     const KEYS: &'static [&'static [KeySpec]] = &[&KEYS, &BOUNDS];
 
-    fn kind(_: &Extended<'_>, _: &Tuning) -> Result<FilterKind, TuningError> {
+    fn kind(_: &AugmentedPlant<'_>, _: &Tuning) -> Result<FilterKind, TuningError> {
         Ok(FilterKind::Extended)
     }
 }
@@ -70,7 +70,7 @@ impl Kalman for Ukf {
     const WORDS: &'static str = "unscented Kalman filter";
     const KEYS: &'static [&'static [KeySpec]] = &[&KEYS, &BOUNDS, &POINTS];
 
-    fn kind(_: &Extended<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError> {
+    fn kind(_: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError> {
         let SigmaPoints { alpha, beta, kappa } = SigmaPoints::default();
         let [own_alpha, own_beta, own_kappa] = &POINTS;
         Ok(FilterKind::Unscented(SigmaPoints {
@@ -87,20 +87,20 @@ impl Kalman for Mhe {
     const WORDS: &'static str = "moving-horizon estimator";
     const KEYS: &'static [&'static [KeySpec]] = &[&KEYS, &WINDOW];
 
-    fn kind(extended: &Extended<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError> {
+    fn kind(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError> {
         let [horizon] = &WINDOW;
         let length = match number(tuning, horizon)? {
             None => HORIZON,
             Some(x) if x >= 1.0 && x.fract() == 0.0 && x <= 1e4 => x as usize,
             Some(x) => return Err(horizon.wrong(x)),
         };
-        Ok(FilterKind::MovingHorizon(length, ranges(extended)))
+        Ok(FilterKind::MovingHorizon(length, ranges(augmented)))
     }
 }
 
 /// The declared range of each state.
-fn ranges(extended: &Extended<'_>) -> Vec<Bounds> {
-    let bounds = extended.states.iter().map(|state| Bounds {
+fn ranges(augmented: &AugmentedPlant<'_>) -> Vec<Bounds> {
+    let bounds = augmented.states.iter().map(|state| Bounds {
         low: state.min,
         high: state.max,
     });
@@ -116,12 +116,12 @@ impl<K: Kalman> Stages for K {
     const IS_FILTER: bool = true;
     const KEYS: &'static [&'static [KeySpec]] = K::KEYS;
 
-    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
-        Settings::read(extended, tuning, K::kind(extended, tuning)?)
+    fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
+        Settings::read(augmented, tuning, K::kind(augmented, tuning)?)
     }
 
-    fn form(extended: &Extended<'_>, _: &Settings, region: &Region) -> Searched<()> {
-        let regularity = Statement::PlantIsRegular.with(extended.regularity(region)?);
+    fn form(augmented: &AugmentedPlant<'_>, _: &Settings, region: &Region) -> Searched<()> {
+        let regularity = Statement::PlantIsRegular.with(augmented.regularity(region)?);
         let jumps = match regularity.standing() {
             Standing::Refuted => format!(
                 "; {}: the filter linearises beside such places",
@@ -141,30 +141,32 @@ impl<K: Kalman> Stages for K {
     }
 
     fn design(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         settings: &Settings,
         found: Found<()>,
     ) -> Result<Design, DesignError> {
-        let copy = PlantCopy::new(extended, &settings.common);
-        let derivatives = copy.at_estimate(&extended.derivatives);
-        let outputs: Vec<_> = extended.outputs.iter().map(|o| o.variable.node).collect();
-        let limits = copy.hats.iter().zip(&extended.states);
+        let copy = PlantCopy::new(augmented, &settings.common);
+        let derivatives = copy.at_estimate(&augmented.derivatives);
+        let outputs: Vec<_> = augmented.outputs.iter().map(|o| o.variable.node).collect();
+        let limits = copy.hats.iter().zip(&augmented.states);
         let limits =
-            limits.map(|(hat, state)| (hat.symbol, limited(extended.graph(), hat.symbol, state)));
-        let confined = extended.graph().substitute(&derivatives, &limits.collect());
+            limits.map(|(hat, state)| (hat.symbol, limited(augmented.graph(), hat.symbol, state)));
+        let confined = augmented
+            .graph()
+            .substitute(&derivatives, &limits.collect());
         let mut observer = copy.observer(K::NAME, derivatives)?;
         let scale = Speed::new(&copy, NOISE_SCALE, 1.0, NOISE_MEANING.to_owned());
         observer = observer.tuned_by([&scale]);
-        let variance = settings.variances(extended, &observer.states);
+        let variance = settings.variances(augmented, &observer.states);
         observer.filter = Some(FilterTuning {
             kind: settings.kind.clone(),
             gate: settings.gate,
-            bounds: settings.projects.then(|| ranges(extended)),
+            bounds: settings.projects.then(|| ranges(augmented)),
             outputs: copy.at_estimate(&outputs),
             confined,
             initial_variance: variance.clone(),
         });
-        let given = settings.variance.iter().zip(&extended.states);
+        let given = settings.variance.iter().zip(&augmented.states);
         let parameters = variance.iter().zip(given).map(|(value, (given, state))| {
             let from = match given {
                 Some(_) => "",
@@ -185,7 +187,7 @@ impl<K: Kalman> Stages for K {
     }
 
     fn theorem(
-        _: &Extended<'_>,
+        _: &AugmentedPlant<'_>,
         _: &Settings,
         _: Found<()>,
         assumptions: &Assumptions,
@@ -266,13 +268,13 @@ pub(crate) struct Settings {
     pub gate: Option<f64>,
     /// the estimate is kept in the declared ranges
     pub projects: bool,
-    /// as given, by extended state
+    /// as given, by augmented state
     variance: Vec<Option<f64>>,
 }
 
 impl Settings {
     pub fn read(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         tuning: &Tuning,
         kind: FilterKind,
     ) -> Result<Self, TuningError> {
@@ -281,13 +283,13 @@ impl Settings {
             kind,
             gate: tuning.positive(GATE.name)?,
             projects: tuning.meant(&BOUNDS[0], [true])?.is_some(),
-            variance: variances(extended, tuning)?,
+            variance: variances(augmented, tuning)?,
         })
     }
 
     /// The variances given, and those that follow from the declared ranges.
-    fn variances(&self, extended: &Extended<'_>, starts: &[(Signal, f64)]) -> Vec<f64> {
-        let states = extended.states.iter().zip(starts).zip(&self.variance);
+    fn variances(&self, augmented: &AugmentedPlant<'_>, starts: &[(Signal, f64)]) -> Vec<f64> {
+        let states = augmented.states.iter().zip(starts).zip(&self.variance);
         states
             .map(|((state, (_, start)), given)| {
                 given.unwrap_or_else(|| prior_variance(state, *start))
@@ -306,9 +308,12 @@ pub fn prior_variance(state: &Variable, start: f64) -> f64 {
     }
 }
 
-fn variances(extended: &Extended<'_>, tuning: &Tuning) -> Result<Vec<Option<f64>>, TuningError> {
+fn variances(
+    augmented: &AugmentedPlant<'_>,
+    tuning: &Tuning,
+) -> Result<Vec<Option<f64>>, TuningError> {
     let table = match tuning.values.get(VARIANCE.name) {
-        None => return Ok(vec![None; extended.states.len()]),
+        None => return Ok(vec![None; augmented.states.len()]),
         Some(Value::Table(table)) => table,
         Some(other) => return Err(VARIANCE.wrong(other)),
     };
@@ -317,18 +322,18 @@ fn variances(extended: &Extended<'_>, tuning: &Tuning) -> Result<Vec<Option<f64>
         other => Err(VARIANCE.wrong(format!("{name} = {other}"))),
     };
     let default = table.get("default").map(|value| variance("default", value));
-    let mut found = vec![default.transpose()?; extended.states.len()];
+    let mut found = vec![default.transpose()?; augmented.states.len()];
     for (name, value) in table.iter().filter(|(name, _)| *name != "default") {
         let value = variance(name, value)?;
         let mut meant = 0;
-        for (state, found) in extended.states.iter().zip(&mut found) {
+        for (state, found) in augmented.states.iter().zip(&mut found) {
             if is_or_has(name, &state.name) {
                 *found = Some(value);
                 meant += 1;
             }
         }
         if meant == 0 {
-            let names: Vec<&str> = extended.states.iter().map(|s| s.name.as_str()).collect();
+            let names: Vec<&str> = augmented.states.iter().map(|s| s.name.as_str()).collect();
             let expected = format!("names of estimated quantities ({})", names.join(", "));
             return Err(TuningError::new(
                 VARIANCE.name,

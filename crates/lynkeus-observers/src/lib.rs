@@ -1,7 +1,7 @@
 //! Observer families, one folder each.
 //!
 //! A [`Family`] takes the plant as an observer sees it
-//! ([`Extended`](lynkeus_structure::Extended)) and a [`Tuning`], and returns a
+//! ([`AugmentedPlant`](lynkeus_structure::AugmentedPlant)) and a [`Tuning`], and returns a
 //! [`Design`] whose [`Observer`] is another system of expressions: its inputs are
 //! time, the known inputs and the measured outputs, its states are the estimate
 //! and whatever the gain needs. Simulation, log replay and export are written

@@ -7,7 +7,7 @@ use lynkeus_expr::flow::Flow;
 use lynkeus_expr::{Graph, MissingInput, Node, flow};
 use lynkeus_model::Variable;
 use lynkeus_run::filter::{Bounds, FilterKind};
-use lynkeus_structure::Extended;
+use lynkeus_structure::AugmentedPlant;
 
 /// A named symbol.
 #[derive(Clone, Debug, PartialEq)]
@@ -181,16 +181,16 @@ impl Observer {
     ///
     /// # Errors
     /// [`MissingInput`] only for an observer of another plant.
-    pub fn sampled(&self, extended: &Extended<'_>) -> Result<Sampled, MissingInput> {
-        let graph = extended.graph();
-        let symbols = extended.symbols();
+    pub fn sampled(&self, augmented: &AugmentedPlant<'_>) -> Result<Sampled, MissingInput> {
+        let graph = augmented.graph();
+        let symbols = augmented.symbols();
         let along = Flow {
             time: self.time,
             states: &symbols,
-            derivatives: &extended.derivatives,
+            derivatives: &augmented.derivatives,
             inputs: &[],
         };
-        let h: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
+        let h: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
         let series = flow::derivatives(graph, &along, &h, 1)?;
         let rates: Vec<Node> = series.iter().filter_map(|y| y.get(1).copied()).collect();
         // x ↦ x̂

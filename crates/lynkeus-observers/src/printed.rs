@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use lynkeus_expr::real::rounded;
 use lynkeus_expr::{Graph, MissingInput, Node, Tape};
-use lynkeus_structure::{Extended, Matrix};
+use lynkeus_structure::{AugmentedPlant, Matrix};
 
 use crate::estimate::{PlantCopy, middle};
 use crate::{ChainGain, TuningError};
@@ -28,9 +28,9 @@ pub(crate) struct ChainCorrection<'a> {
 
 impl ChainCorrection<'_> {
     /// The factors of ŷ − y.
-    fn on_output(&self, extended: &Extended<'_>) -> Vec<Node> {
-        let graph = extended.graph();
-        let Some((_, slope, _)) = extended.outputs[self.output].state else {
+    fn on_output(&self, augmented: &AugmentedPlant<'_>) -> Vec<Node> {
+        let graph = augmented.graph();
+        let Some((_, slope, _)) = augmented.outputs[self.output].state else {
             return vec![];
         };
         let divided = |&factor: &Node| (graph.expr(factor) / graph.expr(slope)).node();
@@ -38,28 +38,31 @@ impl ChainCorrection<'_> {
     }
 
     /// K, where this is a constant gain on ŷ − y.
-    pub fn constant(&self, extended: &Extended<'_>) -> Option<ChainGain> {
+    pub fn constant(&self, augmented: &AugmentedPlant<'_>) -> Option<ChainGain> {
         if self.limited {
             return None;
         }
-        let gains = self.on_output(extended).into_iter();
+        let gains = self.on_output(augmented).into_iter();
         let numbers: Vec<f64> = gains
-            .map(|gain| extended.graph().constant_value(gain))
+            .map(|gain| augmented.graph().constant_value(gain))
             .collect::<Option<_>>()?;
-        let names = self.states.iter().map(|&i| extended.states[i].name.clone());
+        let names = self
+            .states
+            .iter()
+            .map(|&i| augmented.states[i].name.clone());
         Some(ChainGain {
-            output: extended.outputs[self.output].variable.name.clone(),
+            output: augmented.outputs[self.output].variable.name.clone(),
             entries: names.zip(numbers).collect(),
         })
     }
 
     /// The factors of ŷ − y as parameters: expressions, and their values at the start.
     pub fn expressions(&self, start: &AtStart<'_>) -> Vec<(String, String)> {
-        let extended = start.extended;
-        let output = &extended.outputs[self.output].variable.name;
-        let named = self.states.iter().zip(self.on_output(extended));
+        let augmented = start.augmented;
+        let output = &augmented.outputs[self.output].variable.name;
+        let named = self.states.iter().zip(self.on_output(augmented));
         let row = |(&state, gain): (&usize, Node)| {
-            let name = format!("gain of {output} on {}", extended.states[state].name);
+            let name = format!("gain of {output} on {}", augmented.states[state].name);
             let limited = if self.limited {
                 ", on the limited error"
             } else {
@@ -73,7 +76,7 @@ impl ChainCorrection<'_> {
 
 /// Where the estimate starts, for the values of expressions there.
 pub(crate) struct AtStart<'a> {
-    extended: &'a Extended<'a>,
+    augmented: &'a AugmentedPlant<'a>,
     images: HashMap<Node, Node>,
 }
 
@@ -81,30 +84,30 @@ impl<'a> AtStart<'a> {
     /// Estimates at their starts, the outputs as they are there, inputs at their declared
     /// starts, time 0.
     pub fn new(copy: &PlantCopy<'a, '_>) -> Result<Self, TuningError> {
-        let extended = copy.extended;
-        let graph = extended.graph();
+        let augmented = copy.augmented;
+        let graph = augmented.graph();
         let mut images = HashMap::new();
-        images.insert(extended.plant.time, graph.constant(0.0).node());
-        for (state, (hat, start)) in extended.states.iter().zip(copy.states()?) {
+        images.insert(augmented.plant.time, graph.constant(0.0).node());
+        for (state, (hat, start)) in augmented.states.iter().zip(copy.states()?) {
             let start = graph.constant(start).node();
             images.insert(state.node, start);
             images.insert(hat.symbol, start);
         }
-        for input in &extended.inputs {
+        for input in &augmented.inputs {
             if let Some(start) = input.start {
                 images.insert(input.node, graph.constant(start).node());
             }
         }
-        for (output, signal) in extended.outputs.iter().zip(&copy.measured) {
+        for (output, signal) in augmented.outputs.iter().zip(&copy.measured) {
             let value = graph.substitute(&[output.variable.node], &images)[0];
             images.insert(signal.symbol, value);
         }
-        Ok(Self { extended, images })
+        Ok(Self { augmented, images })
     }
 
     /// A number, or an expression with its value at the start where all it reads has one.
     pub fn shown(&self, node: Node) -> String {
-        let graph: &Graph = self.extended.graph();
+        let graph: &Graph = self.augmented.graph();
         let text = graph.render(node, LONGEST);
         if graph.constant_value(node).is_some() {
             return text;
@@ -141,16 +144,16 @@ pub(crate) struct StartPoint<'g> {
 
 impl<'g> StartPoint<'g> {
     pub fn new(copy: &PlantCopy<'_, 'g>) -> Result<Self, TuningError> {
-        let extended: &Extended<'g> = copy.extended;
-        let (mut symbols, mut values) = (vec![extended.plant.time], vec![0.0]);
-        for input in &extended.inputs {
+        let augmented: &AugmentedPlant<'g> = copy.augmented;
+        let (mut symbols, mut values) = (vec![augmented.plant.time], vec![0.0]);
+        for input in &augmented.inputs {
             symbols.push(input.node);
             values.push(input.start.unwrap_or_else(|| middle(input)));
         }
-        symbols.extend(extended.symbols());
+        symbols.extend(augmented.symbols());
         values.extend(copy.states()?.iter().map(|(_, start)| start));
         Ok(Self {
-            graph: extended.graph(),
+            graph: augmented.graph(),
             symbols,
             values,
         })

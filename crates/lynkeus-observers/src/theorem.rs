@@ -10,7 +10,7 @@ use lynkeus_proof::inverse::Inverse;
 use lynkeus_proof::magnitude::{norm, plus, product, size, times};
 use lynkeus_proof::matrix::IntervalMatrix;
 use lynkeus_structure::{
-    Dimension, Extended, Finding, Matrix, Region, Standing, Verdict, enclosure_within,
+    AugmentedPlant, Dimension, Finding, Matrix, Region, Standing, Verdict, enclosure_within,
     magnitude_within, range, short,
 };
 
@@ -20,16 +20,16 @@ use crate::{Assumptions, Bounds, Certificate, Check, Constant, DesignError, Hamm
 /// Upper bounds of the entries of ∂f/∂x that can differ from zero, with the
 /// hypothesis that all are finite; `skip` leaves out entries that are not needed.
 pub(crate) fn slopes(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     region: &Region,
     skip: impl Fn(usize, usize) -> bool,
 ) -> Result<(Vec<Slope>, Check), DesignError> {
-    let graph = extended.graph();
-    let symbols = extended.symbols();
-    let jacobian = jacobian::forward(graph, &extended.derivatives, &symbols);
+    let graph = augmented.graph();
+    let symbols = augmented.symbols();
+    let jacobian = jacobian::forward(graph, &augmented.derivatives, &symbols);
     let (mut found, mut open) = (vec![], vec![]);
     for row in 0..symbols.len() {
-        let jump = jump(graph, extended.derivatives[row], &symbols);
+        let jump = jump(graph, augmented.derivatives[row], &symbols);
         // a jump spoils the whole equation, its skipped entries too
         open.extend(jump.map(|node| Open {
             row,
@@ -37,7 +37,7 @@ pub(crate) fn slopes(
             node: Some(node),
             jumps: true,
         }));
-        for &column in extended.pattern[row].iter().filter(|&&b| !skip(row, b)) {
+        for &column in augmented.pattern[row].iter().filter(|&&b| !skip(row, b)) {
             let node = jacobian.get(row, column);
             let size = match (jump, node) {
                 (Some(_), _) => f64::INFINITY,
@@ -55,7 +55,7 @@ pub(crate) fn slopes(
             found.push(Slope { row, column, size });
         }
     }
-    let check = check(extended, region, &found, &open);
+    let check = check(augmented, region, &found, &open);
     Ok((found, check))
 }
 
@@ -71,9 +71,13 @@ pub(crate) fn magnitude(graph: &Graph, node: Node, region: &Region) -> Result<f6
 }
 
 /// Variables of the expressions that have no declared end.
-pub(crate) fn undeclared(extended: &Extended<'_>, nodes: &[Node], region: &Region) -> Vec<String> {
-    let used = region.restricted(&extended.graph().symbols_of(nodes));
-    let time = extended.plant.time;
+pub(crate) fn undeclared(
+    augmented: &AugmentedPlant<'_>,
+    nodes: &[Node],
+    region: &Region,
+) -> Vec<String> {
+    let used = region.restricted(&augmented.graph().symbols_of(nodes));
+    let time = augmented.plant.time;
     let open = used
         .dimensions
         .into_iter()
@@ -96,19 +100,19 @@ struct Open {
     jumps: bool,
 }
 
-fn check(extended: &Extended<'_>, region: &Region, found: &[Slope], open: &[Open]) -> Check {
+fn check(augmented: &AugmentedPlant<'_>, region: &Region, found: &[Slope], open: &[Open]) -> Check {
     let Some(first) = open.first() else {
         let detail = format!("{} entries enclosed", found.len());
         return proved(Statement::SlopesOfTheProof, detail);
     };
-    let graph = extended.graph();
+    let graph = augmented.graph();
     let nodes: Vec<Node> = open.iter().filter_map(|o| o.node).collect();
     let (f, x) = (
-        &extended.states[first.row].name,
-        &extended.states[first.column].name,
+        &augmented.states[first.row].name,
+        &augmented.states[first.column].name,
     );
     let shown = first.node.map_or_else(String::new, |n| graph.render(n, 60));
-    let missing = undeclared(extended, &nodes, region);
+    let missing = undeclared(augmented, &nodes, region);
     let detail = match (first.jumps, missing.is_empty()) {
         (true, _) => {
             format!("f({f}) switches with {shown}, so no Lipschitz constant is known for it")
@@ -131,18 +135,18 @@ fn check(extended: &Extended<'_>, region: &Region, found: &[Slope], open: &[Open
 /// Bounds of the error of the states that the outputs show: that of the output
 /// divided by the least slope.
 pub(crate) fn state_noise(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     region: &Region,
     noise: &[f64],
 ) -> Result<Vec<f64>, DesignError> {
     let mut found = vec![];
-    for (i, output) in extended.outputs.iter().enumerate() {
+    for (i, output) in augmented.outputs.iter().enumerate() {
         let bound = noise.get(i).copied().unwrap_or(f64::INFINITY);
         let Some((_, slope, _)) = output.state else {
             found.push(f64::INFINITY);
             continue;
         };
-        let least = range(extended.graph(), slope, region)?
+        let least = range(augmented.graph(), slope, region)?
             .enclosure
             .mignitude();
         found.push(match bound == 0.0 {
@@ -154,10 +158,10 @@ pub(crate) fn state_noise(
 }
 
 /// Fills in what the rate σ guarantees, where every hypothesis holds; `of` has the bounds that it leaves
-/// for the densities of process noise, by extended state.
+/// for the densities of process noise, by augmented state.
 pub(crate) fn conclude(
     certificate: &mut Certificate,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     σ: f64,
     assumptions: &Assumptions,
     of: impl Fn(&[f64]) -> Result<Option<Ultimate>, DesignError>,
@@ -165,9 +169,10 @@ pub(crate) fn conclude(
     if certificate.verdict() != Standing::Proved {
         return Ok(());
     }
-    let ultimate = of(&vec![0.0; extended.states.len()])?;
+    let ultimate = of(&vec![0.0; augmented.states.len()])?;
     if assumptions.is_moved() {
-        certificate.mean_square = of(&assumptions.process_noise)?.and_then(|u| bounds(extended, u));
+        certificate.mean_square =
+            of(&assumptions.process_noise)?.and_then(|u| bounds(augmented, u));
     }
     let mut constant = |name: &str, value: f64, meaning: &str| {
         certificate
@@ -194,7 +199,7 @@ pub(crate) fn conclude(
     }
     certificate.rate = Some(σ);
     certificate.overshoot = ultimate.as_ref().map(|found| found.overshoot);
-    match ultimate.and_then(|found| bounds(extended, found)) {
+    match ultimate.and_then(|found| bounds(augmented, found)) {
         Some(bounds) => {
             certificate.ultimate_bound = Some(bounds.norm);
             certificate.ultimate = bounds.states;
@@ -207,10 +212,10 @@ pub(crate) fn conclude(
 }
 
 /// In the order of the states, whatever that of the chains is; none that are infinite.
-fn bounds(extended: &Extended<'_>, found: Ultimate) -> Option<Bounds> {
+fn bounds(augmented: &AugmentedPlant<'_>, found: Ultimate) -> Option<Bounds> {
     let mut states = found.states;
     states.sort_unstable_by_key(|(i, _)| *i);
-    let name = |(i, bound): (usize, f64)| (extended.states[i].name.clone(), bound).into();
+    let name = |(i, bound): (usize, f64)| (augmented.states[i].name.clone(), bound).into();
     let states = states.into_iter().map(name).collect();
     let norm = found.norm;
     norm.is_finite().then_some(Bounds { norm, states })
@@ -247,10 +252,10 @@ pub(crate) struct Enclosure<'g> {
 }
 
 impl<'g> Enclosure<'g> {
-    pub fn new(extended: &Extended<'g>, region: &Region) -> Self {
+    pub fn new(augmented: &AugmentedPlant<'g>, region: &Region) -> Self {
         Self {
-            graph: extended.graph(),
-            time: extended.plant.time,
+            graph: augmented.graph(),
+            time: augmented.plant.time,
             region: region.clone(),
             open: RefCell::default(),
             sizes: RefCell::default(),

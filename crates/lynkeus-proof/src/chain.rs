@@ -43,7 +43,7 @@ pub struct Slope {
 /// One chain of the observer in the coordinates of the proof.
 #[derive(Clone, Debug)]
 pub struct Chain {
-    /// extended states, the measured one first
+    /// augmented states, the measured one first
     pub states: Vec<usize>,
     /// τ: how fast the chain is
     pub speed: Interval,
@@ -207,14 +207,14 @@ fn couplings(chains: &[Chain], places: &[(usize, usize)], slopes: &[Slope]) -> I
     G
 }
 
-/// What acts on the chains from outside: per extended state a bound of the drift,
+/// What acts on the chains from outside: per augmented state a bound of the drift,
 /// per chain a bound of the error of its measured state.
 pub struct Disturbance<'a> {
-    /// per extended state
+    /// per augmented state
     pub drift: &'a [f64],
     /// per chain
     pub noise: &'a [f64],
-    /// per extended state the spectral density of white noise on its derivative; with any, what
+    /// per augmented state the spectral density of white noise on its derivative; with any, what
     /// follows is in mean square
     pub process: &'a [f64],
 }
@@ -225,7 +225,7 @@ pub struct Ultimate {
     pub overshoot: f64,
     /// as t → ∞, the Euclidean norm
     pub norm: f64,
-    /// as t → ∞: (extended state, bound)
+    /// as t → ∞: (augmented state, bound)
     pub states: Vec<(usize, f64)>,
 }
 

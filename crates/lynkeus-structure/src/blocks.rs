@@ -10,7 +10,7 @@
 use std::collections::HashSet;
 
 use crate::chains::{ChainRequest, describe_chains, heads, names};
-use crate::{Chain, Extended};
+use crate::{AugmentedPlant, Chain};
 
 /// Chains in the order in which the observer uses them.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,19 +30,19 @@ impl Blocks {
     }
 
     /// Names of the states of each chain, in the order of the measured outputs.
-    pub fn names(&self, extended: &Extended<'_>) -> Vec<Vec<String>> {
+    pub fn names(&self, augmented: &AugmentedPlant<'_>) -> Vec<Vec<String>> {
         let mut all = vec![vec![]; self.order.len()];
         for (output, chain) in &self.order {
-            let state = |&i: &usize| extended.states[i].name.clone();
+            let state = |&i: &usize| augmented.states[i].name.clone();
             all[*output] = chain.states.iter().map(state).collect();
         }
         all
     }
 
     /// In words: `(x1 → x2), then (x3 → x4)`.
-    pub fn describe(&self, extended: &Extended<'_>) -> String {
+    pub fn describe(&self, augmented: &AugmentedPlant<'_>) -> String {
         let chains: Vec<Chain> = self.order.iter().map(|(_, c)| c.clone()).collect();
-        describe_chains(extended, &chains, ", then ")
+        describe_chains(augmented, &chains, ", then ")
     }
 }
 
@@ -57,13 +57,13 @@ const STEPS: usize = 20_000;
 /// # Errors
 /// Where there is none: which equation breaks the form.
 pub fn find(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     request: &ChainRequest,
     order: Option<&[usize]>,
 ) -> Result<Vec<Blocks>, String> {
-    let heads = heads(extended)?;
+    let heads = heads(augmented)?;
     let mut search = Search {
-        extended,
+        augmented,
         heads: &heads,
         order,
         steps: 0,
@@ -71,7 +71,7 @@ pub fn find(
         found: vec![],
         furthest: None,
     };
-    search.extend(&mut vec![], &mut vec![false; extended.states.len()]);
+    search.extend(&mut vec![], &mut vec![false; augmented.states.len()]);
     let Search {
         mut found,
         furthest,
@@ -92,10 +92,10 @@ pub fn find(
         let lengths = request.lengths.as_ref();
         let names = request.names.as_ref();
         lengths.is_none_or(|l| *l == blocks.lengths())
-            && names.is_none_or(|n| *n == blocks.names(extended))
+            && names.is_none_or(|n| *n == blocks.names(augmented))
     };
     if !found.iter().any(fits) {
-        let mut all: Vec<String> = found.iter().map(|b| b.describe(extended)).collect();
+        let mut all: Vec<String> = found.iter().map(|b| b.describe(augmented)).collect();
         all.truncate(SHOWN);
         return Err(format!(
             "no arrangement has the chains asked for; the equations allow {}",
@@ -114,7 +114,7 @@ pub fn find(
 const SHOWN: usize = 12;
 
 struct Search<'e, 'p> {
-    extended: &'e Extended<'p>,
+    augmented: &'e AugmentedPlant<'p>,
     heads: &'e [usize],
     order: Option<&'e [usize]>,
     steps: usize,
@@ -138,7 +138,7 @@ impl Search<'_, '_> {
         }
         let before = self.found.len();
         for output in self.next(order) {
-            if self.steps == STEPS || self.extended.graph().spent().is_some() {
+            if self.steps == STEPS || self.augmented.graph().spent().is_some() {
                 return;
             }
             self.steps += 1;
@@ -177,7 +177,7 @@ impl Search<'_, '_> {
         let left = (0..taken.len()).filter(|&i| !taken[i]);
         let why = format!(
             "no chain reaches {}; measure another output",
-            names(self.extended, left)
+            names(self.augmented, left)
         );
         self.stopped(taken, why);
     }
@@ -198,7 +198,7 @@ impl Search<'_, '_> {
         let mut states = vec![head];
         loop {
             let last = states[states.len() - 1];
-            let new: Vec<usize> = self.extended.pattern[last]
+            let new: Vec<usize> = self.augmented.pattern[last]
                 .iter()
                 .copied()
                 .filter(|i| !taken[*i] && !states.contains(i) && !self.heads.contains(i))
@@ -209,8 +209,8 @@ impl Search<'_, '_> {
                 _ => {
                     return Err(format!(
                         "the equation of {} depends on {} at once, beside measured states and earlier chains; a block has one new state per equation",
-                        self.extended.states[last].name,
-                        names(self.extended, new)
+                        self.augmented.states[last].name,
+                        names(self.augmented, new)
                     ));
                 }
             }

@@ -13,7 +13,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::Extended;
+use crate::AugmentedPlant;
 
 /// Following chains that are tried, in all cuts together.
 const TRIED: usize = 100_000;
@@ -22,14 +22,14 @@ const MOST: usize = 64;
 /// Assignments that a refusal names.
 const NAMED: usize = 8;
 
-/// States of one chain, as indices into the extended states; the first is measured.
+/// States of one chain, as indices into the augmented states; the first is measured.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chain {
     /// x_1, x_2, …
     pub states: Vec<usize>,
 }
 
-/// An assignment of every extended state to a chain.
+/// An assignment of every augmented state to a chain.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Assignment {
     /// one chain per measured output, in their order
@@ -68,19 +68,22 @@ pub struct ChainRequest {
 ///
 /// # Errors
 /// Where there is none: one line that says which equation breaks the form.
-pub fn find(extended: &Extended<'_>, request: &ChainRequest) -> Result<Vec<Assignment>, String> {
-    let heads = heads(extended)?;
+pub fn find(
+    augmented: &AugmentedPlant<'_>,
+    request: &ChainRequest,
+) -> Result<Vec<Assignment>, String> {
+    let heads = heads(augmented)?;
     let mut found = match heads[..] {
-        [head] => vec![single(extended, head)?],
-        _ => cuts(extended, &heads)?,
+        [head] => vec![single(augmented, head)?],
+        _ => cuts(augmented, &heads)?,
     };
     let all = found.clone();
-    found.retain(|assignment| fits(extended, assignment, request));
+    found.retain(|assignment| fits(augmented, assignment, request));
     if found.is_empty() {
         let options: Vec<String> = all
             .iter()
             .take(NAMED)
-            .map(|a| describe(extended, a))
+            .map(|a| describe(augmented, a))
             .collect();
         return Err(format!(
             "no assignment has the chains asked for; the equations allow {}",
@@ -93,16 +96,20 @@ pub fn find(extended: &Extended<'_>, request: &ChainRequest) -> Result<Vec<Assig
 }
 
 /// The chains in words: `(lower → upper → pump)`.
-pub fn describe(extended: &Extended<'_>, assignment: &Assignment) -> String {
-    describe_chains(extended, &assignment.chains, " and ")
+pub fn describe(augmented: &AugmentedPlant<'_>, assignment: &Assignment) -> String {
+    describe_chains(augmented, &assignment.chains, " and ")
 }
 
-pub(crate) fn describe_chains(extended: &Extended<'_>, chains: &[Chain], between: &str) -> String {
+pub(crate) fn describe_chains(
+    augmented: &AugmentedPlant<'_>,
+    chains: &[Chain],
+    between: &str,
+) -> String {
     let chain = |c: &Chain| {
         let names: Vec<&str> = c
             .states
             .iter()
-            .map(|&i| extended.states[i].name.as_str())
+            .map(|&i| augmented.states[i].name.as_str())
             .collect();
         format!("({})", names.join(" → "))
     };
@@ -110,11 +117,11 @@ pub(crate) fn describe_chains(extended: &Extended<'_>, chains: &[Chain], between
     chains.join(between)
 }
 
-fn fits(extended: &Extended<'_>, assignment: &Assignment, request: &ChainRequest) -> bool {
+fn fits(augmented: &AugmentedPlant<'_>, assignment: &Assignment, request: &ChainRequest) -> bool {
     let names = |c: &Chain| {
         c.states
             .iter()
-            .map(|&i| extended.states[i].name.clone())
+            .map(|&i| augmented.states[i].name.clone())
             .collect()
     };
     let lengths = request
@@ -132,20 +139,20 @@ fn fits(extended: &Extended<'_>, assignment: &Assignment, request: &ChainRequest
 }
 
 /// The measured states, in order.
-pub(crate) fn heads(extended: &Extended<'_>) -> Result<Vec<usize>, String> {
+pub(crate) fn heads(augmented: &AugmentedPlant<'_>) -> Result<Vec<usize>, String> {
     let mut heads: Vec<usize> = vec![];
-    for output in &extended.outputs {
+    for output in &augmented.outputs {
         let Some((state, ..)) = output.state else {
             return Err(format!(
                 "the output {} = {} is not a state times a factor; a chain has to start at a measured state",
                 output.variable.name,
-                extended.graph().render(output.variable.node, 60)
+                augmented.graph().render(output.variable.node, 60)
             ));
         };
         if heads.contains(&state) {
             return Err(format!(
                 "two outputs measure the same state {}; leave one out of 'measured'",
-                extended.states[state].name
+                augmented.states[state].name
             ));
         }
         heads.push(state);
@@ -155,12 +162,12 @@ pub(crate) fn heads(extended: &Extended<'_>) -> Result<Vec<usize>, String> {
 
 /// The longest chain from `head` whose rows are all strict but the last, and the
 /// new states in the last row: none or several.
-fn strict_path(extended: &Extended<'_>, head: usize) -> (Vec<usize>, Vec<usize>) {
+fn strict_path(augmented: &AugmentedPlant<'_>, head: usize) -> (Vec<usize>, Vec<usize>) {
     let mut path = vec![head];
     let mut inside = BTreeSet::from([head]);
     loop {
         let last = path[path.len() - 1];
-        let new: Vec<usize> = extended.pattern[last]
+        let new: Vec<usize> = augmented.pattern[last]
             .iter()
             .copied()
             .filter(|state| !inside.contains(state))
@@ -175,48 +182,51 @@ fn strict_path(extended: &Extended<'_>, head: usize) -> (Vec<usize>, Vec<usize>)
     }
 }
 
-pub(crate) fn names(extended: &Extended<'_>, states: impl IntoIterator<Item = usize>) -> String {
+pub(crate) fn names(
+    augmented: &AugmentedPlant<'_>,
+    states: impl IntoIterator<Item = usize>,
+) -> String {
     let names: Vec<&str> = states
         .into_iter()
-        .map(|i| extended.states[i].name.as_str())
+        .map(|i| augmented.states[i].name.as_str())
         .collect();
     names.join(", ")
 }
 
-fn single(extended: &Extended<'_>, head: usize) -> Result<Assignment, String> {
-    let (path, new) = strict_path(extended, head);
-    if path.len() == extended.states.len() {
+fn single(augmented: &AugmentedPlant<'_>, head: usize) -> Result<Assignment, String> {
+    let (path, new) = strict_path(augmented, head);
+    if path.len() == augmented.states.len() {
         return Ok(Assignment {
             chains: vec![Chain { states: path }],
             leading: 0,
             leads: vec![0],
         });
     }
-    Err(stuck(extended, &path, &new))
+    Err(stuck(augmented, &path, &new))
 }
 
 /// Why a path does not reach every state.
-fn stuck(extended: &Extended<'_>, path: &[usize], new: &[usize]) -> String {
-    let last = &extended.states[path[path.len() - 1]].name;
+fn stuck(augmented: &AugmentedPlant<'_>, path: &[usize], new: &[usize]) -> String {
+    let last = &augmented.states[path[path.len() - 1]].name;
     let states = path.to_vec();
-    let chain = describe_chains(extended, &[Chain { states }], "");
+    let chain = describe_chains(augmented, &[Chain { states }], "");
     if new.is_empty() {
-        let left = (0..extended.states.len()).filter(|i| !path.contains(i));
+        let left = (0..augmented.states.len()).filter(|i| !path.contains(i));
         return format!(
             "the chain {chain} ends at {last}: no equation in it depends on {}; measure another output",
-            names(extended, left)
+            names(augmented, left)
         );
     }
     format!(
         "the chain {chain} breaks at the equation of {last}: it depends on {} at once, where a triangular form has one new state per equation",
-        names(extended, new.iter().copied())
+        names(augmented, new.iter().copied())
     )
 }
 
 /// Every cut into a leading chain and following ones.
-fn cuts(extended: &Extended<'_>, heads: &[usize]) -> Result<Vec<Assignment>, String> {
-    let paths: Vec<_> = heads.iter().map(|&h| strict_path(extended, h)).collect();
-    let n = extended.states.len();
+fn cuts(augmented: &AugmentedPlant<'_>, heads: &[usize]) -> Result<Vec<Assignment>, String> {
+    let paths: Vec<_> = heads.iter().map(|&h| strict_path(augmented, h)).collect();
+    let n = augmented.states.len();
     let mut found: Vec<Assignment> = vec![];
     let mut left = TRIED;
     for leading in 0..heads.len() {
@@ -224,7 +234,7 @@ fn cuts(extended: &Extended<'_>, heads: &[usize]) -> Result<Vec<Assignment>, Str
         for n1 in 1..=lead.len().min(n + 1 - heads.len()) {
             let others = paths.iter().enumerate().filter(|(i, _)| *i != leading);
             let mut cut = Cut {
-                extended,
+                augmented,
                 lead: &lead[..n1],
                 taken: vec![false; n],
                 following: others.map(|(_, (path, _))| path.as_slice()).collect(),
@@ -254,7 +264,7 @@ fn cuts(extended: &Extended<'_>, heads: &[usize]) -> Result<Vec<Assignment>, Str
     if found.is_empty() {
         let reasons: Vec<String> = paths
             .iter()
-            .map(|(path, new)| stuck(extended, path, new))
+            .map(|(path, new)| stuck(augmented, path, new))
             .collect();
         let count = match heads.len() {
             2 => "two".to_owned(),
@@ -270,7 +280,7 @@ fn cuts(extended: &Extended<'_>, heads: &[usize]) -> Result<Vec<Assignment>, Str
 
 /// Following chains behind a leading one, one after the other.
 struct Cut<'a> {
-    extended: &'a Extended<'a>,
+    augmented: &'a AugmentedPlant<'a>,
     lead: &'a [usize],
     taken: Vec<bool>,
     /// the strict paths of their outputs
@@ -332,7 +342,7 @@ impl Cut<'_> {
             return Some(vec![path[0]]);
         }
         let strict = path.get(..n - 1)?;
-        let row = &self.extended.pattern[strict[n - 2]];
+        let row = &self.augmented.pattern[strict[n - 2]];
         let mut new = row
             .iter()
             .copied()
@@ -350,19 +360,19 @@ mod tests {
     use crate::Sensors;
     use lynkeus_model::{LoadOptions, Plant};
 
-    fn with<T>(text: &str, unknown: &[&str], then: impl FnOnce(&Extended<'_>) -> T) -> T {
+    fn with<T>(text: &str, unknown: &[&str], then: impl FnOnce(&AugmentedPlant<'_>) -> T) -> T {
         let plant = Plant::from_modelica(text, "p.mo", &LoadOptions::default()).unwrap();
         let unknown = unknown.iter().map(|s| s.to_string()).collect();
         let sensors = Sensors {
             unknown,
             ..Sensors::default()
         };
-        then(&Extended::new(&plant, &sensors).unwrap())
+        then(&AugmentedPlant::new(&plant, &sensors).unwrap())
     }
 
-    fn described(extended: &Extended<'_>) -> Vec<String> {
-        let found = find(extended, &ChainRequest::default()).unwrap();
-        found.iter().map(|a| describe(extended, a)).collect()
+    fn described(augmented: &AugmentedPlant<'_>) -> Vec<String> {
+        let found = find(augmented, &ChainRequest::default()).unwrap();
+        found.iter().map(|a| describe(augmented, a)).collect()
     }
 
     /// States in any order: the chain comes from the equations.
@@ -402,17 +412,17 @@ mod tests {
 
     #[test]
     fn lengths_and_names_decide_between_cuts() {
-        with(&trays(12, 8), &["Zf"], |extended| {
+        with(&trays(12, 8), &["Zf"], |augmented| {
             let lengths = ChainRequest {
                 lengths: Some(vec![9, 4]),
                 names: None,
             };
-            assert_eq!(find(extended, &lengths).unwrap()[0].lengths(), [9, 4]);
+            assert_eq!(find(augmented, &lengths).unwrap()[0].lengths(), [9, 4]);
             let wrong = ChainRequest {
                 lengths: Some(vec![5, 8]),
                 names: None,
             };
-            let text = find(extended, &wrong).unwrap_err();
+            let text = find(augmented, &wrong).unwrap_err();
             assert!(text.contains("the equations allow"), "{text}");
         });
     }
@@ -445,24 +455,24 @@ mod tests {
                  der(b3) = -c1*a1*b1; der(c1) = -c1; end M;"
             )
         };
-        with(&text("b3 + a2"), &[], |extended| {
-            let found = find(extended, &ChainRequest::default()).unwrap();
+        with(&text("b3 + a2"), &[], |augmented| {
+            let found = find(augmented, &ChainRequest::default()).unwrap();
             assert_eq!(found.len(), 1, "{found:?}");
             assert_eq!(
-                describe(extended, &found[0]),
+                describe(augmented, &found[0]),
                 "(a1 → a2) and (b1 → b2 → b3) and (c1)"
             );
             assert_eq!((found[0].leading, &found[0].leads), (0, &vec![0]));
         });
-        let leads = with(&text("b3"), &[], |extended| {
-            find(extended, &ChainRequest::default()).unwrap()[0]
+        let leads = with(&text("b3"), &[], |augmented| {
+            find(augmented, &ChainRequest::default()).unwrap()[0]
                 .leads
                 .clone()
         });
         assert_eq!(leads, [0, 1, 2]);
         // it would have to follow two
-        let refused = with(&text("b3 + a2 + c1"), &[], |extended| {
-            find(extended, &ChainRequest::default()).unwrap_err()
+        let refused = with(&text("b3 + a2 + c1"), &[], |augmented| {
+            find(augmented, &ChainRequest::default()).unwrap_err()
         });
         assert!(refused.contains("no cut into 3 chains"), "{refused}");
     }

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use lynkeus_expr::{Node, jacobian};
 
 use crate::chains::{heads, names};
-use crate::{Extended, Matrix};
+use crate::{AugmentedPlant, Matrix};
 
 /// A plant in layers.
 #[derive(Clone, Debug)]
@@ -25,8 +25,8 @@ pub struct Layers<'p> {
 
 impl Layers<'_> {
     /// In words: `(x1, x2, x3) → (x4) → (x5)`.
-    pub fn describe(&self, extended: &Extended<'_>) -> String {
-        let layer = |l: &Vec<usize>| format!("({})", names(extended, l.iter().copied()));
+    pub fn describe(&self, augmented: &AugmentedPlant<'_>) -> String {
+        let layer = |l: &Vec<usize>| format!("({})", names(augmented, l.iter().copied()));
         let layers: Vec<String> = self.layers.iter().map(layer).collect();
         layers.join(" → ")
     }
@@ -36,36 +36,36 @@ impl Layers<'_> {
 ///
 /// # Errors
 /// The first equation that breaks the form, or what is missing.
-pub fn find<'p>(extended: &Extended<'p>) -> Result<Layers<'p>, String> {
-    let n = extended.plant_states();
-    let m = extended.states.len() - n;
+pub fn find<'p>(augmented: &AugmentedPlant<'p>) -> Result<Layers<'p>, String> {
+    let n = augmented.plant_states();
+    let m = augmented.states.len() - n;
     if m == 0 {
         return Err("no input is unknown; name those that nobody measures under 'unknown'".into());
     }
-    let heads = heads(extended)?;
+    let heads = heads(augmented)?;
     if let Some(&v) = heads.iter().find(|&&head| head >= n) {
-        let name = &extended.states[v].name;
+        let name = &augmented.states[v].name;
         return Err(format!(
             "the unknown input {name} is measured itself; leave it out of 'unknown'"
         ));
     }
-    let factors = factors(extended, &heads)?;
-    let zero = extended.graph().constant(0.0).node();
-    let silent: HashMap<Node, Node> = unknown(extended).into_iter().map(|v| (v, zero)).collect();
-    let drift = extended
+    let factors = factors(augmented, &heads)?;
+    let zero = augmented.graph().constant(0.0).node();
+    let silent: HashMap<Node, Node> = unknown(augmented).into_iter().map(|v| (v, zero)).collect();
+    let drift = augmented
         .graph()
-        .substitute(&extended.derivatives[..n], &silent);
-    let layers = layers(extended, &drift, heads)?;
+        .substitute(&augmented.derivatives[..n], &silent);
+    let layers = layers(augmented, &drift, heads)?;
     let (p, n2) = (layers[0].len(), layers.get(1).map_or(0, Vec::len));
     if p < m + n2.max(1) {
         return Err(format!(
             "{p} measured outputs are too few: (H4) needs at least {}, one for each unknown input ({}) and each state that the measured equations reveal ({}); measure another output",
             m + n2.max(1),
-            names(extended, n..n + m),
+            names(augmented, n..n + m),
             if n2 == 0 {
                 "at least one".into()
             } else {
-                names(extended, layers[1].iter().copied())
+                names(augmented, layers[1].iter().copied())
             },
         ));
     }
@@ -76,25 +76,25 @@ pub fn find<'p>(extended: &Extended<'p>) -> Result<Layers<'p>, String> {
     })
 }
 
-fn unknown(extended: &Extended<'_>) -> Vec<Node> {
-    extended.symbols().split_off(extended.plant_states())
+fn unknown(augmented: &AugmentedPlant<'_>) -> Vec<Node> {
+    augmented.symbols().split_off(augmented.plant_states())
 }
 
 /// G = ∂f/∂v, which must be known: no unknown input and no state that is not
 /// measured may enter it.
-fn factors<'p>(extended: &Extended<'p>, heads: &[usize]) -> Result<Matrix<'p>, String> {
-    let (graph, n) = (extended.graph(), extended.plant_states());
-    let v = unknown(extended);
-    let factors = Matrix::jacobian(graph, &extended.derivatives[..n], &v);
-    let symbols = extended.symbols();
+fn factors<'p>(augmented: &AugmentedPlant<'p>, heads: &[usize]) -> Result<Matrix<'p>, String> {
+    let (graph, n) = (augmented.graph(), augmented.plant_states());
+    let v = unknown(augmented);
+    let factors = Matrix::jacobian(graph, &augmented.derivatives[..n], &v);
+    let symbols = augmented.symbols();
     for row in 0..n {
-        let equation = &extended.states[row].name;
-        for (column, input) in extended.states[n..].iter().enumerate() {
+        let equation = &augmented.states[row].name;
+        for (column, input) in augmented.states[n..].iter().enumerate() {
             let factor = factors.get(row, column);
             let reads = factor.map_or(vec![], |g| {
                 jacobian::pattern(graph, &[g], &symbols).swap_remove(0)
             });
-            let step = factor.is_none() && extended.pattern[row].contains(&(n + column));
+            let step = factor.is_none() && augmented.pattern[row].contains(&(n + column));
             if step || reads.iter().any(|&i| i >= n) {
                 return Err(format!(
                     "the equation of {equation} is not affine in the unknown input {}; (H3) asks for f̃ + G v",
@@ -107,7 +107,7 @@ fn factors<'p>(extended: &Extended<'p>, heads: &[usize]) -> Result<Matrix<'p>, S
                 return Err(format!(
                     "in the equation of {equation} the factor of {} depends on {}, which is not measured; (H3) asks for a factor that is known",
                     input.name,
-                    names(extended, hidden)
+                    names(augmented, hidden)
                 ));
             }
         }
@@ -116,12 +116,12 @@ fn factors<'p>(extended: &Extended<'p>, heads: &[usize]) -> Result<Matrix<'p>, S
 }
 
 fn layers(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     drift: &[Node],
     heads: Vec<usize>,
 ) -> Result<Vec<Vec<usize>>, String> {
     let n = drift.len();
-    let pattern = jacobian::pattern(extended.graph(), drift, &extended.symbols()[..n]);
+    let pattern = jacobian::pattern(augmented.graph(), drift, &augmented.symbols()[..n]);
     let mut taken = vec![false; n];
     heads.iter().for_each(|&i| taken[i] = true);
     let mut layers = vec![heads];
@@ -135,8 +135,8 @@ fn layers(
         if next.len() > last.len() {
             return Err(format!(
                 "the equations of {} depend on {} at once; the form (1) asks that each layer has no more states than the one before",
-                names(extended, last.iter().copied()),
-                names(extended, next.iter().copied())
+                names(augmented, last.iter().copied()),
+                names(augmented, next.iter().copied())
             ));
         }
         next.iter().for_each(|&i| taken[i] = true);
@@ -147,7 +147,7 @@ fn layers(
         true => Ok(layers),
         false => Err(format!(
             "no equation on the way from the measured states reads {}; measure another output",
-            names(extended, left)
+            names(augmented, left)
         )),
     }
 }
@@ -170,7 +170,7 @@ mod tests {
             unknown: vec!["v".into()],
             ..Sensors::default()
         };
-        find(&Extended::new(&plant, &sensors).unwrap()).map(|l| l.layers)
+        find(&AugmentedPlant::new(&plant, &sensors).unwrap()).map(|l| l.layers)
     }
 
     #[test]

@@ -1,17 +1,17 @@
 //! What can be observed: chains found in the equations, and conditions decided
 //! on the declared box.
 //!
-//! [`Extended`] is the plant as an observer sees it: unknown inputs are states,
+//! [`AugmentedPlant`] is the plant as an observer sees it: unknown inputs are states,
 //! disturbances are zero. [`chains`] finds the triangular form of its equations,
 //! [`sign`] decides whether a partial derivative keeps its sign on the box
 //! — [`Verdict`]: proved, refuted with a witness, or undecided with the box
 //! that is left.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod augmented;
 pub mod blocks;
 pub mod chains;
-mod extended;
-pub mod fate;
+pub mod detectability;
 mod jumps;
 pub mod layers;
 mod matrix;
@@ -29,9 +29,9 @@ mod verdict;
 mod words;
 mod zero;
 
+pub use augmented::{AugmentedPlant, Measurement, NarrowError, Sensors, SensorsError};
 pub use blocks::Blocks;
 pub use chains::{Assignment, Chain, ChainRequest};
-pub use extended::{Extended, Measurement, NarrowError, Sensors, SensorsError};
 pub use layers::Layers;
 pub use matrix::Matrix;
 pub use one_to_one::OneToOne;

@@ -24,12 +24,12 @@ use nalgebra::{DMatrix, DVector};
 pub use crate::matrix::Rows;
 pub use crate::matrix::jacobian_rows;
 use crate::region::{inside, spread};
-use crate::{Extended, Region, Verdict, vanishes};
+use crate::{AugmentedPlant, Region, Verdict, vanishes};
 
 /// f and g of x' = f(x) + g(x)u.
 #[derive(Clone, Debug)]
 pub struct AffineForm {
-    /// f, one expression per extended state
+    /// f, one expression per augmented state
     pub drift: Vec<Node>,
     /// g_j, one column per known input
     pub input_columns: Vec<Vec<Option<Node>>>,
@@ -39,28 +39,30 @@ pub struct AffineForm {
 ///
 /// # Errors
 /// Inside: the first equation that breaks the form, in words.
-pub fn affine_form(extended: &Extended<'_>) -> Result<Result<AffineForm, String>, MissingInput> {
-    let graph = extended.graph();
-    let region = extended.region();
-    let u: Vec<Node> = extended.inputs.iter().map(|i| i.node).collect();
-    let g = jacobian::forward(graph, &extended.derivatives, &u);
+pub fn affine_form(
+    augmented: &AugmentedPlant<'_>,
+) -> Result<Result<AffineForm, String>, MissingInput> {
+    let graph = augmented.graph();
+    let region = augmented.region();
+    let u: Vec<Node> = augmented.inputs.iter().map(|i| i.node).collect();
+    let g = jacobian::forward(graph, &augmented.derivatives, &u);
     let slopes: Vec<Node> = g.entries.iter().map(|e| e.2).collect();
     let second = jacobian::forward(graph, &slopes, &u);
     for (entry, j, node) in second.entries {
         if vanishes(graph, node, &region)? != Verdict::Proved {
-            let (state, input) = (g.entries[entry].0, &extended.inputs[j].name);
+            let (state, input) = (g.entries[entry].0, &augmented.inputs[j].name);
             return Ok(Err(format!(
                 "the equation of {} is not affine in the input {input}; the form is x' = f(x) + g(x)u",
-                extended.states[state].name
+                augmented.states[state].name
             )));
         }
     }
     let of_u = |node: Node| {
         jacobian::pattern(graph, &[node], &u)[0]
             .first()
-            .map(|&j| &extended.inputs[j].name)
+            .map(|&j| &augmented.inputs[j].name)
     };
-    for output in &extended.outputs {
+    for output in &augmented.outputs {
         if let Some(input) = of_u(output.variable.node) {
             return Ok(Err(format!(
                 "the output {} reads the input {input}; the form is y = h(x)",
@@ -70,9 +72,9 @@ pub fn affine_form(extended: &Extended<'_>) -> Result<Result<AffineForm, String>
     }
     let zero = graph.constant(0.0).node();
     let silent: HashMap<Node, Node> = u.iter().map(|&u| (u, zero)).collect();
-    let n = extended.states.len();
+    let n = augmented.states.len();
     Ok(Ok(AffineForm {
-        drift: graph.substitute(&extended.derivatives, &silent),
+        drift: graph.substitute(&augmented.derivatives, &silent),
         input_columns: (0..u.len())
             .map(|j| (0..n).map(|i| g.get(i, j)).collect())
             .collect(),
@@ -84,11 +86,11 @@ pub fn affine_form(extended: &Extended<'_>) -> Result<Result<AffineForm, String>
 /// # Errors
 /// [`MissingInput`] where the plant has parameters without value.
 pub fn lie_derivatives(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     form: &AffineForm,
     order: usize,
 ) -> Result<Vec<Vec<Node>>, MissingInput> {
-    along(extended, &form.drift, &[], order)
+    along(augmented, &form.drift, &[], order)
 }
 
 /// y_i^(k) as functions of x and U, where `U[j]` holds the symbols of input j
@@ -97,11 +99,11 @@ pub fn lie_derivatives(
 /// # Errors
 /// [`MissingInput`] where the plant has parameters without value.
 pub fn output_derivatives(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     U: &[Vec<Node>],
     order: usize,
 ) -> Result<Vec<Vec<Node>>, MissingInput> {
-    let jets = extended.inputs.iter().zip(U).map(|(input, jet)| InputJet {
+    let jets = augmented.inputs.iter().zip(U).map(|(input, jet)| InputJet {
         symbol: input.node,
         derivatives: match jet.is_empty() {
             true => vec![input.node],
@@ -109,7 +111,7 @@ pub fn output_derivatives(
         },
     });
     let jets: Vec<InputJet> = jets.collect();
-    along(extended, &extended.derivatives, &jets, order)
+    along(augmented, &augmented.derivatives, &jets, order)
 }
 
 /// The gradients of [`lie_derivatives`] by the states, output by output.
@@ -117,34 +119,34 @@ pub fn output_derivatives(
 /// # Errors
 /// [`MissingInput`] where the plant has parameters without value.
 pub fn lie_gradients(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     form: &AffineForm,
     order: usize,
 ) -> Result<Vec<Rows>, MissingInput> {
-    let outputs: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
+    let outputs: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
     let flow = Flow {
-        time: extended.plant.time,
-        states: &extended.symbols(),
+        time: augmented.plant.time,
+        states: &augmented.symbols(),
         derivatives: &form.drift,
         inputs: &[],
     };
-    flow::gradients(extended.graph(), &flow, &outputs, order)
+    flow::gradients(augmented.graph(), &flow, &outputs, order)
 }
 
 fn along(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     right: &[Node],
     inputs: &[InputJet],
     order: usize,
 ) -> Result<Vec<Vec<Node>>, MissingInput> {
-    let outputs: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
+    let outputs: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
     let flow = Flow {
-        time: extended.plant.time,
-        states: &extended.symbols(),
+        time: augmented.plant.time,
+        states: &augmented.symbols(),
         derivatives: right,
         inputs,
     };
-    flow::derivatives(extended.graph(), &flow, &outputs, order)
+    flow::derivatives(augmented.graph(), &flow, &outputs, order)
 }
 
 /// L_g of a function with the gradient `row`.
@@ -176,14 +178,14 @@ pub struct Degree {
 /// # Errors
 /// [`MissingInput`] where the plant has parameters without value.
 pub fn relative_degree(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     rows: &[Vec<Option<Node>>],
     form: &AffineForm,
     j: usize,
     region: &Region,
 ) -> Result<Degree, MissingInput> {
-    let graph = extended.graph();
-    let input = &extended.inputs[j].name;
+    let graph = augmented.graph();
+    let input = &augmented.inputs[j].name;
     let mut proved = true;
     for (k, row) in rows.iter().enumerate() {
         let Some(node) = along_column(graph, row, &form.input_columns[j]) else {
@@ -241,18 +243,18 @@ impl Codistribution {
     ///
     /// # Errors
     /// [`MissingInput`] where the plant has parameters without value.
-    pub fn new(extended: &Extended<'_>, rows: &[Rows]) -> Result<Self, MissingInput> {
-        let zero = extended.graph().constant(0.0).node();
+    pub fn new(augmented: &AugmentedPlant<'_>, rows: &[Rows]) -> Result<Self, MissingInput> {
+        let zero = augmented.graph().constant(0.0).node();
         let entries = rows.iter().flatten().flatten();
         let entries: Vec<Node> = entries.map(|e| e.unwrap_or(zero)).collect();
-        let region = extended.region();
-        let tape = Tape::new(extended.graph(), &region.symbols(), &entries)?;
+        let region = augmented.region();
+        let tape = Tape::new(augmented.graph(), &region.symbols(), &entries)?;
         let sides = region.dimensions.iter().map(|d| (d.min, d.max));
         Ok(Self {
             evaluator: tape.evaluator(),
             sides: sides.collect(),
             lengths: rows.iter().map(Vec::len).collect(),
-            n: extended.states.len(),
+            n: augmented.states.len(),
         })
     }
 
@@ -425,8 +427,8 @@ mod tests {
         let text = "model P input Real u; Real a; Real b; output Real y = a;
       equation der(a) = b + u; der(b) = u*u; end P;";
         let plant = Plant::from_modelica(text, "p.mo", &LoadOptions::default()).unwrap();
-        let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-        let why = affine_form(&extended).unwrap().unwrap_err();
+        let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
+        let why = affine_form(&augmented).unwrap().unwrap_err();
         assert!(
             why.contains("equation of b is not affine in the input u"),
             "{why}"
@@ -435,15 +437,15 @@ mod tests {
 
     fn codistribution(text: &str) -> Codistribution {
         let plant = Plant::from_modelica(text, "p.mo", &LoadOptions::default()).unwrap();
-        let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-        let form = affine_form(&extended).unwrap().unwrap();
-        let n = extended.states.len();
-        let h = lie_derivatives(&extended, &form, n - 1).unwrap();
+        let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
+        let form = affine_form(&augmented).unwrap().unwrap();
+        let n = augmented.states.len();
+        let h = lie_derivatives(&augmented, &form, n - 1).unwrap();
         let rows: Vec<Rows> = h
             .iter()
-            .map(|h| jacobian_rows(&plant.graph, h, &extended.symbols()))
+            .map(|h| jacobian_rows(&plant.graph, h, &augmented.symbols()))
             .collect();
-        Codistribution::new(&extended, &rows).unwrap()
+        Codistribution::new(&augmented, &rows).unwrap()
     }
 
     /// Two sensors on chains of 3 and 1, and a third that adds nothing.

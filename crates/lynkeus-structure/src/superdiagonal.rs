@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 use crate::chains::names;
 use crate::rank::subsets;
 use crate::region::{inside, spread};
-use crate::{Extended, Finding, Matrix, Point, Region, Verdict, sign};
+use crate::{AugmentedPlant, Finding, Matrix, Point, Region, Verdict, sign};
 
 /// One rectangular block: F_k.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,8 +43,8 @@ impl Superdiagonal {
     }
 
     /// In words: `(x1) → (x2, x3)`.
-    pub fn describe(&self, extended: &Extended<'_>) -> String {
-        let block = |states: Vec<usize>| format!("({})", names(extended, states));
+    pub fn describe(&self, augmented: &AugmentedPlant<'_>) -> String {
+        let block = |states: Vec<usize>| format!("({})", names(augmented, states));
         self.declared().map(block).collect::<Vec<_>>().join(" → ")
     }
 
@@ -62,27 +62,27 @@ impl Superdiagonal {
 ///
 /// # Errors
 /// The first output or equation that breaks the form; the states that no block reaches.
-pub fn find(extended: &Extended<'_>) -> Result<Superdiagonal, String> {
-    let outputs: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
-    let output = |i: usize| format!("the output {}", extended.outputs[i].variable.name);
-    let all: Vec<usize> = (0..extended.states.len()).collect();
+pub fn find(augmented: &AugmentedPlant<'_>) -> Result<Superdiagonal, String> {
+    let outputs: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
+    let output = |i: usize| format!("the output {}", augmented.outputs[i].variable.name);
+    let all: Vec<usize> = (0..augmented.states.len()).collect();
     let rows: Vec<usize> = (0..outputs.len()).collect();
-    let mut factors = vec![factor(extended, rows, &outputs, &all, output)?];
+    let mut factors = vec![factor(augmented, rows, &outputs, &all, output)?];
     let mut left: Vec<usize> = all;
     loop {
         let block = factors[factors.len() - 1].columns.clone();
         left.retain(|state| !block.contains(state));
         if left.is_empty() {
-            arrange(extended, &mut factors);
+            arrange(augmented, &mut factors);
             return Ok(Superdiagonal { factors });
         }
-        let derivatives: Vec<Node> = block.iter().map(|&i| extended.derivatives[i]).collect();
-        let equation = |i: usize| format!("the equation of {}", extended.states[block[i]].name);
-        let next = factor(extended, block.clone(), &derivatives, &left, equation)?;
+        let derivatives: Vec<Node> = block.iter().map(|&i| augmented.derivatives[i]).collect();
+        let equation = |i: usize| format!("the equation of {}", augmented.states[block[i]].name);
+        let next = factor(augmented, block.clone(), &derivatives, &left, equation)?;
         if next.columns.is_empty() {
             return Err(format!(
                 "no equation on the way from the outputs depends on {}; measure another output",
-                names(extended, left)
+                names(augmented, left)
             ));
         }
         factors.push(next);
@@ -93,13 +93,13 @@ pub fn find(extended: &Extended<'_>) -> Result<Superdiagonal, String> {
 /// the box, not by declaration: a factor of S, and with it every rounding, is then
 /// the same however the states are declared. States that are equal there keep
 /// their order.
-fn arrange(extended: &Extended<'_>, factors: &mut [Factor]) {
-    let Some(values) = at_a_point(extended, factors) else {
+fn arrange(augmented: &AugmentedPlant<'_>, factors: &mut [Factor]) {
+    let Some(values) = at_a_point(augmented, factors) else {
         return;
     };
-    let (derivatives, entries) = values.split_at(extended.states.len());
+    let (derivatives, entries) = values.split_at(augmented.states.len());
     let mut entries = entries.iter();
-    let mut rows: Vec<usize> = (0..extended.outputs.len()).collect();
+    let mut rows: Vec<usize> = (0..augmented.outputs.len()).collect();
     for factor in factors {
         let mut columns: Vec<Vec<f64>> = vec![vec![]; factor.columns.len()];
         for (&(_, j, _), value) in factor.entries.iter().zip(&mut entries) {
@@ -120,20 +120,20 @@ fn arrange(extended: &Extended<'_>, factors: &mut [Factor]) {
 }
 
 /// Every derivative, then the entries of every F_k, at one point of the box.
-fn at_a_point(extended: &Extended<'_>, factors: &[Factor]) -> Option<Vec<f64>> {
+fn at_a_point(augmented: &AugmentedPlant<'_>, factors: &[Factor]) -> Option<Vec<f64>> {
     let entries = factors.iter().flat_map(|f| &f.entries);
-    let nodes: Vec<Node> = extended
+    let nodes: Vec<Node> = augmented
         .derivatives
         .iter()
         .copied()
         .chain(entries.map(|&(.., node)| node))
         .collect();
-    let states = extended.states.iter().map(|v| inside(v.min, v.max, 0.37));
-    let inputs = extended.inputs.iter().enumerate();
+    let states = augmented.states.iter().map(|v| inside(v.min, v.max, 0.37));
+    let inputs = augmented.inputs.iter().enumerate();
     let inputs = inputs.map(|(i, v)| inside(v.min, v.max, spread(0, i)));
     let point: Vec<f64> = states.chain(inputs).chain([0.37]).collect();
-    let symbols = extended.region().symbols();
-    let tape = Tape::new(extended.graph(), &symbols, &nodes).ok()?;
+    let symbols = augmented.region().symbols();
+    let tape = Tape::new(augmented.graph(), &symbols, &nodes).ok()?;
     let mut values = vec![0.0; nodes.len()];
     tape.evaluator().eval(&point, &mut values);
     Some(values)
@@ -141,14 +141,14 @@ fn at_a_point(extended: &Extended<'_>, factors: &[Factor]) -> Option<Vec<f64>> {
 
 /// ∂(functions)/∂x for the states among `candidates` that the functions depend on.
 fn factor(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     rows: Vec<usize>,
     functions: &[Node],
     candidates: &[usize],
     title: impl Fn(usize) -> String,
 ) -> Result<Factor, String> {
-    let graph = extended.graph();
-    let symbol = |&i: &usize| extended.states[i].node;
+    let graph = augmented.graph();
+    let symbol = |&i: &usize| augmented.states[i].node;
     let symbols: Vec<Node> = candidates.iter().map(symbol).collect();
     let pattern = jacobian::pattern(graph, functions, &symbols);
     let new = (0..candidates.len()).filter(|j| pattern.iter().any(|row| row.contains(j)));
@@ -159,7 +159,7 @@ fn factor(
             return Err(format!(
                 "{} is not affine in {}: {}",
                 title(i),
-                names(extended, columns.iter().copied()),
+                names(augmented, columns.iter().copied()),
                 culprit
             ));
         }
@@ -217,14 +217,14 @@ impl Factor {
     /// [`MissingInput`] where an entry depends on a symbol outside the region.
     pub fn column_rank(
         &self,
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         k: usize,
         region: &Region,
     ) -> Result<Finding, MissingInput> {
-        let graph = extended.graph();
+        let graph = augmented.graph();
         let shape = format!("F_{k} is {}×{}", self.rows.len(), self.columns.len());
         if let Some(F) = self.constant(graph) {
-            return Ok(self.constant_rank(extended, &F, &shape));
+            return Ok(self.constant_rank(augmented, &F, &shape));
         }
         let entries: Vec<Node> = self.entries.iter().map(|&(.., node)| node).collect();
         let used = region.restricted(&graph.symbols_of(&entries));
@@ -264,7 +264,12 @@ impl Factor {
     }
 
     /// [`Factor::column_rank`] of a matrix of numbers.
-    fn constant_rank(&self, extended: &Extended<'_>, F: &DMatrix<f64>, shape: &str) -> Finding {
+    fn constant_rank(
+        &self,
+        augmented: &AugmentedPlant<'_>,
+        F: &DMatrix<f64>,
+        shape: &str,
+    ) -> Finding {
         let kernel = kernel(F);
         let Kernel::Direction(ξ) = kernel else {
             let (verdict, detail) = match kernel {
@@ -283,7 +288,7 @@ impl Factor {
             };
             return Finding { verdict, detail };
         };
-        let component = |(&i, x): (&usize, f64)| (extended.states[i].name.clone(), x).into();
+        let component = |(&i, x): (&usize, f64)| (augmented.states[i].name.clone(), x).into();
         let direction = Point {
             coordinates: self.columns.iter().zip(ξ).map(component).collect(),
             value: 0.0,
@@ -413,9 +418,9 @@ mod tests {
     use super::*;
     use crate::{Sensors, Verdict};
 
-    fn examined<T>(text: &str, look: impl Fn(&Extended<'_>) -> T) -> T {
+    fn examined<T>(text: &str, look: impl Fn(&AugmentedPlant<'_>) -> T) -> T {
         let plant = Plant::from_modelica(text, "p.mo", &LoadOptions::default()).unwrap();
-        look(&Extended::new(&plant, &Sensors::default()).unwrap())
+        look(&AugmentedPlant::new(&plant, &Sensors::default()).unwrap())
     }
 
     fn words(text: &str) -> Result<String, String> {

@@ -19,7 +19,7 @@ use crate::matrix::{Rows, determinant, jacobian_rows};
 use crate::output_map::{Codistribution, output_derivatives};
 use crate::region::{Cell, inside};
 use crate::{
-    Extended, Finding, OneToOne, Place, Region, Regularity, Side, Verdict, magnitude_within,
+    AugmentedPlant, Finding, OneToOne, Place, Region, Regularity, Side, Verdict, magnitude_within,
     one_to_one, sign, vanishes,
 };
 
@@ -56,17 +56,17 @@ pub struct Uniformity {
 /// # Errors
 /// [`MissingInput`] where the plant has parameters without value.
 pub fn uniformity(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     known: &[bool],
 ) -> Result<Option<Uniformity>, MissingInput> {
-    let n = extended.states.len();
+    let n = augmented.states.len();
     if n > STATES {
         return Ok(None);
     }
-    let graph = extended.graph();
-    let region = extended.region();
-    let derivatives = Derivatives::new(extended)?;
-    let Some(Map { node, regular }) = map(extended, &derivatives, &region)? else {
+    let graph = augmented.graph();
+    let region = augmented.region();
+    let derivatives = Derivatives::new(augmented)?;
+    let Some(Map { node, regular }) = map(augmented, &derivatives, &region)? else {
         return Ok(None);
     };
     if vanishes(graph, node, &region)? == Verdict::Proved {
@@ -77,12 +77,12 @@ pub fn uniformity(
         _ => cells(graph, node, &region)?,
     };
     // more rows than states may tell apart what no choice of them does
-    let together = regular.is_proved() || extended.outputs.len() > 1;
+    let together = regular.is_proved() || augmented.outputs.len() > 1;
     Ok(Some(Uniformity {
-        one_to_one: derivatives.one_to_one(extended, known, together, &region)?,
+        one_to_one: derivatives.one_to_one(augmented, known, together, &region)?,
         blind: match regular.verdict {
             Verdict::Proved => vec![],
-            _ => blind(extended, node, &region)?,
+            _ => blind(augmented, node, &region)?,
         },
         regular,
         singular,
@@ -93,7 +93,7 @@ pub fn uniformity(
             .into_iter()
             .map(str::to_owned)
             .collect(),
-        sides: extended
+        sides: augmented
             .states
             .iter()
             .map(|s| Side {
@@ -105,27 +105,27 @@ pub fn uniformity(
     }))
 }
 
-/// Per extended state whether the outputs and those of their derivatives that come before `signals`, known inputs of the
-/// extended plant, tell it on the whole box: whatever these do. Other inputs stay constant, `known` states are known.
+/// Per augmented state whether the outputs and those of their derivatives that come before `signals`, known inputs of the
+/// augmented plant, tell it on the whole box: whatever these do. Other inputs stay constant, `known` states are known.
 ///
 /// # Errors
 /// [`MissingInput`] where the plant has parameters without value.
 pub fn apart_whatever(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     signals: &[Node],
     known: &[bool],
 ) -> Result<Vec<bool>, MissingInput> {
-    if extended.states.len() > STATES || known.iter().all(|known| *known) {
+    if augmented.states.len() > STATES || known.iter().all(|known| *known) {
         return Ok(known.to_vec());
     }
-    let graph = extended.graph();
-    let mut derivatives = Derivatives::new(extended)?;
+    let graph = augmented.graph();
+    let mut derivatives = Derivatives::new(augmented)?;
     let reads = |y: &Node| graph.symbols_of(&[*y]).iter().any(|s| signals.contains(s));
     for of_output in &mut derivatives.values {
         let kept = of_output.iter().position(reads);
         of_output.truncate(kept.unwrap_or(of_output.len()));
     }
-    let found = derivatives.one_to_one(extended, known, true, &extended.region())?;
+    let found = derivatives.one_to_one(augmented, known, true, &augmented.region())?;
     Ok(found.known)
 }
 
@@ -150,16 +150,16 @@ struct Map {
 /// The first choice of rows whose determinant is proved to keep its sign, else the
 /// first that is independent at generic points.
 fn map(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     derivatives: &Derivatives,
     region: &Region,
 ) -> Result<Option<Map>, MissingInput> {
-    let mut codistribution = Codistribution::new(extended, &derivatives.gradients)?;
+    let mut codistribution = Codistribution::new(augmented, &derivatives.gradients)?;
     let first = codistribution.krener_respondek();
-    if first.iter().sum::<usize>() < extended.states.len() {
+    if first.iter().sum::<usize>() < augmented.states.len() {
         return Ok(None);
     }
-    let Some(found) = examined(extended, derivatives, &first, region)? else {
+    let Some(found) = examined(augmented, derivatives, &first, region)? else {
         return Ok(None);
     };
     if found.regular.verdict == Verdict::Proved {
@@ -171,7 +171,7 @@ fn map(
         if codistribution.changes_sign(&indices) {
             continue;
         }
-        let other = examined(extended, derivatives, &indices, region)?;
+        let other = examined(augmented, derivatives, &indices, region)?;
         let other = other.filter(|map| map.regular.verdict == Verdict::Proved);
         if other.is_some() {
             return Ok(other);
@@ -181,12 +181,12 @@ fn map(
 }
 
 fn examined(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     derivatives: &Derivatives,
     indices: &[usize],
     region: &Region,
 ) -> Result<Option<Map>, MissingInput> {
-    let graph = extended.graph();
+    let graph = augmented.graph();
     let pairs = derivatives.gradients.iter().zip(indices);
     let chosen: Rows = pairs
         .flat_map(|(rows, &count)| rows.iter().take(count).cloned())
@@ -199,8 +199,8 @@ fn examined(
         .flat_map(|(y, &count)| y.iter().take(count).copied())
         .collect();
     // where the map itself jumps, its derivative tells nothing
-    let mut moving = extended.symbols();
-    moving.push(extended.plant.time);
+    let mut moving = augmented.symbols();
+    moving.push(augmented.plant.time);
     let regularity = Regularity::of(graph, &map, &moving, region)?;
     let regular = match regularity.holds() {
         true => without_jumps(sign::keeps_sign(graph, node, region)?.finding, region),
@@ -218,11 +218,11 @@ struct Derivatives {
 }
 
 impl Derivatives {
-    fn new(extended: &Extended<'_>) -> Result<Self, MissingInput> {
-        let n = extended.states.len();
-        let graph = extended.graph();
+    fn new(augmented: &AugmentedPlant<'_>) -> Result<Self, MissingInput> {
+        let n = augmented.states.len();
+        let graph = augmented.graph();
         let zero = graph.constant(0.0).node();
-        let constant: Vec<Vec<Node>> = extended
+        let constant: Vec<Vec<Node>> = augmented
             .inputs
             .iter()
             .map(|input| {
@@ -231,8 +231,8 @@ impl Derivatives {
                     .collect()
             })
             .collect();
-        let values = output_derivatives(extended, &constant, n.saturating_sub(1))?;
-        let symbols = extended.symbols();
+        let values = output_derivatives(augmented, &constant, n.saturating_sub(1))?;
+        let symbols = augmented.symbols();
         let gradient = |y: &Vec<Node>| jacobian_rows(graph, y, &symbols);
         Ok(Self {
             gradients: values.iter().map(gradient).collect(),
@@ -243,15 +243,15 @@ impl Derivatives {
     /// Whether all of them together are one-to-one on the box.
     fn one_to_one(
         &self,
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         known: &[bool],
         together: bool,
         region: &Region,
     ) -> Result<OneToOne, MissingInput> {
         let map = one_to_one::Map {
-            graph: extended.graph(),
+            graph: augmented.graph(),
             functions: &self.values.concat(),
-            states: &extended.symbols(),
+            states: &augmented.symbols(),
             region,
         };
         map.one_to_one(known, together)
@@ -312,10 +312,14 @@ pub struct Blind {
 
 /// Constant inputs, of zero and the ends and middles of their ranges, for which the
 /// determinant is zero whatever the state.
-fn blind(extended: &Extended<'_>, node: Node, region: &Region) -> Result<Vec<Blind>, MissingInput> {
-    let graph = extended.graph();
+fn blind(
+    augmented: &AugmentedPlant<'_>,
+    node: Node,
+    region: &Region,
+) -> Result<Vec<Blind>, MissingInput> {
+    let graph = augmented.graph();
     let mut found = vec![];
-    for input in &extended.inputs {
+    for input in &augmented.inputs {
         let ends = [
             0.0,
             input.min,
@@ -338,11 +342,11 @@ fn blind(extended: &Extended<'_>, node: Node, region: &Region) -> Result<Vec<Bli
             let fixed = HashMap::from([(input.node, graph.constant(value).node())]);
             let there = graph.substitute(&[node], &fixed)[0];
             if vanishes(graph, there, region)? == Verdict::Proved {
-                let hidden = hidden(extended, &fixed, region)?;
+                let hidden = hidden(augmented, &fixed, region)?;
                 found.push(Blind {
                     input: input.name.clone(),
                     value,
-                    alike: (!hidden.is_empty()).then(|| alike(extended, &hidden)),
+                    alike: (!hidden.is_empty()).then(|| alike(augmented, &hidden)),
                     hidden,
                 });
             }
@@ -353,30 +357,30 @@ fn blind(extended: &Extended<'_>, node: Node, region: &Region) -> Result<Vec<Bli
 
 /// Two states that differ in the hidden ones only: a quarter and three quarters up
 /// their ranges, the others in the middle.
-fn alike(extended: &Extended<'_>, hidden: &[String]) -> [Vec<(String, f64)>; 2] {
+fn alike(augmented: &AugmentedPlant<'_>, hidden: &[String]) -> [Vec<(String, f64)>; 2] {
     [0.25, 0.75].map(|share| {
         let value = |v: &lynkeus_model::Variable| {
             let share = if hidden.contains(&v.name) { share } else { 0.5 };
             (v.name.clone(), inside(v.min, v.max, share))
         };
-        extended.states.iter().map(value).collect()
+        augmented.states.iter().map(value).collect()
     })
 }
 
 /// States from which no path of dependencies leads to an output.
 fn hidden(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     fixed: &HashMap<Node, Node>,
     region: &Region,
 ) -> Result<Vec<String>, MissingInput> {
-    let graph = extended.graph();
-    let symbols = extended.symbols();
-    let outputs = extended.outputs.iter().map(|o| o.variable.node);
+    let graph = augmented.graph();
+    let symbols = augmented.symbols();
+    let outputs = augmented.outputs.iter().map(|o| o.variable.node);
     let functions: Vec<Node> = outputs
-        .chain(extended.derivatives.iter().copied())
+        .chain(augmented.derivatives.iter().copied())
         .collect();
     let partials = jacobian_rows(graph, &functions, &symbols);
-    let first = extended.outputs.len();
+    let first = augmented.outputs.len();
     let mut seen = vec![false; symbols.len()];
     let mut open: Vec<usize> = (0..first).collect();
     while let Some(row) = open.pop() {
@@ -397,7 +401,7 @@ fn hidden(
             }
         }
     }
-    let names = extended.states.iter().zip(&seen);
+    let names = augmented.states.iter().zip(&seen);
     Ok(names
         .filter(|(_, seen)| !**seen)
         .map(|(s, _)| s.name.clone())
@@ -416,31 +420,31 @@ const KNOWN_STATES: usize = 300;
 /// Cells examined for the size of a slope.
 const SLOPE_CELLS: usize = 400;
 
-/// Per extended state whether it is known everywhere on the box whatever the inputs do: because alone, beside what is
+/// Per augmented state whether it is known everywhere on the box whatever the inputs do: because alone, beside what is
 /// known already, it moves an output or the derivative of a known state, with a slope that never vanishes. The functions
 /// are then strictly monotone in it, so that it is known at once and globally: no derivative of an unknown input enters.
 /// False says nothing.
 ///
 /// # Errors
 /// [`MissingInput`] where the plant has parameters without value.
-pub fn determined(extended: &Extended<'_>) -> Result<Vec<bool>, MissingInput> {
-    let (graph, region) = (extended.graph(), extended.region());
-    let mut known = vec![false; extended.states.len()];
+pub fn determined(augmented: &AugmentedPlant<'_>) -> Result<Vec<bool>, MissingInput> {
+    let (graph, region) = (augmented.graph(), augmented.region());
+    let mut known = vec![false; augmented.states.len()];
     if known.len() > KNOWN_STATES {
         return Ok(known);
     }
     // a function that jumps may take a value twice though its slope has one sign
-    if extended.regularity(&region)?.verdict != Verdict::Proved {
+    if augmented.regularity(&region)?.verdict != Verdict::Proved {
         return Ok(known);
     }
-    let outputs = extended.outputs.iter().map(|o| o.variable.node);
+    let outputs = augmented.outputs.iter().map(|o| o.variable.node);
     let functions: Vec<Node> = outputs
-        .chain(extended.derivatives.iter().copied())
+        .chain(augmented.derivatives.iter().copied())
         .collect();
-    let slopes = jacobian::forward(graph, &functions, &extended.symbols());
-    let first = extended.outputs.len();
+    let slopes = jacobian::forward(graph, &functions, &augmented.symbols());
+    let first = augmented.outputs.len();
     // the derivative of an unknown input is no equation
-    let mut open: Vec<usize> = (0..first + extended.plant_states()).collect();
+    let mut open: Vec<usize> = (0..first + augmented.plant_states()).collect();
     loop {
         let mut next = None;
         for (place, &row) in open.iter().enumerate() {
@@ -459,32 +463,32 @@ pub fn determined(extended: &Extended<'_>) -> Result<Vec<bool>, MissingInput> {
     }
 }
 
-/// Per extended state how far two of its values can be apart that the same outputs go with, where that is
+/// Per augmented state how far two of its values can be apart that the same outputs go with, where that is
 /// known: zero for those of `known`, what is `given` for some (place, size), and what follows from these by an output,
 /// or by the derivative of a known state, along a slope that never vanishes.
 ///
 /// # Errors
 /// [`MissingInput`] where the plant has parameters without value.
 pub fn uncertain(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     known: &[bool],
     given: &[(usize, f64)],
 ) -> Result<Vec<Option<f64>>, MissingInput> {
-    let (graph, region) = (extended.graph(), extended.region());
+    let (graph, region) = (augmented.graph(), augmented.region());
     let mut sizes: Vec<Option<f64>> = known.iter().map(|known| known.then_some(0.0)).collect();
     for &(place, size) in given {
         sizes[place] = sizes[place].or(Some(size).filter(|size| size.is_finite()));
     }
-    if sizes.len() > KNOWN_STATES || extended.regularity(&region)?.verdict != Verdict::Proved {
+    if sizes.len() > KNOWN_STATES || augmented.regularity(&region)?.verdict != Verdict::Proved {
         return Ok(sizes);
     }
-    let outputs = extended.outputs.iter().map(|o| o.variable.node);
+    let outputs = augmented.outputs.iter().map(|o| o.variable.node);
     let functions: Vec<Node> = outputs
-        .chain(extended.derivatives.iter().copied())
+        .chain(augmented.derivatives.iter().copied())
         .collect();
-    let slopes = jacobian::forward(graph, &functions, &extended.symbols());
-    let first = extended.outputs.len();
-    let mut open: Vec<usize> = (0..first + extended.plant_states())
+    let slopes = jacobian::forward(graph, &functions, &augmented.symbols());
+    let first = augmented.outputs.len();
+    let mut open: Vec<usize> = (0..first + augmented.plant_states())
         .filter(|&row| row < first || known[row - first])
         .collect();
     loop {
@@ -528,8 +532,8 @@ mod tests {
     end P;"
         );
         let plant = Plant::from_modelica(&text, "p.mo", &LoadOptions::default()).unwrap();
-        let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-        uniformity(&extended, &determined(&extended).unwrap()).unwrap()
+        let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
+        uniformity(&augmented, &determined(&augmented).unwrap()).unwrap()
     }
 
     #[test]
@@ -577,8 +581,8 @@ mod tests {
            output Real y = a; output Real z = {output}; equation der(a) = u*b; der(b) = -b; end P;"
     );
             let plant = Plant::from_modelica(&text, "p.mo", &LoadOptions::default()).unwrap();
-            let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-            let found = uniformity(&extended, &determined(&extended).unwrap())
+            let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
+            let found = uniformity(&augmented, &determined(&augmented).unwrap())
                 .unwrap()
                 .unwrap();
             found
@@ -631,8 +635,8 @@ mod tests {
          equation der(a) = {factor}*b; der(b) = -b; end P;"
     );
             let plant = Plant::from_modelica(&text, "p.mo", &LoadOptions::default()).unwrap();
-            let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-            uniformity(&extended, &determined(&extended).unwrap())
+            let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
+            uniformity(&augmented, &determined(&augmented).unwrap())
                 .unwrap()
                 .unwrap()
         };
@@ -666,7 +670,7 @@ mod tests {
             unknown: vec!["w".into()],
             ..Sensors::default()
         };
-        determined(&Extended::new(&plant, &sensors).unwrap()).unwrap()
+        determined(&AugmentedPlant::new(&plant, &sensors).unwrap()).unwrap()
     }
 
     #[test]

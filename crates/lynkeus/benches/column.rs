@@ -9,7 +9,7 @@ use lynkeus_expr::Tape;
 use lynkeus_model::{LoadOptions, Plant};
 use lynkeus_observers::{Observer, Tuning, find};
 use lynkeus_run::{Rk4, System};
-use lynkeus_structure::{Extended, Sensors};
+use lynkeus_structure::{AugmentedPlant, Sensors};
 
 fn main() {
     divan::main();
@@ -71,9 +71,9 @@ fn observer(plant: &Plant) -> Observer {
         unknown: vec!["Zf".to_owned()],
         ..Sensors::default()
     };
-    let extended = Extended::new(plant, &sensors).expect("an input of the column");
+    let augmented = AugmentedPlant::new(plant, &sensors).expect("an input of the column");
     let family = find("triangular").expect("a family in the list");
-    let design = family.design(&extended, &Tuning::from([("theta", 3.5)]));
+    let design = family.design(&augmented, &Tuning::from([("theta", 3.5)]));
     design.expect("two triangular chains").observer
 }
 

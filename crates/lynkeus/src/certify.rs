@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use lynkeus_observers::{Bounds, Certificate, Claim, Design, Tuning};
-use lynkeus_structure::{Extended, Standing};
+use lynkeus_structure::{AugmentedPlant, Standing};
 
 use crate::declared::{Account, Declared};
 use crate::interval::{self, Intervals};
@@ -162,13 +162,13 @@ impl<'a> Task<'a> {
     }
 
     /// The box with the inputs' ranges between the simulated (0) and the declared (1).
-    fn on(&self, share: f64) -> Result<Extended<'a>, Error> {
+    fn on(&self, share: f64) -> Result<AugmentedPlant<'a>, Error> {
         self.prepared.narrowed(&self.ranges(share))
     }
 
     fn ranges(&self, share: f64) -> Vec<(String, f64, f64)> {
         let wider = |(name, low, high): &(String, f64, f64)| {
-            let mut inputs = self.prepared.extended().inputs.iter();
+            let mut inputs = self.prepared.augmented().inputs.iter();
             let declared = inputs.find(|i| i.name == *name)?;
             let towards = |from: f64, to: f64| match share {
                 0.0 => from,
@@ -187,12 +187,12 @@ impl<'a> Task<'a> {
 
     fn certificate(
         &self,
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         design: &Design,
         claim: Claim,
     ) -> Result<Certificate, Error> {
-        let assumptions = assumptions::of(&self.prepared, extended)?;
-        lynkeus_observers::certify(extended, &design.observer, &assumptions, claim)
+        let assumptions = assumptions::of(&self.prepared, augmented)?;
+        lynkeus_observers::certify(augmented, &design.observer, &assumptions, claim)
             .map_err(|error| self.prepared.refusal(error))
     }
 

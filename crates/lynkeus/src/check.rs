@@ -103,14 +103,14 @@ fn by_which(
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
     let part = prepare::share(&study.budget, UNIFORMITY);
-    let extended = prepared.extended();
-    let graph = extended.graph();
+    let augmented = prepared.augmented();
+    let graph = augmented.graph();
     let examine = || {
-        let known = determined(extended)?;
-        let found = uniformity(extended, &known)?;
+        let known = determined(augmented)?;
+        let found = uniformity(augmented, &known)?;
         Ok((known, found))
     };
-    let mut known = vec![false; extended.states.len()];
+    let mut known = vec![false; augmented.states.len()];
     match graph.budgeted(part, examine) {
         Ok(examined) => {
             let examined: Result<_, lynkeus_expr::MissingInput> = examined;
@@ -173,7 +173,7 @@ fn account(declared: &Declared) -> Account {
 }
 
 /// What can be known of each quantity: whatever the unknown inputs do, and if they hardly move. `known`
-/// are the extended states known everywhere by elimination.
+/// are the augmented states known everywhere by elimination.
 fn knowledge(
     prepared: &Prepared<'_>,
     known: &[bool],
@@ -183,7 +183,7 @@ fn knowledge(
     time: Budget,
 ) -> Result<Vec<Knowledge>, Error> {
     let study = prepared.study();
-    let extended = prepared.extended();
+    let augmented = prepared.augmented();
     let mut asked = vec![];
     match report.unknown.is_empty() {
         true => asked.push((Assumption::NoneUnknown, report.answer.clone())),
@@ -200,7 +200,7 @@ fn knowledge(
             asked.push((Assumption::Wandering { declared }, answer));
         }
     }
-    let graph = extended.graph();
+    let graph = augmented.graph();
     let view = View {
         prepared,
         symbolic,
@@ -213,8 +213,8 @@ fn knowledge(
             determined: known,
         };
         let of = |(assumption, answer): &mut (Assumption, Answer)| {
-            found.settle(extended, *assumption, answer);
-            let known = Knowledge::new(extended, *assumption, answer, &found);
+            found.settle(augmented, *assumption, answer);
+            let known = Knowledge::new(augmented, *assumption, answer, &found);
             let mut known = known.map_err(Error::from_source)?;
             view.reserve(&mut known)?;
             Ok(known)

@@ -53,7 +53,7 @@ fn choose(prepared: &Prepared<'_>) -> Result<Option<Choice>, Error> {
     // of several families one may own a key in another shape
     if study.observer.family.is_some() {
         for family in study.observer.families() {
-            let verified = family.verify(prepared.extended(), &study.observer.tuning);
+            let verified = family.verify(prepared.augmented(), &study.observer.tuning);
             verified.map_err(|error| prepared.refusal(error.into()))?;
         }
     }
@@ -230,7 +230,7 @@ fn lacked_speed(prepared: &Prepared<'_>, examination: &Examination) -> Option<Sp
         |speed: &Speed| family.owns(speed.key()) && !tuning.values.contains_key(speed.key());
     let speed = Speed::ALL.into_iter().find(absent)?;
     // it may be given in other words
-    match prepared.designed(examination, prepared.extended(), tuning) {
+    match prepared.designed(examination, prepared.augmented(), tuning) {
         Err(DesignError::Tuning(e)) if e.absent && e.key == speed.key() => Some(speed),
         _ => None,
     }
@@ -279,7 +279,7 @@ fn tried(prepared: &Prepared<'_>, examination: &Examination) -> Trial {
             tuned.values.insert(speed.key().to_owned(), value.clone());
         }
     }
-    let design = match prepared.designed(examination, prepared.extended(), &tuned) {
+    let design = match prepared.designed(examination, prepared.augmented(), &tuned) {
         Ok(design) => design,
         Err(DesignError::Tuning(e)) if e.absent => {
             let can_be_tried = Speed::ALL.iter().any(|speed| e.key == speed.key());
@@ -297,7 +297,7 @@ fn tried(prepared: &Prepared<'_>, examination: &Examination) -> Trial {
         Err(error) => return Trial::Bad(error.to_string()),
     };
     if let Some(run) = &prepared.study().simulate
-        && let Some(rate) = decay(prepared.extended(), &design)
+        && let Some(rate) = decay(prepared.augmented(), &design)
         && rate * (run.until - run.start) < FALLS
     {
         return Trial::Bad(too_slow(rate, run));

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::HashSet;
 use std::path::Path;
 
-use lynkeus_structure::Extended;
+use lynkeus_structure::AugmentedPlant;
 
 use crate::course::Samples;
 use crate::headers::{further_headers, header, log_time, refuse_seconds, time_of};
@@ -67,8 +67,8 @@ impl<'t> Log<'t> {
     pub fn read(prepared: &Prepared<'_>, table: &'t Table) -> Result<Self, Error> {
         let (study, plant) = (prepared.study(), prepared.plant());
         let settings = &study.estimate;
-        let extended = prepared.extended();
-        let time = time_of(table, plant, settings, read(extended))?;
+        let augmented = prepared.augmented();
+        let time = time_of(table, plant, settings, read(augmented))?;
         refuse_seconds(study, table, &time)?;
         let ordered = match settings.strict {
             true => None,
@@ -78,13 +78,13 @@ impl<'t> Log<'t> {
             None => (Cow::Borrowed(table), vec![], vec![]),
             Some(Ordered { table, notes, lost }) => (Cow::Owned(table), notes, lost),
         };
-        let warnings = read(extended).filter_map(|name| {
+        let warnings = read(augmented).filter_map(|name| {
             let own = header(settings, name);
             lost.iter().find(|lost| lost.column == own)
         });
         let warnings = warnings.flat_map(|lost| told(lost, &time)).collect();
-        let samples = samples(&table, &time, settings, extended)?;
-        notes.extend(gaps(&table, settings, &time, extended));
+        let samples = samples(&table, &time, settings, augmented)?;
+        notes.extend(gaps(&table, settings, &time, augmented));
         Ok(Self {
             table,
             time,
@@ -118,9 +118,9 @@ fn told(lost: &Lost, time: &str) -> Vec<String> {
 }
 
 /// Names of the measured outputs, then of the known inputs.
-fn read<'e>(extended: &'e Extended<'_>) -> impl Iterator<Item = &'e str> {
-    let outputs = extended.outputs.iter().map(|o| o.variable.name.as_str());
-    outputs.chain(extended.inputs.iter().map(|input| input.name.as_str()))
+fn read<'e>(augmented: &'e AugmentedPlant<'_>) -> impl Iterator<Item = &'e str> {
+    let outputs = augmented.outputs.iter().map(|o| o.variable.name.as_str());
+    outputs.chain(augmented.inputs.iter().map(|input| input.name.as_str()))
 }
 
 /// What a log knows to be true of an estimated quantity: what a simulation knew, else the column of that name,
@@ -132,7 +132,7 @@ pub(crate) fn truth<'t>(
 ) -> Option<&'t Series> {
     let settings = &prepared.study().estimate;
     let own = header(settings, name);
-    let is_read = read(prepared.extended()).any(|name| header(settings, name) == own);
+    let is_read = read(prepared.augmented()).any(|name| header(settings, name) == own);
     let unread = || logged(&log.table, settings, &log.time, name).filter(|_| !is_read);
     log.table.truth(name).or_else(unread)
 }
@@ -143,7 +143,7 @@ fn samples(
     table: &Table,
     time_header: &str,
     settings: &EstimateSettings,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
 ) -> Result<Samples, Error> {
     let reading = |name: &str| match settings.strict {
         true => table.column(header(settings, name)).cloned(),
@@ -153,9 +153,9 @@ fn samples(
         true => Ok(Series::default()),
         false => held(table, settings, header(settings, name)),
     };
-    let outputs = extended.outputs.iter().map(|o| &o.variable.name);
+    let outputs = augmented.outputs.iter().map(|o| &o.variable.name);
     let mut read: Vec<(&str, &str)> = vec![];
-    for name in outputs.chain(extended.inputs.iter().map(|u| &u.name)) {
+    for name in outputs.chain(augmented.inputs.iter().map(|u| &u.name)) {
         let own = header(settings, name);
         if let Some((other, _)) = read.iter().find(|(_, known)| *known == own) {
             let message = format!("{other} and {name} both read the column \"{own}\"");
@@ -165,8 +165,8 @@ fn samples(
         }
         read.push((name, own));
     }
-    let readings = extended.outputs.iter().map(|o| reading(&o.variable.name));
-    let inputs = extended.inputs.iter().map(|u| input(&u.name));
+    let readings = augmented.outputs.iter().map(|o| reading(&o.variable.name));
+    let inputs = augmented.inputs.iter().map(|u| input(&u.name));
     Ok(Samples {
         time: table.time(time_header)?.clone(),
         readings: readings.collect::<Result<_, _>>()?,
@@ -201,15 +201,15 @@ fn gaps(
     table: &Table,
     settings: &EstimateSettings,
     time: &str,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
 ) -> Vec<String> {
     let origin = table.origin(time);
     let mut notes: Vec<String> = origin
         .map(|origin| format!("times are seconds since {origin}"))
         .into_iter()
         .collect();
-    let outputs = extended.outputs.iter().map(|o| &o.variable);
-    for signal in extended.inputs.iter().chain(outputs) {
+    let outputs = augmented.outputs.iter().map(|o| &o.variable);
+    for signal in augmented.inputs.iter().chain(outputs) {
         let header = header(settings, &signal.name);
         let missing = table.missing(header);
         if missing == 0 {

@@ -7,7 +7,7 @@ use lynkeus_expr::{Node, Tape};
 use lynkeus_model::Plant;
 use lynkeus_observers as observers;
 use lynkeus_observers::Observer;
-use lynkeus_structure::{Extended, short};
+use lynkeus_structure::{AugmentedPlant, short};
 use serde_json::{Map, Value, json};
 
 use crate::{Error, Study, systems};
@@ -55,10 +55,10 @@ pub struct InjectionEntry {
 pub(crate) fn of(
     study: &Study,
     plant: &Plant,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     observer: &Observer,
 ) -> Result<Correction, Error> {
-    let found = observers::Correction::of(extended, observer)
+    let found = observers::Correction::of(augmented, observer)
         .map_err(|error| Error::input(error.to_string()))?;
     let injections = match found {
         observers::Correction::Varying(injections) => injections,
@@ -74,7 +74,7 @@ pub(crate) fn of(
         }
     };
     let nodes: Vec<Node> = injections.iter().map(|i| i.node).collect();
-    let nodes = at_estimate(study, plant, extended, observer, &nodes)?;
+    let nodes = at_estimate(study, plant, augmented, observer, &nodes)?;
     let entries = injections.into_iter().zip(nodes).map(|(injection, node)| {
         let expression = plant.graph.render(injection.node, WHOLE);
         InjectionEntry {
@@ -92,21 +92,21 @@ pub(crate) fn of(
 fn at_estimate(
     study: &Study,
     plant: &Plant,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     nodes: &[Node],
 ) -> Result<Vec<Node>, Error> {
     let graph = &plant.graph;
-    let states = extended.symbols().into_iter();
+    let states = augmented.symbols().into_iter();
     let estimates: HashMap<Node, Node> = states
         .zip(observer.estimates.iter().map(|e| e.node))
         .collect();
-    let outputs: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
+    let outputs: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
     let seen = graph.substitute(&outputs, &estimates);
     let signals = observer.measured.iter().map(|m| m.symbol);
     let nodes = graph.substitute(nodes, &signals.zip(seen).collect());
     let mut inputs = vec![];
-    for input in &extended.inputs {
+    for input in &augmented.inputs {
         let node = match &study.simulate {
             Some(settings) => systems::input_expression(study, plant, settings, input).ok(),
             None => input.start.map(|start| graph.constant(start).node()),

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use lynkeus_model::{Plant, Variable};
 use lynkeus_run::filter::Limits;
-use lynkeus_structure::{Extended, range};
+use lynkeus_structure::{AugmentedPlant, range};
 
 use crate::study::{Name, Noise};
 use crate::{Error, Study, calibrate, near, systems};
@@ -202,10 +202,10 @@ impl<T> Kind<T> {
 /// on the box, which may be infinite.
 pub(crate) fn deviations(
     declared: &Declared,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
 ) -> Result<BTreeMap<String, f64>, Error> {
     let mut found = BTreeMap::new();
-    for output in &extended.outputs {
+    for output in &augmented.outputs {
         let name = &output.variable.name;
         let Some(noise) = declared.noise.of(name) else {
             continue;
@@ -214,7 +214,7 @@ pub(crate) fn deviations(
             Noise::Absolute(deviation) => deviation,
             Noise::Uniform(bound) => bound / 3.0_f64.sqrt(),
             Noise::Relative(share) => {
-                let values = range(extended.graph(), output.variable.node, &extended.region());
+                let values = range(augmented.graph(), output.variable.node, &augmented.region());
                 share * values.map_err(Error::from_source)?.enclosure.magnitude()
             }
         };

@@ -138,7 +138,7 @@ fn watched(
         quantity
     });
     let estimated: Vec<Quantity> = estimated.collect();
-    let known = prepared.extended().inputs.iter();
+    let known = prepared.augmented().inputs.iter();
     let known = known.map(|input| Quantity {
         name: input.name.clone(),
         truth: logged(&input.name),
@@ -198,12 +198,12 @@ pub(crate) struct AtReading {
 
 /// The states that start at a reading.
 pub(crate) fn at_readings(prepared: &Prepared<'_>) -> Vec<AtReading> {
-    let extended = prepared.extended();
+    let augmented = prepared.augmented();
     let initial = &prepared.study().observer.tuning.initial;
-    let number = |node| extended.graph().constant_value(node);
+    let number = |node| augmented.graph().constant_value(node);
     let of = |(sensor, output): (usize, &lynkeus_structure::Measurement)| {
         let (i, slope, offset) = output.state?;
-        let state = &extended.states[i];
+        let state = &augmented.states[i];
         let given = initial.of(&state.name).or(initial.default);
         let (slope, offset) = (number(slope)?, number(offset)?);
         given.or(state.start).is_none().then_some(AtReading {
@@ -213,7 +213,12 @@ pub(crate) fn at_readings(prepared: &Prepared<'_>) -> Vec<AtReading> {
             offset,
         })
     };
-    extended.outputs.iter().enumerate().filter_map(of).collect()
+    augmented
+        .outputs
+        .iter()
+        .enumerate()
+        .filter_map(of)
+        .collect()
 }
 
 /// Lets them start at the first readings of a log.
@@ -229,7 +234,7 @@ pub(crate) fn start_at_readings(prepared: &Prepared<'_>, samples: &Samples, desi
             own.1 = start;
             design.notes.push(format!(
                 "{} starts at its first reading, {}: neither `initial` nor the model's `start` says where",
-                prepared.extended().states[at.state].name,
+                prepared.augmented().states[at.state].name,
                 lynkeus_structure::short(start)
             ));
         }

@@ -6,7 +6,7 @@ use lynkeus_run::filter::{
     Bounds, Confined, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor, Smoothed,
 };
 use lynkeus_run::{Blueprint, EstimatorSettings};
-use lynkeus_structure::{Extended, short};
+use lynkeus_structure::{AugmentedPlant, short};
 
 use crate::course::{Course, Samples};
 use crate::prepare::Prepared;
@@ -28,7 +28,7 @@ pub(crate) fn run(
     settings: EstimatorSettings,
     watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
-    let (study, extended) = (prepared.study(), prepared.extended());
+    let (study, augmented) = (prepared.study(), prepared.augmented());
     let mut course = Course {
         keeps_innovations: study.estimate.innovations,
         ..Course::default()
@@ -65,7 +65,7 @@ pub(crate) fn run(
         Some(Smoothing::Lag(lag)) => filter.smoothed(Some(lag), study.estimate.deviations),
     };
     if is_window(design) {
-        let held = held_at_an_end(extended, &course.estimates);
+        let held = held_at_an_end(augmented, &course.estimates);
         course.notes.extend(held);
     }
     if study.estimate.smoothing.is_some() && smoothed.is_none() {
@@ -120,12 +120,12 @@ fn is_window(design: &Design) -> bool {
 const HELD: f64 = 0.01;
 
 /// The quantity that the moving horizon keeps at an end of its range in most rows.
-fn held_at_an_end(extended: &Extended<'_>, estimates: &[Series]) -> Option<String> {
+fn held_at_an_end(augmented: &AugmentedPlant<'_>, estimates: &[Series]) -> Option<String> {
     let share = |(state, column): &(&Variable, &Series)| {
         let at_end = column.iter().filter(|x| *x <= state.min || *x >= state.max);
         at_end.count() as f64 / column.len().max(1) as f64
     };
-    let all = extended.states.iter().zip(estimates);
+    let all = augmented.states.iter().zip(estimates);
     let held = all.map(|pair| (share(&pair), pair.0));
     let (share, state) = held.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (share >= HELD).then(|| {
@@ -188,7 +188,7 @@ fn model(
     samples: &Samples,
     notes: &mut Vec<String>,
 ) -> Result<FilterModel, Error> {
-    let (extended, observer) = (prepared.extended(), &design.observer);
+    let (augmented, observer) = (prepared.augmented(), &design.observer);
     let declared = prepared.declared();
     let states = observer
         .states
@@ -196,10 +196,10 @@ fn model(
         .map(|(s, start)| (s.name.clone(), s.symbol, *start));
     let named = |s: &Signal| (s.name.clone(), s.symbol);
     let span = samples.span();
-    let levels = noise::levels(declared, extended, samples, notes);
+    let levels = noise::levels(declared, augmented, samples, notes);
     let sensors = observer.measured.iter().zip(&tuning.outputs).zip(levels);
     let plant = FilterPlant {
-        graph: extended.graph(),
+        graph: augmented.graph(),
         time: observer.time,
         states: states.collect(),
         derivatives: observer.derivatives.clone(),
@@ -216,7 +216,7 @@ fn model(
         initial_variance: tuning.initial_variance.clone(),
         confined: Some(Confined {
             flow: tuning.confined.clone(),
-            bounds: extended.states.iter().map(bounds).collect(),
+            bounds: augmented.states.iter().map(bounds).collect(),
         }),
     };
     FilterModel::new(&plant).map_err(Error::from_source)

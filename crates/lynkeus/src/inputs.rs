@@ -20,7 +20,7 @@ pub(crate) enum Source {
 
 /// Whether these are the plant's inputs, no more and no less, all in the log.
 pub(crate) fn are_logged(prepared: &Prepared<'_>, sources: &[Source]) -> bool {
-    let own = (0..prepared.extended().inputs.len()).map(Source::Input);
+    let own = (0..prepared.augmented().inputs.len()).map(Source::Input);
     prepared.study().estimate.generator.is_empty() && sources.iter().cloned().eq(own)
 }
 
@@ -76,7 +76,7 @@ fn generated(prepared: &Prepared<'_>, design: &mut Design) -> Result<Vec<Source>
         };
         let generator = generator(prepared, name, given)?;
         observer
-            .generate(prepared.extended().graph(), &name.text, &generator)
+            .generate(prepared.augmented().graph(), &name.text, &generator)
             .map_err(|error| name.blame(Error::input(error.to_string())))?;
         match generator {
             Generator::Time(_) => drop(sources.remove(place)),
@@ -95,7 +95,7 @@ fn generator(
     match given {
         study::Generator::Time(u) => Ok(Generator::Time(systems::expression(prepared.plant(), u)?)),
         study::Generator::Prefilter { poles, initial, .. } => {
-            let mut inputs = prepared.extended().inputs.iter();
+            let mut inputs = prepared.augmented().inputs.iter();
             let start = inputs.find(|u| u.name == name.text).and_then(|u| u.start);
             let initial = initial.clone();
             Ok(Generator::Prefilter(Prefilter {
@@ -116,7 +116,7 @@ fn column<'s>(study: &'s Study, needed: &InputDerivative) -> Option<&'s String> 
 /// Columns of derivatives, or generators, of what is no known input.
 pub(crate) fn refuse_strays(prepared: &Prepared<'_>) -> Result<(), Error> {
     let settings = &prepared.study().estimate;
-    let inputs = &prepared.extended().inputs;
+    let inputs = &prepared.augmented().inputs;
     let columns = settings.input_derivatives.iter();
     let columns = columns.map(|(name, _)| ("input_derivatives", name));
     let generators = settings.generator.iter();
@@ -162,7 +162,7 @@ impl Log<'_> {
         sources: &[Source],
     ) -> Result<Vec<Series>, Error> {
         let settings = &prepared.study().estimate;
-        let known = &prepared.extended().inputs;
+        let known = &prepared.augmented().inputs;
         let own = sources.iter().map(|source| {
             let header = match source {
                 Source::Input(place) => header(settings, &known[*place].name),

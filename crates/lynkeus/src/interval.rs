@@ -3,7 +3,7 @@
 use lynkeus_expr::{Node, Tape, jacobian};
 use lynkeus_gain::sampling;
 use lynkeus_observers::{Design, Observer};
-use lynkeus_structure::{Extended, figures};
+use lynkeus_structure::{AugmentedPlant, figures};
 use serde_json::{Value, json};
 
 use crate::course::{Course, Samples};
@@ -52,7 +52,7 @@ pub(crate) fn intervals(
         estimates: course.estimates.iter().collect(),
         inputs: samples.inputs.iter().collect(),
     };
-    let limits = path.limits(prepared.extended(), &design.observer)?;
+    let limits = path.limits(prepared.augmented(), &design.observer)?;
     let interval = median_interval(samples)?;
     Some(Intervals::new(interval, Sampled::Log, limits, prepared))
 }
@@ -83,7 +83,7 @@ pub(crate) fn simulated(
             .map(|u| of(&u.name)?.truth.as_ref())
             .collect::<Option<_>>()?,
     };
-    let limits = path.limits(prepared.extended(), observer)?;
+    let limits = path.limits(prepared.augmented(), observer)?;
     Some(Intervals::new(step, Sampled::Simulation, limits, prepared))
 }
 
@@ -97,7 +97,11 @@ struct Path<'s> {
 impl Path<'_> {
     /// The smallest limits along the run; none for filters, whose gains know the interval, for
     /// observers with further states, and where errors do not shrink.
-    fn limits(&self, extended: &Extended<'_>, observer: &Observer) -> Option<sampling::Limits> {
+    fn limits(
+        &self,
+        augmented: &AugmentedPlant<'_>,
+        observer: &Observer,
+    ) -> Option<sampling::Limits> {
         let is_estimate = observer
             .states
             .iter()
@@ -110,9 +114,9 @@ impl Path<'_> {
             observer: sampled,
             outputs,
             ..
-        } = observer.sampled(extended).ok()?;
+        } = observer.sampled(augmented).ok()?;
         let states: Vec<Node> = sampled.states.iter().map(|(s, _)| s.symbol).collect();
-        let graph = extended.graph();
+        let graph = augmented.graph();
         let slopes = jacobian::forward(graph, &sampled.derivatives, &states);
         let views = jacobian::forward(graph, &outputs, &states[..observer.states.len()]);
         let entries = slopes.entries.iter().chain(&views.entries);

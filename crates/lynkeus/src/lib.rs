@@ -7,7 +7,7 @@
 //! use lynkeus::model::{Attributes, LoadOptions, Model, Plant};
 //! use lynkeus::observers::{Family, Tuning, triangular::Triangular};
 //! use lynkeus::run::{Estimator, EstimatorSettings};
-//! use lynkeus::structure::{Extended, Sensors};
+//! use lynkeus::structure::{AugmentedPlant, Sensors};
 //!
 //! // A tank of unknown inflow: der(level) = inflow - 0.5*sqrt(level).
 //! let in_modelica = Plant::from_modelica(
@@ -33,8 +33,8 @@
 //! // The sensor shows a tank at rest at 4: what flows in?
 //! for plant in [in_modelica, in_rust] {
 //!     let sensors = Sensors { unknown: vec!["inflow".into()], ..Sensors::default() };
-//!     let extended = Extended::new(&plant, &sensors)?;
-//!     let design = Triangular.design(&extended, &Tuning::from([("theta", 1.0)]))?;
+//!     let augmented = AugmentedPlant::new(&plant, &sensors)?;
+//!     let design = Triangular.design(&augmented, &Tuning::from([("theta", 1.0)]))?;
 //!     let observer = lynkeus::observer_system(&plant, &design.observer)?;
 //!     let mut estimator = Estimator::new(&observer, EstimatorSettings::default())?;
 //!     for second in 0..60 {

@@ -96,14 +96,14 @@ fn refuse_looking_ahead(study: &Study, settings: &EstimateSettings) -> Result<()
 
 /// Without a log there is nothing to take a noise from.
 fn need_noises(prepared: &Prepared<'_>, process: bool) -> Result<(), Error> {
-    let (study, extended) = (prepared.study(), prepared.extended());
+    let (study, augmented) = (prepared.study(), prepared.augmented());
     let declared = prepared.declared();
     let missing = |what: String, hint: String| {
         let message =
             format!("{what}: expected in the study, where there is no log to take it from");
         Err(Error::input(message).at(&study.file).hint(hint))
     };
-    let outputs = extended.outputs.iter().map(|o| &o.variable.name);
+    let outputs = augmented.outputs.iter().map(|o| &o.variable.name);
     if let Some(name) = outputs
         .into_iter()
         .find(|name| declared.noise.of(name).is_none())
@@ -113,7 +113,7 @@ fn need_noises(prepared: &Prepared<'_>, process: bool) -> Result<(), Error> {
             format!("write noise = {{ {name} = … }} under [sensors]"),
         );
     }
-    let mut unknown = extended.states.iter().skip(extended.plant_states());
+    let mut unknown = augmented.states.iter().skip(augmented.plant_states());
     let asleep = unknown.find(|input| declared.process_noise.of(&input.name).is_none());
     match asleep.map(|input| input.name.as_str()) {
         Some(name) => missing(

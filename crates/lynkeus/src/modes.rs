@@ -3,7 +3,7 @@
 use lynkeus_expr::{Node, Tape, jacobian};
 use lynkeus_observers::Design;
 use lynkeus_proof::spectrum;
-use lynkeus_structure::Extended;
+use lynkeus_structure::AugmentedPlant;
 use nalgebra::DMatrix;
 
 /// States beyond which no modes are computed.
@@ -11,10 +11,10 @@ const STATES: usize = 60;
 
 /// The rate of the slowest mode of the observer's error, linearised at the start; none where the
 /// observer has states of other kinds, or reads derivatives of inputs.
-pub(crate) fn decay(extended: &Extended<'_>, design: &Design) -> Option<f64> {
+pub(crate) fn decay(augmented: &AugmentedPlant<'_>, design: &Design) -> Option<f64> {
     let observer = &design.observer;
-    let is_copy = observer.states.len() == extended.states.len()
-        && extended.states.len() <= STATES
+    let is_copy = observer.states.len() == augmented.states.len()
+        && augmented.states.len() <= STATES
         && observer.input_derivatives.is_empty()
         && observer
             .estimates
@@ -24,11 +24,11 @@ pub(crate) fn decay(extended: &Extended<'_>, design: &Design) -> Option<f64> {
     if !is_copy || observer.filter.is_some() {
         return None;
     }
-    let graph = extended.graph();
+    let graph = augmented.graph();
     let symbols: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
     let slopes = jacobian::forward(graph, &observer.derivatives, &symbols);
-    let start = Start::of(extended);
-    let readings = start.outputs(extended)?;
+    let start = Start::of(augmented);
+    let readings = start.outputs(augmented)?;
     let own = observer
         .states
         .iter()
@@ -46,7 +46,7 @@ pub(crate) fn decay(extended: &Extended<'_>, design: &Design) -> Option<f64> {
         .chain([(observer.time, 0.0)])
         .collect();
     let nodes: Vec<Node> = slopes.entries.iter().map(|e| e.2).collect();
-    let values = evaluated(extended, &known, &nodes)?;
+    let values = evaluated(augmented, &known, &nodes)?;
     let n = symbols.len();
     let mut J = DMatrix::zeros(n, n);
     for (entry, value) in slopes.entries.iter().zip(values) {
@@ -70,51 +70,54 @@ pub(crate) struct Start {
 
 impl Start {
     /// `start`, else the middle of the range, else 0.
-    pub fn of(extended: &Extended<'_>) -> Self {
+    pub fn of(augmented: &AugmentedPlant<'_>) -> Self {
         let value = |v: &lynkeus_model::Variable| {
             let middle = (v.min + v.max) / 2.0;
             v.start
                 .unwrap_or(if middle.is_finite() { middle } else { 0.0 })
         };
         Self {
-            states: extended.states.iter().map(value).collect(),
-            inputs: extended.inputs.iter().map(value).collect(),
+            states: augmented.states.iter().map(value).collect(),
+            inputs: augmented.inputs.iter().map(value).collect(),
         }
     }
 
     /// Symbols of the plant with their values.
-    fn known(&self, extended: &Extended<'_>) -> Vec<(Node, f64)> {
-        let states = extended
+    fn known(&self, augmented: &AugmentedPlant<'_>) -> Vec<(Node, f64)> {
+        let states = augmented
             .states
             .iter()
             .map(|v| v.node)
             .zip(self.states.iter().copied());
-        let inputs = extended
+        let inputs = augmented
             .inputs
             .iter()
             .map(|v| v.node)
             .zip(self.inputs.iter().copied());
         states
             .chain(inputs)
-            .chain([(extended.plant.time, 0.0)])
+            .chain([(augmented.plant.time, 0.0)])
             .collect()
     }
 
-    fn outputs(&self, extended: &Extended<'_>) -> Option<Vec<f64>> {
-        let nodes: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
-        evaluated(extended, &self.known(extended), &nodes)
+    fn outputs(&self, augmented: &AugmentedPlant<'_>) -> Option<Vec<f64>> {
+        let nodes: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
+        evaluated(augmented, &self.known(augmented), &nodes)
     }
 
     /// ∂f/∂x of the plant there; none where an entry has no value, and for a large plant.
-    pub fn jacobian(&self, extended: &Extended<'_>) -> Option<DMatrix<f64>> {
-        if extended.states.len() > STATES {
+    pub fn jacobian(&self, augmented: &AugmentedPlant<'_>) -> Option<DMatrix<f64>> {
+        if augmented.states.len() > STATES {
             return None;
         }
-        let slopes =
-            jacobian::forward(extended.graph(), &extended.derivatives, &extended.symbols());
+        let slopes = jacobian::forward(
+            augmented.graph(),
+            &augmented.derivatives,
+            &augmented.symbols(),
+        );
         let nodes: Vec<Node> = slopes.entries.iter().map(|e| e.2).collect();
-        let values = evaluated(extended, &self.known(extended), &nodes)?;
-        let n = extended.states.len();
+        let values = evaluated(augmented, &self.known(augmented), &nodes)?;
+        let n = augmented.states.len();
         let mut J = DMatrix::zeros(n, n);
         for (entry, value) in slopes.entries.iter().zip(values) {
             J[(entry.0, entry.1)] = value;
@@ -123,9 +126,13 @@ impl Start {
     }
 }
 
-fn evaluated(extended: &Extended<'_>, known: &[(Node, f64)], nodes: &[Node]) -> Option<Vec<f64>> {
+fn evaluated(
+    augmented: &AugmentedPlant<'_>,
+    known: &[(Node, f64)],
+    nodes: &[Node],
+) -> Option<Vec<f64>> {
     let (symbols, values): (Vec<Node>, Vec<f64>) = known.iter().copied().unzip();
-    let tape = Tape::new(extended.graph(), &symbols, nodes).ok()?;
+    let tape = Tape::new(augmented.graph(), &symbols, nodes).ok()?;
     let mut found = vec![0.0; nodes.len()];
     tape.evaluator().eval(&values, &mut found);
     Some(found)

@@ -248,8 +248,8 @@ impl Raw<'_> {
         let innovation_columns = innovation_columns(&design, &mut course, &mut headers);
         let watches = watches(&design, &mut course.monitors, &time, &mut headers);
         show_measurements(plant, &measurements, &mut quantities);
-        expected::give(prepared.extended(), &time, &mut quantities);
-        let sides = outside::sides(prepared.extended());
+        expected::give(prepared.augmented(), &time, &mut quantities);
+        let sides = outside::sides(prepared.augmented());
         let accuracies = accuracy::accuracies(&time, &quantities, &sides);
         notes.extend(accuracy::told(&accuracies));
         notes.extend(assertions::told(plant, &time, &quantities));
@@ -414,9 +414,9 @@ struct Sight<'s> {
 impl Sight<'_> {
     /// Whether an unknown input is estimated of which nothing declares how fast it wanders.
     fn wander_is_guessed(&self) -> bool {
-        let extended = self.prepared.extended();
+        let augmented = self.prepared.augmented();
         let declared = &self.prepared.declared().process_noise;
-        let mut unknown = extended.states.iter().skip(extended.plant_states());
+        let mut unknown = augmented.states.iter().skip(augmented.plant_states());
         unknown.any(|u| declared.of(&u.name).is_none())
     }
 
@@ -451,8 +451,8 @@ impl Sight<'_> {
             is_declared: false,
         });
         let sensors = followed.chain(bare);
-        let (extended, plant) = (self.prepared.extended(), self.prepared.plant());
-        let declared = extended.states.iter().chain(&plant.states);
+        let (augmented, plant) = (self.prepared.augmented(), self.prepared.plant());
+        let declared = augmented.states.iter().chain(&plant.states);
         let estimates = self.design.observer.estimates.iter();
         let kept = estimates.zip(self.deviations);
         let kept = kept.map(|(e, sd)| (e.variable.name.as_str(), sd));

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use lynkeus_structure::{Extended, Side, figures};
+use lynkeus_structure::{AugmentedPlant, Side, figures};
 use serde_json::{Map, Value, json};
 
 use crate::series::Iter;
@@ -49,10 +49,10 @@ pub struct Outside {
 }
 
 /// The box, side by side: what the observer knows of, time included, then the disturbances.
-pub(crate) fn sides(extended: &Extended<'_>) -> Vec<Side> {
-    let region = extended.region();
+pub(crate) fn sides(augmented: &AugmentedPlant<'_>) -> Vec<Side> {
+    let region = augmented.region();
     let symbols = region.symbols();
-    let inputs = extended.plant.inputs.iter();
+    let inputs = augmented.plant.inputs.iter();
     let disturbances = inputs.filter(|i| !symbols.contains(&i.node));
     let disturbances = disturbances.map(|i| Side {
         name: i.name.clone(),
@@ -256,8 +256,8 @@ mod tests {
         let text =
             format!("model M Real x{declared}; output Real y = x; equation der(x) = -x; end M;");
         let plant = Plant::from_modelica(&text, "m.mo", &LoadOptions::default()).unwrap();
-        let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-        sides(&extended).remove(0)
+        let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
+        sides(&augmented).remove(0)
     }
 
     fn found(declared: &str, values: &[f64]) -> Option<Outside> {

@@ -8,7 +8,7 @@ use lynkeus_expr::{Budget, Spent};
 use lynkeus_model::{LoadError, LoadOptions, Plant, Variable};
 pub(crate) use lynkeus_observers::is_certified_gain;
 use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning};
-use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, range};
+use lynkeus_structure::{AugmentedPlant, Dimension, Region, Sensors, SensorsError, range};
 
 use crate::choice::Choice;
 use crate::declared::Declared;
@@ -97,15 +97,15 @@ pub(crate) fn seen_by<'a>(
     study: &Study,
     plant: &'a Plant,
     sensors: &Sensors,
-) -> Result<Extended<'a>, Error> {
-    let mut extended = Extended::new(plant, sensors).map_err(|error| blame(study, error))?;
+) -> Result<AugmentedPlant<'a>, Error> {
+    let mut augmented = AugmentedPlant::new(plant, sensors).map_err(|error| blame(study, error))?;
     for (name, low, high) in &study.narrower {
-        extended
+        augmented
             .narrow(&name.text, *low, *high)
             .map_err(|error| name.blame(Error::from_source(error)))?;
     }
-    tube(study, &mut extended)?;
-    Ok(extended)
+    tube(study, &mut augmented)?;
+    Ok(augmented)
 }
 
 /// A study with its plant as the observer sees it, and what the families find in it: made
@@ -114,7 +114,7 @@ pub(crate) fn seen_by<'a>(
 pub struct Prepared<'a> {
     study: &'a Study,
     declared: Declared,
-    extended: Extended<'a>,
+    augmented: AugmentedPlant<'a>,
     /// made when first asked for
     examinations: OnceCell<Vec<Examination>>,
     /// the same
@@ -130,10 +130,10 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// Names among the sensors, in `[box]` or of anything else declared that the plant does not have.
     pub fn new(study: &'a Study, plant: &'a Plant) -> Result<Self, Error> {
-        let mut extended = seen_by(study, plant, &sensors(study, plant))?;
+        let mut augmented = seen_by(study, plant, &sensors(study, plant))?;
         let declared = Declared::new(study, plant)?;
         let bounds = |input: &Variable| declared.input_derivatives.of(&input.name);
-        extended.input_derivatives = extended
+        augmented.input_derivatives = augmented
             .inputs
             .iter()
             .map(|u| bounds(u).cloned().unwrap_or_default())
@@ -141,7 +141,7 @@ impl<'a> Prepared<'a> {
         Ok(Self {
             study,
             declared,
-            extended,
+            augmented,
             examinations: OnceCell::new(),
             choice: OnceCell::new(),
         })
@@ -159,12 +159,12 @@ impl<'a> Prepared<'a> {
 
     /// The plant.
     pub fn plant(&self) -> &'a Plant {
-        self.extended.plant
+        self.augmented.plant
     }
 
     /// The plant as the observer sees it.
-    pub fn extended(&self) -> &Extended<'a> {
-        &self.extended
+    pub fn augmented(&self) -> &AugmentedPlant<'a> {
+        &self.augmented
     }
 
     /// The same plant with another study, which differs in nothing else that was prepared than the numbers
@@ -180,7 +180,7 @@ impl<'a> Prepared<'a> {
         Ok(Prepared {
             study,
             declared: Declared::new(study, self.plant())?,
-            extended: self.extended.clone(),
+            augmented: self.augmented.clone(),
             examinations: OnceCell::new(),
             choice: OnceCell::new(),
         })
@@ -220,11 +220,11 @@ impl<'a> Prepared<'a> {
 
     /// What one family finds, of `left` that are still to come, in its share of the time.
     fn examined(&self, family: &dyn Family, left: usize) -> Result<Examination, Error> {
-        let graph = self.extended.graph();
+        let graph = self.augmented.graph();
         let whole = graph.budget();
         // the rest of the work needs a share as well
         graph.set_budget(share(&whole, 1.0 / (left + 1) as f64));
-        let found = family.examine(&self.extended, &self.study.observer.tuning);
+        let found = family.examine(&self.augmented, &self.study.observer.tuning);
         graph.set_budget(whole);
         found.map_err(|error| self.refusal(error))
     }
@@ -289,7 +289,7 @@ impl<'a> Prepared<'a> {
             }
             false => None,
         };
-        let place = simulated.as_ref().unwrap_or(&self.extended);
+        let place = simulated.as_ref().unwrap_or(&self.augmented);
         let design = self.designed(chosen, place, &tuned);
         design.map_err(|error| self.refusal(error))
     }
@@ -298,7 +298,7 @@ impl<'a> Prepared<'a> {
     pub(crate) fn designed(
         &self,
         chosen: &Examination,
-        place: &Extended<'_>,
+        place: &AugmentedPlant<'_>,
         tuning: &Tuning,
     ) -> Result<Design, DesignError> {
         match lynkeus_observers::find(chosen.family) {
@@ -311,8 +311,8 @@ impl<'a> Prepared<'a> {
     ///
     /// # Errors
     /// Sides that the box does not have, or that have nothing in common with it.
-    pub(crate) fn narrowed(&self, sides: &Sides) -> Result<Extended<'a>, Error> {
-        let mut narrowed = self.extended.clone();
+    pub(crate) fn narrowed(&self, sides: &Sides) -> Result<AugmentedPlant<'a>, Error> {
+        let mut narrowed = self.augmented.clone();
         for (name, low, high) in sides {
             let narrow = narrowed.narrow(name, *low, *high);
             narrow.map_err(|error| Error::from_source(error).at(&self.study.file))?;
@@ -339,7 +339,7 @@ impl<'a> Prepared<'a> {
         };
         let mut narrower = vec![];
         let is_chosen = |name: &str| self.study.narrower.iter().any(|(n, ..)| n.text == name);
-        let inputs = self.extended.inputs.iter();
+        let inputs = self.augmented.inputs.iter();
         for input in inputs.filter(|input| !is_chosen(&input.name)) {
             let node = systems::input_expression(self.study, plant, settings, input)?;
             let values = range(&plant.graph, node, &region).map_err(Error::from_source)?;
@@ -381,11 +381,11 @@ pub(crate) fn share(whole: &Budget, share: f64) -> Budget {
 }
 
 /// Limits the states to a tube around their start values.
-fn tube(study: &Study, extended: &mut Extended<'_>) -> Result<(), Error> {
+fn tube(study: &Study, augmented: &mut AugmentedPlant<'_>) -> Result<(), Error> {
     let Some(radius) = study.certify.tube else {
         return Ok(());
     };
-    for state in extended.states.clone() {
+    for state in augmented.states.clone() {
         let Some(start) = state.start else {
             let message = format!(
                 "`tube` of [certify]: the state '{}' has no start value",
@@ -393,7 +393,7 @@ fn tube(study: &Study, extended: &mut Extended<'_>) -> Result<(), Error> {
             );
             return Err(Error::input(message).at(&study.file));
         };
-        let narrowed = extended.narrow(&state.name, start - radius, start + radius);
+        let narrowed = augmented.narrow(&state.name, start - radius, start + radius);
         narrowed.map_err(|error| Error::from_source(error).at(&study.file))?;
     }
     Ok(())

@@ -67,7 +67,7 @@ fn knee(
     };
     let span = run.until - run.start;
     let step = run.sample_step.or(run.output_step).unwrap_or(span / 500.0);
-    if prepared.extended().states.len() > STATES || span / step > ROWS {
+    if prepared.augmented().states.len() > STATES || span / step > ROWS {
         return Ok(None);
     }
     let mut own = study.clone();
@@ -120,9 +120,9 @@ const OFF: f64 = 0.1;
 #[cfg(feature = "tune")]
 fn start_off(own: &mut crate::Study, prepared: &Prepared<'_>) {
     let initial = &mut own.observer.tuning.initial;
-    let extended = prepared.extended();
-    let starts = Start::of(extended).states;
-    for (state, start) in extended.states.iter().zip(starts) {
+    let augmented = prepared.augmented();
+    let starts = Start::of(augmented).states;
+    for (state, start) in augmented.states.iter().zip(starts) {
         let off = OFF * (state.max - state.min);
         let moved = match start + off > state.max {
             true => start - off,
@@ -142,8 +142,8 @@ pub(crate) fn time_scales(
     speed: Speed,
 ) -> Option<Proposal> {
     let family = lynkeus_observers::find(examination.family)?;
-    let extended = prepared.extended();
-    let modes = spectrum::eigenvalues(Start::of(extended).jacobian(extended)?)?;
+    let augmented = prepared.augmented();
+    let modes = spectrum::eigenvalues(Start::of(augmented).jacobian(augmented)?)?;
     let sizes: Vec<f64> = modes.iter().map(|λ| λ.norm()).collect();
     let largest = sizes.iter().copied().fold(0.0, f64::max);
     let moving: Vec<f64> = sizes.into_iter().filter(|x| *x > 1e-9 * largest).collect();

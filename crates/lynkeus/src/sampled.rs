@@ -135,12 +135,12 @@ pub(crate) fn observer(
     follows: bool,
     notes: &mut Vec<String>,
 ) -> Result<SampledObserver, Error> {
-    let (study, extended) = (prepared.study(), prepared.extended());
-    let sampled = design.observer.sampled(extended);
+    let (study, augmented) = (prepared.study(), prepared.augmented());
+    let sampled = design.observer.sampled(augmented);
     let mut sampled = sampled.map_err(Error::from_source)?;
-    let tuned = tuned(extended.graph(), &mut sampled)?;
+    let tuned = tuned(augmented.graph(), &mut sampled)?;
     let predict = study.estimate.between_samples == BetweenSamples::Predict;
-    let lag = (follows && !predict).then(|| sampled.push_lag(extended.graph()));
+    let lag = (follows && !predict).then(|| sampled.push_lag(augmented.graph()));
     let Sampled {
         observer,
         outputs: expected,
@@ -163,7 +163,7 @@ pub(crate) fn observer(
     let sensors: Vec<String> = measured(design);
     let outputs = sensors.iter().cloned().zip(expected.iter().copied());
     let reported: Vec<(String, Node)> = told.chain(monitors).chain(outputs).collect();
-    let graph = extended.graph();
+    let graph = augmented.graph();
     let system = System::new(
         graph,
         observer.time,
@@ -264,9 +264,9 @@ fn error_noise(
     samples: &Samples,
     notes: &mut Vec<String>,
 ) -> ErrorNoise {
-    let (extended, declared) = (prepared.extended(), prepared.declared());
+    let (augmented, declared) = (prepared.augmented(), prepared.declared());
     let mut process = noise::of_families(prepared, samples.span(), notes);
-    let starts = extended.states.iter().zip(states);
+    let starts = augmented.states.iter().zip(states);
     let mut initial: Vec<f64> = starts
         .map(|(s, (.., start))| prior_variance(s, *start))
         .collect();
@@ -275,6 +275,6 @@ fn error_noise(
     ErrorNoise {
         process,
         initial,
-        sensors: noise::levels(declared, extended, samples, notes),
+        sensors: noise::levels(declared, augmented, samples, notes),
     }
 }

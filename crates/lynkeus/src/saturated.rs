@@ -24,7 +24,7 @@ pub(crate) fn limited(prepared: &Prepared<'_>) -> Vec<Limited> {
         let limits = *limits.of(&name)?;
         Some(Limited { name, limits })
     };
-    prepared.extended().outputs.iter().filter_map(of).collect()
+    prepared.augmented().outputs.iter().filter_map(of).collect()
 }
 
 /// What is to be said of readings at an end of their sensor's range, by an observer that takes them

@@ -5,7 +5,7 @@ use lynkeus::observers::{
     Certificate, Check, Design, Examination, FAMILIES, Statement, Tuning, UltimateBound,
 };
 use lynkeus::prepare::Prepared;
-use lynkeus::structure::{Extended, Side, Standing, Verdict};
+use lynkeus::structure::{AugmentedPlant, Side, Standing, Verdict};
 use nalgebra::DMatrix;
 
 use super::tally::Counts;
@@ -57,14 +57,14 @@ pub struct Findings {
 /// What every family finds in the plant, and nothing of an observer.
 pub fn examined(prepared: &Prepared<'_>) -> Findings {
     let mut found = Findings::new(prepared);
-    found.examined(prepared.extended(), true);
+    found.examined(prepared.augmented(), true);
     found
 }
 
 /// Asks the library.
 pub fn findings(prepared: &Prepared<'_>, thorough: bool) -> Findings {
     let mut found = Findings::new(prepared);
-    found.examined(prepared.extended(), thorough);
+    found.examined(prepared.augmented(), thorough);
     let Ok(design) = prepared.design() else {
         return found;
     };
@@ -109,7 +109,7 @@ impl Findings {
         }
     }
 
-    fn examined(&mut self, extended: &Extended<'_>, thorough: bool) {
+    fn examined(&mut self, augmented: &AugmentedPlant<'_>, thorough: bool) {
         match self.examination.as_ref().map(|e| e.fit()) {
             Some(Standing::Proved) => self.counts.fits += 1,
             Some(Standing::Undecided) => self.counts.open_fits += 1,
@@ -121,7 +121,7 @@ impl Findings {
         };
         let others = others.iter().filter_map(|family| {
             let tuning = Tuning::default();
-            family.examine(extended, &tuning).ok()
+            family.examine(augmented, &tuning).ok()
         });
         let all: Vec<Examination> = self.examination.iter().cloned().chain(others).collect();
         for examination in &all {

@@ -2,7 +2,7 @@
 //! everywhere on the box, it does not jump in the states, and along a chain each state
 //! moves the one before it in one direction.
 
-use lynkeus::structure::Extended;
+use lynkeus::structure::AugmentedPlant;
 
 use super::pair::Pair;
 use crate::numbers::Numbers;
@@ -182,10 +182,10 @@ pub fn finite(low: f64, high: f64) -> [f64; 2] {
 }
 
 /// (row, column) of neighbours in chains of plant states.
-pub fn neighbours(chains: &[Vec<String>], extended: &Extended<'_>) -> Vec<(usize, usize)> {
+pub fn neighbours(chains: &[Vec<String>], augmented: &AugmentedPlant<'_>) -> Vec<(usize, usize)> {
     let index = |name: &String| {
-        let found = extended.state_index(name);
-        found.filter(|i| *i < extended.plant_states())
+        let found = augmented.state_index(name);
+        found.filter(|i| *i < augmented.plant_states())
     };
     let pairs = chains.iter().flat_map(|chain| chain.windows(2));
     pairs

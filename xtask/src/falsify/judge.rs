@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use lynkeus::Study;
 use lynkeus::observers::Observer;
 use lynkeus::prepare::Prepared;
-use lynkeus::structure::Extended;
+use lynkeus::structure::AugmentedPlant;
 
 use super::attack::Attack;
 use super::case::{Case, Kind, Role};
@@ -95,18 +95,18 @@ pub fn judge(
         let study = Study::load(&study).map_err(|e| e.to_string())?;
         let plant = lynkeus::prepare::plant(&study).map_err(|e| e.to_string())?;
         let prepared = Prepared::new(&study, &plant).map_err(|e| e.to_string())?;
-        let extended = prepared.extended();
+        let augmented = prepared.augmented();
         let found = match effort.refutations_only {
             true => claims::examined(&prepared),
             false => claims::findings(&prepared, effort.thorough),
         };
         let tuned = tune && !effort.refutations_only;
-        if tuned && round < 2 && retune::raised(&mut case, &found, extended, numbers) {
+        if tuned && round < 2 && retune::raised(&mut case, &found, augmented, numbers) {
             continue;
         }
         let mut looked = Look {
             case: &case,
-            extended,
+            augmented,
             found: &found,
             effort,
             violations: vec![],
@@ -136,7 +136,7 @@ pub fn judge(
 
 struct Look<'a, 'p> {
     case: &'a Case,
-    extended: &'a Extended<'p>,
+    augmented: &'a AugmentedPlant<'p>,
     found: &'a Findings,
     effort: Effort,
     violations: Vec<Violation>,
@@ -174,20 +174,20 @@ impl Look<'_, '_> {
     }
 
     fn against_claims(&mut self, observer: &Observer, numbers: &mut Numbers) {
-        let Ok(mut pair) = Pair::new(self.extended.plant, self.extended, observer) else {
+        let Ok(mut pair) = Pair::new(self.augmented.plant, self.augmented, observer) else {
             return self.note(
                 Flaw::Exceeded,
                 "the observer reads what nobody knows".into(),
             );
         };
-        if pair.estimates() != self.extended.states.len() {
+        if pair.estimates() != self.augmented.states.len() {
             return;
         }
         let found = self.found;
         if found.claims.is_empty() {
             return;
         }
-        let mut attack = attack(self.case, self.extended, &mut pair, &found.claims);
+        let mut attack = attack(self.case, self.augmented, &mut pair, &found.claims);
         if let Some(evidence) = attack.secant(numbers) {
             return self.note(Flaw::Exceeded, evidence);
         }
@@ -202,19 +202,19 @@ impl Look<'_, '_> {
     }
 
     fn against_print(&mut self, observer: &Observer, numbers: &mut Numbers) {
-        let Ok(mut pair) = Pair::new(self.extended.plant, self.extended, observer) else {
+        let Ok(mut pair) = Pair::new(self.augmented.plant, self.augmented, observer) else {
             return;
         };
-        if pair.estimates() != self.extended.states.len() {
+        if pair.estimates() != self.augmented.states.len() {
             return;
         }
         let names: Vec<String> = self
-            .extended
+            .augmented
             .states
             .iter()
             .map(|s| s.name.clone())
             .collect();
-        let mut attack = attack(self.case, self.extended, &mut pair, &[]);
+        let mut attack = attack(self.case, self.augmented, &mut pair, &[]);
         if let Some(evidence) = attack.misprint(numbers, &self.found.gain, &names) {
             self.note(Flaw::Gain, evidence);
         }
@@ -224,10 +224,10 @@ impl Look<'_, '_> {
         let Some(design) = &self.found.design else {
             return;
         };
-        let Ok(mut pair) = Pair::new(self.extended.plant, self.extended, &design.observer) else {
+        let Ok(mut pair) = Pair::new(self.augmented.plant, self.augmented, &design.observer) else {
             return;
         };
-        let plant = self.extended.plant;
+        let plant = self.augmented.plant;
         let side = |v: &lynkeus::model::Variable| facts::finite(v.min, v.max);
         let mut facts = Facts {
             pair: &mut pair,
@@ -246,7 +246,7 @@ impl Look<'_, '_> {
             Kind::Triangular | Kind::BlockTriangular | Kind::Designed
         );
         let chains = match &self.found.examination {
-            Some(examination) if chained => facts::neighbours(&examination.chains, self.extended),
+            Some(examination) if chained => facts::neighbours(&examination.chains, self.augmented),
             _ => vec![],
         };
         if let Some((fact, evidence)) = facts.against(numbers, &chains) {
@@ -256,7 +256,7 @@ impl Look<'_, '_> {
 
     fn witnesses(&mut self) {
         for refutation in &self.found.refutations {
-            match refute::check(refutation, self.extended, self.found.design.as_ref()) {
+            match refute::check(refutation, self.augmented, self.found.design.as_ref()) {
                 refute::Answer::Confirmed => self.counts.refutations += 1,
                 refute::Answer::Unread => self.counts.unread += 1,
                 refute::Answer::Wrong(evidence) => {
@@ -273,7 +273,7 @@ impl Look<'_, '_> {
 /// The attack with the box of everything that is estimated.
 pub fn attack<'a>(
     case: &'a Case,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     pair: &'a mut Pair,
     claims: &'a [claims::Claim],
 ) -> Attack<'a> {
@@ -287,7 +287,7 @@ pub fn attack<'a>(
             [low.max(own.min), high.min(own.max)]
         })
     };
-    let sides: Vec<[f64; 2]> = extended.states.iter().map(side).collect();
+    let sides: Vec<[f64; 2]> = augmented.states.iter().map(side).collect();
     // the practical observer of Germani and Manes follows the inputs by filters
     let filtered = case.setting("variant") == Some("\"practical\"");
     let extra = pair.start.len().saturating_sub(sides.len());

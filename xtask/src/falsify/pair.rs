@@ -3,7 +3,7 @@
 use lynkeus::expr::{Evaluator, MissingInput, Node, Tape};
 use lynkeus::model::Plant;
 use lynkeus::observers::Observer;
-use lynkeus::structure::Extended;
+use lynkeus::structure::AugmentedPlant;
 
 use super::signals::Signal;
 
@@ -41,7 +41,7 @@ pub struct Pair {
 impl Pair {
     pub fn new(
         plant: &Plant,
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         observer: &Observer,
     ) -> Result<Self, MissingInput> {
         let graph = &plant.graph;
@@ -55,7 +55,7 @@ impl Pair {
                 .map(|o| o.node)
         };
         // as the plant has them, disturbances included
-        let h = extended
+        let h = augmented
             .outputs
             .iter()
             .filter_map(|o| shown(&o.variable.name));

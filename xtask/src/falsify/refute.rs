@@ -7,7 +7,7 @@ mod stability;
 use astro_float_num::BigFloat;
 use lynkeus::expr::{Algebra, Node, Tape};
 use lynkeus::observers::{Design, Statement};
-use lynkeus::structure::{Extended, Point};
+use lynkeus::structure::{AugmentedPlant, Point};
 
 use super::claims::Refutation;
 use super::precise::Precise;
@@ -22,15 +22,19 @@ pub enum Answer {
 }
 
 /// Judges a refutation.
-pub fn check(refutation: &Refutation, extended: &Extended<'_>, design: Option<&Design>) -> Answer {
+pub fn check(
+    refutation: &Refutation,
+    augmented: &AugmentedPlant<'_>,
+    design: Option<&Design>,
+) -> Answer {
     let judged = match (
         refutation.of_error,
-        slope_of(&refutation.condition, extended),
+        slope_of(&refutation.condition, augmented),
     ) {
-        (false, Some(slope)) => finely(|lens| sign(&slope, refutation, extended, lens)),
+        (false, Some(slope)) => finely(|lens| sign(&slope, refutation, augmented, lens)),
         (true, _) => match design {
             Some(design) => {
-                finely(|lens| stability::unstable(&design.observer, refutation, extended, lens))
+                finely(|lens| stability::unstable(&design.observer, refutation, augmented, lens))
             }
             None => Ok(Answer::Unread),
         },
@@ -46,19 +50,19 @@ struct Slope {
 }
 
 /// The slope that a condition is about.
-fn slope_of(condition: &Statement, extended: &Extended<'_>) -> Option<Slope> {
+fn slope_of(condition: &Statement, augmented: &AugmentedPlant<'_>) -> Option<Slope> {
     let (value, by) = match condition {
         Statement::PartialKeepsSign { of, by } => {
-            (extended.derivatives[extended.state_index(of)?], by)
+            (augmented.derivatives[augmented.state_index(of)?], by)
         }
         Statement::OutputKeepsSign { output, state } => {
-            let mut outputs = extended.outputs.iter();
+            let mut outputs = augmented.outputs.iter();
             let found = outputs.find(|o| o.variable.name == *output)?;
             (found.variable.node, state)
         }
         _ => return None,
     };
-    let of = extended.states[extended.state_index(by)?].node;
+    let of = augmented.states[augmented.state_index(by)?].node;
     Some(Slope { value, of })
 }
 
@@ -116,13 +120,13 @@ const ZERO: f64 = 1e-26;
 fn sign(
     slope: &Slope,
     refutation: &Refutation,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     lens: &Lens,
 ) -> Result<Answer, String> {
     let values: Vec<f64> = refutation
         .points
         .iter()
-        .map(|point| slope_at(slope, point, extended, lens))
+        .map(|point| slope_at(slope, point, augmented, lens))
         .collect::<Result<_, _>>()?;
     let sizes = values.iter().map(|v| v.abs()).filter(|v| v.is_finite());
     let size = sizes.fold(0.0, f64::max);
@@ -154,11 +158,11 @@ const PLACES: usize = 12;
 fn slope_at(
     slope: &Slope,
     point: &Point,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     lens: &Lens,
 ) -> Result<f64, String> {
-    let graph = extended.graph();
-    let region = extended.region();
+    let graph = augmented.graph();
+    let region = augmented.region();
     let symbols = region.symbols();
     let moved = symbols
         .iter()
@@ -167,7 +171,7 @@ fn slope_at(
     let tape = Tape::new(graph, &symbols, &[slope.value]).map_err(|e| e.to_string())?;
     let mut found = f64::NAN;
     for attempt in 0..PLACES {
-        let place = filled(point, extended, attempt)?;
+        let place = filled(point, augmented, attempt)?;
         let place: Vec<BigFloat> = place.iter().map(|x| lens.precise.number(*x)).collect();
         let at = |by: &BigFloat| {
             let mut place = place.clone();
@@ -185,8 +189,12 @@ fn slope_at(
 /// A place of the box that agrees with the point. What the slope does not depend on is
 /// beside the middle of its range, where models like to switch, and elsewhere in further
 /// attempts: the equation may have no value there.
-fn filled(point: &Point, extended: &Extended<'_>, attempt: usize) -> Result<Vec<f64>, String> {
-    let region = extended.region();
+fn filled(
+    point: &Point,
+    augmented: &AugmentedPlant<'_>,
+    attempt: usize,
+) -> Result<Vec<f64>, String> {
+    let region = augmented.region();
     let sides = region.dimensions.iter().zip(region.centre()).enumerate();
     sides
         .map(|(i, (side, centre))| {

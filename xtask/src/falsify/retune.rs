@@ -2,7 +2,7 @@
 
 use lynkeus::Study;
 use lynkeus::prepare::Prepared;
-use lynkeus::structure::Extended;
+use lynkeus::structure::AugmentedPlant;
 
 use super::case::{Case, Kind, Role};
 use super::claims::{self, Claim, Findings};
@@ -18,14 +18,14 @@ const LARGEST: f64 = 3e3;
 pub fn raised(
     case: &mut Case,
     found: &Findings,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     numbers: &mut Numbers,
 ) -> bool {
     if found.counts.proved > 1 || (found.counts.proved == 1 && numbers.chance(0.7)) {
         return false;
     }
     match case.kind {
-        Kind::DriftObservable => bounded(case, found, extended, numbers) | faster(case, found),
+        Kind::DriftObservable => bounded(case, found, augmented, numbers) | faster(case, found),
         Kind::Triangular | Kind::BlockTriangular | Kind::StateAffine => {
             let θ0 = claims::constant(&found.certificates, "θ0");
             let now = case.setting("theta").and_then(|θ| θ.parse::<f64>().ok());
@@ -57,7 +57,7 @@ pub fn raised(
 fn bounded(
     case: &mut Case,
     found: &Findings,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     numbers: &mut Numbers,
 ) -> bool {
     let Some(design) = &found.design else {
@@ -66,13 +66,13 @@ fn bounded(
     let known = case.inputs.iter().filter(|i| i.role == Role::Known).count();
     if case.slope.is_some()
         || known != 1
-        || design.observer.estimates.len() != extended.states.len()
+        || design.observer.estimates.len() != augmented.states.len()
     {
         return false;
     }
     let observer = &design.observer;
     let order = match case.setting("variant") {
-        Some("\"practical\"") => observer.states.len() - extended.states.len(),
+        Some("\"practical\"") => observer.states.len() - augmented.states.len(),
         Some("\"theoretical\"") => 1 + observer.input_derivatives.len(),
         _ => return false,
     };
@@ -116,8 +116,8 @@ fn scale(case: &mut Case, factor: f64) -> bool {
 }
 
 /// Whether the plant itself is faster somewhere on its box than any gain that is tried.
-fn is_stiff(pair: &mut Pair, extended: &Extended<'_>, numbers: &mut Numbers) -> bool {
-    let plant = extended.plant;
+fn is_stiff(pair: &mut Pair, augmented: &AugmentedPlant<'_>, numbers: &mut Numbers) -> bool {
+    let plant = augmented.plant;
     let side = |v: &lynkeus::model::Variable| facts::finite(v.min, v.max);
     let sides: Vec<[f64; 2]> = plant.states.iter().map(side).collect();
     let acting: Vec<[f64; 2]> = plant.inputs.iter().map(side).collect();
@@ -151,25 +151,25 @@ pub fn diverges(
         let study = Study::load(&study).map_err(|e| e.to_string())?;
         let plant = lynkeus::prepare::plant(&study).map_err(|e| e.to_string())?;
         let prepared = Prepared::new(&study, &plant).map_err(|e| e.to_string())?;
-        let extended = prepared.extended();
+        let augmented = prepared.augmented();
         let Ok(design) = prepared.design() else {
             return Ok(None);
         };
-        let Ok(mut pair) = Pair::new(&plant, extended, &design.observer) else {
+        let Ok(mut pair) = Pair::new(&plant, augmented, &design.observer) else {
             return Ok(None);
         };
         // states beside the estimate have a start of their own to forget
-        let more = design.observer.states.len() != extended.states.len();
+        let more = design.observer.states.len() != augmented.states.len();
         if more
-            || pair.estimates() != extended.states.len()
+            || pair.estimates() != augmented.states.len()
             || pair.held.iter().any(Option::is_none)
         {
             return Ok(None);
         }
-        if is_stiff(&mut pair, extended, numbers) {
+        if is_stiff(&mut pair, augmented, numbers) {
             return Ok(None);
         }
-        let n = extended.states.len() as i32;
+        let n = augmented.states.len() as i32;
         // a claim that nothing meets but an error that grows far beyond any peak
         let peak = 100.0 * (10.0 * factor).powi(n - 1);
         let claim = Claim {
@@ -182,7 +182,7 @@ pub fn diverges(
             sides: vec![],
         };
         let claims = [claim];
-        let mut attack = attack(&faster, extended, &mut pair, &claims);
+        let mut attack = attack(&faster, augmented, &mut pair, &claims);
         let mut grew = None;
         for _ in 0..4 {
             let plan = attack.rest(numbers, 1e-6 / peak);

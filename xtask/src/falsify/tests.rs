@@ -50,7 +50,7 @@ fn case(term: &str) -> Case {
 fn with_pair<T>(
     case: &Case,
     name: &str,
-    look: impl FnOnce(&mut Pair, &lynkeus::structure::Extended<'_>) -> T,
+    look: impl FnOnce(&mut Pair, &lynkeus::structure::AugmentedPlant<'_>) -> T,
 ) -> T {
     let folder =
         std::env::temp_dir().join(format!("lynkeus-falsify-{name}-{}", std::process::id()));
@@ -59,8 +59,8 @@ fn with_pair<T>(
     let plant = lynkeus::prepare::plant(&study).unwrap();
     let prepared = Prepared::new(&study, &plant).unwrap();
     let design = prepared.design().unwrap();
-    let mut pair = Pair::new(&plant, prepared.extended(), &design.observer).unwrap();
-    let seen = look(&mut pair, prepared.extended());
+    let mut pair = Pair::new(&plant, prepared.augmented(), &design.observer).unwrap();
+    let seen = look(&mut pair, prepared.augmented());
     std::fs::remove_dir_all(folder).unwrap();
     seen
 }
@@ -78,9 +78,9 @@ fn claim(rate: f64, overshoot: f64, ultimate: f64) -> Claim {
 }
 
 fn ratio(case: &Case, name: &str, claim: Claim) -> f64 {
-    with_pair(case, name, |pair, extended| {
+    with_pair(case, name, |pair, augmented| {
         let claims = [claim];
-        let mut attack = attack(case, extended, pair, &claims);
+        let mut attack = attack(case, augmented, pair, &claims);
         let (_, worst) = attack.search(&mut Numbers::new(5, 0), 60);
         worst.ratio
     })
@@ -109,9 +109,9 @@ fn a_function_that_does_not_fall_is_found_without_simulation() {
     let of = |rate: f64, name: &str| {
         let mut claim = claim(rate, 1.0, 1.0);
         claim.lyapunov = Some(DMatrix::identity(2, 2));
-        with_pair(&case, name, |pair, extended| {
+        with_pair(&case, name, |pair, augmented| {
             let claims = [claim];
-            attack(&case, extended, pair, &claims).secant(&mut Numbers::new(5, 0))
+            attack(&case, augmented, pair, &claims).secant(&mut Numbers::new(5, 0))
         })
     };
     assert_eq!(of(0.49, "falls"), None);

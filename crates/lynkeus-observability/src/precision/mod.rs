@@ -213,17 +213,6 @@ impl<'g> Experiment<'g> {
         }
     }
 
-    /// Integrates plant and sensitivities once, in parallel, and gathers what every sensor tells.
-    ///
-    /// # Errors
-    /// [`Error::Setting`] for numbers that are impossible; whatever ends the integration. Where
-    /// the graph's budget ends it, the horizons reached by then are the answer, and there is
-    /// [`Error::Cancelled`] where none was.
-    pub fn run(&self) -> Result<Precision, Error> {
-        self.check()?;
-        tangent::run(self)
-    }
-
     /// States, then unknown inputs.
     fn quantities(&self) -> impl Iterator<Item = &Quantity> {
         self.states.iter().chain(&self.unknown)

@@ -10,7 +10,7 @@ use lynkeus_proof::chain::Chain;
 use lynkeus_proof::hurwitz::Stability;
 use lynkeus_proof::lyapunov;
 use lynkeus_proof::matrix::points;
-use lynkeus_structure::{Blocks, Extended, Region, Standing, blocks, short};
+use lynkeus_structure::{AugmentedPlant, Blocks, Region, Standing, blocks, short};
 
 use super::settings::{Correction, Settings};
 use crate::conditions::{GainedChain, Partial, lipschitz, names, output_slope, partials, told};
@@ -33,21 +33,21 @@ pub struct Form {
 /// The first arrangement into blocks whose conditions are proved, else the first that no
 /// condition refutes, else the first with its refusal.
 pub(super) fn form(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     region: &Region,
 ) -> Searched<Form> {
     let refusal = |summary: String| Examination::unfit(NAME, summary, vec![]);
-    let arrangements = match blocks::find(extended, &settings.request, settings.order.as_deref()) {
+    let arrangements = match blocks::find(augmented, &settings.request, settings.order.as_deref()) {
         Ok(arrangements) => arrangements,
         Err(summary) => return Ok(Err(refusal(summary))),
     };
     let mut best: Option<Found<Form>> = None;
-    for choice in distinct(extended, settings, &arrangements)?
+    for choice in distinct(augmented, settings, &arrangements)?
         .into_iter()
         .take(EXAMINED)
     {
-        let form = examined(extended, settings, region, choice)?;
+        let form = examined(augmented, settings, region, choice)?;
         let better = |best: &Found<Form>| form.examination.fit() < best.examination.fit();
         if best.as_ref().is_none_or(better) {
             best = Some(form);
@@ -72,7 +72,7 @@ struct Choice {
 
 /// Per set of chains the first order for which θ satisfies the theorem's rule, else the first.
 fn distinct(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     arrangements: &[Blocks],
 ) -> Result<Vec<Choice>, TuningError> {
@@ -80,7 +80,7 @@ fn distinct(
     let breaks = |blocks: &Blocks| θ.as_ref().is_some_and(|θ| chain_rule(blocks, θ).is_some());
     let mut found: Vec<(Vec<Vec<String>>, Choice)> = vec![];
     for blocks in arrangements {
-        let chains = blocks.names(extended);
+        let chains = blocks.names(augmented);
         match found.iter_mut().find(|(known, _)| *known == chains) {
             Some((_, choice)) => {
                 choice.orders += 1;
@@ -98,20 +98,20 @@ fn distinct(
 }
 
 fn examined(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     region: &Region,
     Choice { blocks, orders }: Choice,
 ) -> Result<Found<Form>, DesignError> {
-    let graph = extended.graph();
+    let graph = augmented.graph();
     let K = settings.K(&blocks.lengths());
     let (mut checks, mut all): (Vec<Check>, Vec<Vec<Partial>>) = (vec![], vec![]);
     for (output, chain) in &blocks.order {
-        checks.extend(output_slope(extended, *output, region)?);
-        let (found, signs) = partials(extended, &chain.states, region)?;
+        checks.extend(output_slope(augmented, *output, region)?);
+        let (found, signs) = partials(augmented, &chain.states, region)?;
         checks.extend(signs);
         checks.extend(stable(
-            extended,
+            augmented,
             settings,
             &chain.states,
             &K[*output],
@@ -119,12 +119,12 @@ fn examined(
         ));
         all.push(found);
     }
-    checks.push(lipschitz(extended, region)?);
+    checks.push(lipschitz(augmented, region)?);
     let numbers = all
         .iter()
         .flatten()
         .map(|partial| graph.constant_value(partial.node));
-    let mut summary = blocks.describe(extended);
+    let mut summary = blocks.describe(augmented);
     summary += match (settings.correction, numbers.clone().all(|a| a == Some(1.0))) {
         (_, true) => "",
         // numbers are 1 in other units
@@ -142,8 +142,8 @@ fn examined(
         summary +=
             &format!("; one of {orders} orders of these chains, the key 'order' decides otherwise");
     }
-    let chains = blocks.names(extended);
-    let examination = Examination::new(extended, region, NAME, summary, chains, checks)?;
+    let chains = blocks.names(augmented);
+    let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
     let form = Form {
         blocks,
         partials: all,
@@ -154,7 +154,7 @@ fn examined(
 /// Whether K stabilises a chain; none where that is known: K by its poles for a chain of
 /// integrators, or the form whose gains are divided by the partials one at a time.
 pub(super) fn stable(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     states: &[usize],
     K: &[f64],
@@ -172,7 +172,7 @@ pub(super) fn stable(
         K,
         partials: &ranges,
     };
-    let states = names(extended, states);
+    let states = names(augmented, states);
     let name = match integrators {
         true => Lee::Stable { states },
         false => Lee::StableAlong { states },

@@ -20,7 +20,7 @@ mod settings;
 mod theorem;
 mod transformed;
 
-use lynkeus_structure::{Extended, Region};
+use lynkeus_structure::{AugmentedPlant, Region};
 
 use crate::design::{Found, Searched};
 use crate::family::Stages;
@@ -45,45 +45,49 @@ impl Stages for BlockTriangular {
     const BASIS: &'static str = BASIS;
     const KEYS: &'static [&'static [KeySpec]] = settings::KEYS;
 
-    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
-        Settings::read(extended, tuning)
+    fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
+        Settings::read(augmented, tuning)
     }
 
     fn late(settings: &Settings) -> Result<(), TuningError> {
         settings.late()
     }
 
-    fn form(extended: &Extended<'_>, settings: &Settings, region: &Region) -> Searched<Form> {
+    fn form(
+        augmented: &AugmentedPlant<'_>,
+        settings: &Settings,
+        region: &Region,
+    ) -> Searched<Form> {
         match settings.impossible() {
             true => {
                 let summary = observer::ONLY_CLASSICAL.to_owned();
                 Ok(Err(Examination::unfit(NAME, summary, vec![])))
             }
-            false => form::form(extended, settings, region),
+            false => form::form(augmented, settings, region),
         }
     }
 
     fn design(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         settings: &Settings,
         found: Found<Form>,
     ) -> Result<Design, DesignError> {
         match (settings.lmi.clone()?, settings.remedies.low_power) {
             (Some(lmi), _) => {
                 let examination = found.examination;
-                guarantee::design_lmi(extended, &settings.common, lmi, NAME, examination)
+                guarantee::design_lmi(augmented, &settings.common, lmi, NAME, examination)
             }
-            (None, true) => observer::assemble(extended, settings, found),
-            (None, false) => observer(extended, settings, found),
+            (None, true) => observer::assemble(augmented, settings, found),
+            (None, false) => observer(augmented, settings, found),
         }
     }
 
     fn theorem(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         settings: &Settings,
         found: Found<Form>,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        theorem::certificate(extended, settings, &found.form.blocks, assumptions)
+        theorem::certificate(augmented, settings, &found.form.blocks, assumptions)
     }
 }

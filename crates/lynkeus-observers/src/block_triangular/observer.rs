@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{Expr, Graph, Node, jacobian};
-use lynkeus_structure::{Blocks, Chain, Extended};
+use lynkeus_structure::{AugmentedPlant, Blocks, Chain};
 
 use super::form::{Form, NAME, chain_rule};
 use super::settings::{Correction, Settings};
@@ -21,12 +21,12 @@ pub(super) const ONLY_CLASSICAL: &str =
 
 /// Observer (7) or (3).
 pub(super) fn observer(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Form>,
 ) -> Result<Design, DesignError> {
-    let graph = extended.graph();
-    let copy = PlantCopy::new(extended, &settings.common);
+    let graph = augmented.graph();
+    let copy = PlantCopy::new(augmented, &settings.common);
     let blocks = &form.blocks;
     let remedies = &settings.remedies;
     let transient = &remedies.transient;
@@ -38,7 +38,7 @@ pub(super) fn observer(
     parameters.extend(transient.as_ref().map(Transient::parameter));
     let coefficients = K.iter().enumerate();
     parameters.extend(coefficients.map(|(i, k)| (format!("K{}", i + 1), text(k))));
-    let mut derivatives = copy.at_estimate(&extended.derivatives);
+    let mut derivatives = copy.at_estimate(&augmented.derivatives);
     let mut gains = vec![];
     let speeds = Speed::of_chains(&copy, &θ);
     for (place, (output, chain)) in blocks.order.iter().enumerate() {
@@ -57,13 +57,13 @@ pub(super) fn observer(
         );
         let gain = match correction {
             Correction::Classical => timed,
-            Correction::Lee => lee(extended, chain, &timed),
+            Correction::Lee => lee(augmented, chain, &timed),
         };
         let gain = copy.at_estimate(&graph.substitute(&gain, &injected));
         let f: Vec<Node> = chain
             .states
             .iter()
-            .map(|&i| extended.derivatives[i])
+            .map(|&i| augmented.derivatives[i])
             .collect();
         let f = copy.at_estimate(&graph.substitute(&f, &injected));
         for ((&state, f), gain) in chain.states.iter().zip(f).zip(&gain) {
@@ -76,11 +76,11 @@ pub(super) fn observer(
             factors: &gain,
             limited: remedies.limit.is_some(),
         };
-        match printed.constant(extended) {
+        match printed.constant(augmented) {
             Some(constant) => gains.push(constant),
             None => {
                 if correction == Correction::Lee {
-                    let found = transformation(extended, chain);
+                    let found = transformation(augmented, chain);
                     let L: Vec<_> = found.L.into_iter().map(|l| vec![l]).collect();
                     parameters.push((format!("M{}", output + 1), start.table(&found.M)));
                     parameters.push((format!("L{}", output + 1), start.table(&L)));
@@ -108,12 +108,12 @@ fn injected(copy: &PlantCopy<'_, '_>, blocks: &Blocks, place: usize) -> HashMap<
     let later = blocks.order[place + 1..].iter();
     later
         .filter_map(|(output, _)| copy.measured_state(*output))
-        .map(|(state, y)| (copy.extended.states[state].node, y))
+        .map(|(state, y)| (copy.augmented.states[state].node, y))
         .collect()
 }
 
 pub(super) fn assemble(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Form>,
 ) -> Result<Design, DesignError> {
@@ -122,8 +122,8 @@ pub(super) fn assemble(
     } = settings;
     estimate::refuse(common, "form = \"low-power\"")?;
     let blocks = &form.blocks;
-    let graph = extended.graph();
-    let copy = PlantCopy::new(extended, common);
+    let graph = augmented.graph();
+    let copy = PlantCopy::new(augmented, common);
     let θ = settings.θ()?;
     let transient = remedies.transient.as_ref();
     let coefficients = remedies.coefficients(&blocks.lengths())?;
@@ -134,9 +134,9 @@ pub(super) fn assemble(
         let Some(innovation) = remedies.innovation(&copy, *output) else {
             continue;
         };
-        let derivative = |&state: &usize| extended.derivatives[state];
+        let derivative = |&state: &usize| augmented.derivatives[state];
         let f: Vec<Node> = chain.states.iter().map(derivative).collect();
-        let output_name = &extended.outputs[*output].variable.name;
+        let output_name = &augmented.outputs[*output].variable.name;
         let found = &form.partials[place];
         notes.extend(variation(
             output_name,
@@ -146,7 +146,7 @@ pub(super) fn assemble(
         let added = run.add(&Part {
             states: &chain.states,
             f: &graph.substitute(&f, &injected(&copy, blocks, place)),
-            divisors: &divisors(extended, found)?,
+            divisors: &divisors(augmented, found)?,
             innovation,
             K: &coefficients[*output],
             θ: &speeds[*output],
@@ -171,7 +171,10 @@ pub(super) fn assemble(
 }
 
 /// The constant that stands for each partial along a chain; 1 in the paper's form (2).
-fn divisors(extended: &Extended<'_>, partials: &[Partial]) -> Result<Vec<Node>, DesignError> {
+fn divisors(
+    augmented: &AugmentedPlant<'_>,
+    partials: &[Partial],
+) -> Result<Vec<Node>, DesignError> {
     let mut found = vec![];
     for partial in partials {
         let Some(middle) = partial.nominal() else {
@@ -179,7 +182,7 @@ fn divisors(extended: &Extended<'_>, partials: &[Partial]) -> Result<Vec<Node>, 
             let bounds = format!("bounds {} and {}", partial.bounds.0, partial.bounds.1);
             return Err(TuningError::new("form", expected, bounds).into());
         };
-        found.push(extended.graph().constant(middle).node());
+        found.push(augmented.graph().constant(middle).node());
     }
     Ok(found)
 }
@@ -196,10 +199,10 @@ struct Steps {
 }
 
 impl Steps {
-    fn new(extended: &Extended<'_>, chain: &Chain) -> Self {
-        let graph = extended.graph();
+    fn new(augmented: &AugmentedPlant<'_>, chain: &Chain) -> Self {
+        let graph = augmented.graph();
         let n = chain.states.len();
-        let F = own_jacobian(extended, chain);
+        let F = own_jacobian(augmented, chain);
         // Step 1: M̄ = (C; CF; …; CF^{n−1}), lower triangular, and the next power CFⁿ
         let mut rows = vec![unit(graph, n)];
         for k in 0..n {
@@ -229,9 +232,9 @@ impl Steps {
 
 /// M⁻¹(L + Δ⁻¹K) by the five steps. Since M = W⁻¹M̄, it is M̄⁻¹W(L + Δ⁻¹K): one
 /// triangular solve.
-pub(super) fn lee(extended: &Extended<'_>, chain: &Chain, gains: &[Node]) -> Vec<Node> {
-    let graph = extended.graph();
-    let Steps { M̄, L, W } = Steps::new(extended, chain);
+pub(super) fn lee(augmented: &AugmentedPlant<'_>, chain: &Chain, gains: &[Node]) -> Vec<Node> {
+    let graph = augmented.graph();
+    let Steps { M̄, L, W } = Steps::new(augmented, chain);
     // Step 5, multiplied out
     let v: Vec<Sparse> = L
         .iter()
@@ -255,9 +258,9 @@ pub(super) struct Transformation {
 }
 
 /// M, M⁻¹ and L of Step 5, for the proof; the observer needs none of them.
-pub(super) fn transformation(extended: &Extended<'_>, chain: &Chain) -> Transformation {
-    let graph = extended.graph();
-    let Steps { M̄, L, W } = Steps::new(extended, chain);
+pub(super) fn transformation(augmented: &AugmentedPlant<'_>, chain: &Chain) -> Transformation {
+    let graph = augmented.graph();
+    let Steps { M̄, L, W } = Steps::new(augmented, chain);
     let solved = |A: &[Vec<Sparse>], B: &[Vec<Sparse>]| {
         let n = A.len();
         let column = |j: usize| solve_lower(graph, A, B.iter().map(|row| row[j]).collect());
@@ -276,18 +279,18 @@ pub(super) fn transformation(extended: &Extended<'_>, chain: &Chain) -> Transfor
 pub(super) type Sparse = Option<Node>;
 
 /// F_i = ∂f_i/∂x_i, row by row.
-pub(super) fn own_jacobian(extended: &Extended<'_>, chain: &Chain) -> Vec<Vec<Sparse>> {
+pub(super) fn own_jacobian(augmented: &AugmentedPlant<'_>, chain: &Chain) -> Vec<Vec<Sparse>> {
     let f: Vec<Node> = chain
         .states
         .iter()
-        .map(|&i| extended.derivatives[i])
+        .map(|&i| augmented.derivatives[i])
         .collect();
     let x: Vec<Node> = chain
         .states
         .iter()
-        .map(|&i| extended.states[i].node)
+        .map(|&i| augmented.states[i].node)
         .collect();
-    let jacobian = jacobian::forward(extended.graph(), &f, &x);
+    let jacobian = jacobian::forward(augmented.graph(), &f, &x);
     let n = f.len();
     (0..n)
         .map(|i| (0..n).map(|j| jacobian.get(i, j)).collect())

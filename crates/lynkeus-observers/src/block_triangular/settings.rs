@@ -1,6 +1,6 @@
 //! The study's keys, and K: given, or by its eigenvalues.
 
-use lynkeus_structure::{ChainRequest, Extended};
+use lynkeus_structure::{AugmentedPlant, ChainRequest};
 
 use crate::conditions::{CHAINS, chain_request};
 use crate::estimate::{Common, PROLONG};
@@ -91,8 +91,8 @@ pub struct Settings {
 }
 
 impl Settings {
-    pub fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
-        let count = extended.outputs.len();
+    pub fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
+        let count = augmented.outputs.len();
         let remedies = Remedies::read(tuning, count, &[GIVEN, POLES])?;
         let correction = tuning.meant(&CORRECTION, [Correction::Lee, Correction::Classical])?;
         let K = coefficients(tuning)?;
@@ -103,8 +103,8 @@ impl Settings {
             K,
             given: tuning.values.contains_key(GIVEN.name),
             correction: correction.unwrap_or(Correction::Lee),
-            request: chain_request(extended, tuning, GIVEN.name, lengths)?,
-            order: order(extended, tuning)?,
+            request: chain_request(augmented, tuning, GIVEN.name, lengths)?,
+            order: order(augmented, tuning)?,
             lmi: (tuning.meant(&GAIN, [true])).and_then(|asked| Lmi::read(tuning, asked.is_some())),
             remedies,
         })
@@ -158,11 +158,14 @@ fn coefficients(tuning: &Tuning) -> Result<Option<Vec<Vec<f64>>>, TuningError> {
 }
 
 /// The outputs in the order that the study asks for, by place.
-fn order(extended: &Extended<'_>, tuning: &Tuning) -> Result<Option<Vec<usize>>, TuningError> {
+fn order(
+    augmented: &AugmentedPlant<'_>,
+    tuning: &Tuning,
+) -> Result<Option<Vec<usize>>, TuningError> {
     let Some(names) = tuning.names(ORDER.name)? else {
         return Ok(None);
     };
-    let outputs = extended.outputs.iter().map(|o| o.variable.name.as_str());
+    let outputs = augmented.outputs.iter().map(|o| o.variable.name.as_str());
     let outputs: Vec<&str> = outputs.collect();
     let place = |name: &String| outputs.iter().position(|o| o == name);
     let places: Option<Vec<usize>> = names.iter().map(place).collect();

@@ -11,7 +11,7 @@ use lynkeus_proof::magnitude::{plus, product, times};
 use lynkeus_proof::matrix::{square, sum};
 use lynkeus_proof::search::{first, lightest};
 use lynkeus_proof::{lyapunov, metzler};
-use lynkeus_structure::{Blocks, Extended, Standing, short};
+use lynkeus_structure::{AugmentedPlant, Blocks, Standing, short};
 use nalgebra::DMatrix;
 
 use super::form::chain_rule;
@@ -27,7 +27,7 @@ use crate::{Assumptions, Certificate, Check, Constant, DesignError, Lee, estimat
 pub(super) const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
 
 pub(super) fn certificate(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     blocks: &Blocks,
     assumptions: &Assumptions,
@@ -39,10 +39,10 @@ pub(super) fn certificate(
     let order: Vec<usize> = blocks.order.iter().map(|(output, _)| *output).collect();
     let by_output = settings.θ()?;
     let K = settings.K(&blocks.lengths());
-    let noise = state_noise(extended, &assumptions.region, &assumptions.noise)?;
+    let noise = state_noise(augmented, &assumptions.region, &assumptions.noise)?;
     let pick = |x: &[f64]| order.iter().map(|&o| x[o]).collect::<Vec<f64>>();
     let plant = Plant {
-        extended,
+        augmented,
         blocks,
         assumptions,
         K: order.iter().map(|&o| K[o].clone()).collect(),
@@ -82,7 +82,7 @@ impl Study<'_> {
     }
 
     fn certificate(&self) -> Result<Certificate, DesignError> {
-        let extended = self.plant.extended;
+        let augmented = self.plant.augmented;
         let facts = self.facts()?;
         let mut checks = facts.checks.clone();
         let mut constants = vec![];
@@ -98,19 +98,19 @@ impl Study<'_> {
         certificate.notes = self.notes();
         if let Some((σ, chains)) = found {
             let left = |process: &[f64]| self.ultimate(&facts, &chains, σ, process);
-            conclude(&mut certificate, extended, σ, self.plant.assumptions, left)?;
+            conclude(&mut certificate, augmented, σ, self.plant.assumptions, left)?;
         }
         Ok(certificate)
     }
 
     fn facts(&self) -> Result<Facts, DesignError> {
-        let extended = self.plant.extended;
+        let augmented = self.plant.augmented;
         let region = &self.plant.assumptions.region;
         let order = &self.blocks().order;
         let (mut checks, mut ranges): (Vec<Check>, Vec<Vec<(f64, f64)>>) = (vec![], vec![]);
         for (output, chain) in order {
-            checks.extend(output_slope(extended, *output, region)?);
-            let (found, signs) = partials(extended, &chain.states, region)?;
+            checks.extend(output_slope(augmented, *output, region)?);
+            let (found, signs) = partials(augmented, &chain.states, region)?;
             checks.extend(signs);
             ranges.push(match self.classical {
                 // M takes the partials out: a chain of integrators is left
@@ -118,7 +118,7 @@ impl Study<'_> {
                 true => found.iter().map(Partial::range).collect(),
             });
         }
-        let (plain, check) = slopes(extended, region, |a, b| self.skipped(a, b))?;
+        let (plain, check) = slopes(augmented, region, |a, b| self.skipped(a, b))?;
         checks.push(check);
         let similar: Vec<Similar> = match self.classical {
             true => vec![],
@@ -168,7 +168,7 @@ impl Study<'_> {
     ) -> Option<(Vec<DMatrix<f64>>, Vec<f64>)> {
         let (mut all, mut decays) = (vec![], vec![]);
         for (i, (_, chain)) in self.blocks().order.iter().enumerate() {
-            let states = names(self.plant.extended, &chain.states);
+            let states = names(self.plant.augmented, &chain.states);
             let name = Lee::Lyapunov { states };
             let gained = GainedChain {
                 K: &self.plant.K[i],
@@ -309,7 +309,7 @@ impl Study<'_> {
         match self.classical {
             true => {
                 let region = &self.plant.assumptions.region;
-                estimate::note(self.common, self.plant.extended, region)
+                estimate::note(self.common, self.plant.augmented, region)
             }
             false => box_note(self.common.clamp),
         }
@@ -485,7 +485,7 @@ impl Study<'_> {
     fn drift(&self, facts: &Facts) -> Result<Vec<f64>, DesignError> {
         let order = &self.blocks().order;
         let given = &self.plant.assumptions.drift;
-        let mut drift = vec![0.0; self.plant.extended.states.len()];
+        let mut drift = vec![0.0; self.plant.augmented.states.len()];
         for (i, (_, chain)) in order.iter().enumerate() {
             let mut column: Table = vec![];
             for &state in &chain.states {

@@ -16,7 +16,7 @@ use lynkeus_expr::{Interval, Node, jacobian};
 use lynkeus_proof::chain::Slope;
 use lynkeus_proof::magnitude::{plus, product, times};
 use lynkeus_proof::matrix::sum;
-use lynkeus_structure::{Blocks, Chain, Extended, Matrix, range};
+use lynkeus_structure::{AugmentedPlant, Blocks, Chain, Matrix, range};
 
 use super::observer::{Sparse, own_jacobian, transformation};
 use crate::theorem::magnitude;
@@ -58,7 +58,7 @@ pub(super) struct Similar {
 
 /// What the bounds are taken of.
 pub(super) struct Plant<'a> {
-    pub extended: &'a Extended<'a>,
+    pub augmented: &'a AugmentedPlant<'a>,
     pub blocks: &'a Blocks,
     pub assumptions: &'a Assumptions,
     /// K, in the order of the blocks
@@ -71,7 +71,7 @@ impl Plant<'_> {
     fn size(&self, node: Sparse) -> Result<f64, DesignError> {
         match node {
             None => Ok(0.0),
-            Some(node) => magnitude(self.extended.graph(), node, &self.assumptions.region),
+            Some(node) => magnitude(self.augmented.graph(), node, &self.assumptions.region),
         }
     }
 
@@ -85,7 +85,7 @@ impl Plant<'_> {
     }
 
     pub fn similar(&self, place: usize) -> Result<Similar, DesignError> {
-        let found = transformation(self.extended, self.chain(place));
+        let found = transformation(self.augmented, self.chain(place));
         let L = found
             .L
             .iter()
@@ -131,7 +131,7 @@ impl Plant<'_> {
 
     /// Widths of the ranges of the entries of F_i.
     fn widths(&self, i: usize) -> Result<Table, DesignError> {
-        let (graph, region) = (self.extended.graph(), &self.assumptions.region);
+        let (graph, region) = (self.augmented.graph(), &self.assumptions.region);
         let width = |node: &Sparse| -> Result<f64, DesignError> {
             let Some(node) = *node else { return Ok(0.0) };
             let found = range(graph, node, region)?;
@@ -145,7 +145,7 @@ impl Plant<'_> {
             })
         };
         let row = |row: &Vec<Sparse>| row.iter().map(width).collect();
-        own_jacobian(self.extended, self.chain(i))
+        own_jacobian(self.augmented, self.chain(i))
             .iter()
             .map(row)
             .collect()
@@ -158,12 +158,15 @@ impl Plant<'_> {
 
     /// |∂f/∂x| for the equations of `rows` and the states `columns`.
     pub fn jacobian(&self, rows: &[usize], columns: &[usize]) -> Result<Table, DesignError> {
-        let f: Vec<Node> = rows.iter().map(|&a| self.extended.derivatives[a]).collect();
+        let f: Vec<Node> = rows
+            .iter()
+            .map(|&a| self.augmented.derivatives[a])
+            .collect();
         let x: Vec<Node> = columns
             .iter()
-            .map(|&b| self.extended.states[b].node)
+            .map(|&b| self.augmented.states[b].node)
             .collect();
-        let found = jacobian::forward(self.extended.graph(), &f, &x);
+        let found = jacobian::forward(self.augmented.graph(), &f, &x);
         let row = |a: usize| (0..x.len()).map(|b| found.get(a, b)).collect();
         let nodes: Vec<Vec<Sparse>> = (0..f.len()).map(row).collect();
         self.table(&nodes)
@@ -174,7 +177,7 @@ impl Plant<'_> {
         let n = self.chain(i).states.len();
         for (c, (_, chain)) in self.blocks.order.iter().enumerate() {
             for (place, &state) in chain.states.iter().enumerate() {
-                let slope = self.slope_of_M(&similar[i], self.extended.states[state].node)?;
+                let slope = self.slope_of_M(&similar[i], self.augmented.states[state].node)?;
                 let product = product(&slope, &similar[i].inverse);
                 if product.iter().flatten().all(|x| *x == 0.0) {
                     continue;
@@ -189,9 +192,9 @@ impl Plant<'_> {
             }
         }
         // time itself has slope one
-        let inputs = self.extended.inputs.iter().enumerate();
+        let inputs = self.augmented.inputs.iter().enumerate();
         let inputs = inputs.map(|(j, u)| (u.node, self.assumptions.input_derivative(j, 1)));
-        for (symbol, speed) in inputs.chain([(self.extended.plant.time, 1.0)]) {
+        for (symbol, speed) in inputs.chain([(self.augmented.plant.time, 1.0)]) {
             let slope = self.slope_of_M(&similar[i], symbol)?;
             let product = product(&slope, &similar[i].inverse);
             for (p, &size) in product.iter().flatten().enumerate() {
@@ -203,7 +206,7 @@ impl Plant<'_> {
 
     /// |∂M/∂symbol|; `Matrix` drops what cancels, as the inputs in M often do.
     fn slope_of_M(&self, similar: &Similar, symbol: Node) -> Result<Table, DesignError> {
-        let graph = self.extended.graph();
+        let graph = self.augmented.graph();
         let n = similar.nodes.len();
         let slope = |i: usize, j: usize| {
             let entry = similar.nodes[i][j]?;
@@ -224,7 +227,7 @@ impl Plant<'_> {
         similar: &[Similar],
     ) -> Result<(f64, Vec<(usize, f64)>), DesignError> {
         let state = self.chain(c).states[place];
-        let f = self.size(Some(self.extended.derivatives[state]))?;
+        let f = self.size(Some(self.augmented.derivatives[state]))?;
         if c > i {
             let drift = self
                 .assumptions
@@ -241,7 +244,7 @@ impl Plant<'_> {
                 vec![],
             ));
         }
-        let head = &self.extended.states[self.chain(c).states[0]];
+        let head = &self.augmented.states[self.chain(c).states[0]];
         let side = self
             .assumptions
             .region

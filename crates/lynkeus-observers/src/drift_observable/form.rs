@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use lynkeus_expr::{Binary, Graph, Node, Op, Spent};
 use lynkeus_structure::output_map::{AffineForm, Degree, Rows};
 use lynkeus_structure::{
-    Dimension, Extended, Matrix, Region, Regularity, Verdict, output_map, short,
+    AugmentedPlant, Dimension, Matrix, Region, Regularity, Verdict, output_map, short,
 };
 
 use super::settings::{Settings, Variant};
@@ -47,25 +47,25 @@ pub(super) struct Map<'s> {
 impl<'s> Map<'s> {
     /// Inside: what breaks the form.
     pub fn new(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         settings: &'s Settings,
         region: &Region,
     ) -> Result<Result<Self, Examination>, DesignError> {
-        let affine = match output_map::affine_form(extended)? {
+        let affine = match output_map::affine_form(augmented)? {
             Ok(affine) => affine,
             Err(why) => return Ok(Err(unfit(why))),
         };
-        affordable(extended, &affine)?;
-        let order = extended.states.len().saturating_sub(1);
-        let lie = output_map::lie_derivatives(extended, &affine, order)?;
-        let gradients = output_map::lie_gradients(extended, &affine, order)?;
-        lasts(extended)?;
+        affordable(augmented, &affine)?;
+        let order = augmented.states.len().saturating_sub(1);
+        let lie = output_map::lie_derivatives(augmented, &affine, order)?;
+        let gradients = output_map::lie_gradients(augmented, &affine, order)?;
+        lasts(augmented)?;
         Ok(Ok(Self {
             affine,
             gradients,
             lie,
-            slopes: slopes(extended),
-            lipschitz: lipschitz(extended, region)?,
+            slopes: slopes(augmented),
+            lipschitz: lipschitz(augmented, region)?,
             settings,
         }))
     }
@@ -129,13 +129,13 @@ impl Form {
 
     /// With μ_i derivatives of output i, Σμ_i = n.
     pub(super) fn new(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         map: &Map<'_>,
         indices: Vec<usize>,
         region: &Region,
     ) -> Result<Found<Self>, DesignError> {
-        let degrees = degrees(extended, map, &indices, region)?;
-        let U = input_symbols(extended, map, &indices, &degrees);
+        let degrees = degrees(augmented, map, &indices, region)?;
+        let U = input_symbols(augmented, map, &indices, &degrees);
         let variant = map.settings.variant.unwrap_or_else(|| Variant::suited(&U));
         let rows: Vec<(usize, usize)> = indices
             .iter()
@@ -146,30 +146,30 @@ impl Form {
             .iter()
             .map(|&(i, k)| map.gradients[i][k].clone())
             .collect();
-        lasts(extended)?;
-        let regular = regular(extended, Germani::Regular, &Q, region)?;
-        lasts(extended)?;
+        lasts(augmented)?;
+        let regular = regular(augmented, Germani::Regular, &Q, region)?;
+        lasts(augmented)?;
         let Φ: Vec<Node> = rows.iter().map(|&(i, k)| map.lie[i][k]).collect();
-        let one_to_one = one_to_one(extended, &Φ, &regular, region)?;
-        lasts(extended)?;
+        let one_to_one = one_to_one(augmented, &Φ, &regular, region)?;
+        lasts(augmented)?;
         let (Φ, Q, Q_a) = match variant {
             Variant::Bounded => (Φ, Q, vec![]),
-            _ => with_inputs(extended, &rows, &U)?,
+            _ => with_inputs(augmented, &rows, &U)?,
         };
         // the map is followed along the plant: as states, inputs and time move
-        let slopes = map.settings.known_slopes(extended, &U);
-        let moving = with_slopes(extended, &U, &slopes, region);
-        let continuous = Regularity::of(extended.graph(), &Φ, &moving.symbols(), &moving)?;
+        let slopes = map.settings.known_slopes(augmented, &U);
+        let moving = with_slopes(augmented, &U, &slopes, region);
+        let continuous = Regularity::of(augmented.graph(), &Φ, &moving.symbols(), &moving)?;
         let reads = U.iter().any(|jet| !jet.is_empty());
         let inputs = Inputs {
-            extended,
+            augmented,
             U: &U,
             slopes: &slopes,
             Q̄: &Q,
             region,
         };
         let checks = Checks {
-            degree: known(extended, &indices, &degrees),
+            degree: known(augmented, &indices, &degrees),
             regular,
             one_to_one,
             lipschitz: map.lipschitz.clone(),
@@ -179,10 +179,10 @@ impl Form {
                 false => None,
             },
         };
-        let every: Vec<usize> = (0..extended.states.len()).collect();
-        let summary = summary(extended, variant, &rows, &U);
-        let chains = vec![names(extended, &every)];
-        let examination = Examination::new(extended, region, NAME, summary, chains, checks.all())?;
+        let every: Vec<usize> = (0..augmented.states.len()).collect();
+        let summary = summary(augmented, variant, &rows, &U);
+        let chains = vec![names(augmented, &every)];
+        let examination = Examination::new(augmented, region, NAME, summary, chains, checks.all())?;
         let next = map.slopes.iter().zip(&U);
         let form = Self {
             variant,
@@ -206,29 +206,29 @@ pub(super) fn unfit(summary: String) -> Examination {
 
 /// Φ̄, and Q̄ and Q̄_a of (4.20).
 fn with_inputs(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     rows: &[(usize, usize)],
     U: &[Vec<Node>],
 ) -> Result<(Vec<Node>, Rows, Rows), DesignError> {
-    let graph = extended.graph();
+    let graph = augmented.graph();
     let order = rows.iter().map(|r| r.1).max().unwrap_or(0);
-    let y = output_map::output_derivatives(extended, U, order)?;
-    lasts(extended)?;
+    let y = output_map::output_derivatives(augmented, U, order)?;
+    lasts(augmented)?;
     let Φ̄: Vec<Node> = rows.iter().map(|&(i, k)| y[i][k]).collect();
-    let Q̄ = output_map::jacobian_rows(graph, &Φ̄, &extended.symbols());
+    let Q̄ = output_map::jacobian_rows(graph, &Φ̄, &augmented.symbols());
     let Q̄_a = output_map::jacobian_rows(graph, &Φ̄, &U.concat());
     Ok((Φ̄, Q̄, Q̄_a))
 }
 
 fn summary(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     variant: Variant,
     rows: &[(usize, usize)],
     U: &[Vec<Node>],
 ) -> String {
-    let y = |&(i, k): &(usize, usize)| derivative_name(&extended.outputs[i].variable.name, k);
+    let y = |&(i, k): &(usize, usize)| derivative_name(&augmented.outputs[i].variable.name, k);
     let map: Vec<String> = rows.iter().map(y).collect();
-    let u = extended
+    let u = augmented
         .inputs
         .iter()
         .zip(U)
@@ -247,7 +247,7 @@ fn summary(
 
 /// r_ij of output i with respect to input j, for indices μ.
 pub(super) fn degrees(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     map: &Map<'_>,
     μ: &[usize],
     region: &Region,
@@ -256,8 +256,8 @@ pub(super) fn degrees(
         let mut all = vec![];
         for (rows, &μ) in gradients.iter().zip(μ) {
             let rows = &rows[..μ];
-            let of_input = |j| output_map::relative_degree(extended, rows, &map.affine, j, region);
-            let row: Result<Vec<Degree>, _> = (0..extended.inputs.len()).map(of_input).collect();
+            let of_input = |j| output_map::relative_degree(augmented, rows, &map.affine, j, region);
+            let row: Result<Vec<Degree>, _> = (0..augmented.inputs.len()).map(of_input).collect();
             all.push(row?);
         }
         Ok(all)
@@ -267,28 +267,28 @@ pub(super) fn degrees(
         .iter()
         .zip(μ)
         .any(|(row, &μ)| row.iter().any(|d| d.r < μ));
-    if extended.inputs.len() < 2 || !early {
+    if augmented.inputs.len() < 2 || !early {
         return Ok(found);
     }
     // an input that enters early may bring another one along
     let order = μ.iter().copied().max().unwrap_or(0);
-    let orders = vec![order; extended.inputs.len()];
-    let U = jets(extended, map, &orders);
-    let y = output_map::output_derivatives(extended, &U, order.saturating_sub(1))?;
-    let x = extended.symbols();
+    let orders = vec![order; augmented.inputs.len()];
+    let U = jets(augmented, map, &orders);
+    let y = output_map::output_derivatives(augmented, &U, order.saturating_sub(1))?;
+    let x = augmented.symbols();
     let gradients: Vec<Rows> = y
         .iter()
-        .map(|y| output_map::jacobian_rows(extended.graph(), y, &x))
+        .map(|y| output_map::jacobian_rows(augmented.graph(), y, &x))
         .collect();
     of(
         &gradients,
-        &with_slopes(extended, &U, &extended.input_derivatives, region),
+        &with_slopes(augmented, &U, &augmented.input_derivatives, region),
     )
 }
 
 /// u_j, u_j', …, as many as Φ̄ depends on: for one output n − r.
 pub(super) fn input_symbols(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     map: &Map<'_>,
     indices: &[usize],
     degrees: &[Vec<Degree>],
@@ -298,13 +298,13 @@ pub(super) fn input_symbols(
         let orders = pairs.map(|(μ, d)| μ.saturating_sub(d[j].r));
         orders.max().unwrap_or(0)
     };
-    let orders: Vec<usize> = (0..extended.inputs.len()).map(needed).collect();
-    jets(extended, map, &orders)
+    let orders: Vec<usize> = (0..augmented.inputs.len()).map(needed).collect();
+    jets(augmented, map, &orders)
 }
 
 /// The symbols of u_j, u_j', …, so many of each input.
-fn jets(extended: &Extended<'_>, map: &Map<'_>, orders: &[usize]) -> Vec<Vec<Node>> {
-    let whole = extended.inputs.iter().zip(&map.slopes);
+fn jets(augmented: &AugmentedPlant<'_>, map: &Map<'_>, orders: &[usize]) -> Vec<Vec<Node>> {
+    let whole = augmented.inputs.iter().zip(&map.slopes);
     let whole = whole.map(|(input, slopes)| std::iter::once(input.node).chain(slopes.clone()));
     whole
         .zip(orders)
@@ -313,25 +313,25 @@ fn jets(extended: &Extended<'_>, map: &Map<'_>, orders: &[usize]) -> Vec<Vec<Nod
 }
 
 /// Symbols of u_j', u_j'', …, as many as there are states, for each known input.
-pub(super) fn slopes(extended: &Extended<'_>) -> Vec<Vec<Node>> {
-    let graph = extended.graph();
+pub(super) fn slopes(augmented: &AugmentedPlant<'_>) -> Vec<Vec<Node>> {
+    let graph = augmented.graph();
     let symbol = |name: &str, k: usize| graph.fresh(format!("derivative {k} of {name}")).node();
-    let orders = 1..=extended.states.len();
+    let orders = 1..=augmented.states.len();
     let one =
         |input: &lynkeus_model::Variable| orders.clone().map(|k| symbol(&input.name, k)).collect();
-    extended.inputs.iter().map(one).collect()
+    augmented.inputs.iter().map(one).collect()
 }
 
 /// The box with u', u'', … within their bounds, which are those of each input's own list, and free
 /// beyond its end.
 pub(super) fn with_slopes(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     U: &[Vec<Node>],
     bounds: &[Vec<f64>],
     region: &Region,
 ) -> Region {
     let mut region = region.clone();
-    for ((input, jet), bounds) in extended.inputs.iter().zip(U).zip(bounds) {
+    for ((input, jet), bounds) in augmented.inputs.iter().zip(U).zip(bounds) {
         let further = jet.iter().enumerate().skip(1).map(|(k, &symbol)| {
             let bound = bounds.get(k - 1).copied().unwrap_or(f64::INFINITY);
             Dimension {
@@ -348,11 +348,15 @@ pub(super) fn with_slopes(
 }
 
 /// Definition 2.2, with the zeros proved or not.
-pub(super) fn known(extended: &Extended<'_>, indices: &[usize], degrees: &[Vec<Degree>]) -> Check {
+pub(super) fn known(
+    augmented: &AugmentedPlant<'_>,
+    indices: &[usize],
+    degrees: &[Vec<Degree>],
+) -> Check {
     let mut found = vec![];
     let mut proved = true;
     for (i, row) in degrees.iter().enumerate().filter(|(i, _)| indices[*i] > 0) {
-        let y = &extended.outputs[i].variable.name;
+        let y = &augmented.outputs[i].variable.name;
         for degree in row {
             proved &= degree.proved;
             found.push(format!("{y}: r = {}, {}", degree.r, degree.detail));
@@ -371,9 +375,12 @@ pub(super) fn known(extended: &Extended<'_>, indices: &[usize], degrees: &[Vec<D
 ///
 /// # Errors
 /// How many operations it would have.
-pub(super) fn affordable(extended: &Extended<'_>, form: &AffineForm) -> Result<(), DesignError> {
-    let budget = extended.graph().budget();
-    let operations = operations(extended, form);
+pub(super) fn affordable(
+    augmented: &AugmentedPlant<'_>,
+    form: &AffineForm,
+) -> Result<(), DesignError> {
+    let budget = augmented.graph().budget();
+    let operations = operations(augmented, form);
     let time = budget.left().map(|left| left.as_secs_f64() * PER_SECOND);
     let room = budget.room().map(|room| room as f64 / BYTES);
     match time.into_iter().chain(room).all(|most| operations <= most) {
@@ -384,10 +391,10 @@ pub(super) fn affordable(extended: &Extended<'_>, form: &AffineForm) -> Result<(
 
 /// Of n derivatives of the outputs with their slopes by n states: the k-th coefficient of a
 /// product of series has k products.
-fn operations(extended: &Extended<'_>, form: &AffineForm) -> f64 {
-    let n = extended.states.len() as f64;
-    let graph = extended.graph();
-    let outputs = extended.outputs.iter().map(|o| o.variable.node);
+fn operations(augmented: &AugmentedPlant<'_>, form: &AffineForm) -> f64 {
+    let n = augmented.states.len() as f64;
+    let graph = augmented.graph();
+    let outputs = augmented.outputs.iter().map(|o| o.variable.node);
     let roots: Vec<Node> = form.drift.iter().copied().chain(outputs).collect();
     let cost = |node: &Node| match graph.op(*node) {
         Op::Constant(_) | Op::Symbol(_) => 0.0,
@@ -411,13 +418,13 @@ fn is_linear(graph: &Graph, op: Op) -> bool {
 
 /// Whether a square matrix is regular on the whole region.
 pub(super) fn regular(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     statement: Germani,
     Q: &Rows,
     region: &Region,
 ) -> Result<Check, DesignError> {
     let n = Q.len();
-    let Q = Matrix::from_fn(extended.graph(), (n, n), |i, j| {
+    let Q = Matrix::from_fn(augmented.graph(), (n, n), |i, j| {
         Q.get(i).and_then(|row| *row.get(j)?)
     });
     Ok(Statement::from(statement).with(lynkeus_structure::rank::regular(&Q, region)?))
@@ -425,14 +432,14 @@ pub(super) fn regular(
 
 /// Whether Φ, whose Jacobian was found `regular` or not, is one-to-one on the whole region.
 pub(super) fn one_to_one(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     Φ: &[Node],
     regular: &Check,
     region: &Region,
 ) -> Result<Check, DesignError> {
-    let states = extended.symbols();
+    let states = augmented.symbols();
     let map = lynkeus_structure::one_to_one::Map {
-        graph: extended.graph(),
+        graph: augmented.graph(),
         functions: Φ,
         states: &states,
         region,
@@ -443,7 +450,7 @@ pub(super) fn one_to_one(
 
 /// The map where it reads inputs.
 pub(super) struct Inputs<'a, 'p> {
-    pub extended: &'a Extended<'p>,
+    pub augmented: &'a AugmentedPlant<'p>,
     pub U: &'a [Vec<Node>],
     /// bounds of |u'|, |u''|, … per input, as far as they are declared
     pub slopes: &'a [Vec<f64>],
@@ -463,15 +470,15 @@ impl Inputs<'_, '_> {
         let name = || Germani::UniformlyObservable;
         // a singular point for a constant input is the better witness
         let still = self.still();
-        let mut check = regular(self.extended, name(), &self.at_rest(&still), self.region)?;
+        let mut check = regular(self.augmented, name(), &self.at_rest(&still), self.region)?;
         if !matches!(check.verdict, Verdict::Refuted(_)) && !still.is_empty() {
-            let wider = with_slopes(self.extended, self.U, self.slopes, self.region);
+            let wider = with_slopes(self.augmented, self.U, self.slopes, self.region);
             let declared = self.declared();
             let statement = match declared.is_empty() {
                 true => name(),
                 false => Germani::RegularWithin,
             };
-            check = regular(self.extended, statement, self.Q̄, &wider)?;
+            check = regular(self.augmented, statement, self.Q̄, &wider)?;
             if !declared.is_empty() {
                 check.detail += &format!("; for {declared}, as `input_derivatives` bounds them");
             }
@@ -484,7 +491,7 @@ impl Inputs<'_, '_> {
 
     /// The bounds of the derivatives that Q̄ reads, in words.
     fn declared(&self) -> String {
-        let jets = self.extended.inputs.iter().zip(self.U).zip(self.slopes);
+        let jets = self.augmented.inputs.iter().zip(self.U).zip(self.slopes);
         let each = jets.flat_map(|((input, jet), bounds)| {
             let read = jet.len().saturating_sub(1);
             let each = bounds.iter().take(read).enumerate();
@@ -504,7 +511,7 @@ impl Inputs<'_, '_> {
     pub fn largest(&self) -> Result<Option<f64>, DesignError> {
         let holds = |radius: f64| -> Result<bool, DesignError> {
             let mut region = self.region.clone();
-            let is_input = |symbol: Node| self.extended.inputs.iter().any(|u| u.node == symbol);
+            let is_input = |symbol: Node| self.augmented.inputs.iter().any(|u| u.node == symbol);
             for side in region
                 .dimensions
                 .iter_mut()
@@ -513,8 +520,8 @@ impl Inputs<'_, '_> {
                 (side.min, side.max) = (-radius, radius);
             }
             let orders = self.U.iter().map(|jet| vec![radius; jet.len()]);
-            let region = with_slopes(self.extended, self.U, &orders.collect::<Vec<_>>(), &region);
-            Ok(regular(self.extended, Germani::RegularWithin, self.Q̄, &region)?.is_proved())
+            let region = with_slopes(self.augmented, self.U, &orders.collect::<Vec<_>>(), &region);
+            Ok(regular(self.augmented, Germani::RegularWithin, self.Q̄, &region)?.is_proved())
         };
         let (mut low, mut high) = (1e-6, ANY);
         if !holds(low)? {
@@ -535,14 +542,14 @@ impl Inputs<'_, '_> {
 
     /// u', u'', … ↦ 0
     fn still(&self) -> HashMap<Node, Node> {
-        let zero = self.extended.graph().constant(0.0).node();
+        let zero = self.augmented.graph().constant(0.0).node();
         let slopes = self.U.iter().flat_map(|jet| jet.iter().skip(1));
         slopes.map(|&symbol| (symbol, zero)).collect()
     }
 
     /// Q̄ for constant inputs.
     fn at_rest(&self, still: &HashMap<Node, Node>) -> Rows {
-        let graph = self.extended.graph();
+        let graph = self.augmented.graph();
         let constant = |row: &Vec<Option<Node>>| {
             let entry = |e: &Option<Node>| Some(graph.substitute(&[(*e)?], still)[0]);
             row.iter().map(entry).collect()

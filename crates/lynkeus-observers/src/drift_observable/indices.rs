@@ -11,7 +11,7 @@ use lynkeus_expr::Spent;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observability::{Answer, Question, analyse};
 use lynkeus_structure::output_map::Codistribution;
-use lynkeus_structure::{Extended, Region, Standing, Verdict};
+use lynkeus_structure::{AugmentedPlant, Region, Standing, Verdict};
 
 use super::form::{Form, Map, unfit};
 use super::settings::{Asked, POLES, Settings};
@@ -27,47 +27,47 @@ const TOLD: usize = 4;
 
 /// The form of the plant on `region`, or why there is none.
 pub(super) fn form(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     region: &Region,
 ) -> Searched<Form> {
-    let map = match Map::new(extended, settings, region)? {
+    let map = match Map::new(augmented, settings, region)? {
         Ok(map) => map,
         Err(examination) => return Ok(Err(examination)),
     };
     let lengths = match settings.asked.clone() {
-        Asked::Indices(indices) => return Ok(Ok(Form::new(extended, &map, indices, region)?)),
+        Asked::Indices(indices) => return Ok(Ok(Form::new(augmented, &map, indices, region)?)),
         Asked::Lengths(lengths) => lengths,
     };
-    lasts(extended)?;
-    let mut rows = Codistribution::new(extended, &map.gradients)?;
-    lasts(extended)?;
+    lasts(augmented)?;
+    let mut rows = Codistribution::new(augmented, &map.gradients)?;
+    lasts(augmented)?;
     let first = rows.krener_respondek();
-    if first.iter().sum::<usize>() < extended.states.len() {
-        return Ok(Err(blind(extended)?));
+    if first.iter().sum::<usize>() < augmented.states.len() {
+        return Ok(Err(blind(augmented)?));
     }
     let mut search = Search {
-        extended,
+        augmented,
         map: &map,
-        region: declared(extended, region),
+        region: declared(augmented, region),
         rows,
         others: vec![],
     };
     let found = search.best(&first, &lengths)?;
     let mut chosen = match search.region == *region {
         true => found,
-        false => Form::new(extended, &map, found.form.indices, region)?,
+        false => Form::new(augmented, &map, found.form.indices, region)?,
     };
     chosen.examination.summary += &told(&chosen.form.indices, &search.others);
     Ok(Ok(chosen))
 }
 
 /// The region with the inputs' declared ranges.
-fn declared(extended: &Extended<'_>, region: &Region) -> Region {
+fn declared(augmented: &AugmentedPlant<'_>, region: &Region) -> Region {
     let mut region = region.clone();
     for side in &mut region.dimensions {
-        let mut inputs = extended.plant.inputs.iter();
-        let known = extended.inputs.iter().any(|i| i.node == side.symbol);
+        let mut inputs = augmented.plant.inputs.iter();
+        let known = augmented.inputs.iter().any(|i| i.node == side.symbol);
         if let Some(input) = inputs.find(|i| known && i.node == side.symbol) {
             (side.min, side.max) = (input.min, input.max);
         }
@@ -92,7 +92,7 @@ enum Known {
 }
 
 struct Search<'a, 'p> {
-    extended: &'a Extended<'p>,
+    augmented: &'a AugmentedPlant<'p>,
     map: &'a Map<'a>,
     region: Region,
     rows: Codistribution,
@@ -155,7 +155,7 @@ impl Search<'_, '_> {
     }
 
     fn examined(&self, indices: &[usize]) -> Result<Found<Form>, DesignError> {
-        Form::new(self.extended, self.map, indices.to_vec(), &self.region)
+        Form::new(self.augmented, self.map, indices.to_vec(), &self.region)
     }
 }
 
@@ -205,20 +205,20 @@ const WORDS: f64 = 0.5;
 ///
 /// # Errors
 /// Only rounding hides it, or a limit ended the search for it.
-pub(super) fn blind(extended: &Extended<'_>) -> Result<Examination, DesignError> {
-    lasts(extended)?;
+pub(super) fn blind(augmented: &AugmentedPlant<'_>) -> Result<Examination, DesignError> {
+    lasts(augmented)?;
     let names = |of: &[Variable]| of.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
-    let drift = answer(extended, names(&extended.inputs))?;
+    let drift = answer(augmented, names(&augmented.inputs))?;
     if drift.is_complete() {
         return Err(DesignError::Spent(Spent::Digits));
     }
     let mut hidden = hidden(&drift);
     if hidden.is_empty() {
-        lasts(extended)?;
+        lasts(augmented)?;
         return Err(DesignError::Spent(Spent::Digits));
     }
-    if !extended.inputs.is_empty() {
-        hidden = self::hidden(&answer(extended, vec![])?);
+    if !augmented.inputs.is_empty() {
+        hidden = self::hidden(&answer(augmented, vec![])?);
     }
     let advice = match hidden.is_empty() {
         true => "the rest shows only where the inputs are not zero; write the model around an operating point, u = u0 + du with the input du".to_owned(),
@@ -227,7 +227,7 @@ pub(super) fn blind(extended: &Extended<'_>) -> Result<Examination, DesignError>
     Ok(unfit(format!(
         "with u = 0 the outputs and their derivatives determine {} of {} combinations of states: {advice}",
         drift.rank,
-        extended.states.len()
+        augmented.states.len()
     )))
 }
 
@@ -239,34 +239,34 @@ fn hidden(answer: &Answer) -> Vec<String> {
     hidden.map(|(asked, _)| asked.name.clone()).collect()
 }
 
-/// What can be known of the extended states, with these inputs at zero.
-fn answer(extended: &Extended<'_>, zero: Vec<String>) -> Result<Answer, DesignError> {
+/// What can be known of the augmented states, with these inputs at zero.
+fn answer(augmented: &AugmentedPlant<'_>, zero: Vec<String>) -> Result<Answer, DesignError> {
     let question = Question {
         disturbances: zero,
-        budget: extended.graph().budget().part(WORDS),
+        budget: augmented.graph().budget().part(WORDS),
         ..Question::default()
     };
-    let answer = analyse(&plant(extended), &question);
+    let answer = analyse(&plant(augmented), &question);
     // the names are the plant's own
     answer.map_err(|_| DesignError::Spent(Spent::Digits))
 }
 
-/// The extended plant as a plant of its own: unknown inputs are states, starts are not known.
-fn plant(extended: &Extended<'_>) -> Plant {
+/// The augmented plant as a plant of its own: unknown inputs are states, starts are not known.
+fn plant(augmented: &AugmentedPlant<'_>) -> Plant {
     let state = |state: &Variable| Variable {
         fixed: false,
         start_node: None,
         ..state.clone()
     };
     Plant {
-        states: extended.states.iter().map(state).collect(),
-        derivatives: extended.derivatives.clone(),
-        inputs: extended.inputs.clone(),
-        outputs: extended
+        states: augmented.states.iter().map(state).collect(),
+        derivatives: augmented.derivatives.clone(),
+        inputs: augmented.inputs.clone(),
+        outputs: augmented
             .outputs
             .iter()
             .map(|o| o.variable.clone())
             .collect(),
-        ..extended.plant.clone()
+        ..augmented.plant.clone()
     }
 }

@@ -18,7 +18,7 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{MissingInput, Node};
 use lynkeus_proof::magnitude::{length, norm, plus, product, times};
-use lynkeus_structure::{Extended, Matrix, Region, Regularity, output_map};
+use lynkeus_structure::{AugmentedPlant, Matrix, Region, Regularity, output_map};
 
 use super::form::{Form, derivative_name, regular};
 use super::settings::Variant;
@@ -57,14 +57,14 @@ pub(super) struct Share {
 }
 
 pub(super) fn bounds(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     form: &Form,
     slopes: &[Option<Vec<f64>>],
     region: &Region,
 ) -> Result<Lipschitz, DesignError> {
-    let graph = extended.graph();
-    let mut box_ = Enclosure::new(extended, region);
-    let U = further(extended, form, slopes, &mut box_);
+    let graph = augmented.graph();
+    let mut box_ = Enclosure::new(augmented, region);
+    let U = further(augmented, form, slopes, &mut box_);
     let n = form.rows.len();
     let of_rows = |rows: &output_map::Rows, columns: usize| {
         Matrix::from_fn(graph, (n, columns), |i, j| {
@@ -87,7 +87,7 @@ pub(super) fn bounds(
         input,
         unseen,
         w,
-    } = remainders(extended, form, &U)?;
+    } = remainders(augmented, form, &U)?;
     let rows: Vec<Node> = input.iter().flatten().chain(&drift).copied().collect();
     let sides = box_.region();
     let continuous = Regularity::of(graph, &rows, &sides.symbols(), sides)?;
@@ -97,7 +97,7 @@ pub(super) fn bounds(
     let (Q_size, Q_a_size) = (box_.magnitudes(&Q)?, box_.magnitudes(&Q_a)?);
     let mixed = |left: &[Vec<f64>]| product(left, &Q_a_size);
     let of_remainder = |r: &[Node]| -> Result<Vec<f64>, MissingInput> {
-        let x = Matrix::jacobian(graph, r, &extended.symbols());
+        let x = Matrix::jacobian(graph, r, &augmented.symbols());
         let a = box_.magnitudes(&Matrix::jacobian(graph, r, &x_a))?;
         let z = match &found {
             Some(inverse) => box_.divided(&x, inverse)?,
@@ -134,7 +134,7 @@ pub(super) fn bounds(
             })
             .collect(),
         Q: Q_size,
-        regular: regular(extended, Germani::RegularWithin, &form.Q, box_.region())?,
+        regular: regular(augmented, Germani::RegularWithin, &form.Q, box_.region())?,
         continuous: Statement::from(Germani::ContinuousRows).with(continuous.finding()),
         open: box_.open(),
     })
@@ -142,14 +142,14 @@ pub(super) fn bounds(
 
 /// u, u', …, one order further than the observer reads, each with its bounds.
 fn further(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     form: &Form,
     slopes: &[Option<Vec<f64>>],
     box_: &mut Enclosure<'_>,
 ) -> Vec<Vec<Node>> {
     let mut U = vec![];
     let jets = form.U.iter().zip(&form.w);
-    for ((input, (jet, &w)), given) in extended.inputs.iter().zip(jets).zip(slopes) {
+    for ((input, (jet, &w)), given) in augmented.inputs.iter().zip(jets).zip(slopes) {
         let mut symbols = vec![input.node];
         for k in 1..=jet.len() {
             let symbol = jet.get(k).copied().unwrap_or(w);
@@ -176,20 +176,20 @@ struct Remainders {
 }
 
 fn remainders(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     form: &Form,
     U: &[Vec<Node>],
 ) -> Result<Remainders, MissingInput> {
-    let graph = extended.graph();
+    let graph = augmented.graph();
     let zero = graph.constant(0.0).node();
     let order = form.indices.iter().copied().max().unwrap_or(0);
     let bounded = match form.variant {
-        Variant::Bounded => output_map::affine_form(extended)?.ok(),
+        Variant::Bounded => output_map::affine_form(augmented)?.ok(),
         _ => None,
     };
     let y = match &bounded {
-        Some(affine) => output_map::lie_derivatives(extended, affine, order)?,
-        None => output_map::output_derivatives(extended, U, order)?,
+        Some(affine) => output_map::lie_derivatives(augmented, affine, order)?,
+        None => output_map::output_derivatives(augmented, U, order)?,
     };
     let last = |&(i, k): &(usize, usize)| match k + 1 == form.indices[i] {
         true => y[i][k + 1],
@@ -207,14 +207,14 @@ fn remainders(
         drift: graph.substitute(&drift, &still),
         input: bounded.map_or_else(Vec::new, |affine| {
             let columns = affine.input_columns.iter();
-            columns.map(|g| along(extended, form, g)).collect()
+            columns.map(|g| along(augmented, form, g)).collect()
         }),
     })
 }
 
 /// L_g of every row of the map.
-fn along(extended: &Extended<'_>, form: &Form, g: &[Option<Node>]) -> Vec<Node> {
-    let graph = extended.graph();
+fn along(augmented: &AugmentedPlant<'_>, form: &Form, g: &[Option<Node>]) -> Vec<Node> {
+    let graph = augmented.graph();
     let of_row = |row: &Vec<Option<Node>>| {
         let pairs = row.iter().zip(g);
         let terms = pairs.filter_map(|(q, g)| Some(graph.expr((*q)?) * graph.expr((*g)?)));

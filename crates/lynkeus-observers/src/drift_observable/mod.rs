@@ -23,7 +23,7 @@ mod observer;
 mod settings;
 mod theorem;
 
-use lynkeus_structure::{Extended, Region};
+use lynkeus_structure::{AugmentedPlant, Region};
 
 use crate::design::{Found, Searched};
 use crate::family::Stages;
@@ -46,29 +46,33 @@ impl Stages for DriftObservable {
     const FORM_ON_ASSUMED_BOX: bool = true;
     const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];
 
-    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
-        Settings::read(extended, tuning)
+    fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
+        Settings::read(augmented, tuning)
     }
 
-    fn form(extended: &Extended<'_>, settings: &Settings, region: &Region) -> Searched<Form> {
-        indices::form(extended, settings, region)
+    fn form(
+        augmented: &AugmentedPlant<'_>,
+        settings: &Settings,
+        region: &Region,
+    ) -> Searched<Form> {
+        indices::form(augmented, settings, region)
     }
 
     fn design(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         settings: &Settings,
         found: Found<Form>,
     ) -> Result<Design, DesignError> {
-        let gains = observer::Gains::new(extended, settings, &found.form)?;
-        observer::design(extended, &settings.common, found, gains)
+        let gains = observer::Gains::new(augmented, settings, &found.form)?;
+        observer::design(augmented, &settings.common, found, gains)
     }
 
     fn theorem(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         settings: &Settings,
         found: Found<Form>,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        theorem::certificate(extended, settings, &found.form, assumptions)
+        theorem::certificate(augmented, settings, &found.form, assumptions)
     }
 }

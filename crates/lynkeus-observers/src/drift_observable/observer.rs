@@ -7,7 +7,7 @@ use lynkeus_expr::{Expr, Graph, Node, Tape};
 use lynkeus_gain::integrators::{self, Lemma32, Pole};
 use lynkeus_model::Variable;
 use lynkeus_proof::magnitude::{root, times};
-use lynkeus_structure::Extended;
+use lynkeus_structure::AugmentedPlant;
 use nalgebra::{DMatrix, DVector};
 
 use super::form::{Form, NAME, derivative_name};
@@ -31,22 +31,22 @@ const WITHDRAWN: f64 = 1e-4;
 pub(super) const WHOLE: f64 = 6.0 * WITHDRAWN;
 
 pub(super) fn design(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     common: &Common,
     Found { form, examination }: Found<Form>,
     gains: Gains,
 ) -> Result<Design, DesignError> {
-    let graph = extended.graph();
-    let copy = PlantCopy::new(extended, common);
+    let graph = augmented.graph();
+    let copy = PlantCopy::new(augmented, common);
     let speed = Speed::new(&copy, "pole_scale", 1.0, scale_of_poles(&gains));
-    let filters = filters(extended, &form, &gains, &speed);
+    let filters = filters(augmented, &form, &gains, &speed);
     let seen = filters.seen();
     // the plant and its map at x̂, and at x̂_a where (4.22) has it
     let at = |expressions: &[Node]| graph.substitute(&copy.at_estimate(expressions), &seen);
     let right = innovations(&copy, &form, &gains, &speed, &filters, &at);
     let Q = numbers(graph, &form.Q, &at);
-    let solution = solve(extended, &Q, &right);
-    let f = at(&extended.derivatives);
+    let solution = solve(augmented, &Q, &right);
+    let f = at(&augmented.derivatives);
     let derivatives = f.iter().zip(&solution.x);
     let mut derivatives: Vec<Node> = derivatives
         .map(|(&f, &x)| (graph.expr(f) + graph.expr(x)).node())
@@ -68,10 +68,10 @@ pub(super) fn design(
         matrix: Some(matrix),
     });
     if form.variant == Variant::Theoretical {
-        observer.input_derivatives = input_derivatives(extended, &form);
+        observer.input_derivatives = input_derivatives(augmented, &form);
     }
     let laid = Laid {
-        extended,
+        augmented,
         form: &form,
         gains: &gains,
         Q: &Q,
@@ -79,7 +79,7 @@ pub(super) fn design(
         observer: &observer,
     };
     Ok(Design {
-        notes: notes(extended, &form, &observer.input_derivatives),
+        notes: notes(augmented, &form, &observer.input_derivatives),
         gains: laid.constant_gains()?,
         parameters: laid.parameters()?,
         observer,
@@ -106,8 +106,8 @@ fn scale_of_poles(gains: &Gains) -> String {
     }
 }
 
-fn filters(extended: &Extended<'_>, form: &Form, gains: &Gains, speed: &Speed) -> Filters {
-    let graph = extended.graph();
+fn filters(augmented: &AugmentedPlant<'_>, form: &Form, gains: &Gains, speed: &Speed) -> Filters {
+    let graph = augmented.graph();
     let state = |input: &Variable, k: usize| {
         let name = format!("filter of {}", derivative_name(&input.name, k));
         let symbol = graph.fresh(&name).node();
@@ -117,9 +117,9 @@ fn filters(extended: &Extended<'_>, form: &Form, gains: &Gains, speed: &Speed) -
         true => speed.scaled(graph, *gain, (k + 1) as f64).node(),
         false => graph.constant(*gain).node(),
     };
-    let pairs = extended.inputs.iter().zip(&gains.K2);
+    let pairs = augmented.inputs.iter().zip(&gains.K2);
     Filters {
-        input: extended.inputs.clone(),
+        input: augmented.inputs.clone(),
         x_a: pairs
             .map(|(input, K2)| (0..K2.len()).map(|k| state(input, k)).collect())
             .collect(),
@@ -181,15 +181,15 @@ fn innovations(
     filters: &Filters,
     at: &dyn Fn(&[Node]) -> Vec<Node>,
 ) -> Vec<Node> {
-    let extended = copy.extended;
-    let graph = extended.graph();
+    let augmented = copy.augmented;
+    let graph = augmented.graph();
     let y = &copy.measured;
-    let x̂: HashMap<Node, Node> = extended
+    let x̂: HashMap<Node, Node> = augmented
         .symbols()
         .into_iter()
         .zip(copy.hats.iter().map(|hat| hat.symbol))
         .collect();
-    let e: Vec<Expr<'_>> = extended
+    let e: Vec<Expr<'_>> = augmented
         .outputs
         .iter()
         .zip(y)
@@ -249,10 +249,10 @@ pub(super) struct Solution {
 /// x with Q x = b. Columns are scaled by the states' ranges and rows to length
 /// one, so that rcond does not depend on units; where it nearly vanishes the
 /// correction is withdrawn smoothly.
-fn solve(extended: &Extended<'_>, Q: &[Node], b: &[Node]) -> Solution {
-    let graph = extended.graph();
+fn solve(augmented: &AugmentedPlant<'_>, Q: &[Node], b: &[Node]) -> Solution {
+    let graph = augmented.graph();
     let n = b.len();
-    let scales: Vec<f64> = extended.states.iter().map(scale).collect();
+    let scales: Vec<f64> = augmented.states.iter().map(scale).collect();
     let (mut A, mut right) = (vec![], vec![]);
     for i in 0..n {
         let row: Vec<Expr<'_>> = (0..n)
@@ -290,9 +290,9 @@ fn scale(state: &Variable) -> f64 {
     }
 }
 
-fn input_derivatives(extended: &Extended<'_>, form: &Form) -> Vec<InputDerivative> {
+fn input_derivatives(augmented: &AugmentedPlant<'_>, form: &Form) -> Vec<InputDerivative> {
     let mut needed = vec![];
-    for (input, U) in extended.inputs.iter().zip(&form.U) {
+    for (input, U) in augmented.inputs.iter().zip(&form.U) {
         for (order, &symbol) in U.iter().enumerate().skip(1) {
             needed.push(InputDerivative {
                 input: input.name.clone(),
@@ -329,7 +329,7 @@ pub(super) struct Gains {
 
 impl Gains {
     pub fn new(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         settings: &Settings,
         form: &Form,
     ) -> Result<Self, TuningError> {
@@ -341,7 +341,7 @@ impl Gains {
             Variant::Practical => form.U.iter().map(Vec::len).collect(),
             _ => vec![0; form.U.len()],
         };
-        let needed = Needed::new(extended, filters.clone());
+        let needed = Needed::new(augmented, filters.clone());
         let filter_slowest = -FILTER_SPEED * slowest(&λ);
         let filter_given = settings.filter_poles(&needed)?;
         let filter_follows = filter_given.iter().map(Option::is_none).collect();
@@ -353,7 +353,7 @@ impl Gains {
         let start = |j: usize| {
             let mut start = vec![0.0; filters[j]];
             if let Some(u) = start.first_mut() {
-                *u = extended.inputs[j].start.unwrap_or(0.0);
+                *u = augmented.inputs[j].start.unwrap_or(0.0);
             }
             start
         };
@@ -429,13 +429,13 @@ pub(super) fn spread(s: &[f64]) -> Vec<Vec<f64>> {
 const WIDTH: usize = 60;
 
 pub(super) fn notes(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     form: &Form,
     derivatives: &[InputDerivative],
 ) -> Vec<String> {
     let mut notes = vec![];
     if let [_, _, ..] = form.indices[..] {
-        let outputs = extended.outputs.iter().zip(&form.indices);
+        let outputs = augmented.outputs.iter().zip(&form.indices);
         let parts: Vec<String> = outputs
             .map(|(o, μ)| format!("{} {μ}", o.variable.name))
             .collect();
@@ -459,7 +459,7 @@ pub(super) fn notes(
 
 /// An observer with what it was made from.
 pub(super) struct Laid<'a, 'p> {
-    pub extended: &'a Extended<'p>,
+    pub augmented: &'a AugmentedPlant<'p>,
     pub form: &'a Form,
     pub gains: &'a Gains,
     /// Q or Q̄ at the estimate, row by row
@@ -472,7 +472,7 @@ impl Laid<'_, '_> {
     /// Q⁻¹K where Q is a matrix of numbers: then the observer is f − Q⁻¹K (ŷ − y). None where
     /// Q follows the estimate, or where a filter takes part.
     pub fn constant_gains(&self) -> Result<Vec<ChainGain>, DesignError> {
-        let graph = self.extended.graph();
+        let graph = self.augmented.graph();
         let numbers: Option<Vec<f64>> = self.Q.iter().map(|&q| graph.constant_value(q)).collect();
         let filtered = self.gains.K2.iter().any(|K2| !K2.is_empty());
         let (Some(numbers), false) = (numbers, filtered) else {
@@ -490,7 +490,7 @@ impl Laid<'_, '_> {
     fn corrections(&self, Q: &[f64]) -> Option<Vec<ChainGain>> {
         let n = self.form.rows.len();
         let Q = DMatrix::from_row_slice(n, n, Q).lu();
-        let outputs = self.extended.outputs.iter().enumerate();
+        let outputs = self.augmented.outputs.iter().enumerate();
         let used = outputs.filter(|(i, _)| self.form.indices[*i] > 0);
         used.map(|(i, output)| {
             let K = |&(row_of, k): &(usize, usize)| match row_of == i {
@@ -502,7 +502,7 @@ impl Laid<'_, '_> {
             if !gain.iter().all(|k| k.is_finite()) {
                 return None;
             }
-            let states = self.extended.states.iter().map(|s| s.name.clone());
+            let states = self.augmented.states.iter().map(|s| s.name.clone());
             Some(ChainGain {
                 output: output.variable.name.clone(),
                 entries: states.zip(gain.iter().copied()).collect(),
@@ -514,7 +514,7 @@ impl Laid<'_, '_> {
     /// The matrices of the paper, as expressions of the estimate and at its start.
     pub fn parameters(&self) -> Result<Vec<(String, String)>, DesignError> {
         let mut rows = vec![("variant".to_owned(), self.form.variant.word().to_owned())];
-        let outputs = self.extended.outputs.iter().zip(&self.gains.λ);
+        let outputs = self.augmented.outputs.iter().zip(&self.gains.λ);
         for ((output, λ), K) in outputs
             .zip(&self.gains.K)
             .filter(|((_, λ), _)| !λ.is_empty())
@@ -523,7 +523,7 @@ impl Laid<'_, '_> {
             rows.push((format!("λ of {y}"), settings::list(λ)));
             rows.push((format!("K of {y}"), listed(K)));
         }
-        let inputs = self.extended.inputs.iter().zip(&self.gains.filter_λ);
+        let inputs = self.augmented.inputs.iter().zip(&self.gains.filter_λ);
         for ((input, λ), K2) in inputs
             .zip(&self.gains.K2)
             .filter(|((_, λ), _)| !λ.is_empty())
@@ -545,14 +545,14 @@ impl Laid<'_, '_> {
     }
 
     fn add_matrices(&self, rows: &mut Vec<(String, String)>) -> Result<(), DesignError> {
-        let graph = self.extended.graph();
+        let graph = self.augmented.graph();
         let Q = match self.form.variant {
             Variant::Bounded => "Q",
             _ => "Q̄",
         };
         let n = self.form.rows.len();
         for (&(i, k), entries) in self.form.rows.iter().zip(self.Q.chunks(n.max(1))) {
-            let y = derivative_name(&self.extended.outputs[i].variable.name, k);
+            let y = derivative_name(&self.augmented.outputs[i].variable.name, k);
             let entries: Vec<String> = entries.iter().map(|&q| graph.render(q, WIDTH)).collect();
             rows.push((format!("{Q}, row {y}"), entries.join(", ")));
         }
@@ -569,7 +569,7 @@ impl Laid<'_, '_> {
 
     /// The values where the observer starts; none where they depend on more than its states.
     fn at_start(&self, nodes: &[Node]) -> Result<Option<Vec<f64>>, DesignError> {
-        let graph = self.extended.graph();
+        let graph = self.augmented.graph();
         let states = &self.observer.states;
         let symbols: Vec<Node> = states.iter().map(|(signal, _)| signal.symbol).collect();
         if graph.symbols_of(nodes).iter().any(|s| !symbols.contains(s)) {

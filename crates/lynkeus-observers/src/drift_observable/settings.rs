@@ -3,7 +3,7 @@
 
 use lynkeus_expr::Node;
 use lynkeus_gain::integrators::{self, Lemma32, Pole};
-use lynkeus_structure::Extended;
+use lynkeus_structure::AugmentedPlant;
 
 use crate::estimate::Common;
 use crate::{KeySpec, Shape, Tuning, TuningError, Value};
@@ -121,13 +121,13 @@ pub struct Settings {
 }
 
 impl Settings {
-    pub fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
+    pub fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
         let value = |key: KeySpec| tuning.values.get(key.name).cloned();
         let poles = value(POLES);
         Ok(Self {
             common: Common::read(tuning)?,
             variant: tuning.meant(&VARIANT, Variant::ALL)?,
-            asked: indices(extended, tuning, poles.as_ref())?,
+            asked: indices(augmented, tuning, poles.as_ref())?,
             poles,
             α: tuning.positive(ALPHA.name)?,
             β: tuning.positive(BETA.name)?,
@@ -216,11 +216,11 @@ impl Settings {
 
     /// Bounds of |u'|, |u''|, … per input as far as any are declared: the family's key, else those of the plant. A
     /// list that has not the length that a guarantee needs is no help here.
-    pub fn known_slopes(&self, extended: &Extended<'_>, U: &[Vec<Node>]) -> Vec<Vec<f64>> {
-        let needed = Needed::new(extended, U.iter().map(Vec::len).collect());
+    pub fn known_slopes(&self, augmented: &AugmentedPlant<'_>, U: &[Vec<Node>]) -> Vec<Vec<f64>> {
+        let needed = Needed::new(augmented, U.iter().map(Vec::len).collect());
         let own = self.slopes(&needed).unwrap_or_default().into_iter();
         let own = own.chain(std::iter::repeat(None));
-        let general = extended.input_derivatives.iter();
+        let general = augmented.input_derivatives.iter();
         own.zip(general)
             .map(|(own, general)| own.unwrap_or_else(|| general.clone()))
             .collect()
@@ -286,8 +286,8 @@ pub struct Needed<'a> {
 }
 
 impl<'a> Needed<'a> {
-    pub fn new(extended: &'a Extended<'_>, orders: Vec<usize>) -> Self {
-        let names = extended.inputs.iter().map(|i| i.name.as_str()).collect();
+    pub fn new(augmented: &'a AugmentedPlant<'_>, orders: Vec<usize>) -> Self {
+        let names = augmented.inputs.iter().map(|i| i.name.as_str()).collect();
         Self { names, orders }
     }
 }
@@ -304,11 +304,11 @@ pub enum Asked {
 /// `indices`: one whole number per measured output, n in sum; else the lengths of the lists
 /// under `poles`.
 pub(super) fn indices(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     tuning: &Tuning,
     poles: Option<&Value>,
 ) -> Result<Asked, TuningError> {
-    let (p, n) = (extended.outputs.len(), extended.states.len());
+    let (p, n) = (augmented.outputs.len(), augmented.states.len());
     if let Some(found) = tuning.numbers(INDICES.name)? {
         let whole = |x: &f64| *x >= 0.0 && x.fract() == 0.0 && *x <= n as f64;
         if found.len() != p || !found.iter().all(whole) || found.iter().sum::<f64>() != n as f64 {

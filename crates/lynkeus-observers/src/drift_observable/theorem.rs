@@ -29,7 +29,7 @@ use lynkeus_expr::Interval;
 use lynkeus_gain::integrators::{self, Pole};
 use lynkeus_proof::magnitude::{length, plus, size, times, total};
 use lynkeus_proof::riccati::Riccati;
-use lynkeus_structure::{Extended, Verdict, short};
+use lynkeus_structure::{AugmentedPlant, Verdict, short};
 
 use super::form::{Form, Inputs};
 use super::lipschitz;
@@ -43,15 +43,15 @@ use crate::{
 };
 
 pub(super) fn certificate(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     form: &Form,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
-    let slopes = slopes(extended, settings, form, assumptions)?;
-    let lipschitz = lipschitz::bounds(extended, form, &slopes, &assumptions.region)?;
-    let u_M = largest_input(extended, assumptions);
-    let gains = gains(extended, settings, form)?;
+    let slopes = slopes(augmented, settings, form, assumptions)?;
+    let lipschitz = lipschitz::bounds(augmented, form, &slopes, &assumptions.region)?;
+    let u_M = largest_input(augmented, assumptions);
+    let gains = gains(augmented, settings, form)?;
     // not that on inputs, which is about slopes without bounds
     let conditions = form.checks.clone();
     let mut hypotheses = vec![
@@ -62,7 +62,7 @@ pub(super) fn certificate(
         conditions.continuous,
         lipschitz.continuous.clone(),
     ];
-    hypotheses.extend(of_the_map(extended, form, &slopes, &lipschitz));
+    hypotheses.extend(of_the_map(augmented, form, &slopes, &lipschitz));
     let order = |jet: &Vec<_>, given: &Option<Vec<f64>>| match (jet.is_empty(), given) {
         (true, _) => 0.0,
         (_, Some(bounds)) => bounds.last().copied().unwrap_or(0.0),
@@ -74,12 +74,12 @@ pub(super) fn certificate(
         .zip(&slopes)
         .map(|(jet, given)| order(jet, given));
     let mut constants = of_lipschitz(form, &lipschitz, u_M);
-    constants.extend(largest_inputs(extended, form, assumptions)?);
+    constants.extend(largest_inputs(augmented, form, assumptions)?);
     let mut found = None;
     match &gains {
         Some(gains) => {
             let proof = Proof {
-                extended,
+                augmented,
                 form,
                 gains,
                 lipschitz: &lipschitz,
@@ -98,7 +98,7 @@ pub(super) fn certificate(
     }
     let mut certificate = Certificate::new(basis(form.variant), assumptions, hypotheses);
     certificate.constants = constants;
-    certificate.notes = notes(extended, form, assumptions);
+    certificate.notes = notes(augmented, form, assumptions);
     if let Some((proof, P)) = found.filter(|_| certificate.weakest().is_none()) {
         conclude(&proof, &P, assumptions, &mut certificate);
     }
@@ -113,12 +113,12 @@ fn basis(variant: Variant) -> &'static str {
     }
 }
 
-fn notes(extended: &Extended<'_>, form: &Form, assumptions: &Assumptions) -> Vec<String> {
+fn notes(augmented: &AugmentedPlant<'_>, form: &Form, assumptions: &Assumptions) -> Vec<String> {
     let mut notes = vec![match form.variant {
         Variant::Practical => "taken for granted, not proved: plant and estimate stay in the box, and so do the filter's estimates of the inputs and of their derivatives; the bound holds once the filter has settled, at the same rate".to_owned(),
         _ => "taken for granted, not proved: plant and estimate stay in the box".to_owned(),
     }];
-    let constant = assumptions.constant(extended.plant_states());
+    let constant = assumptions.constant(augmented.plant_states());
     if !constant.is_empty() {
         notes.push(format!(
             "taken as constant: {}; bounds of rates of change go under `slew` in [certify]",
@@ -132,7 +132,7 @@ fn notes(extended: &Extended<'_>, form: &Form, assumptions: &Assumptions) -> Vec
 /// Per input bounds of u', u'', …, one more than the observer reads: the family's key, else
 /// what holds for every family.
 fn slopes(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     form: &Form,
     assumptions: &Assumptions,
@@ -141,7 +141,7 @@ fn slopes(
         Variant::Bounded => vec![0; form.U.len()],
         _ => form.U.iter().map(Vec::len).collect(),
     };
-    let own = settings.slopes(&Needed::new(extended, orders.clone()))?;
+    let own = settings.slopes(&Needed::new(augmented, orders.clone()))?;
     let general = |j: usize| {
         let bounds = assumptions.input_derivatives.get(j)?;
         bounds.get(..orders[j]).map(<[f64]>::to_vec)
@@ -154,19 +154,19 @@ fn slopes(
 
 /// None where the study has no pole yet.
 fn gains(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     form: &Form,
 ) -> Result<Option<Gains>, TuningError> {
     match settings.has_poles() {
-        true => Gains::new(extended, settings, form).map(Some),
+        true => Gains::new(augmented, settings, form).map(Some),
         false => Ok(None),
     }
 }
 
 /// The largest |u_j| of the box.
-fn largest_input(extended: &Extended<'_>, assumptions: &Assumptions) -> f64 {
-    let symbols: Vec<_> = extended.inputs.iter().map(|i| i.node).collect();
+fn largest_input(augmented: &AugmentedPlant<'_>, assumptions: &Assumptions) -> f64 {
+    let symbols: Vec<_> = augmented.inputs.iter().map(|i| i.node).collect();
     let sides = assumptions.region.restricted(&symbols).dimensions;
     let largest = sides.iter().map(|d| d.min.abs().max(d.max.abs()));
     largest.fold(0.0, f64::max)
@@ -174,7 +174,7 @@ fn largest_input(extended: &Extended<'_>, assumptions: &Assumptions) -> f64 {
 
 /// Ū of Theorem 2.4, where the map reads inputs.
 fn largest_inputs(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     form: &Form,
     assumptions: &Assumptions,
 ) -> Result<Option<Constant>, DesignError> {
@@ -182,7 +182,7 @@ fn largest_inputs(
         return Ok(None);
     }
     let inputs = Inputs {
-        extended,
+        augmented,
         U: &form.U,
         slopes: &[],
         Q̄: &form.Q,
@@ -195,14 +195,14 @@ fn largest_inputs(
 
 /// Hypotheses 1 and 2 of the theorems.
 fn of_the_map(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     form: &Form,
     slopes: &[Option<Vec<f64>>],
     found: &Lipschitz,
 ) -> Vec<Check> {
     let mut checks = vec![];
     if form.reads_inputs() {
-        let pairs = form.U.iter().zip(slopes).zip(&extended.inputs);
+        let pairs = form.U.iter().zip(slopes).zip(&augmented.inputs);
         let lacking = pairs.filter(|((jet, given), _)| !jet.is_empty() && given.is_none());
         let names: Vec<&str> = lacking.map(|(_, input)| input.name.as_str()).collect();
         let detail = match names.is_empty() {
@@ -357,7 +357,7 @@ fn left(proof: &Proof<'_, '_>, P: &Riccati, a: f64, assumptions: &Assumptions) -
     };
     let each: Vec<f64> = proof.lipschitz.states.iter().map(of_state).collect();
     let norm = times(proof.lipschitz.inverse, length(&[e_z, a])).min(length(&each));
-    let names = proof.extended.states.iter().map(|x| x.name.clone());
+    let names = proof.augmented.states.iter().map(|x| x.name.clone());
     let states = names.zip(each).map(UltimateBound::from).collect();
     Bounds { norm, states }
 }
@@ -430,7 +430,7 @@ fn print(
     let mut add = |name: &str, value: f64, meaning: &str| {
         constants.push(Constant::new(name, value, meaning));
     };
-    for (output, K) in proof.extended.outputs.iter().zip(&proof.gains.K) {
+    for (output, K) in proof.augmented.outputs.iter().zip(&proof.gains.K) {
         for (k, gain) in K.iter().enumerate() {
             let meaning = format!("gain of {}", output.variable.name);
             add(&format!("K{}", k + 1), *gain, &meaning);
@@ -494,7 +494,7 @@ pub(super) const SLOW: f64 = 1e-6;
 
 /// Everything the conclusions are drawn from.
 pub(super) struct Proof<'a, 'p> {
-    pub extended: &'a Extended<'p>,
+    pub augmented: &'a AugmentedPlant<'p>,
     pub form: &'a Form,
     pub gains: &'a Gains,
     pub lipschitz: &'a Lipschitz,

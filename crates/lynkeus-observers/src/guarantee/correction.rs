@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{MissingInput, Node, Tape, jacobian};
-use lynkeus_structure::Extended;
+use lynkeus_structure::AugmentedPlant;
 use nalgebra::DMatrix;
 
 use super::error_system::edges;
@@ -19,7 +19,7 @@ const ROUNDING: f64 = 1e-9;
 /// How the measurements correct the estimate.
 #[derive(Clone, Debug)]
 pub enum Correction {
-    /// x̂' = f(x̂, u) − K (ŷ − y) with this K: one row per extended state, one column per
+    /// x̂' = f(x̂, u) − K (ŷ − y) with this K: one row per augmented state, one column per
     /// measured output
     Gain(DMatrix<f64>),
     /// anything else: the entries of ∂F/∂y that are not 0
@@ -42,8 +42,8 @@ impl Correction {
     ///
     /// # Errors
     /// [`MissingInput`] where an expression reads what the observer does not know.
-    pub fn of(extended: &Extended<'_>, observer: &Observer) -> Result<Self, MissingInput> {
-        let graph = extended.graph();
+    pub fn of(augmented: &AugmentedPlant<'_>, observer: &Observer) -> Result<Self, MissingInput> {
+        let graph = augmented.graph();
         let measured: Vec<Node> = observer.measured.iter().map(|m| m.symbol).collect();
         let jacobian = jacobian::forward(graph, &observer.derivatives, &measured);
         let mut K = DMatrix::zeros(observer.states.len(), measured.len());
@@ -59,7 +59,7 @@ impl Correction {
                 constant = false;
             }
         }
-        if constant && is_copy(extended, observer, &K)? {
+        if constant && is_copy(augmented, observer, &K)? {
             return Ok(Self::Gain(K));
         }
         let entries = jacobian.entries.iter().map(|&(i, j, node)| Injection {
@@ -74,29 +74,29 @@ impl Correction {
 /// Whether the observer's states are the estimate and F(x̂, u, h(x̂)) = f(x̂, u), at
 /// points spread over the box.
 fn is_copy(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     K: &DMatrix<f64>,
 ) -> Result<bool, MissingInput> {
     let pairs = observer.states.iter().zip(&observer.estimates);
     let same = pairs.filter(|((s, _), e)| s.symbol == e.node).count();
-    let n = extended.states.len();
+    let n = augmented.states.len();
     if same != n || observer.states.len() != n || !observer.input_derivatives.is_empty() {
         return Ok(false);
     }
-    let graph = extended.graph();
-    let hats = extended.states.iter().zip(&observer.states);
+    let graph = augmented.graph();
+    let hats = augmented.states.iter().zip(&observer.states);
     let hats: HashMap<Node, Node> = hats
         .map(|(state, (hat, _))| (state.node, hat.symbol))
         .collect();
-    let outputs: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
+    let outputs: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
     let seen = graph.substitute(&outputs, &hats);
     let signals = observer.measured.iter().map(|m| m.symbol);
     let measured: HashMap<Node, Node> = signals.zip(seen.iter().copied()).collect();
     let mut roots = graph.substitute(&observer.derivatives, &measured);
-    roots.extend(graph.substitute(&extended.derivatives, &hats));
+    roots.extend(graph.substitute(&augmented.derivatives, &hats));
     roots.extend(&seen);
-    let mut region = extended.region();
+    let mut region = augmented.region();
     for side in &mut region.dimensions {
         side.symbol = *hats.get(&side.symbol).unwrap_or(&side.symbol);
     }

@@ -12,7 +12,8 @@ use lynkeus_proof::decay;
 use lynkeus_proof::decay::ErrorModel;
 use lynkeus_proof::matrix::IntervalMatrix;
 use lynkeus_structure::{
-    Dimension, Extended, Finding, Innovation, Region, Slopes, Verdict, counted, range, range_within,
+    AugmentedPlant, Dimension, Finding, Innovation, Region, Slopes, Verdict, counted, range,
+    range_within,
 };
 use nalgebra::DMatrix;
 
@@ -46,44 +47,47 @@ pub(super) struct ErrorSystem {
 impl ErrorSystem {
     /// The error system of an observer, or why it has none.
     pub fn new(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         observer: &Observer,
         assumptions: &Assumptions,
     ) -> Result<Result<Self, String>, MissingInput> {
         let pairs = observer.states.iter().zip(&observer.estimates);
         let same = pairs.filter(|((s, _), e)| s.symbol == e.node).count();
-        if same != observer.states.len() || same != extended.states.len() {
+        if same != observer.states.len() || same != augmented.states.len() {
             let reason = format!(
                 "the observer has {} for {} to be estimated: its gain is a state, or its coordinates are not the plant's; see what its theorem says",
                 counted(observer.states.len(), "state"),
-                extended.states.len()
+                augmented.states.len()
             );
             return Ok(Err(reason));
         }
         let symbols: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
-        let region = seen_by(extended, observer, assumptions)?;
-        let slopes = around_innovations(extended, observer, &symbols, &region)?;
-        let mut system = Self::of(extended, &observer.derivatives, &symbols, region, slopes)?;
-        system.injection = injection(extended, observer, &system.region)?;
-        right(extended, observer, &mut system)?;
+        let region = seen_by(augmented, observer, assumptions)?;
+        let slopes = around_innovations(augmented, observer, &symbols, &region)?;
+        let mut system = Self::of(augmented, &observer.derivatives, &symbols, region, slopes)?;
+        system.injection = injection(augmented, observer, &system.region)?;
+        right(augmented, observer, &mut system)?;
         Ok(Ok(system))
     }
 
     /// The error system of a copy of the plant without correction.
-    pub fn open_loop(extended: &Extended<'_>, region: &Region) -> Result<Self, MissingInput> {
-        let (symbols, derivatives) = (extended.symbols(), &extended.derivatives);
-        let slopes = Slopes::new(extended.graph(), derivatives, &symbols, region)?;
-        Self::of(extended, derivatives, &symbols, region.clone(), slopes)
+    pub fn open_loop(
+        augmented: &AugmentedPlant<'_>,
+        region: &Region,
+    ) -> Result<Self, MissingInput> {
+        let (symbols, derivatives) = (augmented.symbols(), &augmented.derivatives);
+        let slopes = Slopes::new(augmented.graph(), derivatives, &symbols, region)?;
+        Self::of(augmented, derivatives, &symbols, region.clone(), slopes)
     }
 
     fn of(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         derivatives: &[Node],
         symbols: &[Node],
         region: Region,
         slopes: Slopes,
     ) -> Result<Self, MissingInput> {
-        let graph = extended.graph();
+        let graph = augmented.graph();
         let jacobian = jacobian::forward(graph, derivatives, symbols);
         let zero = graph.constant(0.0).node();
         let n = symbols.len();
@@ -95,7 +99,7 @@ impl ErrorSystem {
             corrected: vec![],
             sides: region.clone(),
             models: expanded(&slopes.models),
-            scale: extended.states.iter().map(size).collect(),
+            scale: augmented.states.iter().map(size).collect(),
             injection: vec![],
             slopes,
             region,
@@ -169,13 +173,13 @@ impl ErrorSystem {
 /// The slopes with the innovations apart: an observer is right where they vanish, whatever
 /// its gain is there.
 fn around_innovations(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     symbols: &[Node],
     region: &Region,
 ) -> Result<Slopes, MissingInput> {
-    let found = of(extended, observer, region)?;
-    let graph = extended.graph();
+    let found = of(augmented, observer, region)?;
+    let graph = augmented.graph();
     let derivatives = graph.substitute(&observer.derivatives, &found.images);
     let innovations = &found.innovations;
     Slopes::around(graph, &derivatives, symbols, innovations, &found.region)
@@ -184,16 +188,16 @@ fn around_innovations(
 /// What the system is where the estimate is right: what is measured is then h at the
 /// estimate. Derivatives of the inputs are 0 there: the inputs are constant.
 fn right(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     system: &mut ErrorSystem,
 ) -> Result<(), MissingInput> {
-    let graph = extended.graph();
-    let hats = extended.states.iter().zip(&observer.states);
+    let graph = augmented.graph();
+    let hats = augmented.states.iter().zip(&observer.states);
     let hats: HashMap<Node, Node> = hats
         .map(|(state, (hat, _))| (state.node, hat.symbol))
         .collect();
-    let outputs: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
+    let outputs: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
     let seen = graph.substitute(&outputs, &hats);
     let measured: HashMap<Node, Node> = observer
         .measured
@@ -223,12 +227,12 @@ fn right(
 
 /// The box in the observer's symbols, with the ranges of what is measured.
 fn seen_by(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     assumptions: &Assumptions,
 ) -> Result<Region, MissingInput> {
     let region = &assumptions.region;
-    let hats: HashMap<Node, Node> = extended
+    let hats: HashMap<Node, Node> = augmented
         .states
         .iter()
         .zip(&observer.states)
@@ -239,7 +243,7 @@ fn seen_by(
         side.symbol = *hats.get(&side.symbol).unwrap_or(&side.symbol);
     }
     let moving = observer.input_derivatives.iter().map(|d| {
-        let input = extended.inputs.iter().position(|u| u.name == d.input);
+        let input = augmented.inputs.iter().position(|u| u.name == d.input);
         let bound = input.map_or(f64::INFINITY, |j| assumptions.input_derivative(j, d.order));
         Dimension {
             name: d.signal.name.clone(),
@@ -250,8 +254,8 @@ fn seen_by(
         }
     });
     seen.dimensions.extend(moving);
-    for (j, (signal, output)) in observer.measured.iter().zip(&extended.outputs).enumerate() {
-        let values = range(extended.graph(), output.variable.node, region)?.enclosure;
+    for (j, (signal, output)) in observer.measured.iter().zip(&augmented.outputs).enumerate() {
+        let values = range(augmented.graph(), output.variable.node, region)?.enclosure;
         let values = values.inflate(assumptions.noise.get(j).copied().unwrap_or(0.0));
         seen.dimensions.push(Dimension {
             name: signal.name.clone(),
@@ -266,11 +270,11 @@ fn seen_by(
 
 /// Bounds of |∂F_i/∂y_j|: how measurement errors reach the estimate.
 fn injection(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     region: &Region,
 ) -> Result<Vec<Vec<f64>>, MissingInput> {
-    let graph = extended.graph();
+    let graph = augmented.graph();
     let measured: Vec<Node> = observer.measured.iter().map(|m| m.symbol).collect();
     let jacobian = jacobian::forward(graph, &observer.derivatives, &measured);
     let mut bounds = vec![vec![0.0; measured.len()]; observer.states.len()];
@@ -307,12 +311,12 @@ pub(super) struct Innovations {
 
 /// Finds h(x̂) − y and x̂_s − x_s(y), in either order.
 pub(super) fn of(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     region: &Region,
 ) -> Result<Innovations, MissingInput> {
-    let graph = extended.graph();
-    let hats = extended.states.iter().zip(&observer.states);
+    let graph = augmented.graph();
+    let hats = augmented.states.iter().zip(&observer.states);
     let hats: HashMap<Node, Node> = hats
         .map(|(state, (hat, _))| (state.node, hat.symbol))
         .collect();
@@ -321,11 +325,11 @@ pub(super) fn of(
         images: HashMap::new(),
         region: region.clone(),
     };
-    for (output, signal) in extended.outputs.iter().zip(&observer.measured) {
+    for (output, signal) in augmented.outputs.iter().zip(&observer.measured) {
         let Some((state, slope, offset)) = output.state else {
             continue;
         };
-        let name = format!("error of {}", extended.states[state].name);
+        let name = format!("error of {}", augmented.states[state].name);
         let symbol = graph.fresh(&name);
         let (y, slope, offset) = (
             graph.expr(signal.symbol),

@@ -10,7 +10,7 @@ use std::time::Duration;
 use lynkeus_expr::{Budget, MissingInput};
 use lynkeus_proof::decay;
 use lynkeus_proof::decay::{Aim, ErrorModel, Gain, NoGain, Request};
-use lynkeus_structure::{Extended, Measurement, Slopes, range, short};
+use lynkeus_structure::{AugmentedPlant, Measurement, Slopes, range, short};
 
 use super::error_system::{ErrorSystem, expanded};
 use crate::conditions::on_output;
@@ -97,16 +97,16 @@ impl Lmi {
 
 /// The observer with a certified gain, under the name of the family that asked.
 pub(crate) fn design_lmi(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     common: &Common,
     asked: Lmi,
     family: &'static str,
     examination: Examination,
 ) -> Result<Design, DesignError> {
     estimate::refuse(common, "gain = \"lmi\"")?;
-    let copy = PlantCopy::new(extended, common);
-    let (measured, slopes) = shown(extended, &copy)?;
-    let system = ErrorSystem::open_loop(extended, &extended.region())?;
+    let copy = PlantCopy::new(augmented, common);
+    let (measured, slopes) = shown(augmented, &copy)?;
+    let system = ErrorSystem::open_loop(augmented, &augmented.region())?;
     if let Some((slope, open)) = system.slopes.unbounded(&system.region) {
         let cure = match open.is_empty() {
             true => "tighten its range".to_owned(),
@@ -122,13 +122,13 @@ pub(crate) fn design_lmi(
     }
     let request = Request {
         rate: asked.rate.unwrap_or(0.0),
-        noise: weights(extended, &asked.noise),
+        noise: weights(augmented, &asked.noise),
         measured,
         slopes,
         scale: system.scale.clone(),
         aim: asked.aim,
         limit: asked.limit,
-        budget: extended.graph().budget(),
+        budget: augmented.graph().budget(),
     };
     let gain = match (asked.rate, asked.limit) {
         (Some(_), _) => decay::design(&system.models, &request)
@@ -139,17 +139,17 @@ pub(crate) fn design_lmi(
             return Err(TuningError::absent(RATE.name, expected).into());
         }
     };
-    assemble(extended, &copy, family, examination, &request, &gain)
+    assemble(augmented, &copy, family, examination, &request, &gain)
 }
 
 /// Of each output the state that it shows, and |c| of y = c·x + d: the smallest on the box where it
 /// varies.
 fn shown(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     copy: &PlantCopy<'_, '_>,
 ) -> Result<(Vec<usize>, Vec<f64>), DesignError> {
     let (mut measured, mut slopes) = (vec![], vec![]);
-    for (i, output) in extended.outputs.iter().enumerate() {
+    for (i, output) in augmented.outputs.iter().enumerate() {
         let wrong = |expected: &str| {
             let name = &output.variable.name;
             TuningError::new("gain", expected, format!("the output {name}"))
@@ -157,7 +157,7 @@ fn shown(
         let Some((state, _)) = copy.measured_state(i) else {
             return Err(wrong("outputs that each show one state (y = c·x + d)").into());
         };
-        let c = slope(extended, i)?;
+        let c = slope(augmented, i)?;
         if c <= 0.0 || !c.is_finite() {
             return Err(wrong("outputs y = c·x + d with a c that is 0 nowhere on the box").into());
         }
@@ -168,23 +168,23 @@ fn shown(
 }
 
 /// The smallest |c| on the box of an output y = c·x + d; 0 where it is none.
-fn slope(extended: &Extended<'_>, output: usize) -> Result<f64, MissingInput> {
-    let Some((_, slope, _)) = extended.outputs[output].state else {
+fn slope(augmented: &AugmentedPlant<'_>, output: usize) -> Result<f64, MissingInput> {
+    let Some((_, slope, _)) = augmented.outputs[output].state else {
         return Ok(0.0);
     };
-    let graph = extended.graph();
+    let graph = augmented.graph();
     match graph.constant_value(slope) {
         Some(c) => Ok(c.abs()),
-        None => Ok(range(graph, slope, &extended.region())?
+        None => Ok(range(graph, slope, &augmented.region())?
             .enclosure
             .mignitude()),
     }
 }
 
 /// Sizes of the measurement errors, one per output: as declared, and all the same where none is.
-fn weights(extended: &Extended<'_>, declared: &BTreeMap<String, f64>) -> Vec<f64> {
+fn weights(augmented: &AugmentedPlant<'_>, declared: &BTreeMap<String, f64>) -> Vec<f64> {
     let of = |output: &Measurement| declared.get(&output.variable.name).copied();
-    let sizes: Vec<f64> = extended
+    let sizes: Vec<f64> = augmented
         .outputs
         .iter()
         .map(|o| of(o).unwrap_or(0.0))
@@ -270,17 +270,17 @@ fn middles(model: &lynkeus_proof::decay::ErrorModel) -> Vec<f64> {
 }
 
 fn assemble(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     copy: &PlantCopy<'_, '_>,
     family: &'static str,
     examination: Examination,
     request: &Request,
     gain: &Gain,
 ) -> Result<Design, DesignError> {
-    let graph = extended.graph();
-    let mut derivatives = copy.at_estimate(&extended.derivatives);
+    let graph = augmented.graph();
+    let mut derivatives = copy.at_estimate(&augmented.derivatives);
     let mut gains = vec![];
-    for (j, output) in extended.outputs.iter().enumerate() {
+    for (j, output) in augmented.outputs.iter().enumerate() {
         let Some(innovation) = copy.innovation(j) else {
             continue;
         };
@@ -290,7 +290,7 @@ fn assemble(
             *derivative = (graph.expr(*derivative) - correction).node();
         }
         let all: Vec<usize> = (0..K.len()).collect();
-        let entries = on_output(extended, j, &all, &K);
+        let entries = on_output(augmented, j, &all, &K);
         gains.push(ChainGain {
             output: output.variable.name.clone(),
             entries,

@@ -36,7 +36,7 @@ use lynkeus_proof::definite::is_below;
 use lynkeus_proof::magnitude::times;
 use lynkeus_proof::matrix::sum;
 use lynkeus_proof::{decay, spectrum};
-use lynkeus_structure::{Extended, Standing, short};
+use lynkeus_structure::{AugmentedPlant, Standing, short};
 use nalgebra::DMatrix;
 
 use crate::statement::{proved, undecided};
@@ -64,7 +64,7 @@ pub enum Claim {
 /// # Errors
 /// Parameters without value.
 pub fn certify(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     assumptions: &Assumptions,
     claim: Claim,
@@ -72,21 +72,21 @@ pub fn certify(
     if observer.filter.is_some() {
         return Ok(Certificate::of_filter(BASIS, assumptions));
     }
-    let graph = extended.graph();
+    let graph = augmented.graph();
     let certified = graph.budgeted(graph.budget().part(1.0), || {
-        let certificate = certified(extended, observer, assumptions, claim)?;
+        let certificate = certified(augmented, observer, assumptions, claim)?;
         Ok(certificate.under(assumptions))
     });
     certified.unwrap_or_else(|spent| Ok(Certificate::ended(BASIS, assumptions, spent)))
 }
 
 fn certified(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     assumptions: &Assumptions,
     claim: Claim,
 ) -> Result<Certificate, DesignError> {
-    let system = match ErrorSystem::new(extended, observer, assumptions)? {
+    let system = match ErrorSystem::new(augmented, observer, assumptions)? {
         Ok(system) => system,
         Err(reason) => return Ok(not_covered(assumptions, reason)),
     };
@@ -94,10 +94,10 @@ fn certified(
     if assumptions.may_saturate() {
         return Ok(Certificate::new(BASIS, assumptions, hypotheses));
     }
-    let sample = refute::worst(extended.graph(), &system);
+    let sample = refute::worst(augmented.graph(), &system);
     // where it ends, what is proved by then still has to be told
-    let search = extended.graph().budget().part(SEARCH);
-    if let Some(check) = refute::growing(extended, observer, &system, &sample)? {
+    let search = augmented.graph().budget().part(SEARCH);
+    if let Some(check) = refute::growing(augmented, observer, &system, &sample)? {
         hypotheses.push(check);
         return Ok(Certificate::new(BASIS, assumptions, hypotheses));
     }
@@ -116,10 +116,10 @@ fn certified(
     let mut certificate = Certificate::new(BASIS, assumptions, hypotheses);
     match found {
         Some(proof) => {
-            fill(&mut certificate, extended, &system, &proof, assumptions);
+            fill(&mut certificate, augmented, &system, &proof, assumptions);
             if assumptions.is_moved() && certificate.verdict() == Standing::Proved {
                 certificate.mean_square =
-                    mean_square(extended, &system, &proof, assumptions, &search);
+                    mean_square(augmented, &system, &proof, assumptions, &search);
             }
             let faster = |spent| format!("a faster rate was sought: {spent}");
             certificate.notes.extend(spent.map(faster));
@@ -189,7 +189,7 @@ fn still_said(system: &ErrorSystem, sample: &Sample, search: &Budget) -> Vec<Str
 /// Rate, bounds and constants of a proof.
 fn fill(
     certificate: &mut Certificate,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     system: &ErrorSystem,
     proof: &Proof,
     assumptions: &Assumptions,
@@ -212,7 +212,7 @@ fn fill(
             "|e(t)| is at most this times e^(−rate·t)·|e(0)|",
         ));
     }
-    match bounds(extended, system, proof, assumptions) {
+    match bounds(augmented, system, proof, assumptions) {
         Some(bounds) => {
             certificate.ultimate_bound = Some(bounds.norm);
             certificate.ultimate = bounds.states;
@@ -237,18 +237,18 @@ const SLOWER: [f64; 3] = [0.85, 0.6, 0.35];
 
 /// What the error ends within without process noise; none where an assumed size is infinite.
 fn bounds(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     system: &ErrorSystem,
     proof: &Proof,
     assumptions: &Assumptions,
 ) -> Option<Bounds> {
-    of(extended, system, proof, assumptions, Interval::ZERO)
+    of(augmented, system, proof, assumptions, Interval::ZERO)
 }
 
 /// What the root of its mean square ends within with process noise, by the P of the proof and those of
 /// slower rates: each of the bounds holds.
 fn mean_square(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     system: &ErrorSystem,
     proof: &Proof,
     assumptions: &Assumptions,
@@ -262,7 +262,7 @@ fn mean_square(
         let densities = assumptions.process_noise.iter().enumerate();
         let trace =
             sum(densities.map(|(i, q)| Interval::point(proof.P[(i, i)]) * Interval::point(*q)));
-        of(extended, system, &proof, assumptions, trace)
+        of(augmented, system, &proof, assumptions, trace)
     });
     each.reduce(|a, b| Bounds {
         norm: a.norm.min(b.norm),
@@ -276,13 +276,13 @@ fn mean_square(
 }
 
 fn of(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     system: &ErrorSystem,
     proof: &Proof,
     assumptions: &Assumptions,
     trace: Interval,
 ) -> Option<Bounds> {
-    let n = extended.states.len();
+    let n = augmented.states.len();
     let through = |i: usize| {
         let columns = system.injection[i].iter().zip(&assumptions.noise);
         sum(columns.map(|(e, ν)| match times(*e, *ν) == 0.0 {
@@ -305,7 +305,7 @@ fn of(
         let mut unit = DMatrix::zeros(n, n);
         unit[(i, i)] = 1.0;
         let bound = finite((r * width(&proof.P, &unit)?).hi())?;
-        Some((extended.states[i].name.clone(), bound).into())
+        Some((augmented.states[i].name.clone(), bound).into())
     };
     Some(Bounds {
         norm: finite((r * width(&proof.P, &DMatrix::identity(n, n))?).hi())?,

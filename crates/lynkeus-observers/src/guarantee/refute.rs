@@ -19,7 +19,7 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape, jacobian};
 use lynkeus_proof::decay::is_unstable;
 use lynkeus_proof::spectrum;
-use lynkeus_structure::{Coordinate, Dimension, Extended, Point};
+use lynkeus_structure::{AugmentedPlant, Coordinate, Dimension, Point};
 use nalgebra::{DMatrix, DVector};
 
 use super::error_system::{ErrorSystem, edges};
@@ -96,7 +96,7 @@ pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Sample {
 
 /// What shows that the error does not decay, if anything does.
 pub(super) fn growing(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     system: &ErrorSystem,
     sample: &Sample,
@@ -104,7 +104,7 @@ pub(super) fn growing(
     if sample.worst.value < 0.0 {
         return Ok(None);
     }
-    if sample.unstable && is_constant(extended, observer, system) {
+    if sample.unstable && is_constant(augmented, observer, system) {
         let detail = "whatever the plant does, the error obeys e' = A e with the same A everywhere, which has an eigenvalue with a positive real part, by interval arithmetic";
         return Ok(Some(refuted(
             Inequality::SmallErrorsDecay,
@@ -112,7 +112,7 @@ pub(super) fn growing(
             detail,
         )));
     }
-    let found = repelling(extended, observer, system)?;
+    let found = repelling(augmented, observer, system)?;
     Ok(found.map(|point| {
         let detail = "the plant can rest at this point, with these inputs, and there the error's Jacobian has an eigenvalue with a positive real part, both by interval arithmetic: the estimate leaves the plant, however close it starts";
         refuted(Inequality::SmallErrorsDecay, point, detail)
@@ -121,8 +121,8 @@ pub(super) fn growing(
 
 /// Whether e' = A e with an A that reads nothing. One that a known input moves refutes nothing by
 /// its worst value: the plant need not stay in the box while the input keeps that value.
-fn is_constant(extended: &Extended<'_>, observer: &Observer, system: &ErrorSystem) -> bool {
-    let graph = extended.graph();
+fn is_constant(augmented: &AugmentedPlant<'_>, observer: &Observer, system: &ErrorSystem) -> bool {
+    let graph = augmented.graph();
     let read = graph.symbols_of(system.entries());
     let hats: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
     read.is_empty() && edges(graph, &observer.derivatives, &hats).is_empty()
@@ -262,11 +262,11 @@ const RANK: f64 = 1e-11;
 /// An equilibrium inside the box that is proved to exist and to repel the estimate; the
 /// value is the largest real part of an eigenvalue of A there, in floating point.
 pub(super) fn repelling(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     system: &ErrorSystem,
 ) -> Result<Option<Point>, MissingInput> {
-    let Some(mut search) = EquilibriumSearch::new(extended, observer, system)? else {
+    let Some(mut search) = EquilibriumSearch::new(augmented, observer, system)? else {
         return Ok(None);
     };
     let starts = (0..STARTS).map(|index| spread(&search.sides, index));
@@ -313,20 +313,20 @@ struct Around {
 impl<'a> EquilibriumSearch<'a> {
     /// None where something moves with time, or a state cannot move at all.
     fn new(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         observer: &Observer,
         system: &'a ErrorSystem,
     ) -> Result<Option<Self>, MissingInput> {
-        let graph = extended.graph();
-        let states = extended.states.len();
-        let mut symbols = extended.symbols();
-        symbols.extend(extended.inputs.iter().map(|u| u.node));
-        let mut equations = extended.derivatives.clone();
+        let graph = augmented.graph();
+        let states = augmented.states.len();
+        let mut symbols = augmented.symbols();
+        symbols.extend(augmented.inputs.iter().map(|u| u.node));
+        let mut equations = augmented.derivatives.clone();
         equations.sort();
         equations.dedup();
         equations.retain(|f| graph.constant_value(*f) != Some(0.0));
         let moved = graph.symbols_of(&[&equations[..], system.corrected()].concat());
-        let still = !moved.contains(&extended.plant.time) && !moved.contains(&observer.time);
+        let still = !moved.contains(&augmented.plant.time) && !moved.contains(&observer.time);
         let sides = sides(system, symbols.len());
         let wide = sides
             .iter()
@@ -343,7 +343,7 @@ impl<'a> EquilibriumSearch<'a> {
         };
         let entries: Vec<Node> = (0..equations.len() * symbols.len()).map(entry).collect();
         let hats: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
-        let pairs = extended.symbols().into_iter().zip(hats.iter().copied());
+        let pairs = augmented.symbols().into_iter().zip(hats.iter().copied());
         let mut values = graph.substitute(&equations, &pairs.collect());
         values.extend(system.corrected());
         let mut smooth = edges(graph, &values, &hats);

@@ -247,7 +247,7 @@ impl<'c, 'e, 'p> Run<'c, 'e, 'p> {
             copy,
             transient,
             starts: starts.collect(),
-            derivatives: copy.at_estimate(&copy.extended.derivatives),
+            derivatives: copy.at_estimate(&copy.augmented.derivatives),
             copies: vec![],
         })
     }
@@ -257,7 +257,7 @@ impl<'c, 'e, 'p> Run<'c, 'e, 'p> {
         let n = part.states.len();
         let constants = constants(part);
         let gains = transient::gains(self.transient, self.copy, part.number, part.θ, &constants);
-        let graph = self.copy.extended.graph();
+        let graph = self.copy.augmented.graph();
         let signals: Vec<Signal> = (0..n).map(|j| self.second(part, j)).collect();
         let mut names = vec![];
         // a chain of one state has no block: its correction is ℓ e_1
@@ -297,13 +297,13 @@ impl<'c, 'e, 'p> Run<'c, 'e, 'p> {
             return hat.clone();
         }
         let name = format!("second estimate of {}", hat.name);
-        let symbol = self.copy.extended.graph().fresh(&name).node();
+        let symbol = self.copy.augmented.graph().fresh(&name).node();
         Signal { name, symbol }
     }
 
     /// y − x̂_1, then c_i − x̂_i.
     fn innovation(&self, part: &Part<'_>, signals: &[Signal], i: usize) -> Node {
-        let graph = self.copy.extended.graph();
+        let graph = self.copy.augmented.graph();
         match i {
             0 => (-graph.expr(part.innovation)).node(),
             _ => {

@@ -89,8 +89,8 @@ impl Remedies {
         let Some(limits) = &self.limit else {
             return Some(innovation);
         };
-        let graph = copy.extended.graph();
-        let (_, slope, _) = copy.extended.outputs[i].state?;
+        let graph = copy.augmented.graph();
+        let (_, slope, _) = copy.augmented.outputs[i].state?;
         let limit = graph.constant(limits[i]) / graph.expr(slope).abs();
         Some(graph.expr(innovation).min(limit).max(-limit).node())
     }

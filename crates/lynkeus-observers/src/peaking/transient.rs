@@ -86,8 +86,8 @@ impl Transient {
         θ: &Speed,
         steady: &[(f64, f64)],
     ) -> Vec<Node> {
-        let graph = copy.extended.graph();
-        let time = graph.expr(copy.extended.plant.time);
+        let graph = copy.augmented.graph();
+        let time = graph.expr(copy.augmented.plant.time);
         let until = graph.constant(self.until);
         let gain = |&(gain, exponent): &(f64, f64)| match self.fall {
             None => {
@@ -127,7 +127,7 @@ pub(crate) fn gains(
     θ: &Speed,
     steady: &[(f64, f64)],
 ) -> Vec<Node> {
-    let graph = copy.extended.graph();
+    let graph = copy.augmented.graph();
     match transient {
         Some(transient) => transient.gains(copy, i, θ, steady),
         None => steady

@@ -19,7 +19,7 @@ mod observer;
 mod settings;
 mod theorem;
 
-use lynkeus_structure::{Extended, Region, Standing, Superdiagonal, superdiagonal};
+use lynkeus_structure::{AugmentedPlant, Region, Standing, Superdiagonal, superdiagonal};
 
 use crate::conditions::{lipschitz, names};
 use crate::design::{Found, Searched};
@@ -45,39 +45,43 @@ impl Stages for StateAffine {
     const BASIS: &'static str = BASIS;
     const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];
 
-    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
-        Settings::read(extended, tuning)
+    fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
+        Settings::read(augmented, tuning)
     }
 
     fn late(settings: &Settings) -> Result<(), TuningError> {
         settings.late()
     }
 
-    fn form(extended: &Extended<'_>, _: &Settings, region: &Region) -> Searched<Superdiagonal> {
-        form(extended, region)
+    fn form(
+        augmented: &AugmentedPlant<'_>,
+        _: &Settings,
+        region: &Region,
+    ) -> Searched<Superdiagonal> {
+        form(augmented, region)
     }
 
     fn design(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         settings: &Settings,
         found: Found<Superdiagonal>,
     ) -> Result<Design, DesignError> {
-        assemble(extended, settings, &found.form, found.examination)
+        assemble(augmented, settings, &found.form, found.examination)
     }
 
     fn theorem(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         settings: &Settings,
         found: Found<Superdiagonal>,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        theorem::certificate(extended, settings, found, assumptions)
+        theorem::certificate(augmented, settings, found, assumptions)
     }
 }
 
 /// The blocks with what is known of A2 and A4.
-pub(crate) fn form(extended: &Extended<'_>, region: &Region) -> Searched<Superdiagonal> {
-    let form = match superdiagonal::find(extended) {
+pub(crate) fn form(augmented: &AugmentedPlant<'_>, region: &Region) -> Searched<Superdiagonal> {
+    let form = match superdiagonal::find(augmented) {
         Ok(form) => form,
         Err(summary) => {
             return Ok(Err(Examination::unfit(NAME, summary, vec![])));
@@ -89,18 +93,18 @@ pub(crate) fn form(extended: &Extended<'_>, region: &Region) -> Searched<Superdi
         declared.sort_unstable();
         let statement = Ltaief::BlockShows {
             factor: k,
-            states: names(extended, &declared),
+            states: names(augmented, &declared),
         };
-        let found = factor.column_rank(extended, k, region)?;
+        let found = factor.column_rank(augmented, k, region)?;
         checks.push(Statement::from(statement).with(found));
     }
     let excited = standing(&checks) == Standing::Undecided;
-    checks.push(lipschitz(extended, region)?);
-    let mut summary = form.describe(extended);
+    checks.push(lipschitz(augmented, region)?);
+    let mut summary = form.describe(augmented);
     if excited {
         summary += "; which inputs suffice depends on their excitation (A4), which the monitor 'excitation' watches";
     }
-    let chains = form.declared().map(|block| names(extended, &block));
-    let examination = Examination::new(extended, region, NAME, summary, chains.collect(), checks)?;
+    let chains = form.declared().map(|block| names(augmented, &block));
+    let examination = Examination::new(augmented, region, NAME, summary, chains.collect(), checks)?;
     Ok(Ok(Found { form, examination }))
 }

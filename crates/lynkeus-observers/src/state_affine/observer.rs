@@ -50,7 +50,7 @@
 
 use lynkeus_expr::{Expr, Graph, Node, jacobian};
 use lynkeus_gain::UnitFactor;
-use lynkeus_structure::{Extended, Matrix, Superdiagonal, range};
+use lynkeus_structure::{AugmentedPlant, Matrix, Superdiagonal, range};
 
 use super::settings::{Numbers, Settings};
 use crate::conditions::names;
@@ -72,22 +72,22 @@ const ALARM: f64 = 1e-6;
 
 /// Observer (7)–(8).
 pub(super) fn assemble(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     form: &Superdiagonal,
     examination: Examination,
 ) -> Result<Design, DesignError> {
-    let graph = extended.graph();
+    let graph = augmented.graph();
     let order: Vec<usize> = form.blocks().flatten().copied().collect();
     let numbers = settings.numbers(&order)?;
-    let copy = PlantCopy::new(extended, &settings.common);
+    let copy = PlantCopy::new(augmented, &settings.common);
     let matrices = Matrices::new(&copy, form, &order);
     let names: Vec<&str> = order
         .iter()
-        .map(|&i| extended.states[i].name.as_str())
+        .map(|&i| augmented.states[i].name.as_str())
         .collect();
     let factor = Factor::new(graph, &names, &numbers.S0);
-    let mut derivatives = copy.at_estimate(&extended.derivatives);
+    let mut derivatives = copy.at_estimate(&augmented.derivatives);
     prolong(&copy, &matrices.F, &order, &mut derivatives);
     let Matrices { C, F } = matrices;
     let v: Vec<Vec<Sparse<'_>>> = C.iter().map(|row| factor.forward(row)).collect();
@@ -106,14 +106,14 @@ pub(super) fn assemble(
         }
     }
     derivatives.extend(factor.derivatives(θ.expr(graph), &F, &v));
-    let alarm = alarm(extended, form, settings)?;
+    let alarm = alarm(augmented, form, settings)?;
     let mut observer = copy.observer(NAME, derivatives)?.tuned_by([&θ]);
     observer.monitors.extend(monitor(&factor, alarm));
     observer.states.extend(factor.states);
     let parameters = parameters(&copy, form, &order, &numbers, alarm)?;
     Ok(Design {
         observer,
-        notes: outside_last(extended, form).into_iter().collect(),
+        notes: outside_last(augmented, form).into_iter().collect(),
         examination,
         gains: vec![],
         parameters,
@@ -133,7 +133,7 @@ fn prolong<'g>(
     if !copy.common.prolong {
         return;
     }
-    let graph: &'g Graph = copy.extended.graph();
+    let graph: &'g Graph = copy.augmented.graph();
     for (row, &state) in order.iter().enumerate() {
         for (entry, &next) in F[row].iter().zip(order) {
             let Some(entry) = entry else { continue };
@@ -146,13 +146,13 @@ fn prolong<'g>(
 
 /// Below this excitation the flag is raised.
 pub(super) fn alarm(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     form: &Superdiagonal,
     settings: &Settings,
 ) -> Result<f64, DesignError> {
     match settings.alarm.clone()? {
         Some(alarm) => Ok(alarm),
-        None => Ok(ALARM * least_reach(extended, form)?),
+        None => Ok(ALARM * least_reach(augmented, form)?),
     }
 }
 
@@ -176,11 +176,11 @@ struct Matrices<'g> {
 
 impl<'g> Matrices<'g> {
     fn new(copy: &PlantCopy<'_, 'g>, form: &Superdiagonal, order: &[usize]) -> Self {
-        let graph: &'g Graph = copy.extended.graph();
+        let graph: &'g Graph = copy.augmented.graph();
         let n = order.len();
         let place = |state: usize| order.iter().position(|&i| i == state);
         let mut matrices = Self {
-            C: vec![vec![None; n]; copy.extended.outputs.len()],
+            C: vec![vec![None; n]; copy.augmented.outputs.len()],
             F: vec![vec![None; n]; n],
         };
         for (k, factor) in form.factors.iter().enumerate() {
@@ -202,15 +202,15 @@ impl<'g> Matrices<'g> {
 
 /// C(u)x̂ − y, one per output.
 fn innovations<'g>(copy: &PlantCopy<'_, 'g>) -> Vec<Expr<'g>> {
-    let extended = copy.extended;
-    let graph: &'g Graph = extended.graph();
-    let hats = extended.states.iter().zip(&copy.hats);
+    let augmented = copy.augmented;
+    let graph: &'g Graph = augmented.graph();
+    let hats = augmented.states.iter().zip(&copy.hats);
     let unlimited = hats.map(|(state, hat)| (state.node, hat.symbol)).collect();
     let innovation = |(o, y): (&lynkeus_structure::Measurement, &Signal)| {
         let h = graph.substitute(&[o.variable.node], &unlimited)[0];
         graph.expr(h) - graph.expr(y.symbol)
     };
-    extended
+    augmented
         .outputs
         .iter()
         .zip(&copy.measured)
@@ -221,9 +221,9 @@ fn innovations<'g>(copy: &PlantCopy<'_, 'g>) -> Vec<Expr<'g>> {
 /// How large the diagonal of S could be at best for the least visible state:
 /// g = 1 for an output, g_j = Σ_i g_i max|F_ij|² for a state. It carries the units
 /// of F, so that the alarm does not depend on them. Unbounded entries count as 1.
-fn least_reach(extended: &Extended<'_>, form: &Superdiagonal) -> Result<f64, DesignError> {
-    let (graph, region) = (extended.graph(), extended.region());
-    let mut reach = vec![1.0; extended.outputs.len()];
+fn least_reach(augmented: &AugmentedPlant<'_>, form: &Superdiagonal) -> Result<f64, DesignError> {
+    let (graph, region) = (augmented.graph(), augmented.region());
+    let mut reach = vec![1.0; augmented.outputs.len()];
     let mut least = f64::INFINITY;
     for factor in &form.factors {
         let mut next = vec![0.0; factor.columns.len()];
@@ -241,11 +241,12 @@ fn least_reach(extended: &Extended<'_>, form: &Superdiagonal) -> Result<f64, Des
 
 /// (1) has ε in the last block only. Elsewhere its trace in the blocks behind
 /// does not shrink as θ grows: worth a note, no reason to refuse.
-fn outside_last(extended: &Extended<'_>, form: &Superdiagonal) -> Option<String> {
-    let plant = extended.plant;
+fn outside_last(augmented: &AugmentedPlant<'_>, form: &Superdiagonal) -> Option<String> {
+    let plant = augmented.plant;
     let last = form.declared().last()?;
     let known = |v: &lynkeus_model::Variable| {
-        extended.inputs.iter().any(|i| i.node == v.node) || extended.state_index(&v.name).is_some()
+        augmented.inputs.iter().any(|i| i.node == v.node)
+            || augmented.state_index(&v.name).is_some()
     };
     let ε: Vec<Node> = plant
         .inputs
@@ -253,17 +254,17 @@ fn outside_last(extended: &Extended<'_>, form: &Superdiagonal) -> Option<String>
         .filter(|v| !known(v))
         .map(|v| v.node)
         .collect();
-    let pattern = jacobian::pattern(extended.graph(), &plant.derivatives, &ε);
+    let pattern = jacobian::pattern(augmented.graph(), &plant.derivatives, &ε);
     let acts = |&i: &usize| {
-        let unknown_input = i >= extended.plant_states();
+        let unknown_input = i >= augmented.plant_states();
         !last.contains(&i) && (unknown_input || !pattern[i].is_empty())
     };
-    let states: Vec<usize> = (0..extended.states.len()).filter(acts).collect();
+    let states: Vec<usize> = (0..augmented.states.len()).filter(acts).collect();
     (!states.is_empty()).then(|| {
         format!(
             "an uncertainty acts on {}, outside of the last block ({}); Theorem 1 covers the last one only, and the error of the blocks behind need not shrink as theta grows",
-            names(extended, &states).join(", "),
-            names(extended, &last).join(", ")
+            names(augmented, &states).join(", "),
+            names(augmented, &last).join(", ")
         )
     })
 }
@@ -275,12 +276,12 @@ pub(super) fn parameters(
     given: &Numbers,
     alarm: f64,
 ) -> Result<Vec<(String, String)>, DesignError> {
-    let extended = copy.extended;
+    let augmented = copy.augmented;
     let start = StartPoint::new(copy)?;
     let n = order.len();
     let place = |state: usize| order.iter().position(|&i| i == state);
     let factor = |k: usize, rows: usize, row: &dyn Fn(usize) -> Option<usize>| {
-        Matrix::from_fn(extended.graph(), (rows, n), |i, j| {
+        Matrix::from_fn(augmented.graph(), (rows, n), |i, j| {
             let factor = form.factors.get(k)?;
             let is_here = |&&(r, c, _): &&(usize, usize, _)| {
                 row(factor.rows[r]) == Some(i) && place(factor.columns[c]) == Some(j)
@@ -288,18 +289,18 @@ pub(super) fn parameters(
             factor.entries.iter().find(is_here).map(|entry| entry.2)
         })
     };
-    let C = factor(0, extended.outputs.len(), &Some);
+    let C = factor(0, augmented.outputs.len(), &Some);
     let F = (1..form.factors.len())
         .map(|k| factor(k, n, &place))
         .reduce(|all, next| all.plus(&next));
     let gain = gain(&start.values(&C)?, form, given);
     let names: Vec<&str> = order
         .iter()
-        .map(|&i| extended.states[i].name.as_str())
+        .map(|&i| augmented.states[i].name.as_str())
         .collect();
     let mut found: Vec<(String, String)> = vec![
         ("θ".into(), given.θ.to_string()),
-        ("blocks".into(), form.describe(extended)),
+        ("blocks".into(), form.describe(augmented)),
         ("alarm".into(), format!("excitation below {alarm:.3e}")),
         ("rows".into(), names.join(", ")),
         ("C(u)".into(), expressions(&C)),

@@ -1,7 +1,7 @@
 //! The study's keys.
 
 use lynkeus_gain::UnitFactor;
-use lynkeus_structure::Extended;
+use lynkeus_structure::AugmentedPlant;
 
 use crate::estimate::{Common, PROLONG};
 use crate::tuning::Late;
@@ -49,11 +49,11 @@ pub struct Settings {
 }
 
 impl Settings {
-    pub fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
+    pub fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
         Ok(Self {
             common: Common::read(tuning)?,
             θ: tuning.positive(THETA.name),
-            S0: start(tuning, extended.states.len()),
+            S0: start(tuning, augmented.states.len()),
             alarm: tuning.positive(ALARM.name),
         })
     }

@@ -29,7 +29,7 @@ use lynkeus_proof::matrix::{IntervalMatrix, square, sum, upper};
 use lynkeus_proof::metzler;
 use lynkeus_proof::metzler::spectral_radius;
 use lynkeus_proof::search::first;
-use lynkeus_structure::{Extended, Region, Standing, Superdiagonal, Verdict, short};
+use lynkeus_structure::{AugmentedPlant, Region, Standing, Superdiagonal, Verdict, short};
 
 use super::observer::alarm;
 use super::settings::{Numbers, Settings};
@@ -44,7 +44,7 @@ use crate::{
 pub(super) const BASIS: &str = "Theorem 1 of Ltaief, Maatoug, Farza, Ménard, M'Saad and Koubaa";
 
 pub(super) fn certificate(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Superdiagonal>,
     assumptions: &Assumptions,
@@ -56,7 +56,7 @@ pub(super) fn certificate(
         .enumerate()
         .flat_map(|(k, b)| b.iter().map(move |_| k))
         .collect();
-    let alarm = alarm(extended, &form, settings)?;
+    let alarm = alarm(augmented, &form, settings)?;
     let shows = |c: &&Check| matches!(&c.statement, Statement::Ltaief(Ltaief::BlockShows { .. }));
     let always_shown = examination
         .checks
@@ -64,7 +64,7 @@ pub(super) fn certificate(
         .filter(shows)
         .all(Check::is_proved);
     let study = Study {
-        extended,
+        augmented,
         assumptions,
         form: &form,
         order,
@@ -81,7 +81,7 @@ pub(super) fn certificate(
 }
 
 struct Study<'a> {
-    extended: &'a Extended<'a>,
+    augmented: &'a AugmentedPlant<'a>,
     assumptions: &'a Assumptions,
     form: &'a Superdiagonal,
     /// the states in the order of the blocks
@@ -129,7 +129,7 @@ impl Study<'_> {
             (Some(p), Some(q)) => self.block[q] > self.block[p],
             _ => false,
         };
-        let (slopes, lipschitz) = slopes(self.extended, self.region(), next)?;
+        let (slopes, lipschitz) = slopes(self.augmented, self.region(), next)?;
         let sizes = self.sizes()?;
         let bounded = [&lipschitz, &sizes.check].iter().all(|c| c.is_proved());
         checks.extend([lipschitz, sizes.check.clone(), self.uncertainty()]);
@@ -144,7 +144,7 @@ impl Study<'_> {
         checks.push(self.a4(excitation));
         let mut certificate = Certificate::new(BASIS, self.assumptions, checks);
         certificate.constants = constants;
-        let note = estimate::note(self.common, self.extended, self.region());
+        let note = estimate::note(self.common, self.augmented, self.region());
         certificate.notes.push(note);
         if let Some((rate, spectrum)) = found.filter(|_| everything_else) {
             self.conclude(&mut certificate, rate, &spectrum);
@@ -154,9 +154,9 @@ impl Study<'_> {
 
     /// A1: bounds of C and F.
     fn sizes(&self) -> Result<Sizes, DesignError> {
-        let graph = self.extended.graph();
+        let graph = self.augmented.graph();
         let n = self.order.len();
-        let mut C = vec![vec![0.0; n]; self.extended.outputs.len()];
+        let mut C = vec![vec![0.0; n]; self.augmented.outputs.len()];
         let mut F = vec![vec![0.0; n]; n];
         let (mut values, mut open): (Option<(Table, Table)>, Vec<Node>) =
             (Some((C.clone(), F.clone())), vec![]);
@@ -188,7 +188,7 @@ impl Study<'_> {
         let check = match open.first() {
             None => proved(name, "every entry enclosed"),
             Some(&node) => {
-                let missing = undeclared(self.extended, &open, self.region());
+                let missing = undeclared(self.augmented, &open, self.region());
                 let advice = match missing.is_empty() {
                     true => "mind divisions and roots at the edges of the box".to_owned(),
                     false => format!("declare min and max of {}", missing.join(", ")),
@@ -215,7 +215,7 @@ impl Study<'_> {
         match self.order.iter().find(|state| !known(state)) {
             None => proved(name, self.assumed_drift()),
             Some(&state) => {
-                let name_of = &self.extended.states[state].name;
+                let name_of = &self.augmented.states[state].name;
                 undecided(
                     name,
                     format!("no bound is assumed for the drift of {name_of}"),
@@ -225,7 +225,7 @@ impl Study<'_> {
     }
 
     fn assumed_drift(&self) -> String {
-        let constant = self.assumptions.constant(self.extended.plant_states());
+        let constant = self.assumptions.constant(self.augmented.plant_states());
         match constant.is_empty() {
             true => "by the assumed drift".to_owned(),
             false => format!(
@@ -393,7 +393,7 @@ impl Study<'_> {
             d * d
         });
         let b = (Interval::point(spectrum.largest) * sum(drift)).sqrt();
-        let count = self.extended.outputs.len();
+        let count = self.augmented.outputs.len();
         let noise = |i: usize| {
             self.assumptions
                 .noise
@@ -416,7 +416,7 @@ impl Study<'_> {
         let last = self.block.iter().copied().max().unwrap_or(0);
         let norm = |radius: Interval| (θ.powi(last as i32).max(Interval::ONE) * radius).hi();
         let bounds = |radius: Interval| {
-            let name = |p: usize| self.extended.states[self.order[p]].name.clone();
+            let name = |p: usize| self.augmented.states[self.order[p]].name.clone();
             let each = (0..self.order.len()).map(|p| (name(p), (scale(p) * radius).hi()).into());
             let norm = norm(radius);
             norm.is_finite().then(|| Bounds {

@@ -4,7 +4,7 @@
 use lynkeus_expr::{MissingInput, Tape, jacobian};
 use lynkeus_proof::hurwitz::Stability;
 use lynkeus_proof::spectrum;
-use lynkeus_structure::{Assignment, Extended, Region, Standing, chains};
+use lynkeus_structure::{Assignment, AugmentedPlant, Region, Standing, chains};
 use nalgebra::DMatrix;
 
 use super::form::{Form, Gains, NAME, Window};
@@ -17,12 +17,12 @@ use crate::{DesignError, Examination, Hammouri, TuningError};
 /// The first assignment whose conditions are proved, else the first that no condition
 /// refutes, else the first with its refusal; or the examination that says why there is none.
 pub(super) fn form(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     region: &Region,
 ) -> Searched<Form> {
     let refusal = |summary: String| Examination::unfit(NAME, summary, vec![]);
-    let mut assignments = match chains::find(extended, &settings.request) {
+    let mut assignments = match chains::find(augmented, &settings.request) {
         Ok(assignments) => assignments,
         Err(summary) => return Ok(Err(refusal(summary))),
     };
@@ -41,7 +41,7 @@ pub(super) fn form(
     let choices = assignments.len();
     let mut best: Option<Found<Form>> = None;
     for assignment in assignments {
-        let form = examined(extended, settings, region, assignment, choices)?;
+        let form = examined(augmented, settings, region, assignment, choices)?;
         match form.examination.fit() {
             Standing::Proved => return Ok(Ok(form)),
             Standing::Undecided
@@ -74,7 +74,7 @@ fn lead_within_window(assignment: &mut Assignment, δ: &[f64]) {
 
 /// Condition H3 for one assignment.
 fn examined(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     region: &Region,
     assignment: Assignment,
@@ -82,25 +82,25 @@ fn examined(
 ) -> Result<Found<Form>, DesignError> {
     let (mut checks, mut all) = (vec![], vec![]);
     for (i, chain) in assignment.chains.iter().enumerate() {
-        checks.extend(output_slope(extended, i, region)?);
-        let (found, signs) = partials(extended, &chain.states, region)?;
+        checks.extend(output_slope(augmented, i, region)?);
+        let (found, signs) = partials(augmented, &chain.states, region)?;
         checks.extend(signs);
         all.push(found);
     }
-    checks.push(lipschitz(extended, region)?);
+    checks.push(lipschitz(augmented, region)?);
     let chains = assignment
         .chains
         .iter()
-        .map(|c| names(extended, &c.states))
+        .map(|c| names(augmented, &c.states))
         .collect();
-    let mut summary = chains::describe(extended, &assignment);
+    let mut summary = chains::describe(augmented, &assignment);
     if choices > 1 {
         summary += &format!(
             ", the most balanced of {choices} assignments that the equations allow; the key 'chains' decides otherwise"
         );
     }
     if assignment.leads.len() > 1 {
-        let leading = &extended.outputs[assignment.leading].variable.name;
+        let leading = &augmented.outputs[assignment.leading].variable.name;
         let which = match assignment.leads.len() {
             count if count < assignment.chains.len() => format!("{count} of the chains"),
             2 => "either chain".to_owned(),
@@ -110,13 +110,13 @@ fn examined(
             "; {which} can lead in Theorem 2, that of {leading} does, the key 'leading' decides otherwise"
         );
     }
-    let examination = Examination::new(extended, region, NAME, summary, chains, checks)?;
+    let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
     let form = Form {
         assignment,
         partials: all,
     };
     let mut found = Found { form, examination };
-    settle(&mut found, extended, settings, region)?;
+    settle(&mut found, augmented, settings, region)?;
     Ok(found)
 }
 
@@ -157,11 +157,11 @@ fn loose_by(chain: &GainedChain<'_>, states: &[String]) -> Option<String> {
 /// box, the gain is not called fit.
 pub(super) fn settle(
     Found { form, examination }: &mut Found<Form>,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     region: &Region,
 ) -> Result<(), DesignError> {
-    let loose = form.loose(extended, settings);
+    let loose = form.loose(augmented, settings);
     if loose.is_empty() {
         return Ok(());
     }
@@ -169,12 +169,12 @@ pub(super) fn settle(
         "with the S given A(a) − rS⁻¹CᵀC {}; only a plant that is damped by itself converges with such a gain, Lemma 1's own S (leave the key S out) is stable",
         loose.join(" and ")
     );
-    let n = extended.states.len();
+    let n = augmented.states.len();
     let words = match n > LARGEST {
         true => format!(
             "{words}; whether this plant's damping is enough is not looked into: it has {n} states, more than {LARGEST}"
         ),
-        false if form.is_damped(extended, settings, region)? => {
+        false if form.is_damped(augmented, settings, region)? => {
             examination.summary += &format!("; {words}");
             return Ok(());
         }
@@ -186,7 +186,7 @@ pub(super) fn settle(
 
 impl Form {
     /// The chains that the gain does not stabilise by itself, with their eigenvalues.
-    fn loose(&self, extended: &Extended<'_>, settings: &Settings) -> Vec<String> {
+    fn loose(&self, augmented: &AugmentedPlant<'_>, settings: &Settings) -> Vec<String> {
         let Some(S) = &settings.S else {
             return vec![];
         };
@@ -205,7 +205,7 @@ impl Form {
                 K: &K,
                 partials: &bounds.collect::<Vec<_>>(),
             };
-            loose.extend(loose_by(&gained, &names(extended, &chain.states)));
+            loose.extend(loose_by(&gained, &names(augmented, &chain.states)));
         }
         loose
     }
@@ -214,16 +214,16 @@ impl Form {
     /// the study has no θ yet.
     fn is_damped(
         &self,
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         settings: &Settings,
         region: &Region,
     ) -> Result<bool, MissingInput> {
         let Ok(gains) = Gains::new(self, settings) else {
             return Ok(false);
         };
-        let n = extended.states.len();
-        let graph = extended.graph();
-        let jacobian = jacobian::forward(graph, &extended.derivatives, &extended.symbols());
+        let n = augmented.states.len();
+        let graph = augmented.graph();
+        let jacobian = jacobian::forward(graph, &augmented.derivatives, &augmented.symbols());
         let nodes: Vec<_> = jacobian.entries.iter().map(|e| e.2).collect();
         let mut values = vec![0.0; nodes.len()];
         Tape::new(graph, &region.symbols(), &nodes)?

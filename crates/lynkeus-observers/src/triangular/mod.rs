@@ -15,7 +15,7 @@ mod observer;
 mod settings;
 mod theorem;
 
-use lynkeus_structure::{Extended, Region};
+use lynkeus_structure::{AugmentedPlant, Region};
 
 use crate::design::{Found, Searched};
 use crate::family::Stages;
@@ -39,41 +39,45 @@ impl Stages for Triangular {
     const BASIS: &'static str = BASIS;
     const KEYS: &'static [&'static [KeySpec]] = settings::KEYS;
 
-    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
-        Settings::read(extended, tuning)
+    fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
+        Settings::read(augmented, tuning)
     }
 
     fn late(settings: &Settings) -> Result<(), TuningError> {
         settings.late()
     }
 
-    fn form(extended: &Extended<'_>, settings: &Settings, region: &Region) -> Searched<Form> {
-        conditions::form(extended, settings, region)
+    fn form(
+        augmented: &AugmentedPlant<'_>,
+        settings: &Settings,
+        region: &Region,
+    ) -> Searched<Form> {
+        conditions::form(augmented, settings, region)
     }
 
     fn design(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         settings: &Settings,
         found: Found<Form>,
     ) -> Result<Design, DesignError> {
         if let Some(lmi) = settings.lmi.clone() {
             let examination = found.examination;
-            return guarantee::design_lmi(extended, &settings.common, lmi, NAME, examination);
+            return guarantee::design_lmi(augmented, &settings.common, lmi, NAME, examination);
         }
         if settings.remedies.low_power {
-            return Ok(observer::assemble(extended, settings, found)?);
+            return Ok(observer::assemble(augmented, settings, found)?);
         }
         let Found { form, examination } = found;
         let gains = Gains::new(&form, settings)?;
-        Ok(observer(extended, settings, &form, &gains, examination)?)
+        Ok(observer(augmented, settings, &form, &gains, examination)?)
     }
 
     fn theorem(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         settings: &Settings,
         found: Found<Form>,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        theorem::certificate(extended, settings, found, assumptions)
+        theorem::certificate(augmented, settings, found, assumptions)
     }
 }

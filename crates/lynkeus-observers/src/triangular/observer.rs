@@ -5,7 +5,7 @@
 //! that the exponents of Theorem 2 serve two chains there as well.
 
 use lynkeus_expr::{Graph, Node};
-use lynkeus_structure::Extended;
+use lynkeus_structure::AugmentedPlant;
 
 use super::form::{Form, Gains, NAME, Window, exponents};
 use super::settings::Settings;
@@ -18,17 +18,17 @@ use crate::{Design, Examination, TuningError, estimate};
 
 /// Observer (9).
 pub(super) fn observer(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     form: &Form,
     gains: &Gains<'_>,
     examination: Examination,
 ) -> Result<Design, TuningError> {
-    let graph = extended.graph();
-    let copy = PlantCopy::new(extended, &settings.common);
+    let graph = augmented.graph();
+    let copy = PlantCopy::new(augmented, &settings.common);
     let remedies = &settings.remedies;
     let start = AtStart::new(&copy)?;
-    let mut derivatives = copy.at_estimate(&extended.derivatives);
+    let mut derivatives = copy.at_estimate(&augmented.derivatives);
     let (mut table, mut parameters) = (vec![], gains.parameters());
     let speeds = Speed::of_chains(&copy, &gains.θ);
     for (i, (chain, θ)) in form.assignment.chains.iter().zip(&speeds).enumerate() {
@@ -47,7 +47,7 @@ pub(super) fn observer(
             factors: &scaled,
             limited: remedies.limit.is_some(),
         };
-        match printed.constant(extended) {
+        match printed.constant(augmented) {
             Some(constant) => table.push(constant),
             None => {
                 let constants: Vec<String> = gains.chain(i).iter().map(f64::to_string).collect();
@@ -97,7 +97,7 @@ fn scaled(
 }
 
 pub(super) fn assemble(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Form>,
 ) -> Result<Design, TuningError> {
@@ -110,7 +110,7 @@ pub(super) fn assemble(
     let transient = remedies.transient.as_ref();
     let coefficients = remedies.coefficients(&form.assignment.lengths())?;
     let divided = settings.divided;
-    let copy = PlantCopy::new(extended, common);
+    let copy = PlantCopy::new(augmented, common);
     let mut run = Run::new(&copy, transient)?;
     let speeds = Speed::of_chains(&copy, &θ);
     let (mut factors, mut notes) = (vec![], vec![]);
@@ -118,9 +118,9 @@ pub(super) fn assemble(
         let Some(innovation) = remedies.innovation(&copy, i) else {
             continue;
         };
-        let derivative = |&state: &usize| extended.derivatives[state];
+        let derivative = |&state: &usize| augmented.derivatives[state];
         let f: Vec<Node> = chain.states.iter().map(derivative).collect();
-        let output = &extended.outputs[i].variable.name;
+        let output = &augmented.outputs[i].variable.name;
         if !divided {
             let bounds: Vec<(f64, f64)> = form.partials[i].iter().map(|p| p.bounds).collect();
             notes.extend(variation(output, &bounds, &coefficients[i]));
@@ -128,7 +128,7 @@ pub(super) fn assemble(
         let added = run.add(&Part {
             states: &chain.states,
             f: &f,
-            divisors: &divisors(extended, &form.partials[i], divided)?,
+            divisors: &divisors(augmented, &form.partials[i], divided)?,
             innovation,
             K: &coefficients[i],
             θ: &speeds[i],
@@ -164,13 +164,13 @@ pub(super) fn assemble(
 
 /// a_i itself, or the constant that stands for it.
 fn divisors(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     partials: &[Partial],
     divided: bool,
 ) -> Result<Vec<Node>, TuningError> {
     let divisor = |partial: &Partial| match (divided, partial.nominal()) {
         (true, _) => Ok(partial.node),
-        (false, Some(middle)) => Ok(extended.graph().constant(middle).node()),
+        (false, Some(middle)) => Ok(augmented.graph().constant(middle).node()),
         (false, None) => {
             let expected = "partial derivatives with known positive bounds for form = \"low-power\"; declare min and max in the model, or set partials = true";
             let found = format!("bounds {} and {}", partial.bounds.0, partial.bounds.1);

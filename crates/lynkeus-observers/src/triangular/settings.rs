@@ -1,7 +1,7 @@
 //! The study's keys.
 
 use lynkeus_gain::Tridiagonal;
-use lynkeus_structure::{ChainRequest, Extended};
+use lynkeus_structure::{AugmentedPlant, ChainRequest};
 
 use crate::conditions::{CHAINS, chain_request};
 use crate::estimate::{Common, PROLONG};
@@ -108,8 +108,8 @@ pub struct Settings {
 }
 
 impl Settings {
-    pub fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
-        let count = extended.outputs.len();
+    pub fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
+        let count = augmented.outputs.len();
         let S = explicit(tuning)?;
         let sizes = S
             .as_ref()
@@ -126,8 +126,8 @@ impl Settings {
             r: tuning.positive_per_chain(FACTOR.name, count)?,
             S,
             divided: tuning.flag(PARTIALS.name)?,
-            request: chain_request(extended, tuning, MATRICES.name, sizes)?,
-            leading: leading(extended, tuning)?,
+            request: chain_request(augmented, tuning, MATRICES.name, sizes)?,
+            leading: leading(augmented, tuning)?,
             lmi,
             remedies: Remedies::read(tuning, count, of_standard)?,
         })
@@ -148,8 +148,8 @@ impl Settings {
 }
 
 /// The chain that the study lets lead, by the place of its output.
-fn leading(extended: &Extended<'_>, tuning: &Tuning) -> Result<Option<usize>, TuningError> {
-    let outputs = extended.outputs.iter().map(|o| o.variable.name.as_str());
+fn leading(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Option<usize>, TuningError> {
+    let outputs = augmented.outputs.iter().map(|o| o.variable.name.as_str());
     let outputs: Vec<&str> = outputs.collect();
     let name = tuning.choice(LEADING.name, &outputs)?;
     Ok(name.and_then(|name| outputs.iter().position(|o| *o == name)))

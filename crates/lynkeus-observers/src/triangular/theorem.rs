@@ -17,7 +17,7 @@ use lynkeus_gain::{Tridiagonal, lemma1};
 use lynkeus_proof::chain::{Chain, Comparison, Disturbance, Slope, ultimate};
 use lynkeus_proof::matrix::sum;
 use lynkeus_proof::search::{first, lightest};
-use lynkeus_structure::{Coordinate, Extended, Point, Region, Standing, short};
+use lynkeus_structure::{AugmentedPlant, Coordinate, Point, Region, Standing, short};
 
 use super::form::{Form, Gains, Window};
 use super::observer::observer;
@@ -36,13 +36,13 @@ pub(super) const BASIS: &str = "Theorem 2 of Hammouri, Targui and Armanet (one c
 const GAIN_ERROR: f64 = 1e-12;
 
 pub(super) fn certificate(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Form>,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
     let region = &assumptions.region;
-    let facts = Facts::new(extended, &form, region)?;
+    let facts = Facts::new(augmented, &form, region)?;
     let mut checks = facts.checks.clone();
     let basis = match form.assignment.chains.len() {
         1 | 2 => BASIS,
@@ -63,7 +63,7 @@ pub(super) fn certificate(
         .any(|&(low, high)| !(low > 0.0 && high.is_finite()));
     let given = settings.S.is_some() || settings.divided;
     if unbounded {
-        checks.extend(without_bounds(extended, &form, &facts, region));
+        checks.extend(without_bounds(augmented, &form, &facts, region));
     }
     if standing(&checks) == Standing::Refuted || (unbounded && !given) {
         let mut certificate = Certificate::new(basis, assumptions, checks);
@@ -75,9 +75,9 @@ pub(super) fn certificate(
         return Err(DesignError::Refused(Box::new(examination)));
     }
     let gains = Gains::new(&form, settings)?;
-    observer(extended, settings, &form, &gains, examination)?;
+    observer(augmented, settings, &form, &gains, examination)?;
     Study {
-        extended,
+        augmented,
         settings,
         assumptions,
         form: &form,
@@ -89,7 +89,7 @@ pub(super) fn certificate(
 }
 
 struct Study<'a> {
-    extended: &'a Extended<'a>,
+    augmented: &'a AugmentedPlant<'a>,
     settings: &'a Settings,
     assumptions: &'a Assumptions,
     form: &'a Form,
@@ -104,7 +104,7 @@ impl Study<'_> {
         checks.extend(self.constant_gain());
         let count = self.form.assignment.chains.len();
         for i in 0..count {
-            let states = names(self.extended, &self.form.assignment.chains[i].states);
+            let states = names(self.augmented, &self.form.assignment.chains[i].states);
             let suffix = match count {
                 1 => String::new(),
                 _ => format!(" of chain {}", i + 1),
@@ -134,7 +134,7 @@ impl Study<'_> {
         certificate.constants = constants;
         let place = estimate::note(
             &self.settings.common,
-            self.extended,
+            self.augmented,
             &self.assumptions.region,
         );
         certificate.notes.push(place);
@@ -271,21 +271,27 @@ impl Study<'_> {
         c: &[f64],
     ) -> Result<(), DesignError> {
         let noise = state_noise(
-            self.extended,
+            self.augmented,
             &self.assumptions.region,
             &self.assumptions.noise,
         )?;
         let count = self.form.assignment.chains.len();
         let chain = |i: usize| self.chain(i, self.gains.θ[i], c[i]);
         let chains: Vec<Chain> = (0..count).map(chain).collect();
-        conclude(certificate, self.extended, σ, self.assumptions, |process| {
-            let outside = Disturbance {
-                drift: &self.assumptions.drift,
-                noise: &noise,
-                process,
-            };
-            Ok(ultimate(&chains, σ, &outside))
-        })
+        conclude(
+            certificate,
+            self.augmented,
+            σ,
+            self.assumptions,
+            |process| {
+                let outside = Disturbance {
+                    drift: &self.assumptions.drift,
+                    noise: &noise,
+                    process,
+                };
+                Ok(ultimate(&chains, σ, &outside))
+            },
+        )
     }
 }
 
@@ -353,12 +359,16 @@ pub(super) struct Facts {
 }
 
 impl Facts {
-    pub fn new(extended: &Extended<'_>, form: &Form, region: &Region) -> Result<Self, DesignError> {
+    pub fn new(
+        augmented: &AugmentedPlant<'_>,
+        form: &Form,
+        region: &Region,
+    ) -> Result<Self, DesignError> {
         let (mut checks, mut bounds) = (vec![], vec![]);
         let chains = &form.assignment.chains;
         for (i, chain) in chains.iter().enumerate() {
-            checks.extend(output_slope(extended, i, region)?);
-            let (found, signs) = partials(extended, &chain.states, region)?;
+            checks.extend(output_slope(augmented, i, region)?);
+            let (found, signs) = partials(augmented, &chain.states, region)?;
             checks.extend(signs);
             bounds.push(
                 found
@@ -372,7 +382,7 @@ impl Facts {
                 .iter()
                 .any(|c| c.states.windows(2).any(|p| p == [a, b]))
         };
-        let (slopes, check) = slopes(extended, region, along)?;
+        let (slopes, check) = slopes(augmented, region, along)?;
         checks.push(check);
         Ok(Self {
             checks,
@@ -384,7 +394,7 @@ impl Facts {
 
 /// Partials without bounds: Lemma 1 has nothing to start from.
 pub(super) fn without_bounds(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     form: &Form,
     facts: &Facts,
     region: &Region,
@@ -397,8 +407,8 @@ pub(super) fn without_bounds(
     let open = partials.filter(|(_, (low, high))| !(*low > 0.0 && high.is_finite()));
     let nodes: Vec<_> = open.map(|(partial, _)| partial.node).collect();
     let first = nodes.first()?;
-    let graph: &Graph = extended.graph();
-    let missing = undeclared(extended, &nodes, region);
+    let graph: &Graph = augmented.graph();
+    let missing = undeclared(augmented, &nodes, region);
     let advice = match missing.is_empty() {
         true => "narrow min and max so that it keeps away from zero and infinity".to_owned(),
         false => format!("declare min and max of {}", missing.join(", ")),

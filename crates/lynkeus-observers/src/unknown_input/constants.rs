@@ -22,7 +22,7 @@ use lynkeus_expr::{Interval, MissingInput, Node, jacobian};
 use lynkeus_gain::integrators::Chain;
 use lynkeus_proof::magnitude::{length, norm, plus, product, size, times, total};
 use lynkeus_proof::matrix::sum;
-use lynkeus_structure::{Extended, Layers, Matrix, Regularity, rank, sign};
+use lynkeus_structure::{AugmentedPlant, Layers, Matrix, Regularity, rank, sign};
 
 use super::form;
 use super::form::{Form, Shape};
@@ -43,7 +43,7 @@ pub(super) fn norms(form: &Form<'_, '_>, assumptions: &Assumptions) -> Result<No
     let (form, box_) = (&signals.form, &signals.box_);
     let q = form.q();
     let (first, own) = (form.x11(), form.block(1));
-    let one = |n: usize| Matrix::identity(form.extended.graph(), n);
+    let one = |n: usize| Matrix::identity(form.augmented.graph(), n);
     let γ: Vec<Matrix<'_>> = (1..=q)
         .map(|k| form.γ_times(k, &one(first.len())))
         .collect();
@@ -141,19 +141,19 @@ impl<'e, 'p> Signals<'e, 'p> {
     /// A symbol for each measured signal that G reads, apart from the state that it
     /// shows: a mean over states does not move the signal.
     fn new(form: &Form<'e, 'p>, assumptions: &Assumptions) -> Result<Self, MissingInput> {
-        let extended: &'e Extended<'p> = form.extended;
-        let graph = extended.graph();
-        let mut box_ = Enclosure::new(extended, &assumptions.region);
-        let mut slopes = vec![(extended.plant.time, graph.constant(1.0).node())];
+        let augmented: &'e AugmentedPlant<'p> = form.augmented;
+        let graph = augmented.graph();
+        let mut box_ = Enclosure::new(augmented, &assumptions.region);
+        let mut slopes = vec![(augmented.plant.time, graph.constant(1.0).node())];
         let mut measured = HashMap::new();
         for &state in &form.layers.layers[0] {
-            let variable = &extended.states[state];
+            let variable = &augmented.states[state];
             // white noise has no bound: then G and Λ₂, which follow the signal, turn at no bounded speed
             let drift = match assumptions.process_noise.get(state) {
                 Some(density) if *density > 0.0 => f64::INFINITY,
                 _ => assumptions.drift.get(state).copied().unwrap_or(0.0),
             };
-            let slope = slope(extended, state, drift, &mut box_)?;
+            let slope = slope(augmented, state, drift, &mut box_)?;
             let label = format!("{} as measured", variable.name);
             let symbol = graph.fresh(&label).node();
             let (min, max) = box_.side(variable.node);
@@ -166,7 +166,7 @@ impl<'e, 'p> Signals<'e, 'p> {
             }
         }
         // (H3): inputs whose derivative the study bounds
-        for (j, input) in extended.inputs.iter().enumerate() {
+        for (j, input) in augmented.inputs.iter().enumerate() {
             let name = format!("the derivative of {}", input.name);
             let slope = box_.within(name, assumptions.input_derivative(j, 1));
             slopes.push((input.node, slope));
@@ -186,7 +186,7 @@ impl<'e, 'p> Signals<'e, 'p> {
 
     /// The derivative of each entry while states other than x₁¹ rest.
     fn along(&self, A: &Matrix<'p>) -> Matrix<'p> {
-        let graph = self.form.extended.graph();
+        let graph = self.form.augmented.graph();
         let signals: Vec<Node> = self.slopes.iter().map(|s| s.0).collect();
         A.map(|node| {
             let gradient = jacobian::forward(graph, &[node], &signals);
@@ -199,13 +199,15 @@ impl<'e, 'p> Signals<'e, 'p> {
     }
 
     fn column(&self, entries: &[Node]) -> Matrix<'p> {
-        let graph = self.form.extended.graph();
+        let graph = self.form.augmented.graph();
         Matrix::from_fn(graph, (entries.len(), 1), |i, _| Some(entries[i]))
     }
 
     fn symbols(&self, states: &[usize]) -> Vec<Node> {
         let states = states.iter();
-        states.map(|&i| self.form.extended.states[i].node).collect()
+        states
+            .map(|&i| self.form.augmented.states[i].node)
+            .collect()
     }
 
     /// f̄_k
@@ -248,7 +250,7 @@ impl<'e, 'p> Signals<'e, 'p> {
         let all = P.iter().chain(&Z).chain([&G11]);
         let nodes: Vec<Node> = all.flat_map(Matrix::nonzero).collect();
         let region = self.box_.region();
-        let graph = self.form.extended.graph();
+        let graph = self.form.augmented.graph();
         let found = Regularity::of(graph, &nodes, &region.symbols(), region)?;
         Ok(Statement::from(Farza::Continuous).with(found.finding()))
     }
@@ -256,7 +258,7 @@ impl<'e, 'p> Signals<'e, 'p> {
     /// (11) asks for Λ₂ at one x; the proof needs it where x̃ has left the measured
     /// signals. That it is singular there refutes the proof, not the observer.
     fn regular(&self, P: &[Matrix<'p>]) -> Result<Check, DesignError> {
-        let graph = self.form.extended.graph();
+        let graph = self.form.augmented.graph();
         for (k, P) in P.iter().enumerate().skip(1) {
             let region = self.box_.region();
             let found = match P.rows == P.columns {
@@ -280,7 +282,7 @@ impl<'e, 'p> Signals<'e, 'p> {
     fn remainders(&self, P: &[Matrix<'p>], Z: &[Matrix<'p>], γ: &[Matrix<'p>]) -> Vec<Matrix<'p>> {
         let q = self.form.q();
         let slope = |state: usize| {
-            let x = self.form.extended.states[state].node;
+            let x = self.form.augmented.states[state].node;
             let found = self.slopes.iter().find(|s| s.0 == x);
             found.map_or(x, |s| s.1)
         };
@@ -316,21 +318,21 @@ impl<'e, 'p> Signals<'e, 'p> {
 
 /// A symbol with the range of x', drift included.
 fn slope(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     state: usize,
     drift: f64,
     box_: &mut Enclosure<'_>,
 ) -> Result<Node, MissingInput> {
-    let name = &extended.states[state].name;
+    let name = &augmented.states[state].name;
     // what is open here must not be mixed up with what was before
-    let inside = Enclosure::new(extended, box_.region());
-    let (low, high) = inside.range(extended.derivatives[state])?;
+    let inside = Enclosure::new(augmented, box_.region());
+    let (low, high) = inside.range(augmented.derivatives[state])?;
     let open = inside.open();
     let label = match open.is_empty() {
         true => format!("the slope of {name}"),
         false => open.join(", "),
     };
-    let symbol = extended.graph().fresh(format!("slope of {name}")).node();
+    let symbol = augmented.graph().fresh(format!("slope of {name}")).node();
     box_.add(label, symbol, low - drift, high + drift);
     Ok(symbol)
 }

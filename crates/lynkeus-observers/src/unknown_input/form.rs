@@ -16,7 +16,7 @@
 use lynkeus_expr::{Interval, MissingInput, Node};
 use lynkeus_gain::integrators::shortened_stability;
 use lynkeus_structure::{
-    Extended, Finding, Layers, Matrix, Point, Region, Standing, counted, layers, rank,
+    AugmentedPlant, Finding, Layers, Matrix, Point, Region, Standing, counted, layers, rank,
 };
 
 use super::settings::{Settings, wrong_size};
@@ -36,7 +36,7 @@ const MAX_ADVISED: usize = 20;
 /// A plant in layers with its measured states split as (H4) asks.
 #[derive(Clone, Debug)]
 pub struct Form<'e, 'p> {
-    pub extended: &'e Extended<'p>,
+    pub augmented: &'e AugmentedPlant<'p>,
     pub layers: Layers<'p>,
     /// measured outputs of x₁¹
     pub first: Vec<usize>,
@@ -79,9 +79,9 @@ impl<'p> Form<'_, 'p> {
     pub fn jacobian(&self, rows: &[usize], columns: &[usize]) -> Matrix<'p> {
         let x: Vec<Node> = columns
             .iter()
-            .map(|&i| self.extended.states[i].node)
+            .map(|&i| self.augmented.states[i].node)
             .collect();
-        Matrix::jacobian(self.extended.graph(), &self.drift(rows), &x)
+        Matrix::jacobian(self.augmented.graph(), &self.drift(rows), &x)
     }
 
     /// G of some states.
@@ -115,7 +115,7 @@ impl<'p> Form<'_, 'p> {
 
     /// The blocks k = 1 … q of Λ₂ (13).
     pub fn Λ2(&self) -> Vec<Matrix<'p>> {
-        let mut Λ2 = vec![Matrix::identity(self.extended.graph(), self.second.len())];
+        let mut Λ2 = vec![Matrix::identity(self.augmented.graph(), self.second.len())];
         for k in 1..self.q() {
             let link = match k {
                 1 => self.bent(),
@@ -135,7 +135,7 @@ impl<'p> Form<'_, 'p> {
         let G = self.G11();
         // a square G₁¹ needs no least squares
         let left = match G.rows == G.columns {
-            true => Matrix::identity(self.extended.graph(), G.rows),
+            true => Matrix::identity(self.augmented.graph(), G.rows),
             false => G.transposed(),
         };
         let upper = left
@@ -156,25 +156,25 @@ impl<'p> Form<'_, 'p> {
 /// The first partition whose conditions are proved, else the first that nothing
 /// refutes; else the examination that says why there is none.
 pub(super) fn search<'e, 'p>(
-    extended: &'e Extended<'p>,
+    augmented: &'e AugmentedPlant<'p>,
     settings: &Settings,
     region: &Region,
 ) -> Searched<Form<'e, 'p>> {
-    let layers = match layers::find(extended) {
+    let layers = match layers::find(augmented) {
         Ok(layers) => layers,
         Err(summary) => {
             return Ok(Err(Examination::unfit(NAME, summary, vec![])));
         }
     };
-    let given = given(extended, &layers, settings)?;
-    let shared = shared(extended, &layers, region)?;
+    let given = given(augmented, &layers, settings)?;
+    let shared = shared(augmented, &layers, region)?;
     let candidates = match &given {
         Some(first) => vec![first.clone()],
-        None => candidates(extended, &layers),
+        None => candidates(augmented, &layers),
     };
     let (mut undecided, mut refuted) = (None, vec![]);
     for first in candidates {
-        let form = form(extended, &layers, first);
+        let form = form(augmented, &layers, first);
         let own = conditions(&form, region)?;
         match standing(&own) {
             Standing::Proved => return Ok(Ok(finish(form, region, shared, own)?)),
@@ -187,17 +187,17 @@ pub(super) fn search<'e, 'p>(
     if let Some((form, own)) = undecided {
         return Ok(Ok(finish(form, region, shared, own)?));
     }
-    Ok(Err(none(extended, &layers, shared, refuted)))
+    Ok(Err(none(augmented, &layers, shared, refuted)))
 }
 
 fn form<'e, 'p>(
-    extended: &'e Extended<'p>,
+    augmented: &'e AugmentedPlant<'p>,
     layers: &Layers<'p>,
     first: Vec<usize>,
 ) -> Form<'e, 'p> {
-    let second = (0..extended.outputs.len()).filter(|i| !first.contains(i));
+    let second = (0..augmented.outputs.len()).filter(|i| !first.contains(i));
     Form {
-        extended,
+        augmented,
         layers: layers.clone(),
         second: second.collect(),
         first,
@@ -205,18 +205,18 @@ fn form<'e, 'p>(
 }
 
 /// Sizes m ≤ m₁ < p that leave p − m₁ ≥ n₂, as (11) needs; the smallest first.
-fn sizes(extended: &Extended<'_>, layers: &Layers<'_>) -> std::ops::RangeInclusive<usize> {
+fn sizes(augmented: &AugmentedPlant<'_>, layers: &Layers<'_>) -> std::ops::RangeInclusive<usize> {
     let (p, n2) = (
-        extended.outputs.len(),
+        augmented.outputs.len(),
         layers.layers.get(1).map_or(0, Vec::len),
     );
     layers.factors.columns..=p.saturating_sub(n2.max(1))
 }
 
-fn candidates(extended: &Extended<'_>, layers: &Layers<'_>) -> Vec<Vec<usize>> {
-    let p = extended.outputs.len();
+fn candidates(augmented: &AugmentedPlant<'_>, layers: &Layers<'_>) -> Vec<Vec<usize>> {
+    let p = augmented.outputs.len();
     let mut all = vec![];
-    for size in sizes(extended, layers) {
+    for size in sizes(augmented, layers) {
         all.extend(rank::subsets(p, size, MAX_PARTITIONS).unwrap_or_default());
     }
     all.truncate(MAX_PARTITIONS);
@@ -225,33 +225,33 @@ fn candidates(extended: &Extended<'_>, layers: &Layers<'_>) -> Vec<Vec<usize>> {
 
 /// The outputs of x₁¹ that the study asks for.
 fn given(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     layers: &Layers<'_>,
     settings: &Settings,
 ) -> Result<Option<Vec<usize>>, TuningError> {
     let Some(first) = &settings.partition else {
         return Ok(None);
     };
-    let sizes = sizes(extended, layers);
+    let sizes = sizes(augmented, layers);
     match sizes.contains(&first.len()) {
         true => Ok(Some(first.clone())),
-        false => Err(wrong_size(&sizes, extended.outputs.len(), first.len())),
+        false => Err(wrong_size(&sizes, augmented.outputs.len(), first.len())),
     }
 }
 
 /// A partition that meets (H4) and makes every block of Λ₂ square, as `partition` wants it.
 pub(super) fn square(form: &Form<'_, '_>, region: &Region) -> Result<Option<String>, DesignError> {
-    let extended = form.extended;
+    let augmented = form.augmented;
     let own = form.block(form.q().min(2)).len();
-    let size = extended.outputs.len() - own;
+    let size = augmented.outputs.len() - own;
     if form.q() < 2 || size < form.layers.factors.columns || form.shape() == Shape::Narrowing {
         return Ok(None);
     }
-    let all = rank::subsets(extended.outputs.len(), size, MAX_PARTITIONS).unwrap_or_default();
+    let all = rank::subsets(augmented.outputs.len(), size, MAX_PARTITIONS).unwrap_or_default();
     for first in all.into_iter().take(MAX_ADVISED) {
-        let candidate = self::form(extended, &form.layers, first);
+        let candidate = self::form(augmented, &form.layers, first);
         if standing(&conditions(&candidate, region)?) == Standing::Proved {
-            let name = |&i: &usize| format!("\"{}\"", extended.outputs[i].variable.name);
+            let name = |&i: &usize| format!("\"{}\"", augmented.outputs[i].variable.name);
             let outputs: Vec<String> = candidate.first.iter().map(name).collect();
             return Ok(Some(outputs.join(", ")));
         }
@@ -261,18 +261,18 @@ pub(super) fn square(form: &Form<'_, '_>, region: &Region) -> Result<Option<Stri
 
 /// (H1), (H2) and what belongs to no partition.
 fn shared(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     layers: &Layers<'_>,
     region: &Region,
 ) -> Result<Vec<Check>, DesignError> {
-    let graph = extended.graph();
+    let graph = augmented.graph();
     let mut checks = vec![];
-    for i in 0..extended.outputs.len() {
-        checks.extend(output_slope(extended, i, region)?);
+    for i in 0..augmented.outputs.len() {
+        checks.extend(output_slope(augmented, i, region)?);
     }
     for (k, pair) in layers.layers.windows(2).enumerate() {
         let f: Vec<Node> = pair[0].iter().map(|&i| layers.drift[i]).collect();
-        let x: Vec<Node> = pair[1].iter().map(|&i| extended.states[i].node).collect();
+        let x: Vec<Node> = pair[1].iter().map(|&i| augmented.states[i].node).collect();
         let jacobian = lynkeus_structure::Matrix::jacobian(graph, &f, &x);
         let (layer, rank) = (k + 1, x.len());
         let h1 = Statement::from(Farza::H1 { layer, rank });
@@ -280,7 +280,7 @@ fn shared(
         let h2 = Statement::from(Farza::H2 { layer });
         checks.push(h2.with(rank::one_to_one(graph, &f, &x, region)?));
     }
-    checks.push(lipschitz(extended, region)?);
+    checks.push(lipschitz(augmented, region)?);
     Ok(checks)
 }
 
@@ -314,25 +314,25 @@ fn finish<'e, 'p>(
     shared: Vec<Check>,
     own: Vec<Check>,
 ) -> Result<Found<Form<'e, 'p>>, MissingInput> {
-    let extended = form.extended;
+    let augmented = form.augmented;
     let checks = [shared, own].concat();
-    let mut chains = vec![names(extended, &form.x11())];
-    chains.extend((1..=form.q()).map(|k| names(extended, &form.block(k))));
-    let unknown: Vec<usize> = (extended.plant_states()..extended.states.len()).collect();
+    let mut chains = vec![names(augmented, &form.x11())];
+    chains.extend((1..=form.q()).map(|k| names(augmented, &form.block(k))));
+    let unknown: Vec<usize> = (augmented.plant_states()..augmented.states.len()).collect();
     let summary = format!(
         "layers {}; the unknown {} read from x₁¹ = ({}), the rest from x₂¹ = ({})",
-        form.layers.describe(extended),
-        names(extended, &unknown).join(", "),
+        form.layers.describe(augmented),
+        names(augmented, &unknown).join(", "),
         chains[0].join(", "),
         chains[1].join(", ")
     );
-    let examination = Examination::new(extended, region, NAME, summary, chains, checks)?;
+    let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
     Ok(Found { form, examination })
 }
 
 /// No partition: the conditions of the one that went furthest.
 fn none(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     layers: &Layers<'_>,
     shared: Vec<Check>,
     refuted: Vec<(Form<'_, '_>, Vec<Check>)>,
@@ -341,7 +341,7 @@ fn none(
     let fails = |check: &Check| check.standing() == Standing::Refuted;
     let met = |own: &[Check]| own.iter().take_while(|check| !fails(check)).count();
     let furthest = refuted.into_iter().rev().max_by_key(|(_, own)| met(own));
-    let mut summary = format!("layers {}", layers.describe(extended));
+    let mut summary = format!("layers {}", layers.describe(augmented));
     let own = match furthest {
         Some((form, own)) => {
             let which = match count {
@@ -352,7 +352,7 @@ fn none(
             };
             summary += &format!(
                 "; {which} x₁¹ = ({}) fails {}",
-                names(extended, &form.x11()).join(", "),
+                names(augmented, &form.x11()).join(", "),
                 own.iter()
                     .find(|check| fails(check))
                     .map_or(String::new(), |c| c.statement.to_string())
@@ -394,11 +394,11 @@ impl Form<'_, '_> {
 
     /// Whether Λ₂ changes with X².
     pub fn bends(&self) -> bool {
-        let graph = self.extended.graph();
+        let graph = self.augmented.graph();
         let nodes: Vec<_> = self.Λ2().iter().flat_map(|P| P.nonzero()).collect();
         let used = graph.symbols_of(&nodes);
         let mut states = (1..=self.q()).flat_map(|k| self.block(k));
-        states.any(|i| used.contains(&self.extended.states[i].node))
+        states.any(|i| used.contains(&self.augmented.states[i].node))
     }
 }
 

@@ -24,7 +24,7 @@ mod observer;
 mod settings;
 mod theorem;
 
-use lynkeus_structure::{Extended, Region};
+use lynkeus_structure::{AugmentedPlant, Region};
 
 use crate::design::{Found, Searched};
 use crate::family::Stages;
@@ -47,8 +47,8 @@ impl Stages for UnknownInput {
     const SPEEDS: &'static [f64] = &[4.0, 1.0];
     const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];
 
-    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
-        Settings::read(extended, tuning)
+    fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
+        Settings::read(augmented, tuning)
     }
 
     fn late(settings: &Settings) -> Result<(), TuningError> {
@@ -56,23 +56,23 @@ impl Stages for UnknownInput {
     }
 
     fn form<'e, 'p>(
-        extended: &'e Extended<'p>,
+        augmented: &'e AugmentedPlant<'p>,
         settings: &Settings,
         region: &Region,
     ) -> Searched<form::Form<'e, 'p>> {
-        form::search(extended, settings, region)
+        form::search(augmented, settings, region)
     }
 
     fn design<'e, 'p>(
-        extended: &'e Extended<'p>,
+        augmented: &'e AugmentedPlant<'p>,
         settings: &Settings,
         found: Found<form::Form<'e, 'p>>,
     ) -> Result<Design, DesignError> {
-        observer::design(extended, settings, &found.form, found.examination)
+        observer::design(augmented, settings, &found.form, found.examination)
     }
 
     fn theorem<'e, 'p>(
-        _: &'e Extended<'p>,
+        _: &'e AugmentedPlant<'p>,
         settings: &Settings,
         found: Found<form::Form<'e, 'p>>,
         assumptions: &Assumptions,

@@ -25,7 +25,7 @@ use std::collections::HashMap;
 use lynkeus_expr::{Expr, MissingInput, Node, jacobian};
 use lynkeus_gain::integrators;
 use lynkeus_gain::integrators::Chain;
-use lynkeus_structure::{Extended, Matrix, Region};
+use lynkeus_structure::{AugmentedPlant, Matrix, Region};
 
 use super::form::{Form, NAME, Shape};
 use super::settings::{Settings, Thetas, no_theta};
@@ -36,7 +36,7 @@ use crate::theorem::Enclosure;
 use crate::{ChainGain, Design, DesignError, Examination};
 
 pub(super) fn design(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     form: &Form<'_, '_>,
     examination: Examination,
@@ -48,7 +48,7 @@ pub(super) fn design(
             (found, Some(note))
         }
     };
-    let copy = PlantCopy::new(extended, &settings.common);
+    let copy = PlantCopy::new(augmented, &settings.common);
     let speeds = speeds(&copy, &thetas);
     let derivatives = derivatives(form, &copy, settings, &speeds);
     let start = StartPoint::new(&copy)?;
@@ -75,21 +75,21 @@ fn speeds(copy: &PlantCopy<'_, '_>, thetas: &Thetas) -> [Speed; 2] {
     ]
 }
 
-/// The right-hand side of (14), in the order of the extended states.
+/// The right-hand side of (14), in the order of the augmented states.
 fn derivatives(
     form: &Form<'_, '_>,
     copy: &PlantCopy<'_, '_>,
     settings: &Settings,
     [θ1, θ2]: &[Speed; 2],
 ) -> Vec<Node> {
-    let extended = form.extended;
-    let (graph, n) = (extended.graph(), extended.plant_states());
-    let v: Vec<Node> = extended.symbols().split_off(n);
+    let augmented = form.augmented;
+    let (graph, n) = (augmented.graph(), augmented.plant_states());
+    let v: Vec<Node> = augmented.symbols().split_off(n);
     let v̂ = column(graph, &copy.at_estimate(&v));
     // s: the measured signals in place of the states they show
-    let measured: HashMap<Node, Node> = (0..extended.outputs.len())
+    let measured: HashMap<Node, Node> = (0..augmented.outputs.len())
         .filter_map(|i| copy.measured_state(i))
-        .map(|(state, y)| (extended.states[state].node, y))
+        .map(|(state, y)| (augmented.states[state].node, y))
         .collect();
     let factors = &form.layers.factors;
     let at_s = factors.map(|node| graph.substitute(&[node], &measured)[0]);
@@ -152,18 +152,18 @@ fn at_tilde<'p>(
     measured: &HashMap<Node, Node>,
     D_e1: &[Matrix<'_>],
 ) -> Vec<Matrix<'p>> {
-    let extended = form.extended;
-    let graph = extended.graph();
+    let augmented = form.augmented;
+    let graph = augmented.graph();
     let mut seen = HashMap::new();
     for state in form.x11() {
-        let x = extended.states[state].node;
+        let x = augmented.states[state].node;
         seen.insert(x, measured.get(&x).copied().unwrap_or(x));
     }
     for k in 1..=form.q() {
         for (row, &state) in form.block(k).iter().enumerate() {
             let hat = graph.expr(copy.hats[state].symbol);
             let tilde = (hat - graph.expr(D_e1[k - 1].node(row, 0))).node();
-            let variable = &extended.states[state];
+            let variable = &augmented.states[state];
             let image = match settings.common.clamp {
                 true => limited(graph, tilde, variable),
                 false => tilde,
@@ -191,7 +191,7 @@ pub(super) struct Matrices<'f, 'e, 'p> {
 
 impl<'f, 'e, 'p> Matrices<'f, 'e, 'p> {
     pub fn new(form: &'f Form<'e, 'p>, θ: Thetas) -> Self {
-        let unit = Matrix::identity(form.extended.graph(), form.first.len());
+        let unit = Matrix::identity(form.augmented.graph(), form.first.len());
         Self {
             form,
             θ,
@@ -219,7 +219,7 @@ impl<'f, 'e, 'p> Matrices<'f, 'e, 'p> {
             return Ok(vec![]);
         }
         let C = Chain::new(form.q()).gain;
-        let mut K = vec![vec![0.0; form.extended.outputs.len()]; form.extended.states.len()];
+        let mut K = vec![vec![0.0; form.augmented.outputs.len()]; form.augmented.states.len()];
         let mut add = |states: &[usize], outputs: &[usize], block: Vec<Vec<f64>>, factor: f64| {
             for (&state, row) in states.iter().zip(block) {
                 for (&output, entry) in outputs.iter().zip(row) {
@@ -227,10 +227,10 @@ impl<'f, 'e, 'p> Matrices<'f, 'e, 'p> {
                 }
             }
         };
-        let one = Matrix::identity(form.extended.graph(), form.first.len());
+        let one = Matrix::identity(form.augmented.graph(), form.first.len());
         add(&form.x11(), &form.first, start.values(&one)?, 2.0 * θ1);
         let unknown: Vec<usize> =
-            (form.extended.plant_states()..form.extended.states.len()).collect();
+            (form.augmented.plant_states()..form.augmented.states.len()).collect();
         add(&unknown, &form.first, start.values(&self.left)?, θ1 * θ1);
         for (k, c) in C.iter().take(form.q()).enumerate() {
             let states = form.block(k + 1);
@@ -238,9 +238,9 @@ impl<'f, 'e, 'p> Matrices<'f, 'e, 'p> {
             let left = start.values(&self.Λ2_left(k))?;
             add(&states, &form.second, left, θ2.powi(k as i32 + 1) * c);
         }
-        let state = |i: usize| form.extended.states[i].name.clone();
+        let state = |i: usize| form.augmented.states[i].name.clone();
         let output = |j: usize| ChainGain {
-            output: form.extended.outputs[j].variable.name.clone(),
+            output: form.augmented.outputs[j].variable.name.clone(),
             entries: (0..K.len())
                 .filter(|&i| K[i][j] != 0.0)
                 .map(|i| (state(i), K[i][j]))
@@ -251,8 +251,8 @@ impl<'f, 'e, 'p> Matrices<'f, 'e, 'p> {
 
     /// The outputs' slopes in the states that they show, where they are numbers.
     fn slopes(&self) -> Option<Vec<f64>> {
-        let graph = self.form.extended.graph();
-        let mut outputs = self.form.extended.outputs.iter();
+        let graph = self.form.augmented.graph();
+        let mut outputs = self.form.augmented.outputs.iter();
         let slope = |(_, slope, _): (usize, _, _)| graph.constant_value(slope);
         outputs.try_fold(vec![], |mut found, output| {
             found.push(output.state.and_then(slope)?);
@@ -266,12 +266,12 @@ impl<'f, 'e, 'p> Matrices<'f, 'e, 'p> {
         start: &StartPoint<'_>,
     ) -> Result<Vec<(String, String)>, MissingInput> {
         let (form, Thetas { θ1, θ2 }) = (self.form, self.θ);
-        let extended = form.extended;
-        let joined = |states: &[usize]| names(extended, states).join(", ");
+        let augmented = form.augmented;
+        let joined = |states: &[usize]| names(augmented, states).join(", ");
         let outputs: Vec<&str> = form
             .first
             .iter()
-            .map(|&i| extended.outputs[i].variable.name.as_str())
+            .map(|&i| augmented.outputs[i].variable.name.as_str())
             .collect();
         let mut found: Vec<(String, String)> = vec![
             ("θ1".into(), θ1.to_string()),
@@ -349,7 +349,7 @@ fn constants(form: &Form<'_, '_>) -> Result<[f64; 4], DesignError> {
     let (S1, S2) = (Chain::new(2), Chain::new(q));
     let κ = |S: &Chain| (S.largest / S.smallest).sqrt();
     let (first, own) = (form.x11(), form.block(1));
-    let unit = |n: usize| Matrix::identity(form.extended.graph(), n);
+    let unit = |n: usize| Matrix::identity(form.augmented.graph(), n);
     let γ: Vec<Matrix<'_>> = (1..=q)
         .map(|k| form.γ_times(k, &unit(first.len())))
         .collect();
@@ -399,16 +399,16 @@ fn J<'p>(form: &Form<'_, 'p>, k: usize, x: &[usize]) -> Matrix<'p> {
 
 /// The derivative of each entry along the solutions of the plant.
 fn rate<'p>(form: &Form<'_, 'p>, A: &Matrix<'p>) -> Result<Matrix<'p>, DesignError> {
-    let extended = form.extended;
-    let graph = extended.graph();
+    let augmented = form.augmented;
+    let graph = augmented.graph();
     let used = graph.symbols_of(&A.nonzero());
-    if let Some(input) = extended.inputs.iter().find(|i| used.contains(&i.node)) {
+    if let Some(input) = augmented.inputs.iter().find(|i| used.contains(&i.node)) {
         let reason = format!("it needs the derivative of the input {}", input.name);
         return Err(missing(&reason));
     }
     let one = graph.constant(1.0).node();
-    let x = [&extended.symbols()[..], &[extended.plant.time]].concat();
-    let slopes = [&extended.derivatives[..], &[one]].concat();
+    let x = [&augmented.symbols()[..], &[augmented.plant.time]].concat();
+    let slopes = [&augmented.derivatives[..], &[one]].concat();
     let along = |node: Node| {
         let gradient = jacobian::forward(graph, &[node], &x);
         let terms = gradient
@@ -424,8 +424,8 @@ fn rate<'p>(form: &Form<'_, 'p>, A: &Matrix<'p>) -> Result<Matrix<'p>, DesignErr
 
 /// An upper bound over the box of the Frobenius norm, hence of the spectral norm.
 fn norm(form: &Form<'_, '_>, A: &Matrix<'_>) -> Result<f64, DesignError> {
-    let region = form.extended.region();
-    let box_ = Enclosure::new(form.extended, &region);
+    let region = form.augmented.region();
+    let box_ = Enclosure::new(form.augmented, &region);
     let mut sum = 0.0;
     for node in A.nonzero() {
         let bound = box_.magnitude(node)?;
@@ -438,11 +438,11 @@ fn norm(form: &Form<'_, '_>, A: &Matrix<'_>) -> Result<f64, DesignError> {
 }
 
 fn unbounded(form: &Form<'_, '_>, node: Node, region: &Region) -> DesignError {
-    let graph = form.extended.graph();
+    let graph = form.augmented.graph();
     let used = region.restricted(&graph.symbols_of(&[node])).dimensions;
     let open: Vec<String> = used
         .into_iter()
-        .filter(|d| d.symbol != form.extended.plant.time)
+        .filter(|d| d.symbol != form.augmented.plant.time)
         .filter(|d| !(d.min.is_finite() && d.max.is_finite()))
         .map(|d| d.name)
         .collect();

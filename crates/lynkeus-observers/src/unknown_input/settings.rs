@@ -1,6 +1,6 @@
 //! The study's keys.
 
-use lynkeus_structure::Extended;
+use lynkeus_structure::AugmentedPlant;
 
 use crate::estimate::Common;
 use crate::tuning::Late;
@@ -43,11 +43,11 @@ pub struct Settings {
 }
 
 impl Settings {
-    pub fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
+    pub fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
         Ok(Self {
             common: Common::read(tuning)?,
             thetas: thetas(tuning),
-            partition: partition(tuning, extended)?,
+            partition: partition(tuning, augmented)?,
         })
     }
 
@@ -71,11 +71,14 @@ fn thetas(tuning: &Tuning) -> Result<Option<Thetas>, TuningError> {
     }
 }
 
-fn partition(tuning: &Tuning, extended: &Extended<'_>) -> Result<Option<Vec<usize>>, TuningError> {
+fn partition(
+    tuning: &Tuning,
+    augmented: &AugmentedPlant<'_>,
+) -> Result<Option<Vec<usize>>, TuningError> {
     let Some(value) = tuning.values.get(PARTITION.name) else {
         return Ok(None);
     };
-    let outputs: Vec<&str> = extended
+    let outputs: Vec<&str> = augmented
         .outputs
         .iter()
         .map(|o| o.variable.name.as_str())

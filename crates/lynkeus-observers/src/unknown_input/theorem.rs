@@ -89,7 +89,7 @@ impl Proof<'_, '_, '_> {
     /// (H5)
     fn slow(&self, assumptions: &Assumptions) -> Check {
         let ε = self.unknown_drift(assumptions);
-        let constant = assumptions.constant(self.form.extended.plant_states());
+        let constant = assumptions.constant(self.form.augmented.plant_states());
         let detail = match (ε == 0.0, constant.is_empty()) {
             (true, false) => "assumed constant".to_owned(),
             (true, true) => "assumed constant but for its process noise".to_owned(),
@@ -176,7 +176,7 @@ impl Proof<'_, '_, '_> {
     }
 
     fn unknown_drift(&self, assumptions: &Assumptions) -> f64 {
-        let n = self.form.extended.plant_states();
+        let n = self.form.augmented.plant_states();
         length(assumptions.drift.get(n..).unwrap_or_default())
     }
 
@@ -303,12 +303,12 @@ impl Proof<'_, '_, '_> {
 
     /// Whether G or Λ₂ changes with the states.
     fn reads_states(&self) -> bool {
-        let graph = self.form.extended.graph();
+        let graph = self.form.augmented.graph();
         let mut nodes = self.form.layers.factors.nonzero();
         nodes.extend(self.form.Λ2().iter().flat_map(|block| block.nonzero()));
         let used = graph.symbols_of(&nodes);
         self.form
-            .extended
+            .augmented
             .symbols()
             .iter()
             .any(|x| used.contains(x))
@@ -316,12 +316,12 @@ impl Proof<'_, '_, '_> {
 
     /// Lengths of the errors of y₁ and y₂, in units of the states they show.
     fn noise(&self, assumptions: &Assumptions) -> Result<[f64; 2], DesignError> {
-        let extended = self.form.extended;
-        let graph = extended.graph();
-        let box_ = Enclosure::new(extended, &assumptions.region);
+        let augmented = self.form.augmented;
+        let graph = augmented.graph();
+        let box_ = Enclosure::new(augmented, &assumptions.region);
         let one = |i: &usize| -> Result<f64, DesignError> {
             let noise = assumptions.noise.get(*i).copied().unwrap_or(0.0);
-            let Some((_, slope, _)) = extended.outputs[*i].state.filter(|_| noise > 0.0) else {
+            let Some((_, slope, _)) = augmented.outputs[*i].state.filter(|_| noise > 0.0) else {
                 return Ok(0.0);
             };
             let inverse = (1.0 / graph.expr(slope)).node();
@@ -335,13 +335,13 @@ impl Proof<'_, '_, '_> {
     }
 
     fn per_state(&self, sizes: &[f64]) -> Vec<UltimateBound> {
-        let (form, extended) = (self.form, self.form.extended);
-        let n = extended.plant_states();
-        let unknown: Vec<usize> = (n..extended.states.len()).collect();
+        let (form, augmented) = (self.form, self.form.augmented);
+        let n = augmented.plant_states();
+        let unknown: Vec<usize> = (n..augmented.states.len()).collect();
         let mut groups = vec![form.x11(), unknown];
         groups.extend((1..=form.q()).map(|k| form.block(k)));
         let place = |i: usize| groups.iter().position(|g| g.contains(&i));
-        let states = extended.states.iter().enumerate();
+        let states = augmented.states.iter().enumerate();
         states
             .filter_map(|(i, s)| Some((s.name.clone(), *sizes.get(place(i)?)?).into()))
             .collect()

@@ -7,7 +7,7 @@ use lynkeus_model::Plant;
 use lynkeus_observers::{
     Certificate, Family, Tuning, Value, block_triangular::BlockTriangular, triangular::Triangular,
 };
-use lynkeus_structure::{Extended, Sensors, Standing, Verdict};
+use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 
 fn numbers(x: &[f64]) -> Value {
     Value::List(x.iter().map(|&x| Value::Number(x)).collect())
@@ -207,11 +207,11 @@ const NEGATIVE: &str = "model Neg input Real u(min=-1,max=1);
 #[test]
 fn the_low_power_form_knows_the_sign() {
     let plant = plant(NEGATIVE);
-    let extended = Extended::new(&plant, &Sensors::default()).unwrap();
+    let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
     let form = ("form", Value::Text("low-power".into()));
     let fit = |keys: &[(&str, Value)]| {
         BlockTriangular
-            .examine(&extended, &with(&[5.0], keys))
+            .examine(&augmented, &with(&[5.0], keys))
             .unwrap()
             .fit()
     };

@@ -7,7 +7,7 @@ use lynkeus_model::{LoadOptions, Plant};
 use lynkeus_observers::{
     Assumptions, Certificate, Check, Design, DesignError, Examination, Family, Tuning,
 };
-use lynkeus_structure::{Extended, Sensors};
+use lynkeus_structure::{AugmentedPlant, Sensors};
 
 /// A plant from its text.
 pub fn plant(text: &str) -> Plant {
@@ -26,7 +26,7 @@ pub fn design_with(
         unknown,
         ..Sensors::default()
     };
-    family.design(&Extended::new(plant, &sensors).unwrap(), tuning)
+    family.design(&AugmentedPlant::new(plant, &sensors).unwrap(), tuning)
 }
 
 /// The examination that a refusal carries.
@@ -218,13 +218,13 @@ impl Guaranteed<'_> {
             unknown: self.unknown.iter().map(|s| s.to_string()).collect(),
             ..Sensors::default()
         };
-        let extended = Extended::new(self.plant, &sensors).unwrap();
-        let assumptions = Assumptions::new(&extended, extended.region())
+        let augmented = AugmentedPlant::new(self.plant, &sensors).unwrap();
+        let assumptions = Assumptions::new(&augmented, augmented.region())
             .unwrap()
             .with_drift(self.drift.clone())
             .with_noise(self.noise.clone());
         self.family
-            .theorem(&extended, &self.tuning, &assumptions)
+            .theorem(&augmented, &self.tuning, &assumptions)
             .unwrap()
     }
 }

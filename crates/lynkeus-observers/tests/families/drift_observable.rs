@@ -13,7 +13,7 @@ use lynkeus_model::Plant;
 use lynkeus_observers::{
     Design, DesignError, Initial, Tuning, Value, drift_observable::DriftObservable,
 };
-use lynkeus_structure::{Extended, Sensors, Standing, Verdict};
+use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 
 const PLANT: &str = include_str!("../../../../examples/germani-manes/germani_manes.mo");
 const INPUT: &[(&str, &str)] = &[("u", "5 + 2*sin(2*pi*time)")];
@@ -295,9 +295,9 @@ fn states_in_any_order_and_names_give_the_same_estimates() {
 #[test]
 fn the_examination_tells_the_degree_and_the_singular_surface() {
     let plant = plant(PLANT);
-    let extended = Extended::new(&plant, &Sensors::default()).unwrap();
+    let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
     let family = lynkeus_observers::find("drift-observable").unwrap();
-    let found = family.examine(&extended, &Tuning::default()).unwrap();
+    let found = family.examine(&augmented, &Tuning::default()).unwrap();
     assert_eq!(found.fit(), Standing::Undecided);
     assert!(
         found.summary.contains("variant practical"),

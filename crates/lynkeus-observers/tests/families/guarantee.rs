@@ -2,7 +2,7 @@
 
 use crate::common::{design_with, plant};
 use lynkeus_observers::{Assumptions, Certificate, Claim, Tuning, certify, triangular::Triangular};
-use lynkeus_structure::{Extended, Sensors, Standing};
+use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
 
 /// The certificate of x̂' = −x̂ − f(x̂) − θ(x̂ − y) on x in [0, 2].
 fn certified(f: &str) -> Certificate {
@@ -10,9 +10,9 @@ fn certified(f: &str) -> Certificate {
         "model P Real x(start = 0.1, min = 0, max = 2); output Real y = x; equation der(x) = -x - {f}; end P;"
     ));
     let design = design_with(&Triangular, &plant, &[], &Tuning::from([("theta", 3.0)])).unwrap();
-    let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-    let assumptions = Assumptions::new(&extended, extended.region()).unwrap();
-    certify(&extended, &design.observer, &assumptions, Claim::Fastest).unwrap()
+    let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
+    let assumptions = Assumptions::new(&augmented, augmented.region()).unwrap();
+    certify(&augmented, &design.observer, &assumptions, Claim::Fastest).unwrap()
 }
 
 /// Beyond x = 1.77 the slope of exp(400 x) is no number: nothing is said of every point.

@@ -10,7 +10,7 @@ use lynkeus_observers::{
     Design, DesignError, Family, Initial, Tuning, Value, state_affine::StateAffine,
     triangular::Triangular,
 };
-use lynkeus_structure::{Extended, Sensors, Standing, Verdict};
+use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 
 /// System (29).
 const EXAMPLE: &str = "model Ltaief
@@ -50,7 +50,7 @@ fn design(plant: &Plant, disturbances: &[&str], tuning: &Tuning) -> Design {
         ..Sensors::default()
     };
     StateAffine
-        .design(&Extended::new(plant, &sensors).unwrap(), tuning)
+        .design(&AugmentedPlant::new(plant, &sensors).unwrap(), tuning)
         .unwrap()
 }
 

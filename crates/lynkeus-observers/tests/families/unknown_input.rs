@@ -11,7 +11,7 @@ use lynkeus_model::Plant;
 use lynkeus_observers::{
     Design, DesignError, FAMILIES, Family, Tuning, TuningError, Value, unknown_input::UnknownInput,
 };
-use lynkeus_structure::{Extended, Sensors, Standing, Verdict};
+use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 
 /// System (15) with a = 1, which the paper leaves open.
 const EXAMPLE: &str = "model Farza
@@ -415,9 +415,9 @@ fn no_family_before_it_fits_the_example() {
         unknown: vec!["v".into()],
         ..Sensors::default()
     };
-    let extended = Extended::new(&plant, &sensors).unwrap();
+    let augmented = AugmentedPlant::new(&plant, &sensors).unwrap();
     let fits = |family: &&&dyn Family| {
-        let found = family.examine(&extended, &Tuning::default()).unwrap();
+        let found = family.examine(&augmented, &Tuning::default()).unwrap();
         found.fit() == Standing::Proved
     };
     let first = FAMILIES.iter().find(fits).unwrap();

@@ -4,7 +4,7 @@ use lynkeus_observers::{
     Claim as Sought, Correction, Design, DesignError, Family, Observer, Tuning, Value,
     block_triangular::BlockTriangular, triangular::Triangular,
 };
-use lynkeus_structure::{Extended, Standing};
+use lynkeus_structure::{AugmentedPlant, Standing};
 
 use crate::judge::{self, Claim, Sides};
 use crate::numbers::Numbers;
@@ -53,9 +53,13 @@ pub fn chain(numbers: &mut Numbers) -> Random {
     }
 }
 
-fn design(extended: &Extended<'_>, tuning: &Tuning, family: usize) -> Result<Design, DesignError> {
+fn design(
+    augmented: &AugmentedPlant<'_>,
+    tuning: &Tuning,
+    family: usize,
+) -> Result<Design, DesignError> {
     let family: &dyn Family = [&Triangular as &dyn Family, &BlockTriangular][family];
-    family.design(extended, tuning)
+    family.design(augmented, tuning)
 }
 
 /// Whether there was a gain; what it promises is judged.
@@ -73,15 +77,15 @@ fn kept(seed: u64) -> bool {
         random.text()
     ));
     let plant = pair::plant(&random.text());
-    let extended = pair::extended(&plant);
+    let augmented = pair::augmented(&plant);
     let family = numbers.below(2);
-    let design = match design(&extended, &tuning, family) {
+    let design = match design(&augmented, &tuning, family) {
         Ok(design) => design,
         Err(DesignError::NoGain { .. }) => return false,
         Err(other) => panic!("{other}"),
     };
     let observer = &design.observer;
-    let certified = |sought| crate::certificate(&extended, observer, [&[], &[]], sought);
+    let certified = |sought| crate::certificate(&augmented, observer, [&[], &[]], sought);
     let fastest = Claim::new(&certified(Sought::Fastest));
     // bisection comes this close to the fastest rate, which may be the one asked for
     assert!(
@@ -94,31 +98,31 @@ fn kept(seed: u64) -> bool {
     let claim = Claim::new(&certificate);
     assert_eq!(claim.rate, rate);
     let sides = Sides::new(&certificate, random.states.len());
-    let mut pair = Pair::new(&extended, observer);
+    let mut pair = Pair::new(&augmented, observer);
     judge::secants(&mut pair, &claim, &sides, &mut numbers);
     judge::points(&mut pair, &claim, &sides, &mut numbers);
     simulate::decay(&mut pair, &claim, &sides, &mut numbers);
-    limited(&extended, tuning, largest(&extended, observer), family);
+    limited(&augmented, tuning, largest(&augmented, observer), family);
     drop(context);
     true
 }
 
 /// The largest |∂F/∂y|, by the observer's own equations.
-fn largest(extended: &Extended<'_>, observer: &Observer) -> f64 {
-    match Correction::of(extended, observer).unwrap() {
+fn largest(augmented: &AugmentedPlant<'_>, observer: &Observer) -> f64 {
+    match Correction::of(augmented, observer).unwrap() {
         Correction::Gain(K) => K.amax(),
         Correction::Varying(other) => panic!("{other:?}"),
     }
 }
 
 /// A limit below what a gain without one has is kept, or nothing is designed.
-fn limited(extended: &Extended<'_>, mut tuning: Tuning, free: f64, family: usize) {
+fn limited(augmented: &AugmentedPlant<'_>, mut tuning: Tuning, free: f64, family: usize) {
     for share in [0.9, 0.3] {
         let limit = Value::Number(share * free);
         tuning.values.insert("gain_limit".into(), limit);
-        match design(extended, &tuning, family) {
+        match design(augmented, &tuning, family) {
             Ok(found) => {
-                let entry = largest(extended, &found.observer);
+                let entry = largest(augmented, &found.observer);
                 assert!(
                     entry <= share * free * (1.0 + 1e-12),
                     "{entry} of {free}, {share}"
@@ -147,15 +151,15 @@ fn declared_noise_weighs_the_outputs_in_their_own_units() {
              der(z) = -0.2*x - z + 0.2*sin(x) + w; der(w) = -w + 0.8*x + 0.3*z; end P;"
         );
         let plant = pair::plant(&text);
-        let extended = pair::extended(&plant);
+        let augmented = pair::augmented(&plant);
         let mut tuning = Tuning::from([("rate", 1.5)]);
         tuning
             .values
             .insert("gain".into(), Value::Text("lmi".into()));
         let named = ["y", "q"].map(str::to_owned).into_iter().zip(noise);
         tuning.noise = named.collect();
-        let found = Triangular.design(&extended, &tuning).unwrap();
-        match Correction::of(&extended, &found.observer).unwrap() {
+        let found = Triangular.design(&augmented, &tuning).unwrap();
+        match Correction::of(&augmented, &found.observer).unwrap() {
             Correction::Gain(K) => [K.column(0).amax(), K.column(1).amax()],
             Correction::Varying(other) => panic!("{other:?}"),
         }

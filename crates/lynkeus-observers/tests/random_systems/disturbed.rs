@@ -71,10 +71,10 @@ fn followed(seed: u64) -> Option<bool> {
     let mut numbers = Numbers(seed.wrapping_mul(0x9FB2_1C65_1E98_DF25));
     let random = plants::random(&mut numbers).at_rest();
     let plant = pair::plant(&random.text());
-    let extended = pair::extended(&plant);
+    let augmented = pair::augmented(&plant);
     let (n, p) = (random.states.len(), random.outputs.len());
-    let copy = pair::observer(&extended, &DMatrix::zeros(n, p));
-    let mut copy = Pair::new(&extended, &copy);
+    let copy = pair::observer(&augmented, &DMatrix::zeros(n, p));
+    let mut copy = Pair::new(&augmented, &copy);
     let K = gains::random(
         &mut numbers,
         &Middle::new(&mut copy, &random.states, &random.inputs),
@@ -83,15 +83,15 @@ fn followed(seed: u64) -> Option<bool> {
     let drift: Vec<f64> = random.states.iter().map(width).collect();
     let drift: Vec<f64> = drift.iter().map(|w| w * numbers.size(1e-5, 1e-2)).collect();
     let noise: Vec<f64> = (0..p).map(|_| numbers.size(1e-6, 1e-3)).collect();
-    let observer = pair::observer(&extended, &K);
-    let certificate = certificate(&extended, &observer, [&drift, &noise], Sought::Fastest);
+    let observer = pair::observer(&augmented, &K);
+    let certificate = certificate(&augmented, &observer, [&drift, &noise], Sought::Fastest);
     if certificate.verdict() != Standing::Proved {
         return None;
     }
     let context = Context(format!("system {seed}\n{}K = {K}", random.text()));
     let sides = Sides::new(&certificate, n);
     let bound = Bound::new(&certificate);
-    let mut pair = Pair::new(&extended, &observer);
+    let mut pair = Pair::new(&augmented, &observer);
     let h = 0.1 / pace(&mut pair, &sides, &mut numbers);
     let inner: Vec<(f64, f64)> = sides.states.iter().map(|s| shrunk(s, 0.2)).collect();
     let u: Vec<f64> = sides

@@ -11,11 +11,11 @@ use crate::pair::{self, Pair};
 /// The certificate of a copy of the plant with gains −K on the outputs' errors.
 fn certified(text: &str, K: &[f64], look: impl Fn(&mut Pair, &Certificate)) -> Standing {
     let plant = pair::plant(text);
-    let extended = pair::extended(&plant);
+    let augmented = pair::augmented(&plant);
     let K = DMatrix::from_row_slice(plant.states.len(), plant.outputs.len(), K);
-    let observer = pair::observer(&extended, &K);
-    let certificate = crate::certificate(&extended, &observer, [&[], &[]], Sought::Fastest);
-    look(&mut Pair::new(&extended, &observer), &certificate);
+    let observer = pair::observer(&augmented, &K);
+    let certificate = crate::certificate(&augmented, &observer, [&[], &[]], Sought::Fastest);
+    look(&mut Pair::new(&augmented, &observer), &certificate);
     certificate.verdict()
 }
 
@@ -179,15 +179,15 @@ fn a_sensor_that_may_be_at_an_end_leaves_everything_undecided() {
             "model P Real x(min = -1, max = 1); output Real y = 2*x + 1; equation der(x) = ({slope})*x; end P;"
         );
         let plant = pair::plant(&text);
-        let extended = pair::extended(&plant);
-        let observer = pair::observer(&extended, &DMatrix::from_element(1, 1, K / 2.0));
+        let augmented = pair::augmented(&plant);
+        let observer = pair::observer(&augmented, &DMatrix::from_element(1, 1, K / 2.0));
         let verdict = |limits: Option<Interval>, noise: f64| {
-            let assumptions = Assumptions::new(&extended, extended.region())
+            let assumptions = Assumptions::new(&augmented, augmented.region())
                 .unwrap()
                 .with_noise(vec![noise])
-                .with_limits(&extended, &[limits])
+                .with_limits(&augmented, &[limits])
                 .unwrap();
-            lynkeus_observers::certify(&extended, &observer, &assumptions, Sought::Fastest)
+            lynkeus_observers::certify(&augmented, &observer, &assumptions, Sought::Fastest)
                 .unwrap()
                 .verdict()
         };

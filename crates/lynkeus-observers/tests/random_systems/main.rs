@@ -17,7 +17,7 @@ mod simulate;
 mod terms;
 
 use lynkeus_observers::{Assumptions, Certificate, Claim as Sought, Observer};
-use lynkeus_structure::{Extended, Standing};
+use lynkeus_structure::{AugmentedPlant, Standing};
 use nalgebra::DMatrix;
 
 use judge::{Claim, Sides};
@@ -38,16 +38,16 @@ struct Tally {
 
 /// With bounds of what acts on the plant and of the measurement errors.
 fn certificate(
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     [drift, noise]: [&[f64]; 2],
     sought: Sought,
 ) -> Certificate {
-    let assumptions = Assumptions::new(extended, extended.region())
+    let assumptions = Assumptions::new(augmented, augmented.region())
         .unwrap()
         .with_drift(drift.to_vec())
         .with_noise(noise.to_vec());
-    lynkeus_observers::certify(extended, observer, &assumptions, sought).unwrap()
+    lynkeus_observers::certify(augmented, observer, &assumptions, sought).unwrap()
 }
 
 /// The system with that number, judged.
@@ -58,16 +58,16 @@ fn judged(seed: u64, tally: &mut Tally) {
         random = random.at_rest();
     }
     let plant = pair::plant(&random.text());
-    let extended = pair::extended(&plant);
+    let augmented = pair::augmented(&plant);
     let none = DMatrix::zeros(plant.states.len(), plant.outputs.len());
-    let copy = pair::observer(&extended, &none);
+    let copy = pair::observer(&augmented, &none);
     let (states, inputs) = (&random.states, &random.inputs);
-    let middle = gains::Middle::new(&mut Pair::new(&extended, &copy), states, inputs);
+    let middle = gains::Middle::new(&mut Pair::new(&augmented, &copy), states, inputs);
     let K = gains::random(&mut numbers, &middle);
-    let observer = pair::observer(&extended, &K);
-    let certificate = certificate(&extended, &observer, [&[], &[]], Sought::Fastest);
+    let observer = pair::observer(&augmented, &K);
+    let certificate = certificate(&augmented, &observer, [&[], &[]], Sought::Fastest);
     let sides = Sides::new(&certificate, states.len());
-    let mut pair = Pair::new(&extended, &observer);
+    let mut pair = Pair::new(&augmented, &observer);
     let context = Context(format!("system {seed}\n{}K ={K}", random.text()));
     match certificate.verdict() {
         Standing::Proved => {

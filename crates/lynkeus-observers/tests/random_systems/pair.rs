@@ -3,7 +3,7 @@
 use lynkeus_expr::{Evaluator, Node, Tape, jacobian};
 use lynkeus_model::{LoadOptions, Plant};
 use lynkeus_observers::{Estimate, Observer, Signal};
-use lynkeus_structure::{Extended, Sensors};
+use lynkeus_structure::{AugmentedPlant, Sensors};
 use nalgebra::{DMatrix, DVector};
 
 pub fn plant(text: &str) -> Plant {
@@ -11,33 +11,33 @@ pub fn plant(text: &str) -> Plant {
     read.unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
-pub fn extended(plant: &Plant) -> Extended<'_> {
-    Extended::new(plant, &Sensors::default()).unwrap()
+pub fn augmented(plant: &Plant) -> AugmentedPlant<'_> {
+    AugmentedPlant::new(plant, &Sensors::default()).unwrap()
 }
 
 /// x̂' = f(x̂, u) − K (h(x̂, u) − y), whatever K is; without K the plant's copy.
-pub fn observer(extended: &Extended<'_>, K: &DMatrix<f64>) -> Observer {
-    let graph = extended.graph();
+pub fn observer(augmented: &AugmentedPlant<'_>, K: &DMatrix<f64>) -> Observer {
+    let graph = augmented.graph();
     let signal = |name: &str, symbol: String| Signal {
         name: name.to_owned(),
         symbol: graph.symbol(&symbol).node(),
     };
-    let hats = extended.states.iter();
+    let hats = augmented.states.iter();
     let hats: Vec<Signal> = hats
         .map(|s| signal(&s.name, format!("estimate of {}", s.name)))
         .collect();
-    let outputs = extended.outputs.iter();
+    let outputs = augmented.outputs.iter();
     let measured: Vec<Signal> = outputs
         .map(|o| &o.variable.name)
         .map(|name| signal(name, format!("measured {name}")))
         .collect();
-    let states = extended.states.iter().zip(&hats);
+    let states = augmented.states.iter().zip(&hats);
     let seen = states
         .clone()
         .map(|(s, hat)| (s.node, hat.symbol))
         .collect();
-    let mut derivatives = graph.substitute(&extended.derivatives, &seen);
-    let h: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
+    let mut derivatives = graph.substitute(&augmented.derivatives, &seen);
+    let h: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
     let h = graph.substitute(&h, &seen);
     for (i, derivative) in derivatives.iter_mut().enumerate() {
         for (j, (h, y)) in h.iter().zip(&measured).enumerate() {
@@ -50,10 +50,10 @@ pub fn observer(extended: &Extended<'_>, K: &DMatrix<f64>) -> Observer {
         node: hat.symbol,
         unknown_input: false,
     };
-    let inputs = extended.inputs.iter();
+    let inputs = augmented.inputs.iter();
     Observer {
         family: "triangular",
-        time: extended.plant.time,
+        time: augmented.plant.time,
         estimates: states.map(estimate).collect(),
         derivatives,
         inputs: inputs
@@ -83,14 +83,14 @@ pub struct Pair {
 }
 
 impl Pair {
-    pub fn new(extended: &Extended<'_>, observer: &Observer) -> Self {
-        let graph = extended.graph();
-        let inputs: Vec<Node> = extended.inputs.iter().map(|v| v.node).collect();
+    pub fn new(augmented: &AugmentedPlant<'_>, observer: &Observer) -> Self {
+        let graph = augmented.graph();
+        let inputs: Vec<Node> = augmented.inputs.iter().map(|v| v.node).collect();
         let hats: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
         let y: Vec<Node> = observer.measured.iter().map(|s| s.symbol).collect();
-        let h: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
-        let time = [extended.plant.time];
-        let seen = [&time[..], &extended.symbols(), &inputs].concat();
+        let h: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
+        let time = [augmented.plant.time];
+        let seen = [&time[..], &augmented.symbols(), &inputs].concat();
         let own = [&time[..], &hats, &inputs, &y].concat();
         let evaluator = |symbols: &[Node], nodes: &[Node]| {
             Tape::new(graph, symbols, nodes).unwrap().evaluator()
@@ -99,7 +99,7 @@ impl Pair {
         let jacobian = jacobian::forward(graph, &observer.derivatives, &hats);
         let entries = (0..n * n).map(|k| jacobian.get(k / n, k % n).unwrap_or(zero));
         Self {
-            plant: evaluator(&seen, &extended.derivatives),
+            plant: evaluator(&seen, &augmented.derivatives),
             outputs: evaluator(&seen, &h),
             observer: evaluator(&own, &observer.derivatives),
             slopes: evaluator(&own, &entries.collect::<Vec<_>>()),

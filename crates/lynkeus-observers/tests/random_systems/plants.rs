@@ -39,14 +39,14 @@ impl Random {
     /// The same plant nearly at rest in the middle of the box, so that it stays there.
     pub fn at_rest(mut self) -> Self {
         let plant = pair::plant(&self.text());
-        let extended = pair::extended(&plant);
+        let augmented = pair::augmented(&plant);
         let none = DMatrix::zeros(self.states.len(), self.outputs.len());
-        let copy = pair::observer(&extended, &none);
+        let copy = pair::observer(&augmented, &none);
         let middle = |sides: &[(f64, f64)]| -> Vec<f64> {
             sides.iter().map(|(a, b)| f64::midpoint(*a, *b)).collect()
         };
         let (x, u) = (middle(&self.states), middle(&self.inputs));
-        let drift = Pair::new(&extended, &copy).plant(0.0, &x, &u);
+        let drift = Pair::new(&augmented, &copy).plant(0.0, &x, &u);
         for (equation, drift) in self.equations.iter_mut().zip(drift.iter()) {
             if drift.is_finite() {
                 *equation += &format!(" - ({drift:.6})");

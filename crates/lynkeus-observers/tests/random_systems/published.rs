@@ -51,15 +51,15 @@ fn judged(seed: u64) -> Option<Standing> {
     let (family, tuning) = tuned(&mut numbers);
     let context = Context(format!("observer {seed}, {tuning:?}\n{}", random.text()));
     let plant = pair::plant(&random.text());
-    let extended = pair::extended(&plant);
-    let design = family.design(&extended, &tuning).ok()?;
+    let augmented = pair::augmented(&plant);
+    let design = family.design(&augmented, &tuning).ok()?;
     let observer = &design.observer;
     if !observer.input_derivatives.is_empty() {
         return None;
     }
-    let certificate = crate::certificate(&extended, observer, [&[], &[]], Sought::Fastest);
+    let certificate = crate::certificate(&augmented, observer, [&[], &[]], Sought::Fastest);
     let sides = Sides::new(&certificate, random.states.len());
-    let mut pair = Pair::new(&extended, observer);
+    let mut pair = Pair::new(&augmented, observer);
     match certificate.verdict() {
         Standing::Proved => {
             let claim = Claim::new(&certificate);

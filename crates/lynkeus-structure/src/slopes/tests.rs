@@ -1,5 +1,5 @@
 use super::*;
-use crate::{Extended, Sensors};
+use crate::{AugmentedPlant, Sensors};
 use lynkeus_model::{LoadOptions, Plant};
 use proptest::prelude::*;
 
@@ -8,10 +8,10 @@ fn plant(text: &str) -> Plant {
 }
 
 fn slopes(plant: &Plant) -> (Slopes, Region) {
-    let extended = Extended::new(plant, &Sensors::default()).unwrap();
-    let region = extended.region();
-    let symbols = extended.symbols();
-    let found = Slopes::new(extended.graph(), &extended.derivatives, &symbols, &region);
+    let augmented = AugmentedPlant::new(plant, &Sensors::default()).unwrap();
+    let region = augmented.region();
+    let symbols = augmented.symbols();
+    let found = Slopes::new(augmented.graph(), &augmented.derivatives, &symbols, &region);
     (found.unwrap(), region)
 }
 
@@ -166,9 +166,9 @@ fn a_gain_times_an_innovation_costs_the_range_of_the_gain() {
         end P;",
     );
     let graph = &plant.graph;
-    let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-    let mut region = extended.region();
-    let [a, b] = extended.symbols()[..] else {
+    let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
+    let mut region = augmented.region();
+    let [a, b] = augmented.symbols()[..] else {
         panic!("two states")
     };
     let error = graph.fresh("error of a");
@@ -181,8 +181,8 @@ fn a_gain_times_an_innovation_costs_the_range_of_the_gain() {
     });
     let correction = (error * 5.0) / graph.expr(b).powi(2);
     let corrected = vec![
-        (graph.expr(extended.derivatives[0]) - error * 7.0).node(),
-        (graph.expr(extended.derivatives[1]) - correction).node(),
+        (graph.expr(augmented.derivatives[0]) - error * 7.0).node(),
+        (graph.expr(augmented.derivatives[1]) - correction).node(),
     ];
     let innovations = [Innovation {
         symbol: error.node(),
@@ -217,9 +217,9 @@ fn slopes_of_the_same_state_and_equation_are_added() {
         end P;",
     );
     let graph = &plant.graph;
-    let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-    let mut region = extended.region();
-    let symbols = extended.symbols();
+    let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
+    let mut region = augmented.region();
+    let symbols = augmented.symbols();
     let error = graph.fresh("error of a");
     region.dimensions.push(crate::Dimension {
         name: "error of a".into(),
@@ -230,8 +230,8 @@ fn slopes_of_the_same_state_and_equation_are_added() {
     });
     let correction = error * graph.expr(symbols[1]);
     let corrected = vec![
-        extended.derivatives[0],
-        (graph.expr(extended.derivatives[1]) - correction).node(),
+        augmented.derivatives[0],
+        (graph.expr(augmented.derivatives[1]) - correction).node(),
     ];
     let innovations = [Innovation {
         symbol: error.node(),

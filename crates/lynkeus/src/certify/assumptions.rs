@@ -3,7 +3,7 @@
 use lynkeus_expr::{Graph, Interval, Node, jacobian};
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::Assumptions;
-use lynkeus_structure::{Dimension, Extended, Matrix, Region, range};
+use lynkeus_structure::{AugmentedPlant, Dimension, Matrix, Region, range};
 
 use crate::Error;
 use crate::declared::Declared;
@@ -13,17 +13,20 @@ use crate::study::Noise;
 /// Gaussian measurement errors are taken to stay within this many standard deviations.
 const DEVIATIONS: f64 = 3.0;
 
-/// What the guarantee takes for granted: all that the study declares, on the box of `extended`.
-pub(super) fn of(prepared: &Prepared<'_>, extended: &Extended<'_>) -> Result<Assumptions, Error> {
-    let (declared, plant, region) = (prepared.declared(), extended.plant, extended.region());
-    let drift = drift(declared, plant, extended, &region)?;
-    let noise = noise(declared, plant, extended, &region)?;
-    let assumptions = Assumptions::new(extended, region).map_err(Error::from_source)?;
+/// What the guarantee takes for granted: all that the study declares, on the box of `augmented`.
+pub(super) fn of(
+    prepared: &Prepared<'_>,
+    augmented: &AugmentedPlant<'_>,
+) -> Result<Assumptions, Error> {
+    let (declared, plant, region) = (prepared.declared(), augmented.plant, augmented.region());
+    let drift = drift(declared, plant, augmented, &region)?;
+    let noise = noise(declared, plant, augmented, &region)?;
+    let assumptions = Assumptions::new(augmented, region).map_err(Error::from_source)?;
     let shown = |name: &str| {
         let limits = declared.limits.of(name)?;
         Interval::new(limits.low, limits.high).ok()
     };
-    let limits: Vec<Option<Interval>> = extended
+    let limits: Vec<Option<Interval>> = augmented
         .outputs
         .iter()
         .map(|o| shown(&o.variable.name))
@@ -45,26 +48,26 @@ pub(super) fn of(prepared: &Prepared<'_>, extended: &Extended<'_>) -> Result<Ass
     assumptions
         .with_drift(drift)
         .with_noise(noise)
-        .with_process_noise(extended.states.iter().map(density).collect())
-        .with_input_derivatives(extended.inputs.iter().map(derivatives).collect())
-        .with_limits(extended, &limits)
+        .with_process_noise(augmented.states.iter().map(density).collect())
+        .with_input_derivatives(augmented.inputs.iter().map(derivatives).collect())
+        .with_limits(augmented, &limits)
         .map_err(Error::from_source)
 }
 
-/// Per extended state: what disturbances within their declared ranges add to its
+/// Per augmented state: what disturbances within their declared ranges add to its
 /// derivative; for an unknown input the bound of its rate of change.
 fn drift(
     declared: &Declared,
     plant: &Plant,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     region: &Region,
 ) -> Result<Vec<f64>, Error> {
     let wider = disturbed(declared, plant, region);
     let mut drift = vec![];
-    for (&actual, &assumed) in plant.derivatives.iter().zip(&extended.derivatives) {
+    for (&actual, &assumed) in plant.derivatives.iter().zip(&augmented.derivatives) {
         drift.push(largest_difference(plant, actual, assumed, &wider)?);
     }
-    let unknown = &extended.states[extended.plant_states()..];
+    let unknown = &augmented.states[augmented.plant_states()..];
     drift.extend(
         unknown
             .iter()
@@ -132,7 +135,7 @@ fn largest_difference(
 fn noise(
     declared: &Declared,
     plant: &Plant,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     region: &Region,
 ) -> Result<Vec<f64>, Error> {
     let graph = &plant.graph;
@@ -155,30 +158,30 @@ fn noise(
         };
         Ok((error + Interval::point(added)).hi())
     };
-    extended.outputs.iter().map(|o| of(&o.variable)).collect()
+    augmented.outputs.iter().map(|o| of(&o.variable)).collect()
 }
 
 /// What a reader of the guarantee has to know about what acts unknown to the observer.
-pub(super) fn notes(prepared: &Prepared<'_>, extended: &Extended<'_>) -> Vec<String> {
+pub(super) fn notes(prepared: &Prepared<'_>, augmented: &AugmentedPlant<'_>) -> Vec<String> {
     let declared = prepared.declared();
     let is_open = |v: &Variable| !(v.min.is_finite() && v.max.is_finite());
     let names = |variables: Vec<&Variable>| {
         let names: Vec<&str> = variables.into_iter().map(|v| v.name.as_str()).collect();
         (!names.is_empty()).then(|| names.join(", "))
     };
-    let unknown = || extended.states[extended.plant_states()..].iter();
+    let unknown = || augmented.states[augmented.plant_states()..].iter();
     let is_slow = |v: &Variable| declared.slew.of(&v.name).is_some();
     let wanders = |v: &Variable| declared.process_noise.of(&v.name).is_some_and(|q| *q > 0.0);
     let is_gaussian = |v: &Variable| match declared.noise.of(&v.name) {
         Some(Noise::Absolute(size) | Noise::Relative(size)) => *size > 0.0,
         Some(Noise::Uniform(_)) | None => false,
     };
-    let outputs = extended.outputs.iter().map(|o| &o.variable);
+    let outputs = augmented.outputs.iter().map(|o| &o.variable);
     let said = [
         names(outputs.filter(|v| is_gaussian(v)).collect()).map(|names| format!(
             "the noise of {names} is Gaussian: its readings are taken to lie within {DEVIATIONS} standard deviations, as 99.7 % of them do"
         )),
-        names(disturbances(declared, extended.plant).filter(|d| is_open(d)).collect()).map(|names| format!(
+        names(disturbances(declared, augmented.plant).filter(|d| is_open(d)).collect()).map(|names| format!(
             "no bound covers what {names} does to the error: it decays at the rate only up to what that leaves; declare min and max"
         )),
         names(unknown().filter(|v| !is_slow(v) && !wanders(v)).collect()).map(|names| format!(

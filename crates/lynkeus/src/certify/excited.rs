@@ -8,7 +8,7 @@ use std::fmt;
 use std::ops::ControlFlow;
 
 use lynkeus_observers::{Family, Tuning, Value};
-use lynkeus_structure::Extended;
+use lynkeus_structure::AugmentedPlant;
 use serde_json::{Value as Json, json};
 
 use super::assumptions;
@@ -66,7 +66,7 @@ impl Excited {
     pub(super) fn of(
         prepared: &Prepared<'_>,
         own: Option<&Outcome>,
-        place: &Extended<'_>,
+        place: &AugmentedPlant<'_>,
         family: Option<&'static dyn Family>,
     ) -> Result<Option<Self>, Error> {
         let (Some(own), Some(family)) = (own, family) else {
@@ -232,7 +232,7 @@ impl fmt::Display for Excited {
 /// One value of θ.
 fn measured(
     prepared: &Prepared<'_>,
-    place: &Extended<'_>,
+    place: &AugmentedPlant<'_>,
     family: &dyn Family,
     tuning: &Tuning,
     theta: f64,
@@ -285,7 +285,7 @@ fn lowest(run: &Outcome) -> Option<f64> {
 /// σ_s L/θ of the theorem for a λ_m that was measured.
 fn condition(
     prepared: &Prepared<'_>,
-    place: &Extended<'_>,
+    place: &AugmentedPlant<'_>,
     family: &dyn Family,
     mut tuning: Tuning,
     excitation: f64,
@@ -299,7 +299,7 @@ fn condition(
 }
 
 /// The largest RMS error over the last half of the rows, in widths of declared ranges.
-fn error(run: &Outcome, place: &Extended<'_>) -> Option<f64> {
+fn error(run: &Outcome, place: &AugmentedPlant<'_>) -> Option<f64> {
     let share = |state: &lynkeus_model::Variable| {
         let width = state.max - state.min;
         let own = run.quantities.iter().find(|q| q.name == state.name)?;

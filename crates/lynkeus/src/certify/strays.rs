@@ -2,7 +2,7 @@
 
 use lynkeus_model::Variable;
 use lynkeus_observers::Design;
-use lynkeus_structure::Extended;
+use lynkeus_structure::AugmentedPlant;
 use serde_json::{Value, json};
 
 use crate::outside::{self, Outside, outside};
@@ -29,7 +29,7 @@ impl Strays {
     pub(super) fn of(
         prepared: &Prepared<'_>,
         run: Option<&Result<Outcome, Error>>,
-        place: &Extended<'_>,
+        place: &AugmentedPlant<'_>,
         design: &Design,
     ) -> Self {
         let found = Self::looked(run, place, design);
@@ -39,7 +39,11 @@ impl Strays {
         }
     }
 
-    fn looked(run: Option<&Result<Outcome, Error>>, place: &Extended<'_>, design: &Design) -> Self {
+    fn looked(
+        run: Option<&Result<Outcome, Error>>,
+        place: &AugmentedPlant<'_>,
+        design: &Design,
+    ) -> Self {
         match run {
             None => Self::at_start(place, design),
             Some(Ok(run)) => Self {
@@ -53,7 +57,7 @@ impl Strays {
         }
     }
 
-    fn along(time: &Series, quantities: &[Quantity], place: &Extended<'_>) -> Self {
+    fn along(time: &Series, quantities: &[Quantity], place: &AugmentedPlant<'_>) -> Self {
         let sides = outside::sides(place);
         let itself = outside::time_itself(time);
         let of = |of| outside(time, quantities.iter().chain([&itself]), of, &sides);
@@ -65,7 +69,7 @@ impl Strays {
     }
 
     /// The start values that are given, of quantities whose estimate is a state of the observer.
-    fn at_start(place: &Extended<'_>, design: &Design) -> Self {
+    fn at_start(place: &AugmentedPlant<'_>, design: &Design) -> Self {
         let observer = &design.observer;
         let estimated = |variable: &Variable| {
             let mut estimates = observer.estimates.iter();

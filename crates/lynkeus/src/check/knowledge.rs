@@ -4,8 +4,8 @@
 use std::fmt;
 
 use lynkeus_observability::{Answer, Verdict};
-use lynkeus_structure::fate::{Fate, Fates, Ground, Hidden, Told};
-use lynkeus_structure::{self as structure, Coordinate, Extended, Uniformity};
+use lynkeus_structure::detectability::{Detectability, Ground, Hidden, HiddenErrors, Told};
+use lynkeus_structure::{self as structure, AugmentedPlant, Coordinate, Uniformity};
 use serde_json::{Map, Value, json};
 
 use crate::words::{listed, number};
@@ -47,7 +47,7 @@ pub enum Known {
         reserve: Reserve,
     },
     /// the outputs do not determine it; what becomes of an error in it
-    Hidden(Fate),
+    Hidden(Detectability),
     /// a limit ended the analysis, or it does not apply
     Undecided,
 }
@@ -96,19 +96,19 @@ pub struct Knowledge {
 /// What the examination of the box has found.
 pub(super) struct Found<'a> {
     pub uniform: Option<&'a Uniformity>,
-    /// known everywhere by elimination, per extended state
+    /// known everywhere by elimination, per augmented state
     pub determined: &'a [bool],
 }
 
 impl Knowledge {
-    /// Sorts the quantities of `extended` by the exact verdicts of `answer`.
+    /// Sorts the quantities of `augmented` by the exact verdicts of `answer`.
     pub(super) fn new(
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         assumption: Assumption,
         answer: &Answer,
         found: &Found<'_>,
     ) -> Result<Self, lynkeus_expr::MissingInput> {
-        let verdicts: Vec<Option<Verdict>> = extended
+        let verdicts: Vec<Option<Verdict>> = augmented
             .states
             .iter()
             .map(|s| answer.verdict(&s.name))
@@ -122,31 +122,33 @@ impl Knowledge {
             told: told.collect(),
             arbitrary: assumption == Assumption::Arbitrary,
             directions: answer.symmetries.iter().map(|s| s.directions).sum(),
-            extended,
+            augmented,
         };
-        let fates = match hidden.told.contains(&Told::Hidden) {
-            true => hidden.fates()?,
-            false => Fates {
+        let hidden_errors = match hidden.told.contains(&Told::Hidden) {
+            true => hidden.hidden_errors()?,
+            false => HiddenErrors {
                 of: vec![None; verdicts.len()],
                 point: vec![],
             },
         };
         let known = |i: usize| match verdicts[i] {
-            Some(Verdict::Observable) => found.seen(extended, i, assumption, answer),
-            Some(Verdict::Unobservable) => Known::Hidden(fates.of[i].unwrap_or(Fate::Undecided)),
+            Some(Verdict::Observable) => found.seen(augmented, i, assumption, answer),
+            Some(Verdict::Unobservable) => {
+                Known::Hidden(hidden_errors.of[i].unwrap_or(Detectability::Undecided))
+            }
             Some(Verdict::Undecided) | None => Known::Undecided,
         };
         let asked = (0..verdicts.len()).filter(|&i| verdicts[i].is_some());
         Ok(Self {
             assumption,
-            unknown: extended.states[extended.plant_states()..]
+            unknown: augmented.states[augmented.plant_states()..]
                 .iter()
                 .map(|s| s.name.clone())
                 .collect(),
             quantities: asked
-                .map(|i| (extended.states[i].name.clone(), known(i)))
+                .map(|i| (augmented.states[i].name.clone(), known(i)))
                 .collect(),
-            point: fates.point,
+            point: hidden_errors.point,
         })
     }
 
@@ -205,12 +207,12 @@ impl Found<'_> {
     /// regular everywhere, or an elimination, shows the quantity near every point.
     pub(super) fn settle(
         &self,
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         assumption: Assumption,
         answer: &mut Answer,
     ) {
         for (asked, _) in &mut answer.quantities {
-            let place = extended.state_index(&asked.name);
+            let place = augmented.state_index(&asked.name);
             let is_proved = place.is_some_and(|place| {
                 self.determined.get(place) == Some(&true)
                     || self.is_one_to_one(place, assumption)
@@ -239,16 +241,16 @@ impl Found<'_> {
     /// Of a quantity that is observable at generic points.
     fn seen(
         &self,
-        extended: &Extended<'_>,
+        augmented: &AugmentedPlant<'_>,
         place: usize,
         assumption: Assumption,
         answer: &Answer,
     ) -> Known {
-        let name = &extended.states[place].name;
+        let name = &augmented.states[place].name;
         if self.determined.get(place) == Some(&true) {
             return Known::Everywhere;
         }
-        let constant = !extended.inputs.is_empty();
+        let constant = !augmented.inputs.is_empty();
         if self.is_one_to_one(place, assumption) {
             return match constant {
                 true => Known::WhileConstant,
@@ -317,7 +319,7 @@ impl Known {
                 reserve: Reserve::Disturbances { .. },
                 ..
             } => "up to disturbances",
-            Known::Hidden(Fate::Decays { .. }) => "decays",
+            Known::Hidden(Detectability::Decays { .. }) => "decays",
             Known::Hidden(_) => "no",
             Known::Undecided => "undecided",
         }
@@ -347,17 +349,17 @@ impl Known {
                     }
                 }
             }
-            Known::Hidden(Fate::Decays { rate, ground }) => {
+            Known::Hidden(Detectability::Decays { rate, ground }) => {
                 entry["rate"] = json!(rate);
                 entry["proved"] = json!(*ground == Ground::Box);
             }
-            Known::Hidden(Fate::Bounded { bound, is_kept }) => {
+            Known::Hidden(Detectability::Bounded { bound, is_kept }) => {
                 entry["bound"] = json!(bound);
                 if !is_kept {
                     entry["error"] = json!("undecided");
                 }
             }
-            Known::Hidden(fate) => entry["error"] = json!(error_word(*fate)),
+            Known::Hidden(detectability) => entry["error"] = json!(error_word(*detectability)),
             _ => {}
         }
         entry
@@ -392,7 +394,7 @@ impl Known {
                 )
             }
             Known::Reserved { known, reserve } => reserve.line(&known.line(unit)),
-            Known::Hidden(fate) => told(*fate, unit),
+            Known::Hidden(detectability) => told(*detectability, unit),
             Known::Undecided => "undecided".to_owned(),
         }
     }
@@ -440,55 +442,57 @@ impl Reserve {
     }
 }
 
-fn error_word(fate: Fate) -> &'static str {
-    match fate {
-        Fate::Stays => "stays",
-        Fate::Grows { .. } => "grows",
-        Fate::Moved => "moved by an unknown input",
-        Fate::Undecided | Fate::Decays { .. } | Fate::Bounded { .. } => "undecided",
+fn error_word(detectability: Detectability) -> &'static str {
+    match detectability {
+        Detectability::Stays => "stays",
+        Detectability::Grows { .. } => "grows",
+        Detectability::Moved => "moved by an unknown input",
+        Detectability::Undecided | Detectability::Decays { .. } | Detectability::Bounded { .. } => {
+            "undecided"
+        }
     }
 }
 
-fn told(fate: Fate, unit: &str) -> String {
-    match fate {
-        Fate::Decays {
+fn told(detectability: Detectability, unit: &str) -> String {
+    match detectability {
+        Detectability::Decays {
             rate,
             ground: Ground::Box,
         } => format!(
             "not observable, but its error decays by itself, at {} per {unit} or faster (proved on the box)",
             number(rate)
         ),
-        Fate::Decays {
+        Detectability::Decays {
             rate,
             ground: Ground::Point,
         } => format!(
             "not observable, but its error decays by itself, at {} per {unit} (linearised at one point only, see below)",
             number(rate)
         ),
-        Fate::Bounded {
+        Detectability::Bounded {
             bound,
             is_kept: true,
         } => format!(
             "not known: an unknown input keeps its error alive, in the end below {} (proved on the box)",
             number(bound)
         ),
-        Fate::Bounded {
+        Detectability::Bounded {
             bound,
             is_kept: false,
         } => format!(
             "not known: its error ends below {} (proved on the box); whether it decays is not decided",
             number(bound)
         ),
-        Fate::Stays => {
+        Detectability::Stays => {
             "not known: its error stays as it is, or hardly moves (linearised, see below)"
                 .to_owned()
         }
-        Fate::Grows { rate } => format!(
+        Detectability::Grows { rate } => format!(
             "not known: its error grows, at {} per {unit} (linearised, see below)",
             number(rate)
         ),
-        Fate::Moved => "not known: an unknown input moves it without a trace".to_owned(),
-        Fate::Undecided => "not known: whether its error decays is not decided".to_owned(),
+        Detectability::Moved => "not known: an unknown input moves it without a trace".to_owned(),
+        Detectability::Undecided => "not known: whether its error decays is not decided".to_owned(),
     }
 }
 
@@ -520,12 +524,12 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, all: &[Knowledge], unit: &str) -
 
 /// What the lines rest on.
 fn caveats(f: &mut fmt::Formatter<'_>, knowledge: &Knowledge) -> fmt::Result {
-    let fates = || {
+    let hidden_errors = || {
         knowledge
             .quantities
             .iter()
             .filter_map(|(_, known)| match known {
-                Known::Hidden(fate) => Some(*fate),
+                Known::Hidden(detectability) => Some(*detectability),
                 _ => None,
             })
     };
@@ -541,7 +545,8 @@ fn caveats(f: &mut fmt::Formatter<'_>, knowledge: &Knowledge) -> fmt::Result {
             sides.collect::<Vec<_>>().join(", ")
         )?;
     }
-    let decays = fates().any(|fate| matches!(fate, Fate::Decays { .. }));
+    let decays =
+        hidden_errors().any(|detectability| matches!(detectability, Detectability::Decays { .. }));
     match (decays, knowledge.assumption) {
         (true, Assumption::Wandering { .. }) => writeln!(
             f,
@@ -580,7 +585,7 @@ impl<'a> Sorted<'a> {
                 | Known::WhileExcited { .. }
                 | Known::InPart { .. }
                 | Known::Reserved { .. } => &mut sorted.seen,
-                Known::Hidden(Fate::Decays { .. }) => &mut sorted.follows,
+                Known::Hidden(Detectability::Decays { .. }) => &mut sorted.follows,
                 Known::Hidden(_) => &mut sorted.hidden,
                 Known::Undecided => &mut sorted.open,
             };

@@ -188,15 +188,15 @@ fn common(tuning: &Tuning) -> Vec<String> {
 
 /// What the filter takes where nothing is declared, to be edited.
 fn process_noise(prepared: &Prepared<'_>) -> Vec<String> {
-    let extended = prepared.extended();
-    let unknown = &extended.states[extended.plant_states()..];
+    let augmented = prepared.augmented();
+    let unknown = &augmented.states[augmented.plant_states()..];
     let mut lines = vec![
         String::new(),
         "# [process_noise]  # spectral densities: how far the model is trusted".to_owned(),
     ];
     let own = unknown
         .iter()
-        .chain(extended.states.iter().take(extended.plant_states()));
+        .chain(augmented.states.iter().take(augmented.plant_states()));
     for state in own.take(6) {
         let width = state.max - state.min;
         let size = if width.is_finite() && width > 0.0 {
@@ -294,8 +294,8 @@ fn skeleton(prepared: &Prepared<'_>, observer: &str) -> String {
 
 /// Ten times the slowest time scale of the plant at its start, else 10.
 fn choice_of_span(prepared: &Prepared<'_>) -> f64 {
-    let extended = prepared.extended();
-    let J = crate::modes::Start::of(extended).jacobian(extended);
+    let augmented = prepared.augmented();
+    let J = crate::modes::Start::of(augmented).jacobian(augmented);
     let Some(modes) = J.and_then(spectrum::eigenvalues) else {
         return 10.0;
     };

@@ -6,9 +6,9 @@
 
 use lynkeus_expr::{Budget, MissingInput, Node};
 use lynkeus_model::Plant;
-use lynkeus_structure::fate::{Fate, Hidden, Told};
+use lynkeus_structure::detectability::{Detectability, Hidden, Told};
 use lynkeus_structure::{
-    Extended, Sensors, apart_whatever, determined, range_within, uncertain, uniformity,
+    AugmentedPlant, Sensors, apart_whatever, determined, range_within, uncertain, uniformity,
 };
 
 use super::knowledge::{Assumption, Found, Knowledge, Known, Reserve};
@@ -77,13 +77,13 @@ impl View<'_> {
             disturbances: vec![],
             ..sensors(self.study(), plant)
         };
-        let extended = seen_by(self.study(), plant, &all)?;
-        for output in &extended.outputs {
+        let augmented = seen_by(self.study(), plant, &all)?;
+        for output in &augmented.outputs {
             let Some(limits) = limits.of(&output.variable.name) else {
                 continue;
             };
-            let (node, region) = (output.variable.node, extended.region());
-            let range = range_within(extended.graph(), node, &region, CELLS);
+            let (node, region) = (output.variable.node, augmented.region());
+            let range = range_within(augmented.graph(), node, &region, CELLS);
             let range = range.map_err(Error::from_source)?.enclosure;
             let inside =
                 range.is_defined() && range.lo() >= limits.low && range.hi() <= limits.high;
@@ -96,7 +96,7 @@ impl View<'_> {
 
     fn within(&self, limited: Vec<String>, knowledge: &mut Knowledge) -> Result<(), Error> {
         let own = sensors(self.study(), self.prepared.plant());
-        let outputs = &self.prepared.extended().outputs;
+        let outputs = &self.prepared.augmented().outputs;
         let names = outputs.iter().map(|o| o.variable.name.clone());
         let measured: Vec<String> = names.filter(|name| !limited.contains(name)).collect();
         let rest = match measured.is_empty() {
@@ -117,11 +117,11 @@ impl View<'_> {
             if is_left {
                 continue;
             }
-            if let Known::Hidden(fate) = known {
+            if let Known::Hidden(detectability) = known {
                 // an error that decays may do so only once others are known
-                *fate = match left {
+                *detectability = match left {
                     Some(Known::Hidden(left)) => *left,
-                    _ => Fate::Undecided,
+                    _ => Detectability::Undecided,
                 };
             } else if known.is_seen() {
                 *known = Known::Reserved {
@@ -135,29 +135,31 @@ impl View<'_> {
 
     /// What becomes of every quantity without sensors.
     fn unseen(&self, own: &Sensors, assumption: Assumption) -> Result<Knowledge, Error> {
-        let mut extended = seen_by(self.study(), self.prepared.plant(), own)?;
-        extended.outputs.clear();
-        let states = &extended.states;
+        let mut augmented = seen_by(self.study(), self.prepared.plant(), own)?;
+        augmented.outputs.clear();
+        let states = &augmented.states;
         let hidden = Hidden {
-            extended: &extended,
+            augmented: &augmented,
             told: vec![Told::Hidden; states.len()],
             arbitrary: assumption == Assumption::Arbitrary,
             directions: states.len(),
         };
-        let fates = hidden.fates().map_err(Error::from_source)?;
+        let hidden_errors = hidden.hidden_errors().map_err(Error::from_source)?;
         let names = states.iter().map(|state| state.name.clone());
-        let of = |fate: Option<Fate>| Known::Hidden(fate.unwrap_or(Fate::Undecided));
+        let of = |detectability: Option<Detectability>| {
+            Known::Hidden(detectability.unwrap_or(Detectability::Undecided))
+        };
         Ok(Knowledge {
             assumption,
             unknown: vec![],
-            quantities: names.zip(fates.of.into_iter().map(of)).collect(),
-            point: fates.point,
+            quantities: names.zip(hidden_errors.of.into_iter().map(of)).collect(),
+            point: hidden_errors.point,
         })
     }
 
     /// What these sensors tell.
     fn known(&self, sensors: Sensors, assumption: Assumption) -> Result<Knowledge, Error> {
-        let extended = seen_by(self.study(), self.prepared.plant(), &sensors)?;
+        let augmented = seen_by(self.study(), self.prepared.plant(), &sensors)?;
         let (_, symbols, signals) = self.plants(assumption);
         let asked = Sensors {
             unknown: signals,
@@ -165,14 +167,14 @@ impl View<'_> {
         };
         let mut answer = self.answer(&symbols, &asked)?;
         let mut work = || -> Result<Knowledge, MissingInput> {
-            let known = determined(&extended)?;
-            let uniform = uniformity(&extended, &known)?;
+            let known = determined(&augmented)?;
+            let uniform = uniformity(&augmented, &known)?;
             let found = Found {
                 uniform: uniform.as_ref(),
                 determined: &known,
             };
-            found.settle(&extended, assumption, &mut answer);
-            Knowledge::new(&extended, assumption, &answer, &found)
+            found.settle(&augmented, assumption, &mut answer);
+            Knowledge::new(&augmented, assumption, &answer, &found)
         };
         work().map_err(Error::from_source)
     }
@@ -205,26 +207,26 @@ impl View<'_> {
             disturbances: vec![],
             ..own
         };
-        let extended = seen_by(self.study(), &numbers, &asked)?;
+        let augmented = seen_by(self.study(), &numbers, &asked)?;
         let mut answer = self.answer(&symbols, &asked)?;
         let mut work = || -> Result<(Knowledge, Vec<Option<f64>>), MissingInput> {
-            let mut known = determined(&extended)?;
+            let mut known = determined(&augmented)?;
             let found = Found {
                 uniform: None,
                 determined: &known,
             };
-            found.settle(&extended, Assumption::Arbitrary, &mut answer);
-            let left = Knowledge::new(&extended, Assumption::Arbitrary, &answer, &found)?;
+            found.settle(&augmented, Assumption::Arbitrary, &mut answer);
+            let left = Knowledge::new(&augmented, Assumption::Arbitrary, &answer, &found)?;
             for (name, firm) in firm.iter().flatten() {
-                if let Some(place) = extended.state_index(name) {
+                if let Some(place) = augmented.state_index(name) {
                     known[place] |= firm;
                 }
             }
-            let sizes = uncertain(&extended, &known, &sizes(&extended, &names))?;
+            let sizes = uncertain(&augmented, &known, &sizes(&augmented, &names))?;
             Ok((left, sizes))
         };
         let (left, sizes) = work().map_err(Error::from_source)?;
-        let constant = !extended.inputs.is_empty();
+        let constant = !augmented.inputs.is_empty();
         for (name, known) in &mut knowledge.quantities {
             let is_firm = firm
                 .iter()
@@ -243,7 +245,7 @@ impl View<'_> {
                     known: Box::new(known.clone()),
                     reserve: Reserve::Disturbances {
                         names: names.clone(),
-                        bound: extended.state_index(name).and_then(|place| sizes[place]),
+                        bound: augmented.state_index(name).and_then(|place| sizes[place]),
                     },
                 },
             };
@@ -262,21 +264,21 @@ impl View<'_> {
             measured: own.measured.clone(),
             ..Sensors::default()
         };
-        let extended = seen_by(self.study(), plant, &known)?;
-        let inputs = extended.inputs.iter().filter(|input| among(&input.name));
+        let augmented = seen_by(self.study(), plant, &known)?;
+        let inputs = augmented.inputs.iter().filter(|input| among(&input.name));
         let signals: Vec<Node> = inputs.map(|input| input.node).collect();
-        let unknown = vec![false; extended.states.len()];
-        let firm = apart_whatever(&extended, &signals, &unknown).map_err(Error::from_source)?;
-        let names = extended.states.iter().map(|s| s.name.clone());
+        let unknown = vec![false; augmented.states.len()];
+        let firm = apart_whatever(&augmented, &signals, &unknown).map_err(Error::from_source)?;
+        let names = augmented.states.iter().map(|s| s.name.clone());
         Ok(names.zip(firm).collect())
     }
 }
 
 /// Places and sizes of the disturbances among the states.
-fn sizes(extended: &Extended<'_>, names: &[String]) -> Vec<(usize, f64)> {
+fn sizes(augmented: &AugmentedPlant<'_>, names: &[String]) -> Vec<(usize, f64)> {
     let of = |name: &String| {
-        let place = extended.state_index(name)?;
-        let side = &extended.states[place];
+        let place = augmented.state_index(name)?;
+        let side = &augmented.states[place];
         Some((place, side.min.abs().max(side.max.abs())))
     };
     names.iter().filter_map(of).collect()

@@ -126,7 +126,7 @@ fn timed<'p>(
 
 fn judged(prepared: &Prepared<'_>, outcome: Outcome, seconds: f64) -> Run {
     let width = |quantity: &Quantity| {
-        let states = prepared.extended().states.iter();
+        let states = prepared.augmented().states.iter();
         let mut own = states.filter(|s| s.name == quantity.name);
         let width = own.next().map_or(f64::INFINITY, |s| s.max - s.min);
         if width.is_finite() && width > 0.0 {

@@ -2,7 +2,7 @@
 
 use lynkeus_model::Variable;
 use lynkeus_run::Level;
-use lynkeus_structure::{Extended, short};
+use lynkeus_structure::{AugmentedPlant, short};
 
 use crate::Series;
 use crate::course::Samples;
@@ -14,12 +14,12 @@ use crate::series::{Sorted, steps};
 /// readings scatter.
 pub(crate) fn levels(
     declared: &Declared,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     samples: &Samples,
     notes: &mut Vec<String>,
 ) -> Vec<Level> {
     let mut levels = vec![];
-    for (i, output) in extended.outputs.iter().enumerate() {
+    for (i, output) in augmented.outputs.iter().enumerate() {
         let name = &output.variable.name;
         levels.push(match declared.noise.of(name) {
             Some(noise) => Level::from(*noise),
@@ -96,7 +96,7 @@ fn off_line(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> f64 {
 /// unknown input without one, a wander over a quarter of its range in a tenth of the log. Where the
 /// study declares none at all every state may drift a little.
 pub(crate) fn densities(prepared: &Prepared<'_>, span: f64, notes: &mut Vec<String>) -> Vec<f64> {
-    let (study, extended) = (prepared.study(), prepared.extended());
+    let (study, augmented) = (prepared.study(), prepared.augmented());
     let declared = &prepared.declared().process_noise;
     let is_declared = declared.is_declared();
     let is_constant = |state: &Variable| {
@@ -104,12 +104,12 @@ pub(crate) fn densities(prepared: &Prepared<'_>, span: f64, notes: &mut Vec<Stri
         names.any(|name| name.is_or_has(&state.name))
     };
     let mut is_awake = false;
-    let chosen = extended.states.iter().enumerate();
+    let chosen = augmented.states.iter().enumerate();
     let chosen: Vec<f64> = chosen
         .map(|(i, state)| match declared.of(&state.name) {
             Some(density) => *density,
             None if span <= 0.0 => 0.0,
-            None if i >= extended.plant_states() => wander(state, span, notes),
+            None if i >= augmented.plant_states() => wander(state, span, notes),
             None if is_declared || is_constant(state) => 0.0,
             None => {
                 let width = state.max - state.min;
@@ -134,11 +134,11 @@ pub(crate) fn densities(prepared: &Prepared<'_>, span: f64, notes: &mut Vec<Stri
 /// The same for a family with a theorem, whose gain reads none: what is not declared is an unknown
 /// input's wander, and no doubt of the model.
 pub(crate) fn of_families(prepared: &Prepared<'_>, span: f64, notes: &mut Vec<String>) -> Vec<f64> {
-    let (extended, declared) = (prepared.extended(), &prepared.declared().process_noise);
-    let states = extended.states.iter().enumerate();
+    let (augmented, declared) = (prepared.augmented(), &prepared.declared().process_noise);
+    let states = augmented.states.iter().enumerate();
     let density = |(i, state): (usize, &Variable)| match declared.of(&state.name) {
         Some(density) => *density,
-        None if i >= extended.plant_states() && span > 0.0 => wander(state, span, notes),
+        None if i >= augmented.plant_states() && span > 0.0 => wander(state, span, notes),
         None => 0.0,
     };
     states.map(density).collect()

@@ -193,7 +193,7 @@ fn reported(
 }
 
 fn is_measured(prepared: &Prepared<'_>, variable: &Variable) -> bool {
-    let outputs = &prepared.extended().outputs;
+    let outputs = &prepared.augmented().outputs;
     outputs.iter().any(|o| o.variable.node == variable.node)
 }
 

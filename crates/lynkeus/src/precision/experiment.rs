@@ -6,7 +6,7 @@ use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observability::precision::{Deviation, Experiment, Quantity, Sensor, Window};
 use lynkeus_run::{Method, Tolerances, Trajectory};
-use lynkeus_structure::Extended;
+use lynkeus_structure::AugmentedPlant;
 
 use crate::crew::within;
 use crate::declared::Declared;
@@ -75,8 +75,8 @@ impl<'p> Setup<'p> {
         settings: &SimulateSettings,
         options: &Options,
     ) -> Result<Self, Error> {
-        let (study, extended) = (prepared.study(), prepared.extended());
-        let plant = extended.plant;
+        let (study, augmented) = (prepared.study(), prepared.augmented());
+        let plant = augmented.plant;
         let mut run = simulate::open_loop(study, settings, plant)?;
         let step = settings.sample_step.unwrap_or(run.output_step);
         let span = horizon(study, settings, options, step)?;
@@ -89,13 +89,13 @@ impl<'p> Setup<'p> {
                 ended(study).unwrap_or_else(|| interrupted(error.error, &study.file))
             })?;
         let reach = Reach { plant, trajectory };
-        let measured: Vec<Variable> = extended
+        let measured: Vec<Variable> = augmented
             .outputs
             .iter()
             .filter_map(|o| plant.outputs.iter().find(|p| p.name == o.variable.name))
             .cloned()
             .collect();
-        let sensors = Sensors::new(prepared.declared(), extended, &measured, &reach);
+        let sensors = Sensors::new(prepared.declared(), augmented, &measured, &reach);
         let others = candidates(plant, &measured, options.sensors);
         let all = measured.iter().chain(&others).map(|v| sensors.sensor(v));
         let (judged, assumed): (Vec<Sensor>, Vec<Assumed>) = all.unzip();
@@ -111,7 +111,7 @@ impl<'p> Setup<'p> {
         };
         let inputs: Vec<Node> = plant.inputs.iter().map(|i| i.node).collect();
         let courses = systems::input_expressions(study, plant, settings)?;
-        let (states, unknown) = extended.states.split_at(extended.plant_states());
+        let (states, unknown) = augmented.states.split_at(augmented.plant_states());
         let window = Window::log_spaced(run.start, span, step, POINTS);
         Ok(Self {
             experiment: Experiment {
@@ -229,13 +229,13 @@ impl<'a> Sensors<'a> {
     /// relative to its value where all of these are, else to its range.
     fn new(
         declared: &'a Declared,
-        extended: &'a Extended<'_>,
+        augmented: &'a AugmentedPlant<'_>,
         measured: &[Variable],
         reach: &'a Reach<'a>,
     ) -> Self {
         let mut sensors = Self {
             declared,
-            states: &extended.states,
+            states: &augmented.states,
             reach,
             usual: Noise::Absolute(SHARE),
         };

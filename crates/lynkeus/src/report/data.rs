@@ -20,9 +20,9 @@ pub(super) fn json(
     moving: &Result<Knob, Error>,
     tradeoff: Option<&Tradeoff>,
 ) -> Value {
-    let extended = prepared.extended();
-    let outputs = extended.outputs.iter().map(|o| &o.variable);
-    let signals = outputs.chain(&extended.inputs).zip(samples.columns());
+    let augmented = prepared.augmented();
+    let outputs = augmented.outputs.iter().map(|o| &o.variable);
+    let signals = outputs.chain(&augmented.inputs).zip(samples.columns());
     let signals: Vec<Value> = signals
         .enumerate()
         .map(|(place, (variable, values))| {
@@ -30,12 +30,12 @@ pub(super) fn json(
                 "name": variable.name,
                 "shown": shown(&variable.name),
                 "unit": unit(variable.unit.as_deref()),
-                "measured": place < extended.outputs.len(),
+                "measured": place < augmented.outputs.len(),
                 "values": column(values),
             })
         })
         .collect();
-    let names: Vec<&str> = extended
+    let names: Vec<&str> = augmented
         .outputs
         .iter()
         .map(|o| o.variable.name.as_str())

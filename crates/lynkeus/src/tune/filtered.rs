@@ -228,7 +228,7 @@ fn predicted(
     let inputs = observer.inputs.iter().map(|signal| signal.symbol);
     let symbols = std::iter::once(observer.time).chain(states).chain(inputs);
     let symbols: Vec<Node> = symbols.collect();
-    let tape = Tape::new(prepared.extended().graph(), &symbols, &outputs);
+    let tape = Tape::new(prepared.augmented().graph(), &symbols, &outputs);
     let tape = tape.map_err(Error::from_source)?;
     let mut evaluator = tape.evaluator();
     let columns = std::iter::once(&samples.time)

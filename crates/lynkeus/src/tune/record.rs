@@ -53,7 +53,7 @@ impl<'t> Record<'t> {
             true => held_out(&log.samples, &plan, between),
         };
         let mut notes = [&log.warnings[..], &log.notes].concat();
-        for (i, output) in prepared.extended().outputs.iter().enumerate() {
+        for (i, output) in prepared.augmented().outputs.iter().enumerate() {
             let name = &output.variable.name;
             let is_left = |readings: &Series| readings.iter().any(f64::is_finite);
             if !parts.readings.get(i).is_some_and(is_left) {

@@ -59,7 +59,7 @@ impl Reference {
         let starts = starts(study, plant)?;
         let last = starts.last().copied().unwrap_or(settings.start);
         let mut notes = vec![];
-        let measured = prepared.extended().outputs.iter();
+        let measured = prepared.augmented().outputs.iter();
         let measured: Vec<&str> = measured.map(|o| o.variable.name.as_str()).collect();
         let noise = noise(stated, plant, &measured, &truth, &mut notes);
         Ok(Self {

@@ -61,9 +61,9 @@ fn first<'t>(prepared: &Prepared<'_>, table: &'t Table) -> Result<Cow<'t, Table>
         return Ok(Cow::Borrowed(table));
     }
     let settings = &prepared.study().estimate;
-    let extended = prepared.extended();
-    let outputs = extended.outputs.iter().map(|o| o.variable.name.as_str());
-    let names = outputs.chain(extended.inputs.iter().map(|u| u.name.as_str()));
+    let augmented = prepared.augmented();
+    let outputs = augmented.outputs.iter().map(|o| o.variable.name.as_str());
+    let names = outputs.chain(augmented.inputs.iter().map(|u| u.name.as_str()));
     let headers = names.map(|name| headers::header(settings, name).to_owned());
     let part = |values: &Series| values.part(0, ROWS);
     let signals = headers.zip(log.samples.columns().map(part));

@@ -214,7 +214,7 @@ fn limits_and_disturbances_count_together() {
 /// b' = −b + a: the error of b decays once a is known, which it is within the limits only.
 #[test]
 fn decay_that_rests_on_a_limited_sensor_is_not_told() {
-    let fate = |b: &str| {
+    let detectability = |b: &str| {
         let model = format!(
             "Real a(start = 1, min = 0, max = 2); Real b(start = 0, min = -2, max = 2); output Real y = a;
              equation der(a) = 0; der(b) = {b};"
@@ -222,6 +222,6 @@ fn decay_that_rests_on_a_limited_sensor_is_not_told() {
         let (report, _) = check(&model, "limits = { y = [0, 1] }");
         known(&report, "b")["known"].clone()
     };
-    assert_eq!(fate("-b + a"), "no");
-    assert_eq!(fate("-b"), "decays");
+    assert_eq!(detectability("-b + a"), "no");
+    assert_eq!(detectability("-b"), "decays");
 }

@@ -3,7 +3,7 @@
 use astro_float_num::BigFloat;
 use lynkeus::expr::{Node, Tape};
 use lynkeus::observers::Observer;
-use lynkeus::structure::{Extended, Point};
+use lynkeus::structure::{AugmentedPlant, Point};
 
 use super::super::claims::Refutation;
 use super::super::precise::Precise;
@@ -14,13 +14,13 @@ use super::{Answer, Lens};
 pub(super) fn unstable(
     observer: &Observer,
     refutation: &Refutation,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     lens: &Lens,
 ) -> Result<Answer, String> {
     let Some(point) = refutation.points.first() else {
         return Err("no point".into());
     };
-    let Some(A) = jacobian(observer, point, extended, lens)? else {
+    let Some(A) = jacobian(observer, point, augmented, lens)? else {
         return Ok(Answer::Unread);
     };
     let n = A.len();
@@ -52,10 +52,10 @@ pub(super) fn unstable(
 fn jacobian(
     observer: &Observer,
     point: &Point,
-    extended: &Extended<'_>,
+    augmented: &AugmentedPlant<'_>,
     lens: &Lens,
 ) -> Result<Option<Vec<Vec<BigFloat>>>, String> {
-    let n = extended.states.len();
+    let n = augmented.states.len();
     if observer.states.len() != n || !observer.input_derivatives.is_empty() {
         return Ok(None);
     }
@@ -64,13 +64,13 @@ fn jacobian(
         let given = point.coordinates.iter().find(|c| c.name == name);
         precise.number(given.map_or(0.0, |c| c.value))
     };
-    let graph = extended.graph();
-    let names = extended.states.iter().chain(&extended.inputs);
+    let graph = augmented.graph();
+    let names = augmented.states.iter().chain(&augmented.inputs);
     let mut symbols: Vec<Node> = names.clone().map(|v| v.node).collect();
     let mut place: Vec<BigFloat> = names.map(|v| value(&v.name)).collect();
-    symbols.push(extended.plant.time);
+    symbols.push(augmented.plant.time);
     place.push(value("time"));
-    let h: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
+    let h: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
     let outputs = Tape::new(graph, &symbols, &h).map_err(|e| e.to_string())?;
     let y = outputs.eval_in(precise, &place);
     for (signal, y) in observer.measured.iter().zip(y) {

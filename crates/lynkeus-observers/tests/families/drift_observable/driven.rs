@@ -7,7 +7,7 @@ use lynkeus_model::Plant;
 use lynkeus_observers::{
     Assumptions, Certificate, Family, Tuning, Value, drift_observable::DriftObservable,
 };
-use lynkeus_structure::{Extended, Sensors, Standing};
+use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
 
 use super::list;
 
@@ -40,26 +40,26 @@ impl Driven<'_> {
     }
 
     fn certificate(&self, plant: &Plant) -> Certificate {
-        let extended = Extended::new(plant, &Sensors::default()).unwrap();
-        let assumptions = Assumptions::new(&extended, extended.region())
+        let augmented = AugmentedPlant::new(plant, &Sensors::default()).unwrap();
+        let assumptions = Assumptions::new(&augmented, augmented.region())
             .unwrap()
-            .with_drift(vec![0.0; extended.states.len()])
-            .with_noise(vec![0.0; extended.outputs.len()])
+            .with_drift(vec![0.0; augmented.states.len()])
+            .with_noise(vec![0.0; augmented.outputs.len()])
             .with_input_derivatives(vec![]);
         DriftObservable
-            .theorem(&extended, &self.tuning(), &assumptions)
+            .theorem(&augmented, &self.tuning(), &assumptions)
             .unwrap()
     }
 
     /// The largest errors of the states, and of all together, over the last quarter.
     fn left(&self, plant: &Plant) -> (Vec<f64>, f64) {
-        let extended = Extended::new(plant, &Sensors::default()).unwrap();
-        let design = DriftObservable.design(&extended, &self.tuning()).unwrap();
-        let n = extended.states.len();
+        let augmented = AugmentedPlant::new(plant, &Sensors::default()).unwrap();
+        let design = DriftObservable.design(&augmented, &self.tuning()).unwrap();
+        let n = augmented.states.len();
         let times: Vec<f64> = (0..=400)
             .map(|k| self.until * f64::from(k) / 400.0)
             .collect();
-        let start: Vec<f64> = extended.states.iter().map(|s| s.start.unwrap()).collect();
+        let start: Vec<f64> = augmented.states.iter().map(|s| s.start.unwrap()).collect();
         let rows = run(plant, &design, self.inputs, &start, &times, 1e-3).rows;
         let last = rows.iter().filter(|row| row[0] > 0.75 * self.until);
         let (mut each, mut all) = (vec![0.0f64; n], 0.0f64);

@@ -7,7 +7,7 @@ use crate::common::{design_with, plant, run, slope};
 use lynkeus_observers::{
     DesignError, Examination, Family, Tuning, Value, drift_observable::DriftObservable,
 };
-use lynkeus_structure::{Extended, Sensors, Standing, Verdict};
+use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 
 use super::{assert_near, list, parameter};
 
@@ -27,8 +27,8 @@ fn pair(re: f64, im: f64) -> Value {
 
 fn examine(text: &str, tuning: &Tuning) -> Result<Examination, DesignError> {
     let plant = plant(text);
-    let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-    DriftObservable.examine(&extended, tuning)
+    let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
+    DriftObservable.examine(&augmented, tuning)
 }
 
 /// Indices (2, 3); rows of Q by hand, and Q s = b by substitution.

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use lynkeus_expr::{Budget, Spent};
 use lynkeus_observers::{Examination, Family, Tuning, drift_observable::DriftObservable};
-use lynkeus_structure::{Extended, Sensors, Standing};
+use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
 
 use crate::common::plant;
 
@@ -17,11 +17,11 @@ fn examined(n: usize, declared: &str, equations: &str, seconds: u64) -> Examinat
          der(x[{n}]) = x[{n}-1] - x[{n}]^3; {equations} end H;"
     );
     let plant = plant(&text);
-    let extended = Extended::new(&plant, &Sensors::default()).unwrap();
+    let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
     let budget = Budget::new(Some(Duration::from_secs(seconds)), None);
-    extended.graph().set_budget(budget);
+    augmented.graph().set_budget(budget);
     DriftObservable
-        .examine(&extended, &Tuning::default())
+        .examine(&augmented, &Tuning::default())
         .unwrap()
 }
 

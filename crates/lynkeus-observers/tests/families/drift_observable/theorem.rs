@@ -7,7 +7,7 @@ use lynkeus_observers::{
     Assumptions, Certificate, Check, Design, Family, Germani, Tuning, UltimateBound, Value,
     drift_observable::DriftObservable,
 };
-use lynkeus_structure::{Extended, Sensors, Standing};
+use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
 
 use super::{PLANT, list};
 
@@ -42,18 +42,18 @@ fn sensors(plant: &Plant) -> Sensors {
 }
 
 fn certificate(plant: &Plant, tuning: &Tuning, drift: &[f64], noise: &[f64]) -> Certificate {
-    let extended = Extended::new(plant, &sensors(plant)).unwrap();
-    let assumptions = Assumptions::new(&extended, extended.region())
+    let augmented = AugmentedPlant::new(plant, &sensors(plant)).unwrap();
+    let assumptions = Assumptions::new(&augmented, augmented.region())
         .unwrap()
         .with_drift(drift.to_vec())
         .with_noise(noise.to_vec());
-    let found = DriftObservable.theorem(&extended, tuning, &assumptions);
+    let found = DriftObservable.theorem(&augmented, tuning, &assumptions);
     found.unwrap()
 }
 
 fn design(plant: &Plant, tuning: &Tuning) -> Design {
-    let extended = Extended::new(plant, &sensors(plant)).unwrap();
-    DriftObservable.design(&extended, tuning).unwrap()
+    let augmented = AugmentedPlant::new(plant, &sensors(plant)).unwrap();
+    DriftObservable.design(&augmented, tuning).unwrap()
 }
 
 fn value(found: &Certificate, name: &str) -> f64 {
@@ -287,16 +287,16 @@ fn disturbances_without_range_are_undecided_by_name() {
 #[test]
 fn bounds_of_slopes_may_come_from_the_assumptions() {
     let plant = early(0.5, 0.5);
-    let extended = Extended::new(&plant, &sensors(&plant)).unwrap();
+    let augmented = AugmentedPlant::new(&plant, &sensors(&plant)).unwrap();
     let lists: [(&str, &[f64]); 2] = [("poles", &[-6.0, -9.0]), ("filter_poles", &[-80.0])];
     let theorem = |tuning: &Tuning, slopes: &[f64]| {
-        let assumptions = Assumptions::new(&extended, extended.region())
+        let assumptions = Assumptions::new(&augmented, augmented.region())
             .unwrap()
             .with_drift(vec![0.0; 2])
             .with_noise(vec![0.0])
             .with_input_derivatives(vec![slopes.to_vec()]);
         DriftObservable
-            .theorem(&extended, tuning, &assumptions)
+            .theorem(&augmented, tuning, &assumptions)
             .unwrap()
     };
     let general = theorem(&tuning("practical", &lists), &[1.0, 7.0]);

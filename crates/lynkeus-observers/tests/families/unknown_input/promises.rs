@@ -6,7 +6,7 @@ use lynkeus_model::Plant;
 use lynkeus_observers::{
     Assumptions, Certificate, Family, Tuning, UltimateBound, unknown_input::UnknownInput,
 };
-use lynkeus_structure::{Extended, Sensors, Standing};
+use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
 
 use super::shapes::{TALL, sensors};
 use super::{tuning, with_partition};
@@ -25,21 +25,21 @@ struct Promise<'a> {
 
 impl Promise<'_> {
     fn certificate(&self, tuning: &Tuning) -> Certificate {
-        let extended = Extended::new(self.plant, &self.sensors).unwrap();
-        let assumptions = Assumptions::new(&extended, extended.region())
+        let augmented = AugmentedPlant::new(self.plant, &self.sensors).unwrap();
+        let assumptions = Assumptions::new(&augmented, augmented.region())
             .unwrap()
             .with_drift(self.drift.to_vec())
             .with_noise(self.noise.to_vec());
         UnknownInput
-            .theorem(&extended, tuning, &assumptions)
+            .theorem(&augmented, tuning, &assumptions)
             .unwrap()
     }
 
     fn kept(&self, tuning: &Tuning, inputs: &[(&str, &str)], step: f64) {
         let found = self.certificate(tuning);
         assert_eq!(found.verdict(), Standing::Proved, "{:#?}", found.hypotheses);
-        let extended = Extended::new(self.plant, &self.sensors).unwrap();
-        let design = UnknownInput.design(&extended, tuning).unwrap();
+        let augmented = AugmentedPlant::new(self.plant, &self.sensors).unwrap();
+        let design = UnknownInput.design(&augmented, tuning).unwrap();
         let times: Vec<f64> = (0..=100).map(|i| 0.05 * f64::from(i)).collect();
         let n = self.x0.len();
         let errors = |row: &[f64]| -> Vec<f64> {

@@ -6,7 +6,7 @@ use lynkeus_model::Plant;
 use lynkeus_observers::{
     Assumptions, Certificate, DesignError, Family, Tuning, unknown_input::UnknownInput,
 };
-use lynkeus_structure::{Extended, Sensors, Standing, Verdict};
+use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 
 use super::{tuning, with_partition};
 
@@ -93,15 +93,15 @@ pub(super) fn sensors() -> Sensors {
 }
 
 fn certificate(plant: &Plant, tuning: &Tuning, slew: f64, noise: f64) -> Certificate {
-    let extended = Extended::new(plant, &sensors()).unwrap();
-    let mut drift = vec![0.0; extended.states.len()];
-    drift[extended.plant_states()] = slew;
-    let assumptions = Assumptions::new(&extended, extended.region())
+    let augmented = AugmentedPlant::new(plant, &sensors()).unwrap();
+    let mut drift = vec![0.0; augmented.states.len()];
+    drift[augmented.plant_states()] = slew;
+    let assumptions = Assumptions::new(&augmented, augmented.region())
         .unwrap()
         .with_drift(drift)
-        .with_noise(vec![noise; extended.outputs.len()]);
+        .with_noise(vec![noise; augmented.outputs.len()]);
     UnknownInput
-        .theorem(&extended, tuning, &assumptions)
+        .theorem(&augmented, tuning, &assumptions)
         .unwrap()
 }
 
@@ -110,9 +110,9 @@ fn certificate(plant: &Plant, tuning: &Tuning, slew: f64, noise: f64) -> Certifi
 #[test]
 fn a_left_inverse_in_the_gain() {
     let plant = plant(TALL);
-    let extended = Extended::new(&plant, &sensors()).unwrap();
+    let augmented = AugmentedPlant::new(&plant, &sensors()).unwrap();
     let given = with_partition(tuning(5.0, 2.0), &["ya"]);
-    let design = UnknownInput.design(&extended, &given).unwrap();
+    let design = UnknownInput.design(&augmented, &given).unwrap();
     let (state, y) = ([0.3, -0.2, 0.5, 0.1, 0.7, 0.6], [0.1, 0.2, 0.4]);
     let found = slope(&plant, &design, &state, &[], &y);
     let expected = [
@@ -251,13 +251,13 @@ fn shortened_chains_that_the_papers_gains_make_unstable_are_refused() {
         unknown: vec!["v".into()],
         ..Sensors::default()
     };
-    let extended = Extended::new(&plant, &sensors).unwrap();
-    let assumptions = Assumptions::new(&extended, extended.region())
+    let augmented = AugmentedPlant::new(&plant, &sensors).unwrap();
+    let assumptions = Assumptions::new(&augmented, augmented.region())
         .unwrap()
-        .with_drift(vec![0.0; extended.states.len()])
+        .with_drift(vec![0.0; augmented.states.len()])
         .with_noise(vec![0.0; 3]);
     let found = UnknownInput
-        .theorem(&extended, &tuning(1e4, 20.0), &assumptions)
+        .theorem(&augmented, &tuning(1e4, 20.0), &assumptions)
         .unwrap();
     assert_eq!(found.verdict(), Standing::Undecided);
     let open = hypothesis(&found, "Λ₂Λ₂⁺");
@@ -322,13 +322,13 @@ fn a_moving_input_needs_a_bound_of_its_derivative() {
         unknown: vec!["v".into()],
         ..Sensors::default()
     };
-    let extended = Extended::new(&plant, &sensors).unwrap();
+    let augmented = AugmentedPlant::new(&plant, &sensors).unwrap();
     let finite = |bounds: Vec<Vec<f64>>| {
-        let assumptions = Assumptions::new(&extended, extended.region())
+        let assumptions = Assumptions::new(&augmented, augmented.region())
             .unwrap()
             .with_input_derivatives(bounds);
         let found = UnknownInput
-            .theorem(&extended, &tuning(50.0, 10.0), &assumptions)
+            .theorem(&augmented, &tuning(50.0, 10.0), &assumptions)
             .unwrap();
         hypothesis(&found, "c1, c2, c4 and c5").is_proved()
     };

@@ -6,7 +6,7 @@ use lynkeus_model::Plant;
 use lynkeus_observers::{
     Assumptions, Certificate, Family, Tuning, UltimateBound, Value, unknown_input::UnknownInput,
 };
-use lynkeus_structure::{Extended, Sensors, Standing, Verdict};
+use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 
 use super::EXAMPLE;
 
@@ -26,13 +26,13 @@ fn theta(θ: [f64; 2]) -> Tuning {
 
 /// The certificate for drifts of the states and v, and noise of the outputs.
 fn certificate(plant: &Plant, tuning: &Tuning, drift: &[f64], noise: &[f64]) -> Certificate {
-    let extended = Extended::new(plant, &sensors()).unwrap();
-    let assumptions = Assumptions::new(&extended, extended.region())
+    let augmented = AugmentedPlant::new(plant, &sensors()).unwrap();
+    let assumptions = Assumptions::new(&augmented, augmented.region())
         .unwrap()
         .with_drift(drift.to_vec())
         .with_noise(noise.to_vec());
     UnknownInput
-        .theorem(&extended, tuning, &assumptions)
+        .theorem(&augmented, tuning, &assumptions)
         .unwrap()
 }
 

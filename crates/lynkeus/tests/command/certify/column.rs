@@ -46,7 +46,7 @@ fn side(certificate: &Certificate, name: &str) -> (f64, f64) {
 }
 
 /// Plant and observer from their starts under constant inputs; rows of the plant's
-/// extended state and of the estimate.
+/// augmented state and of the estimate.
 fn pairs(
     plant: &Plant,
     design: &Design,
@@ -71,11 +71,11 @@ fn pairs(
     let mut simulation = Simulation::new(system, constant, UNTIL, ROWS);
     simulation.observer = Some(observer.with_start(estimate.to_vec()).unwrap());
     let table = simulation.run().unwrap();
-    // the extended state, in the order of the estimates
+    // the augmented state, in the order of the estimates
     let states = (0..plant.states.len()).map(|i| Role::State.at(i));
     let zf = plant.inputs.iter().position(|i| i.name == "Zf").unwrap();
-    let extended = states.chain([Role::Input.at(zf)]).enumerate();
-    let columns: Vec<(&[f64], &[f64])> = extended
+    let augmented = states.chain([Role::Input.at(zf)]).enumerate();
+    let columns: Vec<(&[f64], &[f64])> = augmented
         .map(|(i, column)| {
             let estimate = table.column(Role::Estimate.at(i)).unwrap();
             (table.column(column).unwrap(), estimate)

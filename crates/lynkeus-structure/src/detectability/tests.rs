@@ -1,5 +1,5 @@
 use super::*;
-use crate::{Extended, Sensors};
+use crate::{AugmentedPlant, Sensors};
 use lynkeus_model::{LoadOptions, Plant};
 
 struct Case {
@@ -28,19 +28,19 @@ fn case(equations: &str, hidden: &'static [&'static str], directions: usize) -> 
 }
 
 impl Case {
-    fn fate(&self, name: &str) -> Option<Fate> {
-        self.fates(name).1
+    fn detectability(&self, name: &str) -> Option<Detectability> {
+        self.hidden_errors(name).1
     }
 
-    /// The names of the point, and the fate.
-    fn fates(&self, name: &str) -> (Vec<String>, Option<Fate>) {
+    /// The names of the point, and the detectability.
+    fn hidden_errors(&self, name: &str) -> (Vec<String>, Option<Detectability>) {
         let plant = Plant::from_modelica(&self.text, "p.mo", &LoadOptions::default()).unwrap();
         let sensors = Sensors {
             unknown: self.unknown.clone(),
             ..Sensors::default()
         };
-        let extended = Extended::new(&plant, &sensors).unwrap();
-        let told = extended
+        let augmented = AugmentedPlant::new(&plant, &sensors).unwrap();
+        let told = augmented
             .states
             .iter()
             .map(|s| match self.hidden.contains(&s.name.as_str()) {
@@ -51,11 +51,11 @@ impl Case {
             told: told.collect(),
             arbitrary: true,
             directions: self.directions,
-            extended: &extended,
+            augmented: &augmented,
         };
-        let found = question.fates().unwrap();
+        let found = question.hidden_errors().unwrap();
         let point = found.point.into_iter().map(|c| c.name).collect();
-        (point, found.of[extended.state_index(name).unwrap()])
+        (point, found.of[augmented.state_index(name).unwrap()])
     }
 
     fn known(mut self) -> Self {
@@ -64,9 +64,9 @@ impl Case {
     }
 }
 
-fn rate(fate: Option<Fate>, on: Ground) -> f64 {
-    match fate {
-        Some(Fate::Decays { rate, ground }) if ground == on => rate,
+fn rate(detectability: Option<Detectability>, on: Ground) -> f64 {
+    match detectability {
+        Some(Detectability::Decays { rate, ground }) if ground == on => rate,
         other => panic!("{other:?}"),
     }
 }
@@ -79,9 +79,9 @@ fn a_state_that_nothing_reads_decays_on_the_box() {
         2,
     )
     .known();
-    assert!((rate(found.fate("b"), Ground::Box) - 1.0).abs() < 1e-9);
+    assert!((rate(found.detectability("b"), Ground::Box) - 1.0).abs() < 1e-9);
     // behind b: any rate below 1
-    assert!((rate(found.fate("c"), Ground::Box) - 0.99).abs() < 1e-9);
+    assert!((rate(found.detectability("c"), Ground::Box) - 0.99).abs() < 1e-9);
 }
 
 /// b³ − b has the slope 3b² − 1, positive for large b: near b = 0, where it rests, it decays with 1.
@@ -93,8 +93,8 @@ fn what_decays_in_a_part_of_the_box_is_linearised_where_it_rests() {
         2,
     )
     .known();
-    assert!((rate(found.fate("b"), Ground::Point) - 1.0).abs() < 1e-9);
-    assert!((rate(found.fate("c"), Ground::Box) - 1.0).abs() < 1e-9);
+    assert!((rate(found.detectability("b"), Ground::Point) - 1.0).abs() < 1e-9);
+    assert!((rate(found.detectability("c"), Ground::Box) - 1.0).abs() < 1e-9);
 }
 
 /// a = e^−t, so that of an error in b' = −a²b the share e^(−1/2) stays; where a rests all of it does. What reads a state that
@@ -102,14 +102,16 @@ fn what_decays_in_a_part_of_the_box_is_linearised_where_it_rests() {
 #[test]
 fn a_slope_that_moves_tells_no_rate() {
     let of = |equations: &str, hidden: &'static [&'static str]| {
-        case(equations, hidden, hidden.len()).known().fate("b")
+        case(equations, hidden, hidden.len())
+            .known()
+            .detectability("b")
     };
     let fading = "der(a) = -a; der(b) = -b*a^2; der(c) = -c;";
-    assert_eq!(of(fading, &["b", "c"]), Some(Fate::Stays));
+    assert_eq!(of(fading, &["b", "c"]), Some(Detectability::Stays));
     let growing = "der(a) = 1 + a^2; der(b) = b*a; der(c) = -c;";
-    assert_eq!(of(growing, &["b", "c"]), Some(Fate::Undecided));
+    assert_eq!(of(growing, &["b", "c"]), Some(Detectability::Undecided));
     let behind = "der(a) = 1 + c^2; der(c) = -a*c; der(b) = -b*c + 0.1*b^3;";
-    assert_eq!(of(behind, &["b"]), Some(Fate::Undecided));
+    assert_eq!(of(behind, &["b"]), Some(Detectability::Undecided));
     let steady = "der(a) = 1 + a^2; der(b) = a - b; der(c) = -c;";
     assert!((rate(of(steady, &["b", "c"]), Ground::Box) - 1.0).abs() < 1e-9);
 }
@@ -122,23 +124,23 @@ fn what_an_unknown_input_feeds_does_not_decay() {
         3,
     );
     // |w − w̃| ≤ 3, over the rate 2
-    let Some(Fate::Bounded {
+    let Some(Detectability::Bounded {
         bound,
         is_kept: true,
-    }) = found.fate("b")
+    }) = found.detectability("b")
     else {
-        panic!("{:?}", found.fate("b"))
+        panic!("{:?}", found.detectability("b"))
     };
     assert!((bound - 1.5).abs() < 1e-9, "{bound}");
-    assert_eq!(found.fate("w"), Some(Fate::Moved));
-    assert!((rate(found.fate("c"), Ground::Box) - 1.0).abs() < 1e-9);
+    assert_eq!(found.detectability("w"), Some(Detectability::Moved));
+    assert!((rate(found.detectability("c"), Ground::Box) - 1.0).abs() < 1e-9);
     // integrated, and so without a bound
     let found = case(
         "der(a) = -a; der(b) = w; der(c) = b - c;",
         &["b", "c", "w"],
         3,
     );
-    assert_eq!(found.fate("c"), Some(Fate::Moved));
+    assert_eq!(found.detectability("c"), Some(Detectability::Moved));
 }
 
 /// a' = b − 2c + u leaves b = 2c, and c' = b − 4c = −2c whatever w does to b.
@@ -149,16 +151,18 @@ fn an_unknown_input_that_the_outputs_pin_down_does_not_matter() {
         &["b", "c", "w"],
         1,
     );
-    assert!((rate(found.fate("c"), Ground::Box) - 2.0).abs() < 1e-9);
-    assert!((rate(found.fate("b"), Ground::Box) - 2.0).abs() < 1e-9);
-    assert!((rate(found.fate("w"), Ground::Point) - 2.0).abs() < 1e-9);
+    assert!((rate(found.detectability("c"), Ground::Box) - 2.0).abs() < 1e-9);
+    assert!((rate(found.detectability("b"), Ground::Box) - 2.0).abs() < 1e-9);
+    assert!((rate(found.detectability("w"), Ground::Point) - 2.0).abs() < 1e-9);
     // b = −c/2 now leaves c' = −c/2 + 4c: it grows
     let found = case(
         "der(a) = b + 0.5*c + u; der(b) = w - b; der(c) = b + 4*c;",
         &["b", "c", "w"],
         1,
     );
-    assert!(matches!(found.fate("c"), Some(Fate::Grows { rate }) if (rate - 3.5).abs() < 1e-9));
+    assert!(
+        matches!(found.detectability("c"), Some(Detectability::Grows { rate }) if (rate - 3.5).abs() < 1e-9)
+    );
 }
 
 /// An epidemic: of S and b only b·S is seen, and S' = −b·S·I is the same for all of them.
@@ -169,9 +173,9 @@ fn what_scales_together_stays() {
         &["b", "w", "c"],
         2,
     );
-    assert_eq!(found.fate("b"), Some(Fate::Stays));
-    assert_eq!(found.fate("w"), Some(Fate::Stays));
-    assert!((rate(found.fate("c"), Ground::Box) - 1.0).abs() < 1e-9);
+    assert_eq!(found.detectability("b"), Some(Detectability::Stays));
+    assert_eq!(found.detectability("w"), Some(Detectability::Stays));
+    assert!((rate(found.detectability("c"), Ground::Box) - 1.0).abs() < 1e-9);
 }
 
 /// Two integrators in a row: a double eigenvalue at zero. The error grows with time itself, so that it neither
@@ -184,7 +188,7 @@ fn a_double_integrator_neither_decays_nor_stays() {
         2,
     )
     .known();
-    assert_eq!(found.fate("b"), Some(Fate::Undecided));
+    assert_eq!(found.detectability("b"), Some(Detectability::Undecided));
 }
 
 /// The unknown input stands in the equation of a known state: w = −b there, so that b' = −3b.
@@ -195,15 +199,15 @@ fn an_unknown_input_is_found_where_it_acts_on_something_known() {
         &["b", "w", "c"],
         2,
     );
-    assert!((rate(found.fate("b"), Ground::Box) - 3.0).abs() < 1e-9);
-    assert!((rate(found.fate("w"), Ground::Box) - 3.0).abs() < 1e-9);
+    assert!((rate(found.detectability("b"), Ground::Box) - 3.0).abs() < 1e-9);
+    assert!((rate(found.detectability("w"), Ground::Box) - 3.0).abs() < 1e-9);
 }
 
 #[test]
 fn marginal_and_coupled_modes_are_told_apart() {
     // an oscillator that nothing damps
     let found = case("der(a) = -a; der(b) = c; der(c) = -b;", &["b", "c"], 2).known();
-    assert_eq!(found.fate("b"), Some(Fate::Stays));
+    assert_eq!(found.detectability("b"), Some(Detectability::Stays));
     // damped: eigenvalues −1 ± 2i
     let found = case(
         "der(a) = -a; der(b) = -b + 2*c; der(c) = -2*b - c;",
@@ -211,11 +215,11 @@ fn marginal_and_coupled_modes_are_told_apart() {
         2,
     )
     .known();
-    let proved = rate(found.fate("b"), Ground::Box);
+    let proved = rate(found.detectability("b"), Ground::Box);
     assert!(proved > 0.95 && proved <= 1.0, "{proved}");
     // b + c alone is seen: b − c decays with 1, each of them too
     let found = case("der(a) = b + c; der(b) = -b; der(c) = -c;", &["b", "c"], 1).known();
-    assert!((rate(found.fate("b"), Ground::Box) - 1.0).abs() < 1e-9);
+    assert!((rate(found.detectability("b"), Ground::Box) - 1.0).abs() < 1e-9);
 }
 
 /// A plant whose linearisation hides more than the plant does is not judged there.
@@ -225,7 +229,10 @@ fn a_linearisation_that_hides_something_else_is_no_answer() {
     let mut found = case("der(a) = b^2; der(b) = -b; der(c) = c*c*c - u;", &["c"], 1).known();
     found.text = found.text.replace("b(start = 0.5", "b(start = 0");
     // judged where b shows, and c³ = u
-    assert!(matches!(found.fate("c"), Some(Fate::Grows { .. })));
+    assert!(matches!(
+        found.detectability("c"),
+        Some(Detectability::Grows { .. })
+    ));
 }
 
 /// Of b·c only the product shows; frozen at a point both do, as they move at rates of their own, and there is
@@ -240,16 +247,19 @@ fn what_a_frozen_point_sees_is_told_of_no_point() {
         )
     };
     // b and 1/c scale together, so that an error in b grows as b does
-    let is_right = |fate| match fate {
-        Some(Fate::Grows { rate }) => (rate - 0.1_f64).abs() < 1e-9,
-        fate => matches!(fate, Some(Fate::Undecided | Fate::Moved)),
+    let is_right = |detectability| match detectability {
+        Some(Detectability::Grows { rate }) => (rate - 0.1_f64).abs() < 1e-9,
+        detectability => matches!(
+            detectability,
+            Some(Detectability::Undecided | Detectability::Moved)
+        ),
     };
     for name in ["b", "w"] {
-        assert!(is_right(product().fate(name)), "{name}");
+        assert!(is_right(product().detectability(name)), "{name}");
     }
-    assert!(is_right(product().known().fate("b")));
+    assert!(is_right(product().known().detectability("b")));
     // c alone is proved to decay
-    assert!((rate(product().known().fate("c"), Ground::Box) - 2.0).abs() < 1e-9);
+    assert!((rate(product().known().detectability("c"), Ground::Box) - 2.0).abs() < 1e-9);
 }
 
 /// b follows from a', and b' is all that shows of two unknown inputs: one moves with the other. The states that
@@ -263,9 +273,13 @@ fn two_unknown_inputs_in_one_equation_move_each_other() {
     );
     found.unknown.push("u".to_owned());
     for name in ["u", "w"] {
-        assert_eq!(found.fate(name), Some(Fate::Moved), "{name}");
+        assert_eq!(
+            found.detectability(name),
+            Some(Detectability::Moved),
+            "{name}"
+        );
     }
-    assert!((rate(found.fate("c"), Ground::Box) - 1.0).abs() < 1e-9);
+    assert!((rate(found.detectability("c"), Ground::Box) - 1.0).abs() < 1e-9);
     // nor rounding make the search for them endless
     let alone = Case {
         text: "model M input Real w0(start=1,min=-2,max=2); input Real w1(start=0.5,min=-2,max=2);
@@ -276,28 +290,28 @@ fn two_unknown_inputs_in_one_equation_move_each_other() {
         directions: 1,
         unknown: vec!["w0".to_owned(), "w1".to_owned()],
     };
-    assert_eq!(alone.fate("w0"), Some(Fate::Moved));
+    assert_eq!(alone.detectability("w0"), Some(Detectability::Moved));
 }
 
 /// Beside a rate of 10⁶ one of 1 is no rounding: ∂(c + 0.3c²)/∂c at c = 0.
 #[test]
 fn a_slow_mode_beside_a_fast_one_is_no_rounding() {
     let hidden = &["b", "c"];
-    let of = |equations: &str, name: &str| case(equations, hidden, 2).known().fate(name);
+    let of = |equations: &str, name: &str| case(equations, hidden, 2).known().detectability(name);
     for name in ["b", "c"] {
         let growing = "der(a) = -a; der(b) = -1e6*b + c; der(c) = c + 0.3*c^2 + b;";
-        let fate = of(growing, name);
+        let detectability = of(growing, name);
         assert!(
-            matches!(fate, Some(Fate::Grows { rate }) if (rate - 1.000001).abs() < 1e-6),
-            "{name}: {fate:?}"
+            matches!(detectability, Some(Detectability::Grows { rate }) if (rate - 1.000001).abs() < 1e-6),
+            "{name}: {detectability:?}"
         );
         let decaying =
             "der(a) = -a; der(b) = -1e6*b + c; der(c) = -c + 0.3*c^2 - 3*c^3 + b + 1.5*c*b;";
-        let fate = of(decaying, name);
+        let detectability = of(decaying, name);
         let at_the_point = |rate: f64| (rate - 1.0).abs() < 1e-5;
         assert!(
-            matches!(fate, Some(Fate::Decays { rate, .. }) if at_the_point(rate)),
-            "{name}: {fate:?}"
+            matches!(detectability, Some(Detectability::Decays { rate, .. }) if at_the_point(rate)),
+            "{name}: {detectability:?}"
         );
     }
     // hardly damped: a slope of −0.025 at b = 0, half of it in the real part, beside 10⁴ turns
@@ -306,7 +320,10 @@ fn a_slow_mode_beside_a_fast_one_is_no_rounding() {
     // a coupling of 10⁻⁹ beside the rate still carries what grows
     let weak = of("der(a) = -a; der(b) = -1e6*b + 1e-3*c; der(c) = c;", "b");
     assert!(
-        !matches!(weak, Some(Fate::Decays { .. } | Fate::Stays)),
+        !matches!(
+            weak,
+            Some(Detectability::Decays { .. } | Detectability::Stays)
+        ),
         "{weak:?}"
     );
 }
@@ -314,28 +331,29 @@ fn a_slow_mode_beside_a_fast_one_is_no_rounding() {
 /// Of an error in b' = −b·e^−t the share e^−1 stays for ever.
 #[test]
 fn what_reads_the_time_is_not_told_of_one_instant() {
-    let of = |equations: &str, name: &str| case(equations, &["b", "c"], 2).known().fates(name);
+    let of =
+        |equations: &str, name: &str| case(equations, &["b", "c"], 2).known().hidden_errors(name);
     let fading = "der(a) = -a; der(b) = -b*exp(-time); der(c) = -c + c^3;";
-    assert_eq!(of(fading, "b").1, Some(Fate::Undecided));
+    assert_eq!(of(fading, "b").1, Some(Detectability::Undecided));
     // beside it
-    let (point, fate) = of(fading, "c");
-    assert!((rate(fate, Ground::Point) - 1.0).abs() < 1e-9);
+    let (point, detectability) = of(fading, "c");
+    assert!((rate(detectability, Ground::Point) - 1.0).abs() < 1e-9);
     assert_eq!(point[0], "time", "{point:?}");
     // behind it
     let behind = "der(a) = -a; der(b) = -b/(1 + time); der(c) = -c + c^3 + b;";
-    assert_eq!(of(behind, "c").1, Some(Fate::Undecided));
+    assert_eq!(of(behind, "c").1, Some(Detectability::Undecided));
     // coupled by what is seen, in an equation or in an output
     let seen = "der(a) = b + c; der(b) = -b*exp(-time) - b^3; der(c) = -c + c^3;";
     let mut sum = case(seen, &["b", "c"], 1).known();
-    assert_eq!(sum.fate("c"), Some(Fate::Undecided));
+    assert_eq!(sum.detectability("c"), Some(Detectability::Undecided));
     sum.text = sum.text.replace("y = a;", "y = a; output Real z = b + c;");
-    assert_eq!(sum.fate("c"), Some(Fate::Undecided));
+    assert_eq!(sum.detectability("c"), Some(Detectability::Undecided));
     // proved for every instant
     let proved = "der(a) = -a; der(b) = -b*(2 + sin(time)); der(c) = -c + c^3;";
     assert!((rate(of(proved, "b").1, Ground::Box) - 1.0).abs() < 1e-9);
     // what time moves never rests
     let moved = "der(a) = -a; der(b) = -b^3; der(c) = -c + c^3 + sin(time);";
-    assert_eq!(of(moved, "c").1, Some(Fate::Undecided));
+    assert_eq!(of(moved, "c").1, Some(Detectability::Undecided));
 }
 
 /// However weakly it reads them, what reads what grows, or an unknown input, is not said to decay; nor is what a
@@ -348,18 +366,21 @@ fn small_couplings_and_slow_modes_are_not_rounded_away() {
         2,
     )
     .known();
-    assert_eq!(behind.fate("b"), Some(Fate::Undecided));
+    assert_eq!(behind.detectability("b"), Some(Detectability::Undecided));
     let driven = case(
         "der(a) = -a; der(b) = -b/3600 + w/1e9; der(c) = -c;",
         &["b", "c", "w"],
         3,
     );
-    let fate = driven.fate("b");
-    assert!(!matches!(fate, Some(Fate::Decays { .. })), "{fate:?}");
+    let detectability = driven.detectability("b");
+    assert!(
+        !matches!(detectability, Some(Detectability::Decays { .. })),
+        "{detectability:?}"
+    );
     for rate in ["1e-3", "-1e-3"] {
         let slow = format!("der(a) = -1e12*a; der(b) = {rate}*b + 0.001*b^3; der(c) = -c;");
         let slow = case(&slow, &["b", "c"], 2);
-        let fate = slow.known().fate("b");
-        assert_ne!(fate, Some(Fate::Stays), "{rate}");
+        let detectability = slow.known().detectability("b");
+        assert_ne!(detectability, Some(Detectability::Stays), "{rate}");
     }
 }

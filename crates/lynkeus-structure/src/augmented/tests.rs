@@ -21,31 +21,31 @@ fn unknown_inputs_become_states_and_disturbances_vanish() {
         unknown: vec!["v".into()],
         disturbances: vec!["e".into()],
     };
-    let extended = Extended::new(&plant, &sensors).unwrap();
-    let names: Vec<_> = extended.states.iter().map(|s| s.name.as_str()).collect();
+    let augmented = AugmentedPlant::new(&plant, &sensors).unwrap();
+    let names: Vec<_> = augmented.states.iter().map(|s| s.name.as_str()).collect();
     assert_eq!(names, ["a", "b", "v"]);
-    assert_eq!(extended.pattern, [vec![1, 2], vec![0], vec![]]);
-    assert_eq!(extended.inputs.len(), 1);
-    let (state, slope, _) = extended.outputs[0].state.unwrap();
+    assert_eq!(augmented.pattern, [vec![1, 2], vec![0], vec![]]);
+    assert_eq!(augmented.inputs.len(), 1);
+    let (state, slope, _) = augmented.outputs[0].state.unwrap();
     assert_eq!((state, plant.graph.constant_value(slope)), (0, Some(2.0)));
 }
 
 #[test]
 fn a_product_of_states_is_no_affine_output() {
     let plant = plant();
-    let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-    assert!(extended.outputs[1].state.is_none());
+    let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
+    assert!(augmented.outputs[1].state.is_none());
 }
 
 #[test]
 fn time_is_a_side_of_the_box() {
     let plant = plant();
-    let mut extended = Extended::new(&plant, &Sensors::default()).unwrap();
-    extended.narrow("time", 0.0, 10.0).unwrap();
-    let region = extended.region();
+    let mut augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
+    augmented.narrow("time", 0.0, 10.0).unwrap();
+    let region = augmented.region();
     let time = region.dimensions.iter().find(|d| d.symbol == plant.time);
     assert_eq!(time.map(|d| (d.min, d.max)), Some((0.0, 10.0)));
-    let outside = extended.narrow("time", 11.0, 12.0);
+    let outside = augmented.narrow("time", 11.0, 12.0);
     assert!(matches!(outside, Err(NarrowError::Outside { .. })));
 }
 
@@ -56,7 +56,9 @@ fn wrong_names_are_told_with_the_right_ones() {
         measured: vec!["level".into()],
         ..Sensors::default()
     };
-    let text = Extended::new(&plant, &sensors).unwrap_err().to_string();
+    let text = AugmentedPlant::new(&plant, &sensors)
+        .unwrap_err()
+        .to_string();
     assert!(
         text.contains("no output named 'level'") && text.contains("y, z"),
         "{text}"
@@ -67,7 +69,7 @@ fn wrong_names_are_told_with_the_right_ones() {
         ..Sensors::default()
     };
     assert!(matches!(
-        Extended::new(&plant, &twice),
+        AugmentedPlant::new(&plant, &twice),
         Err(SensorsError::Twice { .. })
     ));
 }

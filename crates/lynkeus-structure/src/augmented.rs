@@ -96,7 +96,7 @@ fn list(names: &[String]) -> String {
 pub struct Measurement {
     /// the output's declaration; its node is h(t, x, u)
     pub variable: Variable,
-    /// index of the extended state it is an affine function of, if it is one:
+    /// index of the augmented state it is an affine function of, if it is one:
     /// y = slope·x + offset
     pub state: Option<(usize, Node, Node)>,
 }
@@ -106,7 +106,7 @@ pub struct Measurement {
 /// the feed composition in Hammouri, Targui and Armanet, section 3), and with
 /// its disturbances set to zero.
 #[derive(Clone, Debug)]
-pub struct Extended<'p> {
+pub struct AugmentedPlant<'p> {
     /// the plant
     pub plant: &'p Plant,
     /// states, then unknown inputs
@@ -119,13 +119,13 @@ pub struct Extended<'p> {
     pub input_derivatives: Vec<Vec<f64>>,
     /// measured outputs, in the order of the study
     pub outputs: Vec<Measurement>,
-    /// row by row which extended states the derivative depends on
+    /// row by row which augmented states the derivative depends on
     pub pattern: Vec<Vec<usize>>,
     /// the side of time in the box; the whole line unless narrowed
     pub time: Dimension,
 }
 
-impl<'p> Extended<'p> {
+impl<'p> AugmentedPlant<'p> {
     /// Applies the sensors to the plant.
     ///
     /// # Errors
@@ -228,12 +228,12 @@ impl<'p> Extended<'p> {
         self.plant.states.len()
     }
 
-    /// Symbols of the extended states.
+    /// Symbols of the augmented states.
     pub fn symbols(&self) -> Vec<Node> {
         self.states.iter().map(|s| s.node).collect()
     }
 
-    /// Index of the extended state of that name.
+    /// Index of the augmented state of that name.
     pub fn state_index(&self, name: &str) -> Option<usize> {
         self.states.iter().position(|s| s.name == name)
     }

@@ -11,10 +11,10 @@ use lynkeus_expr::{Evaluator, MissingInput, Node, Tape, jacobian};
 use lynkeus_proof::spectrum;
 use nalgebra::{DMatrix, DVector};
 
-use crate::fate::exact::{self, Shows};
-use crate::fate::hidden::{Fate, Fates, Hidden, Told};
-use crate::fate::modes::{Modes, image, null_space, reached};
-use crate::{Dimension, Extended, Region};
+use crate::detectability::exact::{self, Shows};
+use crate::detectability::hidden::{Detectability, Hidden, HiddenErrors, Told};
+use crate::detectability::modes::{Modes, image, null_space, reached};
+use crate::{AugmentedPlant, Dimension, Region};
 
 /// States beyond which no modes are looked for.
 const STATES: usize = 60;
@@ -23,25 +23,25 @@ const ZERO: f64 = 1e-8;
 
 /// At the first of a few points whose linearisation hides exactly what is hidden, those at which nothing moves that it
 /// reads before the others; none where there is no such point. Of what reads something that moves on no rate is told.
-pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Fates>, MissingInput> {
-    let extended = hidden.extended;
-    if extended.states.len() > STATES {
+pub(super) fn hidden_errors(hidden: &Hidden<'_, '_>) -> Result<Option<HiddenErrors>, MissingInput> {
+    let augmented = hidden.augmented;
+    if augmented.states.len() > STATES {
         return Ok(None);
     }
-    let region = extended.region();
-    let symbols: Vec<Node> = extended.states.iter().map(|s| s.node).collect();
-    let outputs = extended.outputs.iter().map(|o| o.variable.node);
-    let functions: Vec<Node> = extended
+    let region = augmented.region();
+    let symbols: Vec<Node> = augmented.states.iter().map(|s| s.node).collect();
+    let outputs = augmented.outputs.iter().map(|o| o.variable.node);
+    let functions: Vec<Node> = augmented
         .derivatives
         .iter()
         .copied()
         .chain(outputs)
         .collect();
-    let slopes = jacobian::forward(extended.graph(), &functions, &symbols);
+    let slopes = jacobian::forward(augmented.graph(), &functions, &symbols);
     let nodes: Vec<Node> = slopes.entries.iter().map(|e| e.2).collect();
-    let tape = Tape::new(extended.graph(), &region.symbols(), &nodes)?;
+    let tape = Tape::new(augmented.graph(), &region.symbols(), &nodes)?;
     let mut evaluator = tape.evaluator();
-    let clock = HashSet::from([extended.plant.time]);
+    let clock = HashSet::from([augmented.plant.time]);
     let timed = moved(hidden, &slopes, &clock);
     let is_asked = |i: usize| hidden.told[i] == Told::Hidden;
     if (0..timed.len()).all(|i| timed[i] || !is_asked(i)) {
@@ -60,7 +60,7 @@ pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Fates>, MissingInp
         let found = J
             .iter()
             .all(|x| x.is_finite())
-            .then(|| Linear::new(hidden, &J).fates(hidden));
+            .then(|| Linear::new(hidden, &J).hidden_errors(hidden));
         if let Some(found) = found.flatten() {
             let states = (0..symbols.len()).filter(|&i| !hidden.is_signal(i)).count();
             let exact = exact::shows(&J, states);
@@ -71,26 +71,32 @@ pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Fates>, MissingInp
                     .map(|((_, shown), exact)| *shown == exact)
                     .collect()
             });
-            let mut of: Vec<Fate> = found.into_iter().map(|(fate, _)| fate).collect();
-            for (fate, _) in of.iter_mut().zip(&timed).filter(|(_, timed)| **timed) {
-                *fate = Fate::Undecided;
+            let mut of: Vec<Detectability> = found
+                .into_iter()
+                .map(|(detectability, _)| detectability)
+                .collect();
+            for (detectability, _) in of.iter_mut().zip(&timed).filter(|(_, timed)| **timed) {
+                *detectability = Detectability::Undecided;
             }
             weaken(hidden, &slopes, &sure, &mut of);
             let moved = moved(hidden, &slopes, &rest.moving(&point));
-            for (fate, _) in of.iter_mut().zip(moved).filter(|(_, moved)| *moved) {
-                if matches!(fate, Fate::Decays { .. } | Fate::Grows { .. }) {
-                    *fate = Fate::Undecided;
+            for (detectability, _) in of.iter_mut().zip(moved).filter(|(_, moved)| *moved) {
+                if matches!(
+                    detectability,
+                    Detectability::Decays { .. } | Detectability::Grows { .. }
+                ) {
+                    *detectability = Detectability::Undecided;
                 }
             }
             let sides = || region.dimensions.iter().zip(&point);
-            let is_time = |d: &Dimension| d.symbol == extended.plant.time;
-            let is_read = is_read(extended, &nodes);
+            let is_time = |d: &Dimension| d.symbol == augmented.plant.time;
+            let is_read = is_read(augmented, &nodes);
             // first, as long points are told in part
             let time = sides().filter(|(d, _)| is_read && is_time(d));
             let named = time.chain(sides().filter(|(d, _)| !is_time(d)));
             let point = named.map(|(d, &x)| (d.name.clone(), x).into()).collect();
             let of = of.into_iter().map(Some).collect();
-            return Ok(Some(Fates { of, point }));
+            return Ok(Some(HiddenErrors { of, point }));
         }
     }
     Ok(None)
@@ -98,9 +104,9 @@ pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Fates>, MissingInp
 
 /// The start, then points inside the ranges.
 fn points(hidden: &Hidden<'_, '_>, region: &Region) -> Vec<Vec<f64>> {
-    let extended = hidden.extended;
+    let augmented = hidden.augmented;
     let start = |symbol: Node| {
-        let mut variables = extended.states.iter().chain(&extended.inputs);
+        let mut variables = augmented.states.iter().chain(&augmented.inputs);
         variables.find(|v| v.node == symbol).and_then(|v| v.start)
     };
     let of_share = |share: f64, starts: bool| -> Vec<f64> {
@@ -143,7 +149,7 @@ struct Traceless {
 
 impl Linear {
     fn new(hidden: &Hidden<'_, '_>, J: &DMatrix<f64>) -> Self {
-        let states = &hidden.extended.states;
+        let states = &hidden.augmented.states;
         let signals = (0..states.len()).filter(|&i| hidden.is_signal(i)).count();
         let n = states.len() - signals;
         let scale = |i: usize| {
@@ -196,8 +202,8 @@ impl Linear {
         }
     }
 
-    /// The fates, with what they rest on, where the linearisation hides what is hidden and nothing else.
-    fn fates(&self, hidden: &Hidden<'_, '_>) -> Option<Vec<(Fate, Shows)>> {
+    /// The hidden_errors, with what they rest on, where the linearisation hides what is hidden and nothing else.
+    fn hidden_errors(&self, hidden: &Hidden<'_, '_>) -> Option<Vec<(Detectability, Shows)>> {
         let Traceless { pairs, V } = self.traceless()?;
         let n = self.F.nrows();
         if pairs.ncols() == 0 {
@@ -224,17 +230,17 @@ impl Linear {
                 false => (K.row(i - n).into_owned(), free.row(i - n).amax()),
             };
             if alone > ZERO || (&row * &R).amax() > ZERO {
-                return Some((Fate::Moved, Shows::Moved));
+                return Some((Detectability::Moved, Shows::Moved));
             }
             let row = &row * &S;
             if row.norm() <= ZERO {
-                return Some((Fate::Undecided, Shows::Nothing));
+                return Some((Detectability::Undecided, Shows::Nothing));
             }
             let row = DMatrix::from_fn(1, row.ncols(), |_, j| row[j]);
-            let (fate, count) = modes.fate(&row)?;
-            Some((fate, Shows::Modes(count)))
+            let (detectability, count) = modes.detectability(&row)?;
+            Some((detectability, Shows::Modes(count)))
         });
-        let of: Vec<(Fate, Shows)> = of.collect::<Option<_>>()?;
+        let of: Vec<(Detectability, Shows)> = of.collect::<Option<_>>()?;
         let agrees = of
             .iter()
             .zip(&hidden.told)
@@ -292,14 +298,14 @@ pub(super) struct Rest {
 }
 
 impl Rest {
-    /// `slopes` are those of the equations, then the outputs, by the extended states.
+    /// `slopes` are those of the equations, then the outputs, by the augmented states.
     pub fn new(
         hidden: &Hidden<'_, '_>,
         slopes: &jacobian::Jacobian,
         region: &Region,
     ) -> Result<Self, MissingInput> {
-        let extended = hidden.extended;
-        let graph = extended.graph();
+        let augmented = hidden.augmented;
+        let graph = augmented.graph();
         let is_free = |entry: &&(usize, usize, Node)| hidden.told[entry.1] != Told::Determined;
         let entries = slopes.entries.iter().filter(is_free);
         let mut open: Vec<Node> = entries.map(|entry| entry.2).collect();
@@ -307,21 +313,21 @@ impl Rest {
         loop {
             let read: HashSet<Node> = graph.symbols_of(&open).into_iter().collect();
             let is_new = |place: &usize| {
-                read.contains(&extended.states[*place].node) && !found.contains(place)
+                read.contains(&augmented.states[*place].node) && !found.contains(place)
             };
-            let new: Vec<usize> = (0..extended.plant_states()).filter(is_new).collect();
+            let new: Vec<usize> = (0..augmented.plant_states()).filter(is_new).collect();
             if new.is_empty() {
                 break;
             }
-            open.extend(new.iter().map(|&place| extended.derivatives[place]));
+            open.extend(new.iter().map(|&place| augmented.derivatives[place]));
             found.extend(new);
         }
-        let states: Vec<Node> = found.iter().map(|&i| extended.states[i].node).collect();
-        let mut nodes: Vec<Node> = found.iter().map(|&i| extended.derivatives[i]).collect();
+        let states: Vec<Node> = found.iter().map(|&i| augmented.states[i].node).collect();
+        let mut nodes: Vec<Node> = found.iter().map(|&i| augmented.derivatives[i]).collect();
         let reads: Vec<Vec<Node>> = nodes.iter().map(|f| graph.symbols_of(&[*f])).collect();
-        let signals = (0..extended.states.len()).filter(|&i| hidden.is_signal(i));
+        let signals = (0..augmented.states.len()).filter(|&i| hidden.is_signal(i));
         let free: Vec<usize> = found.iter().copied().chain(signals).collect();
-        let unknowns: Vec<Node> = free.iter().map(|&i| extended.states[i].node).collect();
+        let unknowns: Vec<Node> = free.iter().map(|&i| augmented.states[i].node).collect();
         let own = jacobian::forward(graph, &nodes, &unknowns);
         let zero = graph.constant(0.0).node();
         for i in 0..states.len() {
@@ -331,11 +337,11 @@ impl Rest {
         let place = |unknown: &Node| symbols.iter().position(|symbol| symbol == unknown);
         let sides = free
             .iter()
-            .map(|&i| (extended.states[i].min, extended.states[i].max));
+            .map(|&i| (augmented.states[i].min, augmented.states[i].max));
         Ok(Self {
             places: unknowns.iter().filter_map(place).collect(),
             sides: sides.collect(),
-            driven: behind(&states, &reads, HashSet::from([extended.plant.time])),
+            driven: behind(&states, &reads, HashSet::from([augmented.plant.time])),
             evaluator: Tape::new(graph, &symbols, &nodes)?.evaluator(),
             states,
             reads,
@@ -429,19 +435,19 @@ fn behind(states: &[Node], reads: &[Vec<Node>], mut found: HashSet<Node>) -> Has
 }
 
 /// Whether one of these expressions reads the time.
-pub(super) fn is_read(extended: &Extended<'_>, nodes: &[Node]) -> bool {
-    let symbols = extended.graph().symbols_of(nodes);
-    symbols.contains(&extended.plant.time)
+pub(super) fn is_read(augmented: &AugmentedPlant<'_>, nodes: &[Node]) -> bool {
+    let symbols = augmented.graph().symbols_of(nodes);
+    symbols.contains(&augmented.plant.time)
 }
 
-/// Per extended state whether the error in it, if it is hidden, obeys an equation that reads one of these
-/// symbols. `slopes` are those of the equations, then the outputs, by the extended states.
+/// Per augmented state whether the error in it, if it is hidden, obeys an equation that reads one of these
+/// symbols. `slopes` are those of the equations, then the outputs, by the augmented states.
 pub(super) fn moved(
     hidden: &Hidden<'_, '_>,
     slopes: &jacobian::Jacobian,
     moving: &HashSet<Node>,
 ) -> Vec<bool> {
-    let graph = hidden.extended.graph();
+    let graph = hidden.augmented.graph();
     let reads = |slope: Node| {
         graph
             .symbols_of(&[slope])
@@ -472,12 +478,12 @@ pub(super) fn moved(
 }
 
 /// Undecides what decays or stays, but reads what does not. `slopes` are those of the equations by the
-/// extended states; that the outputs may cancel what is read is not looked for. What is `sure` rests on no threshold.
+/// augmented states; that the outputs may cancel what is read is not looked for. What is `sure` rests on no threshold.
 pub(super) fn weaken(
     hidden: &Hidden<'_, '_>,
     slopes: &jacobian::Jacobian,
     sure: &[bool],
-    of: &mut [Fate],
+    of: &mut [Detectability],
 ) {
     let count = hidden.told.len();
     let is_free = |i: usize| i < count && hidden.told[i] != Told::Determined;
@@ -487,12 +493,14 @@ pub(super) fn weaken(
     let couplings: Vec<(usize, usize)> = couplings.map(|(i, j, _)| (*i, *j)).collect();
     loop {
         let doubted = couplings.iter().find(|(i, j)| match of[*i] {
-            Fate::Decays { .. } => !matches!(of[*j], Fate::Decays { .. }),
-            Fate::Stays => !matches!(of[*j], Fate::Decays { .. } | Fate::Stays),
+            Detectability::Decays { .. } => !matches!(of[*j], Detectability::Decays { .. }),
+            Detectability::Stays => {
+                !matches!(of[*j], Detectability::Decays { .. } | Detectability::Stays)
+            }
             _ => false,
         });
         match doubted {
-            Some((i, _)) => of[*i] = Fate::Undecided,
+            Some((i, _)) => of[*i] = Detectability::Undecided,
             None => return,
         }
     }

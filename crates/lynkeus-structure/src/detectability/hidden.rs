@@ -1,8 +1,8 @@
 //! What is asked of quantities that the outputs do not determine, and what may become of their errors.
 
-use crate::{Coordinate, Extended};
+use crate::{AugmentedPlant, Coordinate};
 
-/// What is known of an extended state.
+/// What is known of an augmented state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Told {
     /// the outputs determine it
@@ -17,8 +17,8 @@ pub enum Told {
 #[derive(Clone, Debug)]
 pub struct Hidden<'e, 'p> {
     /// the plant
-    pub extended: &'e Extended<'p>,
-    /// per extended state
+    pub augmented: &'e AugmentedPlant<'p>,
+    /// per augmented state
     pub told: Vec<Told>,
     /// unknown inputs are any functions of time; else they do not move
     pub arbitrary: bool,
@@ -37,7 +37,7 @@ pub enum Ground {
 
 /// What becomes of the error of a hidden quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Fate {
+pub enum Detectability {
     /// it decays at least like e^(−rate·t)
     Decays {
         /// in 1/(unit of time)
@@ -66,11 +66,11 @@ pub enum Fate {
     Undecided,
 }
 
-/// The fates of hidden quantities.
+/// The hidden_errors of hidden quantities.
 #[derive(Clone, Debug)]
-pub struct Fates {
-    /// per extended state; none where it is not hidden
-    pub of: Vec<Option<Fate>>,
+pub struct HiddenErrors {
+    /// per augmented state; none where it is not hidden
+    pub of: Vec<Option<Detectability>>,
     /// where it was linearised; empty where it was not
     pub point: Vec<Coordinate>,
 }
@@ -85,6 +85,6 @@ impl Hidden<'_, '_> {
 
     /// Whether it is an unknown input without an equation.
     pub(super) fn is_signal(&self, place: usize) -> bool {
-        self.arbitrary && place >= self.extended.plant_states()
+        self.arbitrary && place >= self.augmented.plant_states()
     }
 }

@@ -6,7 +6,7 @@
 use lynkeus_expr::modular::{Echelon, Modular};
 use nalgebra::DMatrix;
 
-/// What an extended state shows of what can move without a trace.
+/// What an augmented state shows of what can move without a trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shows {
     /// nothing

@@ -20,37 +20,41 @@ mod on_the_box;
 
 use lynkeus_expr::MissingInput;
 
-pub use hidden::{Fate, Fates, Ground, Hidden, Told};
+pub use hidden::{Detectability, Ground, Hidden, HiddenErrors, Told};
 
 impl Hidden<'_, '_> {
     /// Decides what becomes of the errors.
     ///
     /// # Errors
     /// [`MissingInput`] where the plant has parameters without value.
-    pub fn fates(&self) -> Result<Fates, MissingInput> {
-        let proved = on_the_box::fates(self)?;
+    pub fn hidden_errors(&self) -> Result<HiddenErrors, MissingInput> {
+        let proved = on_the_box::hidden_errors(self)?;
         let is_open = |i: usize| {
-            let decays = matches!(proved[i], Some(Fate::Decays { .. }));
+            let decays = matches!(proved[i], Some(Detectability::Decays { .. }));
             self.told[i] == Told::Hidden && !decays
         };
         let local = match (0..self.told.len()).any(is_open) {
-            true => at_a_point::fates(self)?,
+            true => at_a_point::hidden_errors(self)?,
             false => None,
         };
         let of = (0..self.told.len()).map(|i| {
             let there = local.as_ref().and_then(|local| local.of[i]);
-            let fate = match (proved[i], there) {
+            let detectability = match (proved[i], there) {
                 // a bound says little where the error vanishes near some point
-                (Some(Fate::Bounded { .. }), Some(Fate::Decays { .. })) | (None, Some(_)) => there,
-                (Some(Fate::Bounded { bound, .. }), there) => Some(Fate::Bounded {
-                    bound,
-                    is_kept: there == Some(Fate::Moved),
-                }),
+                (Some(Detectability::Bounded { .. }), Some(Detectability::Decays { .. }))
+                | (None, Some(_)) => there,
+                (Some(Detectability::Bounded { bound, .. }), there) => {
+                    Some(Detectability::Bounded {
+                        bound,
+                        is_kept: there == Some(Detectability::Moved),
+                    })
+                }
                 (proved, _) => proved,
             };
-            (self.told[i] == Told::Hidden).then(|| fate.unwrap_or(Fate::Undecided))
+            (self.told[i] == Told::Hidden)
+                .then(|| detectability.unwrap_or(Detectability::Undecided))
         });
-        Ok(Fates {
+        Ok(HiddenErrors {
             of: of.collect(),
             point: local.map_or(vec![], |local| local.point),
         })

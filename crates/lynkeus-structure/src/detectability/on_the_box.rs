@@ -5,7 +5,7 @@ use lynkeus_proof::decay::{ErrorModel, Sector, fastest};
 use lynkeus_proof::spectrum;
 use nalgebra::DMatrix;
 
-use crate::fate::hidden::{Fate, Ground, Hidden, Told};
+use crate::detectability::hidden::{Detectability, Ground, Hidden, Told};
 use crate::{Region, Verdict, range_within};
 
 /// States that are hidden together, beyond which no proof is tried.
@@ -15,24 +15,26 @@ const COUPLED: usize = 8;
 /// Of several blocks in a row any rate below the least is proved; this share of it is told.
 const BELOW: f64 = 0.99;
 
-/// Per extended state what is proved, if anything is.
-pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Vec<Option<Fate>>, MissingInput> {
-    let extended = hidden.extended;
+/// Per augmented state what is proved, if anything is.
+pub(super) fn hidden_errors(
+    hidden: &Hidden<'_, '_>,
+) -> Result<Vec<Option<Detectability>>, MissingInput> {
+    let augmented = hidden.augmented;
     let mut found = vec![None; hidden.told.len()];
     let (states, inputs) = hidden.free();
-    let region = extended.region();
+    let region = augmented.region();
     if states.is_empty()
         || states.len() > STATES
-        || extended.regularity(&region)?.verdict != Verdict::Proved
+        || augmented.regularity(&region)?.verdict != Verdict::Proved
     {
         return Ok(found);
     }
-    let width = |i: &usize| extended.states[*i].max - extended.states[*i].min;
+    let width = |i: &usize| augmented.states[*i].max - augmented.states[*i].min;
     let cascade = Cascade {
         system: enclosed(hidden)?.reduced(),
         scales: states.iter().map(width).collect(),
         reach: inputs.iter().map(width).collect(),
-        budget: extended.graph().budget(),
+        budget: augmented.graph().budget(),
     };
     let rates = cascade.rates();
     let of_row = |row: &Row| {
@@ -43,13 +45,13 @@ pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Vec<Option<Fate>>, Missin
         let read = (0..row.a.len()).filter(|&s| !is_zero(&row.a[s]));
         let rate = read.map(|s| rates[s]).collect::<Option<Vec<f64>>>()?;
         let rate = rate.into_iter().fold(f64::INFINITY, f64::min);
-        (finite && rate.is_finite() && row.is_free_of_inputs()).then_some(Fate::Decays {
+        (finite && rate.is_finite() && row.is_free_of_inputs()).then_some(Detectability::Decays {
             rate,
             ground: Ground::Box,
         })
     };
     for (s, &place) in states.iter().enumerate() {
-        let own = rates[s].map(|rate| Fate::Decays {
+        let own = rates[s].map(|rate| Detectability::Decays {
             rate,
             ground: Ground::Box,
         });
@@ -146,7 +148,7 @@ impl Cascade {
     }
 
     /// |δη| ≤ Σ |B|·width/rate in the end, for one state that unknown inputs drive.
-    fn bounded(&self, s: usize, rates: &[Option<f64>]) -> Option<Fate> {
+    fn bounded(&self, s: usize, rates: &[Option<f64>]) -> Option<Detectability> {
         let row = self.row(s)?;
         let rate = self.decay(&[s], &[row])?;
         let others = (0..row.a.len()).filter(|&q| q != s && self.reads(s, q));
@@ -161,7 +163,7 @@ impl Cascade {
         let bound = (sum / Interval::point(rate)).hi();
         // the range itself is a bound
         let tells = bound < self.scales[s] && sum.is_defined();
-        tells.then_some(Fate::Bounded {
+        tells.then_some(Detectability::Bounded {
             bound,
             is_kept: false,
         })
@@ -197,23 +199,23 @@ const CELLS: usize = 400;
 /// Encloses the differences of any two solutions in the box: slopes averaged along the line
 /// between two points lie in the range of the slopes.
 pub(super) fn enclosed(hidden: &Hidden<'_, '_>) -> Result<System, MissingInput> {
-    let extended = hidden.extended;
-    let region = extended.region();
+    let augmented = hidden.augmented;
+    let region = augmented.region();
     let (states, inputs) = hidden.free();
-    let equation = |&i: &usize| extended.derivatives[i];
+    let equation = |&i: &usize| augmented.derivatives[i];
     let told = (0..hidden.told.len())
         .filter(|&i| hidden.told[i] == Told::Determined && !hidden.is_signal(i));
     let told: Vec<usize> = told.collect();
-    let outputs = extended.outputs.iter().map(|o| o.variable.node);
+    let outputs = augmented.outputs.iter().map(|o| o.variable.node);
     let functions: Vec<Node> = states
         .iter()
         .map(equation)
         .chain(told.iter().map(equation))
         .chain(outputs)
         .collect();
-    let symbol = |&i: &usize| extended.states[i].node;
+    let symbol = |&i: &usize| augmented.states[i].node;
     let symbols: Vec<Node> = states.iter().chain(&inputs).map(symbol).collect();
-    let slopes = jacobian::forward(extended.graph(), &functions, &symbols);
+    let slopes = jacobian::forward(augmented.graph(), &functions, &symbols);
     let mut rows = vec![];
     for i in 0..functions.len() {
         let mut all = vec![Interval::ZERO; symbols.len()];
@@ -238,7 +240,7 @@ fn enclosure(
     node: Node,
     region: &Region,
 ) -> Result<Interval, MissingInput> {
-    Ok(range_within(hidden.extended.graph(), node, region, CELLS)?.enclosure)
+    Ok(range_within(hidden.augmented.graph(), node, region, CELLS)?.enclosure)
 }
 
 /// a·δη + b·δv with coefficients that enclose those between any two points of the box.

@@ -3,7 +3,7 @@
 use lynkeus_proof::spectrum;
 use nalgebra::{Complex, DMatrix, DVector};
 
-use crate::fate::hidden::{Fate, Ground};
+use crate::detectability::hidden::{Detectability, Ground};
 
 /// What counts as zero beside one.
 const ZERO: f64 = 1e-8;
@@ -39,7 +39,7 @@ impl Modes {
     /// The slowest mode that shows in a row, undecided where rounding may carry it across the
     /// imaginary axis, or where it rests on how small a coupling counts as none; with the number of modes that
     /// show. None where its eigenvalues are not found.
-    pub fn fate(&self, row: &DMatrix<f64>) -> Option<(Fate, usize)> {
+    pub fn detectability(&self, row: &DMatrix<f64>) -> Option<(Detectability, usize)> {
         let coarse = self.shown(row, ZERO)?;
         let count = coarse.A.nrows();
         if count == self.A.nrows() {
@@ -51,7 +51,11 @@ impl Modes {
         }
         let (coarse, found) = (coarse.slowest()?, fine.slowest()?);
         let agree = std::mem::discriminant(&coarse) == std::mem::discriminant(&found);
-        let found = if agree { found } else { Fate::Undecided };
+        let found = if agree {
+            found
+        } else {
+            Detectability::Undecided
+        };
         Some((found, fine.A.nrows()))
     }
 
@@ -64,7 +68,7 @@ impl Modes {
         })
     }
 
-    fn slowest(&self) -> Option<Fate> {
+    fn slowest(&self) -> Option<Detectability> {
         let modes = spectrum::eigenvalues(self.A.clone())?;
         let slowest = modes.iter().map(|λ| λ.re).reduce(f64::max)?;
         let doubts = (0..modes.len()).map(|k| self.doubt(&modes, k));
@@ -72,18 +76,18 @@ impl Modes {
         let all = || modes.iter().map(|λ| λ.re).zip(&doubts);
         let growing = all().filter(|(re, doubt)| *re > doubt.width);
         if let Some(rate) = growing.map(|(re, _)| re).reduce(f64::max) {
-            return Some(Fate::Grows { rate });
+            return Some(Detectability::Grows { rate });
         }
         let mut slow = all().filter(|(re, doubt)| *re >= -doubt.width).peekable();
         if slow.peek().is_none() {
-            return Some(Fate::Decays {
+            return Some(Detectability::Decays {
                 rate: -slowest,
                 ground: Ground::Point,
             });
         }
         Some(match slow.all(|(_, doubt)| doubt.is_simple) {
-            true => Fate::Stays,
-            false => Fate::Undecided,
+            true => Detectability::Stays,
+            false => Detectability::Undecided,
         })
     }
 
@@ -238,15 +242,15 @@ pub(super) fn reached(A: &DMatrix<f64>, B: &DMatrix<f64>, zero: f64) -> Option<D
 mod tests {
     use super::*;
 
-    /// The fate of what `row` shows of x' = Ax, in coordinates that leave no entry of A as it is.
-    fn mirrored(A: &DMatrix<f64>, row: &[f64]) -> Fate {
+    /// The detectability of what `row` shows of x' = Ax, in coordinates that leave no entry of A as it is.
+    fn mirrored(A: &DMatrix<f64>, row: &[f64]) -> Detectability {
         let n = A.nrows();
         let v = DMatrix::from_fn(n, 1, |i, _| 1.0 + (i as f64).sin());
         let Q = DMatrix::identity(n, n) - &v * v.transpose() * (2.0 / v.norm_squared());
         let row = DMatrix::from_row_slice(1, n, row) * &Q;
         let A = &Q * A * &Q;
         let modes = Modes { gross: A.norm(), A };
-        modes.fate(&row).unwrap().0
+        modes.detectability(&row).unwrap().0
     }
 
     fn first(n: usize) -> Vec<f64> {
@@ -267,16 +271,22 @@ mod tests {
     #[test]
     fn a_multiple_mode_near_the_axis_is_undecided() {
         for r in [-0.01, 0.01, -1e-4] {
-            let fate = mirrored(&chain(10, r), &first(10));
-            assert!(matches!(fate, Fate::Undecided), "{fate:?}");
+            let detectability = mirrored(&chain(10, r), &first(10));
+            assert!(
+                matches!(detectability, Detectability::Undecided),
+                "{detectability:?}"
+            );
         }
-        let fate = mirrored(&chain(10, -0.5), &first(10));
+        let detectability = mirrored(&chain(10, -0.5), &first(10));
         assert!(
-            matches!(fate, Fate::Decays { rate, .. } if rate > 0.3),
-            "{fate:?}"
+            matches!(detectability, Detectability::Decays { rate, .. } if rate > 0.3),
+            "{detectability:?}"
         );
-        let fate = mirrored(&chain(10, 0.5), &first(10));
-        assert!(matches!(fate, Fate::Grows { .. }), "{fate:?}");
+        let detectability = mirrored(&chain(10, 0.5), &first(10));
+        assert!(
+            matches!(detectability, Detectability::Grows { .. }),
+            "{detectability:?}"
+        );
     }
 
     /// Ten modes that are apart are computed to all digits, however slow the slowest is.
@@ -291,10 +301,10 @@ mod tests {
                     -0.2 - 0.3 * i as f64
                 };
             }
-            let fate = mirrored(&A, &first(10));
-            let found = match fate {
-                Fate::Decays { rate, .. } => -rate,
-                Fate::Grows { rate } => rate,
+            let detectability = mirrored(&A, &first(10));
+            let found = match detectability {
+                Detectability::Decays { rate, .. } => -rate,
+                Detectability::Grows { rate } => rate,
                 other => panic!("{other:?}"),
             };
             assert!((found - slowest).abs() < 1e-9, "{found}");
