@@ -108,11 +108,4 @@ impl Comparison {
         let mut runs = self.rows.iter().filter_map(|row| row.run.as_ref().ok());
         runs.any(|run| run.doubt.is_none())
     }
-
-    /// One panel per family: the quantity that is hardest to see.
-    #[cfg(feature = "plot")]
-    #[must_use]
-    pub fn picture(&self, time_unit: Option<&str>) -> crate::plot::Figure {
-        crate::figure::compared(self, time_unit)
-    }
 }

@@ -45,21 +45,24 @@ pub fn figure(
     })
 }
 
-/// One panel per family of a comparison: what is hardest to see, unknown inputs first.
 #[cfg(feature = "tune")]
-pub(crate) fn compared(comparison: &crate::Comparison, time_unit: Option<&str>) -> Figure {
-    let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
-    let panels = comparison.rows.iter().filter_map(|row| {
-        let run = row.run.as_ref().ok()?;
-        let quantity = *interesting(&run.outcome).first()?;
-        let mut panel = panel(&run.outcome, quantity);
-        panel.caption = format!("{}, {}", row.family, panel.caption);
-        Some(panel)
-    });
-    Figure {
-        title: format!("{}: families compared", comparison.plant),
-        time_label: format!("time{unit}"),
-        panels: panels.collect(),
+impl crate::Comparison {
+    /// One panel per family: the quantity that is hardest to see, unknown inputs first.
+    #[must_use]
+    pub fn picture(&self, time_unit: Option<&str>) -> Figure {
+        let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
+        let panels = self.rows.iter().filter_map(|row| {
+            let run = row.run.as_ref().ok()?;
+            let quantity = *interesting(&run.outcome).first()?;
+            let mut panel = panel(&run.outcome, quantity);
+            panel.caption = format!("{}, {}", row.family, panel.caption);
+            Some(panel)
+        });
+        Figure {
+            title: format!("{}: families compared", self.plant),
+            time_label: format!("time{unit}"),
+            panels: panels.collect(),
+        }
     }
 }
 

@@ -59,18 +59,6 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table from columns computed in Rust; a value that is not finite is missing.
-    ///
-    /// # Errors
-    /// The columns differ in length.
-    pub fn from_columns(columns: Vec<(String, Vec<f64>)>) -> Result<Self, Error> {
-        let table = Gathering::new("");
-        let columns = columns.into_iter();
-        let columns = columns.map(|(name, values)| table.owned(&name, values));
-        let columns = columns.collect();
-        table.ragged(columns)
-    }
-
     /// The same with what is true of quantities, row by row.
     #[cfg(feature = "tune")]
     pub(crate) fn with_truth(mut self, truth: Vec<(String, Vec<f64>)>) -> Self {

@@ -268,3 +268,22 @@ end M;
     }
     assert_eq!(ended.out.lines().count(), 103);
 }
+
+/// A state that is measured leaves its declared range by more than 5 % with the plant; a reading
+/// that is missing there does not make the estimate a doubt.
+#[test]
+fn a_gap_beyond_the_declared_range_is_no_doubt() {
+    let model = "model M\n  Real x(start = 0, min = -1, max = 1);\n  output Real y = x;\nequation\n  der(x) = 0;\nend M;\n";
+    let study = "[process_noise]\nx = 0.01\n[observer]\nfamily = \"ekf\"\ninitial_variance = { x = 0.01 }\n";
+    let y = |k: usize| match k % 10 {
+        // the last row is one of those
+        3 | 6 | 9 => f64::NAN,
+        _ => 1.6 * (1.0 - (-0.05 * k as f64).exp()) + noise(k),
+    };
+    let (_, ended) = estimated(model, study, (0..200).map(y));
+    assert_eq!(levels(&ended, "refusal"), [""; 0], "{}", ended.err);
+    assert_eq!(
+        (ended.code, ended.json()["credible"].as_bool()),
+        (0, Some(true))
+    );
+}
