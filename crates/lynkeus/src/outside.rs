@@ -142,8 +142,8 @@ impl<'q> Followed<'q> {
             return false;
         };
         let beyond = |x: f64| (self.side.min - x).max(x - self.side.max);
-        // the last of several
-        if beyond(self.farthest).total_cmp(&beyond(x)).is_le() {
+        // the last of several; a missing value is none of them
+        if self.farthest.is_nan() || beyond(x) >= beyond(self.farthest) {
             self.farthest = x;
         }
         if beyond(x) <= self.slack || x.is_nan() {

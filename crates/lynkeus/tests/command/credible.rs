@@ -274,14 +274,19 @@ end M;
 #[test]
 fn a_gap_beyond_the_declared_range_is_no_doubt() {
     let model = "model M\n  Real x(start = 0, min = -1, max = 1);\n  output Real y = x;\nequation\n  der(x) = 0;\nend M;\n";
-    let study = "[process_noise]\nx = 0.01\n[observer]\nfamily = \"ekf\"\ninitial_variance = { x = 0.01 }\n";
+    let study = "[process_noise]\nx = 0.0004\n[observer]\nfamily = \"ekf\"\ninitial_variance = { x = 0.01 }\n";
     let y = |k: usize| match k % 10 {
         // the last row is one of those
         3 | 6 | 9 => f64::NAN,
-        _ => 1.6 * (1.0 - (-0.05 * k as f64).exp()) + noise(k),
+        _ => 1.6 * (1.0 - (-0.02 * k as f64).exp()) + noise(k),
     };
     let (_, ended) = estimated(model, study, (0..200).map(y));
     assert_eq!(levels(&ended, "refusal"), [""; 0], "{}", ended.err);
+    let plant = &ended.json()["outside_box"]["plant"]["quantities"]["x"];
+    assert!(
+        plant["farthest"].as_f64().is_some_and(|x| x > 1.5),
+        "{plant}"
+    );
     assert_eq!(
         (ended.code, ended.json()["credible"].as_bool()),
         (0, Some(true))
