@@ -40,7 +40,7 @@ pub struct MonteCarlo {
 pub enum Again {
     /// [`simulate`](crate::simulate()) with its seed.
     Alone,
-    /// [`monte_carlo`] of this seed alone: exp, sin and the like are those of
+    /// [`monte_carlo`](crate::monte_carlo()) of this seed alone: exp, sin and the like are those of
     /// [`lanes`](lynkeus_expr::lanes), which [`simulate`](crate::simulate()) rounds otherwise.
     InABatch,
 }
