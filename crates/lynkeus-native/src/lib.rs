@@ -5,7 +5,7 @@
 //! emitter: one number per value ([`Function<1>`]), which is the tape over
 //! [`Reals`](lynkeus_expr::Reals), and four numbers side by side in vector registers
 //! ([`Function<4>`]), the tape over [`Lanes`](lynkeus_expr::lanes::Lanes), whose elementary
-//! functions are written for lanes. A [`Sweep`] does many groups of four with one call.
+//! functions are written for lanes. [`Evaluator::sweep`] does many groups of four with one call.
 //!
 //! Compiling is one more evaluation of the tape, over the algebra of instructions (`record`);
 //! values are then placed in registers in one pass (`emit`), operation by operation
