@@ -8,8 +8,8 @@
 //! functions are written for lanes. [`Evaluator::sweep`] does many groups of four with one call.
 //!
 //! Compiling is one more evaluation of the tape, over the algebra of instructions (`record`);
-//! values are then placed in registers in one pass (`emit`), operation by operation
-//! (`operations`), and encoded (`assemble`). Only x86-64 with AVX2 and FMA is compiled for: elsewhere
+//! values are then placed in registers (`registers`), operation by operation (`emit`), in one
+//! pass, and encoded (`assemble`). Only x86-64 with AVX2 and FMA is compiled for: elsewhere
 //! [`Function::compile`] gives none and the interpreter does the work.
 //!
 //! The engine's only crate with `unsafe`: to call the code that it wrote, and for the instructions
