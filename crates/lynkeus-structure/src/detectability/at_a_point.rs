@@ -12,7 +12,7 @@ use lynkeus_proof::spectrum;
 use nalgebra::{DMatrix, DVector};
 
 use crate::detectability::exact::{self, Shows};
-use crate::detectability::hidden::{Detectability, Hidden, HiddenErrors, Told};
+use crate::detectability::hidden::{Detectability, Hidden, HiddenErrors, Observability};
 use crate::detectability::modes::{Modes, image, null_space, reached};
 use crate::{AugmentedPlant, Dimension, Region};
 
@@ -22,7 +22,7 @@ const STATES: usize = 60;
 const ZERO: f64 = 1e-8;
 
 /// At the first of a few points whose linearisation hides exactly what is hidden, those at which nothing moves that it
-/// reads before the others; none where there is no such point. Of what reads something that moves on no rate is told.
+/// reads before the others; none where there is no such point. Of what reads something that moves on no rate is given.
 pub(super) fn hidden_errors(hidden: &Hidden<'_, '_>) -> Result<Option<HiddenErrors>, MissingInput> {
     let augmented = hidden.augmented;
     if augmented.states.len() > STATES {
@@ -43,7 +43,7 @@ pub(super) fn hidden_errors(hidden: &Hidden<'_, '_>) -> Result<Option<HiddenErro
     let mut evaluator = tape.evaluator();
     let clock = HashSet::from([augmented.plant.time]);
     let timed = moved(hidden, &slopes, &clock);
-    let is_asked = |i: usize| hidden.told[i] == Told::Hidden;
+    let is_asked = |i: usize| hidden.observability[i] == Observability::Hidden;
     if (0..timed.len()).all(|i| timed[i] || !is_asked(i)) {
         return Ok(None);
     }
@@ -91,7 +91,7 @@ pub(super) fn hidden_errors(hidden: &Hidden<'_, '_>) -> Result<Option<HiddenErro
             let sides = || region.dimensions.iter().zip(&point);
             let is_time = |d: &Dimension| d.symbol == augmented.plant.time;
             let is_read = is_read(augmented, &nodes);
-            // first, as long points are told in part
+            // first, as long points are shown in part
             let time = sides().filter(|(d, _)| is_read && is_time(d));
             let named = time.chain(sides().filter(|(d, _)| !is_time(d)));
             let point = named.map(|(d, &x)| (d.name.clone(), x).into()).collect();
@@ -202,7 +202,7 @@ impl Linear {
         }
     }
 
-    /// The hidden_errors, with what they rest on, where the linearisation hides what is hidden and nothing else.
+    /// What becomes of hidden errors, with what that rests on, where the linearisation hides what is hidden and nothing else.
     fn hidden_errors(&self, hidden: &Hidden<'_, '_>) -> Option<Vec<(Detectability, Shows)>> {
         let Traceless { pairs, V } = self.traceless()?;
         let n = self.F.nrows();
@@ -224,7 +224,7 @@ impl Linear {
             A: S.transpose() * &A * &S,
             gross: self.F.norm() + (&self.G * &K).norm(),
         };
-        let of = (0..hidden.told.len()).map(|i| {
+        let of = (0..hidden.observability.len()).map(|i| {
             let (row, alone) = match i < n {
                 true => (V.row(i).into_owned(), 0.0),
                 false => (K.row(i - n).into_owned(), free.row(i - n).amax()),
@@ -243,13 +243,13 @@ impl Linear {
         let of: Vec<(Detectability, Shows)> = of.collect::<Option<_>>()?;
         let agrees = of
             .iter()
-            .zip(&hidden.told)
-            .all(|((_, shown), told)| match told {
-                Told::Determined => *shown == Shows::Nothing,
-                Told::Hidden => *shown != Shows::Nothing,
-                Told::Open => true,
+            .zip(&hidden.observability)
+            .all(|((_, shown), observability)| match observability {
+                Observability::Determined => *shown == Shows::Nothing,
+                Observability::Hidden => *shown != Shows::Nothing,
+                Observability::Open => true,
             });
-        let is_open = hidden.told.contains(&Told::Open);
+        let is_open = hidden.observability.contains(&Observability::Open);
         let counts = is_open || hidden.directions == pairs.ncols();
         (agrees && counts).then_some(of)
     }
@@ -306,7 +306,9 @@ impl Rest {
     ) -> Result<Self, MissingInput> {
         let augmented = hidden.augmented;
         let graph = augmented.graph();
-        let is_free = |entry: &&(usize, usize, Node)| hidden.told[entry.1] != Told::Determined;
+        let is_free = |entry: &&(usize, usize, Node)| {
+            hidden.observability[entry.1] != Observability::Determined
+        };
         let entries = slopes.entries.iter().filter(is_free);
         let mut open: Vec<Node> = entries.map(|entry| entry.2).collect();
         let mut found: Vec<usize> = vec![];
@@ -454,8 +456,8 @@ pub(super) fn moved(
             .iter()
             .any(|s| moving.contains(s))
     };
-    let count = hidden.told.len();
-    let is_free = |i: usize| i < count && hidden.told[i] != Told::Determined;
+    let count = hidden.observability.len();
+    let is_free = |i: usize| i < count && hidden.observability[i] != Observability::Determined;
     let entries = slopes.entries.iter().filter(|entry| is_free(entry.1));
     let entries: Vec<(usize, usize, bool)> = entries
         .map(|(i, j, slope)| (*i, *j, reads(*slope)))
@@ -485,8 +487,8 @@ pub(super) fn weaken(
     sure: &[bool],
     of: &mut [Detectability],
 ) {
-    let count = hidden.told.len();
-    let is_free = |i: usize| i < count && hidden.told[i] != Told::Determined;
+    let count = hidden.observability.len();
+    let is_free = |i: usize| i < count && hidden.observability[i] != Observability::Determined;
     let entries = slopes.entries.iter();
     let is_coupled = |i: usize, j: usize| is_free(i) && is_free(j) && !sure[i];
     let couplings = entries.filter(|entry| is_coupled(entry.0, entry.1));

@@ -4,7 +4,7 @@ use crate::{AugmentedPlant, Coordinate};
 
 /// What is known of an augmented state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Told {
+pub enum Observability {
     /// the outputs determine it
     Determined,
     /// they do not
@@ -19,7 +19,7 @@ pub struct Hidden<'e, 'p> {
     /// the plant
     pub augmented: &'e AugmentedPlant<'p>,
     /// per augmented state
-    pub told: Vec<Told>,
+    pub observability: Vec<Observability>,
     /// unknown inputs are any functions of time; else they do not move
     pub arbitrary: bool,
     /// in how many independent directions the hidden quantities can change
@@ -66,7 +66,7 @@ pub enum Detectability {
     Undecided,
 }
 
-/// The hidden_errors of hidden quantities.
+/// What becomes of the errors in hidden quantities.
 #[derive(Clone, Debug)]
 pub struct HiddenErrors {
     /// per augmented state; none where it is not hidden
@@ -79,7 +79,8 @@ impl Hidden<'_, '_> {
     /// Places of what may differ between two solutions with the same outputs: states, then
     /// unknown inputs that are any functions.
     pub(super) fn free(&self) -> (Vec<usize>, Vec<usize>) {
-        let places = (0..self.told.len()).filter(|&i| self.told[i] != Told::Determined);
+        let places = (0..self.observability.len())
+            .filter(|&i| self.observability[i] != Observability::Determined);
         places.partition(|&i| !self.is_signal(i))
     }
 

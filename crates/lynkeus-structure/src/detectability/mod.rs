@@ -20,7 +20,7 @@ mod on_the_box;
 
 use lynkeus_expr::MissingInput;
 
-pub use hidden::{Detectability, Ground, Hidden, HiddenErrors, Told};
+pub use hidden::{Detectability, Ground, Hidden, HiddenErrors, Observability};
 
 impl Hidden<'_, '_> {
     /// Decides what becomes of the errors.
@@ -31,13 +31,13 @@ impl Hidden<'_, '_> {
         let proved = on_the_box::hidden_errors(self)?;
         let is_open = |i: usize| {
             let decays = matches!(proved[i], Some(Detectability::Decays { .. }));
-            self.told[i] == Told::Hidden && !decays
+            self.observability[i] == Observability::Hidden && !decays
         };
-        let local = match (0..self.told.len()).any(is_open) {
+        let local = match (0..self.observability.len()).any(is_open) {
             true => at_a_point::hidden_errors(self)?,
             false => None,
         };
-        let of = (0..self.told.len()).map(|i| {
+        let of = (0..self.observability.len()).map(|i| {
             let there = local.as_ref().and_then(|local| local.of[i]);
             let detectability = match (proved[i], there) {
                 // a bound says little where the error vanishes near some point
@@ -51,7 +51,7 @@ impl Hidden<'_, '_> {
                 }
                 (proved, _) => proved,
             };
-            (self.told[i] == Told::Hidden)
+            (self.observability[i] == Observability::Hidden)
                 .then(|| detectability.unwrap_or(Detectability::Undecided))
         });
         Ok(HiddenErrors {

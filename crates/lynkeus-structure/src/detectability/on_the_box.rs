@@ -5,14 +5,14 @@ use lynkeus_proof::decay::{ErrorModel, Sector, fastest};
 use lynkeus_proof::spectrum;
 use nalgebra::DMatrix;
 
-use crate::detectability::hidden::{Detectability, Ground, Hidden, Told};
+use crate::detectability::hidden::{Detectability, Ground, Hidden, Observability};
 use crate::{Region, Verdict, range_within};
 
 /// States that are hidden together, beyond which no proof is tried.
 const STATES: usize = 24;
 /// States that are coupled, beyond which no proof is tried.
 const COUPLED: usize = 8;
-/// Of several blocks in a row any rate below the least is proved; this share of it is told.
+/// Of several blocks in a row any rate below the least is proved; this share of it is given.
 const BELOW: f64 = 0.99;
 
 /// Per augmented state what is proved, if anything is.
@@ -20,7 +20,7 @@ pub(super) fn hidden_errors(
     hidden: &Hidden<'_, '_>,
 ) -> Result<Vec<Option<Detectability>>, MissingInput> {
     let augmented = hidden.augmented;
-    let mut found = vec![None; hidden.told.len()];
+    let mut found = vec![None; hidden.observability.len()];
     let (states, inputs) = hidden.free();
     let region = augmented.region();
     if states.is_empty()
@@ -203,14 +203,14 @@ pub(super) fn enclosed(hidden: &Hidden<'_, '_>) -> Result<System, MissingInput> 
     let region = augmented.region();
     let (states, inputs) = hidden.free();
     let equation = |&i: &usize| augmented.derivatives[i];
-    let told = (0..hidden.told.len())
-        .filter(|&i| hidden.told[i] == Told::Determined && !hidden.is_signal(i));
-    let told: Vec<usize> = told.collect();
+    let observability = (0..hidden.observability.len())
+        .filter(|&i| hidden.observability[i] == Observability::Determined && !hidden.is_signal(i));
+    let observability: Vec<usize> = observability.collect();
     let outputs = augmented.outputs.iter().map(|o| o.variable.node);
     let functions: Vec<Node> = states
         .iter()
         .map(equation)
-        .chain(told.iter().map(equation))
+        .chain(observability.iter().map(equation))
         .chain(outputs)
         .collect();
     let symbol = |&i: &usize| augmented.states[i].node;

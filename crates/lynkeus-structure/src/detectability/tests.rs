@@ -40,15 +40,16 @@ impl Case {
             ..Sensors::default()
         };
         let augmented = AugmentedPlant::new(&plant, &sensors).unwrap();
-        let told = augmented
-            .states
-            .iter()
-            .map(|s| match self.hidden.contains(&s.name.as_str()) {
-                true => Told::Hidden,
-                false => Told::Determined,
-            });
+        let observability =
+            augmented
+                .states
+                .iter()
+                .map(|s| match self.hidden.contains(&s.name.as_str()) {
+                    true => Observability::Hidden,
+                    false => Observability::Determined,
+                });
         let question = Hidden {
-            told: told.collect(),
+            observability: observability.collect(),
             arbitrary: true,
             directions: self.directions,
             augmented: &augmented,

@@ -4,7 +4,9 @@
 use std::fmt;
 
 use lynkeus_observability::{Answer, Verdict};
-use lynkeus_structure::detectability::{Detectability, Ground, Hidden, HiddenErrors, Told};
+use lynkeus_structure::detectability::{
+    Detectability, Ground, Hidden, HiddenErrors, Observability,
+};
 use lynkeus_structure::{self as structure, AugmentedPlant, Coordinate, Uniformity};
 use serde_json::{Map, Value, json};
 
@@ -113,18 +115,18 @@ impl Knowledge {
             .iter()
             .map(|s| answer.verdict(&s.name))
             .collect();
-        let told = verdicts.iter().map(|verdict| match verdict {
-            Some(Verdict::Observable) => Told::Determined,
-            Some(Verdict::Unobservable) => Told::Hidden,
-            Some(Verdict::Undecided) | None => Told::Open,
+        let observability = verdicts.iter().map(|verdict| match verdict {
+            Some(Verdict::Observable) => Observability::Determined,
+            Some(Verdict::Unobservable) => Observability::Hidden,
+            Some(Verdict::Undecided) | None => Observability::Open,
         });
         let hidden = Hidden {
-            told: told.collect(),
+            observability: observability.collect(),
             arbitrary: assumption == Assumption::Arbitrary,
             directions: answer.symmetries.iter().map(|s| s.directions).sum(),
             augmented,
         };
-        let hidden_errors = match hidden.told.contains(&Told::Hidden) {
+        let hidden_errors = match hidden.observability.contains(&Observability::Hidden) {
             true => hidden.hidden_errors()?,
             false => HiddenErrors {
                 of: vec![None; verdicts.len()],

@@ -6,7 +6,7 @@
 
 use lynkeus_expr::{Budget, MissingInput, Node};
 use lynkeus_model::Plant;
-use lynkeus_structure::detectability::{Detectability, Hidden, Told};
+use lynkeus_structure::detectability::{Detectability, Hidden, Observability};
 use lynkeus_structure::{
     AugmentedPlant, Sensors, apart_whatever, determined, range_within, uncertain, uniformity,
 };
@@ -140,7 +140,7 @@ impl View<'_> {
         let states = &augmented.states;
         let hidden = Hidden {
             augmented: &augmented,
-            told: vec![Told::Hidden; states.len()],
+            observability: vec![Observability::Hidden; states.len()],
             arbitrary: assumption == Assumption::Arbitrary,
             directions: states.len(),
         };
