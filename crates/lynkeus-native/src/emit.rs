@@ -107,12 +107,23 @@ impl<const LANES: usize> Emitter<'_, LANES> {
                 let to = self.result(id, &[x]);
                 self.assembler.logic(Logic::And, to, from, magnitude);
             }
-            // the others are called
-            _ => {
+            Unary::Neg => {
                 let sign = self.constant(-0.0);
                 let to = self.result(id, &[x]);
                 self.assembler.logic(Logic::Xor, to, from, sign);
             }
+            // called, as `library` has them; named, so that a new operation does not compile before it has a place
+            Unary::Exp
+            | Unary::Ln
+            | Unary::Sin
+            | Unary::Cos
+            | Unary::Tan
+            | Unary::Asin
+            | Unary::Acos
+            | Unary::Atan
+            | Unary::Sinh
+            | Unary::Cosh
+            | Unary::Tanh => {}
         }
     }
 
@@ -128,8 +139,9 @@ impl<const LANES: usize> Emitter<'_, LANES> {
             Binary::And => self.truth(id, Logic::And, x, y),
             Binary::Or => self.truth(id, Logic::Or, x, y),
             Binary::Min => self.extreme(id, Relation::Less, Logic::And, x, y),
-            // the others are called
-            _ => self.extreme(id, Relation::Greater, Logic::AndNot, x, y),
+            Binary::Max => self.extreme(id, Relation::Greater, Logic::AndNot, x, y),
+            // called
+            Binary::Pow | Binary::Atan2 => {}
         }
     }
 
