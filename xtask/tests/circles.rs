@@ -193,6 +193,17 @@ impl Visit<'_> for Paths<'_> {
         }
         visit::visit_path(self, path);
     }
+
+    /// What a macro is given is not parsed: everything in it that reads like a path counts.
+    fn visit_macro(&mut self, call: &syn::Macro) {
+        let text = call.tokens.to_string().replace(" :: ", "::");
+        let words = text.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
+        for word in words.map(|word| word.trim_matches(':')) {
+            if word.contains("::") {
+                self.0.push(word.split("::").map(str::to_owned).collect());
+            }
+        }
+    }
 }
 
 fn defined(item: &Item) -> Option<String> {
@@ -293,6 +304,11 @@ fn a_circle_is_seen_through_re_exports() {
     write(
         "b.rs",
         "pub struct B; impl B { fn a() -> Vec<crate::A> { vec![] } }",
+    );
+    assert_eq!(circular(), 2);
+    write(
+        "b.rs",
+        "pub struct B; fn b() { drop(vec![crate::a::A(B)]); }",
     );
     assert_eq!(circular(), 2);
     fs::remove_dir_all(&folder).expect("a folder can be removed");

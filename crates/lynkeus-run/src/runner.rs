@@ -1,7 +1,7 @@
 //! What an estimator asks of an observer under way.
 
 use crate::Error;
-use crate::filter::{Health, Innovation};
+use crate::filter::health::{Health, Innovation};
 use crate::snapshot::Persist;
 
 /// A sample as an observer takes it.

@@ -39,7 +39,7 @@
 
 mod belief;
 pub(crate) mod ekf;
-mod health;
+pub(crate) mod health;
 pub(crate) mod kalman;
 mod mhe;
 mod model;

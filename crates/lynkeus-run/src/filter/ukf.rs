@@ -259,7 +259,7 @@ impl Kalman for Ukf {
     /// Each point through the flow; P⁻ = Σ W(…)(…)ᵀ + W, W what the process noise comes to along
     /// the estimate ([`Propagation`]), which is exact on linear plants. Where it is to be kept, the transition
     /// of the linear flow that carries the points best is returned: Φ = DᵀP⁻¹ with the covariance D
-    /// of the points before and after (S. Särkkä, "Ukf Rauch–Tung–Striebel smoother", *IEEE
+    /// of the points before and after (S. Särkkä, "Unscented Rauch–Tung–Striebel smoother", *IEEE
     /// Transactions on Automatic Control* 53 (2008) 845–849).
     fn predict(
         &mut self,
