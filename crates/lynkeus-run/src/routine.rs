@@ -307,7 +307,7 @@ mod tests {
                 .collect();
             let symbols: Vec<Node> = [t].into_iter().chain(x.iter().map(|x| x.node())).collect();
             let equations = Arc::new(Equations::new(&g, &symbols, &dx, &[]).unwrap());
-            let dx = equations.roots.derivatives.clone();
+            let dx = equations.roots.free.derivatives.clone();
             let routine = Routine::new(&equations, symbols.len(), dx).unwrap();
             Differentiated::new(&routine, n).map(|known| known.places.len())
         };

@@ -3,10 +3,12 @@
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
 
-use crate::closed_loop::{Loop, table};
+use crate::closed_loop::Loop;
 use crate::divergence::Bound;
 use crate::noise::Sensors;
-use crate::{Error, Events, Integrator, Interrupted, Simulation, Trajectory, process_draws};
+use crate::{
+    Error, Events, Integrator, Interrupted, Role, Simulation, System, Trajectory, process_draws,
+};
 
 impl Simulation {
     /// Runs to the end.
@@ -56,7 +58,17 @@ impl Simulation {
 
     /// The table of a run before its first row.
     pub fn table(&self) -> Trajectory {
-        table(&self.plant, self.observer.as_ref(), self.record_outputs)
+        let Self { plant, .. } = self;
+        let mut table = Trajectory::default()
+            .with(Role::State, plant.states())
+            .with(Role::Input, plant.signals());
+        if self.record_outputs {
+            table = table
+                .with(Role::Output, plant.outputs())
+                .with(Role::Measured, plant.outputs());
+        }
+        let observer = self.observer.as_ref();
+        table.with(Role::Estimate, observer.map_or(&[], System::estimates))
     }
 }
 
@@ -80,8 +92,8 @@ impl Run {
             plant.states(),
             itinerary.hold(),
         )?;
-        let system = Loop::new(simulation, sensors)?;
-        let x = system.system().start().to_vec();
+        let mut system = Loop::new(simulation, sensors)?;
+        let x = system.joined().system().start().to_vec();
         Ok(Self {
             itinerary: itinerary.exact(system.is_exact()),
             integrator: Integrator::new(simulation.method, x.len())?,
@@ -124,7 +136,7 @@ impl Run {
 
     fn record(&mut self, t: f64) -> Result<&[f64], Error> {
         self.row.clear();
-        self.system.enter(t);
+        self.system.joined().enter(t);
         self.system.row(t, &self.x, &mut self.row)?;
         let (names, estimate) = self.system.estimate(&self.x);
         self.bound.see(&self.row[..self.system.known_columns()]);

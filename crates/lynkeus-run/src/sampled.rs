@@ -1,11 +1,11 @@
 //! Observers whose sensors report when they do.
 
+use crate::Evaluation;
 use crate::divergence::{Bound, deviation_diverged};
 use crate::filter::{Health, Innovation, Reading};
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::spread::{ErrorModel, Spread};
-use crate::system::Driven;
 use crate::{BetweenSamples, Dynamics, Error, Events, Integrator, Method, StepAdvice, System};
 
 /// An observer z' = F(t, z, u, w) whose measurements are states of their own: w jumps to a
@@ -89,7 +89,7 @@ impl Tuned {
 /// A [`SampledObserver`] under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Sampled {
-    driven: Driven,
+    driven: Evaluation,
     integrator: Integrator,
     x: Vec<f64>,
     outputs: Vec<f64>,
@@ -136,7 +136,7 @@ impl Sampled {
             .map(|model| Spread::new(model, *inputs, method));
         let judged = errors.as_ref().filter(|model| model.expects());
         Ok(Self {
-            driven: Driven::new(system, *inputs),
+            driven: system.driven(*inputs),
             integrator: Integrator::new(method, system.states().len())?,
             x: system.start().to_vec(),
             outputs: vec![0.0; system.estimates().len()],
@@ -175,7 +175,7 @@ impl Sampled {
     }
 
     fn evaluate(&mut self, t: f64) -> Result<(), Error> {
-        let evaluation = &mut self.driven.evaluation;
+        let evaluation = &mut self.driven;
         evaluation.enter(t);
         evaluation.estimates(t, &self.x, &mut self.outputs);
         match self.outputs.iter().all(|v| v.is_finite()) {
@@ -232,7 +232,7 @@ impl Runner for Sampled {
                 .advance(&mut self.driven, from, sample.t, &mut self.x),
         };
         let scale = self.bound.scale();
-        let evaluation = &mut self.driven.evaluation;
+        let evaluation = &mut self.driven;
         done.map_err(|error| evaluation.explained(error, &self.x, scale))?;
         self.driven.arrive();
         Ok(())
@@ -265,19 +265,19 @@ impl Runner for Sampled {
 
     fn report(&mut self, t: f64) -> Result<(), Error> {
         let own = self.x.len() - self.sensors;
-        let names = self.driven.evaluation.system().states();
+        let names = self.driven.system().states();
         let inside = self
             .bound
             .check(t, names, &self.x[..own], || self.integrator.hint());
         let scale = self.bound.scale();
-        let evaluation = &mut self.driven.evaluation;
+        let evaluation = &mut self.driven;
         inside.map_err(|error| evaluation.explained(error, &self.x, scale))?;
         self.evaluate(t)?;
         let Some(spread) = &mut self.spread else {
             return Ok(());
         };
         spread.measure(t, &self.x);
-        let told = self.driven.evaluation.system().outputs();
+        let told = self.driven.system().outputs();
         match spread.deviations.iter().position(|d| !d.is_finite()) {
             None => Ok(()),
             Some(i) => Err(deviation_diverged(

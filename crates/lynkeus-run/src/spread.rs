@@ -339,7 +339,7 @@ impl Spread {
     /// The measurements of the sensors that report are new readings, with errors of their own; z is
     /// after them.
     pub fn reset(&mut self, t: f64, z: &[f64], readings: &[f64]) {
-        let evaluation = &mut self.engine.driven.evaluation;
+        let evaluation = &mut self.engine.driven;
         evaluation.enter(t);
         evaluation.outputs(t, z, &mut self.values);
         for (sensor, reading) in readings.iter().enumerate() {
@@ -384,7 +384,7 @@ impl Spread {
 
     /// The standard deviations of the estimates at (t, z).
     pub fn measure(&mut self, t: f64, z: &[f64]) {
-        let evaluation = &mut self.engine.driven.evaluation;
+        let evaluation = &mut self.engine.driven;
         evaluation.enter(t);
         evaluation.outputs(t, z, &mut self.values);
         let n = self.belief.root.n;

@@ -60,8 +60,9 @@ impl Batch {
         let Some((plan, program)) = Plan::new(simulation)? else {
             return Ok(None);
         };
+        let table = simulation.table();
         let place = |column: &Column| {
-            plan.place(*column).ok_or_else(|| {
+            table.place(*column).ok_or_else(|| {
                 let found = format!("{:?} {}", column.role, column.index);
                 Error::setting("recorded column", "one of the run", found)
             })

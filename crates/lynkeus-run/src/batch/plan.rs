@@ -11,7 +11,7 @@ use crate::integrator::{check_interval, fixed_steps, pieces};
 use crate::noise::Sensors;
 use crate::routine::Backend;
 use crate::run::{Itinerary, Stop};
-use crate::{Column, Dynamics, Error, Events, Method, Simulation, Step};
+use crate::{Error, Events, Method, Simulation, Step};
 
 /// What all trajectories do next.
 #[derive(Debug)]
@@ -78,8 +78,8 @@ impl Plan {
             return Ok(None);
         };
         let itinerary = Itinerary::new(simulation)?;
-        let clock = Loop::new(simulation, sensors(simulation, itinerary.hold(), 0)?)?;
-        let Some(program) = program(&clock)? else {
+        let mut clock = Loop::new(simulation, sensors(simulation, itinerary.hold(), 0)?)?;
+        let Some(program) = program(&mut clock)? else {
             return Ok(None);
         };
         let plan = Self {
@@ -94,11 +94,6 @@ impl Plan {
     /// The sensors of the run of a seed.
     pub fn sensors(&self, simulation: &Simulation, seed: u64) -> Result<Sensors, Error> {
         sensors(simulation, self.itinerary.hold(), seed)
-    }
-
-    /// The place of a column among the values of a row.
-    pub fn place(&self, column: Column) -> Option<usize> {
-        self.clock.table().place(column)
     }
 
     /// Number of rows in all.
@@ -120,8 +115,7 @@ impl Plan {
                 Some(Stop::Stir) => events.push(Event::Stir),
                 Some(Stop::Advance { from, to }) => self.legs(from, to, &mut events)?,
                 Some(Stop::Row(time)) => {
-                    self.clock.enter(time);
-                    let modes = self.clock.modes().to_vec();
+                    let modes = self.modes(time);
                     events.push(Event::Row { time, modes });
                     recorded += 1;
                 }
@@ -133,18 +127,26 @@ impl Plan {
     fn legs(&mut self, from: f64, to: f64, events: &mut Vec<Event>) -> Result<(), Error> {
         check_interval(from, to)?;
         self.instants.clear();
-        self.clock.instants(from, to, &mut self.instants)?;
+        let clock = self.clock.joined();
+        clock.instants(from, to, &mut self.instants)?;
         let length = self.step.length(to - from).unwrap_or(to - from);
         for (start, end) in pieces(from, to, &mut self.instants) {
-            self.clock.enter(start + 0.5 * (end - start));
+            clock.enter(start + 0.5 * (end - start));
             events.push(Event::Leg(Leg {
                 from: start,
                 to: end,
                 steps: fixed_steps(start, end, length)?,
-                modes: self.clock.modes().to_vec(),
+                modes: clock.modes().to_vec(),
             }));
         }
         Ok(())
+    }
+
+    /// The values of what jumps with time.
+    fn modes(&mut self, t: f64) -> Vec<f64> {
+        let clock = self.clock.joined();
+        clock.enter(t);
+        clock.modes().to_vec()
     }
 }
 
@@ -159,15 +161,15 @@ fn sensors(simulation: &Simulation, hold: f64, seed: u64) -> Result<Sensors, Err
 
 /// The tapes of a step and of a row, divided into what all trajectories share (time, the step,
 /// what jumps with time) and what is their own.
-fn program(clock: &Loop) -> Result<Option<Program>, Error> {
-    let states = clock.dimension();
-    let equations = clock.system().equations();
-    let disturbances = equations.signals.len();
+fn program(clock: &mut Loop) -> Result<Option<Program>, Error> {
+    let system = clock.joined().system().clone();
+    let equations = system.equations();
+    let (states, disturbances) = (equations.states.len(), equations.signals.len());
     let own = 1..1 + states + disturbances;
-    let row = &equations.roots.outputs;
+    let row = &equations.roots.free.outputs;
     let columns = row.len();
     let graph = equations.graph();
-    let Some((inputs, next)) = clock.system().derivatives_at().step_in(&graph) else {
+    let Some((inputs, next)) = system.derivatives_at().step_in(&graph) else {
         return Ok(None);
     };
     let divided = |inputs: &[Node], outputs: &[Node]| {
@@ -176,8 +178,7 @@ fn program(clock: &Loop) -> Result<Option<Program>, Error> {
     let step = divided(&inputs, &next)?;
     let row = divided(&equations.inputs[..equations.smooth_inputs()], row)?;
     drop(graph);
-    let start = vec![0.0; states];
-    let (observer_names, estimates) = clock.estimate(&start);
+    let (observer_names, estimates) = clock.estimate(system.start());
     Ok(Some(Program {
         step: Code::new(step, states + disturbances),
         row: Code::new(row, columns),
@@ -187,7 +188,7 @@ fn program(clock: &Loop) -> Result<Option<Program>, Error> {
         known: clock.known_columns(),
         plant_states: states - estimates.len(),
         observer_names: observer_names.to_vec(),
-        names: clock.names(),
+        names: equations.states.clone(),
     }))
 }
 

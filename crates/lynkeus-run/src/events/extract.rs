@@ -10,8 +10,8 @@ use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::{Binary, Graph, MissingInput, Node, Op, Tape, Unary};
 
-use super::filippov::{Jump, Jumps};
-use super::guards::Surfaces;
+use super::filippov::Jump;
+use super::guards::Surface;
 use super::time::{Indicator, TimeEvents};
 
 /// Characters of an expression in the label of a mode that changes with time,
@@ -20,43 +20,11 @@ const SHOWN: usize = 80;
 /// and of one that changes with the state.
 const SHOWN_OF_STATE: usize = 60;
 
-/// Expressions in which each jump is an input of its own, and when these change.
-pub(crate) struct Taken<E> {
+/// Expressions in which each jump is an input of its own.
+pub(crate) struct Taken {
     pub roots: Vec<Node>,
     /// the symbols of these inputs
     pub modes: Vec<Node>,
-    pub events: E,
-}
-
-/// The events of a system.
-pub(crate) struct Extracted {
-    /// what jumps with time taken out
-    pub time: Taken<TimeEvents>,
-    /// then what jumps with the state, over the inputs and the modes of time; none where nothing does
-    pub state: Option<Taken<Jumps>>,
-    /// what vanishes on the surfaces on which it jumps, over the inputs and both kinds of modes
-    pub surfaces: Vec<Node>,
-    /// what vanishes where it bends, over the same
-    pub bends: Vec<Node>,
-}
-
-/// Takes what jumps out of `roots`, derivatives of so many `states` first. The inputs are time, the
-/// states, and what else the roots read.
-pub(crate) fn extract(
-    graph: &Graph,
-    inputs: &[Node],
-    roots: &[Node],
-    states: usize,
-) -> Result<Extracted, MissingInput> {
-    let time = time_events(graph, inputs[0], roots)?;
-    let (state, surfaces) = state_events(graph, inputs, &time.roots, states).unzip();
-    let smooth = state.as_ref().map_or(&time.roots, |taken| &taken.roots);
-    Ok(Extracted {
-        bends: bends(graph, &inputs[1..], &smooth[..states]),
-        surfaces: surfaces.unwrap_or_default(),
-        time,
-        state,
-    })
 }
 
 /// The first operation of the roots that jumps with one of `inputs`, as it reads.
@@ -169,11 +137,11 @@ impl Operation {
 }
 
 /// Replaces what jumps with `time` alone in `roots` by modes.
-fn time_events(
+pub(crate) fn time_events(
     graph: &Graph,
     time: Node,
     roots: &[Node],
-) -> Result<Taken<TimeEvents>, MissingInput> {
+) -> Result<(Taken, TimeEvents), MissingInput> {
     let of_time = functions_of_time(graph, time, roots);
     let (mut outer, mut inner) = (HashMap::new(), HashMap::new());
     let (mut jumps, mut modes, mut found, mut indicators) = (vec![], vec![], vec![], vec![]);
@@ -202,11 +170,11 @@ fn time_events(
         }
     }
     let values = Tape::new(graph, &[time], &jumps)?;
-    Ok(Taken {
+    let taken = Taken {
         roots: graph.substitute(roots, &outer),
         modes,
-        events: TimeEvents::new(indicators, &values),
-    })
+    };
+    Ok((taken, TimeEvents::new(indicators, &values)))
 }
 
 /// Nodes whose value is a function of time alone: true where time is used,
@@ -231,17 +199,16 @@ fn functions_of_time(graph: &Graph, time: Node, roots: &[Node]) -> HashMap<Node,
 }
 
 /// Takes every `sign`, `<` and `≤` that depends on one of `inputs` out of the roots, and every `floor`
-/// that one of the first `moving` roots reads; none where there is none. Several that change on one
-/// surface change together. Returns what vanishes on the surfaces, too.
-fn state_events(
+/// that one of the first `moving` roots reads, over the surfaces on which they jump. Several that change
+/// on one surface change together.
+pub(crate) fn state_events(
     graph: &Graph,
     inputs: &[Node],
     roots: &[Node],
     moving: usize,
-) -> Option<(Taken<Jumps>, Vec<Node>)> {
+) -> (Taken, Vec<Jump>, Vec<Surface>) {
     let mut replaced: HashMap<Node, Node> = HashMap::new();
-    let (mut jumps, mut modes) = (vec![], vec![]);
-    let mut surfaces = Surfaces::default();
+    let (mut jumps, mut modes, mut surfaces) = (vec![], vec![], vec![]);
     let moves: HashSet<Node> = graph.reachable(&roots[..moving]).into_iter().collect();
     for node in graph.reachable(roots) {
         let Some(operation) = Operation::of(graph, node).filter(|o| o.has_sides()) else {
@@ -254,27 +221,21 @@ fn state_events(
         }
         let quantity = operation.within(graph, &replaced).quantity(graph);
         let mode = graph.fresh(graph.render(node, SHOWN_OF_STATE)).node();
-        let place = match is_floor {
-            true => surfaces.counting(quantity),
-            false => surfaces.place(graph, quantity),
-        };
+        let place = place_of(graph, &mut surfaces, quantity, is_floor);
         jumps.push(Jump::new(place, operation.values()));
         modes.push(mode);
         replaced.insert(node, mode);
     }
-    if jumps.is_empty() {
-        return None;
-    }
     // a kink on a surface that is located is smooth on each side, and no step is rejected for it
     for node in graph.reachable(roots) {
-        let Some(operation) = Operation::of(graph, node) else {
+        let Some(operation) = Operation::of(graph, node).filter(|_| !surfaces.is_empty()) else {
             continue;
         };
         let operation = operation.within(graph, &replaced);
         let Some([above, below]) = operation.branches(graph) else {
             continue;
         };
-        let Some(place) = surfaces.known(graph, operation.quantity(graph)) else {
+        let Some(place) = known_place(graph, &surfaces, operation.quantity(graph)) else {
             continue;
         };
         let mode = graph.fresh(graph.render(node, SHOWN_OF_STATE)).node();
@@ -282,22 +243,12 @@ fn state_events(
         modes.push(mode);
         replaced.insert(node, graph.select(mode, above, below));
     }
-    let names = surfaces.nodes.iter().zip(&surfaces.counts);
-    let name = |(&quantity, &counts): (&Node, &bool)| {
-        let level = if counts { "a whole number" } else { "0" };
-        format!("{} = {level}", graph.render(quantity, SHOWN_OF_STATE))
-    };
-    let names = names.map(name).collect();
-    let taken = Taken {
-        roots: graph.substitute(roots, &replaced),
-        modes,
-        events: Jumps::new(jumps, names, surfaces.counts),
-    };
-    Some((taken, surfaces.nodes))
+    let roots = graph.substitute(roots, &replaced);
+    (Taken { roots, modes }, jumps, surfaces)
 }
 
 /// What vanishes where one of the roots bends with one of `inputs`, each once.
-fn bends(graph: &Graph, inputs: &[Node], roots: &[Node]) -> Vec<Node> {
+pub(crate) fn bends(graph: &Graph, inputs: &[Node], roots: &[Node]) -> Vec<Node> {
     let mut found = vec![];
     for node in graph.reachable(roots) {
         let bends = Operation::of(graph, node).filter(|o| !o.jumps());
@@ -316,40 +267,46 @@ fn depends(graph: &Graph, node: Node, inputs: &[Node]) -> bool {
     graph.symbols_of(&[node]).iter().any(|s| inputs.contains(s))
 }
 
-impl Surfaces {
-    /// The place of a surface, and whether it stands there with the other sign; a new one where it
-    /// is none yet.
-    fn place(&mut self, graph: &Graph, quantity: Node) -> (usize, bool) {
-        self.known(graph, quantity).unwrap_or_else(|| {
-            let (quantity, is_reversed) = bare(graph, quantity);
-            self.nodes.push(quantity);
-            self.counts.push(false);
-            (self.nodes.len() - 1, is_reversed)
-        })
+/// The place of a surface, and whether it stands there with the other sign; a new one where it is none
+/// yet. Where the quantity counts two new ones, for the whole numbers that it meets next: the first.
+fn place_of(
+    graph: &Graph,
+    surfaces: &mut Vec<Surface>,
+    quantity: Node,
+    counts: bool,
+) -> (usize, bool) {
+    if let Some(known) = known_place(graph, surfaces, quantity).filter(|_| !counts) {
+        return known;
     }
+    let (node, is_reversed) = match counts {
+        true => (quantity, false),
+        false => bare(graph, quantity),
+    };
+    let level = if counts { "a whole number" } else { "0" };
+    let surface = Surface {
+        node,
+        name: format!("{} = {level}", graph.render(node, SHOWN_OF_STATE)),
+        counts,
+    };
+    let place = surfaces.len();
+    surfaces.resize(place + if counts { 2 } else { 1 }, surface);
+    (place, is_reversed)
+}
 
-    /// Two new ones, for the whole numbers that a quantity meets next; the place of the first.
-    fn counting(&mut self, quantity: Node) -> (usize, bool) {
-        self.nodes.extend([quantity, quantity]);
-        self.counts.extend([true, true]);
-        (self.nodes.len() - 2, false)
-    }
-
-    fn known(&self, graph: &Graph, quantity: Node) -> Option<(usize, bool)> {
-        let (quantity, is_reversed) = bare(graph, quantity);
-        let known = |sought: Node| {
-            let mut all = self.nodes.iter().zip(&self.counts);
-            all.position(|(&known, counts)| known == sought && !counts)
-        };
-        let same = known(quantity).map(|surface| (surface, is_reversed));
-        same.or_else(|| match graph.op(quantity) {
-            Op::Binary(Binary::Sub, a, b) => {
-                let opposite = graph.binary(Binary::Sub, b, a);
-                known(opposite).map(|surface| (surface, !is_reversed))
-            }
-            _ => None,
-        })
-    }
+fn known_place(graph: &Graph, surfaces: &[Surface], quantity: Node) -> Option<(usize, bool)> {
+    let (quantity, is_reversed) = bare(graph, quantity);
+    let known = |sought: Node| {
+        let mut all = surfaces.iter();
+        all.position(|surface| surface.node == sought && !surface.counts)
+    };
+    let same = known(quantity).map(|surface| (surface, is_reversed));
+    same.or_else(|| match graph.op(quantity) {
+        Op::Binary(Binary::Sub, a, b) => {
+            let opposite = graph.binary(Binary::Sub, b, a);
+            known(opposite).map(|surface| (surface, !is_reversed))
+        }
+        _ => None,
+    })
 }
 
 /// A quantity without its constant factors, and whether they change its sign: multiples of one
@@ -389,9 +346,9 @@ mod tests {
         let g = Graph::new();
         let time = g.symbol("time");
         let root = build(time).node();
-        let mut extracted = time_events(&g, time.node(), &[root]).unwrap();
+        let (_, mut events) = time_events(&g, time.node(), &[root]).unwrap();
         let mut times = vec![];
-        extracted.events.instants(from, to, &mut times).unwrap();
+        events.instants(from, to, &mut times).unwrap();
         times.sort_unstable_by(f64::total_cmp);
         times
     }
@@ -440,7 +397,7 @@ mod tests {
         let g = Graph::new();
         let [time, x] = ["time", "x"].map(|name| g.symbol(name));
         let root = (x.less(time) + x.floor()).node();
-        let extracted = time_events(&g, time.node(), &[root]).unwrap();
+        let (extracted, _) = time_events(&g, time.node(), &[root]).unwrap();
         assert_eq!((extracted.modes.len(), extracted.roots), (0, vec![root]));
     }
 
@@ -450,7 +407,8 @@ mod tests {
         let time = g.symbol("time");
         let relation = time.less(g.constant(2.0));
         let taken = g.symbol("(time < 2)");
-        let extracted = time_events(&g, time.node(), &[(taken + relation).node()]).unwrap();
+        let root = (taken + relation).node();
+        let (extracted, _) = time_events(&g, time.node(), &[root]).unwrap();
         assert_ne!(extracted.modes[0], taken.node());
         let expected = (taken + g.expr(extracted.modes[0])).node();
         assert_eq!(extracted.roots, [expected]);

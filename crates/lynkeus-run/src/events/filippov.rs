@@ -34,7 +34,7 @@ const FASTER: f64 = 1.5;
 
 /// One operation that jumps on a surface.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Jump {
+pub(crate) struct Jump {
     surface: usize,
     /// its values where the function of the surface is negative, zero and positive; none for a
     /// `floor`, whose value is held
@@ -50,41 +50,22 @@ impl Jump {
         }
         Self { surface, values }
     }
-}
 
-/// The operations of a system that jump with its state.
-#[derive(Clone, Debug)]
-pub(crate) struct Jumps {
-    jumps: Vec<Jump>,
-    /// how the surfaces read
-    pub names: Vec<String>,
-    /// as of [`Surfaces`](super::Surfaces)
-    pub counts: Vec<bool>,
-}
-
-impl Jumps {
-    pub(super) fn new(jumps: Vec<Jump>, names: Vec<String>, counts: Vec<bool>) -> Self {
-        Self {
-            jumps,
-            names,
-            counts,
-        }
+    /// The same where its surfaces come after so many others.
+    pub fn after(self, surfaces: usize) -> Self {
+        let surface = self.surface + surfaces;
+        Self { surface, ..self }
     }
 
-    /// Writes the values of the operations on the given sides of the surfaces; of a `floor` its value
-    /// stands for the side. Returns the modes that are not theirs.
-    pub fn modes<'m>(&self, sides: &[f64], modes: &'m mut [f64]) -> &'m mut [f64] {
-        let (own, others) = modes.split_at_mut(self.jumps.len());
-        for (mode, jump) in own.iter_mut().zip(&self.jumps) {
-            let side = sides[jump.surface];
-            *mode = match jump.values {
-                None => side,
-                Some([below, ..]) if side < 0.0 => below,
-                Some([.., above]) if side > 0.0 => above,
-                Some([_, on, _]) => on,
-            };
+    /// Its value on the given sides of the surfaces; of a `floor` its value stands for the side.
+    pub fn value(&self, sides: &[f64]) -> f64 {
+        let side = sides[self.surface];
+        match self.values {
+            None => side,
+            Some([below, ..]) if side < 0.0 => below,
+            Some([.., above]) if side > 0.0 => above,
+            Some([_, on, _]) => on,
         }
-        others
     }
 }
 
@@ -156,7 +137,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     /// At the start of an interval of the given length; decides on which sides it starts.
     pub fn new(inner: &'a mut D, at: &'a mut Sides, (t, x): (f64, &[f64]), length: f64) -> Self {
         let guards = inner.events().and_then(|events| events.guards());
-        let count = guards.as_ref().map_or(0, |guards| guards.surfaces());
+        let count = guards.as_ref().map_or(0, |guards| guards.surfaces.len());
         at.fit(count);
         let mut system = Self {
             guards,
@@ -179,9 +160,10 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
 
     /// Whether the surface is one of two of a `floor`: the first one of them.
     fn pair(&self, i: usize) -> Option<usize> {
-        let counts = &self.guards.as_ref()?.counts;
-        let is_second = |i: usize| counts[..i].iter().filter(|&&c| c).count() % 2 == 1;
-        counts.get(i)?.then(|| i - usize::from(is_second(i)))
+        let surfaces = &self.guards.as_ref()?.surfaces;
+        let is_second = |i: usize| surfaces[..i].iter().filter(|s| s.counts).count() % 2 == 1;
+        let counts = surfaces.get(i)?.counts;
+        counts.then(|| i - usize::from(is_second(i)))
     }
 
     /// The first surface of each `floor`.
@@ -295,7 +277,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     pub fn busiest(&self) -> Option<String> {
         let passes = self.at.passes.iter().enumerate();
         let (i, count) = passes.max_by_key(|(_, count)| **count)?;
-        let name = self.guards.as_ref()?.names.get(i)?;
+        let name = &self.guards.as_ref()?.surfaces.get(i)?.name;
         (*count >= OFTEN).then(|| format!("{name} was passed {count} times; "))
     }
 
@@ -489,7 +471,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
             let over = guard.over(boxes);
             over.is_some_and(|[low, high]| !(low > 0.0 || high < 0.0))
         };
-        let surfaces = guards.surfaces.iter().enumerate();
+        let surfaces = guards.at_surfaces.iter().enumerate();
         let mut free = surfaces.filter(|(i, _)| !self.is_bound(*i));
         free.any(passes) || guards.bends.iter().any(bends)
     }
@@ -506,7 +488,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         let path: Vec<Poly> = path.collect();
         let shortest = SHORTEST.max(resolution(t + h) / h);
         let mut first = Ahead::Nothing;
-        for (i, guard) in guards.surfaces.iter().enumerate() {
+        for (i, guard) in guards.at_surfaces.iter().enumerate() {
             if self.is_bound(i) {
                 continue;
             }

@@ -25,6 +25,17 @@ pub(super) const SHORTEST: f64 = 1e-13;
 /// A bend this near to an end of a step is at the end.
 const AT_THE_END: f64 = 1e-9;
 
+/// A surface on which a right-hand side jumps.
+#[derive(Clone, Debug)]
+pub(crate) struct Surface {
+    /// what vanishes there
+    pub node: Node,
+    /// how it reads
+    pub name: String,
+    /// whether it is one of two on which a `floor` jumps: at even integers and, next, at odd ones
+    pub counts: bool,
+}
+
 /// Everything that is watched of a system, over the inputs of its code: time, states, and what
 /// [`Events::beside`](crate::Events::beside) tells of.
 #[derive(Debug, Default)]
@@ -33,23 +44,11 @@ pub struct Guards {
     states: usize,
     /// which inputs are read, in order
     reads: Vec<usize>,
+    pub(super) surfaces: Vec<Surface>,
     /// one for each surface
-    pub(super) surfaces: Vec<Guard>,
-    /// as of [`Surfaces`]
-    pub(super) names: Vec<String>,
-    pub(super) counts: Vec<bool>,
+    pub(super) at_surfaces: Vec<Guard>,
     /// where something bends and does not jump
     pub(super) bends: Vec<Guard>,
-}
-
-/// The surfaces on which a right-hand side jumps, by the nodes that vanish there.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Surfaces {
-    pub nodes: Vec<Node>,
-    /// how they read
-    pub names: Vec<String>,
-    /// the ones that are one of two on which a `floor` jumps: at even integers and, next, at odd ones
-    pub counts: Vec<bool>,
 }
 
 impl Guards {
@@ -59,13 +58,14 @@ impl Guards {
         graph: &Graph,
         inputs: &[Node],
         states: usize,
-        surfaces: Surfaces,
+        surfaces: &[Surface],
         bends: &[Node],
     ) -> Result<Option<Arc<Self>>, MissingInput> {
-        if surfaces.nodes.is_empty() && bends.is_empty() {
+        let at_surfaces: Vec<Node> = surfaces.iter().map(|surface| surface.node).collect();
+        let all = [&at_surfaces, bends].concat();
+        if all.is_empty() {
             return Ok(None);
         }
-        let all = [&surfaces.nodes, bends].concat();
         let symbols = graph.symbols_of(&all);
         let reads: Vec<usize> = (0..inputs.len())
             .filter(|&i| symbols.contains(&inputs[i]))
@@ -73,18 +73,12 @@ impl Guards {
         let guard = |&node: &Node| Guard::new(graph, inputs, &reads, node);
         let guards = |nodes: &[Node]| nodes.iter().map(guard).collect::<Result<_, _>>();
         Ok(Some(Arc::new(Self {
-            surfaces: guards(&surfaces.nodes)?,
-            names: surfaces.names,
-            counts: surfaces.counts,
+            at_surfaces: guards(&at_surfaces)?,
+            surfaces: surfaces.to_vec(),
             bends: guards(bends)?,
             states,
             reads,
         })))
-    }
-
-    /// How many surfaces there are.
-    pub fn surfaces(&self) -> usize {
-        self.surfaces.len()
     }
 
     /// What there is for each input that is read: for time, for a state, or for what is read beside

@@ -57,6 +57,11 @@ impl TimeEvents {
         }
     }
 
+    /// How many modes there are.
+    pub(crate) fn modes(&self) -> usize {
+        self.values.tape().outputs()
+    }
+
     /// Writes the modes' values at `t`.
     pub(crate) fn modes_at(&mut self, t: f64, modes: &mut [f64]) {
         if !modes.is_empty() {

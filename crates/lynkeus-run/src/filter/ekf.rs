@@ -9,13 +9,13 @@ use super::root::{Gain, Root, dot};
 use super::sensing::{Believed, Sensing};
 use super::smoother::Correction;
 use super::transition::{Propagation, Stage, push_carried};
+use crate::Evaluation;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::system::Driven;
 use crate::{Error, EstimatorSettings, Linearised};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Ekf {
-    pub driven: Driven,
+    pub driven: Evaluation,
     propagation: Propagation,
     /// x̂⁻
     x: Vec<f64>,
@@ -41,7 +41,7 @@ impl Ekf {
     ) -> Result<Self, Error> {
         let n = flow.system().states().len();
         Ok(Self {
-            driven: Driven::new(flow.system(), run.between),
+            driven: flow.system().driven(run.between),
             propagation: Propagation::new(flow, process_noise, run.method)?,
             x: vec![0.0; n],
             rows: vec![],
@@ -82,7 +82,7 @@ impl Ekf {
 }
 
 impl Kalman for Ekf {
-    fn driven(&mut self) -> &mut Driven {
+    fn driven(&mut self) -> &mut Evaluation {
         &mut self.driven
     }
 

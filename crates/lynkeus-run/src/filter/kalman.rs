@@ -4,13 +4,13 @@ use super::belief::Belief;
 use super::profile::Skyline;
 use super::sensing::Sensing;
 use crate::Error;
+use crate::Evaluation;
 use crate::snapshot::Persist;
-use crate::system::Driven;
 
 /// What the filters differ in.
 pub(crate) trait Kalman: Persist {
     /// The plant between samples.
-    fn driven(&mut self) -> &mut Driven;
+    fn driven(&mut self) -> &mut Evaluation;
 
     /// x̂⁻ and P⁻ at the next sample; where it is to be kept, the state-transition matrix is returned, which
     /// the smoother needs. A flow that fails leaves the belief as it was.

@@ -8,8 +8,8 @@ use super::root::{Factor, Root, dot, factor, substitute};
 use super::sensing::{Believed, Sensing};
 use super::smoother::Correction;
 use super::transition::Propagation;
+use crate::Evaluation;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::system::Driven;
 use crate::{Error, EstimatorSettings, Integrator};
 
 /// Images of two points that differ by no more than this share of their size do not differ.
@@ -80,7 +80,7 @@ impl SigmaPoints {
 /// The filter between its samples.
 #[derive(Clone, Debug)]
 pub(crate) struct Ukf {
-    pub driven: Driven,
+    pub driven: Evaluation,
     integrator: Integrator,
     weights: Weights,
     /// what the process noise comes to; none without noise
@@ -110,7 +110,7 @@ impl Ukf {
             false => None,
         };
         Ok(Self {
-            driven: Driven::new(model.flow.system(), run.between),
+            driven: model.flow.system().driven(run.between),
             integrator: Integrator::new(run.method, n)?,
             weights: points.weights(n)?,
             propagation,
@@ -252,7 +252,7 @@ impl Ukf {
 }
 
 impl Kalman for Ukf {
-    fn driven(&mut self) -> &mut Driven {
+    fn driven(&mut self) -> &mut Evaluation {
         &mut self.driven
     }
 

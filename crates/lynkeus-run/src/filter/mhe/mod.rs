@@ -24,8 +24,8 @@ use super::root::{Root, dot};
 use super::sensing::{Believed, Sensing};
 use super::smoother::{History, Step};
 use super::transition::Stage;
+use crate::Evaluation;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::system::Driven;
 use crate::{Error, EstimatorSettings};
 use quadratic::{Linear, Pass, Pin, Problem, Seen, Solution, carried, corrected};
 
@@ -60,7 +60,7 @@ impl Persist for Mhe {
         self.engine.walk(walk)?;
         self.prior.walk(walk)?;
         let states = self.bounds.len();
-        let inputs = self.engine.driven.evaluation.signals().len();
+        let inputs = self.engine.driven.signals().len();
         let count = walk.length(self.rows.len())?;
         self.rows.resize_with(count, Row::default);
         for row in &mut self.rows {
@@ -290,7 +290,7 @@ impl Mhe {
 }
 
 impl Kalman for Mhe {
-    fn driven(&mut self) -> &mut Driven {
+    fn driven(&mut self) -> &mut Evaluation {
         &mut self.engine.driven
     }
 

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::series::Transition;
+use crate::Evaluation;
 use crate::filter::profile::Profile;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::system::Driven;
 use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place, Slopes};
 
 /// x̂, Φ and W by one integration, for flows with few states.
@@ -46,7 +46,7 @@ impl Joint {
     /// Takes `x` to the next sample and writes Φ and W.
     pub fn advance(
         &mut self,
-        driven: &mut Driven,
+        driven: &mut Evaluation,
         from: f64,
         to: f64,
         x: &mut [f64],
@@ -91,7 +91,7 @@ impl Persist for Joint {
 /// rows of (Φ W); W is left out where Q = 0. q is the largest entry of Q: tolerances then see
 /// W in units of time.
 struct Variational<'a> {
-    driven: &'a mut Driven,
+    driven: &'a mut Evaluation,
     entries: &'a [(usize, usize)],
     /// values of the entries of F
     slopes: &'a mut [f64],
@@ -131,7 +131,7 @@ impl Dynamics for Variational<'_> {
         let (x, rows) = z.split_at(n);
         let (dx, drows) = dz.split_at_mut(n);
         self.driven.derivatives(t, x, dx);
-        self.driven.evaluation.outputs(t, x, self.slopes);
+        self.driven.outputs(t, x, self.slopes);
         drows.fill(0.0);
         for (&(i, j), slope) in self.entries.iter().zip(&*self.slopes) {
             let into = &mut drows[i * width..(i + 1) * width];
@@ -157,7 +157,7 @@ impl Dynamics for Variational<'_> {
         if !(self.driven).output_slopes(t, &z[..n], &mut self.curvature.second) {
             return false;
         }
-        self.driven.evaluation.outputs(t, &z[..n], self.slopes);
+        self.driven.outputs(t, &z[..n], self.slopes);
         let layout = Layout { n, width };
         self.curvature
             .write(layout, self.entries, self.slopes, z, slopes);
@@ -296,7 +296,7 @@ mod tests {
         let signals = [("w".to_owned(), w.node())];
         let flow = Linearised::flow(&g, time.node(), &states, &signals, &derivatives).unwrap();
         let entries = flow.jacobians().state.places();
-        let mut driven = Driven::new(flow.system(), BetweenSamples::Hold);
+        let mut driven = flow.system().driven(BetweenSamples::Hold);
         driven.start(&[0.7]);
         for noise in [vec![], vec![0.3, 1.0, 0.5]] {
             let mut linearised = Variational {

@@ -10,8 +10,8 @@ use std::sync::Arc;
 use super::belief::Belief;
 use super::profile::{Profile, Skyline};
 use super::root::{Factor, Root, dot};
+use crate::Evaluation;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::system::Driven;
 use crate::{Error, Linearised, Method, Step};
 use joint::Joint;
 use piecewise::Piecewise;
@@ -59,7 +59,7 @@ impl Propagation {
     /// Takes `x` to the next sample, from the belief's estimate.
     pub fn advance(
         &mut self,
-        driven: &mut Driven,
+        driven: &mut Evaluation,
         belief: &Belief,
         from: f64,
         to: f64,
