@@ -267,19 +267,9 @@ impl Loop {
         (names, &x[self.wiring.plant.states().len()..])
     }
 
-    /// Draws the next noise sample.
-    pub(crate) fn draw(&mut self) {
-        self.sensors.draw();
-        self.disturb();
-    }
-
-    /// Draws what moves the states, between two samples.
-    pub(crate) fn stir(&mut self) {
-        self.sensors.stir();
-        self.disturb();
-    }
-
-    fn disturb(&mut self) {
+    /// Draws what moves the states, and the next noise sample, if it is time.
+    pub(crate) fn draw(&mut self, is_sample: bool) {
+        self.sensors.draw(is_sample);
         let signals = self.joined.signals_mut().iter_mut();
         for (signal, value) in signals.zip(self.sensors.disturbances()) {
             *signal = value;

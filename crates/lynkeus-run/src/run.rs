@@ -113,8 +113,7 @@ impl Run {
         let mut made = 0_usize;
         while let Some(stop) = self.itinerary.next() {
             match stop {
-                Stop::Draw => self.system.draw(),
-                Stop::Stir => self.system.stir(),
+                Stop::Draw { is_sample } => self.system.draw(is_sample),
                 Stop::Advance { from, to } => {
                     let done = self
                         .integrator
@@ -155,10 +154,8 @@ const MOST_CELLS: f64 = 4e8;
 /// What a simulation does next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Stop {
-    /// the next noise sample is drawn
-    Draw,
-    /// what moves the states is drawn anew, between two samples
-    Stir,
+    /// what moves the states is drawn anew, and at a sample all noise
+    Draw { is_sample: bool },
     /// time goes on
     Advance { from: f64, to: f64 },
     /// a row is recorded
@@ -259,8 +256,7 @@ impl Itinerary {
 
     fn draw(&mut self) {
         let is_sample = self.drawn.is_multiple_of(self.draws);
-        let stop = if is_sample { Stop::Draw } else { Stop::Stir };
-        self.planned.push_back(stop);
+        self.planned.push_back(Stop::Draw { is_sample });
         self.drawn += 1;
     }
 
@@ -358,47 +354,38 @@ const DECIMALS: i32 = 15;
 /// The times start + k·step. Where both are decimal numbers, as 0.05, each time is the number
 /// nearest to the decimal one: the third is 0.15 and not 0.15000000000000002.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Grid {
-    start: f64,
-    step: f64,
-    decimal: Option<Decimal>,
-}
-
-/// Start and step in units of 1/scale.
-#[derive(Clone, Copy, Debug)]
-struct Decimal {
-    start: i64,
-    step: i64,
-    scale: i64,
+pub(crate) enum Grid {
+    /// start and step in units of 1/scale
+    Decimal { start: i64, step: i64, scale: i64 },
+    /// no decimal numbers
+    Binary { start: f64, step: f64 },
 }
 
 impl Grid {
     pub(crate) fn new(start: f64, step: f64) -> Self {
-        let scales = (0..=DECIMALS).map(|e| 10_i64.pow(e.unsigned_abs()));
-        let units = |scale: i64| {
-            Some(Decimal {
-                start: whole(start, scale)?,
-                step: whole(step, scale)?,
-                scale,
-            })
-        };
-        Self {
-            start,
-            step,
-            decimal: scales.into_iter().find_map(units),
-        }
+        let mut scales = (0..=DECIMALS).map(|e| 10_i64.pow(e.unsigned_abs()));
+        let decimal = scales.find_map(|scale| {
+            let (start, step) = (whole(start, scale)?, whole(step, scale)?);
+            Some(Self::Decimal { start, step, scale })
+        });
+        decimal.unwrap_or(Self::Binary { start, step })
     }
 
     /// Time `k`.
     pub(crate) fn time(&self, k: usize) -> f64 {
-        let decimal = |d: Decimal| {
-            let steps = i64::try_from(k).ok()?.checked_mul(d.step)?;
-            let units = steps.checked_add(d.start)?;
-            // both are exact, so the quotient is rounded once
-            (units.abs() < EXACT).then(|| units as f64 / d.scale as f64)
+        let (start, step) = match *self {
+            Self::Binary { start, step } => (start, step),
+            Self::Decimal { start, step, scale } => {
+                let steps = i64::try_from(k).ok().and_then(|k| k.checked_mul(step));
+                let units = steps.and_then(|steps| steps.checked_add(start));
+                // both are exact, so the quotient is rounded once
+                if let Some(units) = units.filter(|units| units.abs() < EXACT) {
+                    return units as f64 / scale as f64;
+                }
+                (start as f64 / scale as f64, step as f64 / scale as f64)
+            }
         };
-        let exact = self.decimal.and_then(decimal);
-        exact.unwrap_or(self.start + k as f64 * self.step)
+        start + k as f64 * step
     }
 }
 

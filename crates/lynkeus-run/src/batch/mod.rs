@@ -101,7 +101,7 @@ impl Batch {
     /// in their own way.
     #[must_use]
     pub fn is_exact(&self) -> bool {
-        !self.program.step.has_functions() && !self.program.row.has_functions()
+        !self.program.step.has_functions && !self.program.row.has_functions
     }
 
     /// Number of rows of every run.

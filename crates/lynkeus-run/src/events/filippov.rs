@@ -129,6 +129,8 @@ pub(crate) struct Filippov<'a, D: Dynamics> {
     /// parts of the other side's right-hand side, of each surface that is slid along
     parts: Vec<f64>,
     values: Vec<f64>,
+    /// the first of the two surfaces of each `floor`
+    pairs: Vec<usize>,
     /// what is watched over a step
     guards: Option<Arc<Guards>>,
 }
@@ -137,9 +139,12 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     /// At the start of an interval of the given length; decides on which sides it starts.
     pub fn new(inner: &'a mut D, at: &'a mut Sides, (t, x): (f64, &[f64]), length: f64) -> Self {
         let guards = inner.events().and_then(|events| events.guards());
-        let count = guards.as_ref().map_or(0, |guards| guards.surfaces.len());
+        let surfaces = guards.iter().flat_map(|guards| &guards.surfaces);
+        let counting = surfaces.clone().enumerate().filter(|(_, s)| s.counts);
+        let count = surfaces.count();
         at.fit(count);
         let mut system = Self {
+            pairs: counting.map(|(i, _)| i).step_by(2).collect(),
             guards,
             inner,
             at,
@@ -156,21 +161,6 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     /// Whether nothing jumps with the state.
     pub fn is_plain(&self) -> bool {
         self.values.is_empty()
-    }
-
-    /// Whether the surface is one of two of a `floor`: the first one of them.
-    fn pair(&self, i: usize) -> Option<usize> {
-        let surfaces = &self.guards.as_ref()?.surfaces;
-        let is_second = |i: usize| surfaces[..i].iter().filter(|s| s.counts).count() % 2 == 1;
-        let counts = surfaces.get(i)?.counts;
-        counts.then(|| i - usize::from(is_second(i)))
-    }
-
-    /// The first surface of each `floor`.
-    fn pairs(&self) -> Vec<usize> {
-        (0..self.values.len())
-            .filter(|&i| self.pair(i) == Some(i))
-            .collect()
     }
 
     /// What a `floor` is on the sides of its two surfaces.
@@ -197,7 +187,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
 
     /// Carries the surfaces of a `floor` along where both were passed.
     fn carry(&mut self) {
-        for first in self.pairs() {
+        for first in self.pairs.clone() {
             let (levels, sides) = (&mut self.at.levels, &mut self.at.sides);
             let (low, high) = match levels[first] < levels[first + 1] {
                 true => (first, first + 1),
@@ -213,59 +203,55 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
 
     /// Tells the system on which sides it is.
     fn hold(&mut self) {
-        let pairs = self.pairs();
-        if pairs.is_empty() {
+        if self.pairs.is_empty() {
             return tell(self.inner, Some(&self.at.sides));
         }
         let mut sides = self.at.sides.clone();
-        for first in pairs {
+        for &first in &self.pairs {
             sides[first..first + 2].fill(self.floor(first));
         }
         tell(self.inner, Some(&sides));
     }
 
-    /// Reads the functions of the surfaces, against what they are there.
-    fn read(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+    /// The functions of the surfaces, against what they are there.
+    fn read(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
+        let mut values = vec![0.0; self.parts.len()];
         if let Some(events) = self.inner.events() {
-            events.indicators(t, x, values);
+            events.indicators(t, x, &mut values);
         }
         for (value, level) in values.iter_mut().zip(&self.at.levels) {
             *value -= level;
         }
+        values
     }
 
     /// Reads the functions of the surfaces, and remembers how large they were.
     fn look(&mut self, t: f64, x: &[f64]) {
-        let mut values = std::mem::take(&mut self.values);
-        self.read(t, x, &mut values);
-        self.values = values;
+        self.values = self.read(t, x);
         for (largest, value) in self.at.largest.iter_mut().zip(&self.values) {
             *largest = largest.max(value.abs());
         }
     }
 
     /// How far each surface is from changing what holds; negative beyond.
-    pub fn margins(&mut self, t: f64, x: &[f64], margins: &mut Vec<f64>) {
-        margins.clear();
-        if self.is_plain() {
-            return;
-        }
+    pub fn margins(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
         if self.at.sliding.contains(&true) {
             let mut dx = vec![0.0; x.len()];
             self.derivatives(t, x, &mut dx);
         }
         self.look(t, x);
-        for (i, value) in self.values.iter().enumerate() {
-            margins.push(match self.at.sliding[i] {
-                true => self.parts[i].min(1.0 - self.parts[i]),
-                false if self.at.sides[i] == 0.0 => -value.abs(),
-                false => self.at.sides[i] * value,
-            });
-        }
+        let margin = |(i, value): (usize, &f64)| match self.at.sliding[i] {
+            true => self.parts[i].min(1.0 - self.parts[i]),
+            false if self.at.sides[i] == 0.0 => -value.abs(),
+            false => self.at.sides[i] * value,
+        };
+        self.values.iter().enumerate().map(margin).collect()
     }
 
-    /// A branch need have no value beyond its side: f as the state says, then.
-    fn mend(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
+    /// f on the sides that are held. A branch need have no value beyond its side: as the state says,
+    /// then.
+    fn on_sides(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
+        self.inner.derivatives(t, x, dx);
         if !self.is_plain() && !dx.iter().all(|v| v.is_finite()) {
             tell(self.inner, None);
             self.inner.derivatives(t, x, dx);
@@ -317,7 +303,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
 
     /// Puts the surfaces of each `floor` around where the state is: one may be within another.
     fn encounter(&mut self, t: f64, x: &[f64]) {
-        for first in self.pairs() {
+        for first in self.pairs.clone() {
             self.hold();
             self.look(t, x);
             let value = self.values[first] + self.at.levels[first];
@@ -368,7 +354,8 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
             let mut changed = false;
             for i in off.into_iter().filter(|&i| !reached[i]) {
                 self.at.sliding[i] = false;
-                match self.pair(i) {
+                let mut pairs = self.pairs.iter().copied();
+                match pairs.find(|&first| i == first || i == first + 1) {
                     Some(first) => {
                         let value = self.values[i] + self.at.levels[i];
                         self.surround(first, value);
@@ -532,9 +519,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         let step = (1e-5 * self.length).min(stays);
         let mut at = |step: f64| {
             let moved: Vec<f64> = x.iter().zip(dx).map(|(x, dx)| x + step * dx).collect();
-            let mut values = vec![0.0; self.parts.len()];
-            self.read(t + step, &moved, &mut values);
-            values
+            self.read(t + step, &moved)
         };
         let (after, before) = (at(step), at(-step));
         let speed = |(after, before): (&f64, &f64)| (after - before) / (2.0 * step);
@@ -547,8 +532,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         let along: Vec<usize> = (0..self.parts.len())
             .filter(|&i| self.at.sliding[i])
             .collect();
-        self.inner.derivatives(t, x, dx);
-        self.mend(t, x, dx);
+        self.on_sides(t, x, dx);
         let here = self.speeds(t, x, dx);
         let mut others = vec![];
         let mut matrix = DMatrix::zeros(along.len(), along.len());
@@ -556,8 +540,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
             let mut other = vec![0.0; x.len()];
             let sides = self.at.sides.clone();
             self.turn(i, t, x);
-            self.inner.derivatives(t, x, &mut other);
-            self.mend(t, x, &mut other);
+            self.on_sides(t, x, &mut other);
             let there = self.speeds(t, x, &other);
             self.at.sides.copy_from_slice(&sides);
             self.hold();
@@ -585,17 +568,14 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     /// The other side of a surface that is slid along, and of those that jump with it.
     fn turn(&mut self, i: usize, t: f64, x: &[f64]) {
         let count = self.parts.len();
-        let [mut before, mut after] = [vec![0.0; count], vec![0.0; count]];
-        let is_alone = count == 1;
-        if !is_alone {
-            self.read(t, x, &mut before);
-        }
+        // surfaces jump with another one only where there is one
+        let before = (count > 1).then(|| self.read(t, x));
         self.at.sides[i] = -self.at.sides[i];
         self.hold();
-        if is_alone {
+        let Some(before) = before else {
             return;
-        }
-        self.read(t, x, &mut after);
+        };
+        let after = self.read(t, x);
         for j in (0..count).filter(|&j| !self.at.sliding[j]) {
             if before[j] * after[j] < 0.0 {
                 self.at.sides[j] = -self.at.sides[j];
@@ -622,8 +602,7 @@ impl<D: Dynamics> Dynamics for Filippov<'_, D> {
         if self.at.sliding.contains(&true) {
             return self.slide(t, x, dx);
         }
-        self.inner.derivatives(t, x, dx);
-        self.mend(t, x, dx);
+        self.on_sides(t, x, dx);
     }
 
     /// How the parts of both sides change along a surface is not known.

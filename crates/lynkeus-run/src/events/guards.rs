@@ -103,17 +103,11 @@ impl Guards {
 pub(super) struct Guard {
     /// places among what is read
     reads: Vec<usize>,
-    form: Form,
-}
-
-#[derive(Debug)]
-enum Form {
-    /// a constant and the weights of what is read
-    Affine(f64, Vec<f64>),
-    /// has slopes everywhere, but for bends
-    Smooth(Tape),
-    /// may jump
-    Any(Tape),
+    tape: Tape,
+    /// a constant and the weights of what is read, where that is all
+    affine: Option<(f64, Vec<f64>)>,
+    /// nothing in it jumps: it has slopes everywhere, but for bends
+    has_slopes: bool,
 }
 
 impl Guard {
@@ -145,56 +139,55 @@ impl Guard {
                     | Op::Binary(Binary::And | Binary::Or, ..)
             )
         };
-        let operations: Vec<Op> = graph
-            .reachable(&[node])
-            .iter()
-            .map(|&n| graph.op(n))
-            .collect();
-        let form = match () {
-            () if operations.iter().any(|&op| jumps(op)) => Form::Any(tape),
-            () if operations.iter().any(|&op| chooses(op)) => Form::Smooth(tape),
-            () => match weights(graph, &read, node) {
-                Some(weights) => Form::Affine(point(&tape, &vec![0.0; read.len()]), weights),
-                None => Form::Smooth(tape),
-            },
-        };
-        Ok(Self { reads, form })
+        let operations = graph.reachable(&[node]).into_iter().map(|n| graph.op(n));
+        let operations: Vec<Op> = operations.collect();
+        let has_slopes = !operations.iter().any(|&op| jumps(op));
+        let is_plain = has_slopes && !operations.iter().any(|&op| chooses(op));
+        let weights = is_plain.then(|| weights(graph, &read, node)).flatten();
+        Ok(Self {
+            affine: weights.map(|weights| (point(&tape, &vec![0.0; read.len()]), weights)),
+            reads,
+            tape,
+            has_slopes,
+        })
     }
 
     /// An enclosure for what is read in such boxes (centre and radius of each).
     pub fn over(&self, boxes: &[[f64; 2]]) -> Option<[f64; 2]> {
-        match &self.form {
-            Form::Affine(constant, weights) => {
-                let (mut middle, mut radius, mut size) = (*constant, 0.0, constant.abs());
-                for (&i, weight) in self.reads.iter().zip(weights) {
-                    let [centre, reach] = boxes[i];
-                    middle += weight * centre;
-                    radius += weight.abs() * reach;
-                    size += (weight * centre).abs();
-                }
-                let radius = radius + 8.0 * f64::EPSILON * size;
-                Some([middle - radius, middle + radius])
-            }
-            Form::Smooth(tape) | Form::Any(tape) => {
-                let read = self.reads.iter().map(|&i| {
-                    let [centre, reach] = boxes[i];
-                    interval(centre - reach, centre + reach)
-                });
-                let read: Vec<Interval> = read.collect();
-                bounds(tape.eval_in(&Intervals, &read)[0])
-            }
+        let Some((constant, weights)) = &self.affine else {
+            let read = self.reads.iter().map(|&i| {
+                let [centre, reach] = boxes[i];
+                interval(centre - reach, centre + reach)
+            });
+            let read: Vec<Interval> = read.collect();
+            return bounds(self.tape.eval_in(&Intervals, &read)[0]);
+        };
+        let (mut middle, mut radius, mut size) = (*constant, 0.0, constant.abs());
+        for (&i, weight) in self.reads.iter().zip(weights) {
+            let [centre, reach] = boxes[i];
+            middle += weight * centre;
+            radius += weight.abs() * reach;
+            size += (weight * centre).abs();
         }
+        let radius = radius + 8.0 * f64::EPSILON * size;
+        Some([middle - radius, middle + radius])
     }
 
-    /// The function along a path, what the guards read as polynomials.
-    fn along<'a>(&'a self, path: &'a [Poly]) -> Along<'a> {
-        match &self.form {
-            Form::Affine(constant, weights) => {
-                let parts = self.reads.iter().map(|&i| &path[i]).zip(weights);
-                Along::Polynomial(Poly::combined(*constant, parts))
-            }
-            Form::Smooth(tape) => Along::Code(self, tape, path, true),
-            Form::Any(tape) => Along::Code(self, tape, path, false),
+    /// The function along a path, what the guards read as polynomials: for the search for where it
+    /// leaves a side.
+    fn along<'a>(&'a self, path: &'a [Poly], shortest: f64) -> Search<'a> {
+        let polynomial = self.affine.as_ref().map(|(constant, weights)| {
+            let parts = self.reads.iter().map(|&i| &path[i]).zip(weights);
+            Poly::combined(*constant, parts)
+        });
+        Search {
+            guard: self,
+            path,
+            polynomial,
+            side: 1.0,
+            level: 0.0,
+            band: 0.0,
+            shortest,
         }
     }
 
@@ -209,19 +202,18 @@ impl Guard {
         limit: f64,
     ) -> Ahead {
         let search = Search {
-            along: self.along(path),
             side,
             level,
             band,
-            shortest,
+            ..self.along(path, shortest)
         };
         search.first(0.0, limit)
     }
 
     /// Where something bends first, before `limit`.
     pub fn bend(&self, path: &[Poly], shortest: f64, limit: f64) -> Option<f64> {
-        let along = self.along(path);
-        let [a, b] = [0.0, 1.0].map(|s| along.at(s).abs());
+        let along = self.along(path, shortest);
+        let [a, b] = [0.0, 1.0].map(|s| along.value(s).abs());
         let band = 1e-13 * a.max(b);
         // where a step begins at a bend what follows tells the side
         let from = if a <= 1e-10 * a.max(b) {
@@ -229,13 +221,11 @@ impl Guard {
         } else {
             0.0
         };
-        let side = if along.at(from) < 0.0 { -1.0 } else { 1.0 };
+        let side = if along.value(from) < 0.0 { -1.0 } else { 1.0 };
         let search = Search {
-            along,
             side,
-            level: 0.0,
             band,
-            shortest,
+            ..along
         };
         let at = search.first(from, limit).at();
         (at > AT_THE_END && at < 1.0 - AT_THE_END).then_some(at)
@@ -256,68 +246,13 @@ fn point(tape: &Tape, read: &[f64]) -> f64 {
 }
 
 /// [a, b], or every number where that is none.
-fn interval(a: f64, b: f64) -> Interval {
+pub(super) fn interval(a: f64, b: f64) -> Interval {
     Interval::new(a, b).unwrap_or(Interval::ENTIRE)
 }
 
 /// The ends of an enclosure of the values that there are; none where there is no value.
 fn bounds(value: Interval) -> Option<[f64; 2]> {
     (!value.is_empty()).then(|| [value.lo(), value.hi()])
-}
-
-/// A function along a path, of the part of it that is done.
-enum Along<'a> {
-    Polynomial(Poly),
-    /// the last: slopes are those of the function
-    Code(&'a Guard, &'a Tape, &'a [Poly], bool),
-}
-
-impl Along<'_> {
-    /// The value where a part of the path is done.
-    fn at(&self, part: f64) -> f64 {
-        match self {
-            Self::Polynomial(p) => p.at(part),
-            Self::Code(guard, tape, path, _) => {
-                let read: Vec<f64> = guard.reads.iter().map(|&i| path[i].at(part)).collect();
-                point(tape, &read)
-            }
-        }
-    }
-
-    /// An enclosure of the values over a stretch.
-    fn range(&self, stretch: Stretch) -> Option<[f64; 2]> {
-        match self {
-            Self::Polynomial(p) => Some(p.range(stretch)),
-            Self::Code(guard, tape, path, _) => {
-                let read = guard.reads.iter().map(|&i| path[i].range(stretch));
-                let read: Vec<Interval> = read.map(|[a, b]| interval(a, b)).collect();
-                bounds(tape.eval_in(&Intervals, &read)[0])
-            }
-        }
-    }
-
-    /// An enclosure of the slopes over a stretch, where there are some.
-    fn slope(&self, stretch: Stretch) -> Option<[f64; 2]> {
-        match self {
-            Self::Polynomial(p) => Some(p.slope(stretch)),
-            Self::Code(_, _, _, false) => None,
-            Self::Code(guard, tape, path, true) => {
-                let jet = |&i: &usize| {
-                    let (value, slope) = (path[i].range(stretch), path[i].slope(stretch));
-                    [value, slope].map(|[a, b]| interval(a, b)).to_vec()
-                };
-                let read: Vec<Vec<Interval>> = guard.reads.iter().map(jet).collect();
-                let jets = Jets {
-                    inner: &Intervals,
-                    order: 1,
-                };
-                let series = tape.eval_in(&jets, &read).swap_remove(0);
-                let slope = series.get(1).copied().unwrap_or(Interval::ZERO);
-                // one end of it where the function has no value everywhere
-                slope.is_defined().then(|| [slope.lo(), slope.hi()])
-            }
-        }
-    }
 }
 
 /// What comes first in a step, in parts of it.
@@ -344,9 +279,12 @@ impl Ahead {
     }
 }
 
-/// The search for where a function leaves its side.
+/// A function along a path, of the part of it that is done, and the search for where it leaves its side.
 struct Search<'a> {
-    along: Along<'a>,
+    guard: &'a Guard,
+    path: &'a [Poly],
+    /// the function, where it is affine
+    polynomial: Option<Poly>,
     side: f64,
     level: f64,
     /// nobody asks which side it is so close
@@ -355,8 +293,51 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// The value where a part of the path is done.
+    fn value(&self, part: f64) -> f64 {
+        if let Some(polynomial) = &self.polynomial {
+            return polynomial.at(part);
+        }
+        let read = self.guard.reads.iter().map(|&i| self.path[i].at(part));
+        point(&self.guard.tape, &read.collect::<Vec<f64>>())
+    }
+
+    /// An enclosure of the values over a stretch.
+    fn range(&self, stretch: Stretch) -> Option<[f64; 2]> {
+        if let Some(polynomial) = &self.polynomial {
+            return Some(polynomial.range(stretch));
+        }
+        let read = self.guard.reads.iter();
+        let read = read.map(|&i| self.path[i].range(stretch));
+        let read: Vec<Interval> = read.map(|[a, b]| interval(a, b)).collect();
+        bounds(self.guard.tape.eval_in(&Intervals, &read)[0])
+    }
+
+    /// An enclosure of the slopes over a stretch, where there are some.
+    fn slope(&self, stretch: Stretch) -> Option<[f64; 2]> {
+        if let Some(polynomial) = &self.polynomial {
+            return Some(polynomial.slope(stretch));
+        }
+        if !self.guard.has_slopes {
+            return None;
+        }
+        let jet = |&i: &usize| {
+            let (value, slope) = (self.path[i].range(stretch), self.path[i].slope(stretch));
+            [value, slope].map(|[a, b]| interval(a, b)).to_vec()
+        };
+        let read: Vec<Vec<Interval>> = self.guard.reads.iter().map(jet).collect();
+        let jets = Jets {
+            inner: &Intervals,
+            order: 1,
+        };
+        let series = self.guard.tape.eval_in(&jets, &read).swap_remove(0);
+        let slope = series.get(1).copied().unwrap_or(Interval::ZERO);
+        // one end of it where the function has no value everywhere
+        slope.is_defined().then(|| [slope.lo(), slope.hi()])
+    }
+
     fn margin(&self, s: f64) -> f64 {
-        self.side * (self.along.at(s) - self.level)
+        self.side * (self.value(s) - self.level)
     }
 
     /// Bounds of the margin, from those of the function.
@@ -380,12 +361,9 @@ impl Search<'_> {
                 return Ahead::Nothing;
             };
             match self.look(Stretch { from, to }) {
-                Look::Clear => {}
-                Look::Beyond(beyond) => {
-                    let at = self.root(0.0, beyond);
-                    return Ahead::Jump { at, beyond };
-                }
-                Look::Open => {
+                Some(Ahead::Nothing) => {}
+                Some(found) => return found,
+                None => {
                     let middle = 0.5 * (from + to);
                     left.extend([(middle, to), (from, middle)]);
                 }
@@ -395,49 +373,55 @@ impl Search<'_> {
             None => Ahead::Nothing,
             // so far nothing is passed: the next step goes on from there
             Some((at, _)) if at - from > USEFUL * (limit - from) => Ahead::Stop { at },
-            Some((at, _)) => self.sampled(at, limit),
+            Some((from, _)) => self.sampled(from, limit),
         }
     }
 
     /// Of what cannot be enclosed, as an algebraic loop that is searched, samples tell.
     fn sampled(&self, from: f64, to: f64) -> Ahead {
         let samples = (1..=SAMPLES).map(|k| from + (to - from) * k as f64 / SAMPLES as f64);
-        let mut passed = samples.filter(|&s| self.margin(s) < -self.band);
-        passed.next().map_or(Ahead::Nothing, |beyond| Ahead::Jump {
-            at: self.root(0.0, beyond),
-            beyond,
-        })
+        let mut looks = samples.map(|s| self.at(s));
+        looks
+            .find(|at| *at != Ahead::Nothing)
+            .unwrap_or(Ahead::Nothing)
     }
 
-    fn look(&self, stretch: Stretch) -> Look {
+    /// What the value at one place tells.
+    fn at(&self, s: f64) -> Ahead {
+        match self.margin(s) < -self.band {
+            true => self.jump(s),
+            false => Ahead::Nothing,
+        }
+    }
+
+    /// The passage before `beyond`.
+    fn jump(&self, beyond: f64) -> Ahead {
+        let at = self.root(0.0, beyond);
+        Ahead::Jump { at, beyond }
+    }
+
+    /// What is passed over a stretch, the first such thing; none where that is open.
+    fn look(&self, stretch: Stretch) -> Option<Ahead> {
         let Stretch { from, to } = stretch;
         let is_short = to - from <= self.shortest;
-        let sampled = |s: f64| match self.margin(s) < -self.band {
-            true => Look::Beyond(s),
-            false => Look::Clear,
-        };
-        match self.along.range(stretch).map(|r| self.margins(r)) {
+        match self.range(stretch).map(|r| self.margins(r)) {
             // no value anywhere
-            None => return Look::Clear,
-            Some([low, _]) if low >= -self.band => return Look::Clear,
-            Some([_, high]) if high < -self.band => return Look::Beyond(to),
-            _ if is_short => return sampled(stretch.middle()),
+            None => return Some(Ahead::Nothing),
+            Some([low, _]) if low >= -self.band => return Some(Ahead::Nothing),
+            Some([_, high]) if high < -self.band => return Some(self.jump(to)),
+            _ if is_short => return Some(self.at(stretch.middle())),
             _ => {}
         }
-        let Some([least, most]) = self.along.slope(stretch) else {
-            return Look::Open;
-        };
+        let [least, most] = self.slope(stretch)?;
         if least >= 0.0 || most <= 0.0 {
-            return match (sampled(from), sampled(to)) {
-                (Look::Clear, at_end) => at_end,
-                (beyond, _) => beyond,
-            };
+            let ends = [from, to].map(|s| self.at(s));
+            return ends
+                .into_iter()
+                .find(|at| *at != Ahead::Nothing)
+                .or(Some(Ahead::Nothing));
         }
         let reach = least.abs().max(most.abs()) * stretch.radius();
-        match self.margin(stretch.middle()) - reach >= -self.band {
-            true => Look::Clear,
-            false => Look::Open,
-        }
+        (self.margin(stretch.middle()) - reach >= -self.band).then_some(Ahead::Nothing)
     }
 
     /// Where the margin ends before `beyond`, at which it is negative and up to which it ends once.
@@ -454,14 +438,6 @@ impl Search<'_> {
         }
         beyond
     }
-}
-
-enum Look {
-    /// nothing is passed
-    Clear,
-    /// it is passed before there
-    Beyond(f64),
-    Open,
 }
 
 /// Coefficients of the polynomials: the interpolant of the explicit method has degree 7.
