@@ -8,7 +8,7 @@ mod radau;
 
 use crate::error::state_text;
 use crate::events::{Ahead, Filippov, Span};
-use crate::method::resolution;
+use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Method, Tolerances, spectral_radius};
 
@@ -69,8 +69,8 @@ pub(crate) struct Adaptive {
 }
 
 /// Progress of one call.
-#[derive(Debug)]
-struct Leg<'a> {
+struct Leg<'a, 'f, D: Dynamics> {
+    f: &'a mut Filippov<'f, D>,
     t: f64,
     to: f64,
     x: &'a mut [f64],
@@ -125,14 +125,14 @@ impl Adaptive {
         to: f64,
         x: &mut [f64],
     ) -> Result<(), Error> {
-        let mut leg = Leg { t: from, to, x };
+        let mut leg = Leg { f, t: from, to, x };
         if leg.at_the_end() || leg.x.is_empty() {
-            return leg.check_start(f);
+            return leg.check_start();
         }
         loop {
             let is_done = match self.is_implicit {
-                true => self.run(f, &mut leg, |own| &mut own.implicit)?,
-                false => self.run(f, &mut leg, |own| &mut own.explicit)?,
+                true => self.run(&mut leg, |own| &mut own.implicit)?,
+                false => self.run(&mut leg, |own| &mut own.explicit)?,
             };
             if is_done {
                 return Ok(());
@@ -142,19 +142,13 @@ impl Adaptive {
     }
 
     /// True every so often, where the other method is the better one.
-    fn should_change(
-        &mut self,
-        f: &mut Filippov<'_, impl Dynamics>,
-        t: f64,
-        x: &[f64],
-        step: f64,
-    ) -> bool {
+    fn should_change(&mut self, leg: &mut Leg<'_, '_, impl Dynamics>, step: f64) -> bool {
         self.since_look += 1;
         if !self.may_change || self.since_look < LOOK_EVERY {
             return false;
         }
         self.since_look = 0;
-        let product = spectral_radius(f, t, x) * step;
+        let product = spectral_radius(leg.f, leg.t, leg.x) * step;
         let speaks_for_change = if self.is_implicit {
             product < STIFF_BELOW
         } else {
@@ -175,8 +169,7 @@ impl Adaptive {
     /// Steps of one of the methods; false where the other one fits better from there.
     fn run<M: OneStep>(
         &mut self,
-        f: &mut Filippov<'_, impl Dynamics>,
-        leg: &mut Leg<'_>,
+        leg: &mut Leg<'_, '_, impl Dynamics>,
         of: fn(&mut Self) -> &mut Option<Box<M>>,
     ) -> Result<bool, Error> {
         let mut method = match of(self).take() {
@@ -184,7 +177,7 @@ impl Adaptive {
             None => Box::new(M::new(leg.x.len())),
         };
         method.restart(true);
-        let is_done = self.steps(&mut *method, f, leg);
+        let is_done = self.steps(&mut *method, leg);
         *of(self) = Some(method);
         is_done
     }
@@ -192,31 +185,30 @@ impl Adaptive {
     fn steps(
         &mut self,
         method: &mut impl OneStep,
-        f: &mut Filippov<'_, impl Dynamics>,
-        leg: &mut Leg<'_>,
+        leg: &mut Leg<'_, '_, impl Dynamics>,
     ) -> Result<bool, Error> {
         let tolerances = self.tolerances;
         if !self.is_implicit {
             self.next = self.next.min(leg.to - leg.t);
         }
         loop {
-            if !method.begin(f, leg.t, leg.x) {
-                return Err(f.not_finite(leg.t, leg.x));
+            if !method.begin(leg.f, leg.t, leg.x) {
+                return Err(leg.f.not_finite(leg.t, leg.x));
             }
             if self.next == 0.0 {
                 let span = leg.to - leg.t;
-                self.next = method.first_step(f, (leg.t, leg.x), span, &tolerances);
+                self.next = method.first_step(leg.f, (leg.t, leg.x), span, &tolerances);
             }
-            let mut step = self.accepted_step(method, f, leg)?;
-            match f.is_unwatched() {
+            let mut step = self.accepted_step(method, leg)?;
+            match leg.f.is_unwatched() {
                 true => leg.x.copy_from_slice(method.reached()),
-                false => step = self.to_event(method, f, leg, step)?,
+                false => step = self.to_event(method, leg, step)?,
             }
             leg.pass(step);
             if leg.at_the_end() {
                 return Ok(true);
             }
-            if self.should_change(f, leg.t, leg.x, step) {
+            if self.should_change(leg, step) {
                 return Ok(false);
             }
         }
@@ -226,15 +218,14 @@ impl Adaptive {
     fn accepted_step(
         &mut self,
         method: &mut impl OneStep,
-        f: &mut Filippov<'_, impl Dynamics>,
-        leg: &mut Leg<'_>,
+        leg: &mut Leg<'_, '_, impl Dynamics>,
     ) -> Result<f64, Error> {
         loop {
             let proposed = self.next;
             let step = leg.step(proposed);
-            leg.check_step(f, step, method.bad())?;
-            self.spend(f, leg)?;
-            match method.attempt(f, (leg.t, &*leg.x), step, &self.tolerances) {
+            leg.check_step(step, method.bad())?;
+            self.spend(leg)?;
+            match method.attempt(leg.f, (leg.t, &*leg.x), step, &self.tolerances) {
                 Err(shorter) => self.next = shorter,
                 Ok(next) => {
                     // a step cut short by a stop says nothing about the next one
@@ -254,8 +245,7 @@ impl Adaptive {
     fn to_event(
         &mut self,
         method: &mut impl OneStep,
-        f: &mut Filippov<'_, impl Dynamics>,
-        leg: &mut Leg<'_>,
+        leg: &mut Leg<'_, '_, impl Dynamics>,
         step: f64,
     ) -> Result<f64, Error> {
         let (t, start, reached) = (leg.t, leg.x.to_vec(), method.reached().to_vec());
@@ -264,7 +254,7 @@ impl Adaptive {
             step,
             to: &reached,
         };
-        let ahead = method.ahead(f, &span);
+        let ahead = method.ahead(leg.f, &span);
         let (tolerances, mut has_tried) = (self.tolerances, false);
         let attempt = |f: &mut Filippov<'_, _>, step: f64| {
             has_tried = true;
@@ -273,8 +263,8 @@ impl Adaptive {
                 && method.attempt(f, (t, &start), step, &tolerances).is_ok();
             tried.then(|| method.reached().to_vec())
         };
-        let event = match ahead.is_some() || f.has_bound() {
-            true => self.crossing(f, leg, &span, ahead.unwrap_or(Ahead::Nothing), attempt)?,
+        let event = match ahead.is_some() || leg.f.has_bound() {
+            true => self.crossing(leg, &span, ahead.unwrap_or(Ahead::Nothing), attempt)?,
             false => None,
         };
         if has_tried || event.is_some() {
@@ -286,13 +276,13 @@ impl Adaptive {
             return Ok(step);
         };
         leg.x.copy_from_slice(&event.x);
-        f.pass(t + event.step, &event.x, &event.margins);
+        leg.f.pass(t + event.step, &event.x, &event.margins);
         Ok(event.step)
     }
 
     /// Pays for one step.
-    fn spend(&mut self, f: &mut Filippov<'_, impl Dynamics>, leg: &Leg<'_>) -> Result<(), Error> {
-        if f.is_over() {
+    fn spend(&mut self, leg: &mut Leg<'_, '_, impl Dynamics>) -> Result<(), Error> {
+        if leg.f.is_over() {
             return Err(Error::Cancelled { time: leg.t });
         }
         if self.left == 0 {
@@ -300,8 +290,8 @@ impl Adaptive {
                 time: leg.t,
                 until: leg.to,
                 steps: self.before + self.granted,
-                chatters: f.busiest().unwrap_or_default(),
-                state: state_text(&f.names(), leg.x),
+                chatters: leg.f.busiest().unwrap_or_default(),
+                state: state_text(&leg.f.names(), leg.x),
             });
         }
         self.left -= 1;
@@ -314,8 +304,7 @@ impl Adaptive {
     /// across the surface is accurate.
     fn crossing<D: Dynamics>(
         &mut self,
-        f: &mut Filippov<'_, D>,
-        leg: &Leg<'_>,
+        leg: &mut Leg<'_, '_, D>,
         span: &Span<'_>,
         ahead: Ahead,
         mut attempt: impl FnMut(&mut Filippov<'_, D>, f64) -> Option<Vec<f64>>,
@@ -326,7 +315,7 @@ impl Adaptive {
             Reach { step, x, margins }
         };
         let fine = 4.0 * resolution(t + step).max(1e-14 * step);
-        let mut end = reach(f, step, span.to.to_vec());
+        let mut end = reach(leg.f, step, span.to.to_vec());
         // the end of the step is across; or another one before it is, or leads up to what comes
         let shorter = match ahead {
             Ahead::Nothing if !end.crosses() => return Ok(None),
@@ -337,9 +326,9 @@ impl Adaptive {
         if let Some(part) = shorter {
             let mut shorter = (part * step).max(fine);
             for _ in 0..HALVINGS {
-                self.spend(f, leg)?;
-                if let Some(x) = attempt(f, shorter) {
-                    end = reach(f, shorter, x);
+                self.spend(leg)?;
+                if let Some(x) = attempt(leg.f, shorter) {
+                    end = reach(leg.f, shorter, x);
                     break;
                 }
                 shorter *= 0.5;
@@ -352,7 +341,7 @@ impl Adaptive {
             Ahead::Jump { at, .. } => Some(at * step + 0.5 * fine),
             Ahead::Nothing | Ahead::Stop { .. } => None,
         };
-        let mut begin = reach(f, 0.0, span.from.1.to_vec());
+        let mut begin = reach(leg.f, 0.0, span.from.1.to_vec());
         let mut rejected = None;
         for turn in 0..TRIES {
             let width = end.step - begin.step;
@@ -365,14 +354,14 @@ impl Adaptive {
                 2 => begin.step + 0.5 * width,
                 _ => between(&begin, &end, fine),
             };
-            self.spend(f, leg)?;
-            let Some(x) = attempt(f, guess) else {
+            self.spend(leg)?;
+            let Some(x) = attempt(leg.f, guess) else {
                 // the step that crosses may be accurate and this one not, where what is not
                 // held bends on the surface: shorter ones lead up to it
                 rejected = Some(guess);
                 continue;
             };
-            let tried = reach(f, guess, x);
+            let tried = reach(leg.f, guess, x);
             match tried.crosses() {
                 true => (end, rejected) = (tried, None),
                 false => begin = tried,
@@ -400,7 +389,7 @@ impl Persist for Adaptive {
     }
 }
 
-impl Leg<'_> {
+impl<D: Dynamics> Leg<'_, '_, D> {
     /// Steps end here: what is left is below the resolution of time.
     fn at_the_end(&self) -> bool {
         self.to - self.t <= resolution(self.to)
@@ -428,30 +417,25 @@ impl Leg<'_> {
         };
     }
 
-    fn check_start(&self, f: &mut Filippov<'_, impl Dynamics>) -> Result<(), Error> {
+    fn check_start(&mut self) -> Result<(), Error> {
         let mut dx = vec![0.0; self.x.len()];
-        f.derivatives(self.t, self.x, &mut dx);
-        if dx.iter().all(|v| v.is_finite()) {
+        self.f.derivatives(self.t, self.x, &mut dx);
+        if are_finite(&dx) {
             return Ok(());
         }
-        Err(f.not_finite(self.t, self.x))
+        Err(self.f.not_finite(self.t, self.x))
     }
 
-    fn check_step(
-        &self,
-        f: &mut Filippov<'_, impl Dynamics>,
-        step: f64,
-        bad: Option<&(f64, Vec<f64>)>,
-    ) -> Result<(), Error> {
+    fn check_step(&mut self, step: f64, bad: Option<&(f64, Vec<f64>)>) -> Result<(), Error> {
         if step > resolution(self.t) {
             return Ok(());
         }
         Err(match bad {
-            Some((t, x)) => f.not_finite(*t, x),
+            Some((t, x)) => self.f.not_finite(*t, x),
             None => Error::StepUnderflow {
                 time: self.t,
                 step,
-                state: state_text(&f.names(), self.x),
+                state: state_text(&self.f.names(), self.x),
             },
         })
     }

@@ -5,6 +5,7 @@ use std::sync::Mutex;
 use lynkeus_expr::{Expr, Graph, Node};
 
 use crate::equations::{Both, Equations, Roots};
+use crate::method::are_finite;
 use crate::noise::{Level, Limits, Sensors};
 use crate::{Dynamics, Error, Evaluation, Events, Simulation, Slopes, System};
 
@@ -339,10 +340,6 @@ impl Loop {
         };
         (parts, guilty)
     }
-}
-
-fn are_finite(values: &[f64]) -> bool {
-    values.iter().all(|v| v.is_finite())
 }
 
 impl Dynamics for Loop {

@@ -56,25 +56,26 @@ impl Equations {
         let roots = [derivatives, outputs].concat();
         let image = own.copied(graph, &[symbols, &roots].concat());
         let moving: Vec<Node> = symbols.iter().map(|s| image[s]).collect();
-        let roots: Vec<Node> = roots.iter().map(|r| image[r]).collect();
+        let mut roots: Vec<Node> = roots.iter().map(|r| image[r]).collect();
         let count = derivatives.len();
-        let (free, switches) = time_events(&own, moving[0], &roots)?;
-        let (held, jumps, surfaces) = state_events(&own, &moving, &free.roots, count);
         let both = |roots: &[Node]| Both {
             derivatives: roots[..count].to_vec(),
             outputs: roots[count..].to_vec(),
         };
+        let (modes, switches) = time_events(&own, moving[0], &mut roots)?;
+        let free = both(&roots);
+        let (held_modes, jumps, surfaces) = state_events(&own, &moving, &mut roots, count);
         Ok(Self {
             states: vec![],
             signals: vec![],
             outputs: vec![],
             roots: Roots {
-                free: both(&free.roots),
-                held: both(&held.roots),
+                free,
+                held: both(&roots),
                 surfaces,
-                bends: bends(&own, &moving[1..], &held.roots[..count]),
+                bends: bends(&own, &moving[1..], &roots[..count]),
             },
-            inputs: [moving, free.modes, held.modes].concat(),
+            inputs: [moving, modes, held_modes].concat(),
             switches: vec![switches],
             jumps,
             graph: Mutex::new(own),

@@ -1,6 +1,5 @@
 //! A plant and its observer, simulated together.
 
-use std::collections::VecDeque;
 use std::ops::ControlFlow;
 
 use crate::closed_loop::Loop;
@@ -179,7 +178,8 @@ pub(crate) struct Itinerary {
     row: usize,
     /// the time of the last stop
     reached: f64,
-    planned: VecDeque<Stop>,
+    /// what comes at that time
+    planned: Option<Stop>,
 }
 
 impl Itinerary {
@@ -201,7 +201,7 @@ impl Itinerary {
             drawn: 0,
             row: 0,
             reached: simulation.start,
-            planned: VecDeque::new(),
+            planned: None,
         })
     }
 
@@ -230,58 +230,54 @@ impl Itinerary {
         }
     }
 
-    /// Plans up to the next draw or row; a draw due at a row is made there.
-    fn plan(&mut self) {
-        let Some(before) = self.row.checked_sub(1) else {
-            self.draw();
-            return self.arrive(self.start);
-        };
-        let (from, to) = (self.time(before), self.time(self.row));
-        // a draw and a row at the same time may differ by rounding
-        let same = 1e-9 * (to - from).min(self.hold());
-        let due = self.start + self.due();
-        if self.is_exact || due > to + same {
-            self.advance(to);
-            return self.arrive(to);
-        }
-        self.advance(if due > to - same { to } else { due });
-        self.draw();
-    }
-
     /// How long after the start the next draw is.
     fn due(&self) -> f64 {
         let (samples, rest) = (self.drawn / self.draws, self.drawn % self.draws);
         (samples as f64 + rest as f64 / self.draws as f64) * self.sample_step
     }
 
-    fn draw(&mut self) {
+    fn draw(&mut self) -> Stop {
         let is_sample = self.drawn.is_multiple_of(self.draws);
-        self.planned.push_back(Stop::Draw { is_sample });
         self.drawn += 1;
+        Stop::Draw { is_sample }
     }
 
-    fn arrive(&mut self, t: f64) {
-        self.planned.push_back(Stop::Row(t));
+    fn arrive(&mut self, t: f64) -> Stop {
         self.row += 1;
-    }
-
-    fn advance(&mut self, to: f64) {
-        let from = self.reached;
-        if to > from {
-            self.planned.push_back(Stop::Advance { from, to });
-            self.reached = to;
-        }
+        Stop::Row(t)
     }
 }
 
 impl Iterator for Itinerary {
     type Item = Stop;
 
+    /// A draw that is due at a row is made there.
     fn next(&mut self) -> Option<Stop> {
-        if self.planned.is_empty() && self.row <= self.intervals {
-            self.plan();
+        if self.planned.is_some() || self.row > self.intervals {
+            return self.planned.take();
         }
-        self.planned.pop_front()
+        let Some(before) = self.row.checked_sub(1) else {
+            let is_drawn = self.drawn > 0;
+            return Some(if is_drawn {
+                self.arrive(self.start)
+            } else {
+                self.draw()
+            });
+        };
+        let (from, to) = (self.time(before), self.time(self.row));
+        // a draw and a row at the same time may differ by rounding
+        let same = 1e-9 * (to - from).min(self.hold());
+        let due = self.start + self.due();
+        let (at, stop) = match self.is_exact || due > to + same {
+            true => (to, self.arrive(to)),
+            false => (if due > to - same { to } else { due }, self.draw()),
+        };
+        if at <= self.reached {
+            return Some(stop);
+        }
+        self.planned = Some(stop);
+        let from = std::mem::replace(&mut self.reached, at);
+        Some(Stop::Advance { from, to: at })
     }
 }
 

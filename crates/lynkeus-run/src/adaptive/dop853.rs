@@ -5,7 +5,7 @@
 
 use super::one_step::OneStep;
 use crate::events::{Ahead, COEFFICIENTS, Filippov, Poly, Span};
-use crate::method::resolution;
+use crate::method::{are_finite, resolution};
 use crate::{Dynamics, Tolerances};
 
 const STAGES: usize = 12;
@@ -273,7 +273,7 @@ impl OneStep for Dop853 {
     fn begin(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) -> bool {
         (self.is_retry, self.bad) = (false, None);
         f.derivatives(t, x, &mut self.slopes[0]);
-        finite(&self.slopes[0])
+        are_finite(&self.slopes[0])
     }
 
     fn reached(&self) -> &[f64] {
@@ -298,7 +298,7 @@ impl OneStep for Dop853 {
             }
             let at = t + c * h;
             f.derivatives(at, &self.stage, &mut self.slopes[i + 1]);
-            if !finite(&self.slopes[i + 1]) {
+            if !are_finite(&self.slopes[i + 1]) {
                 self.bad = Some((at, self.stage.clone()));
                 return self.rejected(h * LEAST);
             }
@@ -306,7 +306,7 @@ impl OneStep for Dop853 {
         combine(&mut self.segment, B, &self.slopes);
         self.reached.copy_from_slice(x);
         add(&mut self.reached, h, &self.segment);
-        if !finite(&self.reached) {
+        if !are_finite(&self.reached) {
             return self.rejected(h * FAR);
         }
         let error = self.error(x, h, tolerances);
@@ -415,7 +415,7 @@ impl Dop853 {
             }
             f.derivatives(t + c * h, &self.stage, &mut self.further[i + 1]);
         }
-        self.further.iter().all(|slope| finite(slope))
+        self.further.iter().all(|slope| are_finite(slope))
     }
 
     /// What a state is between the ends of a step, after [`Dop853::look_inside`].
@@ -451,10 +451,6 @@ impl Dop853 {
         c[0] += from;
         Poly(c)
     }
-}
-
-fn finite(values: &[f64]) -> bool {
-    values.iter().all(|v| v.is_finite())
 }
 
 fn add(to: &mut [f64], factor: f64, values: &[f64]) {

@@ -9,6 +9,7 @@ use nalgebra::{Complex, DVector};
 use super::factors::{Factors, Shifted};
 use super::one_step::OneStep;
 use crate::events::{Ahead, Filippov, Poly, Span};
+use crate::method::are_finite;
 use crate::{Dynamics, Slopes, Tolerances};
 
 const SQRT_6: f64 = 2.449_489_742_783_178;
@@ -138,7 +139,7 @@ impl OneStep for Radau {
             f.derivatives(t, x, self.f0.as_mut_slice());
             self.has_begun = true;
         }
-        self.f0.iter().all(|v| v.is_finite())
+        are_finite(self.f0.as_slice())
     }
 
     /// From the size of the derivative.
@@ -331,7 +332,7 @@ impl Radau {
     fn accept(&mut self, f: &mut impl Dynamics, (t, x): (f64, &[f64]), h: f64, error: f64) -> bool {
         self.place(x, 2);
         f.derivatives(t + h, self.stage.as_slice(), self.f0.as_mut_slice());
-        if self.f0.iter().any(|v| !v.is_finite()) {
+        if !are_finite(self.f0.as_slice()) {
             self.bad = Some((t + h, self.stage.as_slice().to_vec()));
             f.derivatives(t, x, self.f0.as_mut_slice());
             return false;
@@ -415,7 +416,7 @@ impl Radau {
             self.place(x, stage);
             let t = t + c * h;
             f.derivatives(t, self.stage.as_slice(), self.k[stage].as_mut_slice());
-            if self.k[stage].iter().any(|v| !v.is_finite()) {
+            if !are_finite(self.k[stage].as_slice()) {
                 self.bad = Some((t, self.stage.as_slice().to_vec()));
                 return false;
             }

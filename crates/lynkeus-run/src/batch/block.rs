@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use lynkeus_native::Buffer;
 
-use super::plan::{Code, Event, LANES, Lane, Leg, Program};
+use super::plan::{Divided, Event, LANES, Lane, Leg, Program};
 use crate::Error;
 use crate::divergence::Bound;
 use crate::error::state_text;
@@ -55,8 +55,8 @@ pub struct Ended {
 /// The working memory of a thread.
 pub(crate) struct Desk<'p> {
     program: &'p Program,
-    step: Code,
-    row: Code,
+    step: Divided,
+    row: Divided,
     /// arguments of what is shared, at four instants
     arguments: Vec<Lane>,
     shared: Buffer<LANES>,

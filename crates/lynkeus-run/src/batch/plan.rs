@@ -49,8 +49,8 @@ pub(crate) struct Plan {
 /// The code that every trajectory of a batch runs.
 #[derive(Debug)]
 pub(crate) struct Program {
-    pub step: Code,
-    pub row: Code,
+    pub step: Divided,
+    pub row: Divided,
     pub states: usize,
     /// what disturbs sensors and states
     pub disturbances: usize,
@@ -171,8 +171,8 @@ fn program(clock: &mut Loop) -> Result<Option<Program>, Error> {
     };
     let (observer_names, estimates) = clock.estimate(system.start());
     Ok(Some(Program {
-        step: Code::new(&graph, &of_step, &next, own.clone(), states + disturbances)?,
-        row: Code::new(&graph, inputs, row, own, columns)?,
+        step: Divided::new(&graph, &of_step, &next, own.clone(), states + disturbances)?,
+        row: Divided::new(&graph, inputs, row, own, columns)?,
         states,
         disturbances,
         columns,
@@ -194,7 +194,7 @@ const LARGEST: usize = 200_000;
 /// Functions in two parts, what all trajectories share (time, the step, what jumps with time) and what
 /// is their own; each thread has a copy. Interpreter and machine code give the same values to the bit.
 #[derive(Clone, Debug)]
-pub(crate) struct Code {
+pub(crate) struct Divided {
     /// shared inputs → the values that the rest reads
     common: Engine,
     /// these values, then all other inputs → the outputs
@@ -227,7 +227,7 @@ impl Engine {
     }
 }
 
-impl Code {
+impl Divided {
     /// Of `outputs`, functions of `inputs`, of which some are a trajectory's own.
     ///
     /// # Errors
@@ -266,7 +266,7 @@ impl Code {
     }
 
     /// What all trajectories share at four instants: the lanes of `inputs`. Each instant has its
-    /// place in `table`, of [`Code::shared`] values that have one number in all lanes.
+    /// place in `table`, of [`Divided::shared`] values that have one number in all lanes.
     pub fn share(&mut self, inputs: &[Lane], table: &mut [Lane]) {
         let count = table.len() / LANES;
         let values = &mut self.scratch[..count];
@@ -311,7 +311,7 @@ mod tests {
         let dx = x * u + u.exp() * p - x.sin();
         let (inputs, outputs) = ([t, x, p].map(|e| e.node()), [dx.node(), u.node()]);
         let tape = Tape::new(&g, &inputs, &outputs).unwrap();
-        let mut code = Code::new(&g, &inputs, &outputs, 1..3, 2).unwrap();
+        let mut code = Divided::new(&g, &inputs, &outputs, 1..3, 2).unwrap();
         // u and eᵘ
         assert!(code.shared == 2 && code.has_functions);
         let mut table = [[0.0; LANES]; 2 * LANES];

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::guards::{Ahead, Guard, Guards, Poly, SHORTEST};
-use crate::method::resolution;
+use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Slopes};
 
@@ -252,7 +252,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     /// then.
     fn on_sides(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
         self.inner.derivatives(t, x, dx);
-        if !self.is_plain() && !dx.iter().all(|v| v.is_finite()) {
+        if !self.is_plain() && !are_finite(dx) {
             tell(self.inner, None);
             self.inner.derivatives(t, x, dx);
             self.hold();

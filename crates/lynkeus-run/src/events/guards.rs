@@ -303,27 +303,29 @@ impl Search<'_> {
     }
 
     /// An enclosure of the values over a stretch.
-    fn range(&self, stretch: Stretch) -> Option<[f64; 2]> {
+    fn range(&self, from: f64, to: f64) -> Option<[f64; 2]> {
         if let Some(polynomial) = &self.polynomial {
-            return Some(polynomial.range(stretch));
+            return Some(polynomial.range(from, to));
         }
         let read = self.guard.reads.iter();
-        let read = read.map(|&i| self.path[i].range(stretch));
+        let read = read.map(|&i| self.path[i].range(from, to));
         let read: Vec<Interval> = read.map(|[a, b]| interval(a, b)).collect();
         bounds(self.guard.tape.eval_in(&Intervals, &read)[0])
     }
 
     /// An enclosure of the slopes over a stretch, where there are some.
-    fn slope(&self, stretch: Stretch) -> Option<[f64; 2]> {
+    fn slope(&self, from: f64, to: f64) -> Option<[f64; 2]> {
         if let Some(polynomial) = &self.polynomial {
-            return Some(polynomial.slope(stretch));
+            return Some(polynomial.slope(from, to));
         }
         if !self.guard.has_slopes {
             return None;
         }
         let jet = |&i: &usize| {
-            let (value, slope) = (self.path[i].range(stretch), self.path[i].slope(stretch));
-            [value, slope].map(|[a, b]| interval(a, b)).to_vec()
+            let state = &self.path[i];
+            [state.range(from, to), state.slope(from, to)]
+                .map(|[a, b]| interval(a, b))
+                .to_vec()
         };
         let read: Vec<Vec<Interval>> = self.guard.reads.iter().map(jet).collect();
         let jets = Jets {
@@ -360,7 +362,7 @@ impl Search<'_> {
             let Some((from, to)) = left.pop() else {
                 return Ahead::Nothing;
             };
-            match self.look(Stretch { from, to }) {
+            match self.look(from, to) {
                 Some(Ahead::Nothing) => {}
                 Some(found) => return found,
                 None => {
@@ -401,18 +403,18 @@ impl Search<'_> {
     }
 
     /// What is passed over a stretch, the first such thing; none where that is open.
-    fn look(&self, stretch: Stretch) -> Option<Ahead> {
-        let Stretch { from, to } = stretch;
+    fn look(&self, from: f64, to: f64) -> Option<Ahead> {
+        let (middle, radius) = around(from, to);
         let is_short = to - from <= self.shortest;
-        match self.range(stretch).map(|r| self.margins(r)) {
+        match self.range(from, to).map(|r| self.margins(r)) {
             // no value anywhere
             None => return Some(Ahead::Nothing),
             Some([low, _]) if low >= -self.band => return Some(Ahead::Nothing),
             Some([_, high]) if high < -self.band => return Some(self.jump(to)),
-            _ if is_short => return Some(self.at(stretch.middle())),
+            _ if is_short => return Some(self.at(middle)),
             _ => {}
         }
-        let [least, most] = self.slope(stretch)?;
+        let [least, most] = self.slope(from, to)?;
         if least >= 0.0 || most <= 0.0 {
             let ends = [from, to].map(|s| self.at(s));
             return ends
@@ -420,8 +422,8 @@ impl Search<'_> {
                 .find(|at| *at != Ahead::Nothing)
                 .or(Some(Ahead::Nothing));
         }
-        let reach = least.abs().max(most.abs()) * stretch.radius();
-        (self.margin(stretch.middle()) - reach >= -self.band).then_some(Ahead::Nothing)
+        let reach = least.abs().max(most.abs()) * radius;
+        (self.margin(middle) - reach >= -self.band).then_some(Ahead::Nothing)
     }
 
     /// Where the margin ends before `beyond`, at which it is negative and up to which it ends once.
@@ -447,21 +449,9 @@ pub(crate) const COEFFICIENTS: usize = 8;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Poly(pub [f64; COEFFICIENTS]);
 
-/// A stretch of the step, in parts of it.
-#[derive(Clone, Copy, Debug)]
-struct Stretch {
-    from: f64,
-    to: f64,
-}
-
-impl Stretch {
-    fn middle(self) -> f64 {
-        0.5 * (self.from + self.to)
-    }
-
-    fn radius(self) -> f64 {
-        0.5 * (self.to - self.from)
-    }
+/// Middle and radius of a stretch of the step.
+fn around(from: f64, to: f64) -> (f64, f64) {
+    (0.5 * (from + to), 0.5 * (to - from))
 }
 
 impl Poly {
@@ -504,16 +494,18 @@ impl Poly {
     }
 
     /// An enclosure over a stretch.
-    fn range(&self, stretch: Stretch) -> [f64; 2] {
-        let (c, r) = (self.about(stretch.middle()), stretch.radius());
+    fn range(&self, from: f64, to: f64) -> [f64; 2] {
+        let (middle, r) = around(from, to);
+        let c = self.about(middle);
         let spread = c[1..].iter().rev().fold(0.0, |sum, c| (sum + c.abs()) * r);
         let spread = spread + self.rounding() + 4.0 * f64::EPSILON * c[0].abs();
         [c[0] - spread, c[0] + spread]
     }
 
     /// An enclosure of the slope over a stretch.
-    fn slope(&self, stretch: Stretch) -> [f64; 2] {
-        let (c, r) = (self.about(stretch.middle()), stretch.radius());
+    fn slope(&self, from: f64, to: f64) -> [f64; 2] {
+        let (middle, r) = around(from, to);
+        let c = self.about(middle);
         let mut spread = 0.0;
         for k in (2..COEFFICIENTS).rev() {
             spread = (spread + k as f64 * c[k].abs()) * r;
@@ -533,23 +525,16 @@ mod tests {
         let derivative = |s: f64| (p.at(s + 1e-6) - p.at(s - 1e-6)) / 2e-6;
         for i in 0..10 {
             for j in i + 1..=10 {
-                let stretch = Stretch {
-                    from: 0.1 * f64::from(i),
-                    to: 0.1 * f64::from(j),
-                };
-                let ([low, high], [least, most]) = (p.range(stretch), p.slope(stretch));
+                let (from, to) = (0.1 * f64::from(i), 0.1 * f64::from(j));
+                let ([low, high], [least, most]) = (p.range(from, to), p.slope(from, to));
                 for k in 0..=20 {
-                    let s = stretch.from + f64::from(k) / 20.0 * (stretch.to - stretch.from);
+                    let s = from + f64::from(k) / 20.0 * (to - from);
                     assert!((low..=high).contains(&p.at(s)));
                     assert!((least - 1e-6..=most + 1e-6).contains(&derivative(s)));
                 }
             }
         }
-        let short = Stretch {
-            from: 0.499,
-            to: 0.501,
-        };
-        let [low, high] = p.range(short);
+        let [low, high] = p.range(0.499, 0.501);
         assert!(high - low < 0.01, "{low} {high}");
     }
 }

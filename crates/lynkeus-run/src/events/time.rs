@@ -41,8 +41,6 @@ pub(crate) struct TimeEvents {
     indicators: Vec<Indicator>,
     /// the modes as functions of time alone
     values: Evaluator,
-    /// what was found in the interval asked for last, as `indicators`
-    timelines: Vec<Timeline>,
     /// what finding them may still cost
     effort: Effort,
 }
@@ -51,7 +49,6 @@ impl TimeEvents {
     /// Of indicators, each after those that it reads, and of the modes as functions of time.
     pub(super) fn new(indicators: Vec<Indicator>, values: &Tape) -> Self {
         Self {
-            timelines: vec![Timeline::default(); indicators.len()],
             indicators,
             values: values.evaluator(),
             effort: Effort::default(),
@@ -86,13 +83,11 @@ impl TimeEvents {
             return Ok(());
         }
         self.effort.begin(from, to);
-        for (i, indicator) in self.indicators.iter_mut().enumerate() {
-            let (before, rest) = self.timelines.split_at_mut(i);
-            if let Some(timeline) = rest.first_mut() {
-                let followed = indicator.follow(&mut self.effort, before, timeline);
-                followed.map_err(|error| error.about(&indicator.expression))?;
-                times.extend_from_slice(&timeline.instants);
-            }
+        for i in 0..self.indicators.len() {
+            let (before, rest) = self.indicators.split_at_mut(i);
+            let followed = rest[0].follow(&mut self.effort, before);
+            followed.map_err(|error| error.about(&rest[0].expression))?;
+            times.extend_from_slice(&rest[0].timeline.instants);
         }
         self.effort.end();
         Ok(())
@@ -271,6 +266,8 @@ pub(super) struct Indicator {
     evaluator: Evaluator,
     /// t, modes read
     inputs: Vec<f64>,
+    /// what was found in the interval asked for last
+    timeline: Timeline,
 }
 
 impl Indicator {
@@ -298,23 +295,19 @@ impl Indicator {
             mode,
             quantity: Tape::new(graph, &inputs, &[quantity])?,
             inputs: vec![0.0; inputs.len()],
+            timeline: Timeline::default(),
             reads,
         })
     }
 
-    /// Writes the mode over the interval of `effort` to `timeline`; `before` are the
-    /// timelines of the indicators before.
-    fn follow(
-        &mut self,
-        effort: &mut Effort,
-        before: &[Timeline],
-        timeline: &mut Timeline,
-    ) -> Result<(), Error> {
-        (timeline.instants.clear(), timeline.values.clear());
+    /// Finds the mode over the interval of `effort`; `before` are the indicators before.
+    fn follow(&mut self, effort: &mut Effort, before: &[Self]) -> Result<(), Error> {
+        self.timeline.instants.clear();
+        self.timeline.values.clear();
         let mut ends: Vec<f64> = self
             .reads
             .iter()
-            .flat_map(|&i| &before[i].instants)
+            .flat_map(|&i| &before[i].timeline.instants)
             .copied()
             .collect();
         ends.sort_unstable_by(f64::total_cmp);
@@ -326,22 +319,16 @@ impl Indicator {
             }
             let middle = start + 0.5 * (end - start);
             for (input, &i) in self.inputs[1..].iter_mut().zip(&self.reads) {
-                *input = before[i].at(middle);
+                *input = before[i].timeline.at(middle);
             }
-            self.piece(start, end, effort, timeline)?;
+            self.piece(start, end, effort)?;
             start = end;
         }
         Ok(())
     }
 
     /// Over a piece on which the modes inside stay.
-    fn piece(
-        &mut self,
-        start: f64,
-        end: f64,
-        effort: &mut Effort,
-        timeline: &mut Timeline,
-    ) -> Result<(), Error> {
+    fn piece(&mut self, start: f64, end: f64, effort: &mut Effort) -> Result<(), Error> {
         let isolation = Isolation {
             indicator: self,
             effort,
@@ -354,7 +341,7 @@ impl Indicator {
         let mut from = start;
         for to in instants.into_iter().chain([end]) {
             let value = self.value(from + 0.5 * (to - from));
-            timeline.push(from, value);
+            self.timeline.push(from, value);
             from = to;
         }
         Ok(())
@@ -432,15 +419,6 @@ struct Isolation<'a> {
     instants: Vec<f64>,
 }
 
-/// What is known of a cell.
-enum Cell {
-    /// the mode stays
-    Constant,
-    /// the quantity is monotone between these times, ends included
-    Monotone(Vec<f64>),
-    Unknown,
-}
-
 impl Isolation<'_> {
     /// The instants strictly inside, increasing.
     fn run(mut self) -> Result<Vec<f64>, Error> {
@@ -448,18 +426,18 @@ impl Isolation<'_> {
         while let Some((a, b)) = cells.pop() {
             self.effort.look(a)?;
             match self.cell(a, b) {
-                Cell::Constant => self.settle(a + 0.5 * (b - a), a)?,
-                Cell::Monotone(times) => {
+                Some(times) if times.is_empty() => self.settle(a + 0.5 * (b - a), a)?,
+                Some(times) => {
                     for pair in times.windows(2) {
                         self.monotone(pair[0], pair[1])?;
                     }
                 }
-                Cell::Unknown if self.is_hidden(a, b)? => {
+                None if self.is_hidden(a, b)? => {
                     if self.is_certain(b) {
                         self.arrive(b)?;
                     }
                 }
-                Cell::Unknown => {
+                None => {
                     let middle = a + 0.5 * (b - a);
                     cells.extend([(middle, b), (a, middle)]);
                 }
@@ -468,25 +446,27 @@ impl Isolation<'_> {
         Ok(self.instants)
     }
 
-    fn cell(&self, a: f64, b: f64) -> Cell {
+    /// The times between which the quantity is monotone, ends included; no time where the mode stays.
+    /// None where nothing is known.
+    fn cell(&self, a: f64, b: f64) -> Option<Vec<f64>> {
         let stretch = interval(a, b);
         if self.indicator.is_constant(stretch) {
-            return Cell::Constant;
+            return Some(vec![]);
         }
         let slope = self.indicator.series::<2>(stretch)[1];
         if slope == Interval::ZERO {
-            return Cell::Constant;
+            return Some(vec![]);
         }
         if slope.is_defined() && keeps_sign(slope) {
-            return Cell::Monotone(vec![a, b]);
+            return Some(vec![a, b]);
         }
         if slope.is_defined() && self.excluded(a, b, slope) {
-            return Cell::Constant;
+            return Some(vec![]);
         }
         let series = self.indicator.series::<{ ORDER + 1 }>(stretch);
         let defined = series.iter().take_while(|c| c.is_defined()).count();
         let order = (2..defined).find(|&k| keeps_sign(series[k]));
-        order.map_or(Cell::Unknown, |k| Cell::Monotone(self.parts(a, b, k)))
+        order.map(|k| self.parts(a, b, k))
     }
 
     /// Whether the mean value form, with the derivative enclosed in `slope`, shows
