@@ -35,7 +35,11 @@ fn partial(
         && !has_value_at(graph, augmented.derivatives[row], witness, region)?
     {
         let f = &augmented.states[row].name;
-        found.finding.detail = format!("{}, but where f({f}) has no value", found.finding.detail);
+        found.finding.reason = format!(
+            "{}, but where f({f}) has no value",
+            found.finding.reason.text()
+        )
+        .into();
         let place = region.restricted(&graph.symbols_of(&[node])).place();
         found.finding.verdict = Verdict::Undecided(place);
     }
@@ -175,7 +179,10 @@ pub(crate) fn lipschitz(
         );
         let used = region.restricted(&graph.symbols_of(&[node]));
         let verdict = Verdict::Undecided(used.place());
-        return Ok(Statement::Lipschitz.with(Finding { verdict, detail }));
+        return Ok(Statement::Lipschitz.with(Finding {
+            verdict,
+            reason: detail.into(),
+        }));
     }
     let detail = format!("{} entries enclosed", jacobian.entries.len());
     Ok(proved(Statement::Lipschitz, detail))

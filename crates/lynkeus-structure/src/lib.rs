@@ -41,6 +41,6 @@ pub use regularity::{Regularity, Trouble, has_value_at, steps};
 pub use slopes::{Innovation, Slopes};
 pub use superdiagonal::Superdiagonal;
 pub use uniform::{Blind, Uniformity, apart_whatever, determined, uncertain, uniformity};
-pub use verdict::{Coordinate, Finding, Place, Point, Side, Standing, Verdict, Witness};
+pub use verdict::{Coordinate, Finding, Place, Point, Reason, Side, Standing, Verdict, Witness};
 pub use words::{counted, figures, short};
 pub use zero::vanishes;

@@ -98,7 +98,7 @@ pub fn one_to_one(
     if let Some(trouble) = regularity.trouble() {
         return Ok(Finding {
             verdict: regularity.verdict(),
-            detail: format!("the mean value theorem does not apply: {trouble}"),
+            reason: format!("the mean value theorem does not apply: {trouble}").into(),
         });
     }
     if affine {
@@ -235,7 +235,7 @@ pub fn regular(matrix: &Matrix<'_>, region: &Region) -> Result<Finding, MissingI
     if let Some(open) = open {
         return Ok(Finding {
             verdict: open.verdict,
-            detail: open.detail,
+            reason: open.detail.into(),
         });
     }
     let detail = match product {
@@ -400,7 +400,12 @@ mod tests {
         let g = Graph::new();
         let x = g.symbol("x");
         let check = rank(&[&[-x], &[1.0 - x]], &[x]);
-        assert_eq!(check.verdict, Verdict::Proved, "{}", check.detail);
+        assert_eq!(
+            check.verdict,
+            Verdict::Proved,
+            "{}",
+            check.reason.clone().text()
+        );
     }
 
     #[test]
@@ -409,7 +414,7 @@ mod tests {
         let (x, y) = (g.symbol("x"), g.symbol("y"));
         let check = rank(&[&[x], &[y.sin()]], &[x, y]);
         let Verdict::Refuted(witness) = check.verdict else {
-            panic!("{}", check.detail)
+            panic!("{}", check.reason.clone().text())
         };
         let values: Vec<f64> = witness.points[0]
             .coordinates
@@ -425,7 +430,13 @@ mod tests {
         let (x, y) = (g.symbol("x"), g.symbol("y"));
         let check = rank(&[&[x, x * y], &[y, y * y], &[x + 1.0, y * x + y]], &[x, y]);
         assert!(matches!(check.verdict, Verdict::Refuted(_)));
-        assert!(rank(&[&[x, y]], &[x, y]).detail.contains("minor"));
+        assert!(
+            rank(&[&[x, y]], &[x, y])
+                .reason
+                .clone()
+                .text()
+                .contains("minor")
+        );
     }
 
     #[test]
@@ -451,7 +462,12 @@ mod tests {
         };
         let box_ = region(&[a, b], 2.0);
         let tame = decide([a + 0.2 * b.sin(), b - 0.1 * a * a], &box_);
-        assert_eq!(tame.verdict, Verdict::Proved, "{}", tame.detail);
+        assert_eq!(
+            tame.verdict,
+            Verdict::Proved,
+            "{}",
+            tame.reason.clone().text()
+        );
         let folded = decide([a * a - b * b, 2.0 * a * b], &box_);
         assert!(matches!(folded.verdict, Verdict::Undecided(_)));
         let flat = decide([a + b, 2.0 * a + 2.0 * b], &box_);
@@ -492,7 +508,12 @@ mod tests {
             regular(&matrix, &region(&[x, y], size)).unwrap()
         };
         let found = decide(0.9);
-        assert_eq!(found.verdict, Verdict::Proved, "{}", found.detail);
+        assert_eq!(
+            found.verdict,
+            Verdict::Proved,
+            "{}",
+            found.reason.clone().text()
+        );
         let Verdict::Refuted(witness) = decide(1.5).verdict else {
             panic!()
         };
@@ -523,9 +544,9 @@ mod tests {
         let found = regular(&matrix, &region(&[x], 3.0)).unwrap();
         assert_eq!(found.verdict, Verdict::Proved);
         assert!(
-            found.detail.starts_with("|det| lies in"),
+            found.reason.clone().text().starts_with("|det| lies in"),
             "{}",
-            found.detail
+            found.reason.clone().text()
         );
     }
 
@@ -551,7 +572,11 @@ mod tests {
         let matrix = Matrix::from_fn(&g, (1, 1), |_, _| Some((1e-20 * (x + 2.0)).node()));
         let found = regular(&matrix, &region(&[x], 1.0)).unwrap();
         assert_eq!(found.verdict, Verdict::Proved);
-        assert!(!found.detail.contains("[0,"), "{}", found.detail);
+        assert!(
+            !found.reason.clone().text().contains("[0,"),
+            "{}",
+            found.reason.clone().text()
+        );
     }
 
     proptest! {

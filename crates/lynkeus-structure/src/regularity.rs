@@ -92,10 +92,11 @@ impl Regularity {
         let examined = || "every operation examined".to_owned();
         Finding {
             verdict: self.verdict(),
-            detail: self
+            reason: self
                 .trouble
                 .as_ref()
-                .map_or_else(examined, Trouble::to_string),
+                .map_or_else(examined, Trouble::to_string)
+                .into(),
         }
     }
 

@@ -71,7 +71,10 @@ pub fn keeps_sign(graph: &Graph, node: Node, region: &Region) -> Result<Sign, Mi
         (0.0, high.max(-low))
     };
     Ok(Sign {
-        finding: Finding { verdict, detail },
+        finding: Finding {
+            verdict,
+            reason: detail.into(),
+        },
         sign,
         bounds,
     })
@@ -389,7 +392,11 @@ mod tests {
         // of one sign as far as anyone looks
         let sign = decide(x + 1e30, vec![side(x, all.0, all.1, false)]);
         assert!(matches!(sign.finding.verdict, Verdict::Undecided(_)));
-        let text = format!("{} {}", sign.finding.verdict, sign.finding.detail);
+        let text = format!(
+            "{} {}",
+            sign.finding.verdict,
+            sign.finding.reason.clone().text()
+        );
         assert!(
             !text.contains("e30") || text.contains("declare min and max of x"),
             "{text}"
@@ -405,9 +412,13 @@ mod tests {
         let sign = decide(x.exp(), vec![side(x, all.0, all.1, false)]);
         assert!(matches!(sign.finding.verdict, Verdict::Undecided(_)));
         assert!(
-            sign.finding.detail.contains("declare min and max of x"),
+            sign.finding
+                .reason
+                .clone()
+                .text()
+                .contains("declare min and max of x"),
             "{}",
-            sign.finding.detail
+            sign.finding.reason.clone().text()
         );
     }
 

@@ -235,19 +235,20 @@ impl Factor {
             );
             return Ok(Finding {
                 verdict: Verdict::Undecided(sides),
-                detail,
+                reason: detail.into(),
             });
         };
         let found = sign::keeps_sign(graph, minors, region)?.finding;
         Ok(match found.verdict {
             Verdict::Refuted(witness) => Finding {
-                detail: format!(
+                reason: format!(
                     "{shape} and loses rank (det F_{k}ᵀF_{k}: {witness}); convergence rests on inputs that do not stay there (A4)"
-                ),
+                )
+                .into(),
                 verdict: Verdict::Undecided(sides),
             },
             verdict => Finding {
-                detail: format!("{shape}; det F_{k}ᵀF_{k} = {}", found.detail),
+                reason: format!("{shape}; det F_{k}ᵀF_{k} = {}", found.reason.text()).into(),
                 verdict,
             },
         })
@@ -286,7 +287,10 @@ impl Factor {
                     ),
                 ),
             };
-            return Finding { verdict, detail };
+            return Finding {
+                verdict,
+                reason: detail.into(),
+            };
         };
         let component = |(&i, x): (&usize, f64)| (augmented.states[i].name.clone(), x).into();
         let direction = Point {

@@ -135,7 +135,7 @@ fn without_jumps(found: Finding, region: &Region) -> Finding {
     match &found.verdict {
         Verdict::Refuted(witness) if witness.zero().is_none() => Finding {
             verdict: Verdict::Undecided(region.named(&region.cell())),
-            detail: format!("{}, but only by a jump", found.detail),
+            reason: format!("{}, but only by a jump", found.reason.text()).into(),
         },
         _ => found,
     }

@@ -134,46 +134,74 @@ impl Standing {
     }
 }
 
+/// What decides a verdict, as data: `lynkeus-words` has the sentences.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reason {
+    /// a sentence that is not data yet
+    Text(String),
+}
+
+impl Reason {
+    /// The sentence.
+    pub fn text(self) -> String {
+        match self {
+            Self::Text(text) => text,
+        }
+    }
+}
+
+impl From<String> for Reason {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl From<&str> for Reason {
+    fn from(text: &str) -> Self {
+        Self::Text(text.to_owned())
+    }
+}
+
 /// What was found of a statement. Which statement, whoever asked knows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
     /// the verdict
     pub verdict: Verdict,
-    /// what was found, in words
-    pub detail: String,
+    /// what decides it
+    pub reason: Reason,
 }
 
 impl Finding {
     /// It holds.
-    pub fn proved(detail: impl Into<String>) -> Self {
+    pub fn proved(reason: impl Into<Reason>) -> Self {
         Self {
             verdict: Verdict::Proved,
-            detail: detail.into(),
+            reason: reason.into(),
         }
     }
 
     /// It is not known to hold; nor where it might fail.
-    pub fn undecided(detail: impl Into<String>) -> Self {
+    pub fn undecided(reason: impl Into<Reason>) -> Self {
         Self {
             verdict: Verdict::open(),
-            detail: detail.into(),
+            reason: reason.into(),
         }
     }
 
     /// It fails.
-    pub fn refuted(witness: impl Into<Witness>, detail: impl Into<String>) -> Self {
+    pub fn refuted(witness: impl Into<Witness>, reason: impl Into<Reason>) -> Self {
         Self {
             verdict: Verdict::Refuted(witness.into()),
-            detail: detail.into(),
+            reason: reason.into(),
         }
     }
 
     /// By a condition that is sufficient, not necessary: that it fails refutes nothing.
-    pub fn sufficient(holds: bool, detail: impl Into<String>) -> Self {
+    pub fn sufficient(holds: bool, reason: impl Into<Reason>) -> Self {
         if holds {
-            Self::proved(detail)
+            Self::proved(reason)
         } else {
-            Self::undecided(detail)
+            Self::undecided(reason)
         }
     }
 

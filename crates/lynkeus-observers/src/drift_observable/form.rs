@@ -480,11 +480,15 @@ impl Inputs<'_, '_> {
             };
             check = regular(self.augmented, statement, self.Q̄, &wider)?;
             if !declared.is_empty() {
-                check.detail += &format!("; for {declared}, as `input_derivatives` bounds them");
+                check.reason = format!(
+                    "{}; for {declared}, as `input_derivatives` bounds them",
+                    check.reason.text()
+                )
+                .into();
             }
         }
         if !check.is_proved() {
-            check.detail += "; small and slow inputs keep it regular (Theorem 2.4), the column rcond and its flag tell";
+            check.reason = (check.reason.text() + "; small and slow inputs keep it regular (Theorem 2.4), the column rcond and its flag tell").into();
         }
         Ok(check)
     }

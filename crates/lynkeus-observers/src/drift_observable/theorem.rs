@@ -221,7 +221,7 @@ fn of_the_map(
         let mut regular = found.regular.clone();
         if let Verdict::Refuted(_) = regular.verdict {
             // the observer passes such a place, only the proof does not
-            regular.detail = format!("{} ({})", regular.detail, regular.verdict);
+            regular.reason = format!("{} ({})", regular.reason.text(), regular.verdict).into();
             regular.verdict = Verdict::open();
         }
         checks.push(regular);

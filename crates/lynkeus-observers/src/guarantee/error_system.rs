@@ -129,7 +129,7 @@ impl ErrorSystem {
             .map(Dimension::side);
         Statement::from(Inequality::SlopesAreBounded).with(Finding {
             verdict: Verdict::Undecided(left.collect()),
-            detail: format!("the slope of {} has no bound; {cure}", slope.term),
+            reason: format!("the slope of {} has no bound; {cure}", slope.term).into(),
         })
     }
 

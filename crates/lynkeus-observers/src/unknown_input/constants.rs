@@ -270,7 +270,12 @@ impl<'e, 'p> Signals<'e, 'p> {
                 false => rank::full_column_rank(P, region)?,
             };
             if !found.is_proved() {
-                let detail = format!("block {}: {} ({})", k + 1, found.detail, found.verdict);
+                let detail = format!(
+                    "block {}: {} ({})",
+                    k + 1,
+                    found.reason.text(),
+                    found.verdict
+                );
                 return Ok(undecided(Farza::Regular, detail));
             }
         }

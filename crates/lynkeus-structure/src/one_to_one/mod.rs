@@ -108,7 +108,7 @@ impl Map<'_> {
             }
             (false, None) => Finding {
                 verdict: Verdict::Undecided(open.unwrap_or_default()),
-                detail: "whether points far apart are told apart is not decided".to_owned(),
+                reason: "whether points far apart are told apart is not decided".into(),
             },
         };
         Ok(OneToOne {

@@ -11,6 +11,7 @@ use crate::{Error, plot::Plane};
 use lynkeus_observability::{Answer, Quantity, Verdict};
 #[cfg(feature = "plot")]
 use lynkeus_structure::Side;
+use lynkeus_words::Words;
 
 /// Parts of the singular set listed for machines.
 const LISTED: usize = 256;
@@ -201,10 +202,10 @@ pub(super) fn json(uniformity: &Uniformity) -> Value {
         .map(|blind| json!({ "input": blind.input, "value": blind.value, "hidden": blind.hidden }));
     json!({
         "verdict": uniformity.regular.verdict.word(),
-        "detail": uniformity.regular.detail,
+        "detail": uniformity.regular.reason.words(),
         "one_to_one": {
             "verdict": uniformity.one_to_one.finding.verdict.word(),
-            "detail": uniformity.one_to_one.finding.detail,
+            "detail": uniformity.one_to_one.finding.reason.words(),
             "alike": uniformity.one_to_one.alike.as_ref().map(|alike| {
                 alike.points.iter().map(point).collect::<Vec<_>>()
             }),
