@@ -160,7 +160,7 @@ impl Incidence {
 /// Arguments of an operation; systems are only built after this stage.
 pub(super) fn arguments(op: Op) -> impl Iterator<Item = Node> {
     let arguments = match op {
-        Op::Constant(_) | Op::Symbol(_) | Op::Solve(_) | Op::Implicit(_) => [None; 3],
+        Op::Constant(_) | Op::Symbol(_) | Op::System(_) => [None; 3],
         Op::Unary(_, a) | Op::Powi(a, _) | Op::Entry(a, _) => [Some(a), None, None],
         Op::Binary(_, a, b) => [Some(a), Some(b), None],
         Op::Select(c, a, b) => [Some(c), Some(a), Some(b)],
