@@ -19,18 +19,14 @@ use crate::{Assertion, Parameter, Plant, Variable, balance};
 pub(super) fn plant<'a>(
     context: &Context<'a>,
     symbols: &Symbols<'a>,
-    flat: Flat,
+    mut flat: Flat,
 ) -> Result<(Plant, Vec<Problem>)> {
     let (unknowns, inputs) = unknowns(context, symbols, &flat.equations)?;
     let graph = context.graph;
-    let system = System {
-        graph,
-        equations: &flat.equations,
-        unknowns: &unknowns,
-        inputs: &inputs,
-        time: symbols.time,
-    };
-    let solution = balance::solve(&system, context.source, context.model.name)?;
+    let equations = std::mem::take(&mut flat.equations);
+    let (source, time) = (context.source, symbols.time);
+    let system = System::new(graph, source, equations, unknowns, &inputs, time);
+    let solution = balance::solve(system, context.model.name)?;
     let mut plant = Plant {
         name: context.model.title.clone(),
         graph: Graph::new(),

@@ -1,12 +1,13 @@
 //! The functions of scalars, and operators that are written as functions: `der`, `semiLinear`,
 //! `cross`. Arrays are taken element by element.
 
-use lynkeus_expr::{Binary, Node, Unary, jacobian};
+use lynkeus_expr::{Binary, Node, Unary};
 
 use super::arithmetic::overflow;
 use super::evaluate::Evaluator;
 use super::scope::Mode;
 use super::value::{Scalar, Value};
+use crate::balance::total_derivative;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::names::did_you_mean;
 use crate::syntax::ast::{BinaryOperator, Call, ExprId, Kind, Relation};
@@ -328,31 +329,21 @@ impl<'a> Evaluator<'a> {
     /// Σ ∂e/∂v der(v) over the variables of e, and ∂e/∂t.
     fn total_derivative(&self, node: Node, span: Span) -> Result<Node> {
         let graph = self.graph;
-        let symbols = graph.symbols_of(&[node]);
-        self.budget.charge(symbols.len() as u64, span)?;
-        let row = jacobian::reverse(graph, &[node], &symbols);
-        let mut sum: Option<Node> = None;
-        let mut add = |term: Node| {
-            sum = Some(sum.map_or(term, |sum| graph.binary(Binary::Add, sum, term)));
+        let symbols = graph.symbols_of(&[node]).len();
+        self.budget.charge(symbols as u64, span)?;
+        let Some(time) = self.scope.time(Mode::Continuous) else {
+            return Err(self.no_derivative(span));
         };
-        for (place, slope) in row.row(0) {
-            let symbol = symbols[place];
-            if Some(symbol) == self.scope.time(Mode::Continuous) {
-                add(slope);
-                continue;
+        total_derivative(graph, node, time, |symbol| {
+            let derivative = self.scope.derivative(symbol);
+            if derivative.is_some() || symbol == time || self.scope.is_parameter(symbol) {
+                return Ok(derivative);
             }
-            if self.scope.is_parameter(symbol) {
-                continue;
-            }
-            let derivative = self.scope.derivative(symbol).ok_or_else(|| {
-                let name = graph.symbol_name(symbol).unwrap_or_default();
-                let message = format!("`der` of an expression with `{name}`, which has none");
-                Problem::new(span, message)
-                    .hint("inputs and parameters have no derivative in the equations")
-            })?;
-            add(graph.binary(Binary::Mul, slope, derivative));
-        }
-        Ok(sum.unwrap_or_else(|| graph.constant(0.0).node()))
+            let name = graph.symbol_name(symbol).unwrap_or_default();
+            let message = format!("`der` of an expression with `{name}`, which has none");
+            Err(Problem::new(span, message)
+                .hint("inputs and parameters have no derivative in the equations"))
+        })
     }
 
     /// `semiLinear(x, a, b)`: a x where x ≥ 0, else b x.
