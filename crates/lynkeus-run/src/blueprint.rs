@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::filter::{FilterModel, FilterSettings};
+use crate::filter::{FilterSettings, NoisyModel};
 use crate::integrator::AUTO_PRODUCT;
 use crate::jacobian::fastest;
 use crate::snapshot::Digest;
@@ -23,7 +23,7 @@ pub enum Blueprint {
     /// a Kalman filter
     Filter {
         /// the plant with its noises
-        model: Box<FilterModel>,
+        model: Box<NoisyModel>,
         /// which filter
         settings: FilterSettings,
         /// how it goes from sample to sample
@@ -46,7 +46,7 @@ impl Blueprint {
     pub(crate) fn sensors(&self) -> Vec<String> {
         match self {
             Self::Sampled { observer, .. } => observer.sensors.clone(),
-            Self::Filter { model, .. } => model.sensors().iter().map(|s| s.name.clone()).collect(),
+            Self::Filter { model, .. } => model.sensors.iter().map(|s| s.name.clone()).collect(),
         }
     }
 
@@ -54,7 +54,7 @@ impl Blueprint {
     pub(crate) fn inputs(&self) -> &[String] {
         match self {
             Self::Sampled { observer, .. } => observer.known_inputs(),
-            Self::Filter { model, .. } => model.inputs(),
+            Self::Filter { model, .. } => model.flow.system().signals(),
         }
     }
 
@@ -62,7 +62,7 @@ impl Blueprint {
     pub(crate) fn estimates(&self) -> &[String] {
         match self {
             Self::Sampled { observer, .. } => observer.estimates(),
-            Self::Filter { model, .. } => model.states(),
+            Self::Filter { model, .. } => model.flow.system().states(),
         }
     }
 
@@ -84,13 +84,13 @@ impl Blueprint {
                 } = &**observer;
                 system.tell(&mut digest);
                 if let Some(errors) = errors {
-                    errors.flow().system().tell(&mut digest);
+                    errors.model.flow.system().tell(&mut digest);
                 }
                 if let Some(tuned) = tuned {
                     tuned.system.tell(&mut digest);
                     digest.numbers(&tuned.values);
                 }
-                let noises = errors.as_ref().map(|errors| errors.noises());
+                let noises = errors.as_ref().map(|errors| errors.model.numbers());
                 write!(digest, "{method:?} {predict} {inputs:?} {noises:?}")
             }
             Self::Filter {
@@ -110,7 +110,7 @@ impl Blueprint {
     pub fn flow(&self) -> &System {
         match self {
             Self::Sampled { observer, .. } => &observer.system,
-            Self::Filter { model, .. } => model.flow().system(),
+            Self::Filter { model, .. } => model.flow.system(),
         }
     }
 

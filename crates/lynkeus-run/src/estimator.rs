@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::filter::{Filter, FilterModel, FilterSettings, Health, Innovation, Smoothed};
+use crate::filter::{Filter, FilterSettings, Health, Innovation, NoisyModel, Smoothed};
 use crate::runner::{Runner, Sample};
 use crate::sampled::Sampled;
 use crate::snapshot::{self, Damaged, Persist, Walk};
@@ -79,7 +79,7 @@ impl Estimator {
                 model,
                 settings,
                 run,
-            } => Core::Filter(Box::new(Filter::new(model, settings.clone(), *run)?)),
+            } => Core::Filter(Box::new(Filter::new(model, settings, *run)?)),
         };
         let sensors = blueprint.sensors();
         Ok(Self {
@@ -113,7 +113,7 @@ impl Estimator {
     /// # Errors
     /// As [`Blueprint::estimator`].
     pub fn filter(
-        model: &FilterModel,
+        model: &NoisyModel,
         settings: FilterSettings,
         run: EstimatorSettings,
     ) -> Result<Self, Error> {

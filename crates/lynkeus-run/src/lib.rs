@@ -134,6 +134,6 @@ pub use settings::{BetweenSamples, EstimatorSettings};
 pub use simulation::Simulation;
 pub use slopes::{Place, Slopes};
 pub use snapshot::{Digest, SnapshotFault};
-pub use spread::{ErrorEquations, ErrorModel, ErrorNoise, Lag};
+pub use spread::{ErrorModel, Lag};
 pub use system::{Evaluation, System};
 pub use trajectory::{Column, Role, Trajectory};

@@ -124,15 +124,6 @@ impl Linearised {
     pub fn jacobians(&self) -> &Jacobians<Jacobian> {
         &self.jacobians
     }
-
-    /// The same from other start values.
-    ///
-    /// # Errors
-    /// As [`System::with_start`].
-    pub fn with_start(mut self, start: Vec<f64>) -> Result<Self, Error> {
-        self.system = self.system.with_start(start)?;
-        Ok(self)
-    }
 }
 
 impl Jacobian {

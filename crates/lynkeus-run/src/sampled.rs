@@ -6,7 +6,10 @@ use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::spread::{ErrorModel, Spread};
 use crate::system::Driven;
-use crate::{BetweenSamples, Dynamics, Error, Events, Integrator, Method, StepAdvice, System};
+use crate::{
+    BetweenSamples, Dynamics, Error, EstimatorSettings, Events, Integrator, Method, StepAdvice,
+    System,
+};
 
 /// An observer z' = F(t, z, u, w) whose measurements are states of their own: w jumps to a
 /// reading when the sensor reports, and in between stays (`hold`) or follows the model,
@@ -114,6 +117,10 @@ impl Sampled {
             errors,
             tuned,
         } = observer;
+        let run = EstimatorSettings {
+            between: *inputs,
+            method,
+        };
         let count = sensors.len();
         let tuned = tuned.as_ref().map(Tuned::signals).unwrap_or_default();
         for (what, found) in [
@@ -131,10 +138,8 @@ impl Sampled {
         }
         let mut signals = vec![0.0; system.signals().len().saturating_sub(tuned.len())];
         signals.extend(tuned);
-        let spread = errors
-            .as_ref()
-            .map(|model| Spread::new(model, *inputs, method));
-        let judged = errors.as_ref().filter(|model| model.expects());
+        let spread = errors.as_ref().map(|model| Spread::new(model, run));
+        let is_judged = errors.as_ref().is_some_and(|model| model.judges);
         Ok(Self {
             driven: Driven::new(system, *inputs),
             integrator: Integrator::new(method, system.states().len())?,
@@ -145,7 +150,7 @@ impl Sampled {
             predict: *predict,
             bound: Bound::new(system.start()),
             spread: spread.transpose()?,
-            innovations: match judged.is_some() {
+            innovations: match is_judged {
                 true => vec![Innovation::default(); count],
                 false => vec![],
             },

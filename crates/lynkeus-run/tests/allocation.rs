@@ -6,7 +6,7 @@
 
 use cap::Cap;
 use lynkeus_expr::Graph;
-use lynkeus_run::filter::{FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor};
+use lynkeus_run::filter::{FilterKind, FilterSettings, NoisyModel, NoisyPlant, Sensor};
 use lynkeus_run::{
     BetweenSamples, Estimator, EstimatorSettings, Level, Method, SampledObserver, Step, System,
 };
@@ -60,7 +60,7 @@ fn sampled() -> Estimator {
 fn filter() -> Estimator {
     let g = Graph::new();
     let [time, a, b, u] = ["time", "a", "b", "u"].map(|name| g.symbol(name));
-    let plant = FilterPlant {
+    let plant = NoisyPlant {
         graph: &g,
         time: time.node(),
         states: vec![("a".into(), a.node(), 0.1), ("b".into(), b.node(), 0.0)],
@@ -74,9 +74,10 @@ fn filter() -> Estimator {
         }],
         process_noise: vec![0.0, 0.1],
         initial_variance: vec![1.0; 2],
+        ranges: vec![],
         confined: None,
     };
-    let model = FilterModel::new(&plant).unwrap();
+    let model = NoisyModel::new(&plant).unwrap();
     let kind = FilterSettings::of(FilterKind::Extended);
     Estimator::filter(&model, kind, settings()).unwrap()
 }

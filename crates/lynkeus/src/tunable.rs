@@ -21,9 +21,7 @@ fn tunables<'d>(design: &'d Design, made: &Blueprint) -> &'d [Tunable] {
     let numbers = &design.observer.tunables.numbers;
     match made {
         Blueprint::Sampled { observer, .. } if observer.tuned.is_some() => numbers,
-        Blueprint::Filter { model, .. } if model.process_noise().iter().any(|q| *q > 0.0) => {
-            numbers
-        }
+        Blueprint::Filter { model, .. } if model.process_noise.iter().any(|q| *q > 0.0) => numbers,
         Blueprint::Sampled { .. } | Blueprint::Filter { .. } => &[],
     }
 }

@@ -78,7 +78,7 @@ impl Device<'_> {
     pub(super) fn sensors(&self) -> usize {
         match self.blueprint {
             Blueprint::Sampled { observer, .. } => observer.sensors.len(),
-            Blueprint::Filter { model, .. } => model.sensors().len(),
+            Blueprint::Filter { model, .. } => model.sensors.len(),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Estimators as drafts: observers and Kalman filters whose sensors report when they do.
 
 use lynkeus_run::credible::{By, CHANCE, CLIP, ENOUGH, FEW};
-use lynkeus_run::filter::{FilterKind, FilterModel, FilterSettings, Limits, Sensor, SigmaPoints};
+use lynkeus_run::filter::{FilterKind, FilterSettings, Limits, NoisyModel, Sensor, SigmaPoints};
 use lynkeus_run::{
     BetweenSamples, Blueprint, ErrorModel, Jacobians, Level, SampledObserver, Tuned,
 };
@@ -168,15 +168,15 @@ impl Machine {
 
     /// The covariance of an observer's error.
     fn spread(&mut self, errors: &ErrorModel, arguments: &Arguments) -> Result<(), Refusal> {
-        let noise = errors.noise();
-        let flow = errors.flow();
+        let model = &errors.model;
+        let flow = &model.flow;
         let n = flow.system().states().len();
-        self.root(&noise.initial);
-        self.noises(noise.sensors.iter().copied());
+        self.root(&model.initial_variance);
+        self.noises(model.sensors.iter().map(|s| s.noise));
         self.size("LARGER", n);
         let linear = Linear {
             flow,
-            noise: &noise.process,
+            noise: &model.process_noise,
             is_tuned: false,
         };
         self.linear(Which::Free, &linear, arguments)?;
@@ -230,30 +230,25 @@ impl Machine {
         if run.between == BetweenSamples::Linear {
             return Err(Refusal::LooksAhead);
         }
-        if settings.bounds.is_some() {
+        if settings.projects {
             return Err(Refusal::Projection);
         }
-        let (states, inputs) = (model.states(), model.inputs());
+        let flow = model.flow.system();
+        let (states, inputs) = (flow.states(), flow.signals());
         let arguments = arguments(states, inputs, device);
         let room = inputs.len() + device.tunables.len();
         let room = vec![0.0; room.max(1)];
         self.size("STATES", states.len());
-        self.field(
-            "x",
-            Type::Real,
-            &states.join(", "),
-            model.flow().system().start().to_vec(),
-        );
+        self.field("x", Type::Real, &states.join(", "), flow.start().to_vec());
         self.field("inputs", Type::Real, &inputs.join(", "), room);
-        self.root(model.initial_variance());
+        self.root(&model.initial_variance);
         // also a polynomial has no value once it has run away
-        let confined = model.confined().filter(|confined| {
-            let mut bounds = confined.bounds.iter();
-            bounds.any(|b| b.low.is_finite() || b.high.is_finite())
-        });
-        let has_limits = model.sensors().iter().any(|sensor| sensor.limits.is_some());
+        let mut ranges = model.ranges.iter();
+        let is_bounded = ranges.any(|b| b.low.is_finite() || b.high.is_finite());
+        let confined = model.confined.as_ref().filter(|_| is_bounded);
+        let has_limits = model.sensors.iter().any(|sensor| sensor.limits.is_some());
         let is_share = |sensor: &Sensor| matches!(sensor.noise, Level::Relative(_));
-        let is_relative = model.sensors().iter().any(is_share);
+        let is_relative = model.sensors.iter().any(is_share);
         let facts = [
             (confined.is_some(), "confined"),
             (device.deviations, "deviations"),
@@ -267,12 +262,12 @@ impl Machine {
         ];
         let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
         self.measure(model, &arguments, &settings.kind)?;
-        let sensors = model.sensors().len();
+        let sensors = model.sensors.len();
         self.credible(sensors, By::Filter, settings.gate.is_some());
         self.judge(model, settings, &holds);
         let free = Linear {
-            flow: model.flow(),
-            noise: model.process_noise(),
+            flow: &model.flow,
+            noise: &model.process_noise,
             is_tuned: !device.tunables.is_empty(),
         };
         self.tuned(device, None)?;
@@ -284,15 +279,14 @@ impl Machine {
         };
         if let Some(confined) = confined {
             let inside = Linear {
-                flow: &confined.flow,
-                noise: model.process_noise(),
+                flow: confined,
+                noise: &model.process_noise,
                 is_tuned: free.is_tuned,
             };
             self.linear(which_inside, &inside, &arguments)?;
             self.carried(which_inside, &inside);
-            let ends = |end: fn(&lynkeus_run::filter::Bounds) -> f64| -> Vec<f64> {
-                confined.bounds.iter().map(end).collect()
-            };
+            let ends =
+                |end: fn(&Limits) -> f64| -> Vec<f64> { model.ranges.iter().map(end).collect() };
             self.tables += &table("range_from", &ends(|b| b.low));
             self.tables += &table("range_to", &ends(|b| b.high));
         }
@@ -331,12 +325,12 @@ impl Machine {
     /// h, and for the extended filter the entries of C.
     fn measure(
         &mut self,
-        model: &FilterModel,
+        model: &NoisyModel,
         arguments: &Arguments,
         kind: &FilterKind,
     ) -> Result<(), Refusal> {
-        let (n, m) = (model.dimension(), model.sensors().len());
-        let output_map = model.output_map();
+        let (n, m) = (model.process_noise.len(), model.sensors.len());
+        let output_map = &model.output_map;
         refuse_jumps(output_map.system())?;
         let tape = output_map.system().output_tape();
         let mut targets = vec![Target::all("h", m)];
@@ -361,8 +355,8 @@ impl Machine {
         Ok(())
     }
 
-    fn judge(&mut self, model: &FilterModel, settings: &FilterSettings, holds: &[&str]) {
-        let m = model.sensors().len();
+    fn judge(&mut self, model: &NoisyModel, settings: &FilterSettings, holds: &[&str]) {
+        let m = model.sensors.len();
         let mut kept = |name, kind, about: &str| self.field(name, kind, about, vec![0.0; m]);
         kept("readings", Type::Real, "of the last sample");
         kept("became", Type::Int, "what became of each reading");
@@ -373,10 +367,10 @@ impl Machine {
             "of these, how many differ from the one before",
         );
         kept("last", Type::Real, "the reading before");
-        self.noises(model.sensors().iter().map(|s| s.noise));
+        self.noises(model.sensors.iter().map(|s| s.noise));
         if holds.contains(&"limits") {
             let ends = |end: f64, pick: fn(Limits) -> f64| -> Vec<f64> {
-                let sensors = model.sensors().iter();
+                let sensors = model.sensors.iter();
                 sensors.map(|s| s.limits.map_or(end, pick)).collect()
             };
             self.tables += &table("lowest", &ends(f64::NEG_INFINITY, |l| l.low));

@@ -1,7 +1,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::*;
-use crate::{Estimator, SampledObserver, System, Tolerances};
+use crate::{BetweenSamples, Estimator, Level, Method, SampledObserver, System, Tolerances};
+use lynkeus_expr::Graph;
 
 /// x' = A x + b + ξ, y = C x + v with two states and one output, and x̂' = A x̂ + b + K (w − C x̂).
 #[derive(Clone, Copy)]
@@ -58,31 +59,36 @@ impl Plant {
         let signals = [("s".to_owned(), s.node())];
         let outputs = [("x1", x1), ("x2", x2), ("y", h)];
         let outputs = outputs.map(|(name, value)| (name.to_owned(), value.node()));
-        let equations = ErrorEquations {
+        let observer = NoisyPlant {
             graph: &g,
             time: time.node(),
-            states: &states,
-            signals: &signals,
-            derivatives: &derivatives,
-            estimates: &[x1.node(), x2.node()],
-            outputs: &[h.node()],
-            lag: Some(Lag {
-                state: 2,
-                rates: &[rate.node()],
-            }),
+            states: states.to_vec(),
+            derivatives: derivatives.to_vec(),
+            inputs: signals.to_vec(),
+            sensors: vec![Sensor {
+                name: "y".to_owned(),
+                output: h.node(),
+                noise: Level::Absolute(self.noise),
+                limits: None,
+            }],
+            process_noise: vec![self.q[0], self.q[1], 0.0, 0.0],
+            initial_variance: vec![self.p[0], self.p[1], 1.0, 0.0],
+            ranges: vec![],
+            confined: None,
         };
-        let noise = ErrorNoise {
-            process: vec![self.q[0], self.q[1], 0.0, 0.0],
-            initial: vec![self.p[0], self.p[1], 1.0, 0.0],
-            sensors: vec![Level::Absolute(self.noise)],
+        let lag = Lag {
+            state: 2,
+            rates: &[rate.node()],
         };
+        let mut errors = ErrorModel::new(&observer, &[x1.node(), x2.node()], Some(lag)).unwrap();
+        errors.judges = false;
         let system = System::new(&g, time.node(), &states, &signals, &derivatives, &outputs);
         SampledObserver {
             system: system.unwrap(),
             sensors: vec!["y".to_owned()],
             predict: self.predict,
             inputs: BetweenSamples::Hold,
-            errors: Some(ErrorModel::new(equations, noise).unwrap()),
+            errors: Some(errors),
             tuned: None,
         }
     }

@@ -221,11 +221,10 @@ fn starts(made: &Made<'_>) -> Vec<Start> {
             let own = states.len().saturating_sub(observer.sensors.len());
             (states, observer.system.start(), own)
         }
-        Blueprint::Filter { model, .. } => (
-            model.states(),
-            model.flow().system().start(),
-            model.states().len(),
-        ),
+        Blueprint::Filter { model, .. } => {
+            let flow = model.flow.system();
+            (flow.states(), flow.start(), flow.states().len())
+        }
     };
     let first = made.device.first_readings;
     let pairs = names.iter().zip(values).take(own).enumerate();

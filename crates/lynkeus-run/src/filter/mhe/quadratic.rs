@@ -9,11 +9,12 @@
 
 use std::sync::Arc;
 
-use crate::filter::belief::{Belief, Bounds, confine};
-use crate::filter::profile::Skyline;
-use crate::filter::root::{Packed, Root, dot};
+use crate::filter::belief::{Belief, confine};
+use crate::filter::profile::Profile;
+use crate::filter::root::{Root, dot};
 use crate::filter::smoother::{Adjoint, Correction, Step};
 use crate::filter::transition::Stage;
+use crate::noise::Limits;
 
 /// Most changes of a set before it is taken to go round.
 const CHANGES: usize = 12;
@@ -30,7 +31,7 @@ const SHORT: f64 = 0.995;
 /// The problem.
 pub(crate) struct Problem<'a> {
     pub prior: &'a Belief,
-    pub bounds: &'a [Bounds],
+    pub bounds: &'a [Limits],
     pub rows: Vec<Linear>,
     /// without bounds
     pub free: Vec<Pass>,
@@ -121,7 +122,7 @@ impl Problem<'_> {
         None
     }
 
-    /// Bounds that are exceeded are met from now on; those that pull inward are let go.
+    /// Limits that are exceeded are met from now on; those that pull inward are let go.
     fn change(&self, met: &mut [Vec<Pin>], found: &[Smooth]) -> bool {
         let mut changed = false;
         for (met, Smooth { x, pushes }) in met.iter_mut().zip(found) {
@@ -129,7 +130,7 @@ impl Problem<'_> {
             let mut pushes = pushes.iter();
             met.retain(|pin| {
                 let force = pushes.next().copied().unwrap_or(0.0);
-                let Bounds { low, high } = self.bounds[pin.state];
+                let Limits { low, high } = self.bounds[pin.state];
                 let outward = if pin.value == low { -force } else { force };
                 // a single value pushes either way
                 low == high || outward <= 0.0
@@ -210,7 +211,7 @@ impl Problem<'_> {
     fn sides(&self, x: &mut [Vec<f64>]) -> Vec<Side> {
         let mut sides = vec![];
         for (row, x) in x.iter_mut().enumerate() {
-            for (state, (x, Bounds { low, high })) in x.iter_mut().zip(self.bounds).enumerate() {
+            for (state, (x, Limits { low, high })) in x.iter_mut().zip(self.bounds).enumerate() {
                 let unit = self.rows[row].spread[state];
                 // what does not move needs no bounds
                 if low == high || unit <= 0.0 {
@@ -306,7 +307,7 @@ fn longest(sides: &[Side], changes: &[Change]) -> f64 {
 }
 
 /// The bound that a state is beyond, by more than rounding.
-fn exceeded(x: f64, Bounds { low, high }: Bounds) -> Option<f64> {
+fn exceeded(x: f64, Limits { low, high }: Limits) -> Option<f64> {
     let slack = 1e-9 * (high - low).min(x.abs().max(1e-3));
     match (x < low - slack, x > high + slack) {
         (true, _) => Some(low),
@@ -369,16 +370,20 @@ pub(crate) struct Pass {
     /// the root before the pins, where there are any
     pub by_readings: Option<Root>,
     /// Φ from the row before; none of the first
-    pub transition: Option<Arc<Skyline>>,
+    pub transition: Option<Arc<Profile>>,
     pub readings: Vec<Correction>,
     /// what each pin did; none of a state that is held by other means
     pub pins: Vec<Option<Correction>>,
 }
 
 impl Pass {
-    /// The root by the readings alone.
-    pub fn by_readings(&self) -> &Root {
-        self.by_readings.as_ref().unwrap_or(&self.after.root)
+    /// The state with its pins, the root by the readings alone.
+    pub fn unpinned(&self) -> Belief {
+        let root = self.by_readings.as_ref().unwrap_or(&self.after.root);
+        Belief {
+            x: self.after.x.clone(),
+            root: root.clone(),
+        }
     }
 
     /// What a smoother keeps of a row that stays in the window: the bounds that it meets are
@@ -387,8 +392,7 @@ impl Pass {
         let pins = self.pins.into_iter().flatten();
         Step {
             transition: self.transition.map(Arc::unwrap_or_clone),
-            x: self.after.x,
-            root: Packed::of(&self.after.root),
+            belief: self.after,
             corrections: self.readings.into_iter().chain(pins).collect(),
         }
     }
@@ -398,8 +402,7 @@ impl Pass {
     pub fn leaving(&self) -> Step {
         Step {
             transition: self.transition.as_deref().cloned(),
-            x: self.after.x.clone(),
-            root: Packed::of(self.by_readings()),
+            belief: self.unpinned(),
             corrections: self.readings.clone(),
         }
     }
@@ -411,7 +414,7 @@ pub(crate) fn carried(
     stage: Option<&Arc<Stage>>,
     prior: &Belief,
     last: Option<&Pass>,
-) -> (Belief, Option<Arc<Skyline>>) {
+) -> (Belief, Option<Arc<Profile>>) {
     match (stage, last) {
         (Some(stage), Some(last)) => {
             let transition = Arc::clone(&stage.transition);
@@ -419,7 +422,7 @@ pub(crate) fn carried(
         }
         (None, Some(last)) => {
             let after = last.after.clone();
-            let identity = Skyline::identity(after.x.len());
+            let identity = Profile::identity(after.x.len());
             (after, Some(Arc::new(identity)))
         }
         (_, None) => (prior.clone(), None),
@@ -431,7 +434,7 @@ pub(crate) fn corrected(
     seen: &[Seen],
     spread: &[f64],
     pins: &[Pin],
-    (before, transition): (Belief, Option<Arc<Skyline>>),
+    (before, transition): (Belief, Option<Arc<Profile>>),
 ) -> Pass {
     let mut after = before.clone();
     let mut readings = Vec::with_capacity(seen.len());
@@ -466,7 +469,10 @@ fn take(belief: &mut Belief, c: &[f64], y: f64, r: f64, least: f64) -> Option<Co
         return None;
     }
     let innovation = y - dot(c, &belief.x);
-    let gain = belief.root.update(&projected, r)?;
+    let mut gain = vec![];
+    if !belief.root.update(&projected, r, &mut gain) {
+        return None;
+    }
     for (x, k) in belief.x.iter_mut().zip(&gain) {
         *x += k * innovation;
     }

@@ -158,9 +158,8 @@ impl Dynamics for Variational<'_> {
             return false;
         }
         self.driven.evaluation.outputs(t, &z[..n], self.slopes);
-        let layout = Layout { n, width };
         self.curvature
-            .write(layout, self.entries, self.slopes, z, slopes);
+            .write([n, width], self.entries, self.slopes, z, slopes);
         true
     }
 
@@ -199,27 +198,12 @@ enum Term {
     Second { entry: usize, of: usize },
 }
 
-/// Where x̂, Φ and W are in the state.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Layout {
-    pub n: usize,
-    /// numbers in a row of (Φ W)
-    pub width: usize,
-}
-
-impl Layout {
-    /// An entry of (Φ W).
-    pub fn at(self, row: usize, column: usize) -> usize {
-        self.n + row * self.width + column
-    }
-}
-
 impl Curvature {
-    /// Writes the Jacobian at the state z, where F has these values at its places and ∂F/∂x is
-    /// [`Curvature::second`].
+    /// Writes the Jacobian at the state z, x̂ and n rows of `width` numbers, where F has these values
+    /// at its places and ∂F/∂x is [`Curvature::second`].
     pub fn write(
         &mut self,
-        layout: Layout,
+        [n, width]: [usize; 2],
         entries: &[(usize, usize)],
         first: &[f64],
         z: &[f64],
@@ -228,7 +212,7 @@ impl Curvature {
         let second = self.second.places();
         if self.known.as_ref().is_none_or(|k| !Arc::ptr_eq(k, second)) {
             self.known = Some(second.clone());
-            self.arrange(layout, entries);
+            self.arrange([n, width], entries);
         }
         let values = slopes.at(&self.places);
         for (value, term) in values.iter_mut().zip(&self.terms) {
@@ -239,12 +223,12 @@ impl Curvature {
         }
     }
 
-    fn arrange(&mut self, layout: Layout, entries: &[(usize, usize)]) {
+    fn arrange(&mut self, size: [usize; 2], entries: &[(usize, usize)]) {
         let mut all: Vec<(Place, Term)> = vec![];
         let mut add = |row, column, term| all.push((Place { row, column }, term));
         for (entry, &(i, j)) in entries.iter().enumerate() {
             add(i, j, Term::First(entry));
-            for (row, of) in affected(layout, i, j) {
+            for (row, of) in affected(size, i, j) {
                 add(row, of, Term::First(entry));
             }
         }
@@ -252,7 +236,7 @@ impl Curvature {
         let places = self.second.places().iter().enumerate();
         for (entry, at) in places.filter(|(_, at)| at.row < entries.len()) {
             let (i, j) = entries[at.row];
-            for (row, of) in affected(layout, i, j) {
+            for (row, of) in affected(size, i, j) {
                 add(row, at.column, Term::Second { entry, of });
             }
         }
@@ -263,12 +247,12 @@ impl Curvature {
 
 /// Which derivatives the entry (i, j) of F adds to, and of what it adds its multiple: (FΦ)ᵢ꜀ has
 /// Φⱼ꜀, and so has (FW)ᵢ꜀ and its mirror image.
-fn affected(layout: Layout, i: usize, j: usize) -> impl Iterator<Item = (usize, usize)> {
-    let n = layout.n;
-    let transition = (0..n).map(move |c| (layout.at(i, c), layout.at(j, c)));
-    let noise = (0..layout.width - n).flat_map(move |c| {
-        let of = layout.at(j, n + c);
-        [(layout.at(i, n + c), of), (layout.at(c, n + i), of)]
+fn affected([n, width]: [usize; 2], i: usize, j: usize) -> impl Iterator<Item = (usize, usize)> {
+    let at = move |row: usize, column: usize| n + row * width + column;
+    let transition = (0..n).map(move |c| (at(i, c), at(j, c)));
+    let noise = (0..width - n).flat_map(move |c| {
+        let of = at(j, n + c);
+        [(at(i, n + c), of), (at(c, n + i), of)]
     });
     transition.chain(noise)
 }
