@@ -151,7 +151,7 @@ impl Signal {
 }
 
 /// An observer whose measurements w are states, to be set to each reading: see
-/// [`lynkeus_run::SampledObserver`].
+/// [`lynkeus_run::Updates::Jumps`].
 #[derive(Clone, Debug)]
 pub struct Sampled {
     /// states z, then w; known inputs, then one switch s per sensor; nothing measured

@@ -1,37 +1,16 @@
 //! How an observer's error spreads, for standard deviations.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
 use lynkeus_expr::{Node, jacobian};
 
 use crate::filter::root::Root;
 use crate::filter::transition::Propagation;
-use crate::filter::{Belief, NoisyModel, NoisyPlant, Sensor, check_counts};
-use crate::linearised::OutputMap;
+use crate::filter::{Belief, Innovation, NoisyModel, NoisyPlant, Reading, Sensor, check_counts};
+use crate::linearised::{Entries, OutputMap};
+use crate::runner::Sample;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings, Events, Jacobian, Jacobians, Linearised};
-
-/// The linearised error of a [sampled observer](crate::SampledObserver) z' = F(t, z, u, w), x̂ = g(z),
-/// driven by the declared noises of plant and sensors.
-///
-/// The error of a measurement w is counted from what the estimate expects, as the innovation ν = w − h(x̂):
-/// process noise moves the plant and its output alike, so that in (z, ν) it acts on the estimated
-/// states alone, between samples as well. A reading with noise v leaves ν = v − C e, C = ∂h/∂x̂.
-///
-/// A measurement that is held falls behind the plant by ẏ = L_f h(x), x = x̂ − e. Its part L_f h(x̂) is
-/// no noise; it is known along the estimate, and counts as the share of one more quantity, the lag, whose
-/// size is 1: deviations are then roots of the mean square error, as if e were independent of x̂, as that
-/// of a filter is.
-#[derive(Clone, Debug)]
-pub struct ErrorModel {
-    /// the observer with its Jacobian in (z, ν), ∂g/∂z and ∂h/∂z; what each sensor should read, h(x̂) by z
-    pub model: NoisyModel,
-    /// place of the lag
-    lag: Option<usize>,
-    estimates: usize,
-    /// readings are judged by what the observer makes of them
-    pub judges: bool,
-}
 
 /// How measurements that are held fall behind.
 #[derive(Clone, Copy, Debug)]
@@ -42,131 +21,36 @@ pub struct Lag<'a> {
     pub rates: &'a [Node],
 }
 
-/// The equations of a [sampled observer](crate::SampledObserver): its states are z, then the measurements
-/// w, each sensor's output is h(x̂).
-struct ErrorEquations<'a> {
-    observer: &'a NoisyPlant<'a>,
-    lag: Option<Lag<'a>>,
-    /// h(x̂)
-    outputs: Vec<Node>,
-}
-
-/// A matrix by its places.
-type Entries = BTreeMap<(usize, usize), Node>;
-
-impl ErrorEquations<'_> {
-    fn own(&self) -> usize {
-        self.observer
-            .states
-            .len()
-            .saturating_sub(self.outputs.len())
-    }
-
-    fn symbols(&self) -> Vec<Node> {
-        self.observer.states.iter().map(|s| s.1).collect()
-    }
-
-    /// C = ∂h/∂z.
-    fn views(&self) -> Entries {
-        let symbols = self.symbols();
-        let views = jacobian::forward(self.observer.graph, &self.outputs, &symbols[..self.own()]);
-        let places = views.entries.into_iter();
-        places.map(|(i, j, c)| ((i, j), c)).collect()
-    }
-
-    /// The Jacobian of nodes by (z, ν). w = ν + h(x̂) is put in its place first, so that what a
-    /// correction has of x̂ goes out before a gain multiplies it.
-    fn slopes(&self, nodes: &[Node]) -> Entries {
-        let graph = self.observer.graph;
-        let mut symbols = self.symbols();
-        let (mut there, mut back) = (HashMap::new(), HashMap::new());
-        for (w, output) in symbols.iter_mut().skip(self.own()).zip(&self.outputs) {
-            let innovation = graph.fresh("innovation");
-            let expected = graph.expr(*output);
-            there.insert(*w, (innovation + expected).node());
-            back.insert(innovation.node(), (graph.expr(*w) - expected).node());
-            *w = innovation.node();
-        }
-        let nodes = graph.substitute(nodes, &there);
-        let slopes = jacobian::forward(graph, &nodes, &symbols).entries;
-        let values: Vec<Node> = slopes.iter().map(|entry| entry.2).collect();
-        let values = graph.substitute(&values, &back);
-        let places = slopes.iter().map(|&(i, j, _)| (i, j));
-        places.zip(values).collect()
-    }
-
-    fn add(&self, entries: &mut Entries, place: (usize, usize), node: Node) {
-        let graph = self.observer.graph;
-        let sum = entries.get(&place).map_or(node, |before| {
-            (graph.expr(*before) + graph.expr(node)).node()
-        });
-        entries.insert(place, sum);
-    }
-
-    /// z' and ν' = L_f h(x̂) − (h(x̂))', to which a measurement that is held adds its lag.
-    fn rates(&self) -> Vec<Node> {
-        let NoisyPlant {
-            graph,
-            time,
-            derivatives,
-            ..
-        } = self.observer;
-        let (own, following) = derivatives.split_at(self.own().min(derivatives.len()));
-        let mut moving = vec![*time];
-        moving.extend(self.symbols().into_iter().take(own.len()));
-        let motion = [&[graph.constant(1.0).node()], own].concat();
-        let expected = jacobian::along(graph, &self.outputs, &moving, &motion);
-        let following = self.lag.map_or(following, |lag| lag.rates);
-        let both = following.iter().zip(expected);
-        let innovations = both.map(|(w, y)| (graph.expr(*w) - graph.expr(y)).node());
-        own.iter().copied().chain(innovations).collect()
-    }
-
-    /// The Jacobian of the flow in (z, ν), with what holding leaves behind.
-    fn flow(&self) -> Entries {
-        let (graph, own) = (self.observer.graph, self.own());
-        let mut flow = self.slopes(&self.rates());
-        if let Some(lag) = &self.lag {
-            let held = self.observer.derivatives.iter().skip(own).zip(lag.rates);
-            for (sensor, (w, rate)) in held.enumerate() {
-                let behind = graph.expr(*w) - graph.expr(*rate);
-                self.add(&mut flow, (own + sensor, lag.state), behind.node());
-            }
-        }
-        flow
-    }
-}
-
-/// Entries in the order of their places.
-fn listed(entries: Entries) -> Vec<(usize, usize, Node)> {
-    let entries = entries.into_iter();
-    entries.map(|((i, j), node)| (i, j, node)).collect()
-}
-
-impl ErrorModel {
-    /// Compiles the linearisation of an observer: its states are z, then the measurements w; its sensors'
-    /// outputs are h(x̂), one for each w; `estimates` are g(z).
+impl NoisyModel {
+    /// Compiles the linearised error of a [observer](crate::Updates::Jumps) z' = F(t, z, u, w),
+    /// x̂ = g(z), driven by the declared noises of plant and sensors. The states are z, then the
+    /// measurements w; the sensors' outputs are h(x̂), one for each w; `estimates` are g(z).
+    ///
+    /// The error of a measurement w is counted from what the estimate expects, as the innovation ν = w − h(x̂):
+    /// process noise moves the plant and its output alike, so that in (z, ν) it acts on the estimated
+    /// states alone, between samples as well. A reading with noise v leaves ν = v − C e, C = ∂h/∂x̂. The
+    /// flow has its Jacobian in (z, ν), ∂g/∂z and ∂h/∂z.
+    ///
+    /// A measurement that is held falls behind the plant by ẏ = L_f h(x), x = x̂ − e. Its part L_f h(x̂) is
+    /// no noise; it is known along the estimate, and counts as the share of one more quantity, the lag, whose
+    /// size is 1: deviations are then roots of the mean square error, as if e were independent of x̂, as that
+    /// of a filter is.
     ///
     /// # Errors
     /// [`Error::MissingInput`], and [`Error::Setting`] for wrong numbers of noises.
-    pub fn new(
+    pub fn of_observer(
         observer: &NoisyPlant<'_>,
         estimates: &[Node],
         lag: Option<Lag<'_>>,
     ) -> Result<Self, Error> {
         check_counts(observer)?;
-        let equations = ErrorEquations {
-            observer,
-            lag,
-            outputs: observer.sensors.iter().map(|s| s.output).collect(),
-        };
         // C first: nodes are made in this order
-        let output = listed(equations.views());
-        let jacobians = Jacobians {
-            state: listed(equations.flow()),
-            estimate: listed(equations.slopes(estimates)),
-            output,
-        };
+        let mut output = observer.views();
+        let mut state = observer.error_flow(lag);
+        let mut estimate = observer.error_slopes(estimates);
+        for entries in [&mut output, &mut state, &mut estimate] {
+            entries.sort_by_key(|&(i, j, _)| (i, j));
+        }
         let flow = Linearised::new(
             observer.graph,
             observer.time,
@@ -174,28 +58,109 @@ impl ErrorModel {
             &observer.inputs,
             &observer.derivatives,
             &[],
-            &jacobians,
+            &Jacobians {
+                state,
+                estimate,
+                output,
+            },
         )?;
         Ok(Self {
-            model: NoisyModel::of(observer, flow, None)?,
             lag: lag.map(|lag| lag.state),
             estimates: estimates.len(),
-            judges: true,
+            ..Self::of(observer, flow, None)?
         })
     }
 
     /// The covariance from an exact start: of the lag alone.
     fn settled(&self) -> Root {
-        let starts = self.model.initial_variance.iter().enumerate();
+        let starts = self.initial_variance.iter().enumerate();
         let starts = starts.map(|(i, v)| if Some(i) == self.lag { *v } else { 0.0 });
         Root::diagonal(&starts.collect::<Vec<f64>>())
+    }
+}
+
+/// Of an observer.
+impl NoisyPlant<'_> {
+    /// How many of the states are z.
+    fn own(&self) -> usize {
+        self.states.len().saturating_sub(self.sensors.len())
+    }
+
+    fn symbols(&self) -> Vec<Node> {
+        self.states.iter().map(|s| s.1).collect()
+    }
+
+    fn outputs(&self) -> Vec<Node> {
+        self.sensors.iter().map(|s| s.output).collect()
+    }
+
+    /// C = ∂h/∂z.
+    fn views(&self) -> Entries {
+        let own = &self.symbols()[..self.own()];
+        jacobian::forward(self.graph, &self.outputs(), own).entries
+    }
+
+    /// The Jacobian of nodes by (z, ν). w = ν + h(x̂) is put in its place first, so that what a
+    /// correction has of x̂ goes out before a gain multiplies it.
+    fn error_slopes(&self, nodes: &[Node]) -> Entries {
+        let graph = self.graph;
+        let mut symbols = self.symbols();
+        let (mut there, mut back) = (HashMap::new(), HashMap::new());
+        for (w, sensor) in symbols.iter_mut().skip(self.own()).zip(&self.sensors) {
+            let innovation = graph.fresh("innovation");
+            let expected = graph.expr(sensor.output);
+            there.insert(*w, (innovation + expected).node());
+            back.insert(innovation.node(), (graph.expr(*w) - expected).node());
+            *w = innovation.node();
+        }
+        let nodes = graph.substitute(nodes, &there);
+        let mut slopes = jacobian::forward(graph, &nodes, &symbols).entries;
+        let values: Vec<Node> = slopes.iter().map(|entry| entry.2).collect();
+        let values = graph.substitute(&values, &back);
+        let entries = slopes.iter_mut().zip(values);
+        entries.for_each(|(entry, value)| entry.2 = value);
+        slopes
+    }
+
+    /// z' and ν' = L_f h(x̂) − (h(x̂))', to which a measurement that is held adds its lag.
+    fn error_rates(&self, lag: Option<Lag<'_>>) -> Vec<Node> {
+        let graph = self.graph;
+        let all = &self.derivatives;
+        let (own, following) = all.split_at(self.own().min(all.len()));
+        let mut moving = vec![self.time];
+        moving.extend(self.symbols().into_iter().take(own.len()));
+        let motion = [&[graph.constant(1.0).node()], own].concat();
+        let expected = jacobian::along(graph, &self.outputs(), &moving, &motion);
+        let following = lag.map_or(following, |lag| lag.rates);
+        let both = following.iter().zip(expected);
+        let innovations = both.map(|(w, y)| (graph.expr(*w) - graph.expr(y)).node());
+        own.iter().copied().chain(innovations).collect()
+    }
+
+    /// The Jacobian of the flow in (z, ν), with what holding leaves behind.
+    fn error_flow(&self, lag: Option<Lag<'_>>) -> Entries {
+        let (graph, own) = (self.graph, self.own());
+        let mut flow = self.error_slopes(&self.error_rates(lag));
+        let Some(lag) = lag else {
+            return flow;
+        };
+        let held = self.derivatives.iter().skip(own).zip(lag.rates);
+        for (sensor, (w, rate)) in held.enumerate() {
+            let behind = graph.expr(*w) - graph.expr(*rate);
+            let at = (own + sensor, lag.state);
+            match flow.iter_mut().find(|entry| (entry.0, entry.1) == at) {
+                Some(entry) => entry.2 = (graph.expr(entry.2) + behind).node(),
+                None => flow.push((at.0, at.1, behind.node())),
+            }
+        }
+        flow
     }
 }
 
 /// The covariance of an observer's states, and of its innovations, along its run.
 #[derive(Clone, Debug)]
 pub(crate) struct Spread {
-    propagation: Propagation,
+    pub propagation: Propagation,
     belief: Belief,
     /// the covariance from an exact start, where readings are judged
     settled: Option<Root>,
@@ -204,6 +169,8 @@ pub(crate) struct Spread {
     values: Vec<f64>,
     sensors: Vec<Sensor>,
     expected: OutputMap,
+    /// of the last readings; empty where they are not judged
+    pub innovations: Vec<Innovation>,
     pub deviations: Vec<f64>,
 }
 
@@ -214,40 +181,36 @@ impl Persist for Spread {
         if let Some(settled) = &mut self.settled {
             settled.walk(walk)?;
         }
+        for innovation in &mut self.innovations {
+            innovation.walk(walk)?;
+        }
         walk.numbers(&mut self.deviations)
     }
 }
 
 impl Spread {
-    pub fn new(errors: &ErrorModel, run: EstimatorSettings) -> Result<Self, Error> {
-        let model = &errors.model;
+    /// Whether readings are judged.
+    pub fn new(model: &NoisyModel, judges: bool, run: EstimatorSettings) -> Result<Self, Error> {
         let flow = model.flow.system();
+        let judged = if judges { model.sensors.len() } else { 0 };
         Ok(Self {
             propagation: Propagation::new(&model.flow, &model.process_noise, run)?,
             belief: Belief::new(flow.start(), &model.initial_variance),
-            settled: errors.judges.then(|| errors.settled()),
+            settled: judges.then(|| model.settled()),
             jacobians: model.flow.jacobians().clone(),
             values: vec![0.0; flow.outputs().len()],
             sensors: model.sensors.clone(),
             expected: OutputMap::new(&model.output_map),
-            deviations: vec![0.0; errors.estimates],
+            innovations: vec![Innovation::default(); judged],
+            deviations: vec![0.0; model.estimates],
         })
     }
 
-    /// The signals from here on.
-    pub fn start(&mut self, signals: &[f64]) {
-        self.propagation.driven.start(signals);
-    }
-
-    /// The known inputs at the end of the interval to come.
-    pub fn aim(&mut self, from: f64, to: f64, inputs: &[f64]) {
-        self.propagation.driven.aim(from, to, inputs);
-    }
-
-    /// State and covariance to a time.
-    pub fn advance(&mut self, from: f64, to: f64, x: &mut [f64]) -> Result<(), Error> {
+    /// State and covariance to the time of a sample.
+    pub fn advance(&mut self, from: f64, to: &Sample<'_>, x: &mut [f64]) -> Result<(), Error> {
         self.belief.x.copy_from_slice(x);
-        let done = self.propagation.predict(&mut self.belief, from, to);
+        self.propagation.driven.aim(from, to.t, to.inputs);
+        let done = self.propagation.predict(&mut self.belief, from, to.t);
         // where an error ends it early, as far as it came
         x.copy_from_slice(&self.belief.x);
         done?;
@@ -277,30 +240,39 @@ impl Spread {
         }
     }
 
-    /// What is expected of the sensors at (t, z) under the signals, before they are read there: h(x̂)
-    /// with the standard deviation of a reading around it, √(HPHᵀ + R), and the same once the start is
-    /// forgotten. Nothing where readings are not judged, or the model has no value.
-    pub fn expected(&mut self, t: f64, z: &[f64], signals: &[f64]) -> Vec<[f64; 3]> {
-        let (expected, Some(settled)) = (&mut self.expected, &self.settled) else {
-            return vec![];
+    /// What is said of readings before they count, at z under the signals: h(x̂) is expected with the
+    /// standard deviation of a reading around it, √(HPHᵀ + R), and the same once the start is forgotten.
+    /// Nothing where readings are not judged, or the model has no value.
+    pub fn judge(&mut self, sample: &Sample<'_>, z: &[f64], signals: &[f64]) {
+        let Some(settled) = &self.settled else {
+            return;
         };
-        expected.evaluate(t, z, signals);
-        if !expected.is_finite() {
-            return vec![];
-        }
+        let expected = &mut self.expected;
+        let is_known = expected.linearise(sample.t, z, signals).is_ok();
         let n = self.belief.root.n;
         let (mut row, mut projected) = (vec![0.0; n], vec![0.0; n]);
-        let each = |(i, (value, sensor)): (usize, (&f64, &Sensor))| {
+        for (i, innovation) in self.innovations.iter_mut().enumerate() {
+            let reading = sample.readings.get(i).copied().unwrap_or(f64::NAN);
+            if !(is_known && reading.is_finite()) {
+                *innovation = Innovation::default();
+                continue;
+            }
+            let predicted = expected.outputs()[i];
+            let noise = self.sensors[i].noise.variance(predicted);
             expected.write_slopes(i, &mut row);
             let mut deviation = |root: &Root| {
                 root.transposed_times(&row, &mut projected);
                 let own: f64 = projected.iter().map(|p| p * p).sum();
-                (own + sensor.noise.variance(*value)).sqrt()
+                (own + noise).sqrt()
             };
-            [*value, deviation(&self.belief.root), deviation(settled)]
-        };
-        let values = expected.outputs().iter().zip(&self.sensors);
-        values.enumerate().map(each).collect()
+            *innovation = Innovation {
+                value: reading - predicted,
+                deviation: deviation(&self.belief.root),
+                settled: deviation(settled),
+                predicted,
+                reading: Reading::Taken,
+            };
+        }
     }
 
     /// The standard deviations of the estimates at (t, z).

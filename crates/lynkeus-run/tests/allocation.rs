@@ -8,7 +8,7 @@ use cap::Cap;
 use lynkeus_expr::Graph;
 use lynkeus_run::filter::{FilterKind, FilterSettings, NoisyModel, NoisyPlant, Sensor};
 use lynkeus_run::{
-    BetweenSamples, Estimator, EstimatorSettings, Level, Method, SampledObserver, Step, System,
+    BetweenSamples, Blueprint, Estimator, EstimatorSettings, Level, Method, Step, System, Updates,
 };
 
 #[global_allocator]
@@ -45,15 +45,17 @@ fn sampled() -> Estimator {
     let derivatives = [(u + (w - x) * 2.0).node(), (s * (u - x)).node()];
     let signals = [("u".to_string(), u.node()), ("s".to_string(), s.node())];
     let outputs = [("x".to_string(), x.node()), ("y".to_string(), x.node())];
-    let observer = SampledObserver {
-        system: System::new(&g, time.node(), &states, &signals, &derivatives, &outputs).unwrap(),
+    let system = System::new(&g, time.node(), &states, &signals, &derivatives, &outputs).unwrap();
+    let observer = Blueprint {
         sensors: vec!["y".to_string()],
-        predict: true,
-        inputs: BetweenSamples::Hold,
-        errors: None,
-        tuned: None,
+        updates: Updates::Jumps {
+            predict: true,
+            errors: None,
+            tuned: None,
+        },
+        ..Blueprint::new(&system, settings())
     };
-    Estimator::sampled(&observer, METHOD).unwrap()
+    observer.estimator().unwrap()
 }
 
 /// x1' = x2 + u, x2' = −sin x1, y = x1.

@@ -99,16 +99,13 @@ pub(crate) fn blueprint(
     refuse_longer_lag(study, &tuning.kind)?;
     refuse_smoothed_bounds(study, tuning)?;
     let model = model(prepared, design, tuning, samples, notes)?;
-    Ok(Blueprint::Filter {
-        model: Box::new(model),
-        settings: FilterSettings {
-            gate: tuning.gate,
-            projects: tuning.projects,
-            keep_history: study.estimate.smoothing.is_some(),
-            ..FilterSettings::of(tuning.kind.clone())
-        },
-        run: settings,
-    })
+    let kept = FilterSettings {
+        gate: tuning.gate,
+        projects: tuning.projects,
+        keep_history: study.estimate.smoothing.is_some(),
+        ..FilterSettings::of(tuning.kind.clone())
+    };
+    Ok(Blueprint::filter(model, kept, settings))
 }
 
 fn is_window(design: &Design) -> bool {

@@ -73,14 +73,10 @@ pub(crate) fn blueprint(prepared: &Prepared<'_>, design: &Design) -> Result<Blue
     }
     let follows = study.estimate.deviations;
     let mut observer = sampled::observer(prepared, design, &none, follows, notes)?;
-    if let Some(errors) = &mut observer.errors {
-        // nobody judges a run that has no end
-        errors.judges = false;
-    }
-    Ok(Blueprint::Sampled {
-        observer: Box::new(observer),
-        method: run.method,
-    })
+    // nobody judges a run that has no end
+    observer.judges = false;
+    observer.run.method = run.method;
+    Ok(observer)
 }
 
 fn refuse_looking_ahead(study: &Study, settings: &EstimateSettings) -> Result<(), Error> {

@@ -2,10 +2,10 @@
 
 use lynkeus_expr::{Graph, Node};
 use lynkeus_observers::{Design, Sampled, Signal, Tunable, kalman::prior_variance};
-use lynkeus_run::filter::{NoisyPlant, Sensor};
+use lynkeus_run::filter::{NoisyModel, NoisyPlant, Sensor};
 use lynkeus_run::{
-    BetweenSamples as Between, Error as RunError, ErrorModel, Estimator, EstimatorSettings, Lag,
-    Method, SampledObserver, System, Tuned,
+    BetweenSamples as Between, Blueprint, Error as RunError, EstimatorSettings, Lag, Method,
+    System, Tuned, Updates,
 };
 
 use crate::Error;
@@ -35,11 +35,10 @@ pub(crate) fn run(
     };
     let follows = prepared.study().estimate.follows_errors();
     let mut observer = observer(prepared, design, samples, follows, &mut course.notes)?;
-    if let Some(errors) = &mut observer.errors {
-        // what the log's scatter gives judges nobody
-        errors.judges = !prepared.study().sensors.noise.is_empty() || course.keeps_innovations;
-    }
-    let mut estimator = Estimator::sampled(&observer, method).map_err(Error::from_source)?;
+    // what the log's scatter gives judges nobody
+    observer.judges = !prepared.study().sensors.noise.is_empty() || course.keeps_innovations;
+    observer.run.method = method;
+    let mut estimator = observer.estimator().map_err(Error::from_source)?;
     let count = design.observer.estimates.len();
     replay(&mut estimator, samples, count, &mut course, watch)?;
     let sensors = estimator.health().sensors.iter();
@@ -118,8 +117,8 @@ fn followed(
 ) -> Result<Course, Error> {
     let mut course = Course::default();
     let mut observer = observer(prepared, design, samples, true, &mut course.notes)?;
-    observer.inputs = run.between;
-    let mut estimator = Estimator::sampled(&observer, run.method).map_err(Error::from_source)?;
+    observer.run = run;
+    let mut estimator = observer.estimator().map_err(Error::from_source)?;
     let count = design.observer.estimates.len();
     replay(&mut estimator, samples, count, &mut course, watch)?;
     Ok(course)
@@ -135,7 +134,7 @@ pub(crate) fn observer(
     samples: &Samples,
     follows: bool,
     notes: &mut Vec<String>,
-) -> Result<SampledObserver, Error> {
+) -> Result<Blueprint, Error> {
     let (study, augmented) = (prepared.study(), prepared.augmented());
     let sampled = design.observer.sampled(augmented);
     let mut sampled = sampled.map_err(Error::from_source)?;
@@ -207,17 +206,19 @@ pub(crate) fn observer(
                 ranges: vec![],
                 confined: None,
             };
-            let errors = ErrorModel::new(&observer, &estimates, lag);
-            Some(errors.map_err(Error::from_source)?)
+            let errors = NoisyModel::of_observer(&observer, &estimates, lag);
+            Some(Box::new(errors.map_err(Error::from_source)?))
         }
     };
-    Ok(SampledObserver {
-        system,
-        sensors,
-        predict,
-        inputs: Between::Hold,
-        errors,
-        tuned,
+    Ok(Blueprint {
+        sensors: measured(design),
+        updates: Updates::Jumps {
+            predict,
+            errors,
+            tuned,
+        },
+        judges: true,
+        ..Blueprint::new(&system, EstimatorSettings::default())
     })
 }
 

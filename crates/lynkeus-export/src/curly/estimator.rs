@@ -2,9 +2,7 @@
 
 use lynkeus_run::credible::{By, CHANCE, CLIP, ENOUGH, FEW};
 use lynkeus_run::filter::{FilterKind, FilterSettings, Limits, NoisyModel, Sensor, SigmaPoints};
-use lynkeus_run::{
-    BetweenSamples, Blueprint, ErrorModel, Jacobians, Level, SampledObserver, Tuned,
-};
+use lynkeus_run::{BetweenSamples, Jacobians, Level, Tuned, Updates};
 
 use super::device::{Device, Entry, FirstReading};
 use super::draft::{Arguments, Target, draft, number, table};
@@ -40,14 +38,14 @@ pub(super) fn drafted(device: &Device<'_>) -> Result<Machine, Refusal> {
     );
     let about = "samples in a row for which the equations had no value or an estimate ran away";
     machine.single("refused", Type::Int, about, 0.0);
-    machine.steps(device.blueprint.method())?;
+    machine.steps(device.blueprint.run.method)?;
     let mut holds = vec![];
-    match device.blueprint {
-        Blueprint::Sampled { observer, .. } => {
+    match &device.blueprint.updates {
+        Updates::Jumps { .. } => {
             holds.push("sampled");
-            machine.sampled(device, observer)?;
+            machine.sampled(device)?;
         }
-        Blueprint::Filter { .. } => machine.filter(device)?,
+        Updates::Filter { .. } => machine.filter(device)?,
     }
     if !device.first_readings.is_empty() {
         holds.push("first");
@@ -84,10 +82,19 @@ fn arguments(states: &[String], signals: &[String], device: &Device<'_>) -> Argu
 }
 
 impl Machine {
-    fn sampled(&mut self, device: &Device<'_>, observer: &SampledObserver) -> Result<(), Refusal> {
-        let system = &observer.system;
+    /// Nothing for a filter.
+    fn sampled(&mut self, device: &Device<'_>) -> Result<(), Refusal> {
+        let Updates::Jumps {
+            predict,
+            errors,
+            tuned: made,
+        } = &device.blueprint.updates
+        else {
+            return Ok(());
+        };
+        let system = &device.blueprint.flow;
         refuse_jumps(system)?;
-        let (n, m) = (system.states().len(), observer.sensors.len());
+        let (n, m) = (system.states().len(), device.sensors());
         let told = system.outputs().len().saturating_sub(m);
         self.size("STATES", n);
         self.size("OWN", n - m);
@@ -96,7 +103,7 @@ impl Machine {
         self.size("ESTIMATED", told.saturating_sub(device.monitors));
         let about = system.states().join(", ");
         self.field("x", Type::Real, &about, system.start().to_vec());
-        let (tuned, behind) = match &observer.tuned {
+        let (tuned, behind) = match made {
             Some(tuned) => (
                 tuned.system.outputs().len(),
                 ", then what follows from tuning",
@@ -125,7 +132,7 @@ impl Machine {
         )?;
         self.add(&outputs);
         let mut holds = vec![];
-        let field = match &observer.errors {
+        let field = match errors {
             None => {
                 self.flow(system, &arguments)?;
                 self.integrate(n);
@@ -138,7 +145,7 @@ impl Machine {
             }
         };
         let is_declared = device.noises.iter().any(Option::is_some);
-        match &observer.errors {
+        match errors {
             _ if !is_declared => {}
             Some(_) => {
                 self.credible(m, By::ErrorSystem, false);
@@ -149,8 +156,8 @@ impl Machine {
                 holds.push("judged");
             }
         }
-        self.tuned(device, observer.tuned.as_ref())?;
-        let follows = if observer.predict { "R(1.0)" } else { "R(0.0)" };
+        self.tuned(device, made.as_ref())?;
+        let follows = if *predict { "R(1.0)" } else { "R(0.0)" };
         let text = chosen(SAMPLED, &holds).replace("FIELD", field);
         self.add(&text.replace("FOLLOWS", follows));
         Ok(())
@@ -167,8 +174,7 @@ impl Machine {
     }
 
     /// The covariance of an observer's error.
-    fn spread(&mut self, errors: &ErrorModel, arguments: &Arguments) -> Result<(), Refusal> {
-        let model = &errors.model;
+    fn spread(&mut self, model: &NoisyModel, arguments: &Arguments) -> Result<(), Refusal> {
         let flow = &model.flow;
         let n = flow.system().states().len();
         self.root(&model.initial_variance);
@@ -219,15 +225,10 @@ const FILTER: &str = include_str!("runtime/filter.c");
 impl Machine {
     /// Nothing for an observer that is no filter.
     fn filter(&mut self, device: &Device<'_>) -> Result<(), Refusal> {
-        let Blueprint::Filter {
-            model,
-            settings,
-            run,
-        } = device.blueprint
-        else {
+        let Updates::Filter { model, settings } = &device.blueprint.updates else {
             return Ok(());
         };
-        if run.between == BetweenSamples::Linear {
+        if device.blueprint.run.between == BetweenSamples::Linear {
             return Err(Refusal::LooksAhead);
         }
         if settings.projects {

@@ -19,6 +19,22 @@ impl Belief {
             root: Root::diagonal(variances),
         }
     }
+
+    /// Corrects by a reading, as [`Root::update`], that is `innovation` off.
+    pub fn take(
+        &mut self,
+        projected: &[f64],
+        innovation: f64,
+        noise: f64,
+        gain: &mut Vec<f64>,
+    ) -> bool {
+        let has_gain = self.root.update(projected, noise, gain);
+        if has_gain {
+            let places = self.x.iter_mut().zip(gain);
+            places.for_each(|(x, k)| *x += *k * innovation);
+        }
+        has_gain
+    }
 }
 
 impl Persist for Belief {

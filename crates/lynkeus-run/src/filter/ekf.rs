@@ -43,7 +43,7 @@ impl Ekf {
         projected.resize(before.len(), 0.0);
         let inside = taken.iter().filter(|b| b.end.is_none());
         for believed in inside.chain(taken.iter().filter(|b| b.end.is_some())) {
-            sensing.write_slopes(believed.sensor, c);
+            sensing.output_map.write_slopes(believed.sensor, c);
             let moves = belief.x.iter().zip(&*before).map(|(x, x0)| x - x0);
             let moved: f64 = c.iter().zip(moves).map(|(c, moved)| c * moved).sum();
             belief.root.transposed_times(c, projected);
@@ -51,11 +51,8 @@ impl Ekf {
             let Some((rest, noise)) = believed.weighed(moved, spread) else {
                 continue;
             };
-            if !belief.root.update(projected, noise, gain) {
+            if !belief.take(projected, rest, noise, gain) {
                 continue;
-            }
-            for (x, k) in belief.x.iter_mut().zip(&*gain) {
-                *x += k * rest;
             }
             if let Some(corrections) = &mut sensing.corrections {
                 let (c, gain) = (c.clone(), gain.clone());

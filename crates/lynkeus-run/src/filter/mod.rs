@@ -58,7 +58,7 @@ pub use model::{NoisyModel, NoisyPlant, Sensor};
 pub use smoother::Smoothed;
 pub use ukf::{SigmaPoints, Weights};
 
-use crate::divergence::{Bound, deviation_diverged};
+use crate::divergence::{Bound, check_deviations};
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings};
@@ -180,9 +180,9 @@ impl Filter {
         })
     }
 
-    /// The estimate after the last sample.
-    pub fn estimate(&self) -> &[f64] {
-        &self.belief.x
+    /// Whether the smoother needs the transition between two updates; a window finds its own.
+    fn keeps_transitions(&self) -> bool {
+        self.history.is_some() && !matches!(self.engine, Engine::MovingHorizon(_))
     }
 
     /// To the next sample; the transition is what the smoother needs of it. Where the plant has no
@@ -255,10 +255,6 @@ impl Filter {
 }
 
 impl Runner for Filter {
-    fn begin(&mut self, _: &Sample<'_>) -> Result<(), Error> {
-        Ok(())
-    }
-
     fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
         self.bound.see(self.propagation.driven.evaluation.signals());
         let transition = self.predict(from, sample)?;
@@ -289,10 +285,7 @@ impl Runner for Filter {
         for (i, deviation) in self.deviations.iter_mut().enumerate() {
             *deviation = self.belief.root.deviation(i);
         }
-        match self.deviations.iter().position(|d| !d.is_finite()) {
-            None => Ok(()),
-            Some(i) => Err(deviation_diverged(t, &names[i], self.deviations[i])),
-        }
+        check_deviations(t, names, &self.deviations)
     }
 
     fn estimate(&self) -> &[f64] {
@@ -309,6 +302,61 @@ impl Runner for Filter {
 
     fn health(&self) -> &Health {
         &self.sensing.health
+    }
+
+    fn remember(&mut self) {
+        let corrections = self.sensing.take_corrections();
+        let transition = self.pending.take();
+        let Some(history) = &mut self.history else {
+            return;
+        };
+        if let Engine::MovingHorizon(horizon) = &mut self.engine {
+            horizon.leave(history);
+            return;
+        }
+        history.steps.push(Step {
+            transition,
+            belief: self.belief.clone(),
+            corrections,
+        });
+    }
+
+    /// None where a window reaches back less far than `lag`, either.
+    fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Option<Vec<Smoothed>> {
+        let history = self.history.as_ref()?;
+        let Engine::MovingHorizon(horizon) = &self.engine else {
+            return Some(history.smoothed(&[], lag, deviations));
+        };
+        if lag.is_some_and(|lag| lag > horizon.length()) {
+            return None;
+        }
+        let newest = horizon.steps(&self.propagation, &self.sensing)?;
+        let mut rows = history.smoothed(&newest, lag, deviations);
+        if let Some(lag) = lag {
+            // as it was known then: the rows kept are linearised about what was known later
+            for (row, x) in rows
+                .iter_mut()
+                .zip(history.in_windows(self.belief.x.len(), lag))
+            {
+                row.estimate.copy_from_slice(x);
+            }
+        }
+        for row in &mut rows {
+            confine(&mut row.estimate, &self.ranges);
+        }
+        Some(rows)
+    }
+
+    fn walk_history(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        let n = self.belief.x.len();
+        match &mut self.history {
+            Some(history) => history.walk(walk, n),
+            None => Ok(()),
+        }
+    }
+
+    fn copied(&self) -> Box<dyn Runner> {
+        Box::new(self.clone())
     }
 }
 
@@ -357,67 +405,6 @@ impl Persist for Filter {
         self.bound.walk(walk)?;
         let n = self.belief.x.len();
         walk.optional(&mut self.pending, |walk, pending| pending.walk(walk, n))
-    }
-}
-
-impl Filter {
-    /// What the smoother keeps.
-    pub fn walk_history(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        let n = self.belief.x.len();
-        match &mut self.history {
-            Some(history) => history.walk(walk, n),
-            None => Ok(()),
-        }
-    }
-
-    /// The estimate at each update given later ones, up to `lag` of them; none without history,
-    /// and where a window reaches back less far than `lag`.
-    pub fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Option<Vec<Smoothed>> {
-        let history = self.history.as_ref()?;
-        let Engine::MovingHorizon(horizon) = &self.engine else {
-            return Some(history.smoothed(&[], lag, deviations));
-        };
-        if lag.is_some_and(|lag| lag > horizon.length()) {
-            return None;
-        }
-        let newest = horizon.steps(&self.propagation, &self.sensing)?;
-        let mut rows = history.smoothed(&newest, lag, deviations);
-        if let Some(lag) = lag {
-            // as it was known then: the rows kept are linearised about what was known later
-            for (row, x) in rows
-                .iter_mut()
-                .zip(history.in_windows(self.belief.x.len(), lag))
-            {
-                row.estimate.copy_from_slice(x);
-            }
-        }
-        for row in &mut rows {
-            confine(&mut row.estimate, &self.ranges);
-        }
-        Some(rows)
-    }
-
-    /// Keeps the last update for the smoother.
-    pub fn remember(&mut self) {
-        let corrections = self.sensing.take_corrections();
-        let transition = self.pending.take();
-        let Some(history) = &mut self.history else {
-            return;
-        };
-        if let Engine::MovingHorizon(horizon) = &mut self.engine {
-            horizon.leave(history);
-            return;
-        }
-        history.steps.push(Step {
-            transition,
-            belief: self.belief.clone(),
-            corrections,
-        });
-    }
-
-    /// Whether the smoother needs the transition between two updates; a window finds its own.
-    fn keeps_transitions(&self) -> bool {
-        self.history.is_some() && !matches!(self.engine, Engine::MovingHorizon(_))
     }
 }
 

@@ -1,9 +1,12 @@
 //! A plant with its sensors and noises, compiled for what follows a covariance.
 
+use std::fmt::Write;
+
 use lynkeus_expr::{Graph, Node};
 
 use crate::noise::{Level, Limits, check_size};
-use crate::{Error, Linearised, System};
+use crate::snapshot::Digest;
+use crate::{Error, Linearised};
 
 /// x' = f(t, x, u) + w, y_i = h_i(t, x, u) + v_i with white noises w, v.
 #[derive(Clone, Debug)]
@@ -61,6 +64,11 @@ pub struct NoisyModel {
     pub ranges: Vec<Limits>,
     /// the flow inside the ranges
     pub confined: Option<Linearised>,
+    /// of an observer: the place of the state that stands for what held measurements lag behind
+    pub(crate) lag: Option<usize>,
+    /// how many functions of the states are estimated; the flow has their slopes where they are not the
+    /// states
+    pub(crate) estimates: usize,
 }
 
 impl NoisyModel {
@@ -102,20 +110,21 @@ impl NoisyModel {
             initial_variance: plant.initial_variance.clone(),
             ranges: plant.ranges.clone(),
             confined,
+            lag: None,
+            estimates: states.len(),
         })
     }
 
-    /// What is compiled.
-    pub(crate) fn systems(&self) -> impl Iterator<Item = &System> {
+    /// Equations, noises, limits and ranges.
+    pub(crate) fn tell(&self, digest: &mut Digest) {
         let all = [&self.flow, &self.output_map].into_iter();
-        all.chain(&self.confined).map(Linearised::system)
-    }
-
-    /// Noises, limits and ranges, as text.
-    pub(crate) fn numbers(&self) -> String {
+        for part in all.chain(&self.confined) {
+            part.system().tell(digest);
+        }
         let sensors: Vec<_> = self.sensors.iter().map(|s| (s.noise, s.limits)).collect();
         let (q, p) = (&self.process_noise, &self.initial_variance);
-        format!("{sensors:?} {q:?} {p:?} {:?}", self.ranges)
+        // a digest takes any text
+        let _ = write!(digest, "{sensors:?} {q:?} {p:?} {:?}", self.ranges);
     }
 }
 

@@ -93,7 +93,7 @@ struct Lockout {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Sensing {
-    output_map: OutputMap,
+    pub output_map: OutputMap,
     sensors: Vec<Sensor>,
     gate: Option<f64>,
     /// of readings that only stand for others ([`super::FilterSettings::foresees`])
@@ -136,36 +136,6 @@ impl Sensing {
             .unwrap_or_default()
     }
 
-    /// h(t, x, u), and C there.
-    pub fn evaluate(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64], Error> {
-        self.output_map.evaluate(t, x, u);
-        match self.output_map.is_finite() {
-            true => Ok(self.output_map.outputs()),
-            false => Err(self.output_map.not_finite(t)),
-        }
-    }
-
-    /// h(t, x, u), whether or not C has values there.
-    pub fn predict(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64], Error> {
-        self.output_map.evaluate(t, x, u);
-        match self.output_map.outputs().iter().all(|v| v.is_finite()) {
-            true => Ok(self.output_map.outputs()),
-            false => Err(self.output_map.not_finite(t)),
-        }
-    }
-
-    /// Row i of C where it was evaluated last.
-    pub fn slopes(&self, i: usize) -> Vec<f64> {
-        let mut row = vec![0.0; self.slopes.len()];
-        self.write_slopes(i, &mut row);
-        row
-    }
-
-    /// The same with room for it.
-    pub fn write_slopes(&self, i: usize, row: &mut [f64]) {
-        self.output_map.write_slopes(i, row);
-    }
-
     /// Decides what becomes of all readings of a sample before the first of them corrects, by h and C at the
     /// belief's mean, and gathers those that correct.
     pub fn judge_all(
@@ -174,7 +144,8 @@ impl Sensing {
         sample: &Sample<'_>,
         taken: &mut Vec<Believed>,
     ) -> Result<(), Error> {
-        self.evaluate(sample.t, &belief.x, sample.inputs)?;
+        self.output_map
+            .linearise(sample.t, &belief.x, sample.inputs)?;
         taken.clear();
         for (i, reading) in sample.readings.iter().enumerate() {
             self.output_map.write_slopes(i, &mut self.slopes);

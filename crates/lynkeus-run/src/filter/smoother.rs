@@ -167,10 +167,11 @@ impl History {
     pub fn smoothed(&self, newest: &[Step], lag: Option<usize>, deviations: bool) -> Vec<Smoothed> {
         let steps: Vec<&Step> = self.steps.iter().chain(newest).collect();
         let count = steps.len();
+        let n = steps.first().map_or(0, |step| step.belief.x.len());
         let mut result = vec![];
         match lag {
             None => {
-                let mut adjoint = nothing(&steps, deviations);
+                let mut adjoint = Adjoint::nothing(n, deviations);
                 for step in steps.iter().rev() {
                     result.push(step.given(&adjoint));
                     step.back(&mut adjoint);
@@ -179,7 +180,7 @@ impl History {
             }
             Some(lag) => {
                 for (k, step) in steps.iter().enumerate() {
-                    let mut adjoint = nothing(&steps, deviations);
+                    let mut adjoint = Adjoint::nothing(n, deviations);
                     let last = k.saturating_add(lag).min(count - 1);
                     for later in steps[k + 1..=last].iter().rev() {
                         later.back(&mut adjoint);
@@ -203,31 +204,17 @@ impl History {
     }
 }
 
-fn nothing(steps: &[&Step], deviations: bool) -> Adjoint {
-    let n = steps.first().map_or(0, |s| s.belief.x.len());
-    match deviations {
-        true => Adjoint::with_matrix(n),
-        false => Adjoint::nothing(n),
-    }
-}
-
 fn quadratic(matrix: &[f64], v: &[f64]) -> f64 {
     let rows = matrix.chunks_exact(v.len().max(1));
     rows.zip(v).map(|(row, x)| x * dot(row, v)).sum()
 }
 
 impl Adjoint {
-    pub fn nothing(n: usize) -> Self {
+    /// That they say nothing; whether deviations are asked for.
+    pub fn nothing(n: usize, deviations: bool) -> Self {
         Self {
             vector: vec![0.0; n],
-            matrix: vec![],
-        }
-    }
-
-    fn with_matrix(n: usize) -> Self {
-        Self {
-            matrix: vec![0.0; n * n],
-            ..Self::nothing(n)
+            matrix: vec![0.0; if deviations { n * n } else { 0 }],
         }
     }
 

@@ -121,7 +121,7 @@ impl Ukf {
         self.shown.clear();
         let mut m = 0;
         for point in self.points.chunks_exact(n) {
-            let shown = sensing.predict(sample.t, point, sample.inputs)?;
+            let shown = sensing.output_map.predict(sample.t, point, sample.inputs)?;
             m = shown.len();
             self.shown.extend_from_slice(shown);
         }

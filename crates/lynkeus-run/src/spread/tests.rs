@@ -1,7 +1,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::*;
-use crate::{BetweenSamples, Estimator, Level, Method, SampledObserver, System, Tolerances};
+use crate::{Blueprint, Level, Method, System, Tolerances, Updates};
 use lynkeus_expr::Graph;
 
 /// x' = A x + b + ξ, y = C x + v with two states and one output, and x̂' = A x̂ + b + K (w − C x̂).
@@ -43,7 +43,7 @@ const DRIFT: Plant = Plant {
 };
 
 impl Plant {
-    fn observer(&self) -> SampledObserver {
+    fn observer(&self, method: Method) -> Blueprint {
         let g = Graph::new();
         let [time, x1, x2, w, s, lag] = ["t", "x1", "x2", "w", "s", "lag"].map(|n| g.symbol(n));
         let Self { A, b, C, K, .. } = *self;
@@ -80,16 +80,21 @@ impl Plant {
             state: 2,
             rates: &[rate.node()],
         };
-        let mut errors = ErrorModel::new(&observer, &[x1.node(), x2.node()], Some(lag)).unwrap();
-        errors.judges = false;
+        let errors =
+            NoisyModel::of_observer(&observer, &[x1.node(), x2.node()], Some(lag)).unwrap();
         let system = System::new(&g, time.node(), &states, &signals, &derivatives, &outputs);
-        SampledObserver {
-            system: system.unwrap(),
+        let run = EstimatorSettings {
+            method,
+            ..EstimatorSettings::default()
+        };
+        Blueprint {
             sensors: vec!["y".to_owned()],
-            predict: self.predict,
-            inputs: BetweenSamples::Hold,
-            errors: Some(errors),
-            tuned: None,
+            updates: Updates::Jumps {
+                predict: self.predict,
+                errors: Some(Box::new(errors)),
+                tuned: None,
+            },
+            ..Blueprint::new(&system.unwrap(), run)
         }
     }
 
@@ -162,7 +167,7 @@ impl Plant {
             absolute: 1e-13,
             ..Tolerances::default()
         });
-        let mut estimator = Estimator::sampled(&self.observer(), method).unwrap();
+        let mut estimator = self.observer(method).estimator().unwrap();
         let exact = self.exact(step, ROWS, &reports);
         for (row, exact) in exact.iter().enumerate() {
             let t = step * row as f64;
@@ -203,7 +208,7 @@ fn what_the_plant_did_since_the_reading_counts() {
         noise: 0.001,
         ..DRIFT
     };
-    let mut estimator = Estimator::sampled(&walk.observer(), Method::default()).unwrap();
+    let mut estimator = walk.observer(Method::default()).estimator().unwrap();
     for k in 0..60 {
         estimator.push(f64::from(k), &[0.0]).unwrap();
     }

@@ -260,15 +260,9 @@ impl Mhe {
                 _ => None,
             };
             let before = carried(stage.as_ref(), &self.prior, free.last());
-            let spread = (0..row.guess.len()).map(|i| before.0.root.deviation(i));
-            let spread: Vec<f64> = spread.collect();
             let seen = seen(sensing, row)?;
-            free.push(corrected(&seen, &spread, &[], before));
-            rows.push(Linear {
-                stage,
-                seen,
-                spread,
-            });
+            free.push(corrected(&seen, None, &[], before));
+            rows.push(Linear { stage, seen });
         }
         Ok(Problem {
             prior: &self.prior,
@@ -405,9 +399,11 @@ impl Row {
 
 /// The readings of a row, h linearised at its guess.
 pub(crate) fn seen(sensing: &mut Sensing, row: &Row) -> Result<Vec<Seen>, Error> {
-    let h = sensing.evaluate(row.t, &row.guess, &row.inputs)?.to_vec();
+    let map = &mut sensing.output_map;
+    let h = map.linearise(row.t, &row.guess, &row.inputs)?.to_vec();
     let seen = |believed: &Believed| {
-        let slopes = sensing.slopes(believed.sensor);
+        let mut slopes = vec![0.0; row.guess.len()];
+        map.write_slopes(believed.sensor, &mut slopes);
         let offset = h[believed.sensor] - dot(&slopes, &row.guess);
         let (value, variance) = believed.about(h[believed.sensor])?;
         Some(Seen {
