@@ -3,7 +3,10 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod conditions;
+mod numbers;
 mod structure;
+
+pub use numbers::{counted, figures, short};
 
 /// What has words.
 pub trait Words {
