@@ -4,6 +4,7 @@
 
 mod conditions;
 mod numbers;
+mod observability;
 mod structure;
 
 pub use numbers::{counted, figures, short};
