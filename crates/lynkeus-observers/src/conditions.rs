@@ -10,7 +10,7 @@ use lynkeus_proof::hurwitz;
 use lynkeus_proof::hurwitz::Stability;
 use lynkeus_structure::sign::Sign;
 use lynkeus_structure::{
-    AugmentedPlant, ChainRequest, Finding, Point, Region, Regularity, Verdict, has_value_at, short,
+    AugmentedPlant, ChainRequest, Finding, Point, Region, Verdict, has_value_at, regularity, short,
     sign,
 };
 
@@ -40,7 +40,7 @@ fn partial(
             found.finding.reason.text()
         )
         .into();
-        let place = region.restricted(&graph.symbols_of(&[node])).place();
+        let place = region.restricted(&graph.symbols_of(&[node])).dimensions;
         found.finding.verdict = Verdict::Undecided(place);
     }
     Ok((node, found))
@@ -160,9 +160,9 @@ pub(crate) fn lipschitz(
     let graph = augmented.graph();
     let symbols = augmented.symbols();
     let jacobian = lynkeus_expr::jacobian::forward(graph, &augmented.derivatives, &symbols);
-    let regularity = Regularity::of(graph, &augmented.derivatives, &symbols, region)?;
-    if !regularity.holds() {
-        return Ok(Statement::Lipschitz.with(regularity.finding()));
+    let regular = regularity(graph, &augmented.derivatives, &symbols, region)?;
+    if !regular.is_proved() {
+        return Ok(Statement::Lipschitz.with(regular));
     }
     let entries: Vec<_> = jacobian.entries.iter().map(|entry| entry.2).collect();
     let at_once = sign::bounded_at_once(graph, &entries, region)?;
@@ -178,7 +178,7 @@ pub(crate) fn lipschitz(
             graph.render(node, 60)
         );
         let used = region.restricted(&graph.symbols_of(&[node]));
-        let verdict = Verdict::Undecided(used.place());
+        let verdict = Verdict::Undecided(used.dimensions);
         return Ok(Statement::Lipschitz.with(Finding {
             verdict,
             reason: detail.into(),

@@ -127,7 +127,7 @@ fn check(augmented: &AugmentedPlant<'_>, region: &Region, found: &[Slope], open:
     };
     let used = region.restricted(&graph.symbols_of(&nodes));
     Statement::SlopesOfTheProof.with(Finding {
-        verdict: Verdict::Undecided(used.place()),
+        verdict: Verdict::Undecided(used.dimensions),
         reason: detail.into(),
     })
 }

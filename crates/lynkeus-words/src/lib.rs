@@ -3,7 +3,11 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod conditions;
+mod numbers;
+mod observability;
 mod structure;
+
+pub use numbers::{counted, figures, short};
 
 /// What has words.
 pub trait Words {

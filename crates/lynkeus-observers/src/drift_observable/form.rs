@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use lynkeus_expr::{Binary, Graph, Node, Op, Spent};
 use lynkeus_structure::output_map::{AffineForm, Degree, Rows};
 use lynkeus_structure::{
-    AugmentedPlant, Dimension, Matrix, Region, Regularity, Verdict, output_map, short,
+    AugmentedPlant, Dimension, Matrix, Region, Verdict, output_map, regularity, short,
 };
 
 use super::settings::{Settings, Variant};
@@ -159,7 +159,7 @@ impl Form {
         // the map is followed along the plant: as states, inputs and time move
         let slopes = map.settings.known_slopes(augmented, &U);
         let moving = with_slopes(augmented, &U, &slopes, region);
-        let continuous = Regularity::of(augmented.graph(), &Φ, &moving.symbols(), &moving)?;
+        let continuous = regularity(augmented.graph(), &Φ, &moving.symbols(), &moving)?;
         let reads = U.iter().any(|jet| !jet.is_empty());
         let inputs = Inputs {
             augmented,
@@ -173,7 +173,7 @@ impl Form {
             regular,
             one_to_one,
             lipschitz: map.lipschitz.clone(),
-            continuous: Statement::from(Germani::Continuous).with(continuous.finding()),
+            continuous: Statement::from(Germani::Continuous).with(continuous),
             inputs: match reads {
                 true => Some(inputs.check(variant)?.advisory()),
                 false => None,

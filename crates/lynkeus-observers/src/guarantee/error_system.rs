@@ -124,9 +124,7 @@ impl ErrorSystem {
             false => format!("declare min and max of {}", open.join(", ")),
         };
         let sides = self.region.dimensions.iter();
-        let left = sides
-            .filter(|d| slope.variables.contains(&d.name))
-            .map(Dimension::side);
+        let left = sides.filter(|d| slope.variables.contains(&d.name)).cloned();
         Statement::from(Inequality::SlopesAreBounded).with(Finding {
             verdict: Verdict::Undecided(left.collect()),
             reason: format!("the slope of {} has no bound; {cure}", slope.term).into(),
