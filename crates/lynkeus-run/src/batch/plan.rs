@@ -213,7 +213,7 @@ pub(crate) struct Divided {
 /// Machine code, or a tape.
 #[derive(Clone, Debug)]
 enum Engine {
-    Native(lynkeus_native::Evaluator<LANES>),
+    Native(Function<LANES>),
     Interpreted(Box<Evaluator<Lanes<LANES>>>),
 }
 
@@ -221,7 +221,7 @@ impl Engine {
     fn new(tape: &Tape, compile: impl FnOnce(&Tape) -> Option<Function<LANES>>) -> Self {
         let is_wanted = Backend::compiles_at_once() && tape.len() <= LARGEST;
         match is_wanted.then(|| compile(tape)).flatten() {
-            Some(function) => Self::Native(function.evaluator()),
+            Some(function) => Self::Native(function),
             None => Self::Interpreted(Box::new(tape.evaluator_in(Lanes))),
         }
     }
