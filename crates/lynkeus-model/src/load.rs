@@ -149,7 +149,8 @@ fn is_ode_model(file_name: &str) -> bool {
 pub fn model_names(source: &str, file_name: &str) -> Result<Vec<String>, Diagnostic> {
     let names = match is_ode_model(file_name) {
         false => elaborate::names(source),
-        true => ode_model::names(source, file_name),
+        true => ode_model::models(source, file_name)
+            .map(|models| models.iter().map(|(name, _)| (*name).to_owned()).collect()),
     };
     names.map_err(|problem| Diagnostic::new(problem, file_name, source))
 }

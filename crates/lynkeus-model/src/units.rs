@@ -3,9 +3,11 @@
 
 use std::collections::HashMap;
 
+use lynkeus_expr::Binary;
+
 use crate::diagnostic::{Problem, Span};
 use crate::flat::FlatModel;
-use crate::syntax::ast::{Ast, BinaryOperator, Call, Equation, EquationKind, ExprId, Kind};
+use crate::syntax::ast::{Ast, Call, Equation, EquationKind, ExprId, Kind, Term};
 use crate::syntax::{plain, unquoted};
 
 /// Powers of kg, m, s, A, K, mol and cd.
@@ -298,7 +300,7 @@ const MOST: usize = 20;
 const TIMES: [f64; 8] = [1e-9, 1e-6, 1e-3, 1.0, 60.0, 3600.0, 86400.0, 31_557_600.0];
 
 /// Warnings where declared units do not fit.
-pub(crate) fn check(source: &str, ast: &Ast, model: &FlatModel) -> Vec<Problem> {
+pub(crate) fn check(source: &str, ast: &Ast, model: &FlatModel) -> Vec<Box<Problem>> {
     let mut declared = HashMap::new();
     for declaration in &model.declarations {
         let mut attributes = declaration.attributes.iter();
@@ -345,7 +347,7 @@ struct Walk<'a> {
     declared: HashMap<&'a str, Unit>,
     /// seconds in the model's unit of time, with the line that says so
     tick: Option<(f64, usize)>,
-    found: Vec<Problem>,
+    found: Vec<Box<Problem>>,
 }
 
 impl Walk<'_> {
@@ -449,7 +451,7 @@ impl Walk<'_> {
                 let whole = plain(expression.span.text(self.source));
                 self.named(&whole).or_else(|| self.named(&joined))
             }
-            Kind::Unary(_, operand) => self.unit(*operand),
+            Kind::Plus(operand) | Kind::Minus(operand) | Kind::Not(operand) => self.unit(*operand),
             Kind::Chain(head, rest) => self.chain(*head, rest),
             Kind::Power(base, exponent, _) => {
                 let base = self.unit(*base);
@@ -483,43 +485,37 @@ impl Walk<'_> {
         self.declared.get(name).cloned()
     }
 
-    fn chain(&mut self, head: ExprId, rest: &[(BinaryOperator, ExprId)]) -> Option<Unit> {
-        use BinaryOperator as B;
-        let span = |walk: &Self, id: ExprId| walk.ast.expression(id).span;
-        let is_sum = |operator: B| {
-            matches!(
-                operator,
-                B::Add | B::Subtract | B::ElementAdd | B::ElementSubtract
-            )
-        };
-        let (operator, _) = *rest.first()?;
-        if is_sum(operator) {
-            let mut unit = self.unit(head);
-            for &(operator, operand) in rest {
-                let next = self.unit(operand);
-                let place = span(self, head).to(span(self, operand));
-                let has_offset = |unit: &Option<Unit>| unit.as_ref().is_some_and(|u| u.has_offset);
-                let is_difference = matches!(operator, B::Subtract | B::ElementSubtract)
-                    && has_offset(&unit)
-                    && has_offset(&next);
-                unit = self.compare(unit, next, place, "what is added");
-                if is_difference {
-                    unit = unit.map(|unit| unit.difference());
-                }
-            }
-            return unit;
+    fn chain(&mut self, head: ExprId, rest: &[Term]) -> Option<Unit> {
+        if matches!(rest.first()?.0, Binary::Add | Binary::Sub) {
+            return self.sum(head, rest);
         }
         let mut product = self.factor(head);
-        for &(operator, operand) in rest {
+        for &(operation, _, operand) in rest {
             let factor = self.factor(operand);
-            let power = match operator {
-                B::Multiply | B::ElementMultiply => 1.0,
-                B::Divide | B::ElementDivide => -1.0,
+            let power = match operation {
+                Binary::Mul => 1.0,
+                Binary::Div => -1.0,
                 _ => return None,
             };
             product = product.zip(factor).and_then(|(a, b)| a.times(&b, power));
         }
         product
+    }
+
+    fn sum(&mut self, head: ExprId, rest: &[Term]) -> Option<Unit> {
+        let has_offset = |unit: &Option<Unit>| unit.as_ref().is_some_and(|u| u.has_offset);
+        let mut unit = self.unit(head);
+        for &(operation, _, operand) in rest {
+            let next = self.unit(operand);
+            let span = |id| self.ast.expression(id).span;
+            let place = span(head).to(span(operand));
+            let is_difference = operation == Binary::Sub && has_offset(&unit) && has_offset(&next);
+            unit = self.compare(unit, next, place, "what is added");
+            if is_difference {
+                unit = unit.map(|unit| unit.difference());
+            }
+        }
+        unit
     }
 
     /// Small whole numbers count as numbers; others may hide a unit.

@@ -278,7 +278,7 @@ impl<'a> Solver<'a> {
         }
     }
 
-    fn too_many_torn(&self, block: &[(usize, usize)]) -> Problem {
+    fn too_many_torn(&self, block: &[(usize, usize)]) -> Box<Problem> {
         let System {
             equations,
             unknowns,
@@ -297,7 +297,7 @@ impl<'a> Solver<'a> {
     }
 }
 
-fn too_many_coupled(pairs: &[(&FlatEquation, &Unknown)], left: usize) -> Problem {
+fn too_many_coupled(pairs: &[(&FlatEquation, &Unknown)], left: usize) -> Box<Problem> {
     let span = pairs
         .iter()
         .map(|(equation, _)| equation.span)
@@ -312,7 +312,7 @@ fn too_many_coupled(pairs: &[(&FlatEquation, &Unknown)], left: usize) -> Problem
 }
 
 /// One equation of a linear loop follows from the others, or contradicts them.
-fn dependent(source: &str, pairs: &[(&FlatEquation, &Unknown)], place: usize) -> Problem {
+fn dependent(source: &str, pairs: &[(&FlatEquation, &Unknown)], place: usize) -> Box<Problem> {
     let names = listed(pairs.iter().map(|(_, unknown)| *unknown));
     let spans = pairs.iter().map(|(equation, _)| equation.span);
     let lines = lines(source, spans);
@@ -326,7 +326,7 @@ fn dependent(source: &str, pairs: &[(&FlatEquation, &Unknown)], place: usize) ->
         )
 }
 
-fn undetermined(equation: &FlatEquation, unknown: &Unknown) -> Problem {
+fn undetermined(equation: &FlatEquation, unknown: &Unknown) -> Box<Problem> {
     let message = format!(
         "this equation{} cannot be solved for {}: its terms in it cancel",
         equation.which_element(),

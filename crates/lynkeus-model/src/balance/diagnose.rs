@@ -50,7 +50,7 @@ impl Balance<'_> {
     }
 
     /// The unknowns and equations that share the lack, by alternating paths.
-    fn missing(&self, place: usize, unknown: &Unknown) -> Problem {
+    fn missing(&self, place: usize, unknown: &Unknown) -> Box<Problem> {
         let (unknowns, equations) = self.reached_from_unknown(place);
         let name = &unknown.name;
         let message = format!("variable `{name}` lacks an equation");
@@ -82,7 +82,7 @@ impl Balance<'_> {
         equation: &FlatEquation,
         lacking: Option<(usize, &Unknown)>,
         inputs: &[Node],
-    ) -> Problem {
+    ) -> Box<Problem> {
         let message = format!("one equation too many{}", equation.which_element());
         let problem = Problem::new(equation.span, message).label(self.count());
         let mut hint = self.surplus_hint(place, equation, inputs);

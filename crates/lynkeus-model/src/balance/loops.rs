@@ -327,7 +327,12 @@ fn dependent_rows(mut rows: Vec<Vec<f64>>) -> Vec<usize> {
 }
 
 /// `only_near_starts`: on this side of a threshold, beyond which they are regular.
-fn undetermined(torn: &Torn<'_>, rows: &[usize], only_near_starts: bool, source: &str) -> Problem {
+fn undetermined(
+    torn: &Torn<'_>,
+    rows: &[usize],
+    only_near_starts: bool,
+    source: &str,
+) -> Box<Problem> {
     let dependent = rows.iter().map(|&i| torn.equations[i].span);
     let span = dependent
         .clone()

@@ -6,7 +6,6 @@ use lynkeus_expr::{Binary, Node, Unary};
 use super::evaluate::Evaluator;
 use super::value::{Array, Scalar, Value, describe_dims, expected_number};
 use crate::diagnostic::{Problem, Result, Span};
-use crate::syntax::ast::{BinaryOperator, Relation};
 
 impl Evaluator<'_> {
     /// A number as a Real expression.
@@ -76,42 +75,38 @@ impl Evaluator<'_> {
 
     pub(super) fn binary(
         &self,
-        operator: BinaryOperator,
+        operation: Binary,
+        elementwise: bool,
         left: Value,
         right: Value,
         span: Span,
     ) -> Result<Value> {
-        use BinaryOperator as B;
         let scalars = left.dims().is_empty() && right.dims().is_empty();
-        match operator {
-            B::And | B::Or => {
+        match operation {
+            Binary::And | Binary::Or => {
                 let (left, right) = (self.boolean(&left, span)?, self.boolean(&right, span)?);
-                let operation = if operator == B::And {
-                    Binary::And
-                } else {
-                    Binary::Or
-                };
                 let node = self.graph.binary(operation, left, right);
                 return Ok(Value::Scalar(Scalar::Boolean(node)));
             }
-            B::Add | B::Subtract if left.dims() != right.dims() => {
+            _ if elementwise => {}
+            Binary::Add | Binary::Sub if left.dims() != right.dims() => {
                 let problem = unequal_sizes(left.dims(), right.dims(), span);
                 return Err(match left.dims().is_empty() || right.dims().is_empty() {
                     true => problem.hint("`.+` and `.-` take a scalar with every element"),
                     false => problem,
                 });
             }
-            B::Multiply if !left.dims().is_empty() && !right.dims().is_empty() => {
+            Binary::Mul if !left.dims().is_empty() && !right.dims().is_empty() => {
                 return self.product(left.into_array(), right.into_array(), span);
             }
-            B::Divide if !right.dims().is_empty() => {
+            Binary::Div if !right.dims().is_empty() => {
                 return Err(Problem::new(span, "division by an array")
                     .hint("`./` divides by every element"));
             }
             _ => {}
         }
         let operation =
-            |evaluator: &Self, a, b, span| evaluator.scalar_binary(operator, a, b, span);
+            |evaluator: &Self, a, b, span| evaluator.scalar_binary(operation, a, b, span);
         if let (true, Value::Scalar(a), Value::Scalar(b)) = (scalars, &left, &right) {
             return Ok(Value::Scalar(operation(self, *a, *b, span)?));
         }
@@ -120,18 +115,11 @@ impl Evaluator<'_> {
 
     pub(super) fn scalar_binary(
         &self,
-        operator: BinaryOperator,
+        operation: Binary,
         left: Scalar,
         right: Scalar,
         span: Span,
     ) -> Result<Scalar> {
-        use BinaryOperator as B;
-        let operation = match operator {
-            B::Add | B::ElementAdd => Binary::Add,
-            B::Subtract | B::ElementSubtract => Binary::Sub,
-            B::Multiply | B::ElementMultiply => Binary::Mul,
-            _ => Binary::Div,
-        };
         if let (Scalar::Integer(a), Scalar::Integer(b)) = (left, right) {
             let exact = match operation {
                 Binary::Add => Some(a.checked_add(b)),
@@ -191,7 +179,7 @@ impl Evaluator<'_> {
 
     pub(super) fn compare(
         &self,
-        relation: Relation,
+        relation: &str,
         left: Scalar,
         right: Scalar,
         span: Span,
@@ -201,12 +189,12 @@ impl Evaluator<'_> {
             _ => (self.real(left, span)?, self.real(right, span)?),
         };
         let node = match relation {
-            Relation::Less => self.graph.binary(Binary::Less, left, right),
-            Relation::LessEqual => self.graph.binary(Binary::LessEq, left, right),
-            Relation::Greater => self.graph.binary(Binary::Less, right, left),
-            Relation::GreaterEqual => self.graph.binary(Binary::LessEq, right, left),
-            Relation::Equal => self.graph.binary(Binary::Equal, left, right),
-            Relation::NotEqual => {
+            "<" => self.graph.binary(Binary::Less, left, right),
+            "<=" => self.graph.binary(Binary::LessEq, left, right),
+            ">" => self.graph.binary(Binary::Less, right, left),
+            ">=" => self.graph.binary(Binary::LessEq, right, left),
+            "==" => self.graph.binary(Binary::Equal, left, right),
+            _ => {
                 let equal = self.graph.binary(Binary::Equal, left, right);
                 self.graph.unary(Unary::Not, equal)
             }
@@ -276,9 +264,9 @@ impl Evaluator<'_> {
             if a.number(self.graph) == Some(0.0) || b.number(self.graph) == Some(0.0) {
                 continue;
             }
-            let term = self.scalar_binary(BinaryOperator::Multiply, a, b, span)?;
+            let term = self.scalar_binary(Binary::Mul, a, b, span)?;
             sum = Some(match sum {
-                Some(sum) => self.scalar_binary(BinaryOperator::Add, sum, term, span)?,
+                Some(sum) => self.scalar_binary(Binary::Add, sum, term, span)?,
                 None => term,
             });
         }
@@ -286,11 +274,11 @@ impl Evaluator<'_> {
     }
 }
 
-pub(super) fn overflow(span: Span) -> Problem {
+pub(super) fn overflow(span: Span) -> Box<Problem> {
     Problem::new(span, "this Integer does not fit in 64 bits").hint("use Real numbers")
 }
 
-fn no_product(left: &[usize], right: &[usize], span: Span) -> Problem {
+fn no_product(left: &[usize], right: &[usize], span: Span) -> Box<Problem> {
     let (left, right) = (describe_dims(left), describe_dims(right));
     Problem::new(span, format!("no product of sizes {left} and {right}"))
         .hint("the inner sizes of a matrix product must agree; `.*` multiplies element by element")

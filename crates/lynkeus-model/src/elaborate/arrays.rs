@@ -1,13 +1,15 @@
 //! Arrays: constructors (`{…}`, `[…; …]`, ranges, comprehensions), subscripts (`x[2:end]`), and the
 //! functions that make, measure and reduce them.
 
+use lynkeus_expr::Binary;
+
 use super::arithmetic::overflow;
 use super::evaluate::Evaluator;
 use super::scope::Named;
 use super::value::{Array, Scalar, Value, describe_dims, element_count, unequal_sizes};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_RANK;
-use crate::syntax::ast::{BinaryOperator, Call, ExprId, ForIndex, Kind};
+use crate::syntax::ast::{Call, ExprId, ForIndex, Kind};
 use crate::syntax::{plain, too_many_dimensions};
 
 impl<'a> Evaluator<'a> {
@@ -193,13 +195,13 @@ impl<'a> Evaluator<'a> {
 
     /// The sum of scalars, from the left.
     pub(super) fn sum(&self, elements: &[Scalar], span: Span) -> Result<Scalar> {
-        self.fold(BinaryOperator::Add, elements, Scalar::Integer(0), span)
+        self.fold(Binary::Add, elements, Scalar::Integer(0), span)
     }
 
     /// The elements joined by an operator; `empty` where there are none.
     pub(super) fn fold(
         &self,
-        operator: BinaryOperator,
+        operator: Binary,
         elements: &[Scalar],
         empty: Scalar,
         span: Span,
@@ -243,7 +245,7 @@ impl<'a> Evaluator<'a> {
             "product" => {
                 let elements = self.reduced(call, span)?;
                 let empty = Scalar::Integer(1);
-                Value::Scalar(self.fold(BinaryOperator::Multiply, &elements, empty, span)?)
+                Value::Scalar(self.fold(Binary::Mul, &elements, empty, span)?)
             }
             "array" if !call.iterators.is_empty() => self.iterated(call, span)?,
             "array" => self.array(&call.arguments, span)?,
@@ -663,14 +665,14 @@ fn within(text: &str, dim: usize, value: i64, span: Span) -> Result<usize> {
     })
 }
 
-fn not_an_array(text: &str, span: Span) -> Problem {
+fn not_an_array(text: &str, span: Span) -> Box<Problem> {
     Problem::new(
         span,
         format!("`{text}` is a scalar and takes no subscripts"),
     )
 }
 
-fn not_whole(span: Span) -> Problem {
+fn not_whole(span: Span) -> Box<Problem> {
     Problem::new(
         span,
         "a subscript must be an Integer or a range of Integers",

@@ -20,7 +20,7 @@ pub(super) fn plant<'a>(
     context: &Context<'a>,
     symbols: &Symbols<'a>,
     flat: Flat,
-) -> Result<(Plant, Vec<Problem>)> {
+) -> Result<(Plant, Vec<Box<Problem>>)> {
     let (unknowns, inputs) = unknowns(context, symbols, &flat.equations)?;
     let graph = context.graph;
     let system = System {
@@ -393,7 +393,7 @@ fn fix_starts<'a>(
     flat: &Flat,
     solution: &HashMap<Node, Node>,
     states: &mut [Variable],
-) -> Vec<Problem> {
+) -> Vec<Box<Problem>> {
     let mut at_start = solution.clone();
     at_start.insert(symbols.time, graph.constant(0.0).node());
     let by_symbol: HashMap<Node, usize> = states
@@ -406,7 +406,7 @@ fn fix_starts<'a>(
         values: symbols.parameter_values(),
         by_symbol,
     };
-    let mut warnings: Vec<Problem> = flat
+    let mut warnings: Vec<Box<Problem>> = flat
         .initial_unread
         .iter()
         .map(|&span| unread(span))
@@ -501,12 +501,12 @@ impl Starts<'_> {
     }
 }
 
-fn unread(span: Span) -> Problem {
+fn unread(span: Span) -> Box<Problem> {
     Problem::new(span, "an initial equation of a derivative has no effect")
         .hint("starts are taken from `start = …` and from initial equations as `x = …`")
 }
 
-fn does_not_fix(equation: &FlatEquation) -> Problem {
+fn does_not_fix(equation: &FlatEquation) -> Box<Problem> {
     let message = "this initial equation fixes the start of no state by itself: it has no effect";
     Problem::new(equation.span, message)
         .hint("starts are taken from `start = …` and from initial equations as `x = …`")
@@ -533,7 +533,7 @@ fn failing_at_start(
     symbols: &Symbols<'_>,
     assertions: &[(Assertion, Span)],
     variables: &[&Variable],
-) -> Vec<Problem> {
+) -> Vec<Box<Problem>> {
     let mut known: HashMap<Node, f64> = HashMap::from([(symbols.time, 0.0)]);
     let values = symbols.parameter_values().into_iter();
     known.extend(values.filter_map(|(node, value)| Some((node, value?))));

@@ -335,7 +335,7 @@ fn sort(declarations: &[Declaration], needs: &[Vec<usize>]) -> Result<Vec<usize>
     Ok(sequence)
 }
 
-fn cycle(declarations: &[Declaration], path: &[(usize, usize)], closing: usize) -> Problem {
+fn cycle(declarations: &[Declaration], path: &[(usize, usize)], closing: usize) -> Box<Problem> {
     let name = |place: usize| declarations[place].label.as_str();
     let start = path
         .iter()
@@ -607,7 +607,7 @@ impl Parts<'_> {
         Ok(Scalar::Integer(value as i64))
     }
 
-    fn no_value(&self) -> Problem {
+    fn no_value(&self) -> Box<Problem> {
         let name = self.name;
         Problem::new(
             self.declaration.name,
@@ -697,7 +697,7 @@ fn check_settable(name: &str, declaration: &Declaration) -> Result<()> {
     Err(Problem::new(declaration.name, message).hint("only parameters can be set"))
 }
 
-fn unknown(model: &FlatModel, name: &str) -> Problem {
+fn unknown(model: &FlatModel, name: &str) -> Box<Problem> {
     let settable = model.declarations.iter().filter(|declaration| {
         let prefix = &declaration.prefix;
         prefix.variability == Variability::Parameter && !prefix.is_final

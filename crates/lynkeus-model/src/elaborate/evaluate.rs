@@ -13,7 +13,7 @@ use crate::diagnostic::{Problem, Result, Span};
 use crate::flat::{Classes, constant};
 use crate::limits::{Budget, MAX_CALL_DEPTH};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{Ast, BinaryOperator, ExprId, Kind, PathPart, Relation, UnaryOperator};
+use crate::syntax::ast::{Ast, ExprId, Kind, PathPart, Term};
 use crate::syntax::{plain, shortened};
 
 /// Evaluates expressions of one text. Recursion is bounded by the nesting of the text.
@@ -148,13 +148,23 @@ impl<'a> Evaluator<'a> {
             Kind::Comprehension(body, iterators) => {
                 return self.comprehension(*body, iterators, span);
             }
-            Kind::Unary(operator, operand) => return self.unary(*operator, *operand),
+            Kind::Not(operand) => {
+                Scalar::Boolean(self.graph.unary(Unary::Not, self.condition(*operand)?))
+            }
+            Kind::Plus(operand) => {
+                let value = self.value(*operand)?;
+                return self.map(value, self.span(*operand), |_, scalar, _| Ok(scalar));
+            }
+            Kind::Minus(operand) => {
+                let value = self.value(*operand)?;
+                return self.map(value, self.span(*operand), Self::negated);
+            }
             Kind::Chain(head, rest) => return self.chain(*head, rest),
             Kind::Power(base, exponent, elementwise) => {
                 let (base, exponent) = (self.value(*base)?, self.value(*exponent)?);
                 return self.power(base, exponent, *elementwise, span);
             }
-            Kind::Relation(relation, left, right) => self.relation(*relation, *left, *right)?,
+            Kind::Relation(relation, left, right) => self.relation(relation, *left, *right)?,
             Kind::If(branches, otherwise) => return self.conditional(branches, *otherwise),
             Kind::Range(start, step, stop) => return self.range(*start, *step, *stop, span),
         };
@@ -212,7 +222,7 @@ impl<'a> Evaluator<'a> {
         size.map(Scalar::Integer).ok_or_else(outside)
     }
 
-    pub(super) fn varying(&self, span: Span) -> Problem {
+    pub(super) fn varying(&self, span: Span) -> Box<Problem> {
         let name = self.text(span);
         Problem::new(
             span,
@@ -221,7 +231,7 @@ impl<'a> Evaluator<'a> {
         .hint("sizes, loop bounds, subscripts, attributes and parameters use parameters only")
     }
 
-    pub(super) fn without_value(&mut self, span: Span) -> Problem {
+    pub(super) fn without_value(&mut self, span: Span) -> Box<Problem> {
         self.valueless = true;
         let name = self.text(span);
         Problem::new(
@@ -233,7 +243,7 @@ impl<'a> Evaluator<'a> {
         ))
     }
 
-    pub(super) fn unknown_name(&self, span: Span) -> Problem {
+    pub(super) fn unknown_name(&self, span: Span) -> Box<Problem> {
         let name = self.text(span);
         if name == "time" {
             return self.varying(span);
@@ -256,32 +266,18 @@ impl<'a> Evaluator<'a> {
         Problem::new(span, message).maybe_hint(for_pi.or(suggestion))
     }
 
-    fn unary(&mut self, operator: UnaryOperator, operand: ExprId) -> Result<Value> {
-        let value = self.value(operand)?;
-        let span = self.span(operand);
-        match operator {
-            UnaryOperator::Not => {
-                let node = self.boolean(&value, span)?;
-                let node = self.graph.unary(Unary::Not, node);
-                Ok(Value::Scalar(Scalar::Boolean(node)))
-            }
-            UnaryOperator::Plus => self.map(value, span, |_, scalar, _| Ok(scalar)),
-            UnaryOperator::Minus => self.map(value, span, Self::negated),
-        }
-    }
-
-    fn chain(&mut self, head: ExprId, rest: &'a [(BinaryOperator, ExprId)]) -> Result<Value> {
+    fn chain(&mut self, head: ExprId, rest: &'a [Term]) -> Result<Value> {
         let mut value = self.value(head)?;
         let start = self.span(head);
-        for &(operator, operand) in rest {
+        for &(operation, elementwise, operand) in rest {
             let right = self.value(operand)?;
             let span = start.to(self.span(operand));
-            value = self.binary(operator, value, right, span)?;
+            value = self.binary(operation, elementwise, value, right, span)?;
         }
         Ok(value)
     }
 
-    fn relation(&mut self, relation: Relation, left: ExprId, right: ExprId) -> Result<Scalar> {
+    fn relation(&mut self, relation: &str, left: ExprId, right: ExprId) -> Result<Scalar> {
         let span = self.span(left).to(self.span(right));
         let (left, right) = (self.scalar(left)?, self.scalar(right)?);
         self.compare(relation, left, right, span)
@@ -489,7 +485,7 @@ impl<'a> Evaluator<'a> {
         Some(Scalar::Real(self.graph.constant(known?).node()))
     }
 
-    pub(super) fn unassigned(&self, name: &str, span: Span) -> Problem {
+    pub(super) fn unassigned(&self, name: &str, span: Span) -> Box<Problem> {
         Problem::new(
             span,
             format!("`{name}` is read before it has a value in every case"),

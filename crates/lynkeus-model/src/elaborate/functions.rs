@@ -9,7 +9,7 @@ use super::scope::Mode;
 use super::value::{Scalar, Value};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{BinaryOperator, Call, ExprId, Kind, Relation};
+use crate::syntax::ast::{Call, ExprId, Kind};
 use crate::syntax::shortened;
 
 const UNARY: [(&str, Unary); 14] = [
@@ -147,7 +147,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    fn unknown_function(&self, span: Span, name: &str) -> Problem {
+    fn unknown_function(&self, span: Span, name: &str) -> Box<Problem> {
         if let Some((_, hint)) = REFUSED.iter().find(|(refused, _)| *refused == name) {
             return Problem::new(span, format!("`{name}` is not supported")).hint(*hint);
         }
@@ -318,7 +318,7 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    fn no_derivative(&self, span: Span) -> Problem {
+    fn no_derivative(&self, span: Span) -> Box<Problem> {
         let name = self.text(span);
         let message = format!("`der({name})`: `{name}` is not a Real variable");
         Problem::new(span, message)
@@ -361,11 +361,11 @@ impl<'a> Evaluator<'a> {
         let x = self.scalar(x)?;
         let (above, below) = (self.scalar(above)?, self.scalar(below)?);
         let zero = Scalar::Integer(0);
-        let Scalar::Boolean(positive) = self.compare(Relation::GreaterEqual, x, zero, span)? else {
+        let Scalar::Boolean(positive) = self.compare(">=", x, zero, span)? else {
             return Err(Problem::new(span, "expected a number"));
         };
         let slope = self.select(positive, above, below, span)?;
-        let product = self.scalar_binary(BinaryOperator::Multiply, slope, x, span)?;
+        let product = self.scalar_binary(Binary::Mul, slope, x, span)?;
         Ok(Value::Scalar(product))
     }
 
@@ -380,9 +380,9 @@ impl<'a> Evaluator<'a> {
             ));
         };
         let term = |p: &Scalar, q: &Scalar, r: &Scalar, s: &Scalar| {
-            let first = self.scalar_binary(BinaryOperator::Multiply, *p, *q, span)?;
-            let second = self.scalar_binary(BinaryOperator::Multiply, *r, *s, span)?;
-            self.scalar_binary(BinaryOperator::Subtract, first, second, span)
+            let first = self.scalar_binary(Binary::Mul, *p, *q, span)?;
+            let second = self.scalar_binary(Binary::Mul, *r, *s, span)?;
+            self.scalar_binary(Binary::Sub, first, second, span)
         };
         let elements = vec![
             term(a2, b3, a3, b2)?,

@@ -1,6 +1,8 @@
 //! The syntax tree. Expressions live in one arena: a chain of a million terms is flat,
 //! and nothing here needs deep recursion to be read or dropped.
 
+use lynkeus_expr::Binary;
+
 use crate::diagnostic::Span;
 
 /// Index of an expression in [`Ast::expressions`]; operands come before their users.
@@ -79,17 +81,23 @@ pub(crate) enum Kind {
     Matrix(Vec<Vec<ExprId>>),
     /// `{e for i in r}`
     Comprehension(ExprId, Vec<ForIndex>),
-    Unary(UnaryOperator, ExprId),
+    Plus(ExprId),
+    Minus(ExprId),
+    Not(ExprId),
     /// operators of one precedence, from the left
-    Chain(ExprId, Vec<(BinaryOperator, ExprId)>),
+    Chain(ExprId, Vec<Term>),
     /// base, exponent, elementwise
     Power(ExprId, ExprId, bool),
-    Relation(Relation, ExprId, ExprId),
+    /// `<` and its like, as it is written
+    Relation(&'static str, ExprId, ExprId),
     /// conditions with values, and the value of `else`
     If(Vec<(ExprId, ExprId)>, ExprId),
     /// start, step, stop
     Range(ExprId, Option<ExprId>, ExprId),
 }
+
+/// An operator, whether it is applied element by element, and the operand behind it.
+pub(crate) type Term = (Binary, bool, ExprId);
 
 /// One part of a dotted name.
 #[derive(Debug)]
@@ -108,37 +116,6 @@ pub(crate) struct Call {
     pub iterators: Vec<ForIndex>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum UnaryOperator {
-    Plus,
-    Minus,
-    Not,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum BinaryOperator {
-    Add,
-    Subtract,
-    Multiply,
-    Divide,
-    ElementAdd,
-    ElementSubtract,
-    ElementMultiply,
-    ElementDivide,
-    And,
-    Or,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Relation {
-    Less,
-    LessEqual,
-    Greater,
-    GreaterEqual,
-    Equal,
-    NotEqual,
-}
-
 /// `name in range`
 #[derive(Clone, Debug)]
 pub(crate) struct ForIndex {
@@ -147,9 +124,10 @@ pub(crate) struct ForIndex {
 }
 
 /// What kind of class it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum ClassKind {
     /// `model`, `class` and `block`
+    #[default]
     Model,
     Package,
     Record,
@@ -159,7 +137,7 @@ pub(crate) enum ClassKind {
 }
 
 /// A class with its contents as they are written.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Class {
     pub kind: ClassKind,
     pub is_partial: bool,

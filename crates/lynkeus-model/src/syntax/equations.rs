@@ -2,7 +2,7 @@
 
 use super::ast::{Assert, Equation, EquationKind, ExprId, ForIndex, Statement, StatementKind};
 use super::classes::HOW_TO_FLATTEN;
-use super::lexer::{Keyword, Symbol, Token};
+use super::lexer::Token;
 use super::parser::Parser;
 use super::unquoted;
 use crate::diagnostic::{Problem, Result, Span};
@@ -10,6 +10,10 @@ use crate::limits::MAX_ITERATORS;
 
 /// Conditions with what holds under them, and what holds under none.
 type Cases<T> = (Vec<(ExprId, Vec<T>)>, Vec<T>);
+
+const NO_EVENTS: &str = "an observer needs continuous equations: use `if` expressions";
+const WHERE_DECLARATIONS_STAND: &str =
+    "declarations come before the word `equation`, or after `public`";
 
 impl Parser<'_> {
     pub(super) fn equation(&mut self) -> Result<Equation> {
@@ -21,11 +25,11 @@ impl Parser<'_> {
         let start = self.span;
         self.refuse_unsupported_equation()?;
         let kind = match self.token {
-            Token::Keyword(Keyword::For) => {
+            Token::Fixed("for") => {
                 let (iterators, body) = self.repeated(Self::equation)?;
                 EquationKind::For(iterators, body)
             }
-            Token::Keyword(Keyword::If) => {
+            Token::Fixed("if") => {
                 let (branches, otherwise) = self.branches(Self::equation)?;
                 EquationKind::If(branches, otherwise)
             }
@@ -33,33 +37,23 @@ impl Parser<'_> {
         };
         let span = start.to(self.last);
         self.comment()?;
-        self.expect(Symbol::Semicolon)?;
+        self.expect(";")?;
         Ok(Equation { kind, span })
     }
 
     fn refuse_unsupported_equation(&self) -> Result<()> {
-        let (what, hint) = match self.token {
-            Token::Keyword(Keyword::When | Keyword::Elsewhen) => (
-                "a `when` equation",
-                "an observer needs continuous equations: use `if` expressions",
-            ),
-            Token::Keyword(Keyword::Connect) => {
-                return Err(
-                    Problem::new(self.span, "the model is not flat: it has `connect`")
-                        .hint(HOW_TO_FLATTEN),
-                );
+        Err(match self.token {
+            Token::Fixed("when" | "elsewhen") => self.refuse("a `when` equation", NO_EVENTS),
+            Token::Fixed("while") => self.refuse("`while`", "use a `for` loop"),
+            Token::Fixed("connect") => {
+                let message = "the model is not flat: it has `connect`";
+                Problem::new(self.span, message).hint(HOW_TO_FLATTEN)
             }
-            Token::Keyword(Keyword::While) => ("`while`", "use a `for` loop"),
-            Token::Keyword(
-                Keyword::Parameter | Keyword::Constant | Keyword::Input | Keyword::Output,
-            ) => {
-                return Err(self
-                    .unexpected("an equation")
-                    .hint("declarations come before the word `equation`, or after `public`"));
-            }
+            Token::Fixed("parameter" | "constant" | "input" | "output") => self
+                .unexpected("an equation")
+                .hint(WHERE_DECLARATIONS_STAND),
             _ => return Ok(()),
-        };
-        Err(self.refuse(what, hint))
+        })
     }
 
     fn equality(&mut self) -> Result<EquationKind> {
@@ -67,32 +61,30 @@ impl Parser<'_> {
         if let Some(assert) = self.assert_call()? {
             return Ok(EquationKind::Assert(assert));
         }
-        if self.at(Symbol::OpenParen) && self.is_list() {
+        if self.at("(") && self.is_list() {
             let targets = self.targets()?;
-            self.expect(Symbol::Equal)?;
+            self.expect("=")?;
             return Ok(EquationKind::Several(targets, self.expression()?));
         }
         let left = self.expression()?;
-        if self.at(Symbol::Equal) {
-            self.advance()?;
-            let right = self.expression()?;
-            return Ok(EquationKind::Equality(left, right));
+        if self.accept("=")? {
+            return Ok(EquationKind::Equality(left, self.expression()?));
         }
         let text = start.text(self.source);
         if matches!(text, "Real" | "Integer") && self.token == Token::Identifier {
             return Err(Problem::new(start, "a declaration among the equations")
-                .hint("declarations come before the word `equation`, or after `public`"));
+                .hint(WHERE_DECLARATIONS_STAND));
         }
         if matches!(text, "terminate" | "reinit") {
             return Err(Problem::new(start, format!("`{text}` is not supported"))
                 .hint("models with events are not supported: use `if` expressions"));
         }
         let hint = match self.token {
-            Token::Symbol(Symbol::Assign) => Some("`:=` assigns in algorithms; write `=`"),
-            Token::Symbol(Symbol::EqualEqual) => Some("an equation is written with one `=`"),
+            Token::Fixed(":=") => Some("`:=` assigns in algorithms; write `=`"),
+            Token::Fixed("==") => Some("an equation is written with one `=`"),
             _ => None,
         };
-        Err(self.unexpected("`=`").maybe_hint(hint.map(str::to_owned)))
+        Err(self.unexpected("`=`").maybe_hint(hint))
     }
 
     /// `assert(condition, "message", level)`, where one stands here.
@@ -101,9 +93,9 @@ impl Parser<'_> {
             return Ok(None);
         }
         self.advance()?;
-        self.expect(Symbol::OpenParen)?;
+        self.expect("(")?;
         let condition = self.expression()?;
-        self.expect(Symbol::Comma)?;
+        self.expect(",")?;
         let message = match self.token {
             Token::Text => unquoted(self.span.text(self.source)),
             _ => String::new(),
@@ -113,10 +105,10 @@ impl Parser<'_> {
         let mut open = 1usize;
         while open > 0 {
             match self.token {
-                Token::Symbol(Symbol::OpenParen) => open += 1,
-                Token::Symbol(Symbol::CloseParen) => open -= 1,
+                Token::Fixed("(") => open += 1,
+                Token::Fixed(")") => open -= 1,
                 Token::Identifier => is_warning |= self.span.text(self.source) == "warning",
-                Token::End | Token::Symbol(Symbol::Semicolon) => {
+                Token::End | Token::Fixed(";") => {
                     return Err(self.unexpected("`)` after the message of the `assert`"));
                 }
                 _ => {}
@@ -135,10 +127,10 @@ impl Parser<'_> {
         self.advance()?;
         let branches = self.cases(|parser| parser.until_end(one))?;
         let mut otherwise = vec![];
-        if self.accept_word(Keyword::Else)? {
+        if self.accept("else")? {
             otherwise = self.until_end(one)?;
         }
-        self.end_of(Keyword::If)?;
+        self.end_of("if")?;
         Ok((branches, otherwise))
     }
 
@@ -146,30 +138,34 @@ impl Parser<'_> {
     fn repeated<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<(Vec<ForIndex>, Vec<T>)> {
         self.advance()?;
         let iterators = self.iterators()?;
-        self.expect_word(Keyword::Loop)?;
+        self.expect("loop")?;
         let body = self.until_end(one)?;
-        self.end_of(Keyword::For)?;
+        self.end_of("for")?;
         Ok((iterators, body))
     }
 
     /// Equations or statements up to `end` or `else`.
     fn until_end<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<Vec<T>> {
         let mut found = vec![];
-        while !matches!(
-            self.token,
-            Token::Keyword(Keyword::End | Keyword::Else | Keyword::Elseif) | Token::End
-        ) {
+        let end = Token::Fixed("end");
+        while ![
+            end,
+            Token::Fixed("else"),
+            Token::Fixed("elseif"),
+            Token::End,
+        ]
+        .contains(&self.token)
+        {
             found.push(one(self)?);
         }
         Ok(found)
     }
 
-    pub(super) fn end_of(&mut self, keyword: Keyword) -> Result<()> {
-        if !self.accept_word(Keyword::End)? {
-            return Err(self.unexpected(&format!("`end {}`", keyword.text())));
+    fn end_of(&mut self, word: &'static str) -> Result<()> {
+        if !self.accept("end")? {
+            return Err(self.unexpected(&format!("`end {word}`")));
         }
-        self.expect_word(keyword)?;
-        Ok(())
+        self.expect(word).map(|_| ())
     }
 
     /// `i in 1:N, j in 1:M`
@@ -184,14 +180,14 @@ impl Parser<'_> {
                 ));
             }
             self.refuse_repeated(&iterators, name)?;
-            if !self.at_word(Keyword::In) {
+            if !self.at("in") {
                 let problem = self.unexpected("`in` and a range");
                 return Err(problem.hint("write `for i in 1:N`"));
             }
             self.advance()?;
             let range = self.expression()?;
             iterators.push(ForIndex { name, range });
-            if !self.accept(Symbol::Comma)? {
+            if !self.accept(",")? {
                 return Ok(iterators);
             }
         }
@@ -221,41 +217,38 @@ impl Parser<'_> {
         self.count(2)?;
         let start = self.span;
         let kind = match self.token {
-            Token::Keyword(Keyword::For) => {
+            Token::Fixed("for") => {
                 let (iterators, body) = self.repeated(Self::statement)?;
                 StatementKind::For(iterators, body)
             }
-            Token::Keyword(Keyword::While) => {
+            Token::Fixed("while") => {
                 self.advance()?;
                 let condition = self.expression()?;
-                self.expect_word(Keyword::Loop)?;
+                self.expect("loop")?;
                 let body = self.until_end(Self::statement)?;
-                self.end_of(Keyword::While)?;
+                self.end_of("while")?;
                 StatementKind::While(condition, body)
             }
-            Token::Keyword(Keyword::If) => {
+            Token::Fixed("if") => {
                 let (branches, otherwise) = self.branches(Self::statement)?;
                 StatementKind::If(branches, otherwise)
             }
-            Token::Keyword(Keyword::Break) => {
+            Token::Fixed("break") => {
                 self.advance()?;
                 StatementKind::Break
             }
-            Token::Keyword(Keyword::Return) => {
+            Token::Fixed("return") => {
                 self.advance()?;
                 StatementKind::Return
             }
-            Token::Keyword(Keyword::When) => {
-                return Err(self.refuse(
-                    "a `when` statement",
-                    "an observer needs continuous equations: use `if` expressions",
-                ));
+            Token::Fixed("when") => {
+                return Err(self.refuse("a `when` statement", NO_EVENTS));
             }
             _ => self.assignment()?,
         };
         let span = start.to(self.last);
         self.comment()?;
-        self.expect(Symbol::Semicolon)?;
+        self.expect(";")?;
         Ok(Statement { kind, span })
     }
 
@@ -263,11 +256,11 @@ impl Parser<'_> {
         if let Some(assert) = self.assert_call()? {
             return Ok(StatementKind::Assert(assert));
         }
-        let targets = match self.at(Symbol::OpenParen) {
+        let targets = match self.at("(") {
             true => self.targets()?,
             false => vec![Some(self.expression()?)],
         };
-        if !self.at(Symbol::Assign) {
+        if !self.at(":=") {
             let hint = "a statement of an algorithm reads `x := …;`";
             return Err(self.unexpected("`:=`").hint(hint));
         }
@@ -278,19 +271,19 @@ impl Parser<'_> {
 
     /// `(a, , b)` on the left of what gives several values.
     pub(super) fn targets(&mut self) -> Result<Vec<Option<ExprId>>> {
-        let start = self.expect(Symbol::OpenParen)?;
+        let start = self.expect("(")?;
         let mut targets = vec![];
         loop {
-            let is_left_out = self.at(Symbol::Comma) || self.at(Symbol::CloseParen);
+            let is_left_out = self.at(",") || self.at(")");
             targets.push(match is_left_out {
                 true => None,
                 false => Some(self.expression()?),
             });
-            if !self.accept(Symbol::Comma)? {
+            if !self.accept(",")? {
                 break;
             }
         }
-        self.expect(Symbol::CloseParen)?;
+        self.expect(")")?;
         if targets.iter().all(Option::is_none) {
             let message = "expected variables between the parentheses";
             return Err(Problem::new(start, message));
