@@ -14,80 +14,45 @@ use crate::syntax::{plain, unquoted};
 const BASE: [&str; 7] = ["kg", "m", "s", "A", "K", "mol", "cd"];
 
 /// A unit in SI base units: `value · factor + offset` counts in kg^a m^b s^c A^d K^e mol^f cd^g.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct BaseUnit {
     /// powers of kg, m, s, A, K, mol and cd
-    pub powers: [i32; 7],
+    pub powers: [f64; 7],
     /// how many of the base unit one of it is
     pub factor: f64,
-    /// where its zero lies, in the base unit
+    /// where its zero lies, in the base unit: that of a degree Celsius is elsewhere
     pub offset: f64,
-}
-
-impl BaseUnit {
-    /// A unit as Modelica writes it (`kg.m2/s`, `degC`); none where a part is not known.
-    pub fn of(text: &str) -> Option<Self> {
-        let unit = Unit::parse(text)?;
-        // the readers' powers are products of whole numbers
-        let powers = unit.powers.map(|power| power as i32);
-        Some(Self {
-            powers,
-            factor: unit.scale,
-            offset: if unit.has_offset { 273.15 } else { 0.0 },
-        })
-    }
-}
-
-/// A unit over the base units.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Unit {
-    powers: [f64; 7],
-    /// how many of the base unit one of it is
-    scale: f64,
     /// power of the model's own unit of time, which `der` divides by
     ticks: f64,
-    /// counts from another zero: a degree Celsius
-    has_offset: bool,
     /// as it is written, where it is
     text: Option<String>,
 }
 
-impl Unit {
-    pub(super) fn one() -> Self {
+impl BaseUnit {
+    /// A unit as Modelica writes it: `kg.m2/s`, `J/(kg.K)`, `degC`; none where a part is not known.
+    pub fn of(text: &str) -> Option<Self> {
+        let letters: String = text.split_whitespace().collect();
+        let (mut unit, rest) = product(&letters, 0)?;
+        unit.text = Some(text.to_owned());
+        rest.is_empty().then_some(unit)
+    }
+
+    fn one() -> Self {
         Self {
             powers: [0.0; 7],
-            scale: 1.0,
+            factor: 1.0,
+            offset: 0.0,
             ticks: 0.0,
-            has_offset: false,
             text: None,
         }
     }
 
-    /// A unit as Modelica writes it: `kg.m2/s`, `J/(kg.K)`; `None` where a part is not known.
-    pub(super) fn parse(text: &str) -> Option<Self> {
-        let characters: Vec<char> = text.chars().filter(|c| !c.is_whitespace()).collect();
-        if characters.is_empty() {
-            return None;
-        }
-        let mut reader = Reader {
-            characters: &characters,
-            next: 0,
-            depth: 0,
-        };
-        let mut unit = reader.product()?;
-        if reader.next != characters.len() {
-            return None;
-        }
-        unit.text = Some(text.to_owned());
-        Some(unit)
-    }
-
-    pub(super) fn times(&self, other: &Self, power: f64) -> Option<Self> {
-        if self.has_offset || other.has_offset {
+    fn times(&self, other: &Self, power: f64) -> Option<Self> {
+        if self.offset != 0.0 || other.offset != 0.0 {
             return None;
         }
         let mut product = Self {
-            scale: self.scale * other.scale.powf(power),
+            factor: self.factor * other.factor.powf(power),
             ticks: self.ticks + power * other.ticks,
             ..Self::one()
         };
@@ -98,32 +63,32 @@ impl Unit {
     }
 
     /// A difference of degrees Celsius is one of kelvin.
-    pub(super) fn difference(&self) -> Self {
+    fn difference(&self) -> Self {
         Self {
-            has_offset: false,
+            offset: 0.0,
             text: None,
             ..self.clone()
         }
     }
 
     /// A part of time, behind `der`.
-    pub(super) fn per_tick(&self) -> Option<Self> {
+    fn per_tick(&self) -> Self {
         let mut rate = self.difference();
         rate.ticks -= 1.0;
         rate.powers[2] -= 1.0;
-        Some(rate)
+        rate
     }
 
-    pub(super) fn is_pure_number(&self) -> bool {
+    fn is_pure_number(&self) -> bool {
         self.powers.iter().all(|power| power.abs() < 1e-9)
     }
 
     fn same_dimension(&self, other: &Self) -> bool {
-        let pairs = self.powers.iter().zip(&other.powers);
-        pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-9)
+        let mut pairs = self.powers.iter().zip(&other.powers);
+        pairs.all(|(a, b)| (a - b).abs() < 1e-9)
     }
 
-    pub(super) fn describe(&self) -> String {
+    fn describe(&self) -> String {
         if let Some(text) = &self.text {
             return text.clone();
         }
@@ -140,86 +105,53 @@ impl Unit {
             true => "1".to_owned(),
             false => parts.join("."),
         };
-        match (self.scale - 1.0).abs() < 1e-12 {
+        match (self.factor - 1.0).abs() < 1e-12 {
             true => product,
-            false => format!("{} {product}", self.scale),
+            false => format!("{} {product}", self.factor),
         }
     }
 }
 
-struct Reader<'c> {
-    characters: &'c [char],
-    next: usize,
-    depth: usize,
+/// A product at the beginning of a text without blanks, and what is behind it.
+fn product(text: &str, depth: usize) -> Option<(BaseUnit, &str)> {
+    let (mut unit, mut rest) = factor(text, depth)?;
+    loop {
+        let power = match rest.chars().next() {
+            Some('.' | '*') => 1.0,
+            Some('/') => -1.0,
+            _ => return Some((unit, rest)),
+        };
+        let (next, behind) = factor(&rest[1..], depth)?;
+        (unit, rest) = (unit.times(&next, power)?, behind);
+    }
 }
 
-impl Reader<'_> {
-    fn peek(&self) -> Option<char> {
-        self.characters.get(self.next).copied()
+/// `(…)`, `1`, or a symbol with its exponent: `m2`, `m-1`, `m^2`.
+fn factor(text: &str, depth: usize) -> Option<(BaseUnit, &str)> {
+    if let Some(inner) = text.strip_prefix('(').filter(|_| depth < 20) {
+        let (unit, rest) = product(inner, depth + 1)?;
+        return Some((unit, rest.strip_prefix(')')?));
     }
-
-    fn product(&mut self) -> Option<Unit> {
-        let mut unit = self.factor()?;
-        while let Some(operator) = self.peek() {
-            let power = match operator {
-                '.' | '*' => 1.0,
-                '/' => -1.0,
-                _ => break,
-            };
-            self.next += 1;
-            unit = unit.times(&self.factor()?, power)?;
-        }
-        Some(unit)
+    if let Some(rest) = text.strip_prefix('1') {
+        return Some((BaseUnit::one(), rest));
     }
-
-    fn factor(&mut self) -> Option<Unit> {
-        if self.peek() == Some('(') {
-            self.depth += 1;
-            if self.depth > 20 {
-                return None;
-            }
-            self.next += 1;
-            let inner = self.product()?;
-            self.depth -= 1;
-            if self.peek() != Some(')') {
-                return None;
-            }
-            self.next += 1;
-            return Some(inner);
-        }
-        if self.peek() == Some('1') {
-            self.next += 1;
-            return Some(Unit::one());
-        }
-        let start = self.next;
-        while self.peek().is_some_and(char::is_alphabetic) {
-            self.next += 1;
-        }
-        let name: String = self.characters[start..self.next].iter().collect();
-        let unit = symbol(&name)?;
-        match self.exponent()? {
-            1.0 => Some(unit),
-            power => Unit::one().times(&unit, power),
-        }
-    }
-
-    /// `2`, `-1` or `^2`; 1 where there is none.
-    fn exponent(&mut self) -> Option<f64> {
-        if self.peek() == Some('^') {
-            self.next += 1;
-        }
-        let start = self.next;
-        if matches!(self.peek(), Some('-' | '+')) {
-            self.next += 1;
-        }
-        while self.peek().is_some_and(|c| c.is_ascii_digit()) {
-            self.next += 1;
-        }
-        let text: String = self.characters[start..self.next].iter().collect();
-        match text.is_empty() {
-            true => Some(1.0),
-            false => text.parse().ok().filter(|power: &f64| power.abs() < 20.0),
-        }
+    let behind = |text: &str, is_part: fn(char) -> bool| {
+        let end = text.find(|c| !is_part(c));
+        end.unwrap_or(text.len())
+    };
+    let (name, rest) = text.split_at(behind(text, char::is_alphabetic));
+    let unit = symbol(name)?;
+    let rest = rest.strip_prefix('^').unwrap_or(rest);
+    let sign = usize::from(rest.starts_with(['-', '+']));
+    let (exponent, rest) = rest.split_at(sign + behind(&rest[sign..], |c| c.is_ascii_digit()));
+    let power: f64 = match exponent {
+        "" => 1.0,
+        text => text.parse().ok()?,
+    };
+    match power {
+        1.0 => Some((unit, rest)),
+        _ if power.abs() < 20.0 => Some((BaseUnit::one().times(&unit, power)?, rest)),
+        _ => None,
     }
 }
 
@@ -274,18 +206,18 @@ const PREFIXES: [(&str, f64); 11] = [
     ("p", 1e-12),
 ];
 
-fn symbol(name: &str) -> Option<Unit> {
+fn symbol(name: &str) -> Option<BaseUnit> {
     if name == "degC" {
         let mut celsius = symbol("K")?;
-        celsius.has_offset = true;
+        celsius.offset = 273.15;
         return Some(celsius);
     }
     let whole = |name: &str, factor: f64| {
-        let (_, powers, scale) = SYMBOLS.iter().find(|(symbol, ..)| *symbol == name)?;
-        Some(Unit {
+        let (_, powers, size) = SYMBOLS.iter().find(|(symbol, ..)| *symbol == name)?;
+        Some(BaseUnit {
             powers: powers.map(f64::from),
-            scale: scale * factor,
-            ..Unit::one()
+            factor: size * factor,
+            ..BaseUnit::one()
         })
     };
     whole(name, 1.0).or_else(|| {
@@ -313,7 +245,7 @@ pub(crate) fn check(source: &str, ast: &Ast, model: &FlatModel) -> Vec<Box<Probl
             .library
             .get(&declaration.label)
             .map(|known| known.unit.to_owned());
-        if let Some(unit) = text.or(library).and_then(|text| Unit::parse(&text)) {
+        if let Some(unit) = text.or(library).and_then(|text| BaseUnit::of(&text)) {
             let label = declaration.label.as_str();
             declared.insert(label.strip_prefix('.').unwrap_or(label), unit);
         }
@@ -344,7 +276,7 @@ pub(crate) fn check(source: &str, ast: &Ast, model: &FlatModel) -> Vec<Box<Probl
 struct Walk<'a> {
     source: &'a str,
     ast: &'a Ast,
-    declared: HashMap<&'a str, Unit>,
+    declared: HashMap<&'a str, BaseUnit>,
     /// seconds in the model's unit of time, with the line that says so
     tick: Option<(f64, usize)>,
     found: Vec<Box<Problem>>,
@@ -377,11 +309,11 @@ impl Walk<'_> {
     /// The first of two units that is known; a warning where both are and they differ.
     fn compare(
         &mut self,
-        a: Option<Unit>,
-        b: Option<Unit>,
+        a: Option<BaseUnit>,
+        b: Option<BaseUnit>,
         span: Span,
         other: &str,
-    ) -> Option<Unit> {
+    ) -> Option<BaseUnit> {
         let (one, two) = match (a, b) {
             (Some(one), Some(two)) => (one, two),
             (one, two) => return one.or(two),
@@ -395,13 +327,13 @@ impl Walk<'_> {
             self.found.push(Problem::new(span, message));
             return Some(one);
         }
-        if one.has_offset != two.has_offset {
+        if one.offset != two.offset {
             let message = format!("a degree Celsius against a kelvin: one is {x}, {other} is {y}");
             let hint = "nothing is converted: add or subtract 273.15 where it belongs";
             self.found.push(Problem::new(span, message).hint(hint));
             return Some(one);
         }
-        let ratio = one.scale / two.scale;
+        let ratio = one.factor / two.factor;
         match one.ticks - two.ticks {
             0.0 if (ratio - 1.0).abs() > 1e-9 => {
                 let message = format!("the same quantity in two units: one is {x}, {other} is {y}");
@@ -439,7 +371,7 @@ impl Walk<'_> {
     }
 
     /// The unit of an expression; `None` where it is not known, and for plain numbers.
-    fn unit(&mut self, id: ExprId) -> Option<Unit> {
+    fn unit(&mut self, id: ExprId) -> Option<BaseUnit> {
         let ast = self.ast;
         let expression = ast.expression(id);
         match &expression.kind {
@@ -457,7 +389,7 @@ impl Walk<'_> {
                 let base = self.unit(*base);
                 match ast.expression(*exponent).kind {
                     Kind::Integer(power) if power.abs() < 20 => {
-                        Unit::one().times(&base?, power as f64)
+                        BaseUnit::one().times(&base?, power as f64)
                     }
                     _ => None,
                 }
@@ -481,11 +413,11 @@ impl Walk<'_> {
         }
     }
 
-    fn named(&self, name: &str) -> Option<Unit> {
+    fn named(&self, name: &str) -> Option<BaseUnit> {
         self.declared.get(name).cloned()
     }
 
-    fn chain(&mut self, head: ExprId, rest: &[Term]) -> Option<Unit> {
+    fn chain(&mut self, head: ExprId, rest: &[Term]) -> Option<BaseUnit> {
         if matches!(rest.first()?.0, Binary::Add | Binary::Sub) {
             return self.sum(head, rest);
         }
@@ -502,8 +434,8 @@ impl Walk<'_> {
         product
     }
 
-    fn sum(&mut self, head: ExprId, rest: &[Term]) -> Option<Unit> {
-        let has_offset = |unit: &Option<Unit>| unit.as_ref().is_some_and(|u| u.has_offset);
+    fn sum(&mut self, head: ExprId, rest: &[Term]) -> Option<BaseUnit> {
+        let has_offset = |unit: &Option<BaseUnit>| unit.as_ref().is_some_and(|u| u.offset != 0.0);
         let mut unit = self.unit(head);
         for &(operation, _, operand) in rest {
             let next = self.unit(operand);
@@ -519,26 +451,26 @@ impl Walk<'_> {
     }
 
     /// Small whole numbers count as numbers; others may hide a unit.
-    fn factor(&mut self, id: ExprId) -> Option<Unit> {
+    fn factor(&mut self, id: ExprId) -> Option<BaseUnit> {
         match self.ast.expression(id).kind {
-            Kind::Integer(value) if value.abs() <= 10 => Some(Unit::one()),
+            Kind::Integer(value) if value.abs() <= 10 => Some(BaseUnit::one()),
             _ => self.unit(id),
         }
     }
 
-    fn call(&mut self, call: &Call, span: Span) -> Option<Unit> {
+    fn call(&mut self, call: &Call, span: Span) -> Option<BaseUnit> {
         let name = plain(call.function.text(self.source));
-        let units: Vec<Option<Unit>> = call.arguments.iter().map(|&id| self.unit(id)).collect();
+        let units: Vec<Option<BaseUnit>> = call.arguments.iter().map(|&id| self.unit(id)).collect();
         let first = units.first().cloned().flatten();
         match &*name {
-            "der" => first?.per_tick(),
+            "der" => Some(first?.per_tick()),
             "abs" | "noEvent" | "sum" | "homotopy" => first,
             "smooth" => units.get(1).cloned().flatten(),
             "min" | "max" => {
                 let second = units.get(1).cloned().flatten();
                 self.compare(first, second, span, "the other")
             }
-            "sqrt" => Unit::one().times(&first?, 0.5),
+            "sqrt" => BaseUnit::one().times(&first?, 0.5),
             "exp" | "log" | "log10" | "sin" | "cos" | "tan" | "sinh" | "cosh" | "tanh" => {
                 if let Some(unit) = first.filter(|unit| !unit.is_pure_number())
                     && self.found.len() < MOST
@@ -563,7 +495,7 @@ mod tests {
         let celsius = BaseUnit::of("degC").unwrap();
         assert_eq!((celsius.factor, celsius.offset), (1.0, 273.15));
         let flow = BaseUnit::of("l/min").unwrap();
-        assert_eq!(flow.powers, [0, 3, -1, 0, 0, 0, 0]);
+        assert_eq!(flow.powers, [0.0, 3.0, -1.0, 0.0, 0.0, 0.0, 0.0]);
         assert!((flow.factor - 1e-3 / 60.0).abs() < 1e-18 && flow.offset == 0.0);
         assert_eq!(BaseUnit::of("cells"), None);
     }
@@ -580,12 +512,10 @@ mod tests {
             ("Ohm.F", "s", 1.0),
             ("V.s", "Wb", 1.0),
         ] {
-            let (one, other) = (Unit::parse(text).unwrap(), Unit::parse(same).unwrap());
+            let (one, other) = (BaseUnit::of(text).unwrap(), BaseUnit::of(same).unwrap());
             assert!(one.same_dimension(&other), "{text} {same}");
-            assert!(
-                (one.scale / other.scale - scale).abs() < 1e-12 * scale,
-                "{text} {same}"
-            );
+            let ratio = one.factor / other.factor;
+            assert!((ratio - scale).abs() < 1e-12 * scale, "{text} {same}");
         }
         for text in [
             "cells",
@@ -596,7 +526,7 @@ mod tests {
             "",
             "((((((((((((((((((((((((s",
         ] {
-            assert_eq!(Unit::parse(text), None, "{text}");
+            assert_eq!(BaseUnit::of(text), None, "{text}");
         }
     }
 }

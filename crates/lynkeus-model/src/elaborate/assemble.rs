@@ -51,7 +51,7 @@ pub(super) fn plant<'a>(
             continue;
         }
         let attributes = Declared::new(context, symbols, declaration, component)?;
-        if declaration.prefix.variability == Variability::Continuous {
+        if declaration.variability == Variability::Continuous {
             variables(symbols, &attributes, &inputs, &solution, &mut plant);
         } else if !symbols.dependent.get(place).copied().unwrap_or_default() {
             parameters(graph, &attributes, &mut plant);
@@ -81,7 +81,7 @@ fn unknowns(
         if component.is_known {
             continue;
         }
-        let is_input = declaration.prefix.causality == Causality::Input;
+        let is_input = declaration.causality == Causality::Input;
         let attributes = Declared::new(context, symbols, declaration, component)?;
         for (offset, node) in nodes(component).enumerate() {
             let is_open = declaration.binding.is_none() && !equated.contains(&node);
@@ -147,7 +147,7 @@ fn variables(
     solution: &HashMap<Node, Node>,
     plant: &mut Plant,
 ) {
-    let causality = declared.declaration.prefix.causality;
+    let causality = declared.declaration.causality;
     for (offset, symbol) in nodes(declared.component).enumerate() {
         if inputs.contains(&symbol) {
             plant.inputs.push(declared.variable(offset, symbol));
@@ -178,9 +178,8 @@ fn parameters(graph: &Graph, declared: &Declared<'_>, plant: &mut Plant) {
         component,
         ..
     } = declared;
-    let prefix = &declaration.prefix;
-    let is_fixed = prefix.variability == Variability::Constant || prefix.is_final;
-    if is_fixed || prefix.type_name == TypeName::Boolean {
+    let is_fixed = declaration.variability == Variability::Constant || declaration.is_final;
+    if is_fixed || declaration.type_name == TypeName::Boolean {
         return;
     }
     for offset in 0..component.elements.len() {
@@ -319,7 +318,7 @@ impl<'s> Declared<'s> {
             min: at(&self.min, offset).unwrap_or(f64::NEG_INFINITY),
             max: at(&self.max, offset).unwrap_or(f64::INFINITY),
             nominal: at(&self.nominal, offset),
-            integer: self.declaration.prefix.is_integer(),
+            integer: self.declaration.is_integer(),
             fixed: at(&self.fixed, offset) == Some(1.0),
         }
     }
@@ -359,7 +358,7 @@ fn numbers<'a>(
     id: ExprId,
 ) -> Result<Vec<f64>> {
     let is_truth = name == "fixed";
-    let is_boolean = declaration.prefix.type_name == TypeName::Boolean;
+    let is_boolean = declaration.type_name == TypeName::Boolean;
     let mut evaluator = symbols.evaluator(context, Mode::Structural);
     let span = context.ast.expression(id).span;
     let value = match evaluator.value(id) {

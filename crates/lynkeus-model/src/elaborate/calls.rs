@@ -101,7 +101,7 @@ impl<'a> Evaluator<'a> {
         let declarations = self.declarations_of(place).unwrap_or_default();
         let first = declarations
             .into_iter()
-            .find(|d| d.prefix.causality == Causality::Output);
+            .find(|d| d.causality == Causality::Output);
         let path = self
             .ast
             .classes
@@ -178,7 +178,7 @@ impl<'a> Evaluator<'a> {
     ) -> Result<Vec<Option<Outcome>>> {
         let inputs = declarations
             .iter()
-            .filter(|d| d.prefix.causality == Causality::Input);
+            .filter(|d| d.causality == Causality::Input);
         let inputs: Vec<&Declaration> = inputs.copied().collect();
         let mut found = vec![];
         for (input, id) in inputs
@@ -244,7 +244,7 @@ impl<'a> Evaluator<'a> {
     ) -> Result<Vec<Outcome>> {
         let mut given = given.into_iter();
         for declaration in declarations {
-            let value = match declaration.prefix.causality {
+            let value = match declaration.causality {
                 Causality::Input => given.next().flatten(),
                 _ => None,
             };
@@ -257,7 +257,7 @@ impl<'a> Evaluator<'a> {
         }
         let outputs = declarations
             .iter()
-            .filter(|d| d.prefix.causality == Causality::Output);
+            .filter(|d| d.causality == Causality::Output);
         let mut outcomes = vec![];
         for output in outputs {
             outcomes.push(self.outcome(class, output)?);
@@ -293,7 +293,7 @@ impl<'a> Evaluator<'a> {
 impl<'a> Evaluator<'a> {
     /// The record that a variable is declared as.
     pub(super) fn record_type(&self, declaration: &Declaration, path: &str) -> Option<usize> {
-        let TypeName::Named(name) = declaration.prefix.type_name else {
+        let TypeName::Named(name) = declaration.type_name else {
             return None;
         };
         let place = self.classes?.class(&plain(self.text(name)), &[path])?;
@@ -318,7 +318,7 @@ impl<'a> Evaluator<'a> {
                 None => self.open_record(record, &name),
             };
         }
-        if let TypeName::Named(type_name) = declaration.prefix.type_name {
+        if let TypeName::Named(type_name) = declaration.type_name {
             self.check_number(class, type_name)?;
         }
         let value = match (given, declaration.binding) {
@@ -334,7 +334,7 @@ impl<'a> Evaluator<'a> {
             }
         };
         let dims = self.dims_declared(declaration, value.as_ref(), span)?;
-        let mut local = Local::without_value(dims, declaration.prefix.is_integer());
+        let mut local = Local::without_value(dims, declaration.is_integer());
         if let Some(value) = value {
             check_size(&name, &local.dims, value.dims(), span)?;
             let elements = value.into_array().elements.into_iter();
@@ -404,7 +404,7 @@ impl<'a> Evaluator<'a> {
         let mut members = vec![];
         for declaration in self.declarations_of(record)? {
             let dims = self.dims_declared(declaration, None, declaration.name)?;
-            let local = Local::without_value(dims, declaration.prefix.is_integer());
+            let local = Local::without_value(dims, declaration.is_integer());
             members.push((declaration.label.clone(), local));
         }
         self.insert_record(name, members);
@@ -451,7 +451,7 @@ impl<'a> Evaluator<'a> {
 
 /// Refuses an input that has no value; other variables are given theirs by statements.
 fn check_given(class: &Class, declaration: &Declaration, span: Span) -> Result<()> {
-    if declaration.prefix.causality != Causality::Input {
+    if declaration.causality != Causality::Input {
         return Ok(());
     }
     let (name, function) = (&declaration.label, &class.path);
@@ -656,7 +656,7 @@ impl<'a> Evaluator<'a> {
         id: ExprId,
     ) -> Result<Vec<(String, Value)>> {
         let label = &declaration.label;
-        if let TypeName::Named(_) = declaration.prefix.type_name
+        if let TypeName::Named(_) = declaration.type_name
             && let Some(inner) = self.record(id)?
         {
             let inner = inner.members.into_iter();

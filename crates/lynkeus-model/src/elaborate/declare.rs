@@ -70,7 +70,7 @@ impl<'a> Symbols<'a> {
     ) -> Result<Component> {
         let declaration = &self.declarations[place];
         let name = declaration.label.as_str();
-        if declaration.prefix.variability != Variability::Continuous {
+        if declaration.variability != Variability::Continuous {
             return self.parameter(context, overrides, sizes, place);
         }
         let dims = self.dims(context, declaration)?.into_iter();
@@ -84,13 +84,13 @@ impl<'a> Symbols<'a> {
         })?;
         sizes.charge(context, &dims, declaration)?;
         let count: usize = dims.iter().product();
-        let is_boolean = declaration.prefix.type_name == TypeName::Boolean;
-        if is_boolean && declaration.prefix.causality == Causality::Input {
+        let is_boolean = declaration.type_name == TypeName::Boolean;
+        if is_boolean && declaration.causality == Causality::Input {
             let problem = Problem::new(declaration.name, "a Boolean input is not supported");
             return Err(problem.hint("use a Real and compare it, as in `if u > 0.5 then …`"));
         }
         let may_have_derivative =
-            declaration.prefix.type_name == TypeName::Real && !is_outer_input(declaration);
+            declaration.type_name == TypeName::Real && !is_outer_input(declaration);
         let mut derivatives = self.derivatives.borrow_mut();
         let symbol = |offset: usize| {
             let symbol = self.graph.symbol(&element_name(name, &dims, offset)).node();
@@ -207,9 +207,8 @@ fn dependent(declarations: &[Declaration], needs: &[Vec<usize>], sequence: &[usi
     let mut dependent = vec![false; declarations.len()];
     for &place in sequence {
         let depends = |&need: &usize| {
-            let prefix = &declarations[need].prefix;
-            let settable = prefix.variability == Variability::Parameter && !prefix.is_final;
-            dependent[need] || (settable && !prefix.is_integer())
+            let needed = &declarations[need];
+            dependent[need] || (needed.is_settable() && !needed.is_integer())
         };
         dependent[place] = needs[place].iter().any(depends);
     }
@@ -222,7 +221,7 @@ fn needs(
     declaration: &Declaration,
     by_name: &HashMap<&str, usize>,
 ) -> Vec<usize> {
-    let is_known = declaration.prefix.variability != Variability::Continuous;
+    let is_known = declaration.variability != Variability::Continuous;
     let binding = declaration.binding.filter(|_| is_known);
     let own: Vec<&str> = context.model.scopes.iter().map(String::as_str).collect();
     let package = declaration.package.as_deref();
@@ -367,14 +366,13 @@ impl<'a> Symbols<'a> {
         let (declaration, dependent) = (&self.declarations[place], self.dependent[place]);
         let label = declaration.label.as_str();
         let name = label.strip_prefix('.').unwrap_or(label);
-        if declaration.prefix.causality == Causality::Input {
+        if declaration.causality == Causality::Input {
             let message = format!("`{name}` is both a parameter and an input");
             return Err(Problem::new(declaration.name, message).hint("choose one of the two"));
         }
         let keeps_symbols = context.options.symbolic_parameters
-            && declaration.prefix.variability == Variability::Parameter
-            && !declaration.prefix.is_final
-            && declaration.prefix.type_name == TypeName::Real;
+            && declaration.is_settable()
+            && declaration.type_name == TypeName::Real;
         let known = self.binding(context, declaration, Mode::Structural)?;
         let dims = self.parameter_dims(context, declaration, known.as_ref())?;
         sizes.charge(context, &dims, declaration)?;
@@ -406,9 +404,7 @@ impl<'a> Symbols<'a> {
             (false, Some(values)) if keeps_symbols => parts.symbols_but(values),
             (false, None) if keeps_symbols => parts.symbols(),
             (false, Some(values)) => values.clone(),
-            (false, None) if declaration.prefix.variability == Variability::Parameter => {
-                parts.symbols()
-            }
+            (false, None) if declaration.variability == Variability::Parameter => parts.symbols(),
             (false, None) => return Err(parts.no_value()),
         };
         Ok(Component {
@@ -501,7 +497,7 @@ impl Parts<'_> {
         self.check_size(&array, id)?;
         let span = self.context.ast.expression(id).span;
         let graph = self.context.graph;
-        let is_boolean = self.declaration.prefix.type_name == TypeName::Boolean;
+        let is_boolean = self.declaration.type_name == TypeName::Boolean;
         let typed = |element: Scalar| {
             if is_boolean {
                 return match element {
@@ -565,14 +561,14 @@ impl Parts<'_> {
     /// A value of the declared type.
     fn known(&self, element: Scalar, span: Span) -> Result<Scalar> {
         let graph = self.context.graph;
-        if self.declaration.prefix.type_name == TypeName::Boolean {
+        if self.declaration.type_name == TypeName::Boolean {
             return match element {
                 Scalar::Boolean(node) if graph.constant_value(node).is_some() => Ok(element),
                 _ => Err(Problem::new(span, "expected `true` or `false`")),
             };
         }
         let node = element.real(graph).ok_or_else(|| expected_number(span))?;
-        match (element, self.declaration.prefix.is_integer()) {
+        match (element, self.declaration.is_integer()) {
             (Scalar::Integer(_), true) => Ok(element),
             (_, true) => {
                 let message = format!("`{}` is an Integer, its value is a Real", self.name);
@@ -587,14 +583,14 @@ impl Parts<'_> {
     }
 
     fn converted(&self, value: f64) -> Result<Scalar> {
-        if self.declaration.prefix.type_name == TypeName::Boolean {
+        if self.declaration.type_name == TypeName::Boolean {
             let node = self
                 .context
                 .graph
                 .constant(f64::from(u8::from(value != 0.0)));
             return Ok(Scalar::Boolean(node.node()));
         }
-        if !self.declaration.prefix.is_integer() {
+        if !self.declaration.is_integer() {
             return Ok(Scalar::Real(self.context.graph.constant(value).node()));
         }
         if value.fract() != 0.0 || value.abs() > 2f64.powi(53) {
@@ -686,9 +682,8 @@ fn by_offset(
 }
 
 fn check_settable(name: &str, declaration: &Declaration) -> Result<()> {
-    let prefix = &declaration.prefix;
-    let what = match prefix.variability {
-        Variability::Parameter if prefix.is_final => "a final parameter",
+    let what = match declaration.variability {
+        Variability::Parameter if declaration.is_final => "a final parameter",
         Variability::Parameter => return Ok(()),
         Variability::Constant => "a constant",
         Variability::Continuous => "a variable",
@@ -698,10 +693,7 @@ fn check_settable(name: &str, declaration: &Declaration) -> Result<()> {
 }
 
 fn unknown(model: &FlatModel, name: &str) -> Box<Problem> {
-    let settable = model.declarations.iter().filter(|declaration| {
-        let prefix = &declaration.prefix;
-        prefix.variability == Variability::Parameter && !prefix.is_final
-    });
+    let settable = model.declarations.iter().filter(|d| d.is_settable());
     let names: Vec<&str> = settable
         .map(|declaration| declaration.label.as_str())
         .collect();

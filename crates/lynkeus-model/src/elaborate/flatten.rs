@@ -34,7 +34,7 @@ pub(super) fn flatten<'a>(context: &Context<'a>, symbols: &Symbols<'a>) -> Resul
         equations: vec![],
     };
     for (declaration, component) in symbols.all() {
-        if declaration.prefix.variability == Variability::Continuous
+        if declaration.variability == Variability::Continuous
             && let Some(binding) = declaration.binding
         {
             let variable = Value::new(component.dims.clone(), component.elements.clone());

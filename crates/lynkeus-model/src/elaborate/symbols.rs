@@ -128,9 +128,7 @@ impl Scope for Symbols<'_> {
         let place = own.and_then(|name| self.by_name.get(name));
         let declaration = place.and_then(|&place| self.declarations.get(place));
         match (own, declaration) {
-            (Some(name), Some(declaration))
-                if declaration.prefix.variability == Variability::Constant =>
-            {
+            (Some(name), Some(declaration)) if declaration.variability == Variability::Constant => {
                 self.named(name, mode)
             }
             _ => Named::Unknown,
@@ -176,7 +174,7 @@ impl Scope for Symbols<'_> {
 /// True for an input that nothing in the model can determine: one of a part, as `r1.u`, may be
 /// equated with another variable.
 pub(super) fn is_outer_input(declaration: &Declaration) -> bool {
-    declaration.prefix.causality == Causality::Input
+    declaration.causality == Causality::Input
         && declaration.binding.is_none()
         && !declaration.label.contains('.')
 }

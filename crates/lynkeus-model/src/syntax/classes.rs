@@ -1,8 +1,8 @@
 //! Classes: their heads, their sections, and the declarations in them.
 
 use super::ast::{
-    Alias, Attribute, Base, Causality, Class, ClassKind, Declaration, ExprId, Import, Kind, Prefix,
-    TypeName, Variability,
+    Attribute, Causality, Class, ClassKind, Declaration, ExprId, Import, Kind, TypeName,
+    Variability,
 };
 use super::lexer::{Token, plain, shortened};
 use super::parser::Parser;
@@ -110,16 +110,9 @@ impl Parser<'_> {
             self.expect(")")?;
             return Ok(());
         }
-        let mut prefix = Prefix::plain();
-        self.causality(&mut prefix)?;
-        let of = self.type_name()?;
-        let dimensions = self.maybe_subscripts()?;
-        let modification = self.modification()?;
-        class.alias = Some(Alias {
-            of,
-            dimensions,
-            modification,
-        });
+        let mut alias = self.typed(Declaration::default())?;
+        alias.attributes = self.modification()?;
+        class.alias = Some(alias);
         Ok(())
     }
 
@@ -199,9 +192,14 @@ impl Parser<'_> {
             return self.class(&path);
         }
         if self.accept("extends")? {
-            let base = self.base()?;
-            class.bases.push(base);
-            return Ok(());
+            let (name, nested) = (self.dotted_name()?, self.modification()?);
+            class.bases.push(Attribute {
+                name,
+                value: None,
+                nested,
+            });
+            self.comment()?;
+            return self.expect(";").map(|_| ());
         }
         if self.accept("import")? {
             let import = self.import()?;
@@ -216,14 +214,6 @@ impl Parser<'_> {
             return Ok(());
         }
         self.declarations(&mut class.declarations)
-    }
-
-    fn base(&mut self) -> Result<Base> {
-        let name = self.dotted_name()?;
-        let modification = self.modification()?;
-        self.comment()?;
-        self.expect(";")?;
-        Ok(Base { name, modification })
     }
 
     fn import(&mut self) -> Result<Import> {
@@ -276,18 +266,15 @@ impl Parser<'_> {
 
 impl Parser<'_> {
     /// `parameter Real a = 1, b[3];`
-    pub(super) fn declarations(&mut self, into: &mut Vec<Declaration>) -> Result<()> {
+    fn declarations(&mut self, into: &mut Vec<Declaration>) -> Result<()> {
         self.refuse_unsupported_element()?;
-        let prefix = self.prefix()?;
-        loop {
-            let declaration = self.declarator(prefix.clone())?;
-            into.push(declaration);
-            if !self.accept(",")? {
-                break;
-            }
-        }
-        self.expect(";")?;
-        Ok(())
+        let is_final = self.accept("final")?;
+        let common = self.typed(Declaration {
+            is_final,
+            ..Declaration::default()
+        })?;
+        into.extend(self.list(|parser| parser.declarator(common.clone()))?);
+        self.expect(";").map(|_| ())
     }
 
     fn refuse_unsupported_element(&self) -> Result<()> {
@@ -313,24 +300,15 @@ impl Parser<'_> {
         Err(self.refuse(what, hint))
     }
 
-    fn prefix(&mut self) -> Result<Prefix> {
-        let mut prefix = Prefix::plain();
-        prefix.is_final = self.accept("final")?;
-        self.causality(&mut prefix)?;
-        prefix.type_name = self.type_name()?;
-        prefix.dimensions = self.maybe_subscripts()?;
-        Ok(prefix)
-    }
-
-    /// `parameter`, `input`, `flow` and their like.
-    pub(super) fn causality(&mut self, prefix: &mut Prefix) -> Result<()> {
+    /// `parameter`, `input`, `flow` and their like, and the type.
+    fn typed(&mut self, mut declaration: Declaration) -> Result<Declaration> {
         while let Token::Fixed(word) = self.token {
             match word {
-                "parameter" => prefix.variability = Variability::Parameter,
-                "constant" => prefix.variability = Variability::Constant,
-                "input" => prefix.causality = Causality::Input,
-                "output" => prefix.causality = Causality::Output,
-                "flow" | "stream" => prefix.of_connector = Some(self.span),
+                "parameter" => declaration.variability = Variability::Parameter,
+                "constant" => declaration.variability = Variability::Constant,
+                "input" => declaration.causality = Causality::Input,
+                "output" => declaration.causality = Causality::Output,
+                "flow" | "stream" => declaration.of_connector = Some(self.span),
                 _ if word == "enumeration" || !word.starts_with(char::is_alphabetic) => break,
                 _ => {
                     self.refuse_unsupported_element()?;
@@ -339,10 +317,12 @@ impl Parser<'_> {
             }
             self.advance()?;
         }
-        Ok(())
+        declaration.type_name = self.type_name()?;
+        declaration.dimensions = self.maybe_subscripts()?;
+        Ok(declaration)
     }
 
-    pub(super) fn type_name(&mut self) -> Result<TypeName> {
+    fn type_name(&mut self) -> Result<TypeName> {
         if self.at("enumeration") {
             // a choice that the compiler has made already
             let start = self.advance()?;
@@ -372,35 +352,25 @@ impl Parser<'_> {
             .hint("a declaration reads `Real x;`; equations follow after the word `equation`"))
     }
 
-    fn declarator(&mut self, prefix: Prefix) -> Result<Declaration> {
+    fn declarator(&mut self, mut declaration: Declaration) -> Result<Declaration> {
         self.count(8)?;
-        let name = self.variable_name()?;
-        let label = plain(name.text(self.source)).into_owned();
+        declaration.name = self.variable_name()?;
+        declaration.label = plain(declaration.name.text(self.source)).into_owned();
         let mut dimensions = self.maybe_subscripts()?;
-        dimensions.extend(&prefix.dimensions);
-        let attributes = self.modification()?;
-        let mut binding = None;
+        dimensions.append(&mut declaration.dimensions);
+        declaration.dimensions = dimensions;
+        declaration.attributes = self.modification()?;
         if self.accept("=")? {
-            binding = Some(self.expression()?);
+            declaration.binding = Some(self.expression()?);
         } else if self.at(":=") {
-            return Err(self
-                .unexpected("`=`")
-                .hint("a declaration equation is written with `=`"));
+            let problem = self.unexpected("`=`");
+            return Err(problem.hint("a declaration equation is written with `=`"));
         }
         if self.at("if") {
             return Err(self.refuse("a conditional component", "declare it always"));
         }
-        let description = self.comment()?;
-        Ok(Declaration {
-            prefix,
-            name,
-            label,
-            dimensions,
-            attributes,
-            binding,
-            description,
-            package: None,
-        })
+        declaration.description = self.comment()?;
+        Ok(declaration)
     }
 
     /// `x`, `r1.p.v` or `c[2].x`: compilers write the names of parts in full.
@@ -420,44 +390,38 @@ impl Parser<'_> {
 
     /// `(start = 1, each min = 0)`, where it stands here.
     fn modification(&mut self) -> Result<Vec<Attribute>> {
-        let mut given = vec![];
-        if self.accept("(")? {
-            self.nested(|parser| parser.attributes(&mut given))?;
+        if !self.accept("(")? {
+            return Ok(vec![]);
         }
-        Ok(given)
+        self.nested(|parser| {
+            if parser.accept(")")? {
+                return Ok(vec![]);
+            }
+            let given = parser.list(Self::attribute)?;
+            parser.expect(")")?;
+            Ok(given)
+        })
     }
 
-    fn attributes(&mut self, into: &mut Vec<Attribute>) -> Result<()> {
-        if self.accept(")")? {
-            return Ok(());
+    fn attribute(&mut self) -> Result<Attribute> {
+        if self.at("redeclare") || self.at("replaceable") {
+            return Err(self.refuse("a redeclaration", HOW_TO_FLATTEN));
         }
-        loop {
-            if self.at("redeclare") || self.at("replaceable") {
-                return Err(self.refuse("a redeclaration", HOW_TO_FLATTEN));
-            }
-            self.accept("each")?;
-            self.accept("final")?;
-            let name = self.identifier("the name of an attribute")?;
-            let nested = self.modification()?;
-            let mut value = None;
-            if nested.is_empty() {
-                self.expect("=")?;
-                value = Some(self.attribute_value()?);
-            } else if self.accept("=")? {
-                value = Some(self.attribute_value()?);
-            }
-            self.comment()?;
-            into.push(Attribute {
-                name,
-                value,
-                nested,
-            });
-            if !self.accept(",")? {
-                break;
-            }
+        self.accept("each")?;
+        self.accept("final")?;
+        let name = self.identifier("the name of an attribute")?;
+        let nested = self.modification()?;
+        let mut value = None;
+        if nested.is_empty() || self.at("=") {
+            self.expect("=")?;
+            value = Some(self.attribute_value()?);
         }
-        self.expect(")")?;
-        Ok(())
+        self.comment()?;
+        Ok(Attribute {
+            name,
+            value,
+            nested,
+        })
     }
 
     fn attribute_value(&mut self) -> Result<ExprId> {
@@ -467,20 +431,6 @@ impl Parser<'_> {
         let (start, first) = (self.span, self.next_id());
         self.advance()?;
         self.push(Kind::Text, start, first)
-    }
-}
-
-impl Prefix {
-    /// A Real variable, with nothing before it.
-    pub(super) fn plain() -> Self {
-        Self {
-            is_final: false,
-            variability: Variability::Continuous,
-            causality: Causality::Local,
-            of_connector: None,
-            type_name: TypeName::Real,
-            dimensions: vec![],
-        }
     }
 }
 

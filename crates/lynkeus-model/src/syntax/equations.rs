@@ -272,17 +272,10 @@ impl Parser<'_> {
     /// `(a, , b)` on the left of what gives several values.
     pub(super) fn targets(&mut self) -> Result<Vec<Option<ExprId>>> {
         let start = self.expect("(")?;
-        let mut targets = vec![];
-        loop {
-            let is_left_out = self.at(",") || self.at(")");
-            targets.push(match is_left_out {
-                true => None,
-                false => Some(self.expression()?),
-            });
-            if !self.accept(",")? {
-                break;
-            }
-        }
+        let targets = self.list(|parser| match parser.at(",") || parser.at(")") {
+            true => Ok(None),
+            false => parser.expression().map(Some),
+        })?;
         self.expect(")")?;
         if targets.iter().all(Option::is_none) {
             let message = "expected variables between the parentheses";

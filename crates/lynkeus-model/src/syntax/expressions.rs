@@ -171,14 +171,11 @@ impl Parser<'_> {
                 .unexpected("an element")
                 .hint("for no elements write `zeros(0)`"));
         }
-        let mut elements = vec![self.expression()?];
-        if self.accept("for")? {
+        let elements = self.list(Self::expression)?;
+        if elements.len() == 1 && self.accept("for")? {
             let iterators = self.iterators()?;
             self.expect("}")?;
             return self.push(Kind::Comprehension(elements[0], iterators), start, first);
-        }
-        while self.accept(",")? {
-            elements.push(self.expression()?);
         }
         self.expect("}")?;
         self.push(Kind::Array(elements), start, first)
@@ -186,16 +183,9 @@ impl Parser<'_> {
 
     fn matrix(&mut self) -> Result<ExprId> {
         let (start, first) = (self.advance()?, self.next_id());
-        let mut rows = vec![];
-        loop {
-            let mut row = vec![self.expression()?];
-            while self.accept(",")? {
-                row.push(self.expression()?);
-            }
-            rows.push(row);
-            if !self.accept(";")? {
-                break;
-            }
+        let mut rows = vec![self.list(Self::expression)?];
+        while self.accept(";")? {
+            rows.push(self.list(Self::expression)?);
         }
         self.expect("]")?;
         self.push(Kind::Matrix(rows), start, first)

@@ -131,6 +131,15 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
         })
     }
 
+    /// One or more of something, with commas between them.
+    pub(crate) fn list<T>(&mut self, one: impl Fn(&mut Self) -> Result<T>) -> Result<Vec<T>> {
+        let mut items = vec![one(self)?];
+        while self.accept(",")? {
+            items.push(one(self)?);
+        }
+        Ok(items)
+    }
+
     pub(crate) fn identifier(&mut self, what: &str) -> Result<Span> {
         if self.token == Token::Identifier {
             return self.advance();
