@@ -133,12 +133,11 @@ struct Excerpt {
 
 impl Diagnostic {
     pub(crate) fn new(problem: Box<Problem>, file: &str, source: &str) -> Self {
-        let start = floor_boundary(source, problem.span.start as usize);
-        let end = floor_boundary(source, problem.span.end as usize).max(start);
+        let start = source.floor_char_boundary(problem.span.start as usize);
+        let end = source.floor_char_boundary(problem.span.end as usize);
         let line_start = source[..start].rfind('\n').map_or(0, |i| i + 1);
-        let line_end = source[start..]
-            .find('\n')
-            .map_or(source.len(), |i| start + i);
+        let rest = source[start..].find('\n');
+        let line_end = rest.map_or(source.len(), |length| start + length);
         let line = problem.span.line(source);
         let column = 1 + source[line_start..start].chars().count();
         Self {
@@ -149,7 +148,11 @@ impl Diagnostic {
             message: problem.message,
             label: problem.label,
             hint: problem.hint,
-            excerpt: Box::new(Excerpt::new(source, line_start..line_end, start..end)),
+            excerpt: Box::new(Excerpt::new(
+                source,
+                line_start..line_end,
+                start..end.max(start),
+            )),
         }
     }
 
@@ -163,15 +166,16 @@ impl Diagnostic {
     /// `file:line:column: message (hint)` on one line.
     pub fn one_line(&self) -> String {
         let hint = self.hint.as_deref().map(|hint| format!(" ({hint})"));
-        format!(
-            "{}:{}:{}: {}{}",
-            self.file,
-            self.line,
-            self.column,
-            self.message,
-            hint.unwrap_or_default()
-        )
-        .replace('\n', " ")
+        let Self {
+            file,
+            line,
+            column,
+            message,
+            ..
+        } = self;
+        let hint = hint.unwrap_or_default();
+        let text = format!("{file}:{line}:{column}: {message}{hint}");
+        text.replace('\n', " ")
     }
 
     /// The rendered form with terminal colours.
@@ -199,10 +203,8 @@ impl Diagnostic {
         } else {
             title.element(snippet.path(self.file.as_str()))
         };
-        let hint = self
-            .hint
-            .as_deref()
-            .map(|hint| Group::with_title(Level::HELP.secondary_title(hint)));
+        let hint = self.hint.as_deref();
+        let hint = hint.map(|hint| Group::with_title(Level::HELP.secondary_title(hint)));
         let report: Vec<Group<'_>> = std::iter::once(group).chain(hint).collect();
         renderer.render(&report)
     }
@@ -220,9 +222,9 @@ impl Excerpt {
     /// The line, or a window of it around the marked bytes where it is long.
     fn new(source: &str, line: std::ops::Range<usize>, marked: std::ops::Range<usize>) -> Self {
         let marked_end = marked.end.min(line.end).min(marked.start + WINDOW);
-        let from = floor_boundary(source, marked.start.saturating_sub(WINDOW).max(line.start));
-        let to = floor_boundary(source, (marked_end + WINDOW).min(line.end));
-        let marked_end = floor_boundary(source, marked_end).max(marked.start);
+        let from = source.floor_char_boundary(marked.start.saturating_sub(WINDOW).max(line.start));
+        let to = source.floor_char_boundary((marked_end + WINDOW).min(line.end));
+        let marked_end = source.floor_char_boundary(marked_end).max(marked.start);
         Self {
             // A carriage return would move the caret; it takes one byte, as a space does.
             text: source[from..to].replace('\r', " "),
@@ -231,11 +233,6 @@ impl Excerpt {
             is_warning: false,
         }
     }
-}
-
-/// The last character boundary at or before `index`.
-fn floor_boundary(source: &str, index: usize) -> usize {
-    source.floor_char_boundary(index.min(source.len()))
 }
 
 /// Why a model file could not be loaded.

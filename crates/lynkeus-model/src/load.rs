@@ -94,22 +94,16 @@ impl Plant {
         let bytes = std::fs::read(path).map_err(read_error)?;
         let source = std::str::from_utf8(&bytes).map_err(|error| {
             let offset = error.valid_up_to();
-            let line = 1 + bytes
-                .iter()
-                .take(offset)
-                .filter(|&&byte| byte == b'\n')
-                .count();
+            let before = bytes.iter().take(offset);
+            let line = 1 + before.filter(|&&byte| byte == b'\n').count();
             LoadError::NotUtf8 {
                 path: path.to_owned(),
                 line,
                 offset,
             }
         })?;
-        Ok(Self::from_text(
-            source,
-            &path.display().to_string(),
-            options,
-        )?)
+        let name = path.display().to_string();
+        Ok(Self::from_text(source, &name, options)?)
     }
 
     /// Reads a text in the language that `file_name` tells: the notation of `@ODEmodel` where it
@@ -200,11 +194,6 @@ pub fn parse_expression(
         Value::Scalar(scalar) => scalar.real(graph),
         Value::Array(_) => None,
     };
-    node.ok_or_else(|| {
-        let span = ast.expression(root).span;
-        refused(Problem::new(
-            span,
-            "expected a number, found an array or a condition",
-        ))
-    })
+    let message = "expected a number, found an array or a condition";
+    node.ok_or_else(|| refused(Problem::new(ast.expression(root).span, message)))
 }

@@ -318,55 +318,47 @@ impl Walk<'_> {
             (Some(one), Some(two)) => (one, two),
             (one, two) => return one.or(two),
         };
-        if self.found.len() >= MOST {
-            return Some(one);
-        }
         let (x, y) = (one.describe(), two.describe());
+        let ratio = one.factor / two.factor;
+        let ticks = one.ticks - two.ticks;
         if !one.same_dimension(&two) {
             let message = format!("units differ: one is {x}, {other} is {y}");
-            self.found.push(Problem::new(span, message));
-            return Some(one);
-        }
-        if one.offset != two.offset {
+            self.warn(Problem::new(span, message));
+        } else if one.offset != two.offset {
             let message = format!("a degree Celsius against a kelvin: one is {x}, {other} is {y}");
             let hint = "nothing is converted: add or subtract 273.15 where it belongs";
-            self.found.push(Problem::new(span, message).hint(hint));
-            return Some(one);
-        }
-        let ratio = one.factor / two.factor;
-        match one.ticks - two.ticks {
-            0.0 if (ratio - 1.0).abs() > 1e-9 => {
-                let message = format!("the same quantity in two units: one is {x}, {other} is {y}");
-                let hint = format!("nothing is converted: 1 {x} is {ratio} {y}");
-                self.found.push(Problem::new(span, message).hint(hint));
-            }
-            ticks if ticks == -1.0 || ticks == 1.0 => {
-                self.time(ratio.powf(-ticks), &x, &y, span);
-            }
-            _ => {}
+            self.warn(Problem::new(span, message).hint(hint));
+        } else if ticks == 0.0 && (ratio - 1.0).abs() > 1e-9 {
+            let message = format!("the same quantity in two units: one is {x}, {other} is {y}");
+            let hint = format!("nothing is converted: 1 {x} is {ratio} {y}");
+            self.warn(Problem::new(span, message).hint(hint));
+        } else if ticks == -1.0 || ticks == 1.0 {
+            self.time(ratio.powf(-ticks), &x, &y, span);
         }
         Some(one)
+    }
+
+    fn warn(&mut self, problem: Box<Problem>) {
+        if self.found.len() < MOST {
+            self.found.push(problem);
+        }
     }
 
     /// An equation says how long the model's unit of time is: all must say the same.
     fn time(&mut self, seconds: f64, x: &str, y: &str, span: Span) {
         let line = span.line(self.source);
-        let known = TIMES.iter().any(|time| (seconds / time - 1.0).abs() < 1e-9);
-        match self.tick {
-            _ if !known => {
-                let message = format!("a rate in two units: {x} on one side, {y} on the other");
-                self.found
-                    .push(Problem::new(span, message).hint("nothing is converted"));
-            }
-            Some((before, first)) if (seconds / before - 1.0).abs() > 1e-9 => {
-                let message = format!(
-                    "this equation takes {seconds} s as the unit of time, line {first} takes {before} s"
-                );
-                let hint = "nothing is converted: write all rates over one unit of time";
-                self.found.push(Problem::new(span, message).hint(hint));
-            }
-            Some(_) => {}
-            None => self.tick = Some((seconds, line)),
+        let fits = |time: f64| (seconds / time - 1.0).abs() < 1e-9;
+        if !TIMES.into_iter().any(fits) {
+            let message = format!("a rate in two units: {x} on one side, {y} on the other");
+            return self.warn(Problem::new(span, message).hint("nothing is converted"));
+        }
+        let (before, first) = *self.tick.get_or_insert((seconds, line));
+        if !fits(before) {
+            let message = format!(
+                "this equation takes {seconds} s as the unit of time, line {first} takes {before} s"
+            );
+            let hint = "nothing is converted: write all rates over one unit of time";
+            self.warn(Problem::new(span, message).hint(hint));
         }
     }
 
@@ -472,12 +464,10 @@ impl Walk<'_> {
             }
             "sqrt" => BaseUnit::one().times(&first?, 0.5),
             "exp" | "log" | "log10" | "sin" | "cos" | "tan" | "sinh" | "cosh" | "tanh" => {
-                if let Some(unit) = first.filter(|unit| !unit.is_pure_number())
-                    && self.found.len() < MOST
-                {
+                if let Some(unit) = first.filter(|unit| !unit.is_pure_number()) {
                     let message = format!("`{name}` of a quantity in {}", unit.describe());
                     let hint = "divide it by a reference in the same unit";
-                    self.found.push(Problem::new(span, message).hint(hint));
+                    self.warn(Problem::new(span, message).hint(hint));
                 }
                 None
             }

@@ -46,7 +46,6 @@ pub(crate) fn flat_model(source: &str, ast: &mut Ast, place: usize) -> Result<Fl
         ast,
         model: FlatModel::default(),
         declared: HashSet::new(),
-        depth: 0,
     };
     let done = flattening.whole(place);
     let model = flattening.model;
@@ -61,8 +60,6 @@ struct Flattening<'a> {
     model: FlatModel,
     /// labels of the declarations so far
     declared: HashSet<String>,
-    /// records around the one that is written out
-    depth: usize,
 }
 
 impl<'a> Flattening<'a> {
@@ -131,10 +128,8 @@ impl<'a> Flattening<'a> {
     /// A declaration of numbers as it is, one of a record as those of its members.
     fn declaration(&mut self, mut declaration: Declaration, path: &str) -> Result<()> {
         if let Some(span) = declaration.of_connector {
-            return Err(
-                Problem::new(span, "the model is not flat: it has a connector variable")
-                    .hint(HOW_TO_FLATTEN),
-            );
+            let message = "the model is not flat: it has a connector variable";
+            return Err(Problem::new(span, message).hint(HOW_TO_FLATTEN));
         }
         let mut path = path.to_owned();
         for _ in 0..MAX_BASES {
@@ -166,10 +161,8 @@ impl<'a> Flattening<'a> {
                 }
             }
         }
-        Err(Problem::new(
-            declaration.name,
-            "the type of this variable is made from itself",
-        ))
+        let message = "the type of this variable is made from itself";
+        Err(Problem::new(declaration.name, message))
     }
 
     fn of_library(
@@ -245,16 +238,12 @@ fn elements_by_themselves(source: &str, ast: &Ast, declarations: &mut [Declarati
     let literal = |id: &ExprId| matches!(ast.expression(*id).kind, Kind::Integer(_));
     for declaration in declarations {
         let dimensions = &declaration.dimensions;
-        let repeated = count
-            .get(&declaration.label)
-            .is_some_and(|&count| count > 1);
+        let repeated = count.get(&declaration.label) > Some(&1);
         if !repeated || dimensions.is_empty() || !dimensions.iter().all(literal) {
             continue;
         }
-        let subscripts = dimensions
-            .iter()
-            .map(|id| ast.expression(*id).span.text(source));
-        let subscripts: Vec<&str> = subscripts.collect();
+        let subscript = |id: &ExprId| ast.expression(*id).span.text(source);
+        let subscripts: Vec<&str> = dimensions.iter().map(subscript).collect();
         declaration.label = format!("{}[{}]", declaration.label, subscripts.join(","));
         declaration.dimensions.clear();
     }
@@ -269,14 +258,7 @@ const MAX_DEPTH: usize = 20;
 impl<'a> Flattening<'a> {
     /// The members of a record, each declared under its full name.
     fn record(&mut self, record: Declaration, class: &'a Class) -> Result<()> {
-        self.depth += 1;
-        let done = self.record_here(record, class);
-        self.depth -= 1;
-        done
-    }
-
-    fn record_here(&mut self, record: Declaration, class: &'a Class) -> Result<()> {
-        if self.depth > MAX_DEPTH {
+        if record.label.matches('.').count() > MAX_DEPTH {
             let message = format!("the record `{}` holds itself", class.path);
             return Err(Problem::new(record.name, message));
         }
@@ -297,13 +279,10 @@ impl<'a> Flattening<'a> {
                 self.check_default(&member, class)?;
             }
             member.label = format!("{}.{name}", record.label);
-            let sized = !record.dimensions.is_empty();
-            let mut dimensions = record.dimensions.clone();
-            dimensions.append(&mut member.dimensions);
-            member.dimensions = dimensions;
+            member.dimensions.splice(0..0, record.dimensions.clone());
             if let Some(value) = record.binding {
                 member.binding = Some(self.ast.member(value, name));
-            } else if sized {
+            } else if !record.dimensions.is_empty() {
                 member.binding = None;
             }
             if member.variability == Variability::Continuous {
@@ -325,13 +304,14 @@ impl<'a> Flattening<'a> {
         let Some(default) = member.binding else {
             return Ok(());
         };
-        let is_sibling = |name: &str| class.declarations.iter().any(|d| d.label == name);
+        let is_known = |name: &str| {
+            let mut siblings = class.declarations.iter();
+            siblings.any(|d| d.label == name) || self.declared.contains(name)
+        };
         for part in self.ast.parts(default) {
             let name = plain(part.span.text(self.source));
             let first = name.split(['.', '[']).next().unwrap_or_default();
-            if matches!(part.kind, Kind::Name)
-                && (is_sibling(first) || self.declared.contains(first))
-            {
+            if matches!(part.kind, Kind::Name) && is_known(first) {
                 let (label, record) = (&member.label, &class.path);
                 let message = format!("the default of `{label}` in `{record}` needs `{first}`");
                 return Err(Problem::new(part.span, message).hint(format!(
@@ -358,11 +338,8 @@ fn modified(source: &str, declaration: &Declaration, modification: &[Attribute])
 /// Adds attributes that are not given yet.
 fn inherit(source: &str, attributes: &mut Vec<Attribute>, from: &[Attribute]) {
     for attribute in from {
-        let name = attribute.name.text(source);
-        if attributes
-            .iter()
-            .all(|given| given.name.text(source) != name)
-        {
+        let is_other = |given: &Attribute| given.name.text(source) != attribute.name.text(source);
+        if attributes.iter().all(is_other) {
             attributes.push(attribute.clone());
         }
     }
@@ -433,36 +410,30 @@ impl Flattening<'_> {
             }
             let name = plain(expression.span.text(self.source));
             let first = name.split('.').next().unwrap_or_default();
-            for full in imported.get(first).into_iter().flatten() {
-                insert(&mut found, &format!("{full}{}", &name[first.len()..]));
+            let imported = imported.get(first).into_iter().flatten();
+            let mut names: Vec<String> = imported
+                .map(|full| format!("{full}{}", &name[first.len()..]))
+                .collect();
+            names.push(name.into_owned());
+            for name in &names {
+                // what encloses a name that is known is known as well
+                enclosing(name).all(|name| found.insert(name.to_owned()));
             }
-            insert(&mut found, &name);
         }
         found
     }
 }
 
-/// A name and the names before each of its dots.
-fn insert(names: &mut HashSet<String>, name: &str) {
-    let mut rest = Some(name);
-    while let Some(name) = rest {
-        if !names.insert(name.to_owned()) {
-            return;
-        }
-        rest = name.rsplit_once('.').map(|(above, _)| above);
-    }
+/// A name and the names before each of its dots, the longest first.
+fn enclosing(name: &str) -> impl Iterator<Item = &str> {
+    std::iter::successors(Some(name), |name| Some(name.rsplit_once('.')?.0))
 }
 
 /// Whether a name in full stands in the text as it is, or behind one of its dots.
 fn is_meant(names: &HashSet<String>, full: &str) -> bool {
-    let mut rest = full;
-    while let Some((_, below)) = rest.split_once('.') {
-        if names.contains(rest) {
-            return true;
-        }
-        rest = below;
-    }
-    false
+    let behind = std::iter::successors(Some(full), |name| Some(name.split_once('.')?.1));
+    let mut behind = behind.filter(|name| name.contains('.'));
+    behind.any(|name| names.contains(name))
 }
 
 /// The classes of a text by their names in full.
@@ -509,11 +480,8 @@ impl<'a> Classes<'a> {
         if !self.last.contains(last(name)) {
             return None;
         }
-        let candidates = self.full_names(name, scopes);
-        let mut found = candidates
-            .iter()
-            .map(|full| self.by_path.get(full.as_str()));
-        found.find_map(|place| place.copied())
+        let mut candidates = self.full_names(name, scopes).into_iter();
+        candidates.find_map(|full| self.by_path.get(full.as_str()).copied())
     }
 
     /// The ordinal of a literal of an enumeration.
@@ -521,34 +489,26 @@ impl<'a> Classes<'a> {
         if self.literals.is_empty() || !name.contains('.') {
             return None;
         }
-        let candidates = self.full_names(name, scopes);
-        candidates
-            .iter()
-            .find_map(|full| self.literals.get(full).copied())
+        let mut candidates = self.full_names(name, scopes).into_iter();
+        candidates.find_map(|full| self.literals.get(&full).copied())
     }
 
     /// What a name may be in full, nearest first.
     pub(crate) fn full_names(&self, name: &str, scopes: &[&str]) -> Vec<String> {
         let mut found = vec![];
-        let (first, rest) = match name.split_once('.') {
-            Some((first, rest)) => (first, Some(rest)),
-            None => (name, None),
-        };
-        for scope in scopes {
-            let mut around = Some(*scope).filter(|scope| !scope.is_empty());
-            while let Some(path) = around {
-                found.push(format!("{path}.{name}"));
-                for import in self.imports.get(path).copied().unwrap_or_default() {
-                    match &import.short {
-                        Some(short) if short == first => found.push(match rest {
-                            Some(rest) => format!("{}.{rest}", import.full),
-                            None => import.full.clone(),
-                        }),
-                        None => found.push(format!("{}.{name}", import.full)),
-                        _ => {}
+        let first = name.split('.').next().unwrap_or_default();
+        let behind = &name[first.len()..];
+        let scopes = scopes.iter().filter(|scope| !scope.is_empty());
+        for path in scopes.flat_map(|scope| enclosing(scope)) {
+            found.push(format!("{path}.{name}"));
+            for import in self.imports.get(path).copied().unwrap_or_default() {
+                match &import.short {
+                    Some(short) if short == first => {
+                        found.push(format!("{}{behind}", import.full));
                     }
+                    None => found.push(format!("{}.{name}", import.full)),
+                    _ => {}
                 }
-                around = path.rsplit_once('.').map(|(above, _)| above);
             }
         }
         found.push(name.to_owned());

@@ -27,28 +27,26 @@ pub(super) fn name_end(source: &str, start: usize) -> usize {
 /// The end of the comment that begins at `start`: `# …` to the end of the line, or `#= … =#`,
 /// which may hold further ones.
 pub(super) fn comment_end(source: &str, start: usize) -> Result<usize> {
-    let bytes = source.as_bytes();
-    let pair = |at: usize| (bytes.get(at), bytes.get(at + 1));
-    if pair(start) != (Some(&b'#'), Some(&b'=')) {
-        let rest = source.get(start..).unwrap_or_default();
+    let rest = source.get(start..).unwrap_or_default();
+    if !rest.starts_with("#=") {
         return Ok(start + rest.find('\n').unwrap_or(rest.len()));
     }
-    let (mut at, mut open) = (start + 2, 1usize);
+    let (mut at, mut open) = (2, 1usize);
     while open > 0 {
-        at += match pair(at) {
-            (Some(b'#'), Some(b'=')) => {
+        at += match rest.as_bytes().get(at..) {
+            Some([b'#', b'=', ..]) => {
                 open += 1;
                 2
             }
-            (Some(b'='), Some(b'#')) => {
+            Some([b'=', b'#', ..]) => {
                 open -= 1;
                 2
             }
-            (Some(_), _) => 1,
-            (None, _) => return Err(no_end("comment", start, "#=", "=#")),
+            Some([_, ..]) => 1,
+            _ => return Err(no_end("comment", start, "#=", "=#")),
         };
     }
-    Ok(at)
+    Ok(start + at)
 }
 
 const MACRO: &str = "@ODEmodel";
@@ -102,17 +100,10 @@ fn string_end(source: &str, start: usize) -> Result<usize> {
 
 /// The end of a character literal such as `'"'`; the quote alone where there is none.
 fn character_end(source: &str, start: usize) -> usize {
-    let mut characters = source
-        .get(start..)
-        .unwrap_or_default()
-        .char_indices()
-        .skip(1);
-    let escaped = characters
-        .next()
-        .is_some_and(|(_, character)| character == '\\');
-    let mut behind = characters.skip(usize::from(escaped));
-    match behind.next() {
-        Some((length, '\'')) => start + length + 1,
+    let inner = source.get(start + 1..).unwrap_or_default();
+    let escaped = usize::from(inner.starts_with('\\'));
+    match inner.char_indices().nth(1 + escaped) {
+        Some((length, '\'')) => start + 1 + length + 1,
         _ => start + 1,
     }
 }

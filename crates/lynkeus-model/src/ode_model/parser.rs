@@ -79,10 +79,8 @@ impl<'s> Language<'s> for ParsedModel<'s> {
 impl<'s> Parser<'s, ParsedModel<'s>> {
     /// The parenthesis behind `@ODEmodel`.
     fn opening(&mut self) -> Result<()> {
-        let rest = self
-            .source
-            .get(self.span.end as usize..)
-            .unwrap_or_default();
+        let rest = self.source.get(self.span.end as usize..);
+        let rest = rest.unwrap_or_default();
         if !rest.starts_with('(') {
             let problem = Problem::new(self.span, "expected `(` directly behind `@ODEmodel`");
             return Err(problem.hint("a model reads `@ODEmodel(x'(t) = …, y(t) = …)`"));
@@ -275,13 +273,9 @@ impl<'s> Parser<'s, ParsedModel<'s>> {
             if self.at("'") {
                 return Err(self.derivative(name));
             }
-        }
-        if is_function || !is_time {
-            let role = match is_function {
-                true => Role::Input,
-                false => Role::Parameter,
-            };
-            self.language.mentions.push((name, role));
+            self.language.mentions.push((name, Role::Input));
+        } else if !is_time {
+            self.language.mentions.push((name, Role::Parameter));
         }
         self.push_at(Kind::Name, name, first)
     }
@@ -297,10 +291,9 @@ impl<'s> Parser<'s, ParsedModel<'s>> {
         }
         self.expect(")")?;
         let call = Call {
-            named: vec![],
             function,
             arguments,
-            iterators: vec![],
+            ..Call::default()
         };
         self.push(Kind::Call(call), function, first)
     }

@@ -106,7 +106,7 @@ pub(crate) struct PathPart {
     pub subscripts: Vec<ExprId>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Call {
     pub function: Span,
     pub arguments: Vec<ExprId>,

@@ -52,8 +52,7 @@ impl Parser<'_> {
             self.class_body(&mut class)?;
             self.class_end(name)?;
         }
-        self.comment()?;
-        self.expect(";")?;
+        self.ending()?;
         self.ast.classes.push(class);
         Ok(())
     }
@@ -61,10 +60,7 @@ impl Parser<'_> {
     /// A name; compilers write those of inner classes in full.
     fn class_name(&mut self, what: &str) -> Result<Span> {
         let start = self.identifier(what)?;
-        while self.accept(".")? {
-            self.identifier("a name after `.`")?;
-        }
-        Ok(start.to(self.last))
+        self.members(start)
     }
 
     fn path(&self, around: &str, name: Span) -> Result<String> {
@@ -81,10 +77,11 @@ impl Parser<'_> {
 
     /// The kind of class that begins here; the words before it are read.
     fn class_kind(&mut self) -> Result<ClassKind> {
-        while let Token::Fixed(word @ ("expandable" | "operator" | "pure" | "impure")) = self.token
-        {
+        const BEFORE: [&str; 4] = ["expandable", "operator", "pure", "impure"];
+        while BEFORE.iter().any(|word| self.at(word)) {
+            let is_operator = self.at("operator");
             self.advance()?;
-            if word == "operator" && self.token == Token::Identifier {
+            if is_operator && self.token == Token::Identifier {
                 return Err(self.refuse("an operator", "write the formula where it is used"));
             }
         }
@@ -198,16 +195,13 @@ impl Parser<'_> {
                 value: None,
                 nested,
             });
-            self.comment()?;
-            return self.expect(";").map(|_| ());
+            return self.ending();
         }
         if self.accept("import")? {
             let import = self.import()?;
             if class.imports.len() >= MAX_IMPORTS {
-                let message = format!(
-                    "a class with more than {} imports",
-                    grouped(MAX_IMPORTS as u64)
-                );
+                let limit = grouped(MAX_IMPORTS as u64);
+                let message = format!("a class with more than {limit} imports");
                 return Err(Problem::new(self.last, message).hint("write names in full"));
             }
             class.imports.push(import);
@@ -229,27 +223,20 @@ impl Parser<'_> {
             let problem = Problem::new(start, "an import of several names is not supported");
             return Err(problem.hint("write one `import` for each"));
         }
-        self.comment()?;
-        self.expect(";")?;
+        self.ending()?;
         if short.is_none() && !whole {
-            let last = full.rsplit('.').next().unwrap_or_default();
-            short = Some(last.to_owned());
+            short = full.rsplit('.').next().map(str::to_owned);
         }
         Ok(Import { short, full })
     }
 
     /// A name that ends before `.{` and before `.*`.
     fn dotted_import(&mut self) -> Result<String> {
-        let mut name = plain(self.identifier("a name")?.text(self.source)).into_owned();
-        while self.accept(".")? {
-            if self.at("{") {
-                break;
-            }
-            let part = self.identifier("a name after `.`")?;
-            name.push('.');
-            name.push_str(&plain(part.text(self.source)));
+        let start = self.identifier("a name")?;
+        while self.accept(".")? && !self.at("{") {
+            self.identifier("a name after `.`")?;
         }
-        Ok(name)
+        Ok(plain(start.to(self.last).text(self.source)).into_owned())
     }
 
     fn skip_to_semicolon(&mut self) -> Result<()> {
@@ -278,26 +265,24 @@ impl Parser<'_> {
     }
 
     fn refuse_unsupported_element(&self) -> Result<()> {
-        let (what, hint) = match self.token {
-            Token::Identifier
-            | Token::Fixed(
-                "." | "final" | "parameter" | "constant" | "input" | "output" | "flow" | "stream"
-                | "enumeration",
-            ) => return Ok(()),
-            Token::Fixed("discrete") => (
-                "a `discrete` variable",
-                "only continuous variables are supported",
-            ),
-            Token::Fixed("inner" | "outer") => ("`inner`/`outer`", HOW_TO_FLATTEN),
-            Token::Fixed("redeclare" | "replaceable") => ("a replaceable element", HOW_TO_FLATTEN),
-            Token::Fixed(word @ ("connect" | "when" | "if" | "for")) => {
-                let found = format!("expected a declaration, found `{word}`");
-                return Err(Problem::new(self.span, found)
-                    .hint("equations follow after the word `equation`"));
+        const TAKEN: &str = ". final parameter constant input output flow stream enumeration";
+        Err(match self.token {
+            Token::Identifier => return Ok(()),
+            Token::Fixed(word) if TAKEN.split(' ').any(|taken| taken == word) => return Ok(()),
+            Token::Fixed("discrete") => {
+                let hint = "only continuous variables are supported";
+                self.refuse("a `discrete` variable", hint)
             }
-            _ => return Err(self.unexpected("a declaration, `equation` or `end`")),
-        };
-        Err(self.refuse(what, hint))
+            Token::Fixed("inner" | "outer") => self.refuse("`inner`/`outer`", HOW_TO_FLATTEN),
+            Token::Fixed("redeclare" | "replaceable") => {
+                self.refuse("a replaceable element", HOW_TO_FLATTEN)
+            }
+            Token::Fixed("connect" | "when" | "if" | "for") => {
+                let problem = self.unexpected("a declaration");
+                problem.hint("equations follow after the word `equation`")
+            }
+            _ => self.unexpected("a declaration, `equation` or `end`"),
+        })
     }
 
     /// `parameter`, `input`, `flow` and their like, and the type.
@@ -377,14 +362,11 @@ impl Parser<'_> {
     fn variable_name(&mut self) -> Result<Span> {
         let start = self.identifier("the name of a variable")?;
         loop {
-            if self.at(".") {
-                self.advance()?;
-                self.identifier("a name after `.`")?;
-            } else if self.at("[") && self.is_inner_subscript() {
-                self.subscripts()?;
-            } else {
-                return Ok(start.to(self.last));
+            let name = self.members(start)?;
+            if !self.at("[") || !self.is_inner_subscript() {
+                return Ok(name);
             }
+            self.subscripts()?;
         }
     }
 

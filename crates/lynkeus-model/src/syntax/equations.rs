@@ -1,6 +1,8 @@
 //! What stands in the sections `equation` and `algorithm`.
 
-use super::ast::{Assert, Equation, EquationKind, ExprId, ForIndex, Statement, StatementKind};
+use super::ast::{
+    Assert, Equation, EquationKind, ExprId, ForIndex, Placed, Statement, StatementKind,
+};
 use super::classes::HOW_TO_FLATTEN;
 use super::lexer::Token;
 use super::parser::Parser;
@@ -8,37 +10,32 @@ use super::unquoted;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_ITERATORS;
 
-/// Conditions with what holds under them, and what holds under none.
-type Cases<T> = (Vec<(ExprId, Vec<T>)>, Vec<T>);
-
 const NO_EVENTS: &str = "an observer needs continuous equations: use `if` expressions";
 const WHERE_DECLARATIONS_STAND: &str =
     "declarations come before the word `equation`, or after `public`";
 
 impl Parser<'_> {
     pub(super) fn equation(&mut self) -> Result<Equation> {
-        self.nested(|parser| parser.equation_here())
+        self.placed(|parser| {
+            parser.refuse_unsupported_equation()?;
+            match parser.token {
+                Token::Fixed("for") => parser.repeated(Self::equation, EquationKind::For),
+                Token::Fixed("if") => parser.branches(Self::equation, EquationKind::If),
+                _ => parser.equality(),
+            }
+        })
     }
 
-    fn equation_here(&mut self) -> Result<Equation> {
-        self.count(2)?;
-        let start = self.span;
-        self.refuse_unsupported_equation()?;
-        let kind = match self.token {
-            Token::Fixed("for") => {
-                let (iterators, body) = self.repeated(Self::equation)?;
-                EquationKind::For(iterators, body)
-            }
-            Token::Fixed("if") => {
-                let (branches, otherwise) = self.branches(Self::equation)?;
-                EquationKind::If(branches, otherwise)
-            }
-            _ => self.equality()?,
-        };
-        let span = start.to(self.last);
-        self.comment()?;
-        self.expect(";")?;
-        Ok(Equation { kind, span })
+    /// An equation or a statement up to its semicolon.
+    fn placed<K>(&mut self, kind: impl FnOnce(&mut Self) -> Result<K>) -> Result<Placed<K>> {
+        self.nested(|parser| {
+            parser.count(2)?;
+            let start = parser.span;
+            let kind = kind(parser)?;
+            let span = start.to(parser.last);
+            parser.ending()?;
+            Ok(Placed { kind, span })
+        })
     }
 
     fn refuse_unsupported_equation(&self) -> Result<()> {
@@ -49,9 +46,10 @@ impl Parser<'_> {
                 let message = "the model is not flat: it has `connect`";
                 Problem::new(self.span, message).hint(HOW_TO_FLATTEN)
             }
-            Token::Fixed("parameter" | "constant" | "input" | "output") => self
-                .unexpected("an equation")
-                .hint(WHERE_DECLARATIONS_STAND),
+            Token::Fixed("parameter" | "constant" | "input" | "output") => {
+                let problem = self.unexpected("an equation");
+                problem.hint(WHERE_DECLARATIONS_STAND)
+            }
             _ => return Ok(()),
         })
     }
@@ -72,8 +70,8 @@ impl Parser<'_> {
         }
         let text = start.text(self.source);
         if matches!(text, "Real" | "Integer") && self.token == Token::Identifier {
-            return Err(Problem::new(start, "a declaration among the equations")
-                .hint(WHERE_DECLARATIONS_STAND));
+            let problem = Problem::new(start, "a declaration among the equations");
+            return Err(problem.hint(WHERE_DECLARATIONS_STAND));
         }
         if matches!(text, "terminate" | "reinit") {
             return Err(Problem::new(start, format!("`{text}` is not supported"))
@@ -123,7 +121,11 @@ impl Parser<'_> {
     }
 
     /// Equations or statements behind `if`.
-    fn branches<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<Cases<T>> {
+    fn branches<T, K>(
+        &mut self,
+        one: fn(&mut Self) -> Result<T>,
+        kind: fn(Vec<(ExprId, Vec<T>)>, Vec<T>) -> K,
+    ) -> Result<K> {
         self.advance()?;
         let branches = self.cases(|parser| parser.until_end(one))?;
         let mut otherwise = vec![];
@@ -131,17 +133,26 @@ impl Parser<'_> {
             otherwise = self.until_end(one)?;
         }
         self.end_of("if")?;
-        Ok((branches, otherwise))
+        Ok(kind(branches, otherwise))
     }
 
-    /// The iterators and the body of a loop, behind `for`.
-    fn repeated<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<(Vec<ForIndex>, Vec<T>)> {
+    /// Equations or statements behind `for`.
+    fn repeated<T, K>(
+        &mut self,
+        one: fn(&mut Self) -> Result<T>,
+        kind: fn(Vec<ForIndex>, Vec<T>) -> K,
+    ) -> Result<K> {
         self.advance()?;
         let iterators = self.iterators()?;
+        Ok(kind(iterators, self.looped("for", one)?))
+    }
+
+    /// What stands between `loop` and its end.
+    fn looped<T>(&mut self, of: &'static str, one: fn(&mut Self) -> Result<T>) -> Result<Vec<T>> {
         self.expect("loop")?;
         let body = self.until_end(one)?;
-        self.end_of("for")?;
-        Ok((iterators, body))
+        self.end_of(of)?;
+        Ok(body)
     }
 
     /// Equations or statements up to `end` or `else`.
@@ -174,10 +185,8 @@ impl Parser<'_> {
         loop {
             let name = self.identifier("the name of an iterator")?;
             if iterators.len() >= MAX_ITERATORS {
-                return Err(Problem::new(
-                    name,
-                    format!("more than {MAX_ITERATORS} iterators"),
-                ));
+                let message = format!("more than {MAX_ITERATORS} iterators");
+                return Err(Problem::new(name, message));
             }
             self.refuse_repeated(&iterators, name)?;
             if !self.at("in") {
@@ -195,14 +204,10 @@ impl Parser<'_> {
 
     fn refuse_repeated(&self, iterators: &[ForIndex], name: Span) -> Result<()> {
         let text = name.text(self.source);
-        if iterators
-            .iter()
-            .any(|other| other.name.text(self.source) == text)
-        {
-            return Err(Problem::new(
-                name,
-                format!("iterator `{text}` is used twice"),
-            ));
+        let mut names = iterators.iter().map(|other| other.name.text(self.source));
+        if names.any(|other| other == text) {
+            let message = format!("iterator `{text}` is used twice");
+            return Err(Problem::new(name, message));
         }
         Ok(())
     }
@@ -210,46 +215,20 @@ impl Parser<'_> {
 
 impl Parser<'_> {
     pub(super) fn statement(&mut self) -> Result<Statement> {
-        self.nested(|parser| parser.statement_here())
-    }
-
-    fn statement_here(&mut self) -> Result<Statement> {
-        self.count(2)?;
-        let start = self.span;
-        let kind = match self.token {
-            Token::Fixed("for") => {
-                let (iterators, body) = self.repeated(Self::statement)?;
-                StatementKind::For(iterators, body)
-            }
+        self.placed(|parser| match parser.token {
+            Token::Fixed("for") => parser.repeated(Self::statement, StatementKind::For),
             Token::Fixed("while") => {
-                self.advance()?;
-                let condition = self.expression()?;
-                self.expect("loop")?;
-                let body = self.until_end(Self::statement)?;
-                self.end_of("while")?;
-                StatementKind::While(condition, body)
+                parser.advance()?;
+                let condition = parser.expression()?;
+                let body = parser.looped("while", Self::statement)?;
+                Ok(StatementKind::While(condition, body))
             }
-            Token::Fixed("if") => {
-                let (branches, otherwise) = self.branches(Self::statement)?;
-                StatementKind::If(branches, otherwise)
-            }
-            Token::Fixed("break") => {
-                self.advance()?;
-                StatementKind::Break
-            }
-            Token::Fixed("return") => {
-                self.advance()?;
-                StatementKind::Return
-            }
-            Token::Fixed("when") => {
-                return Err(self.refuse("a `when` statement", NO_EVENTS));
-            }
-            _ => self.assignment()?,
-        };
-        let span = start.to(self.last);
-        self.comment()?;
-        self.expect(";")?;
-        Ok(Statement { kind, span })
+            Token::Fixed("if") => parser.branches(Self::statement, StatementKind::If),
+            Token::Fixed("break") => parser.advance().map(|_| StatementKind::Break),
+            Token::Fixed("return") => parser.advance().map(|_| StatementKind::Return),
+            Token::Fixed("when") => Err(parser.refuse("a `when` statement", NO_EVENTS)),
+            _ => parser.assignment(),
+        })
     }
 
     fn assignment(&mut self) -> Result<StatementKind> {

@@ -53,10 +53,9 @@ impl Parser<'_> {
     fn range(&mut self) -> Result<ExprId> {
         let (start, first) = (self.span, self.next_id());
         let low = self.operators(OR)?;
-        if !self.at(":") {
+        if !self.accept(":")? {
             return Ok(low);
         }
-        self.advance()?;
         let second = self.operators(OR)?;
         if !self.accept(":")? {
             return self.push(Kind::Range(low, None, second), start, first);
@@ -68,11 +67,10 @@ impl Parser<'_> {
     fn if_expression(&mut self) -> Result<ExprId> {
         let (start, first) = (self.advance()?, self.next_id());
         let branches = self.cases(Self::expression)?;
-        if !self.at("else") {
+        if !self.accept("else")? {
             let problem = self.unexpected("`else`");
             return Err(problem.hint("an `if` expression has a value in every case"));
         }
-        self.advance()?;
         let otherwise = self.expression()?;
         self.push(Kind::If(branches, otherwise), start, first)
     }
@@ -126,9 +124,7 @@ impl Parser<'_> {
             Token::Fixed("(") => return self.parenthesised(),
             Token::Fixed("{") => return self.braces(),
             Token::Fixed("[") => return self.matrix(),
-            Token::Identifier | Token::Fixed(".") | Token::Fixed("der") => {
-                return self.reference();
-            }
+            Token::Identifier | Token::Fixed("." | "der") => return self.reference(),
             Token::Fixed("initial") => {
                 return Err(self.refuse("`initial()`", "use `time` or a parameter"));
             }
@@ -150,10 +146,8 @@ impl Parser<'_> {
         self.advance()?;
         let inner = self.expression()?;
         if self.at(",") {
-            return Err(self.refuse(
-                "a list in parentheses",
-                "write one equation for each component",
-            ));
+            let hint = "write one equation for each component";
+            return Err(self.refuse("a list in parentheses", hint));
         }
         self.expect(")")?;
         if self.at("[") {
@@ -167,9 +161,8 @@ impl Parser<'_> {
     fn braces(&mut self) -> Result<ExprId> {
         let (start, first) = (self.advance()?, self.next_id());
         if self.at("}") {
-            return Err(self
-                .unexpected("an element")
-                .hint("for no elements write `zeros(0)`"));
+            let problem = self.unexpected("an element");
+            return Err(problem.hint("for no elements write `zeros(0)`"));
         }
         let elements = self.list(Self::expression)?;
         if elements.len() == 1 && self.accept("for")? {
@@ -245,13 +238,18 @@ impl Parser<'_> {
 
     pub(super) fn dotted_name(&mut self) -> Result<Span> {
         let start = self.span;
-        if !self.accept("der")? {
-            self.accept(".")?;
-            self.identifier("a name")?;
-            while self.at(".") {
-                self.advance()?;
-                self.identifier("a name after `.`")?;
-            }
+        if self.accept("der")? {
+            return Ok(start);
+        }
+        self.accept(".")?;
+        self.identifier("a name")?;
+        self.members(start)
+    }
+
+    /// `.b.c`, where it stands here; the whole name that begins at `start`.
+    pub(super) fn members(&mut self, start: Span) -> Result<Span> {
+        while self.accept(".")? {
+            self.identifier("a name after `.`")?;
         }
         Ok(start.to(self.last))
     }
@@ -261,9 +259,7 @@ impl Parser<'_> {
         self.advance()?;
         let mut call = Call {
             function,
-            arguments: vec![],
-            named: vec![],
-            iterators: vec![],
+            ..Call::default()
         };
         while !self.at(")") {
             let argument = self.expression()?;

@@ -273,11 +273,6 @@ pub(crate) fn plain(text: &str) -> Cow<'_, str> {
     if text.bytes().all(is_plain) {
         return Cow::Borrowed(text);
     }
-    if let Some(inner) = text.strip_prefix('\'').and_then(|t| t.strip_suffix('\''))
-        && !inner.contains('\'')
-    {
-        return Cow::Borrowed(inner);
-    }
     Cow::Owned(without_quotes(text))
 }
 

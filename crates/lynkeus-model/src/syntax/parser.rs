@@ -154,11 +154,9 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
             return self.unexpected("`;`");
         }
         let end = self.last.end as usize;
-        Problem::new(
-            Span::new(end.saturating_sub(1), end),
-            "expected `;` after this",
-        )
-        .hint("every declaration and every equation ends with `;`")
+        let place = Span::new(end.saturating_sub(1), end);
+        Problem::new(place, "expected `;` after this")
+            .hint("every declaration and every equation ends with `;`")
     }
 
     /// "expected …, found …" at the current token.
@@ -306,26 +304,24 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
 }
 
 impl Parser<'_> {
+    /// So many tokens behind the current one.
+    fn ahead(&self, count: usize) -> impl Iterator<Item = Token> {
+        let mut lexer = self.language.clone();
+        let tokens = std::iter::from_fn(move || Some(lexer.token().ok()?.0));
+        tokens.take(count).take_while(|token| *token != Token::End)
+    }
+
     /// At an opening parenthesis: true where a comma stands between it and the one that closes
     /// it, outside of other brackets. Looks at a line's worth of tokens at most.
     pub(super) fn is_list(&self) -> bool {
-        const AHEAD: usize = 400;
-        let mut lexer = self.language.clone();
         let mut open = 1usize;
-        for _ in 0..AHEAD {
-            match lexer.token() {
-                Ok((Token::Fixed(","), _)) if open == 1 => return true,
-                Ok((Token::Fixed(text), _)) => match text {
-                    "(" | "[" | "{" => open += 1,
-                    ")" | "]" | "}" => open -= 1,
-                    ";" => return false,
-                    _ => {}
-                },
-                Ok((Token::End, _)) | Err(_) => return false,
+        for token in self.ahead(400) {
+            match token {
+                Token::Fixed(",") if open == 1 => return true,
+                Token::Fixed("(" | "[" | "{") => open += 1,
+                Token::Fixed(")" | "]" | "}") if open > 1 => open -= 1,
+                Token::Fixed(")" | "]" | "}" | ";") => return false,
                 _ => {}
-            }
-            if open == 0 {
-                return false;
             }
         }
         false
@@ -333,18 +329,10 @@ impl Parser<'_> {
 
     /// At an opening bracket: true where a dot follows the one that closes it.
     pub(super) fn is_inner_subscript(&self) -> bool {
-        const AHEAD: usize = 40;
-        let mut lexer = self.language.clone();
-        for _ in 0..AHEAD {
-            match lexer.token() {
-                Ok((Token::Fixed("]"), _)) => {
-                    return matches!(lexer.token(), Ok((Token::Fixed("."), _)));
-                }
-                Ok((Token::End, _)) | Err(_) => return false,
-                _ => {}
-            }
-        }
-        false
+        let mut behind = self
+            .ahead(41)
+            .skip_while(|token| *token != Token::Fixed("]"));
+        behind.nth(1) == Some(Token::Fixed("."))
     }
 
     /// "… is not supported" at the current token.
@@ -357,15 +345,12 @@ impl Parser<'_> {
         if self.token != Token::Text {
             return Ok(None);
         }
-        let mut text = unquoted(self.span.text(self.source));
-        self.advance()?;
-        while self.at("+") {
-            self.advance()?;
+        let mut text = unquoted(self.advance()?.text(self.source));
+        while self.accept("+")? {
             if self.token != Token::Text {
                 return Err(self.unexpected("a string"));
             }
-            text.push_str(&unquoted(self.span.text(self.source)));
-            self.advance()?;
+            text.push_str(&unquoted(self.advance()?.text(self.source)));
         }
         Ok(Some(text))
     }
@@ -377,6 +362,12 @@ impl Parser<'_> {
             self.annotation()?;
         }
         Ok(description)
+    }
+
+    /// The comment behind something, and its semicolon.
+    pub(super) fn ending(&mut self) -> Result<()> {
+        self.comment()?;
+        self.expect(";").map(|_| ())
     }
 
     /// `annotation(…)`: skipped by counting brackets.
