@@ -185,12 +185,12 @@ impl Evaluator<'_> {
         left: Scalar,
         right: Scalar,
         span: Span,
-    ) -> Result<Scalar> {
+    ) -> Result<Node> {
         let (left, right) = match (left, right) {
             (Scalar::Boolean(a), Scalar::Boolean(b)) => (a, b),
             _ => (self.real(left, span)?, self.real(right, span)?),
         };
-        let node = match relation {
+        Ok(match relation {
             Relation::Less => self.graph.binary(Binary::Less, left, right),
             Relation::LessEqual => self.graph.binary(Binary::LessEq, left, right),
             Relation::Greater => self.graph.binary(Binary::Less, right, left),
@@ -200,8 +200,7 @@ impl Evaluator<'_> {
                 let equal = self.graph.binary(Binary::Equal, left, right);
                 self.graph.unary(Unary::Not, equal)
             }
-        };
-        Ok(Scalar::Boolean(node))
+        })
     }
 
     pub(super) fn select(

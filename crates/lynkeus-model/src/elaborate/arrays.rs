@@ -252,10 +252,9 @@ impl<'a> Evaluator<'a> {
     fn dims_of(&mut self, argument: ExprId) -> Result<Vec<usize>> {
         if matches!(self.ast.expression(argument).kind, Kind::Name) {
             let name = plain(self.text(self.span(argument)));
-            let known = match self.local(&name) {
-                Some(local) => local.ok().map(|local| local.dims.as_slice()),
-                None => self.symbols.dims(&name),
-            };
+            let declared = || self.symbols.dims(&name).filter(|_| !self.is_closed());
+            let local = self.local(&name).map(|local| local.dims.as_slice());
+            let known = local.or_else(declared);
             if let Some(dims) = known.filter(|_| self.iterator(&name).is_none()) {
                 return Ok(dims.to_vec());
             }
@@ -470,11 +469,11 @@ impl<'a> Evaluator<'a> {
         name: Span,
         span: Span,
     ) -> Result<Value> {
-        if let Some(Ok(local)) = self.local(text) {
+        if let Some(local) = self.local(text) {
             let dims = local.dims.clone();
             let (dims, offsets) = self.selected(text, &dims, subscripts, span)?;
-            let local = self.local(text).and_then(std::result::Result::ok);
-            let element = |&offset: &usize| local?.elements.get(offset).copied()?;
+            let local = self.local(text);
+            let element = |&offset: &usize| local?.elements[offset];
             let elements: Option<Vec<Scalar>> = offsets.iter().map(element).collect();
             let elements = elements.ok_or_else(|| self.unassigned(text, name))?;
             return Ok(Value { dims, elements });
@@ -494,14 +493,11 @@ impl<'a> Evaluator<'a> {
         name: Span,
         subscripts: &[ExprId],
     ) -> Result<Value> {
-        let mut numbers = vec![];
-        for &subscript in subscripts {
-            if matches!(self.ast.expression(subscript).kind, Kind::All | Kind::End) {
-                return Err(self.unknown_name(name));
-            }
-            numbers.push(self.known_integer(subscript, "a subscript")?.to_string());
+        let is_open = |&id: &ExprId| matches!(self.ast.expression(id).kind, Kind::All | Kind::End);
+        if subscripts.iter().any(is_open) {
+            return Err(self.unknown_name(name));
         }
-        let full = format!("{text}[{}]", numbers.join(","));
+        let full = format!("{text}[{}]", self.numbers(subscripts)?);
         self.meant(self.named(&full), name)
     }
 

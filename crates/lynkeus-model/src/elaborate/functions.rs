@@ -345,9 +345,7 @@ impl<'a> Evaluator<'a> {
         let x = self.scalar(x)?;
         let (above, below) = (self.scalar(above)?, self.scalar(below)?);
         let zero = Scalar::Integer(0);
-        let Scalar::Boolean(positive) = self.compare(Relation::GreaterEqual, x, zero, span)? else {
-            return Err(Problem::new(span, "expected a number"));
-        };
+        let positive = self.compare(Relation::GreaterEqual, x, zero, span)?;
         let slope = self.select(positive, above, below, span)?;
         let product = self.scalar_binary(BinaryOperator::Multiply, slope, x, span)?;
         Ok(product.into())

@@ -1,7 +1,7 @@
 //! What names mean where an expression stands: in a model, and in a function or an algorithm whose
 //! statements are carried out.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use lynkeus_expr::{Graph, Node};
 
@@ -33,7 +33,7 @@ pub(crate) enum Named<'a> {
 /// What the statements have given values to so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Frame {
-    pub locals: HashMap<String, Local>,
+    pub locals: BTreeMap<String, Local>,
     /// names of the members of its records
     pub records: HashMap<String, Vec<String>>,
     /// names outside of it are constants only
