@@ -186,10 +186,8 @@ impl Evaluator<'_> {
         right: Scalar,
         span: Span,
     ) -> Result<Node> {
-        let (left, right) = match (left, right) {
-            (Scalar::Boolean(a), Scalar::Boolean(b)) => (a, b),
-            _ => (self.real(left, span)?, self.real(right, span)?),
-        };
+        let sides = left.with(right, self.graph);
+        let (left, right) = sides.ok_or_else(|| expected_number(span))?;
         Ok(match relation {
             Relation::Less => self.graph.binary(Binary::Less, left, right),
             Relation::LessEqual => self.graph.binary(Binary::LessEq, left, right),
@@ -201,20 +199,6 @@ impl Evaluator<'_> {
                 self.graph.unary(Unary::Not, equal)
             }
         })
-    }
-
-    pub(super) fn select(
-        &self,
-        condition: Node,
-        left: Scalar,
-        right: Scalar,
-        span: Span,
-    ) -> Result<Scalar> {
-        if let (Scalar::Boolean(a), Scalar::Boolean(b)) = (left, right) {
-            return Ok(Scalar::Boolean(self.graph.select(condition, a, b)));
-        }
-        let (left, right) = (self.real(left, span)?, self.real(right, span)?);
-        Ok(Scalar::Real(self.graph.select(condition, left, right)))
     }
 
     /// Scalar product, or product of matrices and vectors.

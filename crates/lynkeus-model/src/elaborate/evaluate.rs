@@ -4,7 +4,7 @@ use lynkeus_expr::{Graph, Node, Unary};
 
 use super::scope::{Frame, Local, Mode, Named};
 use super::symbols::Symbols;
-use super::value::{Scalar, Value, describe_dims, unequal_sizes};
+use super::value::{Scalar, Value, describe_dims, expected_number, unequal_sizes};
 use crate::Assertion;
 use crate::balance::FlatEquation;
 use crate::diagnostic::{Problem, Result, Span};
@@ -166,6 +166,16 @@ impl<'a> Evaluator<'a> {
         value
     }
 
+    /// The value of an expression; `None` where it needs a parameter without value and these are
+    /// allowed.
+    pub(super) fn value_if_known(&mut self, id: ExprId) -> Result<Option<Value>> {
+        match self.value(id) {
+            Ok(value) => Ok(Some(value)),
+            Err(_) if self.valueless && self.symbols.options.symbolic_parameters => Ok(None),
+            Err(problem) => Err(problem),
+        }
+    }
+
     /// An Integer that must be known; `what` names it in the refusal.
     pub(super) fn known_integer(&mut self, id: ExprId, what: &str) -> Result<i64> {
         let value = self.structural(id)?;
@@ -277,7 +287,10 @@ impl<'a> Evaluator<'a> {
             if yes.dims != no.dims {
                 return Err(unequal_sizes(&yes.dims, &no.dims, span));
             }
-            let select = |evaluator: &Self, a, b, span| evaluator.select(condition, a, b, span);
+            let select = |evaluator: &Self, a: Scalar, b, span| {
+                let chosen = a.select(condition, b, evaluator.graph);
+                chosen.ok_or_else(|| expected_number(span))
+            };
             Ok((evaluator.elementwise(yes, no, span, select)?, span))
         };
         let chosen = self.chosen(branches.iter().copied(), otherwise, take, join);

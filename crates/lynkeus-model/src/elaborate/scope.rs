@@ -118,12 +118,8 @@ impl Frame {
 
 fn either(condition: Node, a: Option<Scalar>, b: Option<Scalar>, graph: &Graph) -> Option<Scalar> {
     let (a, b) = (a?, b?);
-    if a == b {
-        return Some(a);
+    match a == b {
+        true => Some(a),
+        false => a.select(condition, b, graph),
     }
-    if let (Scalar::Boolean(a), Scalar::Boolean(b)) = (a, b) {
-        return Some(Scalar::Boolean(graph.select(condition, a, b)));
-    }
-    let (a, b) = (a.real(graph)?, b.real(graph)?);
-    Some(Scalar::Real(graph.select(condition, a, b)))
 }
