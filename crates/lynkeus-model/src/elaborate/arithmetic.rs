@@ -185,12 +185,10 @@ impl Evaluator<'_> {
         left: Scalar,
         right: Scalar,
         span: Span,
-    ) -> Result<Scalar> {
-        let (left, right) = match (left, right) {
-            (Scalar::Boolean(a), Scalar::Boolean(b)) => (a, b),
-            _ => (self.real(left, span)?, self.real(right, span)?),
-        };
-        let node = match relation {
+    ) -> Result<Node> {
+        let sides = left.with(right, self.graph);
+        let (left, right) = sides.ok_or_else(|| expected_number(span))?;
+        Ok(match relation {
             Relation::Less => self.graph.binary(Binary::Less, left, right),
             Relation::LessEqual => self.graph.binary(Binary::LessEq, left, right),
             Relation::Greater => self.graph.binary(Binary::Less, right, left),
@@ -200,22 +198,7 @@ impl Evaluator<'_> {
                 let equal = self.graph.binary(Binary::Equal, left, right);
                 self.graph.unary(Unary::Not, equal)
             }
-        };
-        Ok(Scalar::Boolean(node))
-    }
-
-    pub(super) fn select(
-        &self,
-        condition: Node,
-        left: Scalar,
-        right: Scalar,
-        span: Span,
-    ) -> Result<Scalar> {
-        if let (Scalar::Boolean(a), Scalar::Boolean(b)) = (left, right) {
-            return Ok(Scalar::Boolean(self.graph.select(condition, a, b)));
-        }
-        let (left, right) = (self.real(left, span)?, self.real(right, span)?);
-        Ok(Scalar::Real(self.graph.select(condition, left, right)))
+        })
     }
 
     /// Scalar product, or product of matrices and vectors.

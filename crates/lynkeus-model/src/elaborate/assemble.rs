@@ -55,8 +55,7 @@ pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec
     }
     let mut warnings = fix_starts(symbols, &flat, &solution, &mut plant.states);
     let found = assertions(graph, flat.claims, &solution);
-    let variables: Vec<&Variable> = plant.states.iter().chain(&plant.inputs).collect();
-    warnings.extend(failing_at_start(symbols, &found, &variables));
+    warnings.extend(failing_at_start(symbols, &found, &plant));
     plant.table_points = symbols.table_points.take();
     plant.assertions = found.into_iter().map(|(assertion, _)| assertion).collect();
     Ok((plant, warnings))
@@ -214,10 +213,8 @@ fn elements(
     for attribute in &declaration.attributes {
         let name = attribute.name.text(symbols.source);
         if given.contains(&name) {
-            return Err(Problem::new(
-                attribute.name,
-                "this attribute is given twice",
-            ));
+            let message = "this attribute is given twice";
+            return Err(Problem::new(attribute.name, message));
         }
         given.push(name);
         set(symbols, declaration, component, attribute, &mut elements)?;
@@ -320,10 +317,8 @@ fn numbers(
     let is_boolean = declaration.prefix.type_name == TypeName::Boolean;
     let mut evaluator = Evaluator::new(symbols, Mode::Structural);
     let span = evaluator.span(id);
-    let value = match evaluator.value(id) {
-        Ok(value) => value,
-        Err(_) if evaluator.valueless && symbols.options.symbolic_parameters => return Ok(vec![]),
-        Err(problem) => return Err(problem),
+    let Some(value) = evaluator.value_if_known(id)? else {
+        return Ok(vec![]);
     };
     let graph = symbols.graph;
     let number = |&scalar: &Scalar| {
@@ -474,15 +469,12 @@ fn assertions(
 fn failing_at_start(
     symbols: &Symbols<'_>,
     assertions: &[(Assertion, Span)],
-    variables: &[&Variable],
+    plant: &Plant,
 ) -> Vec<Problem> {
     let mut known = symbols.parameter_values();
     known.insert(symbols.time(), Some(0.0));
-    known.extend(
-        variables
-            .iter()
-            .map(|variable| (variable.node, variable.start)),
-    );
+    let variables = plant.states.iter().chain(&plant.inputs);
+    known.extend(variables.map(|variable| (variable.node, variable.start)));
     let fails = |assertion: &Assertion| {
         let value = |symbol| known.get(&symbol).copied()?;
         computed(symbols.graph, assertion.condition, value) == Some(0.0)

@@ -6,7 +6,7 @@ use lynkeus_expr::{Binary, Expr, Node, Unary};
 use super::arithmetic::overflow;
 use super::arrays::{matrix_dims, scalar_dims, vector_dims};
 use super::evaluate::Evaluator;
-use super::value::{Scalar, Value};
+use super::value::{Scalar, Value, expected_number};
 use crate::balance::total_derivative;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::names::did_you_mean;
@@ -345,10 +345,9 @@ impl<'a> Evaluator<'a> {
         let x = self.scalar(x)?;
         let (above, below) = (self.scalar(above)?, self.scalar(below)?);
         let zero = Scalar::Integer(0);
-        let Scalar::Boolean(positive) = self.compare(Relation::GreaterEqual, x, zero, span)? else {
-            return Err(Problem::new(span, "expected a number"));
-        };
-        let slope = self.select(positive, above, below, span)?;
+        let positive = self.compare(Relation::GreaterEqual, x, zero, span)?;
+        let slope = above.select(positive, below, self.graph);
+        let slope = slope.ok_or_else(|| expected_number(span))?;
         let product = self.scalar_binary(BinaryOperator::Multiply, slope, x, span)?;
         Ok(product.into())
     }
@@ -357,10 +356,8 @@ impl<'a> Evaluator<'a> {
     pub(super) fn cross(&mut self, call: &'a Call, span: Span) -> Result<Value> {
         let (a, b) = self.two_arguments(call)?;
         let ([a1, a2, a3], [b1, b2, b3]) = (&a.elements[..], &b.elements[..]) else {
-            return Err(Problem::new(
-                span,
-                "`cross` takes two vectors of three elements",
-            ));
+            let message = "`cross` takes two vectors of three elements";
+            return Err(Problem::new(span, message));
         };
         let term = |p: &Scalar, q: &Scalar, r: &Scalar, s: &Scalar| {
             let first = self.scalar_binary(BinaryOperator::Multiply, *p, *q, span)?;

@@ -23,6 +23,24 @@ impl Scalar {
         }
     }
 
+    /// Both as expressions, of Booleans those of their truth; `None` of a Boolean and a number.
+    pub(crate) fn with(self, other: Self, graph: &Graph) -> Option<(Node, Node)> {
+        match (self, other) {
+            (Scalar::Boolean(a), Scalar::Boolean(b)) => Some((a, b)),
+            _ => Some((self.real(graph)?, other.real(graph)?)),
+        }
+    }
+
+    /// `if condition then self else other`
+    pub(crate) fn select(self, condition: Node, other: Self, graph: &Graph) -> Option<Self> {
+        let (a, b) = self.with(other, graph)?;
+        let node = graph.select(condition, a, b);
+        Some(match self {
+            Scalar::Boolean(_) => Scalar::Boolean(node),
+            _ => Scalar::Real(node),
+        })
+    }
+
     /// The number, where it is known.
     pub(crate) fn number(self, graph: &Graph) -> Option<f64> {
         match self {
@@ -95,10 +113,8 @@ pub(crate) fn element_name(name: &str, dims: &[usize], offset: usize) -> String 
 
 pub(super) fn unequal_sizes(left: &[usize], right: &[usize], span: Span) -> Problem {
     let (left, right) = (describe_dims(left), describe_dims(right));
-    Problem::new(
-        span,
-        format!("the sizes differ: left is {left}, right is {right}"),
-    )
+    let message = format!("the sizes differ: left is {left}, right is {right}");
+    Problem::new(span, message)
 }
 
 /// The members of a record, those of inner records by their names in full, as `z.re`; a number or
