@@ -6,11 +6,10 @@ use lynkeus_expr::Node;
 
 use super::parser::{ParsedModel, Role, is_elementary};
 use crate::diagnostic::{Problem, Result, Span};
-use crate::elaborate::{Evaluator, GivenNames, Mode};
-use crate::limits::{Budget, MAX_SCALARS, elaboration};
+use crate::limits::{Budget, MAX_SCALARS};
 use crate::names::did_you_mean;
 use crate::syntax::ast::Ast;
-use crate::{Attributes, LoadOptions, Model, Plant};
+use crate::{Attributes, LoadOptions, Model, Plant, elaborate};
 
 /// What the names of a model are.
 struct Names<'s> {
@@ -158,22 +157,21 @@ fn equations(
     model: &Model,
     nodes: &HashMap<&str, Node>,
 ) -> Result<()> {
-    let (graph, budget) = (model.graph(), elaboration());
+    let graph = model.graph();
     let names = &|name: &str| nodes.get(name).copied();
-    let names = GivenNames { graph, names };
-    let mode = Mode::Continuous;
-    let mut evaluator = Evaluator::new(source, ast, graph, &budget, &names, mode);
-    for &(name, role, right) in &syntax.equations {
-        let text = name.text(source);
-        let value = evaluator.scalar(right)?.real(graph);
-        let expected = || Problem::new(ast.expression(right).span, "expected a number");
-        let value = graph.expr(value.ok_or_else(expected)?);
-        match role {
-            Role::State => model.der(graph.symbol(text), value),
-            _ => model.output(text, value, Attributes::default()),
+    elaborate::evaluated(source, ast, graph, names, |evaluator| {
+        for &(name, role, right) in &syntax.equations {
+            let text = name.text(source);
+            let value = evaluator.scalar(right)?.real(graph);
+            let expected = || Problem::new(ast.expression(right).span, "expected a number");
+            let value = graph.expr(value.ok_or_else(expected)?);
+            match role {
+                Role::State => model.der(graph.symbol(text), value),
+                _ => model.output(text, value, Attributes::default()),
+            }
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// Refuses values for what is no parameter, and values that are no numbers.
