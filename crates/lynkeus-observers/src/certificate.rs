@@ -7,7 +7,7 @@ use lynkeus_structure::{
 use nalgebra::DMatrix;
 
 use crate::statement::{proved, standing, sufficient, undecided};
-use crate::{Check, Statement};
+use crate::{Check, Reason, Statement};
 
 /// What a guarantee may take for granted beside the plant's equations.
 #[derive(Clone, Debug)]
@@ -257,7 +257,7 @@ pub struct Bounds {
 pub struct Certificate {
     /// what proves it, e.g. `Theorem 2 of Hammouri, Targui and Armanet` or
     /// `linear matrix inequality`
-    pub basis: String,
+    pub basis: &'static str,
     /// guaranteed decay rate, 1/time unit; only where proved
     pub rate: Option<f64>,
     /// c of the bound above: the factor by which the error may peak; only where proved
@@ -279,8 +279,8 @@ pub struct Certificate {
     /// P of the Lyapunov function V = eᵀPe, V' ≤ −2·rate·V, in the order of the
     /// augmented states; only where the proof has one
     pub lyapunov: Option<DMatrix<f64>>,
-    /// what the reader should know, in words
-    pub notes: Vec<String>,
+    /// what the reader should know
+    pub notes: Vec<Reason>,
     regularity: Check,
 }
 
@@ -295,11 +295,7 @@ impl Certificate {
     /// A certificate without rate, bounds, constants and notes; its verdict is
     /// that of the hypotheses, of which the first is always that the plant has values on
     /// the box of the assumptions and does not jump there.
-    pub fn new(
-        basis: impl Into<String>,
-        assumptions: &Assumptions,
-        hypotheses: Vec<Check>,
-    ) -> Self {
+    pub fn new(basis: &'static str, assumptions: &Assumptions, hypotheses: Vec<Check>) -> Self {
         let bounded = |d: &&Dimension| d.symbol != assumptions.time || d.max.is_finite();
         let sides = assumptions.region.dimensions.iter().filter(bounded);
         let side = |d: &Dimension| Side {
@@ -311,7 +307,7 @@ impl Certificate {
         let first = first.chain(assumptions.within_limits.clone());
         let hypotheses: Vec<Check> = first.chain(hypotheses).collect();
         Self {
-            basis: basis.into(),
+            basis,
             rate: None,
             overshoot: None,
             ultimate_bound: None,
@@ -341,13 +337,13 @@ impl Certificate {
             }
             None => "of its mean square no bound is known here either",
         };
-        self.notes.push(format!("the process noise of {moved} is Gaussian, so that no bound holds of the error for certain and plant and estimate leave any box now and then: {kept}"));
+        self.notes.push(format!("the process noise of {moved} is Gaussian, so that no bound holds of the error for certain and plant and estimate leave any box now and then: {kept}").into());
         self.notes.extend(without.map(|norm| {
             let each: Vec<String> = each
                 .iter()
                 .map(|b| format!("{} of {}", short(b.value), b.name))
                 .collect();
-            match each.is_empty() {
+            Reason::from(match each.is_empty() {
                 true => format!(
                     "without the process noise the error would end within {} (Euclidean norm)",
                     short(norm)
@@ -356,20 +352,20 @@ impl Certificate {
                     "without the process noise the error would end within {}",
                     each.join(", ")
                 ),
-            }
+            })
         }));
         self
     }
 
     /// Of a Kalman filter, of which nothing is certified.
-    pub(crate) fn of_filter(basis: impl Into<String>, assumptions: &Assumptions) -> Self {
+    pub(crate) fn of_filter(basis: &'static str, assumptions: &Assumptions) -> Self {
         let reason = "its gain depends on the run: no theorem holds on the whole box, however good it is on a log";
         let check = undecided(Statement::FilterConverges, reason);
         Self::new(basis, assumptions, vec![check])
     }
 
     /// A limit ended the work: nothing is decided.
-    pub(crate) fn ended(basis: impl Into<String>, assumptions: &Assumptions, spent: Spent) -> Self {
+    pub(crate) fn ended(basis: &'static str, assumptions: &Assumptions, spent: Spent) -> Self {
         let check = undecided(Statement::Finished, spent.to_string());
         Self::new(basis, assumptions, vec![check])
     }

@@ -5,7 +5,7 @@ use lynkeus_expr::{MissingInput, Spent};
 use lynkeus_structure::{AugmentedPlant, Region, Standing};
 
 use crate::statement::standing;
-use crate::{Check, Observer, Statement, TuningError};
+use crate::{Check, Observer, Reason, Statement, TuningError};
 
 /// Whether a family fits, in the words of reports: it does where every condition is proved, and
 /// does not where the form is another or a condition is refuted.
@@ -22,8 +22,8 @@ pub fn fit_word(fit: Standing) -> &'static str {
 pub struct Examination {
     /// name of the family
     pub family: &'static str,
-    /// what was found, in one or two sentences: the chains, or what breaks the form
-    pub summary: String,
+    /// what was found: the chains, or what breaks the form
+    pub summary: Reason,
     /// names of the states of each chain, where the form was found
     pub chains: Vec<Vec<String>>,
     /// every condition of the family with its verdict
@@ -52,14 +52,14 @@ impl Examination {
         augmented: &AugmentedPlant<'_>,
         region: &Region,
         family: &'static str,
-        summary: String,
+        summary: impl Into<Reason>,
         chains: Vec<Vec<String>>,
         checks: Vec<Check>,
     ) -> Result<Self, MissingInput> {
         let regularity = Statement::PlantIsRegular.with(augmented.regularity(region)?);
         Ok(Self {
             family,
-            summary,
+            summary: summary.into(),
             chains,
             checks,
             plant: PlantFit::Form(regularity),
@@ -67,10 +67,14 @@ impl Examination {
     }
 
     /// The plant does not have the form, or a condition ends the search for one.
-    pub(crate) fn unfit(family: &'static str, summary: String, checks: Vec<Check>) -> Self {
+    pub(crate) fn unfit(
+        family: &'static str,
+        summary: impl Into<Reason>,
+        checks: Vec<Check>,
+    ) -> Self {
         Self {
             family,
-            summary,
+            summary: summary.into(),
             chains: vec![],
             checks,
             plant: PlantFit::Unfit,
@@ -78,10 +82,10 @@ impl Examination {
     }
 
     /// Of a family that asks nothing of a plant, and promises nothing.
-    pub(crate) fn of_any_plant(family: &'static str, summary: String) -> Self {
+    pub(crate) fn of_any_plant(family: &'static str, summary: impl Into<Reason>) -> Self {
         Self {
             family,
-            summary,
+            summary: summary.into(),
             chains: vec![],
             checks: vec![],
             plant: PlantFit::Any,
@@ -153,10 +157,31 @@ pub struct Design {
     pub examination: Examination,
     /// gains, one per chain
     pub gains: Vec<ChainGain>,
-    /// numbers that the tool chose or was given, for the reader: (name, value)
-    pub parameters: Vec<(String, String)>,
+    /// what the tool chose or was given: (name, value)
+    pub parameters: Vec<(String, ParameterValue)>,
     /// what the user should know
-    pub notes: Vec<String>,
+    pub notes: Vec<Reason>,
+}
+
+/// The value of a parameter of a design.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ParameterValue {
+    /// words that are not data yet
+    Text(String),
+    /// numbers
+    Numbers(Vec<f64>),
+}
+
+impl From<String> for ParameterValue {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl From<f64> for ParameterValue {
+    fn from(number: f64) -> Self {
+        Self::Numbers(vec![number])
+    }
 }
 
 /// Why there is no observer.
@@ -169,12 +194,12 @@ pub enum DesignError {
     #[error(transparent)]
     Tuning(#[from] TuningError),
     /// no gain of the kind asked for exists, or none is proved
-    #[error("{reason}")]
+    #[error("no gain as the key '{key}' asks for")]
     NoGain {
         /// the key that asks for too much
         key: &'static str,
-        /// what blocks it and what to do
-        reason: String,
+        /// what blocks it
+        reason: Reason,
     },
     /// the plant has parameters without value
     #[error(transparent)]

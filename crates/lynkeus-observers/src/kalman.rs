@@ -174,7 +174,7 @@ impl<K: Kalman> Stages for K {
             };
             (
                 format!("initial variance of {}", state.name),
-                format!("{value}{from}"),
+                format!("{value}{from}").into(),
             )
         });
         Ok(Design {

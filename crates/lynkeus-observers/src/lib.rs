@@ -32,7 +32,7 @@ mod tuning;
 pub mod unknown_input;
 
 pub use certificate::{Assumptions, Bounds, Certificate, Constant, UltimateBound};
-pub use design::{ChainGain, Design, DesignError, Examination, fit_word};
+pub use design::{ChainGain, Design, DesignError, Examination, ParameterValue, fit_word};
 pub use family::Family;
 pub use generator::{Generator, GeneratorError, Prefilter};
 pub use guarantee::{Claim, Correction, Injection, certify, is_certified_gain};

@@ -53,7 +53,8 @@ pub enum Statement {
     Germani(Germani),
 }
 
-/// What decides a verdict, as data: `lynkeus-words` has the sentences.
+/// What is said of a plant, a verdict, an observer or a certificate, as data: `lynkeus-words` has
+/// the sentences.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Reason {
     /// a sentence that is not data yet

@@ -1,6 +1,6 @@
 //! Conditions of families and hypotheses of theorems, with what was found of them.
 
-use lynkeus_observers::{Check, DesignError, Examination, Reason, Statement};
+use lynkeus_observers::{Check, DesignError, Examination, ParameterValue, Reason, Statement};
 
 use crate::Words;
 
@@ -30,13 +30,29 @@ impl Words for DesignError {
     fn words(&self) -> String {
         match self {
             DesignError::Refused(examination) => refusal(examination),
+            DesignError::NoGain { reason, .. } => reason.words(),
             error => error.to_string(),
         }
     }
 }
 
+impl Words for ParameterValue {
+    fn words(&self) -> String {
+        match self {
+            ParameterValue::Text(text) => text.clone(),
+            ParameterValue::Numbers(numbers) => listed(numbers),
+        }
+    }
+}
+
+/// `1, 2.5`
+pub(crate) fn listed(numbers: &[f64]) -> String {
+    let numbers: Vec<String> = numbers.iter().map(f64::to_string).collect();
+    numbers.join(", ")
+}
+
 fn refusal(examination: &Examination) -> String {
-    let (family, summary) = (examination.family, &examination.summary);
+    let (family, summary) = (examination.family, examination.summary.words());
     let mut text = match examination.spent() {
         Some(_) => format!("whether the family '{family}' fits is {summary}"),
         None => format!("the family '{family}' does not fit: {summary}"),

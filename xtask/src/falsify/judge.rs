@@ -256,7 +256,7 @@ impl Look<'_, '_> {
 
     fn witnesses(&mut self) {
         for refutation in &self.found.refutations {
-            match refute::check(refutation, self.augmented, self.found.design.as_ref()) {
+            match refute::check(refutation, self.augmented, self.found.design.as_deref()) {
                 refute::Answer::Confirmed => self.counts.refutations += 1,
                 refute::Answer::Unread => self.counts.unread += 1,
                 refute::Answer::Wrong(evidence) => {

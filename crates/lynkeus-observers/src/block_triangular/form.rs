@@ -16,7 +16,7 @@ use super::settings::{Correction, Settings};
 use crate::conditions::{GainedChain, Partial, lipschitz, names, output_slope, partials, told};
 use crate::design::{Found, Searched};
 use crate::statement::{proved, refuted, undecided};
-use crate::{Check, DesignError, Examination, Lee, TuningError};
+use crate::{Check, DesignError, Examination, Lee, Reason, TuningError};
 
 pub(super) const NAME: &str = "block-triangular";
 
@@ -237,7 +237,7 @@ fn decay(K: &[f64], a: &[f64], ranges: &[(f64, f64)]) -> Option<f64> {
 }
 
 /// Lemma 2's condition on θ.
-pub(super) fn chain_rule(blocks: &Blocks, θ: &[f64]) -> Option<String> {
+pub(super) fn chain_rule(blocks: &Blocks, θ: &[f64]) -> Option<Reason> {
     blocks.order.windows(2).find_map(|pair| {
         let ((before, chain), (after, _)) = (&pair[0], &pair[1]);
         let needed = θ[*before].powi(chain.states.len() as i32);
@@ -245,7 +245,7 @@ pub(super) fn chain_rule(blocks: &Blocks, θ: &[f64]) -> Option<String> {
             format!(
                 "theta: {} for the later chain is below {needed} = {}^{} of the chain before it; the proof of Theorem 1 needs at least that",
                 θ[*after], θ[*before], chain.states.len()
-            )
+            ).into()
         })
     })
 }

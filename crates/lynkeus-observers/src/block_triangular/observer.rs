@@ -99,7 +99,7 @@ pub(super) fn observer(
         notes: chain_rule(blocks, &θ).into_iter().collect(),
         examination,
         gains,
-        parameters,
+        parameters: parameters.into_iter().map(|(n, v)| (n, v.into())).collect(),
     })
 }
 
@@ -166,7 +166,7 @@ pub(super) fn assemble(
         notes,
         examination,
         gains: vec![],
-        parameters,
+        parameters: parameters.into_iter().map(|(n, v)| (n, v.into())).collect(),
     })
 }
 

@@ -22,7 +22,7 @@ use crate::estimate::{Common, box_note};
 use crate::peaking::departure;
 use crate::statement::{proved, standing, undecided};
 use crate::theorem::{conclude, slopes, state_noise};
-use crate::{Assumptions, Certificate, Check, Constant, DesignError, Lee, estimate};
+use crate::{Assumptions, Certificate, Check, Constant, DesignError, Lee, Reason, estimate};
 
 pub(super) const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
 
@@ -65,7 +65,7 @@ pub(super) struct Study<'a> {
     /// in the order of the blocks
     pub θ: Vec<f64>,
     /// what breaks Lemma 2's rule
-    rule: Option<String>,
+    rule: Option<Reason>,
 }
 
 /// Everything that does not depend on θ.
@@ -315,8 +315,8 @@ impl Study<'_> {
         }
     }
 
-    fn notes(&self) -> Vec<String> {
-        let mut notes = vec![self.place()];
+    fn notes(&self) -> Vec<Reason> {
+        let mut notes = vec![self.place().into()];
         notes.extend(self.rule.clone());
         if !self.classical {
             notes.push("Observer (7): M(x̂) moves with the correction, so its derivative grows with θ and with the error (the paper's Lemma 2 ii takes it as bounded independently of θ). The bound used here is that of the declared box, |y − x̂_1| at most the width of the range of x_1: a proof for that box, not a global one. Narrow ranges make it sharper; correction = \"classical\" does without.".into());

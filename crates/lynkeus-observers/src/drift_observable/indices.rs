@@ -58,7 +58,8 @@ pub(super) fn form(
         true => found,
         false => Form::new(augmented, &map, found.form.indices, region)?,
     };
-    chosen.examination.summary += &told(&chosen.form.indices, &search.others);
+    let summary = chosen.examination.summary.clone().text();
+    chosen.examination.summary = (summary + &told(&chosen.form.indices, &search.others)).into();
     Ok(Ok(chosen))
 }
 

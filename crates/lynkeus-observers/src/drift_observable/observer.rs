@@ -79,9 +79,16 @@ pub(super) fn design(
         observer: &observer,
     };
     Ok(Design {
-        notes: notes(augmented, &form, &observer.input_derivatives),
+        notes: notes(augmented, &form, &observer.input_derivatives)
+            .into_iter()
+            .map(Into::into)
+            .collect(),
         gains: laid.constant_gains()?,
-        parameters: laid.parameters()?,
+        parameters: laid
+            .parameters()?
+            .into_iter()
+            .map(|(n, v)| (n, v.into()))
+            .collect(),
         observer,
         examination,
     })

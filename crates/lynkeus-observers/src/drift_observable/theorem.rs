@@ -38,7 +38,7 @@ use super::observer::{Gains, closed_loop, slowest, spread};
 use super::settings::{Needed, SLOPES, Settings, Variant};
 use crate::statement::{sufficient, undecided};
 use crate::{
-    Assumptions, Bounds, Certificate, Check, Constant, DesignError, Germani, TuningError,
+    Assumptions, Bounds, Certificate, Check, Constant, DesignError, Germani, Reason, TuningError,
     UltimateBound,
 };
 
@@ -113,19 +113,22 @@ fn basis(variant: Variant) -> &'static str {
     }
 }
 
-fn notes(augmented: &AugmentedPlant<'_>, form: &Form, assumptions: &Assumptions) -> Vec<String> {
+fn notes(augmented: &AugmentedPlant<'_>, form: &Form, assumptions: &Assumptions) -> Vec<Reason> {
     let mut notes = vec![match form.variant {
-        Variant::Practical => "taken for granted, not proved: plant and estimate stay in the box, and so do the filter's estimates of the inputs and of their derivatives; the bound holds once the filter has settled, at the same rate".to_owned(),
-        _ => "taken for granted, not proved: plant and estimate stay in the box".to_owned(),
+        Variant::Practical => "taken for granted, not proved: plant and estimate stay in the box, and so do the filter's estimates of the inputs and of their derivatives; the bound holds once the filter has settled, at the same rate".into(),
+        _ => "taken for granted, not proved: plant and estimate stay in the box".into(),
     }];
     let constant = assumptions.constant(augmented.plant_states());
     if !constant.is_empty() {
-        notes.push(format!(
-            "taken as constant: {}; bounds of rates of change go under `slew` in [certify]",
-            constant.join(", ")
-        ));
+        notes.push(
+            format!(
+                "taken as constant: {}; bounds of rates of change go under `slew` in [certify]",
+                constant.join(", ")
+            )
+            .into(),
+        );
     }
-    notes.push("where the column rcond is below 6·10⁻⁴ the tool withdraws a part of the correction, and the theorem says nothing".to_owned());
+    notes.push("where the column rcond is below 6·10⁻⁴ the tool withdraws a part of the correction, and the theorem says nothing".into());
     notes
 }
 

@@ -117,7 +117,8 @@ pub(crate) fn design_lmi(
             reason: format!(
                 "the slope of {} has no bound on the box; {cure}",
                 slope.term
-            ),
+            )
+            .into(),
         });
     }
     let request = Request {
@@ -214,7 +215,7 @@ fn refusal(system: &ErrorSystem, request: &Request, error: NoGain) -> DesignErro
                 "the rate {} needs larger gains than {}: the smallest largest entry found is {found:.4}; raise gain_limit or lower rate",
                 request.rate,
                 request.limit.unwrap_or(f64::INFINITY)
-            ),
+            ).into(),
         },
         _ => DesignError::NoGain {
             key: "rate",
@@ -222,7 +223,7 @@ fn refusal(system: &ErrorSystem, request: &Request, error: NoGain) -> DesignErro
                 "no gain is proved to reach {} on the box: {}",
                 request.rate,
                 reason(system, request)
-            ),
+            ).into(),
         },
     }
 }
@@ -300,12 +301,12 @@ fn assemble(
     observer.tunables.refused = copy.common.tunable.then_some(NO_SPEED);
     let slopes = gain.proof.multipliers.first().map_or(0, |t| t.len());
     let parameters = vec![
-        ("rate".to_owned(), format!("{}", request.rate)),
+        ("rate".to_owned(), format!("{}", request.rate).into()),
         (
             "largest gain".to_owned(),
-            format!("{:.6}", request.largest(&gain.K)),
+            format!("{:.6}", request.largest(&gain.K)).into(),
         ),
-        ("slopes".to_owned(), format!("{slopes}")),
+        ("slopes".to_owned(), format!("{slopes}").into()),
     ];
     Ok(Design {
         observer,

@@ -40,7 +40,9 @@ use lynkeus_structure::{AugmentedPlant, Standing, short};
 use nalgebra::DMatrix;
 
 use crate::statement::{proved, undecided};
-use crate::{Assumptions, Bounds, Certificate, Check, Constant, DesignError, Inequality, Observer};
+use crate::{
+    Assumptions, Bounds, Certificate, Check, Constant, DesignError, Inequality, Observer, Reason,
+};
 use error_system::ErrorSystem;
 use refute::Sample;
 
@@ -121,7 +123,7 @@ fn certified(
                 certificate.mean_square =
                     mean_square(augmented, &system, &proof, assumptions, &search);
             }
-            let faster = |spent| format!("a faster rate was sought: {spent}");
+            let faster = |spent| Reason::from(format!("a faster rate was sought: {spent}"));
             certificate.notes.extend(spent.map(faster));
         }
         None if claim == Claim::Fastest => {
@@ -167,13 +169,13 @@ fn inequality(system: &ErrorSystem, sample: &Sample, proof: Option<&Proof>) -> C
 }
 
 /// What can be said without a proof on the whole box.
-fn still_said(system: &ErrorSystem, sample: &Sample, search: &Budget) -> Vec<String> {
+fn still_said(system: &ErrorSystem, sample: &Sample, search: &Budget) -> Vec<Reason> {
     let mut notes = vec![];
     if let Some(slowest) = sample.slowest.filter(|slowest| *slowest > 0.0) {
         notes.push(format!(
             "at every point examined the error's Jacobian is stable, the slowest mode decaying at {}",
             short(slowest)
-        ));
+        ).into());
     }
     if system.is_bounded()
         && let Some(share) = lmi::provable_share(system, search)
@@ -181,7 +183,7 @@ fn still_said(system: &ErrorSystem, sample: &Sample, search: &Budget) -> Vec<Str
         notes.push(format!(
             "the inequality holds once every slope's range is cut to {:.0} % about its middle: a smaller box would do",
             100.0 * share
-        ));
+        ).into());
     }
     notes
 }

@@ -27,7 +27,7 @@ use lynkeus_gain::low_power::Coefficients;
 use super::transient;
 use super::transient::Transient;
 use crate::estimate::{PlantCopy, Speed};
-use crate::{KeySpec, Observer, Shape, Signal, Tuning, TuningError, Value};
+use crate::{KeySpec, Observer, Reason, Shape, Signal, Tuning, TuningError, Value};
 
 /// Eigenvalues of M.
 pub(super) const POLES: KeySpec = KeySpec {
@@ -180,7 +180,7 @@ pub(crate) fn factor_rows(output: &str, factors: Vec<(String, f64)>) -> Vec<(Str
 
 /// What the reader should know where the partials, with sizes in `bounds`, move and the
 /// gain does not.
-pub(crate) fn variation(output: &str, bounds: &[(f64, f64)], K: &[[f64; 2]]) -> Option<String> {
+pub(crate) fn variation(output: &str, bounds: &[(f64, f64)], K: &[[f64; 2]]) -> Option<Reason> {
     // to the geometric mean, which the gain is made for
     let ratio = |&(low, high): &(f64, f64)| {
         let half = (high / low).sqrt();
@@ -188,7 +188,7 @@ pub(crate) fn variation(output: &str, bounds: &[(f64, f64)], K: &[[f64; 2]]) -> 
     };
     let ratios: Vec<(f64, f64)> = bounds.iter().map(ratio).collect();
     (!bounds.is_empty() && !low_power::tolerates(K, &ratios)).then(|| {
-        format!("form: in the chain of {output} the partials vary more than the stability of M is proved for; narrower min and max help, and for the family triangular partials = true, which makes M constant")
+        format!("form: in the chain of {output} the partials vary more than the stability of M is proved for; narrower min and max help, and for the family triangular partials = true, which makes M constant").into()
     })
 }
 

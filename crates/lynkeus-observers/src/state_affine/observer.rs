@@ -111,9 +111,13 @@ pub(super) fn assemble(
     observer.monitors.extend(monitor(&factor, alarm));
     observer.states.extend(factor.states);
     let parameters = parameters(&copy, form, &order, &numbers, alarm)?;
+    let parameters = parameters.into_iter().map(|(n, v)| (n, v.into())).collect();
     Ok(Design {
         observer,
-        notes: outside_last(augmented, form).into_iter().collect(),
+        notes: outside_last(augmented, form)
+            .into_iter()
+            .map(Into::into)
+            .collect(),
         examination,
         gains: vec![],
         parameters,

@@ -145,7 +145,7 @@ impl Study<'_> {
         let mut certificate = Certificate::new(BASIS, self.assumptions, checks);
         certificate.constants = constants;
         let note = estimate::note(self.common, self.augmented, self.region());
-        certificate.notes.push(note);
+        certificate.notes.push(note.into());
         if let Some((rate, spectrum)) = found.filter(|_| everything_else) {
             self.conclude(&mut certificate, rate, &spectrum);
         }

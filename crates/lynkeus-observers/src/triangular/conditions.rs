@@ -175,7 +175,8 @@ pub(super) fn settle(
             "{words}; whether this plant's damping is enough is not looked into: it has {n} states, more than {LARGEST}"
         ),
         false if form.is_damped(augmented, settings, region)? => {
-            examination.summary += &format!("; {words}");
+            let summary = examination.summary.clone().text();
+            examination.summary = format!("{summary}; {words}").into();
             return Ok(());
         }
         false => words,

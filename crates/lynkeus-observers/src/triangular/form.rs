@@ -9,7 +9,7 @@ use super::settings::Settings;
 use crate::conditions::Partial;
 use crate::estimate::{PlantCopy, Speed};
 use crate::peaking::Transient;
-use crate::{TuningError, peaking};
+use crate::{Reason, TuningError, peaking};
 
 pub(super) const NAME: &str = "triangular";
 
@@ -28,7 +28,7 @@ pub(super) struct Gains<'s> {
     pub S: Vec<Tridiagonal>,
     pub divided: bool,
     pub transient: Option<&'s Transient>,
-    pub notes: Vec<String>,
+    pub notes: Vec<Reason>,
 }
 
 impl<'s> Gains<'s> {
@@ -190,12 +190,12 @@ impl Window {
     }
 
     /// What the reader should know of an observer outside of it.
-    pub fn note(&self) -> Option<String> {
+    pub fn note(&self) -> Option<Reason> {
         let Self {
             low, high, ratio, ..
         } = self;
         (!self.holds()).then(|| {
-            format!("delta: the ratio {ratio:.4} lies outside ({low:.4}, {high:.4}), the window of Theorem 2; its proof does not cover this observer")
+            format!("delta: the ratio {ratio:.4} lies outside ({low:.4}, {high:.4}), the window of Theorem 2; its proof does not cover this observer").into()
         })
     }
 }

@@ -61,7 +61,7 @@ pub(super) fn observer(
     }
     Ok(Design {
         observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
-        parameters,
+        parameters: parameters.into_iter().map(|(n, v)| (n, v.into())).collect(),
         notes: gains.notes.clone(),
         gains: table,
         examination,
@@ -157,7 +157,7 @@ pub(super) fn assemble(
         observer: run.finish(NAME)?.tuned_by(&speeds),
         examination,
         gains: vec![],
-        parameters,
+        parameters: parameters.into_iter().map(|(n, v)| (n, v.into())).collect(),
         notes,
     })
 }

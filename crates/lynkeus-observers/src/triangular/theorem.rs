@@ -67,7 +67,7 @@ pub(super) fn certificate(
     }
     if standing(&checks) == Standing::Refuted || (unbounded && !given) {
         let mut certificate = Certificate::new(basis, assumptions, checks);
-        certificate.notes.push(remainder(&facts));
+        certificate.notes.push(remainder(&facts).into());
         return Ok(certificate);
     }
     // the observer under study, for its refusals and its gain
@@ -137,8 +137,8 @@ impl Study<'_> {
             self.augmented,
             &self.assumptions.region,
         );
-        certificate.notes.push(place);
-        certificate.notes.extend(broken.then(|| BROKEN.to_owned()));
+        certificate.notes.push(place.into());
+        certificate.notes.extend(broken.then(|| BROKEN.into()));
         if let Some((σ, c)) = rate {
             self.conclude(&mut certificate, σ, &c)?;
         }

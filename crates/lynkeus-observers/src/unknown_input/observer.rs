@@ -56,8 +56,12 @@ pub(super) fn design(
     Ok(Design {
         observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
         gains: matrices.gains(&start)?,
-        parameters: matrices.parameters(&start)?,
-        notes: note.into_iter().collect(),
+        parameters: matrices
+            .parameters(&start)?
+            .into_iter()
+            .map(|(n, v)| (n, v.into()))
+            .collect(),
+        notes: note.into_iter().map(Into::into).collect(),
         examination,
     })
 }

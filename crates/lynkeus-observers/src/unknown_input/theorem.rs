@@ -21,7 +21,8 @@ use super::{constants, observer};
 use crate::statement::{sufficient, undecided};
 use crate::theorem::Enclosure;
 use crate::{
-    Assumptions, Certificate, Check, Constant, DesignError, Examination, Farza, UltimateBound,
+    Assumptions, Certificate, Check, Constant, DesignError, Examination, Farza, Reason,
+    UltimateBound,
 };
 
 pub(super) const BASIS: &str = "Theorem 1 of Farza, M'Saad, Liu and Targui";
@@ -167,10 +168,10 @@ impl Proof<'_, '_, '_> {
         constants.extend(finite.map(|(name, value, meaning)| Constant::new(name, value, meaning)));
     }
 
-    fn notes(&self) -> Vec<String> {
+    fn notes(&self) -> Vec<Reason> {
         let mut notes = vec![];
         if self.norms.γ.iter().any(|&γ| γ > 0.0) {
-            notes.push("in the box beside plant and estimate: X̃² = X̂² − D (x̂₁¹ − y₁), at which Λ₂ is taken; with the key 'clamp' the observer sees to Λ₂'s argument, not to X̃² itself".to_owned());
+            notes.push("in the box beside plant and estimate: X̃² = X̂² − D (x̂₁¹ − y₁), at which Λ₂ is taken; with the key 'clamp' the observer sees to Λ₂'s argument, not to X̃² itself".into());
         }
         notes
     }
@@ -207,11 +208,11 @@ impl Proof<'_, '_, '_> {
             "the factor by which the error may peak",
         ));
         let Some(δ) = self.unknown_forces(θ, assumptions)? else {
-            found.notes.push("no ultimate bound: G or Λ₂ reads measured signals, and the proof does not cover noise in them".to_owned());
+            found.notes.push("no ultimate bound: G or Λ₂ reads measured signals, and the proof does not cover noise in them".into());
             return Ok(());
         };
         if !δ.is_finite() {
-            found.notes.push("no ultimate bound: a disturbance or a measurement error has none; declare min and max of the disturbances".to_owned());
+            found.notes.push("no ultimate bound: a disturbance or a measurement error has none; declare min and max of the disturbances".into());
             return Ok(());
         }
         let root_V = (Interval::point(2.0) * size(δ) / Interval::point(λ)).hi();

@@ -12,6 +12,7 @@ use lynkeus_observers::{
     Design, DesignError, FAMILIES, Family, Tuning, TuningError, Value, unknown_input::UnknownInput,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
+use lynkeus_words::Words;
 
 /// System (15) with a = 1, which the paper leaves open.
 const EXAMPLE: &str = "model Farza
@@ -290,13 +291,13 @@ fn theta_from_the_proof() {
     let plant = plant(SMALL);
     let design = design(&plant, &Tuning::default()).unwrap();
     assert!(
-        design.notes[0].contains("proof of Theorem 1"),
+        design.notes[0].words().contains("proof of Theorem 1"),
         "{:?}",
         design.notes
     );
     let θ: Vec<f64> = design.parameters[..2]
         .iter()
-        .map(|p| p.1.parse().unwrap())
+        .map(|p| p.1.words().parse().unwrap())
         .collect();
     assert!(θ[0] > θ[1] && θ[1] >= 1.0 && θ[0] < 1e4, "{θ:?}");
     let rows = run(
@@ -368,9 +369,9 @@ fn wrong_keys_are_named() {
 fn what_is_missing_is_said() {
     let examination = refused(&UnknownInput, &plant(EXAMPLE), &tuning(60.0, 15.0));
     assert!(
-        examination.summary.contains("'unknown'"),
+        examination.summary.words().contains("'unknown'"),
         "{}",
-        examination.summary
+        examination.summary.words()
     );
     let hidden = EXAMPLE.replace("- 2*cos(time)*v", "- x5*v");
     let Err(DesignError::Refused(examination)) = design(&plant(&hidden), &tuning(60.0, 15.0))
@@ -380,9 +381,10 @@ fn what_is_missing_is_said() {
     assert!(
         examination
             .summary
+            .words()
             .contains("equation of x4 the factor of v depends on x5"),
         "{}",
-        examination.summary
+        examination.summary.words()
     );
 }
 

@@ -34,17 +34,14 @@ pub(crate) fn certificate(report: &CertifyReport) -> Value {
     object["outside_box"] = report.strays.to_json();
     object["excitation"] = json!(report.excited.as_ref().map(Excited::to_json));
     object["sampling"] = json!(report.sampling.map(sampling));
-    let notes = report.theorem.iter().flat_map(|t| &t.notes);
     let strays = report.strays.words(false);
     let strays = strays.map(|words| format!("the certificate is for the box only, and {words}"));
     object["notes"] = json!(
-        report
-            .certificate
-            .notes
-            .iter()
-            .chain(notes)
-            .chain(&report.assumed)
-            .chain(&strays)
+        std::iter::once(&report.certificate)
+            .chain(&report.theorem)
+            .flat_map(|certificate| report.notes_of(certificate))
+            .chain(report.assumed.iter().cloned())
+            .chain(strays)
             .collect::<Vec<_>>()
     );
     if let Some(theorem) = &report.theorem {

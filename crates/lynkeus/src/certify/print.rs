@@ -221,7 +221,7 @@ fn certificate(
         let bounds = bounds(report, &found.states).join(", ");
         writeln!(f, "  {IN_MEAN_SQUARE}: {bounds}")?;
     }
-    for note in &certificate.notes {
+    for note in report.notes_of(certificate) {
         writeln!(f, "  note: {note}")?;
     }
     Ok(())

@@ -69,7 +69,7 @@ fn family(examination: &Examination) -> Value {
     json!({
         "family": examination.family,
         "fit": fit_word(examination.fit()),
-        "summary": examination.summary,
+        "summary": examination.summary.words(),
         "chains": examination.chains,
         "checks": examination.conditions().map(check).collect::<Vec<_>>(),
     })

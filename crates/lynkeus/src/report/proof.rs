@@ -20,7 +20,7 @@ pub(super) fn certificate(html: &mut Html, report: &CertifyReport) {
 }
 
 fn one(html: &mut Html, report: &CertifyReport, certificate: &Certificate) {
-    let basis = escaped(&certificate.basis);
+    let basis = escaped(certificate.basis);
     let word = badge(report.word(certificate));
     html.raw(&format!("<h3>{basis}: {word}</h3>"));
     let guaranteed = [
@@ -73,7 +73,7 @@ fn one(html: &mut Html, report: &CertifyReport, certificate: &Certificate) {
         });
         html.table(&["quantity", "from", "to"], sides.collect());
     });
-    html.list(&certificate.notes);
+    html.list(&report.notes_of(certificate));
 }
 
 /// How the measurements enter.

@@ -4,7 +4,7 @@
 use crate::common::{plant, run};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Assumptions, Certificate, Check, Design, Family, Germani, Tuning, UltimateBound, Value,
+    Assumptions, Certificate, Check, Design, Family, Germani, Reason, Tuning, UltimateBound, Value,
     drift_observable::DriftObservable,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
@@ -341,7 +341,10 @@ fn the_stay_in_the_box_is_said() {
             &[0.0; 2],
             &[0.0],
         );
-        let said = |note: &String| note.contains("not proved: plant and estimate stay in the box");
+        let said = |note: &Reason| {
+            note.words()
+                .contains("not proved: plant and estimate stay in the box")
+        };
         assert!(found.notes.iter().any(said), "{:?}", found.notes);
     }
 }

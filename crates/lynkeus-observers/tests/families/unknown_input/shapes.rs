@@ -301,7 +301,7 @@ fn the_matrices_of_the_paper_are_shown() {
         found
             .unwrap_or_else(|| panic!("{name}: {:?}", design.parameters))
             .1
-            .clone()
+            .words()
     };
     assert_eq!(value("G₁¹"), "[[b + 2]]");
     assert_eq!(value("(G₁¹)⁺ at the start"), "[[0.4]]");

@@ -151,7 +151,7 @@ fn noise_in_a_signal_that_g_reads() {
     let noisy = certificate(&plant(&text), &theta([1e4, 40.0]), &[0.0; 4], &[0.0, 1e-3]);
     assert!(noisy.rate.is_some() && noisy.ultimate_bound.is_none());
     assert!(
-        noisy.notes.iter().any(|n| n.contains("noise")),
+        noisy.notes.iter().any(|n| n.words().contains("noise")),
         "{:?}",
         noisy.notes
     );
