@@ -191,8 +191,7 @@ pub(crate) fn lipschitz(
 /// The states of each chain, for the families that have chains.
 pub(crate) const CHAINS: KeySpec = KeySpec {
     name: "chains",
-    kind: "list of lists of names",
-    shape: Shape::List(&Shape::NAMES),
+    shape: Shape::As("list of lists of names", &Shape::List(&Shape::NAMES)),
     default: "found",
     meaning: "the states of each chain, from the sensor outward",
 };

@@ -204,7 +204,6 @@ pub(crate) fn middle(variable: &Variable) -> f64 {
 /// The study's key.
 pub(crate) const PROLONG: KeySpec = KeySpec {
     name: "prolong",
-    kind: "true, false",
     shape: Shape::Flag,
     default: "false",
     meaning: "outside of the declared ranges the plant's functions are [prolonged](triangular.md#options) as the papers ask, so that the theorem holds for every start of the estimate",

@@ -198,15 +198,16 @@ impl<K: Kalman> Stages for K {
 
 const VARIANCE: KeySpec = KeySpec {
     name: "initial_variance",
-    kind: "table: name = number ≥ 0, and `default`",
-    shape: Shape::Table(&Shape::NotNegative),
+    shape: Shape::As(
+        "table: name = number ≥ 0, and `default`",
+        &Shape::Table(&Shape::NotNegative),
+    ),
     default: "the square of a quarter of the declared range (without a range: of the start value, or 1)",
     meaning: "how uncertain the first estimate is: the variance of each state and unknown input; `default` holds for everything not listed",
 };
 
 const GATE: KeySpec = KeySpec {
     name: "gate",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "none",
     meaning: "a reading whose innovation exceeds so many of its standard deviations is rejected and counted; after ten in a row the next is believed",
@@ -218,8 +219,7 @@ pub(super) const KEYS: [KeySpec; 2] = [VARIANCE, GATE];
 /// That of the filters that may go anywhere.
 pub(super) const BOUNDS: [KeySpec; 1] = [KeySpec {
     name: "bounds",
-    kind: "\"project\"",
-    shape: Shape::Word(&["project"]),
+    shape: Shape::As("\"project\"", &Shape::Word(&["project"])),
     default: "none",
     meaning: "\"project\": the estimate is kept in the declared ranges `[min, max]`: after each prediction and correction it is put to the nearest place inside by the covariance's metric, so that what is correlated moves along; the covariance stays",
 }];
@@ -228,21 +228,18 @@ pub(super) const BOUNDS: [KeySpec; 1] = [KeySpec {
 pub(super) const POINTS: [KeySpec; 3] = [
     KeySpec {
         name: "alpha",
-        kind: "number > 0",
         shape: Shape::Positive,
         default: "1",
         meaning: "α, the spread of the sigma points: λ = α²(n + κ) − n",
     },
     KeySpec {
         name: "beta",
-        kind: "number",
         shape: Shape::Number,
         default: "0",
         meaning: "β, what the first weight of the covariance gets on top",
     },
     KeySpec {
         name: "kappa",
-        kind: "number",
         shape: Shape::Number,
         default: "0",
         meaning: "κ, with n + κ above 0; the defaults make the cubature filter",
@@ -255,7 +252,6 @@ pub(super) const HORIZON: usize = 10;
 /// That of the moving-horizon estimator.
 pub(super) const WINDOW: [KeySpec; 1] = [KeySpec {
     name: "horizon",
-    kind: "whole number ≥ 1",
     shape: Shape::Whole(1),
     default: "10",
     meaning: "samples over which the states are estimated anew at each sample, within `[min, max]`",

@@ -210,7 +210,7 @@ impl Tuning {
         key: &KeySpec,
         meanings: [T; N],
     ) -> Result<Option<T>, TuningError> {
-        let Shape::Word(words) = key.shape else {
+        let Shape::Word(words) = key.shape.plain() else {
             return Ok(None);
         };
         let found = self.choice(key.name, words)?;
@@ -309,9 +309,7 @@ fn numbers(key: &str, value: &Value) -> Result<Vec<f64>, TuningError> {
 pub struct KeySpec {
     /// the key
     pub name: &'static str,
-    /// what may stand there, in words
-    pub kind: &'static str,
-    /// the same for programs
+    /// what may stand there
     pub shape: Shape,
     /// what holds where it is absent
     pub default: &'static str,
@@ -353,24 +351,69 @@ pub enum Shape {
     Section(&'static [&'static [KeySpec]]),
     /// one of several shapes
     Either(&'static [Shape]),
+    /// a shape that documentation and messages call by these words
+    As(&'static str, &'static Shape),
 }
 
 impl Shape {
     /// A number > 0, or one per chain or output.
-    pub const POSITIVES: Self = Self::Either(&[Self::Positive, Self::List(&Self::Positive)]);
+    pub const POSITIVES: Self = Self::As(
+        "number > 0, or one per chain",
+        &Self::Either(&[Self::Positive, Self::List(&Self::Positive)]),
+    );
     /// A list of names.
-    pub const NAMES: Self = Self::List(&Self::Text);
+    pub const NAMES: Self = Self::As("list of names", &Self::List(&Self::Text));
     /// A list of lists of numbers.
     pub const ROWS: Self = Self::List(&Self::List(&Self::Number));
+
+    /// The words of a key of this shape.
+    fn words(&self) -> String {
+        match self {
+            Self::Number => "number".to_owned(),
+            Self::Positive => "number > 0".to_owned(),
+            Self::NotNegative => "number ≥ 0".to_owned(),
+            Self::Share => "number between 0 and 1".to_owned(),
+            Self::Between { least, most } => format!("number in [{least:?}, {most:?}]"),
+            Self::Whole(least) => format!("whole number ≥ {least}"),
+            Self::Flag => "true, false".to_owned(),
+            Self::Text => "text".to_owned(),
+            Self::Word(words) => {
+                let words: Vec<String> = words.iter().map(|w| format!("`\"{w}\"`")).collect();
+                words.join(", ")
+            }
+            Self::List(entry) => format!("list: {}", entry.words()),
+            Self::Table(value) => format!("table: name = {}", value.words()),
+            Self::Section(_) => "table".to_owned(),
+            Self::Either(shapes) => {
+                let shapes: Vec<String> = shapes.iter().map(Self::words).collect();
+                shapes.join(", or ")
+            }
+            Self::As(words, _) => (*words).to_owned(),
+        }
+    }
+
+    /// The shape without the words for it.
+    pub(crate) fn plain(&self) -> &Self {
+        match self {
+            Self::As(_, shape) => shape.plain(),
+            plain => plain,
+        }
+    }
 }
 
 /// The default of a key that has none.
 pub const REQUIRED: &str = "required";
 
 impl KeySpec {
+    /// What may stand there, in words.
+    #[must_use]
+    pub fn kind(&self) -> String {
+        self.shape.words()
+    }
+
     /// The error that `found` stands under this key.
     pub fn wrong(&self, found: impl ToString) -> TuningError {
-        TuningError::new(self.name, self.kind, found)
+        TuningError::new(self.name, self.kind(), found)
     }
 
     /// The key as a row of a table of keys.
@@ -378,11 +421,11 @@ impl KeySpec {
     pub fn row(&self) -> String {
         let Self {
             name,
-            kind,
             default,
             meaning,
             ..
         } = self;
+        let kind = self.kind();
         format!("| `{name}` | {kind} | {default} | {meaning} |")
     }
 }

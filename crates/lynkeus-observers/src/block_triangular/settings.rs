@@ -11,7 +11,6 @@ use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value, peaking};
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
-    kind: "number > 0, or one per chain",
     shape: Shape::POSITIVES,
     default: REQUIRED,
     meaning: "θᵢ",
@@ -19,23 +18,23 @@ const THETA: KeySpec = KeySpec {
 
 const GIVEN: KeySpec = KeySpec {
     name: "k",
-    kind: "list of lists of numbers, one per chain",
-    shape: Shape::ROWS,
+    shape: Shape::As("list of lists of numbers, one per chain", &Shape::ROWS),
     default: "poles at −1",
     meaning: "Kᵢ: the coefficients that place the poles of Aᵢ − KᵢCᵢ",
 };
 
 const POLES: KeySpec = KeySpec {
     name: "k_poles",
-    kind: "list of lists of negative numbers, one per chain",
-    shape: Shape::ROWS,
+    shape: Shape::As(
+        "list of lists of negative numbers, one per chain",
+        &Shape::ROWS,
+    ),
     default: "−1, −1, …",
     meaning: "the eigenvalues of Aᵢ − KᵢCᵢ, instead of `k`",
 };
 
 const CORRECTION: KeySpec = KeySpec {
     name: "correction",
-    kind: "`\"lee\"`, `\"classical\"`",
     shape: Shape::Word(&["lee", "classical"]),
     default: "`\"lee\"`",
     meaning: "observer (7), or (3)",
@@ -43,15 +42,13 @@ const CORRECTION: KeySpec = KeySpec {
 
 const ORDER: KeySpec = KeySpec {
     name: "order",
-    kind: "list of every measured output",
-    shape: Shape::NAMES,
+    shape: Shape::As("list of every measured output", &Shape::NAMES),
     default: "searched",
     meaning: "the order of the blocks",
 };
 
 const GAIN: KeySpec = KeySpec {
     name: "gain",
-    kind: "`\"lmi\"`",
     shape: Shape::Word(&[LMI]),
     default: "by `k` or `k_poles`",
     meaning: "[a certified gain](certificates.md) instead of the paper's",

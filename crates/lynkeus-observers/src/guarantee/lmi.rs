@@ -29,7 +29,6 @@ const HALVINGS: usize = 9;
 
 const RATE: KeySpec = KeySpec {
     name: "rate",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "required with `\"lmi\"` unless `gain_limit` is given",
     meaning: "the decay to be proved, in 1/(unit of time)",
@@ -37,7 +36,6 @@ const RATE: KeySpec = KeySpec {
 
 const LIMIT: KeySpec = KeySpec {
     name: "gain_limit",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "none",
     meaning: "the largest entry of the gain K on ŷ − y, with `\"lmi\"`",
@@ -45,7 +43,6 @@ const LIMIT: KeySpec = KeySpec {
 
 const MINIMISE: KeySpec = KeySpec {
     name: "minimise",
-    kind: "`\"noise\"`, `\"gain\"`, `\"peak\"`",
     shape: Shape::Word(&["noise", "gain", "peak"]),
     default: "`\"noise\"`",
     meaning: "what the gain makes small at that rate, with `\"lmi\"`",

@@ -32,8 +32,10 @@ use crate::{KeySpec, Observer, Reason, Shape, Signal, Tuning, TuningError, Value
 /// Eigenvalues of M.
 pub(super) const POLES: KeySpec = KeySpec {
     name: "low_power_poles",
-    kind: "one list per chain of 2n − 2 negative numbers",
-    shape: Shape::ROWS,
+    shape: Shape::As(
+        "one list per chain of 2n − 2 negative numbers",
+        &Shape::ROWS,
+    ),
     default: "−1, −1, …",
     meaning: "with `form = \"low-power\"`: the eigenvalues of the form's error system",
 };
@@ -41,8 +43,10 @@ pub(super) const POLES: KeySpec = KeySpec {
 /// The coefficients themselves.
 pub(super) const GIVEN: KeySpec = KeySpec {
     name: "low_power_k",
-    kind: "one list per chain of a pair `[k1, k2]` per state but the last",
-    shape: Shape::List(&Shape::ROWS),
+    shape: Shape::As(
+        "one list per chain of a pair `[k1, k2]` per state but the last",
+        &Shape::List(&Shape::ROWS),
+    ),
     default: "by `low_power_poles`",
     meaning: "with `form = \"low-power\"`: its coefficients",
 };

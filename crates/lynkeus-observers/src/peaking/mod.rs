@@ -17,7 +17,6 @@ use crate::{Check, KeySpec, Shape, Statement, Tuning, TuningError, Value};
 
 const FORM: KeySpec = KeySpec {
     name: "form",
-    kind: "`\"standard\"`, `\"low-power\"`",
     shape: Shape::Word(&["standard", "low-power"]),
     default: "`\"standard\"`",
     meaning: "the observer with gains of order θ² at most, with `low_power_poles` or `low_power_k`",
@@ -99,8 +98,7 @@ impl Remedies {
 /// The study's key.
 pub(super) const LIMIT: KeySpec = KeySpec {
     name: "innovation_limit",
-    kind: "number > 0, or one per output",
-    shape: Shape::POSITIVES,
+    shape: Shape::As("number > 0, or one per output", &Shape::POSITIVES),
     default: "none",
     meaning: "the correction sees the innovation limited to ± this: a remedy against [peaking](peaking.md)",
 };

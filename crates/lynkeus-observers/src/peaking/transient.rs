@@ -10,15 +10,16 @@ use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 /// The study's key.
 pub(super) const TRANSIENT: KeySpec = KeySpec {
     name: "transient",
-    kind: "`{ theta = …, until = …, fall = … }`",
-    shape: Shape::Section(&[&[THETA, UNTIL, FALL]]),
+    shape: Shape::As(
+        "`{ theta = …, until = …, fall = … }`",
+        &Shape::Section(&[&[THETA, UNTIL, FALL]]),
+    ),
     default: "none",
     meaning: "another θ up to a time, then the study's; `fall` is the time constant of a smooth change",
 };
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
-    kind: "number > 0, or one per chain",
     shape: Shape::POSITIVES,
     default: REQUIRED,
     meaning: "θ at the start",
@@ -26,7 +27,6 @@ const THETA: KeySpec = KeySpec {
 
 const UNTIL: KeySpec = KeySpec {
     name: "until",
-    kind: "number",
     shape: Shape::Number,
     default: REQUIRED,
     meaning: "the time up to which it holds, on the axis of the study",
@@ -34,7 +34,6 @@ const UNTIL: KeySpec = KeySpec {
 
 const FALL: KeySpec = KeySpec {
     name: "fall",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "at once",
     meaning: "the time constant of the change",
