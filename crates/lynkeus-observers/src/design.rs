@@ -184,6 +184,12 @@ impl From<f64> for ParameterValue {
     }
 }
 
+impl From<Vec<f64>> for ParameterValue {
+    fn from(numbers: Vec<f64>) -> Self {
+        Self::Numbers(numbers)
+    }
+}
+
 /// Why there is no observer.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum DesignError {

@@ -40,10 +40,12 @@ pub use lynkeus_gain::integrators::Pole;
 pub use observer::{
     Estimate, FilterTuning, InputDerivative, Monitor, Observer, Sampled, Signal, Tunable, Tunables,
 };
-pub use statement::{
-    Check, Farza, Germani, Hammouri, Inequality, Lee, Ltaief, Reason, Statement, Weight,
-};
+pub use statement::{Check, Hammouri, Inequality, Lee, Reason, Statement, Weight};
 pub use tuning::{Initial, KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
+
+pub use drift_observable::Germani;
+pub use state_affine::Ltaief;
+pub use unknown_input::Farza;
 
 use block_triangular::BlockTriangular;
 use drift_observable::DriftObservable;

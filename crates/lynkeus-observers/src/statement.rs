@@ -7,6 +7,11 @@ use std::fmt;
 
 use lynkeus_structure::{Finding, Standing, Verdict, Witness, short};
 
+use crate::drift_observable::Germani;
+use crate::state_affine::Ltaief;
+use crate::unknown_input::Farza;
+use crate::{drift_observable, state_affine, unknown_input};
+
 /// What has to hold: a condition of a family or a hypothesis of a theorem.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -61,6 +66,26 @@ pub enum Reason {
     Text(String),
     /// found in the structure of the plant
     Structure(lynkeus_structure::Reason),
+    /// a number that has to be at most a limit, and is or not
+    AtMost {
+        /// the number
+        found: f64,
+        /// what it is held against
+        limit: f64,
+    },
+    /// a number that has to be at least another, and is or not
+    AtLeast {
+        /// the number
+        found: f64,
+        /// what it is held against
+        least: f64,
+    },
+    /// of the family `state-affine`
+    StateAffine(state_affine::Said),
+    /// of the family `unknown-input`
+    UnknownInput(unknown_input::Said),
+    /// of the family `drift-observable`
+    DriftObservable(drift_observable::Said),
 }
 
 impl Reason {
@@ -69,6 +94,7 @@ impl Reason {
         match self {
             Self::Text(text) => text,
             Self::Structure(reason) => reason.text(),
+            said => format!("{said:?}"),
         }
     }
 }
@@ -88,6 +114,24 @@ impl From<&str> for Reason {
 impl From<lynkeus_structure::Reason> for Reason {
     fn from(reason: lynkeus_structure::Reason) -> Self {
         Self::Structure(reason)
+    }
+}
+
+impl From<state_affine::Said> for Reason {
+    fn from(said: state_affine::Said) -> Self {
+        Self::StateAffine(said)
+    }
+}
+
+impl From<unknown_input::Said> for Reason {
+    fn from(said: unknown_input::Said) -> Self {
+        Self::UnknownInput(said)
+    }
+}
+
+impl From<drift_observable::Said> for Reason {
+    fn from(said: drift_observable::Said) -> Self {
+        Self::DriftObservable(said)
     }
 }
 
@@ -210,9 +254,9 @@ impl fmt::Display for Statement {
             Self::Inequality(part) => part.fmt(f),
             Self::Hammouri(part) => part.fmt(f),
             Self::Lee(part) => part.fmt(f),
-            Self::Ltaief(part) => part.fmt(f),
-            Self::Farza(part) => part.fmt(f),
-            Self::Germani(part) => part.fmt(f),
+            Self::Ltaief(part) => write!(f, "{part:?}"),
+            Self::Farza(part) => write!(f, "{part:?}"),
+            Self::Germani(part) => write!(f, "{part:?}"),
         }
     }
 }
@@ -342,110 +386,10 @@ impl fmt::Display for Lee {
     }
 }
 
-/// Of Ltaief, Maatoug, Farza, Ménard, M'Saad and Koubaa.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Ltaief {
-    /// F_k hides no direction of the next block
-    BlockShows {
-        /// k, counted from 0
-        factor: usize,
-        /// the block, as declared
-        states: Vec<String>,
-    },
-    /// bounds of C and F
-    A1,
-    /// bounds of the uncertainty
-    A3,
-    /// the excitation
-    A4,
-    /// θ is large enough
-    Theta {
-        /// of the study
-        θ: f64,
-    },
-}
-
 impl From<Ltaief> for Statement {
     fn from(part: Ltaief) -> Self {
         Self::Ltaief(part)
     }
-}
-
-impl fmt::Display for Ltaief {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::BlockShows { factor, states } => write!(
-                f,
-                "F_{factor} ξ ≠ 0 for every direction ξ of ({})",
-                states.join(", ")
-            ),
-            Self::A1 => f.write_str("C(u) and F(u, x) are bounded on the box (A1)"),
-            Self::A3 => {
-                f.write_str("what acts on the plant unknown to the observer is bounded (A3)")
-            }
-            Self::A4 => f.write_str("persistent excitation (A4): S(t) ≥ λ_m I"),
-            Self::Theta { θ } => write!(f, "θ = {} is large enough: μ_θ > 0", short(*θ)),
-        }
-    }
-}
-
-/// Of Farza, M'Saad, Liu and Targui.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Farza {
-    /// rank of a layer in the next
-    H1 {
-        /// counted from 1
-        layer: usize,
-        /// states of the next layer
-        rank: usize,
-    },
-    /// a layer tells the next
-    H2 {
-        /// counted from 1
-        layer: usize,
-    },
-    /// the unknown inputs show in x₁¹
-    H4i {
-        /// number of unknown inputs
-        rank: usize,
-    },
-    /// they and the next layer do together
-    H4ii {
-        /// states of the second layer and unknown inputs
-        rank: usize,
-    },
-    /// the rest of the outputs tells the second layer
-    Eleven {
-        /// states of the second layer
-        rank: usize,
-    },
-    /// a chain that ends early
-    ShortenedChain {
-        /// the last of the chain
-        layer: usize,
-        /// how many there are
-        gains: usize,
-    },
-    /// what Λ₂⁺ leaves out does no harm
-    LeftInverse,
-    /// the proof meets Λ₂ there
-    Regular,
-    /// G₁¹, Λ₂ and Z
-    Continuous,
-    /// of the proof
-    Constants,
-    /// the unknown inputs are slow
-    H5,
-    /// the study gives θ
-    ThetaGiven,
-    /// θ₁ is large enough
-    Theta1,
-    /// θ₂ is large enough
-    Theta2,
-    /// by more than rounding
-    Rate,
 }
 
 impl From<Farza> for Statement {
@@ -454,140 +398,10 @@ impl From<Farza> for Statement {
     }
 }
 
-impl fmt::Display for Farza {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::H1 { layer, rank } => write!(
-                f,
-                "(H1) rank ∂f{}/∂x{} = {rank}",
-                superscript(*layer),
-                superscript(layer + 1)
-            ),
-            Self::H2 { layer } => write!(
-                f,
-                "(H2) x{} ↦ f{} is one to one",
-                superscript(layer + 1),
-                superscript(*layer)
-            ),
-            Self::H4i { rank } => write!(f, "(H4) (i) rank G₁¹ = {}", rank),
-            Self::H4ii { rank } => write!(f, "(H4) (ii) rank (∂f̃¹/∂x² G¹) = {}", rank),
-            Self::Eleven { rank } => write!(f, "(11) rank ∂f̄₁²/∂x² = {}", rank),
-            Self::ShortenedChain { layer, gains } => write!(
-                f,
-                "the chain that ends in layer {layer} is stable with the first {layer} of the gains of {gains}: Routh's numbers are positive"
-            ),
-            Self::LeftInverse => {
-                f.write_str("Λ₂Λ₂⁺ = I, or it leaves whole chains: the step to (24)")
-            }
-            Self::Regular => {
-                f.write_str("Λ₂ is regular for estimates that differ from the measured signals")
-            }
-            Self::Continuous => {
-                f.write_str("what the proof differentiates has values on the box and does not jump")
-            }
-            Self::Constants => f.write_str("c1, c2, c4 and c5 are finite on the box"),
-            Self::H5 => f.write_str("(H5) v' is bounded"),
-            Self::ThetaGiven => f.write_str("θ1 ≥ θ1*"),
-            Self::Theta1 => f.write_str("θ1 ≥ θ1* = c1 + (c2 + c5)²θ2²/(4(θ2 − c4))"),
-            Self::Theta2 => f.write_str("θ2 ≥ θ2* = max(1, c4)"),
-            Self::Rate => f.write_str("λ > 0"),
-        }
-    }
-}
-
-/// Of Germani and Manes.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Germani {
-    /// Definition 2.2
-    Degree,
-    /// drift-observability
-    Regular,
-    /// the same for points far apart: Definition 2.1 asks for a diffeomorphism
-    OneToOne,
-    /// Φ̄ along the plant
-    Continuous,
-    /// what (3.1) asks of the input
-    SmallInput,
-    /// what (4.1) and (4.22) ask of the input
-    UniformlyObservable,
-    /// the same for bounded inputs
-    RegularWithin,
-    /// the remainder
-    ContinuousRows,
-    /// u, u', …
-    InputDerivatives,
-    /// hypothesis 1
-    Inverse,
-    /// hypothesis 2
-    LastRows,
-    /// there are gains
-    Gains,
-    /// hypothesis 4
-    Riccati,
-    /// the same with the input
-    Input,
-    /// the filter's inequality
-    Filter,
-}
-
 impl From<Germani> for Statement {
     fn from(part: Germani) -> Self {
         Self::Germani(part)
     }
-}
-
-impl fmt::Display for Germani {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Degree => {
-                f.write_str("the observation relative degree r is known (Definition 2.2)")
-            }
-            Self::Regular => f.write_str("Q(x) is regular on the box (drift-observable)"),
-            Self::OneToOne => f.write_str(
-                "the map to the outputs' derivatives is one-to-one on the box (Definition 2.1)",
-            ),
-            Self::Continuous => f.write_str(
-                "the map to the outputs' derivatives has values on the box and does not jump",
-            ),
-            Self::SmallInput => f.write_str("r = n, or the input is small (Theorem 3.3)"),
-            Self::UniformlyObservable => {
-                f.write_str("Q̄(x, U) is regular on the box for every U (uniformly observable)")
-            }
-            Self::RegularWithin => {
-                f.write_str("Q̄(x, U) is regular on the box for U within its bounds")
-            }
-            Self::ContinuousRows => {
-                f.write_str("the last rows have values on the box and do not jump")
-            }
-            Self::InputDerivatives => f.write_str("the derivatives of the inputs are bounded"),
-            Self::Inverse => f.write_str(
-                "the map from x to the output's derivatives has a Lipschitz inverse on the box",
-            ),
-            Self::LastRows => f.write_str("the last rows are Lipschitz in these coordinates"),
-            Self::Gains => f.write_str("K and P solve the Riccati inequality"),
-            Self::Riccati => f.write_str("γ ≤ γ*: K and some P > 0 solve the Riccati inequality"),
-            Self::Input => f.write_str("|u| ≤ u_M"),
-            Self::Filter => f.write_str("K2 and P_a solve (4.27)"),
-        }
-    }
-}
-
-/// ¹, ², …
-fn superscript(k: usize) -> String {
-    let digit = |c: char| match c {
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        '4' => '⁴',
-        '5' => '⁵',
-        '6' => '⁶',
-        '7' => '⁷',
-        '8' => '⁸',
-        '9' => '⁹',
-        _ => '⁰',
-    };
-    k.to_string().chars().map(digit).collect()
 }
 
 /// Of the certificate by linear matrix inequalities.

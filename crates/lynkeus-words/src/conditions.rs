@@ -2,11 +2,18 @@
 
 use lynkeus_observers::{Check, DesignError, Examination, ParameterValue, Reason, Statement};
 
+use lynkeus_structure::short;
+
 use crate::Words;
 
 impl Words for Statement {
     fn words(&self) -> String {
-        self.to_string()
+        match self {
+            Statement::Ltaief(part) => part.words(),
+            Statement::Farza(part) => part.words(),
+            Statement::Germani(part) => part.words(),
+            other => other.to_string(),
+        }
     }
 }
 
@@ -15,6 +22,17 @@ impl Words for Reason {
         match self {
             Reason::Text(text) => text.clone(),
             Reason::Structure(reason) => reason.words(),
+            Reason::AtMost { found, limit } => {
+                let sign = if found <= limit { "≤" } else { ">" };
+                format!("{} {sign} {}", short(*found), short(*limit))
+            }
+            Reason::AtLeast { found, least } => {
+                let sign = if found >= least { "≥" } else { "<" };
+                format!("{} {sign} {}", short(*found), short(*least))
+            }
+            Reason::StateAffine(said) => said.words(),
+            Reason::UnknownInput(said) => said.words(),
+            Reason::DriftObservable(said) => said.words(),
         }
     }
 }
@@ -47,8 +65,11 @@ impl Words for ParameterValue {
 
 /// `1, 2.5`
 pub(crate) fn listed(numbers: &[f64]) -> String {
-    let numbers: Vec<String> = numbers.iter().map(f64::to_string).collect();
-    numbers.join(", ")
+    let number = |x: &f64| match x.is_finite() {
+        true => x.to_string(),
+        false => "beyond the range of numbers".to_owned(),
+    };
+    numbers.iter().map(number).collect::<Vec<_>>().join(", ")
 }
 
 fn refusal(examination: &Examination) -> String {

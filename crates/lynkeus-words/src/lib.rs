@@ -3,10 +3,22 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod conditions;
+mod drift_observable;
+mod state_affine;
 mod structure;
+mod unknown_input;
 
 /// What has words.
 pub trait Words {
     /// As people read it, without a full stop.
     fn words(&self) -> String;
+}
+
+/// `(x1, x2) → (x3)`: lists of names that lead from one to the next.
+fn arrows(lists: &[Vec<String>]) -> String {
+    let each: Vec<String> = lists
+        .iter()
+        .map(|names| format!("({})", names.join(", ")))
+        .collect();
+    each.join(" → ")
 }

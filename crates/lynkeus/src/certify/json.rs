@@ -86,7 +86,7 @@ fn sampling(intervals: Intervals) -> Value {
 
 fn hypothesis(check: &Check) -> Value {
     let mut entry = json!({
-        "name": check.statement.to_string(),
+        "name": check.statement.words(),
         "verdict": check.verdict.word(),
         "detail": check.reason.words(),
     });

@@ -48,7 +48,7 @@ impl Report {
 fn family(examination: &Examination) -> Value {
     let check = |check: &Check| {
         let mut entry = json!({
-            "name": check.statement.to_string(),
+            "name": check.statement.words(),
             "verdict": check.verdict.word(),
             "detail": check.reason.words(),
         });

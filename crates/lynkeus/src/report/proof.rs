@@ -120,7 +120,7 @@ pub(super) fn conditions<'a>(html: &mut Html, checks: impl IntoIterator<Item = &
         }
         vec![
             Cell::Verdict(check.verdict.word()),
-            Cell::from(check.statement.to_string()),
+            Cell::from(check.statement.words()),
             Cell::from(detail),
         ]
     };
