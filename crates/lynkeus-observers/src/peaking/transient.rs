@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use lynkeus_expr::Node;
 
 use crate::estimate::{PlantCopy, Speed};
-use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
+use crate::{KeySpec, ParameterValue, REQUIRED, Shape, Tuning, TuningError, Value};
 
 /// The study's key.
 pub(super) const TRANSIENT: KeySpec = KeySpec {
@@ -108,13 +108,13 @@ impl Transient {
     }
 
     /// For the reader.
-    pub fn parameter(&self) -> (String, String) {
-        let θ: Vec<String> = self.θ.iter().map(f64::to_string).collect();
-        let mut text = format!("{} until t = {}", θ.join(", "), self.until);
-        if let Some(fall) = self.fall {
-            text += &format!(", then to θ with the time constant {fall}");
-        }
-        ("θ in the transient".to_owned(), text)
+    pub fn parameter(&self) -> (String, ParameterValue) {
+        let value = ParameterValue::Transient {
+            θ: self.θ.clone(),
+            until: self.until,
+            fall: self.fall,
+        };
+        ("θ in the transient".to_owned(), value)
     }
 }
 

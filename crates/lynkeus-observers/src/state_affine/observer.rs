@@ -58,7 +58,7 @@ use super::said::Said;
 use super::settings::Settings;
 use crate::conditions::names;
 use crate::estimate::{PlantCopy, Speed};
-use crate::printed::{StartPoint, expressions, numbers};
+use crate::printed::{StartPoint, expressions};
 use crate::{Design, DesignError, Examination, Monitor, ParameterValue, Signal};
 
 pub(super) const NAME: &str = "state-affine";
@@ -114,16 +114,16 @@ pub(super) fn assemble(
     let [C, F] = matrices.map(|A| Matrix::from_fn(graph, (A.len(), order.len()), |i, j| A[i][j]));
     let gain = gain(&start.values(&C)?, form, study, &S0);
     let mut parameters: Vec<(String, ParameterValue)> = vec![("θ".into(), study.into())];
-    let mut add = |name: &str, value: String| parameters.push((name.to_owned(), value.into()));
-    add("blocks", form.describe(augmented));
-    add("alarm", format!("excitation below {alarm:.3e}"));
-    add("rows", named.join(", "));
+    let mut add = |name: &str, value| parameters.push((name.to_owned(), value));
+    add("blocks", ParameterValue::Blocks(examination.chains.clone()));
+    add("alarm", ParameterValue::Alarm(alarm));
+    add("rows", named.into());
     add("C(u)", expressions(&C));
     if form.factors.len() > 1 {
         add("F(u, x)", expressions(&F));
     }
-    add("S(0)", numbers(&product(&S0)));
-    add("θΔ⁻¹S⁻¹Cᵀ at the start", numbers(&gain));
+    add("S(0)", ParameterValue::Matrix(product(&S0)));
+    add("θΔ⁻¹S⁻¹Cᵀ at the start", ParameterValue::Matrix(gain));
     Ok(Design {
         observer,
         notes: outside_last(augmented, form)
