@@ -224,9 +224,9 @@ fn a_missing_box_is_named() {
         slopes.reason.words()
     );
     assert!(
-        found.notes[0].contains("1 of 2 partials"),
+        found.notes[0].words().contains("1 of 2 partials"),
         "{}",
-        found.notes[0]
+        found.notes[0].words()
     );
 }
 
