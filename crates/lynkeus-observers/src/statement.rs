@@ -380,7 +380,10 @@ mod tests {
             (vec![holding(), failing().advisory()], Standing::Undecided),
             (vec![failing(), holding()], Standing::Refuted),
             (
-                vec![undecided(Germani::Degree, Reason::Assumed), failing().advisory()],
+                vec![
+                    undecided(Germani::Degree, Reason::Assumed),
+                    failing().advisory(),
+                ],
                 Standing::Undecided,
             ),
             (vec![holding().advisory()], Standing::Proved),

@@ -10,7 +10,7 @@
 use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::interval::Intervals;
-use lynkeus_expr::{Algebra, Binary, Graph, Interval, MissingInput, Node, Op, Tape, Unary};
+use lynkeus_expr::{Algebra, Binary, Call, Graph, Interval, MissingInput, Node, Op, Tape, Unary};
 
 use crate::jumps::{meets, without_removable_jumps};
 use crate::region::{Cell, Question};
@@ -189,9 +189,7 @@ pub fn steps(graph: &Graph, node: Node, symbols: &[Node]) -> bool {
                 ..,
             ) => depends(n),
             Op::Select(condition, ..) => depends(condition),
-            Op::Implicit(_) => graph
-                .implicit_call(n)
-                .is_some_and(|call| call.function.steps() && depends(n)),
+            Op::System(_) => graph.jumps(n) && depends(n),
             _ => false,
         })
 }
@@ -355,7 +353,7 @@ impl<'g> Walk<'g> {
             Op::Binary(op, ..) => Intervals.binary(op, &of(0), &of(1)),
             Op::Select(..) => Intervals.select(&of(0), &of(1), &of(2)),
             // a system has no value of its own, and must not pass for a constant
-            Op::Solve(_) | Op::Implicit(_) => Interval::ENTIRE,
+            Op::System(_) => Interval::ENTIRE,
             Op::Entry(_, i) => {
                 let entry = self.solved[step.arguments[0]].get(i as usize);
                 entry.copied().unwrap_or(Interval::UNKNOWN)
@@ -367,19 +365,15 @@ impl<'g> Walk<'g> {
         let step = &self.steps[i];
         let arguments = step.arguments.iter();
         let values: Vec<Interval> = arguments.map(|&a| self.known[a].values).collect();
-        if let Some(call) = self.graph.implicit_call(step.node) {
-            return Intervals.implicit(&call.function, &values);
+        let call = self.graph.system(step.node);
+        if let Some(function) = call.as_ref().and_then(Call::function) {
+            return Intervals.implicit(function, &values);
         }
-        let n = self.unknowns(step.node);
+        let n = call.map_or(0, |call| call.size());
         let (A, b) = values.split_at(n * n);
         let (mut x, condition) = Intervals.solve(A, b);
         x.push(condition);
         x
-    }
-
-    /// Number of unknowns of a linear system.
-    fn unknowns(&self, system: Node) -> usize {
-        self.graph.system(system).map_or(0, |system| system.size())
     }
 
     fn continuous(&self, step: &Step, values: Interval) -> bool {
@@ -412,11 +406,12 @@ impl<'g> Walk<'g> {
             // the condition estimate steps with the pivots; a root that is the only one of
             // equations that do not jump moves with them
             Op::Entry(system, i) => {
-                let linear = matches!(self.steps[step.arguments[0]].op, Op::Solve(_));
-                let last = linear && i as usize == self.unknowns(system);
+                // an implicit function has none
+                let call = self.graph.system(system);
+                let last = call.is_some_and(|call| i as usize == call.size());
                 of(0).continuous && values.is_defined() && !last
             }
-            Op::Unary(..) | Op::Powi(..) | Op::Binary(..) | Op::Solve(_) | Op::Implicit(_) => {
+            Op::Unary(..) | Op::Powi(..) | Op::Binary(..) | Op::System(_) => {
                 let mut arguments = step.arguments.iter();
                 arguments.all(|&a| self.known[a].continuous)
             }

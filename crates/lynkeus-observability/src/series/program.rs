@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{E, LN_2, LN_10, PI};
 
-use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
+use lynkeus_expr::{Binary, Call, Graph, Node, Op, Unary};
 
 use crate::Note;
 use crate::series::functions::Inverse;
@@ -185,8 +185,7 @@ impl Builder<'_> {
                 true => of(self, a),
                 false => of(self, b),
             },
-            Op::Solve(_) => return self.solve(node),
-            Op::Implicit(_) => return Err(Note::Loop(self.graph.render(node, 60))),
+            Op::System(_) => return self.solve(node),
             Op::Entry(solve, i) => {
                 let solution = self.solutions.get(&solve);
                 let slot = solution.and_then(|x| x.get(i as usize));
@@ -286,15 +285,15 @@ impl Builder<'_> {
 
     /// Gaussian elimination; pivots are generic, so that only structural zeros matter.
     fn solve(&mut self, node: Node) -> Result<(), Note> {
-        let Some(system) = self.graph.system(node) else {
-            return Ok(());
+        let call = self.graph.system(node);
+        let Some((a, b)) = call.as_ref().and_then(Call::linear) else {
+            return Err(Note::Loop(self.graph.render(node, 60)));
         };
-        let n = system.size();
+        let n = b.len();
         let zero = |builder: &Self, slot: usize| matches!(builder.program.steps[slot], Step::Constant(c) if c.is_zero());
         let mut rows: Vec<Vec<usize>> = (0..n)
             .map(|i| {
-                let row = &system.matrix()[i * n..(i + 1) * n];
-                let row = row.iter().chain(&system.right()[i..=i]);
+                let row = a[i * n..(i + 1) * n].iter().chain(&b[i..=i]);
                 row.map(|node| self.slots[node]).collect()
             })
             .collect();
