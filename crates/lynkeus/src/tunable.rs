@@ -5,10 +5,10 @@ use lynkeus_observers::{Design, Tunable, Tuning};
 use lynkeus_run::{Blueprint, Updates};
 
 use crate::Error;
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, StudyDesign};
 
 /// The design with what may be changed as symbols.
-pub(crate) fn design(prepared: &Prepared<'_>) -> Result<Design, Error> {
+pub(crate) fn design(prepared: &Prepared<'_>) -> Result<StudyDesign, Error> {
     let tuning = Tuning {
         tunable: true,
         ..prepared.study().observer.tuning.clone()

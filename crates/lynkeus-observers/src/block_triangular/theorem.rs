@@ -11,18 +11,19 @@ use lynkeus_proof::magnitude::{plus, product, times};
 use lynkeus_proof::matrix::{square, sum};
 use lynkeus_proof::search::{first, lightest};
 use lynkeus_proof::{lyapunov, metzler};
-use lynkeus_structure::{AugmentedPlant, Blocks, Standing, short};
+use lynkeus_structure::{AugmentedPlant, Blocks, Standing};
 use nalgebra::DMatrix;
 
 use super::form::chain_rule;
-use super::settings::{Correction, Settings};
+use super::said::{Correction, Lee, Said};
+use super::settings::Settings;
 use super::transformed::{Plant, Similar, Table, Term};
-use crate::conditions::{GainedChain, Partial, names, output_slope, partials};
-use crate::estimate::{Common, box_note};
+use crate::conditions::{GainedChain, Partial, along, names};
+use crate::estimate::Common;
 use crate::peaking::departure;
 use crate::statement::{proved, standing, undecided};
 use crate::theorem::{conclude, slopes, state_noise};
-use crate::{Assumptions, Certificate, Check, Constant, DesignError, Lee, estimate};
+use crate::{Assumptions, Certificate, Check, Constant, DesignError, Reason, estimate};
 
 pub(super) const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
 
@@ -65,7 +66,7 @@ pub(super) struct Study<'a> {
     /// in the order of the blocks
     pub θ: Vec<f64>,
     /// what breaks Lemma 2's rule
-    rule: Option<String>,
+    rule: Option<Reason>,
 }
 
 /// Everything that does not depend on θ.
@@ -107,17 +108,16 @@ impl Study<'_> {
         let augmented = self.plant.augmented;
         let region = &self.plant.assumptions.region;
         let order = &self.blocks().order;
-        let (mut checks, mut ranges): (Vec<Check>, Vec<Vec<(f64, f64)>>) = (vec![], vec![]);
-        for (output, chain) in order {
-            checks.extend(output_slope(augmented, *output, region)?);
-            let (found, signs) = partials(augmented, &chain.states, region)?;
-            checks.extend(signs);
-            ranges.push(match self.classical {
-                // M takes the partials out: a chain of integrators is left
-                false => vec![(1.0, 1.0); found.len()],
-                true => found.iter().map(Partial::range).collect(),
-            });
-        }
+        let places = order.iter().map(|(output, c)| (*output, &c[..]));
+        let (partials, mut checks) = along(augmented, places, region)?;
+        let range = |partial: &Partial| match self.classical {
+            // M takes the partials out: a chain of integrators is left
+            false => (1.0, 1.0),
+            true => partial.range(),
+        };
+        let ranges = partials
+            .iter()
+            .map(|chain| chain.iter().map(range).collect());
         let (plain, check) = slopes(augmented, region, |a, b| self.skipped(a, b))?;
         checks.push(check);
         let similar: Vec<Similar> = match self.classical {
@@ -137,7 +137,7 @@ impl Study<'_> {
         }
         Ok(Facts {
             checks,
-            partials: ranges,
+            partials: ranges.collect(),
             similar,
             terms,
         })
@@ -146,18 +146,15 @@ impl Study<'_> {
     /// The partial along a chain, which is in A, and measured heads of later chains.
     fn skipped(&self, row: usize, column: usize) -> bool {
         let order = &self.blocks().order;
-        let place = |state: usize| order.iter().position(|(_, c)| c.states.contains(&state));
+        let place = |state: usize| order.iter().position(|(_, c)| c.contains(&state));
         let along = order
             .iter()
-            .any(|(_, c)| c.states.windows(2).any(|p| p == [row, column]));
+            .any(|(_, c)| c.windows(2).any(|p| p == [row, column]));
         along || place(column) > place(row)
     }
 
     fn unbounded(&self) -> Check {
-        undecided(
-            Lee::Assumption1,
-            "they have none: declare min and max of the states that M depends on and of the chains' heads; where M depends on an input, bound its derivative under `input_derivatives` in [certify]; correction = \"classical\" needs none of this",
-        )
+        undecided(Lee::Assumption1, Said::NoBounds)
     }
 
     /// P_i and μ_i of the first inequality, where it holds for every chain.
@@ -168,7 +165,7 @@ impl Study<'_> {
     ) -> Option<(Vec<DMatrix<f64>>, Vec<f64>)> {
         let (mut all, mut decays) = (vec![], vec![]);
         for (i, (_, chain)) in self.blocks().order.iter().enumerate() {
-            let states = names(self.plant.augmented, &chain.states);
+            let states = names(self.plant.augmented, chain);
             let name = Lee::Lyapunov { states };
             let gained = GainedChain {
                 K: &self.plant.K[i],
@@ -183,22 +180,18 @@ impl Study<'_> {
             });
             match found {
                 Some((P, μ)) => {
-                    let detail = format!("≤ −{}·diag(P), for every ∂f/∂x along the chain", short(μ));
-                    checks.push(proved(name, detail));
+                    checks.push(proved(name, Said::Decays(μ)));
                     all.push(P);
                     decays.push(μ);
                 }
-                None => checks.push(undecided(
-                    name,
-                    "not with the P of the middle of the partials' bounds: K does not stabilise the chain, or (classical observer) the partials vary too much",
-                )),
+                None => checks.push(undecided(name, Said::NoDecay)),
             }
         }
         (all.len() == self.θ.len()).then_some((all, decays))
     }
 
     fn chain(&self, i: usize, facts: &Facts, P: &DMatrix<f64>, θ: f64, c: f64) -> Chain {
-        let states = self.blocks().order[i].1.states.clone();
+        let states = self.blocks().order[i].1.clone();
         let speed = Interval::point(θ);
         let weighed = |i, j| Interval::point(c) * Interval::point(P[(i, j)]);
         let error = Interval::new(1.0 - 1e-12, 1.0 + 1e-12).unwrap_or(Interval::ONE);
@@ -267,20 +260,20 @@ impl Study<'_> {
             ));
         }
         if let Some(θ0) = θ0 {
-            let exponents: Vec<String> = ν.iter().map(|&ν| short(ν)).collect();
-            let meaning = format!(
-                "the decay is proved for θ_i = θ^ν_i, ν = ({}), and every θ from here on",
-                exponents.join(", ")
-            );
-            constants.push(Constant::new("θ0", θ0, meaning));
+            constants.push(Constant {
+                name: "θ0".to_owned(),
+                value: θ0,
+                meaning: "the decay is proved for θ_i = θ^ν_i, ν = ({}), and every θ from here on"
+                    .to_owned(),
+                numbers: ν.to_vec(),
+            });
         }
         let name = Lee::Theta {
             θ: self.θ.clone()
         };
         checks.push(match (σ, θ0) {
-            (Some(_), _) => proved(name, "the comparison matrix is negative definite"),
-            (None, Some(θ0)) => undecided(name, format!("proved from θ1 = θ0 = {} on (the others in proportion of their logarithms); the theorem is sufficient, not necessary", short(θ0))),
-            (None, None) => undecided(name, "no θ0 was found: in this box the bound of Ṁ or of the couplings grows as fast as the decay. The theorem is sufficient, not necessary"),
+            (Some(_), _) => proved(name, Said::NegativeDefinite),
+            (None, θ0) => undecided(name, Said::Threshold(θ0)),
         });
         σ.map(|σ| (σ, self.chains(facts, P, &self.θ, &c)))
     }
@@ -290,7 +283,7 @@ impl Study<'_> {
     fn falls(&self, facts: &Facts, ν: &[f64]) -> bool {
         let place = |state: usize| {
             let mut chains = self.blocks().order.iter().enumerate();
-            chains.find_map(|(i, (_, c))| Some((i, c.states.iter().position(|s| *s == state)? + 1)))
+            chains.find_map(|(i, (_, c))| Some((i, c.iter().position(|s| *s == state)? + 1)))
         };
         facts.terms.iter().all(|term| {
             let (Some((i, l)), Some((k, m))) = (place(term.row), place(term.column)) else {
@@ -305,23 +298,22 @@ impl Study<'_> {
     }
 
     /// Where the estimate may be: M of observer (7) moves with it, so the box bounds it.
-    fn place(&self) -> String {
+    fn place(&self) -> Reason {
         match self.classical {
             true => {
                 let region = &self.plant.assumptions.region;
                 estimate::note(self.common, self.plant.augmented, region)
             }
-            false => box_note(self.common.clamp),
+            false => Reason::InTheBox {
+                clamp: self.common.clamp,
+            },
         }
     }
 
-    fn notes(&self) -> Vec<String> {
-        let mut notes = vec![self.place()];
-        notes.extend(self.rule.clone());
-        if !self.classical {
-            notes.push("Observer (7): M(x̂) moves with the correction, so its derivative grows with θ and with the error (the paper's Lemma 2 ii takes it as bounded independently of θ). The bound used here is that of the declared box, |y − x̂_1| at most the width of the range of x_1: a proof for that box, not a global one. Narrow ranges make it sharper; correction = \"classical\" does without.".into());
-        }
-        notes
+    fn notes(&self) -> Vec<Reason> {
+        let moving = (!self.classical).then(|| Said::MovingM.into());
+        let notes = std::iter::once(self.place()).chain(self.rule.clone());
+        notes.chain(moving).collect()
     }
 }
 
@@ -386,10 +378,7 @@ impl Study<'_> {
 
     /// ‖Δ_i H_ij Δ_j⁻¹‖ at the study's θ.
     fn scaled_norm(&self, facts: &Facts, i: usize, j: usize) -> f64 {
-        let (rows, columns) = (
-            &self.blocks().order[i].1.states,
-            &self.blocks().order[j].1.states,
-        );
+        let (rows, columns) = (&self.blocks().order[i].1, &self.blocks().order[j].1);
         let mut H = vec![vec![0.0; columns.len()]; rows.len()];
         for term in &facts.terms {
             let l = rows.iter().position(|s| *s == term.row);
@@ -466,12 +455,9 @@ impl Study<'_> {
             let Some(similar) = facts.similar.get(i) else {
                 continue;
             };
-            let count = Interval::point(chain.states.len() as f64);
-            for (&state, row) in chain.states.iter().zip(&similar.M) {
-                let terms = row
-                    .iter()
-                    .zip(&chain.states)
-                    .filter(|(_, k)| given[**k] > 0.0);
+            let count = Interval::point(chain.len() as f64);
+            for (&state, row) in chain.iter().zip(&similar.M) {
+                let terms = row.iter().zip(chain).filter(|(_, k)| given[**k] > 0.0);
                 let terms =
                     terms.map(|(m, k)| Interval::point(*m).powi(2) * Interval::point(given[*k]));
                 found[state] = (count * sum(terms)).hi();
@@ -488,10 +474,10 @@ impl Study<'_> {
         let mut drift = vec![0.0; self.plant.augmented.states.len()];
         for (i, (_, chain)) in order.iter().enumerate() {
             let mut column: Table = vec![];
-            for &state in &chain.states {
+            for &state in chain {
                 let mut d = Interval::point(given.get(state).copied().unwrap_or(f64::INFINITY));
                 for (k, (_, later)) in order.iter().enumerate().skip(i + 1) {
-                    let slope = self.plant.jacobian(&[state], &later.states[..1])?[0][0];
+                    let slope = self.plant.jacobian(&[state], &later[..1])?[0][0];
                     if slope != 0.0 && self.plant.noise[k] != 0.0 {
                         d = d + Interval::point(slope) * Interval::point(self.plant.noise[k]);
                     }
@@ -500,9 +486,9 @@ impl Study<'_> {
             }
             let (column, L) = match facts.similar.get(i) {
                 Some(similar) => (product(&similar.M, &column), similar.L.clone()),
-                None => (column, vec![0.0; chain.states.len()]),
+                None => (column, vec![0.0; chain.len()]),
             };
-            for ((&state, d), l) in chain.states.iter().zip(column).zip(L) {
+            for ((&state, d), l) in chain.iter().zip(column).zip(L) {
                 let noisy = times(l, self.plant.noise[i]);
                 drift[state] = plus(d[0], noisy);
             }

@@ -16,6 +16,7 @@
 //! Beyond the print: C(u) need not be square, and y = C(u)x + d(u) is understood.
 
 mod observer;
+mod said;
 mod settings;
 mod theorem;
 
@@ -26,10 +27,11 @@ use crate::design::{Found, Searched};
 use crate::family::Stages;
 use crate::statement::standing;
 use crate::{
-    Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Ltaief, Statement, Tuning,
+    Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Statement, Tuning,
     TuningError,
 };
 use observer::{NAME, assemble};
+pub use said::{Ltaief, Said};
 use settings::Settings;
 use theorem::BASIS;
 
@@ -80,12 +82,10 @@ impl Stages for StateAffine {
 }
 
 /// The blocks with what is known of A2 and A4.
-pub(crate) fn form(augmented: &AugmentedPlant<'_>, region: &Region) -> Searched<Superdiagonal> {
+fn form(augmented: &AugmentedPlant<'_>, region: &Region) -> Searched<Superdiagonal> {
     let form = match superdiagonal::find(augmented) {
         Ok(form) => form,
-        Err(summary) => {
-            return Ok(Err(Examination::unfit(NAME, summary, vec![])));
-        }
+        Err(summary) => return Ok(Err(Examination::unfit(NAME, summary, vec![]))),
     };
     let mut checks = vec![];
     for (k, factor) in form.factors.iter().enumerate() {
@@ -98,13 +98,15 @@ pub(crate) fn form(augmented: &AugmentedPlant<'_>, region: &Region) -> Searched<
         let found = factor.column_rank(augmented, k, region)?;
         checks.push(Statement::from(statement).with(found));
     }
-    let excited = standing(&checks) == Standing::Undecided;
+    let depends_on_inputs = standing(&checks) == Standing::Undecided;
     checks.push(lipschitz(augmented, region)?);
-    let mut summary = form.describe(augmented);
-    if excited {
-        summary += "; which inputs suffice depends on their excitation (A4), which the monitor 'excitation' watches";
-    }
     let chains = form.declared().map(|block| names(augmented, &block));
-    let examination = Examination::new(augmented, region, NAME, summary, chains.collect(), checks)?;
+    let chains: Vec<Vec<String>> = chains.collect();
+    let blocks = chains.clone();
+    let summary = Said::Form {
+        blocks,
+        depends_on_inputs,
+    };
+    let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
     Ok(Ok(Found { form, examination }))
 }

@@ -50,13 +50,16 @@
 
 use lynkeus_expr::{Expr, Graph, Node, jacobian};
 use lynkeus_gain::UnitFactor;
-use lynkeus_structure::{AugmentedPlant, Matrix, Superdiagonal, range};
+use lynkeus_proof::matrix::square;
+use lynkeus_structure::output_map::Rows;
+use lynkeus_structure::{AugmentedPlant, Matrix, Measurement, Superdiagonal, range};
 
-use super::settings::{Numbers, Settings};
+use super::said::Said;
+use super::settings::Settings;
 use crate::conditions::names;
 use crate::estimate::{PlantCopy, Speed};
-use crate::printed::{StartPoint, expressions, numbers};
-use crate::{Design, DesignError, Examination, Monitor, Signal};
+use crate::printed::{StartPoint, expressions};
+use crate::{Design, DesignError, Examination, Monitor, ParameterValue, Signal};
 
 pub(super) const NAME: &str = "state-affine";
 
@@ -79,21 +82,18 @@ pub(super) fn assemble(
 ) -> Result<Design, DesignError> {
     let graph = augmented.graph();
     let order: Vec<usize> = form.blocks().flatten().copied().collect();
-    let numbers = settings.numbers(&order)?;
+    let (study, S0) = (settings.θ()?, settings.S0(&order)?);
     let copy = PlantCopy::new(augmented, &settings.common);
-    let matrices = Matrices::new(&copy, form, &order);
-    let names: Vec<&str> = order
-        .iter()
-        .map(|&i| augmented.states[i].name.as_str())
-        .collect();
-    let factor = Factor::new(graph, &names, &numbers.S0);
+    let matrices = matrices(augmented, form, &order);
+    let [C, F] = matrices.each_ref().map(|A| at_estimate(&copy, A));
+    let named = names(augmented, &order);
+    let factor = Factor::new(graph, &named, &S0);
     let mut derivatives = copy.at_estimate(&augmented.derivatives);
-    prolong(&copy, &matrices.F, &order, &mut derivatives);
-    let Matrices { C, F } = matrices;
+    prolong(&copy, &F, &order, &mut derivatives);
     let v: Vec<Vec<Sparse<'_>>> = C.iter().map(|row| factor.forward(row)).collect();
     // θΔ_θ⁻¹ = diag(θI, θ²I, …) over the blocks
     let meaning = "the speed θ of the gain and of S".to_owned();
-    let θ = Speed::new(&copy, "theta", numbers.θ, meaning);
+    let θ = Speed::new(&copy, "theta", study, meaning);
     let exponents = form
         .blocks()
         .enumerate()
@@ -101,7 +101,7 @@ pub(super) fn assemble(
     let correction = factor.gain(&v, &innovations(&copy));
     for ((&state, exponent), z) in order.iter().zip(exponents).zip(correction) {
         if let Some(z) = z {
-            let power = θ.scaled(graph, numbers.θ.powi(exponent), f64::from(exponent));
+            let power = θ.scaled(graph, study.powi(exponent), f64::from(exponent));
             derivatives[state] = (graph.expr(derivatives[state]) - power * z).node();
         }
     }
@@ -110,10 +110,26 @@ pub(super) fn assemble(
     let mut observer = copy.observer(NAME, derivatives)?.tuned_by([&θ]);
     observer.monitors.extend(monitor(&factor, alarm));
     observer.states.extend(factor.states);
-    let parameters = parameters(&copy, form, &order, &numbers, alarm)?;
+    let start = StartPoint::new(&copy)?;
+    let [C, F] = matrices.map(|A| Matrix::from_fn(graph, (A.len(), order.len()), |i, j| A[i][j]));
+    let gain = gain(&start.values(&C)?, form, study, &S0);
+    let mut parameters: Vec<(String, ParameterValue)> = vec![("θ".into(), study.into())];
+    let mut add = |name: &str, value| parameters.push((name.to_owned(), value));
+    add("blocks", ParameterValue::Blocks(examination.chains.clone()));
+    add("alarm", ParameterValue::Alarm(alarm));
+    add("rows", named.into());
+    add("C(u)", expressions(&C));
+    if form.factors.len() > 1 {
+        add("F(u, x)", expressions(&F));
+    }
+    add("S(0)", ParameterValue::Matrix(product(&S0)));
+    add("θΔ⁻¹S⁻¹Cᵀ at the start", ParameterValue::Matrix(gain));
     Ok(Design {
         observer,
-        notes: outside_last(augmented, form).into_iter().collect(),
+        notes: outside_last(augmented, form)
+            .into_iter()
+            .map(Into::into)
+            .collect(),
         examination,
         gains: vec![],
         parameters,
@@ -168,36 +184,38 @@ fn monitor(factor: &Factor<'_>, alarm_below: f64) -> Option<Monitor> {
     })
 }
 
-/// C(u) and F(u, x̂), dense, in the order of the blocks.
-struct Matrices<'g> {
-    C: Vec<Vec<Sparse<'g>>>,
-    F: Vec<Vec<Sparse<'g>>>,
-}
-
-impl<'g> Matrices<'g> {
-    fn new(copy: &PlantCopy<'_, 'g>, form: &Superdiagonal, order: &[usize]) -> Self {
-        let graph: &'g Graph = copy.augmented.graph();
-        let n = order.len();
-        let place = |state: usize| order.iter().position(|&i| i == state);
-        let mut matrices = Self {
-            C: vec![vec![None; n]; copy.augmented.outputs.len()],
-            F: vec![vec![None; n]; n],
-        };
-        for (k, factor) in form.factors.iter().enumerate() {
-            for &(i, j, node) in &factor.entries {
-                let entry: Expr<'g> = graph.expr(copy.at_estimate(&[node])[0]);
-                let Some(column) = place(factor.columns[j]) else {
-                    continue;
-                };
-                match (k, place(factor.rows[i])) {
-                    (0, _) => matrices.C[factor.rows[i]][column] = Some(entry),
-                    (_, Some(row)) => matrices.F[row][column] = Some(entry),
-                    (_, None) => {}
-                }
+/// C(u) and F(u, x) with the states in the order of the blocks; C has a row per output.
+pub(super) fn matrices(
+    augmented: &AugmentedPlant<'_>,
+    form: &Superdiagonal,
+    order: &[usize],
+) -> [Rows; 2] {
+    let n = order.len();
+    let place = |state: usize| order.iter().position(|&i| i == state);
+    let mut C = vec![vec![None; n]; augmented.outputs.len()];
+    let mut F = vec![vec![None; n]; n];
+    for (k, factor) in form.factors.iter().enumerate() {
+        for &(i, j, node) in &factor.entries {
+            let column = place(factor.columns[j]);
+            let (table, row) = match k {
+                0 => (&mut C, Some(factor.rows[i])),
+                _ => (&mut F, place(factor.rows[i])),
+            };
+            if let (Some(row), Some(column)) = (row, column) {
+                table[row][column] = Some(node);
             }
         }
-        matrices
     }
+    [C, F]
+}
+
+/// The entries at the estimate.
+fn at_estimate<'g>(copy: &PlantCopy<'_, 'g>, A: &Rows) -> Vec<Vec<Sparse<'g>>> {
+    let graph: &'g Graph = copy.augmented.graph();
+    let entry = |e: &Option<Node>| Some(graph.expr(copy.at_estimate(&[(*e)?])[0]));
+    A.iter()
+        .map(|row| row.iter().map(entry).collect())
+        .collect()
 }
 
 /// C(u)x̂ − y, one per output.
@@ -206,7 +224,7 @@ fn innovations<'g>(copy: &PlantCopy<'_, 'g>) -> Vec<Expr<'g>> {
     let graph: &'g Graph = augmented.graph();
     let hats = augmented.states.iter().zip(&copy.hats);
     let unlimited = hats.map(|(state, hat)| (state.node, hat.symbol)).collect();
-    let innovation = |(o, y): (&lynkeus_structure::Measurement, &Signal)| {
+    let innovation = |(o, y): (&Measurement, &Signal)| {
         let h = graph.substitute(&[o.variable.node], &unlimited)[0];
         graph.expr(h) - graph.expr(y.symbol)
     };
@@ -241,7 +259,7 @@ fn least_reach(augmented: &AugmentedPlant<'_>, form: &Superdiagonal) -> Result<f
 
 /// (1) has ε in the last block only. Elsewhere its trace in the blocks behind
 /// does not shrink as θ grows: worth a note, no reason to refuse.
-fn outside_last(augmented: &AugmentedPlant<'_>, form: &Superdiagonal) -> Option<String> {
+fn outside_last(augmented: &AugmentedPlant<'_>, form: &Superdiagonal) -> Option<Said> {
     let plant = augmented.plant;
     let last = form.declared().last()?;
     let known = |v: &lynkeus_model::Variable| {
@@ -260,69 +278,18 @@ fn outside_last(augmented: &AugmentedPlant<'_>, form: &Superdiagonal) -> Option<
         !last.contains(&i) && (unknown_input || !pattern[i].is_empty())
     };
     let states: Vec<usize> = (0..augmented.states.len()).filter(acts).collect();
-    (!states.is_empty()).then(|| {
-        format!(
-            "an uncertainty acts on {}, outside of the last block ({}); Theorem 1 covers the last one only, and the error of the blocks behind need not shrink as theta grows",
-            names(augmented, &states).join(", "),
-            names(augmented, &last).join(", ")
-        )
+    (!states.is_empty()).then(|| Said::OutsideLast {
+        states: names(augmented, &states),
+        last: names(augmented, &last),
     })
-}
-
-pub(super) fn parameters(
-    copy: &PlantCopy<'_, '_>,
-    form: &Superdiagonal,
-    order: &[usize],
-    given: &Numbers,
-    alarm: f64,
-) -> Result<Vec<(String, String)>, DesignError> {
-    let augmented = copy.augmented;
-    let start = StartPoint::new(copy)?;
-    let n = order.len();
-    let place = |state: usize| order.iter().position(|&i| i == state);
-    let factor = |k: usize, rows: usize, row: &dyn Fn(usize) -> Option<usize>| {
-        Matrix::from_fn(augmented.graph(), (rows, n), |i, j| {
-            let factor = form.factors.get(k)?;
-            let is_here = |&&(r, c, _): &&(usize, usize, _)| {
-                row(factor.rows[r]) == Some(i) && place(factor.columns[c]) == Some(j)
-            };
-            factor.entries.iter().find(is_here).map(|entry| entry.2)
-        })
-    };
-    let C = factor(0, augmented.outputs.len(), &Some);
-    let F = (1..form.factors.len())
-        .map(|k| factor(k, n, &place))
-        .reduce(|all, next| all.plus(&next));
-    let gain = gain(&start.values(&C)?, form, given);
-    let names: Vec<&str> = order
-        .iter()
-        .map(|&i| augmented.states[i].name.as_str())
-        .collect();
-    let mut found: Vec<(String, String)> = vec![
-        ("θ".into(), given.θ.to_string()),
-        ("blocks".into(), form.describe(augmented)),
-        ("alarm".into(), format!("excitation below {alarm:.3e}")),
-        ("rows".into(), names.join(", ")),
-        ("C(u)".into(), expressions(&C)),
-    ];
-    if let Some(F) = F {
-        found.push(("F(u, x)".into(), expressions(&F)));
-    }
-    found.push(("S(0)".into(), numbers(&product(&given.S0))));
-    found.push(("θΔ⁻¹S⁻¹Cᵀ at the start".into(), numbers(&gain)));
-    Ok(found)
 }
 
 /// S = UᵀDU
 fn product(S: &UnitFactor) -> Vec<Vec<f64>> {
-    let n = S.diagonal.len();
-    let entry = |i: usize, j: usize| {
+    square(S.diagonal.len(), |i, j| {
         let terms = (0..=i.min(j)).map(|k| U(S, k, i) * S.diagonal[k] * U(S, k, j));
         terms.sum()
-    };
-    (0..n)
-        .map(|i| (0..n).map(|j| entry(i, j)).collect())
-        .collect()
+    })
 }
 
 /// An entry of U, j ≥ k.
@@ -334,8 +301,7 @@ fn U(S: &UnitFactor, k: usize, j: usize) -> f64 {
 }
 
 /// θ Δ_θ⁻¹ S(0)⁻¹ Cᵀ: by Uᵀv = Cᵀ and then Uz = D⁻¹v, as the observer has it.
-fn gain(C: &[Vec<f64>], form: &Superdiagonal, given: &Numbers) -> Vec<Vec<f64>> {
-    let (S, θ) = (&given.S0, given.θ);
+fn gain(C: &[Vec<f64>], form: &Superdiagonal, θ: f64, S: &UnitFactor) -> Vec<Vec<f64>> {
     let n = S.diagonal.len();
     let column = |c: &Vec<f64>| {
         let mut v = c.clone();
@@ -359,10 +325,10 @@ fn gain(C: &[Vec<f64>], form: &Superdiagonal, given: &Numbers) -> Vec<Vec<f64>> 
 }
 
 /// An entry that may be zero everywhere.
-pub(super) type Sparse<'g> = Option<Expr<'g>>;
+type Sparse<'g> = Option<Expr<'g>>;
 
 /// The states of the factors as symbols.
-pub(super) struct Factor<'g> {
+struct Factor<'g> {
     graph: &'g Graph,
     /// ln d_i
     pub δ: Vec<Expr<'g>>,
@@ -391,7 +357,7 @@ fn minus<'g>(a: Sparse<'g>, b: Sparse<'g>) -> Sparse<'g> {
 
 impl<'g> Factor<'g> {
     /// Symbols for the factors of S, named after the states and starting at S(0).
-    pub fn new(graph: &'g Graph, names: &[&str], start: &UnitFactor) -> Self {
+    pub fn new(graph: &'g Graph, names: &[String], start: &UnitFactor) -> Self {
         let n = names.len();
         let mut states = vec![];
         let mut state = |name: String, start: f64| {
@@ -511,7 +477,7 @@ impl<'g> Factor<'g> {
 }
 
 /// ℓ for A = S⁻¹, whose rows start at the diagonal.
-pub(super) fn least_eigenvalue<'g>(A: &[Vec<Expr<'g>>]) -> Option<Expr<'g>> {
+fn least_eigenvalue<'g>(A: &[Vec<Expr<'g>>]) -> Option<Expr<'g>> {
     let trace = trace(A)?;
     let mut B = divided(A, trace);
     let mut bound = 1.0 / trace;
