@@ -18,7 +18,7 @@ pub(crate) fn design(prepared: &Prepared<'_>) -> Result<StudyDesign, Error> {
 
 /// The numbers of an estimator that may be changed.
 fn tunables<'d>(design: &'d Design, made: &Blueprint) -> &'d [Tunable] {
-    let numbers = &design.observer.tunables.numbers;
+    let numbers = &design.observer.tunables;
     match made {
         Blueprint::Sampled { observer, .. } if observer.tuned.is_some() => numbers,
         Blueprint::Filter { model, .. } if model.process_noise().iter().any(|q| *q > 0.0) => {
@@ -38,10 +38,12 @@ pub(crate) fn note(design: &Design, made: &Blueprint) -> String {
             names.join(", ")
         );
     }
-    let reason = match (design.observer.tunables.refused, made) {
-        (Some(reason), _) => reason,
-        (None, Blueprint::Filter { .. }) => "without process noise there is none to scale",
-        (None, Blueprint::Sampled { .. }) => "its equations read no gain",
+    let reason = match (design.observer.is_whole, made) {
+        (true, _) => {
+            "a gain by linear matrix inequalities has no θ: it is made, and proved, as a whole"
+        }
+        (false, Blueprint::Filter { .. }) => "without process noise there is none to scale",
+        (false, Blueprint::Sampled { .. }) => "its equations read no gain",
     };
     format!("nothing may be changed while it runs: {reason}")
 }
