@@ -14,7 +14,7 @@
 //! Nothing is required of the plant, and nothing is proved of the error.
 
 use lynkeus_model::Variable;
-use lynkeus_run::filter::{Bounds, FilterKind, SigmaPoints};
+use lynkeus_run::filter::{FilterKind, SigmaPoints};
 use lynkeus_structure::{AugmentedPlant, Standing};
 
 use crate::estimate::{Common, PlantCopy, Speed, limited};
@@ -38,7 +38,7 @@ pub struct Filter {
     /// what people call it
     called: &'static str,
     keys: &'static [&'static [KeySpec]],
-    kind: fn(&AugmentedPlant<'_>, &Tuning) -> Result<FilterKind, TuningError>,
+    kind: fn(&Tuning) -> Result<FilterKind, TuningError>,
 }
 
 /// The family `ekf`.
@@ -47,7 +47,7 @@ pub const EKF: Filter = Filter {
     paper: "Jazwinski 1970, the extended Kalman filter, continuous-discrete",
     called: "extended Kalman filter",
     keys: &[&KEYS, &BOUNDS],
-    kind: |_, _| Ok(FilterKind::Extended),
+    kind: |_| Ok(FilterKind::Extended),
 };
 
 /// The family `ukf`.
@@ -56,7 +56,7 @@ pub const UKF: Filter = Filter {
     paper: "Julier and Uhlmann 1997, the unscented Kalman filter",
     called: "unscented Kalman filter",
     keys: &[&KEYS, &BOUNDS, &POINTS],
-    kind: |_, tuning| {
+    kind: |tuning| {
         let SigmaPoints { alpha, beta, kappa } = SigmaPoints::default();
         let [own_alpha, own_beta, own_kappa] = &POINTS;
         Ok(FilterKind::Unscented(SigmaPoints {
@@ -73,25 +73,16 @@ pub const MHE: Filter = Filter {
     paper: "Rao, Rawlings and Mayne 2003, moving-horizon estimation",
     called: "moving-horizon estimator",
     keys: &[&KEYS, &WINDOW],
-    kind: |augmented, tuning| {
+    kind: |tuning| {
         let [horizon] = &WINDOW;
         let length = match number(tuning, horizon)? {
             None => HORIZON,
             Some(x) if x >= 1.0 && x.fract() == 0.0 && x <= 1e4 => x as usize,
             Some(x) => return Err(horizon.wrong(x)),
         };
-        Ok(FilterKind::MovingHorizon(length, ranges(augmented)))
+        Ok(FilterKind::MovingHorizon(length))
     },
 };
-
-/// The declared range of each state.
-fn ranges(augmented: &AugmentedPlant<'_>) -> Vec<Bounds> {
-    let bounds = augmented.states.iter().map(|state| Bounds {
-        low: state.min,
-        high: state.max,
-    });
-    bounds.collect()
-}
 
 impl Filter {
     fn read(
@@ -100,7 +91,7 @@ impl Filter {
         tuning: &Tuning,
     ) -> Result<Settings, TuningError> {
         Ok(Settings {
-            kind: (self.kind)(augmented, tuning)?,
+            kind: (self.kind)(tuning)?,
             common: Common::read(tuning)?,
             gate: tuning.positive(GATE.name)?,
             projects: tuning.meant(&BOUNDS[0], [true])?.is_some(),
@@ -142,7 +133,7 @@ impl Filter {
         observer.filter = Some(FilterTuning {
             kind: settings.kind.clone(),
             gate: settings.gate,
-            bounds: settings.projects.then(|| ranges(augmented)),
+            projects: settings.projects,
             outputs: copy.at_estimate(&outputs),
             confined,
             initial_variance: variance.clone(),

@@ -331,7 +331,7 @@ impl Proof<'_, '_> {
         )
     }
 
-    fn bears(&self, A: &[Vec<f64>], g: &[f64], slowest: f64) -> bool {
+    fn bears(&self, A: &DMatrix<f64>, g: &[f64], slowest: f64) -> bool {
         g.iter().all(|g| g.is_finite())
             && Riccati::solve(A, &spread(g), SLOW * slowest, 1.0).is_some()
     }
