@@ -96,7 +96,7 @@ impl Examination {
     pub(crate) fn ended(family: &'static str, spent: Spent) -> Self {
         Self {
             plant: PlantFit::Ended(spent),
-            ..Self::unfit(family, format!("undecided: {spent}"), vec![])
+            ..Self::unfit(family, Reason::Ended(spent), vec![])
         }
     }
 
@@ -166,15 +166,61 @@ pub struct Design {
 /// The value of a parameter of a design.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ParameterValue {
-    /// words that are not data yet
-    Text(String),
+    /// names or expressions
+    Names(Vec<String>),
+    /// names in blocks, one after the other
+    Blocks(Vec<Vec<String>>),
+    /// the least excitation that raises no alarm
+    Alarm(f64),
     /// numbers
     Numbers(Vec<f64>),
+    /// pairs of them
+    Pairs(Vec<[f64; 2]>),
+    /// a number that is computed
+    Computed(f64),
+    /// numbers row by row, NaN where there is none
+    Matrix(Vec<Vec<f64>>),
+    /// expressions row by row
+    Expressions(Vec<Vec<String>>),
+    /// the same, each with its value at the start where all it reads has one
+    AtStart(Vec<Vec<Shown>>),
+    /// a gain on ŷ − y
+    Gain {
+        /// the gain
+        gain: Shown,
+        /// whether ŷ − y is limited before
+        limited: bool,
+    },
+    /// θ in the transient
+    Transient {
+        /// by chain
+        θ: Vec<f64>,
+        /// up to this time
+        until: f64,
+        /// the time constant of the change
+        fall: Option<f64>,
+    },
+    /// of a first estimate
+    Variance {
+        /// the variance
+        variance: f64,
+        /// it follows from the declared range
+        from_range: bool,
+    },
 }
 
-impl From<String> for ParameterValue {
-    fn from(text: String) -> Self {
-        Self::Text(text)
+/// A number, or an expression with its value at the start where all that it reads has one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// the number or the expression
+    pub text: String,
+    /// the value of an expression
+    pub at_start: Option<f64>,
+}
+
+impl From<Vec<String>> for ParameterValue {
+    fn from(names: Vec<String>) -> Self {
+        Self::Names(names)
     }
 }
 

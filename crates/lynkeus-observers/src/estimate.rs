@@ -22,7 +22,8 @@ use lynkeus_structure::{AugmentedPlant, Measurement, Region};
 use crate::conditions::Partial;
 use crate::tuning::is_or_has;
 use crate::{
-    Estimate, Initial, KeySpec, Observer, Shape, Signal, Tunable, Tunables, Tuning, TuningError,
+    Estimate, Initial, KeySpec, Observer, Reason, Shape, Signal, Tunable, Tunables, Tuning,
+    TuningError,
 };
 
 /// The keys of every observer, read.
@@ -204,7 +205,6 @@ pub(crate) fn middle(variable: &Variable) -> f64 {
 /// The study's key.
 pub(crate) const PROLONG: KeySpec = KeySpec {
     name: "prolong",
-    kind: "true, false",
     shape: Shape::Flag,
     default: "false",
     meaning: "outside of the declared ranges the plant's functions are [prolonged](triangular.md#options) as the papers ask, so that the theorem holds for every start of the estimate",
@@ -259,7 +259,7 @@ pub(crate) fn refuse(common: &Common, observer: &str) -> Result<(), TuningError>
 ///
 /// Everywhere only where the box of the proof is the one that the observer projects on and
 /// takes its slopes from: a smaller one of states (`tube`) or of inputs has other bounds.
-pub(crate) fn note(common: &Common, augmented: &AugmentedPlant<'_>, region: &Region) -> String {
+pub(crate) fn note(common: &Common, augmented: &AugmentedPlant<'_>, region: &Region) -> Reason {
     let whole = |variable: &Variable| {
         let mut sides = region.dimensions.iter();
         let side = sides.find(|d| d.symbol == variable.node);
@@ -267,9 +267,11 @@ pub(crate) fn note(common: &Common, augmented: &AugmentedPlant<'_>, region: &Reg
     };
     let declared = augmented.plant.states.iter().chain(&augmented.plant.inputs);
     match (common.prolong, declared.into_iter().all(whole)) {
-        (true, true) => "The guarantee holds for every start of the estimate, while the plant stays in the box: outside of it the functions are prolonged with the same bounds of their slopes ('prolong').".into(),
-        (true, false) => "The guarantee holds while plant and estimate stay in the box, which is smaller than the declared one that the functions are prolonged from ('prolong'): on the declared box it would hold for every start of the estimate.".into(),
-        (false, _) => box_note(common.clamp),
+        (true, true) => Reason::EveryStart,
+        (true, false) => Reason::PartOfTheBox,
+        (false, _) => Reason::InTheBox {
+            clamp: common.clamp,
+        },
     }
 }
 
@@ -359,13 +361,5 @@ impl Observer {
         });
         self.tunables.numbers.extend(numbers);
         self
-    }
-}
-
-/// What the box means for the guarantee.
-pub(crate) fn box_note(clamp: bool) -> String {
-    match clamp {
-        true => "The guarantee holds while plant and estimate stay in the box. Limiting what the functions see ('clamp') is no prolongation as the paper's: where an estimate is outside of its range, the functions do not react to it any more and the proof does not cover that time.".into(),
-        false => "The guarantee holds while plant and estimate stay in the box, or the functions are prolonged outside of it with the same bounds of their partial derivatives.".into(),
     }
 }

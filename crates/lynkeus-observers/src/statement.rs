@@ -3,18 +3,21 @@
 //! A statement is known by its variant, never by its words: these are for people. Each paper
 //! has an enum of its own, as has the certificate by linear matrix inequalities.
 
-use std::fmt;
+use lynkeus_expr::{Interval, Spent};
+use lynkeus_structure::{Finding, Standing, Verdict, Witness};
 
-use lynkeus_structure::{Finding, Standing, Verdict, Witness, short};
-
+use crate::block_triangular::Lee;
 use crate::drift_observable::Germani;
+use crate::guarantee::Inequality;
 use crate::state_affine::Ltaief;
+use crate::triangular::Hammouri;
 use crate::unknown_input::Farza;
-use crate::{drift_observable, state_affine, unknown_input};
+use crate::{
+    block_triangular, drift_observable, guarantee, state_affine, triangular, unknown_input,
+};
 
 /// What has to hold: a condition of a family or a hypothesis of a theorem.
 #[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum Statement {
     /// f and h have values on the box and do not jump: asked of every plant
     PlantIsRegular,
@@ -80,6 +83,95 @@ pub enum Reason {
         /// what it is held against
         least: f64,
     },
+    /// a limit ended the work
+    Spent(Spent),
+    /// a limit ended an examination, so that the whole is undecided
+    Ended(Spent),
+    /// so many entries of ∂f/∂x have bounds
+    Enclosed(usize),
+    /// an entry of ∂f/∂x without bound
+    Unbounded {
+        /// the state whose equation it is of
+        of: String,
+        /// the state by which it is
+        by: String,
+        /// the entry
+        slope: String,
+        /// what keeps it from being bounded; none where that is not looked for
+        undeclared: Option<Vec<String>>,
+    },
+    /// an equation jumps
+    Switches {
+        /// the state whose equation it is
+        of: String,
+        /// the operation
+        with: String,
+    },
+    /// what would refute lies where an equation has no value
+    WhereNothingIs {
+        /// what was found there
+        found: lynkeus_structure::Reason,
+        /// the state whose equation it is
+        of: String,
+    },
+    /// the declared ranges and deviations are
+    Assumed,
+    /// what acts on these has no bound
+    ActsWithoutBound(Vec<String>),
+    /// by the outputs on the box and the measurement errors
+    ReadingsOnTheBox,
+    /// outputs that leave what their sensors show: name, the reading's range, the sensor's
+    BeyondSensors(Vec<(String, Interval, Interval)>),
+    /// process noise leaves no bound for certain
+    Moved {
+        /// the states that it moves
+        states: Vec<String>,
+        /// whether the mean square has a bound
+        in_mean_square: bool,
+    },
+    /// what the error would end within without process noise
+    WithoutNoise {
+        /// of the Euclidean norm
+        norm: f64,
+        /// by state; none where not known
+        states: Vec<(String, f64)>,
+    },
+    /// the proof has a rate, and no bound in the end
+    NoUltimateBound,
+    /// what holds for every start of the estimate, by the prolongation
+    EveryStart,
+    /// what would hold so on the declared box, of which this one is a part
+    PartOfTheBox,
+    /// what holds while plant and estimate stay in the box
+    InTheBox {
+        /// the functions see the estimate limited to it
+        clamp: bool,
+    },
+    /// a key of the study that makes an observer which the theorem does not cover
+    AnotherObserver {
+        /// the key
+        key: &'static str,
+    },
+    /// the low-power form is not proved to be stable for these partials
+    PartialsVary {
+        /// of the chain of this output
+        output: String,
+    },
+    /// a filter takes any plant
+    AnyPlant {
+        /// which filter
+        filter: &'static str,
+        /// where the plant is not regular
+        irregular: Option<Box<Reason>>,
+    },
+    /// the gain of a filter depends on the run
+    GainOfTheRun,
+    /// of the certificate by linear matrix inequalities
+    Guarantee(guarantee::Said),
+    /// of the family `triangular`
+    Triangular(triangular::Said),
+    /// of the family `block-triangular`
+    BlockTriangular(block_triangular::Said),
     /// of the family `state-affine`
     StateAffine(state_affine::Said),
     /// of the family `unknown-input`
@@ -132,6 +224,24 @@ impl From<unknown_input::Said> for Reason {
 impl From<drift_observable::Said> for Reason {
     fn from(said: drift_observable::Said) -> Self {
         Self::DriftObservable(said)
+    }
+}
+
+impl From<guarantee::Said> for Reason {
+    fn from(said: guarantee::Said) -> Self {
+        Self::Guarantee(said)
+    }
+}
+
+impl From<triangular::Said> for Reason {
+    fn from(said: triangular::Said) -> Self {
+        Self::Triangular(said)
+    }
+}
+
+impl From<block_triangular::Said> for Reason {
+    fn from(said: block_triangular::Said) -> Self {
+        Self::BlockTriangular(said)
     }
 }
 
@@ -233,156 +343,15 @@ pub(crate) fn sufficient(
     statement.into().found(verdict, reason)
 }
 
-impl fmt::Display for Statement {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::PlantIsRegular => {
-                f.write_str("f and h have values on the whole box and do not jump")
-            }
-            Self::WhatActs => f.write_str("disturbances and measurement errors are bounded"),
-            Self::ReadingsAreShown => f.write_str("no reading is beyond its sensor's range"),
-            Self::Finished => f.write_str("everything was examined"),
-            Self::PartialKeepsSign { of, by } => write!(f, "∂f({of})/∂{by} keeps its sign"),
-            Self::OutputKeepsSign { output, state } => {
-                write!(f, "∂{output}/∂{state} keeps its sign")
-            }
-            Self::Lipschitz => f.write_str("∂f/∂x is bounded on the box"),
-            Self::SlopesOfTheProof => {
-                f.write_str("every ∂f/∂x of the proof has a bound on the box")
-            }
-            Self::FilterConverges => f.write_str("the filter's error decays"),
-            Self::Inequality(part) => part.fmt(f),
-            Self::Hammouri(part) => part.fmt(f),
-            Self::Lee(part) => part.fmt(f),
-            Self::Ltaief(part) => write!(f, "{part:?}"),
-            Self::Farza(part) => write!(f, "{part:?}"),
-            Self::Germani(part) => write!(f, "{part:?}"),
-        }
-    }
-}
-
-/// Of Hammouri, Targui and Armanet.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Hammouri {
-    /// the theorem is about this observer
-    Observer,
-    /// no division by partials that vary
-    ConstantGain,
-    /// what Lemma 1 starts from
-    PartialsAreBounded,
-    /// (17) for one chain
-    Lemma1 {
-        /// the chain
-        states: Vec<String>,
-        /// 2r
-        ρ: f64,
-    },
-    /// of the exponents
-    Window,
-    /// θ is large enough
-    Theta {
-        /// of the study
-        θ: f64,
-    },
-    /// where the chains have a θ each
-    Comparison,
-    /// where the S given does not stabilise the chains by itself
-    Damped,
-}
-
 impl From<Hammouri> for Statement {
     fn from(part: Hammouri) -> Self {
         Self::Hammouri(part)
     }
 }
 
-impl fmt::Display for Hammouri {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Observer => {
-                f.write_str("the observer is (9) with a constant gain from a tridiagonal S")
-            }
-            Self::ConstantGain => f.write_str("the gain is constant"),
-            Self::PartialsAreBounded => {
-                f.write_str("Lemma 1: every partial along the chains lies in some [α1, α2], α1 > 0")
-            }
-            Self::Lemma1 { states, ρ } => write!(
-                f,
-                "Lemma 1 for ({}): A(a)ᵀS + SA(a) − ρCᵀC < 0 for every a in its bounds, ρ = 2r = {}",
-                states.join(" → "),
-                short(*ρ)
-            ),
-            Self::Window => f.write_str("δ2/δ1 lies in the window of Theorem 2"),
-            Self::Theta { θ } => write!(f, "θ = {} is at least θ0", short(*θ)),
-            Self::Comparison => {
-                f.write_str("the comparison matrix is negative definite at the study's θ")
-            }
-            Self::Damped => {
-                f.write_str("the error decays where it is small, in the middle of the box")
-            }
-        }
-    }
-}
-
-/// Of Lee, Yee and Park.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Lee {
-    /// the theorem is about these observers
-    Observer,
-    /// K stabilises a chain of integrators
-    Stable {
-        /// the chain
-        states: Vec<String>,
-    },
-    /// K stabilises a chain whose partials are not 1
-    StableAlong {
-        /// the chain
-        states: Vec<String>,
-    },
-    /// what moves M is bounded
-    Assumption1,
-    /// the first inequality
-    Lyapunov {
-        /// the chain
-        states: Vec<String>,
-    },
-    /// the second inequality
-    Theta {
-        /// by block
-        θ: Vec<f64>,
-    },
-}
-
 impl From<Lee> for Statement {
     fn from(part: Lee) -> Self {
         Self::Lee(part)
-    }
-}
-
-impl fmt::Display for Lee {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Observer => f.write_str("the observer is (7) or (3) with a constant θ"),
-            Self::Stable { states } => write!(f, "A − KC is stable for ({})", states.join(" → ")),
-            Self::StableAlong { states } => write!(
-                f,
-                "A(a) − KC is stable for every partial a along ({})",
-                states.join(" → ")
-            ),
-            Self::Assumption1 => {
-                f.write_str("M R M⁻¹ and Ṁ M⁻¹ have bounds on the box (Assumption 1)")
-            }
-            Self::Lyapunov { states } => {
-                write!(f, "(A − KC)ᵀP + P(A − KC) < 0 for ({})", states.join(" → "))
-            }
-            Self::Theta { θ } => write!(
-                f,
-                "θ = ({}) is large enough",
-                θ.iter().map(|&θ| short(θ)).collect::<Vec<_>>().join(", ")
-            ),
-        }
     }
 }
 
@@ -404,40 +373,9 @@ impl From<Germani> for Statement {
     }
 }
 
-/// Of the certificate by linear matrix inequalities.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Inequality {
-    /// the error system is one in x̂ − x
-    StatesAreTheEstimate,
-    /// the box gives the error system ranges
-    SlopesAreBounded,
-    /// the inequality
-    OneLyapunovFunction,
-    /// what a point of rest refutes
-    SmallErrorsDecay,
-}
-
 impl From<Inequality> for Statement {
     fn from(part: Inequality) -> Self {
         Self::Inequality(part)
-    }
-}
-
-impl fmt::Display for Inequality {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::StatesAreTheEstimate => f.write_str("the observer's states are the estimate"),
-            Self::SlopesAreBounded => {
-                f.write_str("every slope of a nonlinear term is bounded on the box")
-            }
-            Self::OneLyapunovFunction => {
-                f.write_str("one Lyapunov function eᵀPe for the whole box")
-            }
-            Self::SmallErrorsDecay => {
-                f.write_str("small errors decay wherever the plant stays in the box")
-            }
-        }
     }
 }
 

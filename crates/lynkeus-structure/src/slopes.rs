@@ -42,7 +42,7 @@ pub struct Slopes {
 }
 
 /// The slope of nonlinear terms in one state.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Slope {
     /// index of the state
     pub state: usize,

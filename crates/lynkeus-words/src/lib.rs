@@ -2,10 +2,15 @@
 //! here each gets its words, and advice that names keys of a study. One file per crate or family.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod block_triangular;
+mod chains;
 mod conditions;
 mod drift_observable;
+mod guarantee;
+mod parameters;
 mod state_affine;
 mod structure;
+mod triangular;
 mod unknown_input;
 
 /// What has words.

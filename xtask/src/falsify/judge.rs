@@ -262,7 +262,7 @@ impl Look<'_, '_> {
                 refute::Answer::Wrong(evidence) => {
                     self.counts.refutations += 1;
                     self.counts.wrong += 1;
-                    let evidence = format!("{}: {evidence}", refutation.condition);
+                    let evidence = format!("{:?}: {evidence}", refutation.condition);
                     self.note(Flaw::Witness, evidence);
                 }
             }

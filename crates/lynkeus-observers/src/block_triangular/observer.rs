@@ -7,17 +7,13 @@ use lynkeus_expr::{Expr, Graph, Node, jacobian};
 use lynkeus_structure::{AugmentedPlant, Blocks, Chain};
 
 use super::form::{Form, NAME, chain_rule};
-use super::settings::{Correction, Settings};
-use crate::conditions::Partial;
+use super::said::Correction;
+use super::settings::Settings;
 use crate::design::Found;
 use crate::estimate::{PlantCopy, Speed, prolong};
-use crate::peaking::{self, Part, Run, Transient, factor_rows, variation};
+use crate::peaking::{Part, Transient};
 use crate::printed::AtStart;
-use crate::{Design, DesignError, TuningError, estimate, printed};
-
-/// Why there is no such form of the default observer.
-pub(super) const ONLY_CLASSICAL: &str =
-    "correction = \"classical\" with form = \"low-power\": observer (7) has no such form";
+use crate::{Design, DesignError, estimate, peaking, printed};
 
 /// Observer (7) or (3).
 pub(super) fn observer(
@@ -33,11 +29,10 @@ pub(super) fn observer(
     let (θ, K) = (settings.θ()?, settings.K(&blocks.lengths()));
     let correction = settings.correction;
     let start = AtStart::new(&copy)?;
-    let text = |x: &[f64]| x.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
-    let mut parameters = vec![("θ".to_owned(), text(&θ))];
+    let mut parameters = vec![("θ".to_owned(), θ.clone().into())];
     parameters.extend(transient.as_ref().map(Transient::parameter));
     let coefficients = K.iter().enumerate();
-    parameters.extend(coefficients.map(|(i, k)| (format!("K{}", i + 1), text(k))));
+    parameters.extend(coefficients.map(|(i, k)| (format!("K{}", i + 1), k.clone().into())));
     let mut derivatives = copy.at_estimate(&augmented.derivatives);
     let mut gains = vec![];
     let speeds = Speed::of_chains(&copy, &θ);
@@ -86,7 +81,7 @@ pub(super) fn observer(
                     parameters.push((format!("L{}", output + 1), start.table(&L)));
                 }
                 let constants: Vec<f64> = steady.iter().map(|gain| gain.0).collect();
-                parameters.push((format!("Δ⁻¹K{}", output + 1), text(&constants)));
+                parameters.push((format!("Δ⁻¹K{}", output + 1), constants.into()));
                 parameters.extend(printed.expressions(&start));
             }
         }
@@ -99,7 +94,7 @@ pub(super) fn observer(
         notes: chain_rule(blocks, &θ).into_iter().collect(),
         examination,
         gains,
-        parameters: parameters.into_iter().map(|(n, v)| (n, v.into())).collect(),
+        parameters,
     })
 }
 
@@ -112,83 +107,45 @@ fn injected(copy: &PlantCopy<'_, '_>, blocks: &Blocks, place: usize) -> HashMap<
         .collect()
 }
 
-pub(super) fn assemble(
+/// The observer whose chains have the low-power form.
+pub(super) fn low_power(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Form>,
 ) -> Result<Design, DesignError> {
-    let Settings {
-        common, remedies, ..
-    } = settings;
-    estimate::refuse(common, "form = \"low-power\"")?;
-    let blocks = &form.blocks;
-    let graph = augmented.graph();
-    let copy = PlantCopy::new(augmented, common);
+    estimate::refuse(&settings.common, "form = \"low-power\"")?;
+    let (blocks, graph) = (&form.blocks, augmented.graph());
+    let copy = PlantCopy::new(augmented, &settings.common);
     let θ = settings.θ()?;
-    let transient = remedies.transient.as_ref();
-    let coefficients = remedies.coefficients(&blocks.lengths())?;
-    let mut run = Run::new(&copy, transient)?;
-    let speeds = Speed::of_chains(&copy, &θ);
-    let (mut notes, mut factors) = (vec![], vec![]);
-    for (place, (output, chain)) in blocks.order.iter().enumerate() {
-        let Some(innovation) = remedies.innovation(&copy, *output) else {
-            continue;
-        };
-        let derivative = |&state: &usize| augmented.derivatives[state];
-        let f: Vec<Node> = chain.states.iter().map(derivative).collect();
-        let output_name = &augmented.outputs[*output].variable.name;
-        let found = &form.partials[place];
-        notes.extend(variation(
-            output_name,
-            &bounds(found),
-            &coefficients[*output],
-        ));
-        let added = run.add(&Part {
+    let part = |place: usize| {
+        let (output, chain) = &blocks.order[place];
+        let f: Vec<Node> = chain
+            .states
+            .iter()
+            .map(|&i| augmented.derivatives[i])
+            .collect();
+        Part {
+            output: *output,
             states: &chain.states,
-            f: &graph.substitute(&f, &injected(&copy, blocks, place)),
-            divisors: &divisors(augmented, found)?,
-            innovation,
-            K: &coefficients[*output],
-            θ: &speeds[*output],
+            f: graph.substitute(&f, &injected(&copy, blocks, place)),
+            partials: &form.partials[place],
             δ: 1.0,
-            number: *output,
-        });
-        factors.extend(factor_rows(output_name, added));
-    }
-    let text: Vec<String> = θ.iter().map(f64::to_string).collect();
-    let mut parameters = vec![("θ".to_owned(), text.join(", "))];
-    parameters.extend(transient.map(Transient::parameter));
-    parameters.extend(peaking::parameters(&coefficients));
-    parameters.extend(factors);
-    notes.extend(chain_rule(blocks, &θ));
-    Ok(Design {
-        observer: run.finish(NAME)?.tuned_by(&speeds),
-        notes,
+        }
+    };
+    let parts: Vec<Part<'_>> = (0..blocks.order.len()).map(part).collect();
+    let advice = Some("declare min and max in the model");
+    let lengths = blocks.lengths();
+    let mut design = peaking::low_power(
+        &copy,
+        &settings.remedies,
+        &θ,
+        &lengths,
+        &parts,
+        advice,
         examination,
-        gains: vec![],
-        parameters: parameters.into_iter().map(|(n, v)| (n, v.into())).collect(),
-    })
-}
-
-/// The constant that stands for each partial along a chain; 1 in the paper's form (2).
-fn divisors(
-    augmented: &AugmentedPlant<'_>,
-    partials: &[Partial],
-) -> Result<Vec<Node>, DesignError> {
-    let mut found = vec![];
-    for partial in partials {
-        let Some(middle) = partial.nominal() else {
-            let expected = "partial derivatives with known positive bounds for form = \"low-power\"; declare min and max in the model";
-            let bounds = format!("bounds {} and {}", partial.bounds.0, partial.bounds.1);
-            return Err(TuningError::new("form", expected, bounds).into());
-        };
-        found.push(augmented.graph().constant(middle).node());
-    }
-    Ok(found)
-}
-
-fn bounds(partials: &[Partial]) -> Vec<(f64, f64)> {
-    partials.iter().map(|partial| partial.bounds).collect()
+    )?;
+    design.notes.extend(chain_rule(blocks, &θ));
+    Ok(design)
 }
 
 /// M̄, L and W of the five steps.

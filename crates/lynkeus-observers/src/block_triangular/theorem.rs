@@ -15,14 +15,15 @@ use lynkeus_structure::{AugmentedPlant, Blocks, Standing, short};
 use nalgebra::DMatrix;
 
 use super::form::chain_rule;
-use super::settings::{Correction, Settings};
+use super::said::{Correction, Lee, Said};
+use super::settings::Settings;
 use super::transformed::{Plant, Similar, Table, Term};
-use crate::conditions::{GainedChain, Partial, names, output_slope, partials};
-use crate::estimate::{Common, box_note};
+use crate::conditions::{GainedChain, Partial, along, names};
+use crate::estimate::Common;
 use crate::peaking::departure;
 use crate::statement::{proved, standing, undecided};
 use crate::theorem::{conclude, slopes, state_noise};
-use crate::{Assumptions, Certificate, Check, Constant, DesignError, Lee, Reason, estimate};
+use crate::{Assumptions, Certificate, Check, Constant, DesignError, Reason, estimate};
 
 pub(super) const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
 
@@ -107,17 +108,16 @@ impl Study<'_> {
         let augmented = self.plant.augmented;
         let region = &self.plant.assumptions.region;
         let order = &self.blocks().order;
-        let (mut checks, mut ranges): (Vec<Check>, Vec<Vec<(f64, f64)>>) = (vec![], vec![]);
-        for (output, chain) in order {
-            checks.extend(output_slope(augmented, *output, region)?);
-            let (found, signs) = partials(augmented, &chain.states, region)?;
-            checks.extend(signs);
-            ranges.push(match self.classical {
-                // M takes the partials out: a chain of integrators is left
-                false => vec![(1.0, 1.0); found.len()],
-                true => found.iter().map(Partial::range).collect(),
-            });
-        }
+        let places = order.iter().map(|(output, c)| (*output, &c.states[..]));
+        let (partials, mut checks) = along(augmented, places, region)?;
+        let range = |partial: &Partial| match self.classical {
+            // M takes the partials out: a chain of integrators is left
+            false => (1.0, 1.0),
+            true => partial.range(),
+        };
+        let ranges = partials
+            .iter()
+            .map(|chain| chain.iter().map(range).collect());
         let (plain, check) = slopes(augmented, region, |a, b| self.skipped(a, b))?;
         checks.push(check);
         let similar: Vec<Similar> = match self.classical {
@@ -137,7 +137,7 @@ impl Study<'_> {
         }
         Ok(Facts {
             checks,
-            partials: ranges,
+            partials: ranges.collect(),
             similar,
             terms,
         })
@@ -154,10 +154,7 @@ impl Study<'_> {
     }
 
     fn unbounded(&self) -> Check {
-        undecided(
-            Lee::Assumption1,
-            "they have none: declare min and max of the states that M depends on and of the chains' heads; where M depends on an input, bound its derivative under `input_derivatives` in [certify]; correction = \"classical\" needs none of this",
-        )
+        undecided(Lee::Assumption1, Said::NoBounds)
     }
 
     /// P_i and μ_i of the first inequality, where it holds for every chain.
@@ -183,15 +180,11 @@ impl Study<'_> {
             });
             match found {
                 Some((P, μ)) => {
-                    let detail = format!("≤ −{}·diag(P), for every ∂f/∂x along the chain", short(μ));
-                    checks.push(proved(name, detail));
+                    checks.push(proved(name, Said::Decays(μ)));
                     all.push(P);
                     decays.push(μ);
                 }
-                None => checks.push(undecided(
-                    name,
-                    "not with the P of the middle of the partials' bounds: K does not stabilise the chain, or (classical observer) the partials vary too much",
-                )),
+                None => checks.push(undecided(name, Said::NoDecay)),
             }
         }
         (all.len() == self.θ.len()).then_some((all, decays))
@@ -278,9 +271,8 @@ impl Study<'_> {
             θ: self.θ.clone()
         };
         checks.push(match (σ, θ0) {
-            (Some(_), _) => proved(name, "the comparison matrix is negative definite"),
-            (None, Some(θ0)) => undecided(name, format!("proved from θ1 = θ0 = {} on (the others in proportion of their logarithms); the theorem is sufficient, not necessary", short(θ0))),
-            (None, None) => undecided(name, "no θ0 was found: in this box the bound of Ṁ or of the couplings grows as fast as the decay. The theorem is sufficient, not necessary"),
+            (Some(_), _) => proved(name, Said::NegativeDefinite),
+            (None, θ0) => undecided(name, Said::Threshold(θ0)),
         });
         σ.map(|σ| (σ, self.chains(facts, P, &self.θ, &c)))
     }
@@ -305,23 +297,22 @@ impl Study<'_> {
     }
 
     /// Where the estimate may be: M of observer (7) moves with it, so the box bounds it.
-    fn place(&self) -> String {
+    fn place(&self) -> Reason {
         match self.classical {
             true => {
                 let region = &self.plant.assumptions.region;
                 estimate::note(self.common, self.plant.augmented, region)
             }
-            false => box_note(self.common.clamp),
+            false => Reason::InTheBox {
+                clamp: self.common.clamp,
+            },
         }
     }
 
     fn notes(&self) -> Vec<Reason> {
-        let mut notes = vec![self.place().into()];
-        notes.extend(self.rule.clone());
-        if !self.classical {
-            notes.push("Observer (7): M(x̂) moves with the correction, so its derivative grows with θ and with the error (the paper's Lemma 2 ii takes it as bounded independently of θ). The bound used here is that of the declared box, |y − x̂_1| at most the width of the range of x_1: a proof for that box, not a global one. Narrow ranges make it sharper; correction = \"classical\" does without.".into());
-        }
-        notes
+        let moving = (!self.classical).then(|| Said::MovingM.into());
+        let notes = std::iter::once(self.place()).chain(self.rule.clone());
+        notes.chain(moving).collect()
     }
 }
 

@@ -458,12 +458,15 @@ fn parameters(
     form: &Form,
     gains: &Gains,
 ) -> Vec<(String, ParameterValue)> {
-    let mut rows = vec![("variant".to_owned(), form.variant.word().to_owned().into())];
+    let mut rows = vec![(
+        "variant".to_owned(),
+        vec![form.variant.word().to_owned()].into(),
+    )];
     let mut add = |names: [String; 2], λ: &[Pole], K: &Vec<f64>| {
         if !λ.is_empty() {
             let [of_λ, of_K] = names;
             let poles: Vec<String> = λ.iter().map(Pole::to_string).collect();
-            rows.push((of_λ, poles.join(", ").into()));
+            rows.push((of_λ, poles.into()));
             rows.push((of_K, K.clone().into()));
         }
     };
@@ -499,7 +502,7 @@ fn matrices(
     for (&(i, k), entries) in form.rows.iter().zip(Q.chunks(form.rows.len().max(1))) {
         let y = derivative_name(&augmented.outputs[i].variable.name, k);
         let entries: Vec<String> = entries.iter().map(|&q| graph.render(q, WIDTH)).collect();
-        rows.push((format!("{name}, row {y}"), entries.join(", ").into()));
+        rows.push((format!("{name}, row {y}"), entries.into()));
     }
     let start = at_start(graph, observer, Q)?;
     let found = start.and_then(|start| corrections(augmented, form, gains, &start));

@@ -23,7 +23,6 @@ const VARIANTS: [&str; 3] = ["bounded", "theoretical", "practical"];
 
 const VARIANT: KeySpec = KeySpec {
     name: "variant",
-    kind: "`\"bounded\"`, `\"theoretical\"`, `\"practical\"`",
     shape: Shape::Word(&VARIANTS),
     default: "see above",
     meaning: "which observer",
@@ -31,15 +30,16 @@ const VARIANT: KeySpec = KeySpec {
 
 pub(super) const POLES: KeySpec = KeySpec {
     name: "poles",
-    kind: "n poles; for several outputs one list of μ_i each, or the slowest pole of each",
-    shape: Shape::Either(&[SPEEDS, Shape::List(&SPEEDS), Shape::List(&Shape::ROWS)]),
+    shape: Shape::As(
+        "n poles; for several outputs one list of μ_i each, or the slowest pole of each",
+        &Shape::Either(&[SPEEDS, Shape::List(&SPEEDS), Shape::List(&Shape::ROWS)]),
+    ),
     default: "required, or `alpha`",
     meaning: "the eigenvalues of A − KC, see below",
 };
 
 pub(super) const ALPHA: KeySpec = KeySpec {
     name: "alpha",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "required, or `poles`",
     meaning: "the decay α: poles by Lemma 3.2 instead, see below",
@@ -47,7 +47,6 @@ pub(super) const ALPHA: KeySpec = KeySpec {
 
 const BETA: KeySpec = KeySpec {
     name: "beta",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "1",
     meaning: BESIDE_ALPHA,
@@ -55,7 +54,6 @@ const BETA: KeySpec = KeySpec {
 
 pub(super) const GAMMA: KeySpec = KeySpec {
     name: "gamma",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "required with `alpha`",
     meaning: BESIDE_ALPHA,
@@ -63,36 +61,38 @@ pub(super) const GAMMA: KeySpec = KeySpec {
 
 pub(super) const FILTER_POLES: KeySpec = KeySpec {
     name: "filter_poles",
-    kind: "n − r poles or the slowest; for several inputs a table `{ u = […], v = […] }`",
-    shape: Shape::Either(&[
-        SPEEDS,
-        Shape::ROWS,
-        Shape::Table(&Shape::Either(&[SPEEDS, Shape::ROWS])),
-    ]),
+    shape: Shape::As(
+        "n − r poles or the slowest; for several inputs a table `{ u = […], v = […] }`",
+        &Shape::Either(&[
+            SPEEDS,
+            Shape::ROWS,
+            Shape::Table(&Shape::Either(&[SPEEDS, Shape::ROWS])),
+        ]),
+    ),
     default: "10 times the slowest pole, each 1.2 times the one before",
     meaning: "the eigenvalues of the input filter",
 };
 
 pub(super) const FILTER_INITIAL: KeySpec = KeySpec {
     name: "filter_initial",
-    kind: "as `filter_poles`",
-    shape: PER_INPUT,
+    shape: Shape::As("as `filter_poles`", &PER_INPUT),
     default: "the input's start value, then zeros",
     meaning: "x̂ₐ(0)",
 };
 
 pub(super) const INDICES: KeySpec = KeySpec {
     name: "indices",
-    kind: "a whole number per measured output",
-    shape: Shape::Either(&[Shape::Whole(0), Shape::List(&Shape::Whole(0))]),
+    shape: Shape::As(
+        "a whole number per measured output",
+        &Shape::Either(&[Shape::Whole(0), Shape::List(&Shape::Whole(0))]),
+    ),
     default: "found",
     meaning: "how many derivatives of each output count",
 };
 
 pub(super) const SLOPES: KeySpec = KeySpec {
     name: "input_derivatives",
-    kind: "n − r numbers; for several inputs a table",
-    shape: PER_INPUT,
+    shape: Shape::As("n − r numbers; for several inputs a table", &PER_INPUT),
     default: "those of `[certify]`",
     meaning: "bounds of &#124;u'&#124;, …, &#124;u^(n−r)&#124;, read by guarantees only",
 };

@@ -12,13 +12,13 @@ use lynkeus_proof::decay;
 use lynkeus_proof::decay::ErrorModel;
 use lynkeus_proof::matrix::IntervalMatrix;
 use lynkeus_structure::{
-    AugmentedPlant, Dimension, Finding, Innovation, Region, Slopes, Verdict, counted, range,
-    range_within,
+    AugmentedPlant, Dimension, Innovation, Region, Slopes, Verdict, range, range_within,
 };
 use nalgebra::DMatrix;
 
+use super::said::{Inequality, Said};
 use crate::statement::proved;
-use crate::{Assumptions, Check, Inequality, InputDerivative, Observer, Statement};
+use crate::{Assumptions, Check, InputDerivative, Observer, Statement};
 
 /// Cells examined per end of the range of an injection.
 const CELLS: usize = 200;
@@ -50,16 +50,14 @@ impl ErrorSystem {
         augmented: &AugmentedPlant<'_>,
         observer: &Observer,
         assumptions: &Assumptions,
-    ) -> Result<Result<Self, String>, MissingInput> {
+    ) -> Result<Result<Self, Said>, MissingInput> {
         let pairs = observer.states.iter().zip(&observer.estimates);
         let same = pairs.filter(|((s, _), e)| s.symbol == e.node).count();
         if same != observer.states.len() || same != augmented.states.len() {
-            let reason = format!(
-                "the observer has {} for {} to be estimated: its gain is a state, or its coordinates are not the plant's; see what its theorem says",
-                counted(observer.states.len(), "state"),
-                augmented.states.len()
-            );
-            return Ok(Err(reason));
+            return Ok(Err(Said::OtherStates {
+                states: observer.states.len(),
+                estimated: augmented.states.len(),
+            }));
         }
         let symbols: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
         let region = seen_by(augmented, observer, assumptions)?;
@@ -112,25 +110,18 @@ impl ErrorSystem {
 
     /// The hypothesis that every slope is bounded.
     pub fn bounded(&self) -> Check {
-        let Some((slope, open)) = self.slopes.unbounded(&self.region) else {
-            let detail = format!("{} enclosed", counted(self.slopes.slopes.len(), "slope"));
-            return proved(Inequality::SlopesAreBounded, detail);
-        };
-        let cure = match open.is_empty() {
-            true => {
-                "it jumps or its derivative is infinite at the edge of the box: tighten min and max"
-                    .to_owned()
-            }
-            false => format!("declare min and max of {}", open.join(", ")),
+        let Some((slope, undeclared)) = self.slopes.unbounded(&self.region) else {
+            let said = Said::SlopesEnclosed(self.slopes.slopes.len());
+            return proved(Inequality::SlopesAreBounded, said);
         };
         let sides = self.region.dimensions.iter();
         let left = sides
             .filter(|d| slope.variables.contains(&d.name))
             .map(Dimension::side);
-        Statement::from(Inequality::SlopesAreBounded).with(Finding {
-            verdict: Verdict::Undecided(left.collect()),
-            reason: format!("the slope of {} has no bound; {cure}", slope.term).into(),
-        })
+        let verdict = Verdict::Undecided(left.collect());
+        let term = slope.term.clone();
+        let said = Said::Unbounded { term, undeclared };
+        Statement::from(Inequality::SlopesAreBounded).found(verdict, said)
     }
 
     /// A as an expression of estimate, known inputs, measurements and time, row by row.

@@ -10,14 +10,15 @@ use std::time::Duration;
 use lynkeus_expr::{Budget, MissingInput};
 use lynkeus_proof::decay;
 use lynkeus_proof::decay::{Aim, ErrorModel, Gain, NoGain, Request};
-use lynkeus_structure::{AugmentedPlant, Measurement, Slopes, range, short};
+use lynkeus_structure::{AugmentedPlant, Measurement, Slopes, range};
 
 use super::error_system::{ErrorSystem, expanded};
+use super::said::{Obstacle, Said};
 use crate::conditions::on_output;
 use crate::estimate::{Common, PlantCopy};
 use crate::{
-    ChainGain, Design, DesignError, Examination, KeySpec, Shape, Tuning, TuningError, Value,
-    estimate,
+    ChainGain, Design, DesignError, Examination, KeySpec, ParameterValue, Shape, Tuning,
+    TuningError, Value, estimate,
 };
 
 /// Why nothing of such an observer may be changed.
@@ -29,7 +30,6 @@ const HALVINGS: usize = 9;
 
 const RATE: KeySpec = KeySpec {
     name: "rate",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "required with `\"lmi\"` unless `gain_limit` is given",
     meaning: "the decay to be proved, in 1/(unit of time)",
@@ -37,7 +37,6 @@ const RATE: KeySpec = KeySpec {
 
 const LIMIT: KeySpec = KeySpec {
     name: "gain_limit",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "none",
     meaning: "the largest entry of the gain K on ŷ − y, with `\"lmi\"`",
@@ -45,7 +44,6 @@ const LIMIT: KeySpec = KeySpec {
 
 const MINIMISE: KeySpec = KeySpec {
     name: "minimise",
-    kind: "`\"noise\"`, `\"gain\"`, `\"peak\"`",
     shape: Shape::Word(&["noise", "gain", "peak"]),
     default: "`\"noise\"`",
     meaning: "what the gain makes small at that rate, with `\"lmi\"`",
@@ -107,19 +105,9 @@ pub(crate) fn design_lmi(
     let copy = PlantCopy::new(augmented, common);
     let (measured, slopes) = shown(augmented, &copy)?;
     let system = ErrorSystem::open_loop(augmented, &augmented.region())?;
-    if let Some((slope, open)) = system.slopes.unbounded(&system.region) {
-        let cure = match open.is_empty() {
-            true => "tighten its range".to_owned(),
-            false => format!("declare min and max of {}", open.join(", ")),
-        };
-        return Err(DesignError::NoGain {
-            key: "gain",
-            reason: format!(
-                "the slope of {} has no bound on the box; {cure}",
-                slope.term
-            )
-            .into(),
-        });
+    if let Some((slope, undeclared)) = system.slopes.unbounded(&system.region) {
+        let term = slope.term.clone();
+        return Err(none("gain", Said::NoGainUnbounded { term, undeclared }));
     }
     let request = Request {
         rate: asked.rate.unwrap_or(0.0),
@@ -206,25 +194,23 @@ fn aim(tuning: &Tuning) -> Result<Aim, TuningError> {
     })
 }
 
+fn none(key: &'static str, said: Said) -> DesignError {
+    let reason = said.into();
+    DesignError::NoGain { key, reason }
+}
+
 fn refusal(system: &ErrorSystem, request: &Request, error: NoGain) -> DesignError {
+    let rate = request.rate;
     match error {
         NoGain::Spent(spent) => spent.into(),
-        NoGain::Limit(found) => DesignError::NoGain {
-            key: "gain_limit",
-            reason: format!(
-                "the rate {} needs larger gains than {}: the smallest largest entry found is {found:.4}; raise gain_limit or lower rate",
-                request.rate,
-                request.limit.unwrap_or(f64::INFINITY)
-            ).into(),
-        },
-        _ => DesignError::NoGain {
-            key: "rate",
-            reason: format!(
-                "no gain is proved to reach {} on the box: {}",
-                request.rate,
-                reason(system, request)
-            ).into(),
-        },
+        NoGain::Limit(least) => {
+            let limit = request.limit.unwrap_or(f64::INFINITY);
+            none(LIMIT.name, Said::BeyondLimit { rate, limit, least })
+        }
+        _ => {
+            let obstacle = obstacle(system, request);
+            none(RATE.name, Said::NotReached { rate, obstacle })
+        }
     }
 }
 
@@ -300,13 +286,12 @@ fn assemble(
     let mut observer = copy.observer(family, derivatives)?;
     observer.tunables.refused = copy.common.tunable.then_some(NO_SPEED);
     let slopes = gain.proof.multipliers.first().map_or(0, |t| t.len());
+    let row = |name: &str, value| (name.to_owned(), value);
+    let largest = ParameterValue::Computed(request.largest(&gain.K));
     let parameters = vec![
-        ("rate".to_owned(), format!("{}", request.rate).into()),
-        (
-            "largest gain".to_owned(),
-            format!("{:.6}", request.largest(&gain.K)).into(),
-        ),
-        ("slopes".to_owned(), format!("{slopes}").into()),
+        row("rate", request.rate.into()),
+        row("largest gain", largest),
+        row("slopes", (slopes as f64).into()),
     ];
     Ok(Design {
         observer,
@@ -363,8 +348,8 @@ pub(super) fn provable_share(system: &ErrorSystem, budget: &Budget) -> Option<f6
     share.filter(|_| budget.marked().is_none())
 }
 
-/// In words: what keeps every gain from a proof of the requested rate.
-pub(super) fn reason(system: &ErrorSystem, request: &Request) -> String {
+/// What keeps every gain from a proof of the requested rate.
+fn obstacle(system: &ErrorSystem, request: &Request) -> Obstacle {
     let slopes = &system.slopes;
     let request = &Request {
         budget: request.budget.within(EXPLAINING),
@@ -375,37 +360,16 @@ pub(super) fn reason(system: &ErrorSystem, request: &Request) -> String {
     let least = || decay::is_reachable(&cut(slopes, |_| LEAST), request, false);
     let share = share(slopes, works).or_else(|| least().then_some(LEAST));
     if request.budget.marked().is_some() {
-        return "which range stands in the way takes longer to find out: narrow the box or lower the rate".into();
+        return Obstacle::TakesLonger;
     }
     let Some(share) = share else {
-        return "not even the linearisation in the middle of the box reaches it: a state leaves too weak a trace in the outputs, or the rate is beyond what they allow".into();
-    };
-    let range = |k: usize| {
-        let slope = &slopes.slopes[k];
-        format!(
-            "the slope of {} in [{}, {}]{}",
-            slope.term,
-            short(slope.range.lo()),
-            short(slope.range.hi()),
-            match slope.variables.is_empty() {
-                true => String::new(),
-                false => format!(" (over the range of {})", slope.variables.join(", ")),
-            }
-        )
+        return Obstacle::Middle;
     };
     // one inequality per slope is affordable only for few
-    let tried = match slopes.slopes.len() {
-        few if few <= SINGLES => few,
-        _ => 0,
-    };
-    let mut blocking =
-        (0..tried).filter(|&only| works(&cut(slopes, |k| if k == only { 0.0 } else { 1.0 })));
-    let blocked = match blocking.next() {
-        Some(k) => format!("{} alone blocks it; ", range(k)),
-        None => String::new(),
-    };
-    format!(
-        "{blocked}with every slope's range cut to {:.0} % about its middle there is a gain: narrow the box",
-        100.0 * share
-    )
+    let few = slopes.slopes.len() <= SINGLES;
+    let mut tried = slopes.slopes.iter().enumerate().filter(|_| few);
+    let alone = tried
+        .find(|(only, _)| works(&cut(slopes, |k| if k == *only { 0.0 } else { 1.0 })))
+        .map(|(_, slope)| slope.clone());
+    Obstacle::Ranges { share, alone }
 }

@@ -23,8 +23,9 @@ use lynkeus_structure::{AugmentedPlant, Coordinate, Dimension, Point};
 use nalgebra::{DMatrix, DVector};
 
 use super::error_system::{ErrorSystem, edges};
+use super::said::{Inequality, Said};
 use crate::statement::refuted;
-use crate::{Check, Inequality, Observer};
+use crate::{Check, Observer};
 
 /// Points tried before the search climbs from the best of them.
 const POINTS: usize = 400;
@@ -105,18 +106,12 @@ pub(super) fn growing(
         return Ok(None);
     }
     if sample.unstable && is_constant(augmented, observer, system) {
-        let detail = "whatever the plant does, the error obeys e' = A e with the same A everywhere, which has an eigenvalue with a positive real part, by interval arithmetic";
-        return Ok(Some(refuted(
-            Inequality::SmallErrorsDecay,
-            sample.worst.clone(),
-            detail,
-        )));
+        let point = sample.worst.clone();
+        let check = refuted(Inequality::SmallErrorsDecay, point, Said::GrowsEverywhere);
+        return Ok(Some(check));
     }
     let found = repelling(augmented, observer, system)?;
-    Ok(found.map(|point| {
-        let detail = "the plant can rest at this point, with these inputs, and there the error's Jacobian has an eigenvalue with a positive real part, both by interval arithmetic: the estimate leaves the plant, however close it starts";
-        refuted(Inequality::SmallErrorsDecay, point, detail)
-    }))
+    Ok(found.map(|point| refuted(Inequality::SmallErrorsDecay, point, Said::Repelling)))
 }
 
 /// Whether e' = A e with an A that reads nothing. One that a known input moves refutes nothing by

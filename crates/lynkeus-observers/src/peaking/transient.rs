@@ -5,20 +5,21 @@ use std::collections::BTreeMap;
 use lynkeus_expr::Node;
 
 use crate::estimate::{PlantCopy, Speed};
-use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
+use crate::{KeySpec, ParameterValue, REQUIRED, Shape, Tuning, TuningError, Value};
 
 /// The study's key.
 pub(super) const TRANSIENT: KeySpec = KeySpec {
     name: "transient",
-    kind: "`{ theta = …, until = …, fall = … }`",
-    shape: Shape::Section(&[&[THETA, UNTIL, FALL]]),
+    shape: Shape::As(
+        "`{ theta = …, until = …, fall = … }`",
+        &Shape::Section(&[&[THETA, UNTIL, FALL]]),
+    ),
     default: "none",
     meaning: "another θ up to a time, then the study's; `fall` is the time constant of a smooth change",
 };
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
-    kind: "number > 0, or one per chain",
     shape: Shape::POSITIVES,
     default: REQUIRED,
     meaning: "θ at the start",
@@ -26,7 +27,6 @@ const THETA: KeySpec = KeySpec {
 
 const UNTIL: KeySpec = KeySpec {
     name: "until",
-    kind: "number",
     shape: Shape::Number,
     default: REQUIRED,
     meaning: "the time up to which it holds, on the axis of the study",
@@ -34,7 +34,6 @@ const UNTIL: KeySpec = KeySpec {
 
 const FALL: KeySpec = KeySpec {
     name: "fall",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "at once",
     meaning: "the time constant of the change",
@@ -109,13 +108,13 @@ impl Transient {
     }
 
     /// For the reader.
-    pub fn parameter(&self) -> (String, String) {
-        let θ: Vec<String> = self.θ.iter().map(f64::to_string).collect();
-        let mut text = format!("{} until t = {}", θ.join(", "), self.until);
-        if let Some(fall) = self.fall {
-            text += &format!(", then to θ with the time constant {fall}");
-        }
-        ("θ in the transient".to_owned(), text)
+    pub fn parameter(&self) -> (String, ParameterValue) {
+        let value = ParameterValue::Transient {
+            θ: self.θ.clone(),
+            until: self.until,
+            fall: self.fall,
+        };
+        ("θ in the transient".to_owned(), value)
     }
 }
 

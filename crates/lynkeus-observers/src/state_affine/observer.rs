@@ -60,7 +60,7 @@ use super::settings::Settings;
 use crate::conditions::names;
 use crate::design::Found;
 use crate::estimate::{PlantCopy, Speed};
-use crate::printed::{StartPoint, expressions, numbers};
+use crate::printed::{StartPoint, expressions};
 use crate::{Design, DesignError, Monitor, ParameterValue, Reason, Signal};
 
 /// The smallest d_i that forgetting leaves.
@@ -106,9 +106,15 @@ pub(super) fn assemble(
     Ok(Design {
         observer,
         notes: outside.map(Reason::from).collect(),
-        examination,
         gains: vec![],
-        parameters: parameters(&copy, &form, given, &S0, alarm)?,
+        parameters: parameters(
+            &copy,
+            &form,
+            (given, &S0),
+            alarm,
+            examination.chains.clone(),
+        )?,
+        examination,
     })
 }
 
@@ -238,9 +244,9 @@ fn outside_last(augmented: &AugmentedPlant<'_>, form: &Form) -> Option<Said> {
 fn parameters(
     copy: &PlantCopy<'_, '_>,
     form: &Form,
-    θ: f64,
-    S0: &UnitFactor,
+    (θ, S0): (f64, &UnitFactor),
     alarm: f64,
+    chains: Vec<Vec<String>>,
 ) -> Result<Vec<(String, ParameterValue)>, DesignError> {
     let augmented = copy.augmented;
     let [C, F] = [&form.C, &form.F].map(|A| {
@@ -249,16 +255,16 @@ fn parameters(
     });
     let gain = gain(&StartPoint::new(copy)?.values(&C)?, form, θ, S0);
     let mut found: Vec<(String, ParameterValue)> = vec![("θ".into(), θ.into())];
-    let mut add = |name: &str, value: String| found.push((name.to_owned(), value.into()));
-    add("blocks", form.blocks.describe(augmented));
-    add("alarm", format!("excitation below {alarm:.3e}"));
-    add("rows", names(augmented, &form.order).join(", "));
+    let mut add = |name: &str, value| found.push((name.to_owned(), value));
+    add("blocks", ParameterValue::Blocks(chains));
+    add("alarm", ParameterValue::Alarm(alarm));
+    add("rows", names(augmented, &form.order).into());
     add("C(u)", expressions(&C));
     if form.blocks.factors.len() > 1 {
         add("F(u, x)", expressions(&F));
     }
-    add("S(0)", numbers(&product(S0)));
-    add("θΔ⁻¹S⁻¹Cᵀ at the start", numbers(&gain));
+    add("S(0)", ParameterValue::Matrix(product(S0)));
+    add("θΔ⁻¹S⁻¹Cᵀ at the start", ParameterValue::Matrix(gain));
     Ok(found)
 }
 

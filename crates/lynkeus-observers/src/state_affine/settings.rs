@@ -10,7 +10,6 @@ use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: REQUIRED,
     meaning: "the speed θ, in 1/(unit of time): the gain of block k grows like θ^k. Theorem 1 is stated for θ ≥ 1, so choose a unit of time in which the entries of F are of the order of 1",
@@ -18,15 +17,16 @@ const THETA: KeySpec = KeySpec {
 
 const START: KeySpec = KeySpec {
     name: "S0",
-    kind: "number s > 0, or a matrix as a list of rows",
-    shape: Shape::Either(&[Shape::Positive, Shape::ROWS]),
+    shape: Shape::As(
+        "number s > 0, or a matrix as a list of rows",
+        &Shape::Either(&[Shape::Positive, Shape::ROWS]),
+    ),
     default: "1",
     meaning: "S(0) = s·I, or the matrix; rows and columns in the order of the plant's states, then the unknown inputs",
 };
 
 const ALARM: KeySpec = KeySpec {
     name: "alarm",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "see below",
     meaning: "the flag is raised where `excitation` is below this",

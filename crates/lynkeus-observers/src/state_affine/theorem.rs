@@ -122,7 +122,7 @@ impl Study<'_> {
         let mut certificate = Certificate::new(BASIS, self.assumptions, checks);
         certificate.constants = constants;
         let note = estimate::note(self.common, self.augmented, self.region());
-        certificate.notes.push(note.into());
+        certificate.notes.push(note);
         if let Some((rate, λ)) = found.filter(|_| everything_else) {
             self.conclude(&mut certificate, rate, λ);
         }

@@ -31,7 +31,7 @@ use super::said::{Said, Shape};
 use super::settings::{Settings, no_theta};
 use crate::conditions::names;
 use crate::estimate::{PlantCopy, Speed, limited};
-use crate::printed::{StartPoint, expressions, is_constant, numbers};
+use crate::printed::{StartPoint, expressions, is_constant};
 use crate::theorem::{Enclosure, undeclared};
 use crate::{ChainGain, Design, DesignError, Examination, ParameterValue};
 
@@ -253,20 +253,18 @@ impl<'f, 'e, 'p> Matrices<'f, 'e, 'p> {
     ) -> Result<Vec<(String, ParameterValue)>, MissingInput> {
         let (form, [θ1, θ2]) = (self.form, self.θ);
         let augmented = form.augmented;
-        let joined = |states: &[usize]| names(augmented, states).join(", ");
         let outputs = form.first.iter();
-        let outputs: Vec<&str> = outputs
-            .map(|&i| augmented.outputs[i].variable.name.as_str())
-            .collect();
+        let outputs = outputs.map(|&i| augmented.outputs[i].variable.name.clone());
+        let outputs: Vec<String> = outputs.collect();
         let mut found: Vec<(String, ParameterValue)> =
             vec![("θ1".into(), θ1.into()), ("θ2".into(), θ2.into())];
-        let mut add = |name: &str, value: String| found.push((name.to_owned(), value.into()));
-        add("partition", outputs.join(", "));
-        add("x₁¹", joined(&form.x11()));
+        let mut add = |name: &str, value| found.push((name.to_owned(), value));
+        add("partition", outputs.into());
+        add("x₁¹", names(augmented, &form.x11()).into());
         for k in 1..=form.q() {
-            add(&format!("X² {k}"), joined(&form.block(k)));
+            add(&format!("X² {k}"), names(augmented, &form.block(k)).into());
         }
-        let gain = |n: usize| numbers(&[Chain::new(n).gain]);
+        let gain = |n: usize| ParameterValue::Matrix(vec![Chain::new(n).gain]);
         add("S₁⁻¹C₁ᵀ", gain(2));
         add("S₂⁻¹C₂ᵀ", gain(form.q()));
         add("G₁¹", expressions(&form.G11()));

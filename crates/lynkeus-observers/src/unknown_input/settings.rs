@@ -8,16 +8,17 @@ use crate::{KeySpec, Shape, Tuning, TuningError, Value};
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
-    kind: "list of two numbers > 0, [θ1, θ2]",
-    shape: Shape::List(&Shape::Positive),
+    shape: Shape::As(
+        "list of two numbers > 0, [θ1, θ2]",
+        &Shape::List(&Shape::Positive),
+    ),
     default: "from the proof, where a bound exists",
     meaning: "θ1 for the unknown inputs and x₁¹, θ2 for the rest",
 };
 
 const PARTITION: KeySpec = KeySpec {
     name: "partition",
-    kind: "list of measured outputs",
-    shape: Shape::NAMES,
+    shape: Shape::As("list of measured outputs", &Shape::NAMES),
     default: "found",
     meaning: "the outputs of x₁¹",
 };

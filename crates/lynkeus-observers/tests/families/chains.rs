@@ -275,7 +275,7 @@ fn a_positive_partial_that_is_too_large_is_refuted() {
             .refuted()
             .unwrap()
             .statement
-            .to_string()
+            .words()
             .starts_with("A(a) − KC is stable")
     );
     let fine = plant(&text(8.0));

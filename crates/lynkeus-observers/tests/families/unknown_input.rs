@@ -117,9 +117,9 @@ fn the_only_possible_partition() {
         };
         let refuted = examination.refuted().unwrap();
         assert!(
-            refuted.statement.to_string().contains("(i)"),
+            refuted.statement.words().contains("(i)"),
             "{}",
-            refuted.statement
+            refuted.statement.words()
         );
     }
     let tuning = with_partition(tuning(60.0, 15.0), &["y2", "y1"]);
@@ -269,7 +269,7 @@ fn a_counter_example_to_lemma_1() {
             .refuted()
             .unwrap()
             .statement
-            .to_string()
+            .words()
             .starts_with("(11)")
     );
     // the search finds x₁¹ = (a), with x₂¹ = (b, c) taller than x² = (d)
@@ -402,9 +402,9 @@ fn a_rank_that_is_lost_is_refuted() {
     };
     let refuted = examination.refuted().unwrap();
     assert!(
-        refuted.statement.to_string().starts_with("(H1)"),
+        refuted.statement.words().starts_with("(H1)"),
         "{}",
-        refuted.statement
+        refuted.statement.words()
     );
     assert!(matches!(refuted.verdict, Verdict::Refuted(_)));
 }

@@ -232,9 +232,9 @@ fn shortened_chains_that_the_papers_gains_make_unstable_are_refused() {
     };
     let refuted = examination.refuted().unwrap();
     assert!(
-        refuted.statement.to_string().contains("ends in layer 7"),
+        refuted.statement.words().contains("ends in layer 7"),
         "{}",
-        refuted.statement
+        refuted.statement.words()
     );
     let fine = design_with(
         &UnknownInput,
