@@ -23,15 +23,6 @@ pub struct Layers<'p> {
     pub factors: Matrix<'p>,
 }
 
-impl Layers<'_> {
-    /// In words: `(x1, x2, x3) → (x4) → (x5)`.
-    pub fn describe(&self, augmented: &AugmentedPlant<'_>) -> String {
-        let layer = |l: &Vec<usize>| format!("({})", names(augmented, l.iter().copied()));
-        let layers: Vec<String> = self.layers.iter().map(layer).collect();
-        layers.join(" → ")
-    }
-}
-
 /// The layers of a plant with unknown inputs.
 ///
 /// # Errors
