@@ -10,7 +10,7 @@ use lynkeus_proof::hurwitz;
 use lynkeus_proof::hurwitz::Stability;
 use lynkeus_structure::sign::Sign;
 use lynkeus_structure::{
-    AugmentedPlant, ChainRequest, Point, Region, Regularity, Verdict, has_value_at, sign,
+    AugmentedPlant, ChainRequest, Point, Region, Verdict, has_value_at, regularity, sign,
 };
 
 use crate::statement::proved;
@@ -73,7 +73,7 @@ pub(crate) fn partials(
         let statement = Statement::PartialKeepsSign { of: of.clone(), by };
         checks.push(match is_nowhere {
             true => {
-                let place = region.restricted(&graph.symbols_of(&[node])).place();
+                let place = region.restricted(&graph.symbols_of(&[node])).dimensions;
                 let found = finding.reason;
                 statement.found(
                     Verdict::Undecided(place),
@@ -165,9 +165,9 @@ pub(crate) fn lipschitz(
     let graph = augmented.graph();
     let symbols = augmented.symbols();
     let jacobian = lynkeus_expr::jacobian::forward(graph, &augmented.derivatives, &symbols);
-    let regularity = Regularity::of(graph, &augmented.derivatives, &symbols, region)?;
-    if !regularity.holds() {
-        return Ok(Statement::Lipschitz.with(regularity.finding()));
+    let regular = regularity(graph, &augmented.derivatives, &symbols, region)?;
+    if !regular.is_proved() {
+        return Ok(Statement::Lipschitz.with(regular));
     }
     let entries: Vec<_> = jacobian.entries.iter().map(|entry| entry.2).collect();
     let at_once = sign::bounded_at_once(graph, &entries, region)?;
@@ -184,7 +184,7 @@ pub(crate) fn lipschitz(
             slope: graph.render(node, 60),
             undeclared: None,
         };
-        return Ok(Statement::Lipschitz.found(Verdict::Undecided(used.place()), reason));
+        return Ok(Statement::Lipschitz.found(Verdict::Undecided(used.dimensions), reason));
     }
     let reason = Reason::Enclosed(jacobian.entries.len());
     Ok(proved(Statement::Lipschitz, reason))

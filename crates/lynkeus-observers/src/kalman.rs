@@ -14,7 +14,7 @@
 //! Nothing is required of the plant, and nothing is proved of the error.
 
 use lynkeus_model::Variable;
-use lynkeus_run::filter::{Bounds, FilterKind, SigmaPoints};
+use lynkeus_run::filter::{FilterKind, SigmaPoints};
 use lynkeus_structure::{AugmentedPlant, Standing};
 
 use crate::estimate::{Common, PlantCopy, Speed, limited};
@@ -73,25 +73,16 @@ pub const MHE: Filter = Filter {
     paper: "Rao, Rawlings and Mayne 2003, moving-horizon estimation",
     called: "moving-horizon estimator",
     keys: &[&KEYS, &WINDOW],
-    kind: |augmented, tuning| {
+    kind: |_, tuning| {
         let [horizon] = &WINDOW;
         let length = match number(tuning, horizon)? {
             None => HORIZON,
             Some(x) if x >= 1.0 && x.fract() == 0.0 && x <= 1e4 => x as usize,
             Some(x) => return Err(horizon.wrong(x)),
         };
-        Ok(FilterKind::MovingHorizon(length, ranges(augmented)))
+        Ok(FilterKind::MovingHorizon(length))
     },
 };
-
-/// The declared range of each state.
-fn ranges(augmented: &AugmentedPlant<'_>) -> Vec<Bounds> {
-    let bounds = augmented.states.iter().map(|state| Bounds {
-        low: state.min,
-        high: state.max,
-    });
-    bounds.collect()
-}
 
 impl Filter {
     fn read(
@@ -142,7 +133,7 @@ impl Filter {
         observer.filter = Some(FilterTuning {
             kind: settings.kind.clone(),
             gate: settings.gate,
-            bounds: settings.projects.then(|| ranges(augmented)),
+            projects: settings.projects,
             outputs: copy.at_estimate(&outputs),
             confined,
             initial_variance: variance.clone(),

@@ -7,11 +7,15 @@ mod chains;
 mod conditions;
 mod drift_observable;
 mod guarantee;
+mod numbers;
+mod observability;
 mod parameters;
 mod state_affine;
 mod structure;
 mod triangular;
 mod unknown_input;
+
+pub use numbers::{counted, figures, short};
 
 /// What has words.
 pub trait Words {

@@ -6,8 +6,6 @@ use crate::Words;
 
 impl Words for Reason {
     fn words(&self) -> String {
-        match self {
-            Reason::Text(text) => text.clone(),
-        }
+        self.text()
     }
 }

@@ -16,8 +16,8 @@ use lynkeus_expr::{Budget, Spent};
 use lynkeus_model::Plant;
 use lynkeus_observability::{Answer, Verdict};
 use lynkeus_observers::{Examination, fit_word};
-use lynkeus_structure::{Sensors, counted, determined, uniformity};
-use lynkeus_words::Words;
+use lynkeus_structure::{Sensors, determined, uniformity};
+use lynkeus_words::{Words, counted};
 
 use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;

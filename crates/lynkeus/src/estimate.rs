@@ -239,7 +239,7 @@ pub(crate) fn start_at_readings(
             design.notes.push(format!(
                 "{} starts at its first reading, {}: neither `initial` nor the model's `start` says where",
                 prepared.augmented().states[at.state].name,
-                lynkeus_structure::short(start)
+                lynkeus_words::short(start)
             ));
         }
     }

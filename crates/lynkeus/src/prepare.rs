@@ -428,7 +428,7 @@ fn tube(study: &Study, augmented: &mut AugmentedPlant<'_>) -> Result<(), Error> 
 fn blame(study: &Study, error: SensorsError) -> Error {
     let name = match &error {
         SensorsError::NoSuchName { name, .. } | SensorsError::Twice { name, .. } => name,
-        SensorsError::NothingMeasured { .. } => {
+        _ => {
             return Error::from_source(error).at(&study.file);
         }
     };

@@ -4,8 +4,8 @@ use std::fmt;
 
 use lynkeus_expr::real::rounded;
 use lynkeus_observers::Check;
-use lynkeus_structure::{Verdict, figures};
-use lynkeus_words::Words;
+use lynkeus_structure::Verdict;
+use lynkeus_words::{Words, figures};
 
 /// Four significant digits.
 pub(crate) fn number(value: f64) -> String {

@@ -6,8 +6,8 @@ use std::collections::HashMap;
 use lynkeus_expr::{Binary, Graph, Node, Op, Spent};
 use lynkeus_structure::output_map::{AffineForm, Degree, Rows};
 use lynkeus_structure::{
-    AugmentedPlant, Dimension, Finding, Matrix, Measurement, Region, Regularity, Verdict,
-    output_map, rank,
+    AugmentedPlant, Dimension, Finding, Matrix, Measurement, Region, Verdict, output_map, rank,
+    regularity,
 };
 
 use super::said::Said;
@@ -138,13 +138,13 @@ impl Form {
         // the map is followed along the plant: as states, inputs and time move
         let slopes = map.settings.known_slopes(augmented, &form.U);
         let moving = with_slopes(augmented, &form.U, &slopes, region);
-        let continuous = Regularity::of(augmented.graph(), &Φ, &moving.symbols(), &moving)?;
+        let continuous = regularity(augmented.graph(), &Φ, &moving.symbols(), &moving)?;
         let mut checks = vec![
             known(augmented, indices, &degrees),
             Statement::from(Germani::Regular).with(regular),
             Statement::from(Germani::OneToOne).with(one_to_one),
             map.lipschitz.clone(),
-            Statement::from(Germani::Continuous).with(continuous.finding()),
+            Statement::from(Germani::Continuous).with(continuous),
         ];
         if form.has_inputs() {
             checks.push(form.of_inputs(augmented, &slopes, region)?.advisory());

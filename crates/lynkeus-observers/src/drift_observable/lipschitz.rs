@@ -21,7 +21,7 @@ use lynkeus_proof::magnitude::{length, norm, plus, product, times};
 use lynkeus_structure::output_map::{
     Rows, affine_form, along_column, jacobian_rows, lie_derivatives, output_derivatives,
 };
-use lynkeus_structure::{AugmentedPlant, Finding, Matrix, Region, Regularity};
+use lynkeus_structure::{AugmentedPlant, Finding, Matrix, Region, regularity};
 
 use super::form::{Form, matrix, regular, with_slopes};
 use super::settings::Variant;
@@ -72,7 +72,7 @@ pub(super) fn bounds(
     let still: HashMap<Node, Node> = w.iter().map(|&w| (w, graph.constant(0.0).node())).collect();
     let drift = graph.substitute(&rows, &still);
     let every: Vec<Node> = inputs.iter().flatten().chain(&drift).copied().collect();
-    let continuous = Regularity::of(graph, &every, &region.symbols(), &region)?;
+    let continuous = regularity(graph, &every, &region.symbols(), &region)?;
     let found = box_.inverse(&Q)?;
     let unknown = || vec![vec![f64::INFINITY; n]; n];
     let of_z = found.as_ref().map_or_else(unknown, |found| found.bounds());
@@ -110,7 +110,7 @@ pub(super) fn bounds(
         of_z,
         Q: Q_size,
         regular: regular(augmented, &form.Q, &region)?,
-        continuous: continuous.finding(),
+        continuous,
         open: box_.open(),
     })
 }

@@ -30,6 +30,7 @@ use lynkeus_gain::integrators::{self, Pole};
 use lynkeus_proof::magnitude::{length, plus, size, times, total};
 use lynkeus_proof::riccati::Riccati;
 use lynkeus_structure::{AugmentedPlant, Verdict};
+use nalgebra::DMatrix;
 
 use super::form::Form;
 use super::lipschitz;
@@ -257,7 +258,7 @@ struct Proof<'a, 'p> {
     gains: &'a Gains,
     lipschitz: &'a Lipschitz,
     /// A − KC
-    A: Vec<Vec<f64>>,
+    A: DMatrix<f64>,
     /// the slowest pole's absolute value
     slowest: f64,
     /// per input: the bound of the derivative that drives the filter
@@ -331,7 +332,7 @@ impl Proof<'_, '_> {
         )
     }
 
-    fn bears(&self, A: &[Vec<f64>], g: &[f64], slowest: f64) -> bool {
+    fn bears(&self, A: &DMatrix<f64>, g: &[f64], slowest: f64) -> bool {
         g.iter().all(|g| g.is_finite())
             && Riccati::solve(A, &spread(g), SLOW * slowest, 1.0).is_some()
     }
@@ -384,8 +385,8 @@ impl Proof<'_, '_> {
         let twice = Interval::point(2.0) * Interval::point(P.α);
         let root_ν = (f + (f.powi(2) + twice * size(a).powi(2)).sqrt()) / twice;
         let e_z = Interval::point(P.largest).sqrt() * root_ν;
-        let part = |j: usize| (Interval::point(P.P[j][j]).sqrt() * root_ν).min(e_z).hi();
-        let parts: Vec<f64> = (0..P.P.len()).map(part).collect();
+        let part = |j: usize| (Interval::point(P.P[(j, j)]).sqrt() * root_ν).min(e_z).hi();
+        let parts: Vec<f64> = (0..P.P.nrows()).map(part).collect();
         let e_z = e_z.hi();
         let of_state = |(z, of_a): (&Vec<f64>, &f64)| {
             let one_by_one = total(z.iter().zip(&parts).map(|(z, e)| times(*z, *e)));
@@ -435,7 +436,7 @@ impl Proof<'_, '_> {
         let mut start = 0;
         for (i, K) in self.gains.K.iter().enumerate() {
             let noise = assumptions.noise.get(i).copied().unwrap_or(0.0);
-            let mut column = vec![0.0; self.A.len()];
+            let mut column = vec![0.0; self.A.nrows()];
             column[start..start + K.len()].copy_from_slice(K);
             if noise > 0.0 && !K.is_empty() {
                 sum = plus(sum, times(P.weight(&column), noise));

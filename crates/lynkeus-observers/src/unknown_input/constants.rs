@@ -22,7 +22,7 @@ use lynkeus_expr::{Interval, MissingInput, Node};
 use lynkeus_gain::integrators::Chain;
 use lynkeus_proof::magnitude::{length, norm, plus, product, size, times, total};
 use lynkeus_proof::matrix::sum;
-use lynkeus_structure::{AugmentedPlant, Matrix, Regularity, rank, sign};
+use lynkeus_structure::{AugmentedPlant, Matrix, rank, regularity, sign};
 
 use super::form::{Form, along, column, covered};
 use super::said::{Said, Shape};
@@ -203,8 +203,8 @@ impl<'e, 'p> Signals<'e, 'p> {
         let nodes: Vec<Node> = all.flat_map(Matrix::nonzero).collect();
         let region = self.box_.region();
         let graph = self.form.augmented.graph();
-        let found = Regularity::of(graph, &nodes, &region.symbols(), region)?;
-        Ok(Statement::from(Farza::Continuous).with(found.finding()))
+        let found = regularity(graph, &nodes, &region.symbols(), region)?;
+        Ok(Statement::from(Farza::Continuous).with(found))
     }
 
     /// (11) asks for Λ₂ at one x; the proof needs it where x̃ has left the measured
