@@ -38,7 +38,7 @@ pub struct Filter {
     /// what people call it
     called: &'static str,
     keys: &'static [&'static [KeySpec]],
-    kind: fn(&AugmentedPlant<'_>, &Tuning) -> Result<FilterKind, TuningError>,
+    kind: fn(&Tuning) -> Result<FilterKind, TuningError>,
 }
 
 /// The family `ekf`.
@@ -47,7 +47,7 @@ pub const EKF: Filter = Filter {
     paper: "Jazwinski 1970, the extended Kalman filter, continuous-discrete",
     called: "extended Kalman filter",
     keys: &[&KEYS, &BOUNDS],
-    kind: |_, _| Ok(FilterKind::Extended),
+    kind: |_| Ok(FilterKind::Extended),
 };
 
 /// The family `ukf`.
@@ -56,7 +56,7 @@ pub const UKF: Filter = Filter {
     paper: "Julier and Uhlmann 1997, the unscented Kalman filter",
     called: "unscented Kalman filter",
     keys: &[&KEYS, &BOUNDS, &POINTS],
-    kind: |_, tuning| {
+    kind: |tuning| {
         let SigmaPoints { alpha, beta, kappa } = SigmaPoints::default();
         let [own_alpha, own_beta, own_kappa] = &POINTS;
         Ok(FilterKind::Unscented(SigmaPoints {
@@ -73,7 +73,7 @@ pub const MHE: Filter = Filter {
     paper: "Rao, Rawlings and Mayne 2003, moving-horizon estimation",
     called: "moving-horizon estimator",
     keys: &[&KEYS, &WINDOW],
-    kind: |_, tuning| {
+    kind: |tuning| {
         let [horizon] = &WINDOW;
         let length = match number(tuning, horizon)? {
             None => HORIZON,
@@ -91,7 +91,7 @@ impl Filter {
         tuning: &Tuning,
     ) -> Result<Settings, TuningError> {
         Ok(Settings {
-            kind: (self.kind)(augmented, tuning)?,
+            kind: (self.kind)(tuning)?,
             common: Common::read(tuning)?,
             gate: tuning.positive(GATE.name)?,
             projects: tuning.meant(&BOUNDS[0], [true])?.is_some(),
@@ -174,6 +174,10 @@ impl Family for Filter {
 
     fn is_filter(&self) -> bool {
         true
+    }
+
+    fn smooths(&self) -> bool {
+        self.name == EKF.name
     }
 
     fn verify(&self, augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<(), TuningError> {
