@@ -84,14 +84,6 @@ pub(crate) fn grouped(number: u64) -> String {
     text
 }
 
-/// The budget of writing out one text.
-pub(crate) fn elaboration() -> Budget {
-    Budget::new(
-        MAX_ELABORATED,
-        "scalar operations when loops and arrays are written out",
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

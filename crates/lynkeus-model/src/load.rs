@@ -5,8 +5,7 @@ use std::path::Path;
 use lynkeus_expr::{Graph, Node};
 
 use crate::diagnostic::Problem;
-use crate::elaborate::{Evaluator, GivenNames, Mode, Value};
-use crate::limits::{MAX_SOURCE_BYTES, elaboration};
+use crate::limits::MAX_SOURCE_BYTES;
 use crate::syntax::parse_single_expression;
 use crate::{Diagnostic, LoadError, LoadOptions, Plant, elaborate, ode_model};
 
@@ -191,14 +190,9 @@ pub fn parse_expression(
 ) -> Result<Node, Diagnostic> {
     let refused = |problem| Diagnostic::new(problem, "expression", source);
     let (ast, root) = parse_single_expression(source).map_err(refused)?;
-    let scope = GivenNames { graph, names };
-    let budget = elaboration();
-    let mut evaluator = Evaluator::new(source, &ast, graph, &budget, &scope, Mode::Continuous);
-    let value = evaluator.value(root).map_err(refused)?;
-    let node = match value {
-        Value::Scalar(scalar) => scalar.real(graph),
-        Value::Array(_) => None,
-    };
+    let value = elaborate::evaluated(source, &ast, graph, names, |e| e.value(root));
+    let scalar = value.map_err(refused)?.as_scalar();
+    let node = scalar.and_then(|scalar| scalar.real(graph));
     node.ok_or_else(|| {
         let span = ast.expression(root).span;
         refused(Problem::new(

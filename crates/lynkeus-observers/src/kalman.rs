@@ -116,7 +116,7 @@ impl<K: Kalman> Stages for K {
         let jumps = match regularity.standing() {
             Standing::Refuted => format!(
                 "; {}: the filter linearises beside such places",
-                regularity.detail
+                regularity.reason.text()
             ),
             _ => String::new(),
         };

@@ -6,7 +6,8 @@ use lynkeus_run::filter::{
     FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, Smoothed,
 };
 use lynkeus_run::{Blueprint, EstimatorSettings};
-use lynkeus_structure::{AugmentedPlant, short};
+use lynkeus_structure::AugmentedPlant;
+use lynkeus_words::short;
 
 use crate::course::{Course, Samples};
 use crate::prepare::Prepared;

@@ -3,7 +3,7 @@
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_run::{Blueprint, Method, NeededStep, Step, System, first_jump, needed_step};
-use lynkeus_structure::short;
+use lynkeus_words::short;
 
 use crate::prepare::Prepared;
 use crate::{Error, Study, systems};

@@ -1,10 +1,9 @@
 //! Operators on scalars, arrays and matrices.
 
-use super::value::unequal_sizes;
 use lynkeus_expr::{Binary, Node, Unary};
 
 use super::evaluate::Evaluator;
-use super::value::{Array, Scalar, Value, describe_dims, expected_number};
+use super::value::{Scalar, Value, describe_dims, expected_number, unequal_sizes};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::syntax::ast::{BinaryOperator, Relation};
 
@@ -17,8 +16,8 @@ impl Evaluator<'_> {
 
     /// A truth value.
     pub(super) fn boolean(&self, value: &Value, span: Span) -> Result<Node> {
-        match value {
-            Value::Scalar(Scalar::Boolean(node)) => Ok(*node),
+        match value.as_scalar() {
+            Some(Scalar::Boolean(node)) => Ok(node),
             _ => Err(Problem::new(span, "expected a condition, found a number")
                 .hint("compare it, as in `u > 0`")),
         }
@@ -27,16 +26,15 @@ impl Evaluator<'_> {
     /// Applies an operation to every element.
     pub(super) fn map(
         &self,
-        value: Value,
+        mut value: Value,
         span: Span,
         operation: impl Fn(&Self, Scalar, Span) -> Result<Scalar>,
     ) -> Result<Value> {
-        let Array { dims, mut elements } = value.into_array();
-        self.budget.charge(elements.len() as u64, span)?;
-        for element in &mut elements {
+        self.budget.charge(value.elements.len() as u64, span)?;
+        for element in &mut value.elements {
             *element = operation(self, *element, span)?;
         }
-        Ok(Value::new(dims, elements))
+        Ok(value)
     }
 
     /// Applies an operation to the elements of two arrays of one size, or of an array and a
@@ -48,30 +46,24 @@ impl Evaluator<'_> {
         span: Span,
         operation: impl Fn(&Self, Scalar, Scalar, Span) -> Result<Scalar>,
     ) -> Result<Value> {
-        let (left, right) = (left.into_array(), right.into_array());
         if !left.dims.is_empty() && !right.dims.is_empty() && left.dims != right.dims {
             return Err(unequal_sizes(&left.dims, &right.dims, span));
         }
-        let count = left.elements.len().max(right.elements.len());
-        let count = if left.elements.is_empty() || right.elements.is_empty() {
-            0
-        } else {
-            count
+        let (dims, count) = match left.dims[..] {
+            [] => (&right.dims, right.elements.len()),
+            _ => (&left.dims, left.elements.len()),
         };
         self.budget.charge(count as u64, span)?;
-        let at = |array: &Array, i: usize| match array.dims.is_empty() {
-            true => array.elements.first().copied(),
-            false => array.elements.get(i).copied(),
+        let at = |value: &Value, i: usize| match value.dims[..] {
+            [] => value.elements[0],
+            _ => value.elements[i],
         };
-        let pairs = (0..count).filter_map(|i| Some((at(&left, i)?, at(&right, i)?)));
-        let elements: Result<Vec<Scalar>> =
-            pairs.map(|(a, b)| operation(self, a, b, span)).collect();
-        let dims = if left.dims.is_empty() {
-            right.dims
-        } else {
-            left.dims
-        };
-        Ok(Value::new(dims, elements?))
+        let pairs = (0..count).map(|i| (at(&left, i), at(&right, i)));
+        let elements = pairs.map(|(a, b)| operation(self, a, b, span));
+        Ok(Value {
+            elements: elements.collect::<Result<_>>()?,
+            dims: dims.clone(),
+        })
     }
 
     pub(super) fn binary(
@@ -82,40 +74,38 @@ impl Evaluator<'_> {
         span: Span,
     ) -> Result<Value> {
         use BinaryOperator as B;
-        let scalars = left.dims().is_empty() && right.dims().is_empty();
         match operator {
             B::And | B::Or => {
                 let (left, right) = (self.boolean(&left, span)?, self.boolean(&right, span)?);
-                let operation = if operator == B::And {
-                    Binary::And
-                } else {
-                    Binary::Or
+                let operation = match operator {
+                    B::And => Binary::And,
+                    _ => Binary::Or,
                 };
                 let node = self.graph.binary(operation, left, right);
-                return Ok(Value::Scalar(Scalar::Boolean(node)));
+                return Ok(Scalar::Boolean(node).into());
             }
-            B::Add | B::Subtract if left.dims() != right.dims() => {
-                let problem = unequal_sizes(left.dims(), right.dims(), span);
-                return Err(match left.dims().is_empty() || right.dims().is_empty() {
+            B::Add | B::Subtract if left.dims != right.dims => {
+                let problem = unequal_sizes(&left.dims, &right.dims, span);
+                return Err(match left.dims.is_empty() || right.dims.is_empty() {
                     true => problem.hint("`.+` and `.-` take a scalar with every element"),
                     false => problem,
                 });
             }
-            B::Multiply if !left.dims().is_empty() && !right.dims().is_empty() => {
-                return self.product(left.into_array(), right.into_array(), span);
+            B::Multiply if !left.dims.is_empty() && !right.dims.is_empty() => {
+                return self.product(&left, &right, span);
             }
-            B::Divide if !right.dims().is_empty() => {
+            B::Divide if !right.dims.is_empty() => {
                 return Err(Problem::new(span, "division by an array")
                     .hint("`./` divides by every element"));
             }
             _ => {}
         }
-        let operation =
-            |evaluator: &Self, a, b, span| evaluator.scalar_binary(operator, a, b, span);
-        if let (true, Value::Scalar(a), Value::Scalar(b)) = (scalars, &left, &right) {
-            return Ok(Value::Scalar(operation(self, *a, *b, span)?));
+        if let (Some(a), Some(b)) = (left.as_scalar(), right.as_scalar()) {
+            return Ok(self.scalar_binary(operator, a, b, span)?.into());
         }
-        self.elementwise(left, right, span, operation)
+        self.elementwise(left, right, span, |evaluator, a, b, span| {
+            evaluator.scalar_binary(operator, a, b, span)
+        })
     }
 
     pub(super) fn scalar_binary(
@@ -166,7 +156,7 @@ impl Evaluator<'_> {
         elementwise: bool,
         span: Span,
     ) -> Result<Value> {
-        let are_scalars = base.dims().is_empty() && exponent.dims().is_empty();
+        let are_scalars = base.dims.is_empty() && exponent.dims.is_empty();
         if !elementwise && !are_scalars {
             return Err(Problem::new(span, "powers of arrays are not supported")
                 .hint("`.^` takes the power of every element"));
@@ -229,20 +219,14 @@ impl Evaluator<'_> {
     }
 
     /// Scalar product, or product of matrices and vectors.
-    fn product(&self, left: Array, right: Array, span: Span) -> Result<Value> {
-        let (rows, inner) = match left.dims[..] {
-            [inner] => (1, inner),
-            [rows, inner] => (rows, inner),
-            _ => return Err(no_product(&left.dims, &right.dims, span)),
+    fn product(&self, left: &Value, right: &Value, span: Span) -> Result<Value> {
+        let (rows, inner, columns) = match (&left.dims[..], &right.dims[..]) {
+            (&[inner], &[across]) if inner == across => (1, inner, 1),
+            (&[inner], &[across, columns]) if inner == across => (1, inner, columns),
+            (&[rows, inner], &[across]) if inner == across => (rows, inner, 1),
+            (&[rows, inner], &[across, columns]) if inner == across => (rows, inner, columns),
+            (left, right) => return Err(no_product(left, right, span)),
         };
-        let (across, columns) = match right.dims[..] {
-            [across] => (across, 1),
-            [across, columns] => (across, columns),
-            _ => return Err(no_product(&left.dims, &right.dims, span)),
-        };
-        if inner != across {
-            return Err(no_product(&left.dims, &right.dims, span));
-        }
         let work = (rows as u64)
             .saturating_mul(inner as u64)
             .saturating_mul(columns as u64);
@@ -251,17 +235,16 @@ impl Evaluator<'_> {
         let mut elements = Vec::with_capacity(rows * columns);
         for row in 0..rows {
             for column in 0..columns {
-                let terms = (0..inner).filter_map(|k| {
-                    let a = left.elements.get(row * inner + k)?;
-                    Some((*a, *right.elements.get(k * columns + column)?))
-                });
+                let left = left.elements[row * inner..].iter().take(inner);
+                let right = right.elements.iter().skip(column).step_by(columns);
+                let terms = left.copied().zip(right.copied());
                 elements.push(self.sum_of_products(terms, span)?);
             }
         }
         let mut dims = vec![];
         dims.extend((left.dims.len() == 2).then_some(rows));
         dims.extend((right.dims.len() == 2).then_some(columns));
-        Ok(Value::new(dims, elements))
+        Ok(Value { dims, elements })
     }
 
     fn sum_of_products(

@@ -1,89 +1,62 @@
 //! Declarations to symbols: in which order they can be given sizes and values, and which.
 
 use std::borrow::Cow;
-use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 
-use super::scope::{Context, Mode};
+use super::evaluate::Evaluator;
+use super::scope::Mode;
 use super::symbols::{Component, Symbols, gathered, is_outer_input};
 use super::value::{
-    Array, Scalar, check_size, describe_dims, element_count, element_name, expected_number,
+    Scalar, Value, check_size, describe_dims, element_count, element_name, expected_number,
 };
 use crate::diagnostic::{Problem, Result, Span};
 use crate::flat::{FlatModel, constant_label};
-use crate::limits::{Budget, MAX_SCALARS, MAX_TEXT};
 use crate::names::{did_you_mean, listed};
 use crate::syntax::ast::{Causality, Declaration, ExprId, Kind, TypeName, Variability};
 use crate::syntax::plain;
 
 impl<'a> Symbols<'a> {
-    /// The declarations of a model, each behind those that its size or value needs.
-    pub(crate) fn new(context: &Context<'a>) -> Result<Self> {
-        let model = context.model;
-        let by_name = index_names(context.source, &model.declarations)?;
-        let declarations = &model.declarations;
-        let needs = declarations.iter().map(|d| needs(context, d, &by_name));
+    /// With the declarations of the model, each found behind those that its size or value needs.
+    pub(crate) fn declared(mut self) -> Result<Self> {
+        let declarations = &self.model.declarations;
+        self.by_name = index_names(self.source, declarations)?;
+        let needs = declarations.iter().map(|d| self.needs(d));
         let needs: Vec<Vec<usize>> = needs.collect();
         let sequence = sort(declarations, &needs)?;
-        let dependent = dependent(declarations, &needs, &sequence);
-        let overrides = overrides(context, &by_name)?;
-        let mut symbols = Self {
-            declarations,
-            by_name,
-            components: model.declarations.iter().map(|_| None).collect(),
-            gathered: HashMap::new(),
-            parameters: HashSet::new(),
-            model,
-            derivatives: RefCell::default(),
-            time: context.graph.symbol("time").node(),
-            graph: context.graph,
-            dependent,
-        };
-        let sizes = Sizes::new();
+        self.dependent = dependent(declarations, &needs, &sequence);
+        let overrides = self.overrides()?;
+        self.components = declarations.iter().map(|_| None).collect();
+        self.time();
         for place in sequence {
-            let component = symbols.component(context, &overrides, &sizes, place);
-            if component.is_err() && model.possible.contains(&model.declarations[place].label) {
+            let given = overrides.get(&place).map_or(&[][..], Vec::as_slice);
+            let component = self.component(place, given);
+            if component.is_err() && self.model.possible.contains(&declarations[place].label) {
                 continue;
             }
             let component = component?;
             if component.is_known {
-                let elements = component
-                    .elements
-                    .iter()
-                    .filter_map(|e| e.real(context.graph));
-                symbols.parameters.extend(elements);
+                let elements = component.elements.iter();
+                let symbols = elements.filter_map(|element| element.real(self.graph));
+                self.parameters.extend(symbols);
             }
-            if let Some(slot) = symbols.components.get_mut(place) {
-                *slot = Some(component);
-            }
+            self.components[place] = Some(component);
         }
-        symbols.gathered = gathered(&symbols.by_name, &symbols.components);
-        Ok(symbols)
+        self.gathered = gathered(&self.by_name, &self.components);
+        Ok(self)
     }
 
-    fn component(
-        &self,
-        context: &Context<'a>,
-        overrides: &HashMap<usize, Vec<Override>>,
-        sizes: &Sizes,
-        place: usize,
-    ) -> Result<Component> {
-        let declaration = &self.declarations[place];
+    fn component(&self, place: usize, given: &[Given]) -> Result<Component> {
+        let declaration = &self.model.declarations[place];
         let name = declaration.label.as_str();
         if declaration.prefix.variability != Variability::Continuous {
-            return self.parameter(context, overrides, sizes, place);
+            return self.parameter(declaration, self.dependent[place], given);
         }
-        let dims = self.dims(context, declaration)?.into_iter();
-        let dims: Option<Vec<usize>> = dims.collect();
-        let dims = dims.ok_or_else(|| {
-            Problem::new(
-                declaration.name,
-                format!("the size of variable `{name}` must be given"),
-            )
-            .hint("write a number or a parameter instead of `:`")
+        let dims = self.dims_of(declaration, |_| {
+            let message = format!("the size of variable `{name}` must be given");
+            Err(Problem::new(declaration.name, message)
+                .hint("write a number or a parameter instead of `:`"))
         })?;
-        sizes.charge(context, &dims, declaration)?;
-        let count: usize = dims.iter().product();
+        self.charge(&dims, declaration)?;
         let is_boolean = declaration.prefix.type_name == TypeName::Boolean;
         if is_boolean && declaration.prefix.causality == Causality::Input {
             let problem = Problem::new(declaration.name, "a Boolean input is not supported");
@@ -102,23 +75,47 @@ impl<'a> Symbols<'a> {
                 false => Scalar::Real(symbol),
             }
         };
-        let elements = (0..count).map(symbol).collect();
         Ok(Component {
+            elements: (0..dims.iter().product()).map(symbol).collect(),
             dims,
-            elements,
             values: None,
             is_known: false,
         })
     }
 
-    /// Sizes as declared; `None` for `:`.
-    fn dims(&self, context: &Context<'a>, declaration: &Declaration) -> Result<Vec<Option<usize>>> {
-        let mut evaluator = self.evaluator_of(context, declaration, Mode::Structural);
-        let length = |&id| match context.ast.expression(id).kind {
-            Kind::All => Ok(None),
-            _ => evaluator.length(id).map(Some),
+    /// Sizes as declared; `open` gives that of an axis for `:`.
+    fn dims_of(
+        &self,
+        declaration: &Declaration,
+        open: impl Fn(usize) -> Result<usize>,
+    ) -> Result<Vec<usize>> {
+        let mut evaluator = Evaluator::of(self, declaration, Mode::Structural);
+        let sizes = declaration.dimensions.iter().enumerate();
+        let size = |(axis, &id)| match self.ast.expression(id).kind {
+            Kind::All => open(axis),
+            _ => evaluator.length(id),
         };
-        declaration.dimensions.iter().map(length).collect()
+        sizes.map(size).collect()
+    }
+
+    /// Takes what a declaration is written out to from the budgets.
+    fn charge(&self, dims: &[usize], declaration: &Declaration) -> Result<()> {
+        // A size beside a size of zero counts as well: slices walk along it.
+        let walked: Vec<usize> = dims.iter().map(|&dim| dim.max(1)).collect();
+        let count = element_count(&walked).unwrap_or(u64::MAX);
+        self.scalars.charge(count, declaration.name)?;
+        let description = declaration.description.as_ref().map_or(0, String::len);
+        let attributes = declaration.attributes.iter();
+        let values = attributes.filter_map(|attribute| Some(self.ast.expression(attribute.value?)));
+        let texts = values.filter(|value| matches!(value.kind, Kind::Text));
+        let length: u64 = texts
+            .map(|text| text.span)
+            .chain([declaration.name])
+            .map(|span| u64::from(span.end.saturating_sub(span.start)))
+            .sum();
+        let each = length.saturating_add(description as u64);
+        self.texts
+            .charge(count.saturating_mul(each), declaration.name)
     }
 }
 
@@ -158,49 +155,6 @@ fn index_names<'a>(
     Ok(by_name)
 }
 
-/// Budgets of what declarations are written out to.
-struct Sizes {
-    scalars: Budget,
-    text: Budget,
-}
-
-impl Sizes {
-    fn new() -> Self {
-        Self {
-            scalars: Budget::new(MAX_SCALARS, "scalar variables and parameters"),
-            text: Budget::new(MAX_TEXT, "bytes of names, units and descriptions"),
-        }
-    }
-
-    fn charge(
-        &self,
-        context: &Context<'_>,
-        dims: &[usize],
-        declaration: &Declaration,
-    ) -> Result<()> {
-        // A size beside a size of zero counts as well: slices walk along it.
-        let walked: Vec<usize> = dims.iter().map(|&dim| dim.max(1)).collect();
-        let count = element_count(&walked).unwrap_or(u64::MAX);
-        self.scalars.charge(count, declaration.name)?;
-        let description = declaration.description.as_ref().map_or(0, String::len);
-        let is_text = |id| matches!(context.ast.expression(id).kind, Kind::Text);
-        let texts = declaration
-            .attributes
-            .iter()
-            .filter_map(|attribute| attribute.value);
-        let texts = texts
-            .filter(|&id| is_text(id))
-            .map(|id| context.ast.expression(id).span);
-        let length: u64 = texts
-            .chain([declaration.name])
-            .map(|span| u64::from(span.end.saturating_sub(span.start)))
-            .sum();
-        let each = length.saturating_add(description as u64);
-        self.text
-            .charge(count.saturating_mul(each), declaration.name)
-    }
-}
-
 /// Of each declaration: true where the value of a parameter is made from other parameters of type
 /// Real. `needs`: places of the declarations that each one reads; `sequence`: each behind these.
 fn dependent(declarations: &[Declaration], needs: &[Vec<usize>], sequence: &[usize]) -> Vec<bool> {
@@ -216,119 +170,94 @@ fn dependent(declarations: &[Declaration], needs: &[Vec<usize>], sequence: &[usi
     dependent
 }
 
-/// Declarations whose size or value this one reads.
-fn needs(
-    context: &Context<'_>,
-    declaration: &Declaration,
-    by_name: &HashMap<&str, usize>,
-) -> Vec<usize> {
-    let is_known = declaration.prefix.variability != Variability::Continuous;
-    let binding = declaration.binding.filter(|_| is_known);
-    let own: Vec<&str> = context.model.scopes.iter().map(String::as_str).collect();
-    let package = declaration.package.as_deref();
-    let scopes = package.map_or(own, |package| vec![package]);
-    let mut found = vec![];
-    for root in declaration.dimensions.iter().copied().chain(binding) {
-        for name in names(context, by_name, root) {
-            let before = found.len();
-            if package.is_none() {
-                named(context.model, by_name, &name, &mut found);
+impl<'a> Symbols<'a> {
+    /// Declarations whose size or value this one reads.
+    fn needs(&self, declaration: &Declaration) -> Vec<usize> {
+        let is_known = declaration.prefix.variability != Variability::Continuous;
+        let binding = declaration.binding.filter(|_| is_known);
+        let own: Vec<&str> = self.model.scopes.iter().map(String::as_str).collect();
+        let package = declaration.package.as_deref();
+        let scopes = package.map_or(own, |package| vec![package]);
+        let mut found = vec![];
+        for root in declaration.dimensions.iter().copied().chain(binding) {
+            for name in self.names_in(root) {
+                let before = found.len();
+                if package.is_none() {
+                    self.places(&name, &mut found);
+                }
+                if found.len() > before {
+                    continue;
+                }
+                let full = self.classes.full_names(&name, &scopes);
+                let mut constants = full.iter().map(|full| constant_label(full));
+                while found.len() == before
+                    && let Some(label) = constants.next()
+                {
+                    self.places(&label, &mut found);
+                }
             }
-            if found.len() > before {
-                continue;
-            }
-            let full = context.classes.full_names(&name, &scopes);
-            let mut constants = full.iter().map(|full| constant_label(full));
-            while found.len() == before
-                && let Some(label) = constants.next()
+        }
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
+    /// The names in an expression: `p[2]` where that is declared by itself, and not `p`.
+    fn names_in(&self, root: ExprId) -> Vec<Cow<'a, str>> {
+        let text = |id: ExprId| plain(self.ast.expression(id).span.text(self.source));
+        let mut elements = HashSet::new();
+        for id in self.ast.ids(root) {
+            if let Kind::Index(base, _) = self.ast.expression(id).kind
+                && self.by_name.contains_key(&*text(id))
             {
-                named(context.model, by_name, &label, &mut found);
+                elements.insert(base);
+                elements.insert(id);
             }
         }
+        let is_name = |id: &ExprId| match self.ast.expression(*id).kind {
+            Kind::Name | Kind::Path(_) => !elements.contains(id),
+            _ => elements.contains(id),
+        };
+        self.ast.ids(root).filter(is_name).map(text).collect()
     }
-    found.sort_unstable();
-    found.dedup();
-    found
-}
 
-/// The names in an expression: `p[2]` where that is declared by itself, and not `p`.
-fn names<'a>(
-    context: &Context<'a>,
-    by_name: &HashMap<&str, usize>,
-    root: ExprId,
-) -> Vec<Cow<'a, str>> {
-    let text = |id: ExprId| plain(context.ast.expression(id).span.text(context.source));
-    let mut elements = HashSet::new();
-    for id in context.ast.ids(root) {
-        if let Kind::Index(base, _) = context.ast.expression(id).kind
-            && by_name.contains_key(&*text(id))
-        {
-            elements.insert(base);
-            elements.insert(id);
+    /// The declaration of a name; else those of the members of a record, and of elements that are
+    /// declared by themselves.
+    fn places(&self, name: &str, found: &mut Vec<usize>) {
+        if let Some(&place) = self.by_name.get(name) {
+            found.push(place);
+            return;
+        }
+        let base = name.split('[').next().unwrap_or_default();
+        let element = |element| self.by_name.get(format!("{base}[{element}]").as_str());
+        found.extend((1..).map_while(element));
+        for member in self.model.records.get(base).into_iter().flatten() {
+            self.places(&format!("{base}.{member}"), found);
         }
     }
-    let is_name = |id: &ExprId| match context.ast.expression(*id).kind {
-        Kind::Name | Kind::Path(_) => !elements.contains(id),
-        _ => elements.contains(id),
-    };
-    context.ast.ids(root).filter(is_name).map(text).collect()
-}
-
-fn named(model: &FlatModel, by_name: &HashMap<&str, usize>, name: &str, found: &mut Vec<usize>) {
-    match by_name.get(name) {
-        Some(&place) => found.push(place),
-        None => members(model, by_name, name, found),
-    }
-}
-
-/// Declarations of the members of a record, and of elements that are declared by themselves.
-fn members(model: &FlatModel, by_name: &HashMap<&str, usize>, name: &str, found: &mut Vec<usize>) {
-    let base = name.split('[').next().unwrap_or_default();
-    for element in 1.. {
-        let Some(&place) = by_name.get(format!("{base}[{element}]").as_str()) else {
-            break;
-        };
-        found.push(place);
-    }
-    for member in model.records.get(base).into_iter().flatten() {
-        let full = format!("{base}.{member}");
-        named(model, by_name, &full, found);
-    }
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Mark {
-    New,
-    Open,
-    Done,
 }
 
 /// Depth-first, without recursion: a chain of parameters may be as long as the file.
 fn sort(declarations: &[Declaration], needs: &[Vec<usize>]) -> Result<Vec<usize>> {
-    let mut marks = vec![Mark::New; needs.len()];
+    let (mut is_met, mut is_done) = (vec![false; needs.len()], vec![false; needs.len()]);
     let mut sequence = Vec::with_capacity(needs.len());
     let mut path: Vec<(usize, usize)> = vec![];
     for root in 0..needs.len() {
-        if marks[root] != Mark::New {
-            continue;
+        if !std::mem::replace(&mut is_met[root], true) {
+            path.push((root, 0));
         }
-        marks[root] = Mark::Open;
-        path.push((root, 0));
         while let Some((place, next)) = path.last_mut() {
             let Some(&need) = needs[*place].get(*next) else {
-                marks[*place] = Mark::Done;
+                is_done[*place] = true;
                 sequence.push(*place);
                 path.pop();
                 continue;
             };
             *next += 1;
-            match marks[need] {
-                Mark::Done => {}
-                Mark::Open => return Err(cycle(declarations, &path, need)),
-                Mark::New => {
-                    marks[need] = Mark::Open;
-                    path.push((need, 0));
-                }
+            if !std::mem::replace(&mut is_met[need], true) {
+                path.push((need, 0));
+            } else if !is_done[need] {
+                return Err(cycle(declarations, &path, need));
             }
         }
     }
@@ -359,57 +288,46 @@ impl<'a> Symbols<'a> {
     /// A parameter: its value as sizes see it and its symbols as equations see it.
     fn parameter(
         &self,
-        context: &Context<'a>,
-        overrides: &HashMap<usize, Vec<Override>>,
-        sizes: &Sizes,
-        place: usize,
+        declaration: &Declaration,
+        dependent: bool,
+        given: &[Given],
     ) -> Result<Component> {
-        let (declaration, dependent) = (&self.declarations[place], self.dependent[place]);
         let label = declaration.label.as_str();
         let name = label.strip_prefix('.').unwrap_or(label);
-        if declaration.prefix.causality == Causality::Input {
+        let prefix = &declaration.prefix;
+        if prefix.causality == Causality::Input {
             let message = format!("`{name}` is both a parameter and an input");
             return Err(Problem::new(declaration.name, message).hint("choose one of the two"));
         }
-        let keeps_symbols = context.options.symbolic_parameters
-            && declaration.prefix.variability == Variability::Parameter
-            && !declaration.prefix.is_final
-            && declaration.prefix.type_name == TypeName::Real;
-        let known = self.binding(context, declaration, Mode::Structural)?;
-        let dims = self.parameter_dims(context, declaration, known.as_ref())?;
-        sizes.charge(context, &dims, declaration)?;
-        let given = overrides.get(&place).map_or(&[][..], Vec::as_slice);
-        let given = by_offset(given, name, &dims, declaration.name)?;
+        let known = self.binding(declaration, Mode::Structural)?;
+        let dims = self.dims_of(declaration, |axis| {
+            let found = known.as_ref().and_then(|(value, _)| value.dims.get(axis));
+            found.copied().ok_or_else(|| {
+                let message = "the size `:` needs a value to be taken from";
+                Problem::new(declaration.name, message)
+            })
+        })?;
+        self.charge(&dims, declaration)?;
         let parts = Parts {
-            context,
+            symbols: self,
             declaration,
             name,
+            given: &by_offset(given, name, &dims, declaration.name)?,
             dims: &dims,
-            given: &given,
         };
         let values = parts.values(known)?;
-        if !context.options.symbolic_parameters {
-            let values = values.ok_or_else(|| parts.no_value())?;
-            let elements = values.clone();
-            return Ok(Component {
-                dims,
-                elements,
-                values: Some(values),
-                is_known: true,
-            });
-        }
-        let elements = match (dependent, &values) {
-            (true, _) => {
-                let symbolic = self.binding(context, declaration, Mode::Parametric)?;
-                parts.symbolic(symbolic)?
+        let is_parameter = prefix.variability == Variability::Parameter;
+        let keeps_symbols = is_parameter && !prefix.is_final && prefix.type_name == TypeName::Real;
+        let elements = match &values {
+            _ if dependent && self.options.symbolic_parameters => {
+                parts.symbolic(self.binding(declaration, Mode::Parametric)?)?
             }
-            (false, Some(values)) if keeps_symbols => parts.symbols_but(values),
-            (false, None) if keeps_symbols => parts.symbols(),
-            (false, Some(values)) => values.clone(),
-            (false, None) if declaration.prefix.variability == Variability::Parameter => {
-                parts.symbols()
+            Some(values) if keeps_symbols && self.options.symbolic_parameters => {
+                parts.symbols_but(values)
             }
-            (false, None) => return Err(parts.no_value()),
+            Some(values) => values.clone(),
+            None if is_parameter && self.options.symbolic_parameters => parts.all_symbols(),
+            None => return Err(parts.no_value()),
         };
         Ok(Component {
             dims,
@@ -419,53 +337,24 @@ impl<'a> Symbols<'a> {
         })
     }
 
-    /// The value of the declaration equation; `None` if there is none, or if it needs a
-    /// parameter without value where these are allowed.
-    fn binding(
-        &self,
-        context: &Context<'a>,
-        declaration: &Declaration,
-        mode: Mode,
-    ) -> Result<Option<(Array, ExprId)>> {
+    /// The value of the declaration equation, and where it stands; `None` if there is none, or if it
+    /// needs a parameter without value where these are allowed.
+    fn binding(&self, declaration: &Declaration, mode: Mode) -> Result<Option<(Value, Span)>> {
         let Some(id) = declaration.binding else {
             return Ok(None);
         };
-        let mut evaluator = self.evaluator_of(context, declaration, mode);
+        let mut evaluator = Evaluator::of(self, declaration, mode);
         match evaluator.value(id) {
-            Ok(value) => Ok(Some((value.into_array(), id))),
-            Err(_) if evaluator.valueless && context.options.symbolic_parameters => Ok(None),
+            Ok(value) => Ok(Some((value, evaluator.span(id)))),
+            Err(_) if evaluator.valueless && self.options.symbolic_parameters => Ok(None),
             Err(problem) => Err(problem),
         }
-    }
-
-    /// The declared size, with `:` taken from the value.
-    fn parameter_dims(
-        &self,
-        context: &Context<'a>,
-        declaration: &Declaration,
-        value: Option<&(Array, ExprId)>,
-    ) -> Result<Vec<usize>> {
-        let declared = self.dims(context, declaration)?;
-        let found = value.map(|(array, _)| array.dims.as_slice());
-        let open = |axis: usize| {
-            found
-                .and_then(|dims| dims.get(axis))
-                .copied()
-                .ok_or_else(|| {
-                    let message = "the size `:` needs a value to be taken from";
-                    Problem::new(declaration.name, message)
-                })
-        };
-        let sizes = declared.into_iter().enumerate();
-        sizes
-            .map(|(axis, size)| size.map_or_else(|| open(axis), Ok))
-            .collect()
     }
 }
 
 /// One declaration with what is known about it.
 struct Parts<'p> {
-    context: &'p Context<'p>,
+    symbols: &'p Symbols<'p>,
     declaration: &'p Declaration,
     name: &'p str,
     dims: &'p [usize],
@@ -474,89 +363,73 @@ struct Parts<'p> {
 
 impl Parts<'_> {
     /// Known values of all elements; `None` where some have none.
-    fn values(&self, binding: Option<(Array, ExprId)>) -> Result<Option<Vec<Scalar>>> {
-        let count: usize = self.dims.iter().product();
-        let mut values = vec![None; count];
-        if let Some((array, id)) = binding {
-            self.check_size(&array, id)?;
-            let span = self.context.ast.expression(id).span;
-            for (slot, element) in values.iter_mut().zip(array.elements) {
+    fn values(&self, binding: Option<(Value, Span)>) -> Result<Option<Vec<Scalar>>> {
+        let mut values = vec![None; self.dims.iter().product()];
+        if let Some((value, span)) = binding {
+            self.check_size(&value, span)?;
+            for (slot, element) in values.iter_mut().zip(value.elements) {
                 *slot = Some(self.known(element, span)?);
             }
         }
         for &(offset, value) in self.given {
-            let value = self.converted(value)?;
-            if let Some(slot) = values.get_mut(offset) {
-                *slot = Some(value);
-            }
+            values[offset] = Some(self.converted(value)?);
         }
         Ok(values.into_iter().collect())
     }
 
     /// Expressions over other parameters, but for elements set from outside.
-    fn symbolic(&self, binding: Option<(Array, ExprId)>) -> Result<Vec<Scalar>> {
-        let Some((array, id)) = binding else {
-            return Ok(self.symbols());
+    fn symbolic(&self, binding: Option<(Value, Span)>) -> Result<Vec<Scalar>> {
+        let Some((value, span)) = binding else {
+            return Ok(self.all_symbols());
         };
-        self.check_size(&array, id)?;
-        let span = self.context.ast.expression(id).span;
-        let graph = self.context.graph;
+        self.check_size(&value, span)?;
         let is_boolean = self.declaration.prefix.type_name == TypeName::Boolean;
-        let typed = |element: Scalar| {
-            if is_boolean {
-                return match element {
-                    Scalar::Boolean(_) => Ok(element),
-                    _ => Err(Problem::new(span, "expected `true` or `false`")),
-                };
+        let typed = |element: Scalar| match (is_boolean, element) {
+            (true, Scalar::Boolean(_)) => Ok(element),
+            (true, _) => Err(expected_truth(span)),
+            (false, _) => {
+                let node = element.real(self.symbols.graph);
+                node.map(Scalar::Real).ok_or_else(|| expected_number(span))
             }
-            let node = element.real(graph).ok_or_else(|| expected_number(span))?;
-            Ok(Scalar::Real(node))
         };
-        let mut elements: Vec<Scalar> = array
-            .elements
-            .into_iter()
-            .map(typed)
-            .collect::<Result<_>>()?;
+        let elements = value.elements.into_iter().map(typed);
+        let mut elements: Vec<Scalar> = elements.collect::<Result<_>>()?;
         for &(offset, value) in self.given {
-            if let Some(slot) = elements.get_mut(offset) {
-                *slot = match is_boolean {
-                    true => self.converted(value)?,
-                    false => Scalar::Real(graph.constant(value).node()),
-                };
-            }
+            elements[offset] = match is_boolean {
+                true => self.converted(value)?,
+                false => Scalar::Real(self.symbols.graph.constant(value).node()),
+            };
         }
         Ok(elements)
     }
 
-    fn symbols(&self) -> Vec<Scalar> {
-        let count: usize = self.dims.iter().product();
-        let graph = self.context.graph;
+    fn element_name(&self, offset: usize) -> String {
+        element_name(self.name, self.dims, offset)
+    }
+
+    fn all_symbols(&self) -> Vec<Scalar> {
         let symbol = |offset| {
-            graph
-                .symbol(&element_name(self.name, self.dims, offset))
-                .node()
+            let symbol = self.symbols.graph.symbol(&self.element_name(offset));
+            Scalar::Real(symbol.node())
         };
-        (0..count)
-            .map(|offset| Scalar::Real(symbol(offset)))
-            .collect()
+        (0..self.dims.iter().product()).map(symbol).collect()
     }
 
     /// Symbols, but for elements that are to be numbers.
     fn symbols_but(&self, values: &[Scalar]) -> Vec<Scalar> {
-        let numbers = &self.context.options.numbers;
-        let mut elements = self.symbols();
+        let numbers = &self.symbols.options.numbers;
+        let mut elements = self.all_symbols();
         for (offset, (element, value)) in elements.iter_mut().zip(values).enumerate() {
-            if numbers.contains(&element_name(self.name, self.dims, offset)) {
+            if numbers.contains(&self.element_name(offset)) {
                 *element = *value;
             }
         }
         elements
     }
 
-    fn check_size(&self, array: &Array, id: ExprId) -> Result<()> {
-        let span = self.context.ast.expression(id).span;
-        let checked = check_size(self.name, self.dims, &array.dims, span);
-        checked.map_err(|problem| match array.dims.is_empty() {
+    fn check_size(&self, value: &Value, span: Span) -> Result<()> {
+        let checked = check_size(self.name, self.dims, &value.dims, span);
+        checked.map_err(|problem| match value.dims.is_empty() {
             true => problem.hint("use `fill(value, size)`"),
             false => problem,
         })
@@ -564,11 +437,11 @@ impl Parts<'_> {
 
     /// A value of the declared type.
     fn known(&self, element: Scalar, span: Span) -> Result<Scalar> {
-        let graph = self.context.graph;
+        let graph = self.symbols.graph;
         if self.declaration.prefix.type_name == TypeName::Boolean {
             return match element {
                 Scalar::Boolean(node) if graph.constant_value(node).is_some() => Ok(element),
-                _ => Err(Problem::new(span, "expected `true` or `false`")),
+                _ => Err(expected_truth(span)),
             };
         }
         let node = element.real(graph).ok_or_else(|| expected_number(span))?;
@@ -586,25 +459,19 @@ impl Parts<'_> {
         }
     }
 
+    /// A number from outside as a value of the declared type.
     fn converted(&self, value: f64) -> Result<Scalar> {
-        if self.declaration.prefix.type_name == TypeName::Boolean {
-            let node = self
-                .context
-                .graph
-                .constant(f64::from(u8::from(value != 0.0)));
-            return Ok(Scalar::Boolean(node.node()));
+        let constant = |value: f64| self.symbols.graph.constant(value).node();
+        match self.declaration.prefix.type_name {
+            TypeName::Boolean => Ok(Scalar::Boolean(constant(f64::from(value != 0.0)))),
+            TypeName::Integer if value.fract() != 0.0 || value.abs() > 2f64.powi(53) => {
+                let name = self.name;
+                let message = format!("`{name}` is an Integer and is given the value {value}");
+                Err(Problem::new(self.declaration.name, message).hint("give a whole number"))
+            }
+            TypeName::Integer => Ok(Scalar::Integer(value as i64)),
+            _ => Ok(Scalar::Real(constant(value))),
         }
-        if !self.declaration.prefix.is_integer() {
-            return Ok(Scalar::Real(self.context.graph.constant(value).node()));
-        }
-        if value.fract() != 0.0 || value.abs() > 2f64.powi(53) {
-            let message = format!(
-                "`{}` is an Integer and is given the value {value}",
-                self.name
-            );
-            return Err(Problem::new(self.declaration.name, message).hint("give a whole number"));
-        }
-        Ok(Scalar::Integer(value as i64))
     }
 
     fn no_value(&self) -> Problem {
@@ -619,68 +486,54 @@ impl Parts<'_> {
     }
 }
 
-/// A value that the caller gives to a parameter, or to an element of one.
-struct Override {
-    subscripts: Vec<usize>,
-    value: f64,
+fn expected_truth(span: Span) -> Problem {
+    Problem::new(span, "expected `true` or `false`")
 }
 
-/// The values that the caller gives, by place of the declaration.
-fn overrides(
-    context: &Context<'_>,
-    by_name: &HashMap<&str, usize>,
-) -> Result<HashMap<usize, Vec<Override>>> {
-    let model = context.model;
-    let mut by_place: HashMap<usize, Vec<Override>> = HashMap::new();
-    for (key, &value) in &context.options.parameters {
-        let (name, subscripts) = split(key).ok_or_else(|| {
-            Problem::new(
-                model.name,
-                format!("`{key}` is not the name of a parameter"),
-            )
-            .hint("names of parameters read `k`, `H[3]` or `A[1,2]`")
-        })?;
-        // an element may be declared by itself: `x[3]`
-        let (name, subscripts) = match by_name.contains_key(key.trim()) {
-            true => (key.trim(), vec![]),
-            false => (name, subscripts),
-        };
-        let Some((&place, declaration)) = by_name
-            .get(name)
-            .and_then(|place| Some((place, model.declarations.get(*place)?)))
-        else {
-            return Err(unknown(model, name));
-        };
-        check_settable(name, declaration)?;
-        if !value.is_finite() {
-            let message = format!("parameter `{key}` is given the value {value}");
-            return Err(Problem::new(declaration.name, message).hint("give a finite number"));
+/// What the caller gives to a parameter, or to an element of one: its subscripts, and the value.
+type Given = (Vec<usize>, f64);
+
+impl Symbols<'_> {
+    /// The values that the caller gives, by place of the declaration.
+    fn overrides(&self) -> Result<HashMap<usize, Vec<Given>>> {
+        let model = self.model;
+        let mut by_place: HashMap<usize, Vec<Given>> = HashMap::new();
+        for (key, &value) in &self.options.parameters {
+            let (name, subscripts) = split(key).ok_or_else(|| {
+                let message = format!("`{key}` is not the name of a parameter");
+                Problem::new(model.name, message)
+                    .hint("names of parameters read `k`, `H[3]` or `A[1,2]`")
+            })?;
+            // an element may be declared by itself: `x[3]`
+            let (name, subscripts) = match self.by_name.contains_key(key.trim()) {
+                true => (key.trim(), vec![]),
+                false => (name, subscripts),
+            };
+            let place = self.by_name.get(name);
+            let &place = place.ok_or_else(|| unknown(model, name))?;
+            let declaration = &model.declarations[place];
+            check_settable(name, declaration)?;
+            if !value.is_finite() {
+                let message = format!("parameter `{key}` is given the value {value}");
+                return Err(Problem::new(declaration.name, message).hint("give a finite number"));
+            }
+            by_place.entry(place).or_default().push((subscripts, value));
         }
-        by_place
-            .entry(place)
-            .or_default()
-            .push(Override { subscripts, value });
+        Ok(by_place)
     }
-    Ok(by_place)
 }
 
 /// The values given to a declaration, by offset of its elements.
-fn by_offset(
-    given: &[Override],
-    name: &str,
-    dims: &[usize],
-    span: Span,
-) -> Result<Vec<(usize, f64)>> {
-    let offset = |given: &Override| {
-        let offset = offset(&given.subscripts, dims).ok_or_else(|| {
-            let size = describe_dims(dims);
-            let subscripts = describe_dims(&given.subscripts);
+fn by_offset(given: &[Given], name: &str, dims: &[usize], span: Span) -> Result<Vec<(usize, f64)>> {
+    let offset = |(subscripts, value): &Given| {
+        let offset = offset(subscripts, dims).ok_or_else(|| {
+            let (size, subscripts) = (describe_dims(dims), describe_dims(subscripts));
             let message =
                 format!("a value is given for `{name}` {subscripts}, which has the size {size}");
             Problem::new(span, message)
                 .hint("give values to elements, such as `H[3]`, with subscripts from 1")
         })?;
-        Ok((offset, given.value))
+        Ok((offset, *value))
     };
     given.iter().map(offset).collect()
 }

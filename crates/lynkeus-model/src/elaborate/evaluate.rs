@@ -1,28 +1,33 @@
 //! Expressions of the syntax tree to values over the graph; what dotted and subscripted names lead to.
 
-use crate::Assertion;
-use std::cell::RefCell;
-use std::collections::BTreeSet;
-
 use lynkeus_expr::{Graph, Node, Unary};
 
-use super::scope::{Context, Frame, Local, Mode, Named, Scope};
+use super::scope::{Frame, Local, Mode, Named};
+use super::symbols::Symbols;
 use super::value::{Scalar, Value, describe_dims, unequal_sizes};
-use crate::Tables;
+use crate::Assertion;
+use crate::balance::FlatEquation;
 use crate::diagnostic::{Problem, Result, Span};
-use crate::flat::{Classes, constant};
+use crate::flat::constant;
 use crate::limits::{Budget, MAX_CALL_DEPTH};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{Ast, BinaryOperator, ExprId, Kind, PathPart, Relation, UnaryOperator};
+use crate::syntax::ast::{
+    Ast, BinaryOperator, Declaration, ExprId, Kind, PathPart, Relation, UnaryOperator,
+};
 use crate::syntax::{plain, shortened};
 
-/// Evaluates expressions of one text. Recursion is bounded by the nesting of the text.
+/// What to do about a Real where an Integer is needed.
+pub(super) const HOW_TO_BE_WHOLE: &str =
+    "`/` and `^` always give a Real: use `div(a, b)` or `integer(a)`";
+
+/// Evaluates expressions of one text, carries out its statements and writes out its equations.
+/// Recursion is bounded by the nesting of the text.
 pub(crate) struct Evaluator<'a> {
     pub(super) source: &'a str,
     pub(super) ast: &'a Ast,
     pub(super) graph: &'a Graph,
     pub(super) budget: &'a Budget,
-    pub(super) scope: &'a dyn Scope,
+    pub(super) symbols: &'a Symbols<'a>,
     pub(super) mode: Mode,
     /// iterators of the loops around, innermost last
     pub(super) loops: Vec<(&'a str, Scalar)>,
@@ -30,8 +35,6 @@ pub(crate) struct Evaluator<'a> {
     pub(super) ends: Vec<usize>,
     /// set when an evaluation failed because a parameter has no value
     pub(super) valueless: bool,
-    /// the classes of the text, for functions and records
-    pub(super) classes: Option<&'a Classes<'a>>,
     /// where names of classes are looked up
     pub(super) scopes: Vec<&'a str>,
     /// variables of the function or algorithm around
@@ -40,55 +43,44 @@ pub(crate) struct Evaluator<'a> {
     pub(super) calls: Vec<usize>,
     /// expressions and statements around, those of the callers included
     pub(super) depth: usize,
-    /// conditions of the `if`s around
-    pub(super) conditions: Vec<OnPath>,
+    /// conditions of the `if`s around, each with whether it holds in the branch that is taken
+    pub(super) conditions: Vec<(Node, bool)>,
     /// what is to hold along a run
     pub(super) claims: Vec<(Assertion, Span)>,
-    /// what tables are between their points
-    pub(super) tables: Tables,
-    /// where it is told of what the points of tables are made
-    pub(super) table_points: Option<&'a RefCell<BTreeSet<Node>>>,
+    pub(super) equations: Vec<FlatEquation>,
 }
 
 impl<'a> Evaluator<'a> {
-    pub(crate) fn new(
-        source: &'a str,
-        ast: &'a Ast,
-        graph: &'a Graph,
-        budget: &'a Budget,
-        scope: &'a dyn Scope,
-        mode: Mode,
-    ) -> Self {
-        let (loops, ends, valueless) = (vec![], vec![], false);
+    pub(crate) fn new(symbols: &'a Symbols<'a>, mode: Mode) -> Self {
+        let scopes = symbols.model.scopes.iter();
         Self {
-            source,
-            ast,
-            graph,
-            budget,
-            scope,
+            source: symbols.source,
+            ast: symbols.ast,
+            graph: symbols.graph,
+            budget: &symbols.budget,
+            symbols,
             mode,
-            loops,
-            ends,
-            valueless,
-            classes: None,
-            scopes: vec![],
+            loops: vec![],
+            ends: vec![],
+            valueless: false,
+            scopes: scopes.map(String::as_str).collect(),
             frame: None,
             calls: vec![],
             depth: 0,
             conditions: vec![],
             claims: vec![],
-            tables: Tables::Linear,
-            table_points: None,
+            equations: vec![],
         }
     }
 
-    /// With the functions and records of a text.
-    pub(super) fn within(mut self, context: &Context<'a>) -> Self {
-        self.classes = Some(context.classes);
-        self.tables = context.options.tables;
-        self.table_points = Some(context.table_points);
-        self.scopes = context.model.scopes.iter().map(String::as_str).collect();
-        self
+    /// For what stands in a declaration: in one of a package, only what that knows.
+    pub(super) fn of(symbols: &'a Symbols<'a>, declaration: &'a Declaration, mode: Mode) -> Self {
+        let mut evaluator = Self::new(symbols, mode);
+        if let Some(package) = &declaration.package {
+            evaluator.scopes = vec![package];
+            evaluator.frame = Some(Frame::closed());
+        }
+        evaluator
     }
 
     pub(super) fn span(&self, id: ExprId) -> Span {
@@ -158,19 +150,17 @@ impl<'a> Evaluator<'a> {
             Kind::If(branches, otherwise) => return self.conditional(branches, *otherwise),
             Kind::Range(start, step, stop) => return self.range(*start, *step, *stop, span),
         };
-        Ok(Value::Scalar(scalar))
+        Ok(scalar.into())
     }
 
     /// The value of an expression that must be scalar.
     pub(crate) fn scalar(&mut self, id: ExprId) -> Result<Scalar> {
-        match self.value(id)? {
-            Value::Scalar(scalar) => Ok(scalar),
-            Value::Array(array) => {
-                let found = describe_dims(&array.dims);
-                let message = format!("expected a scalar, found an array {found}");
-                Err(Problem::new(self.span(id), message))
-            }
-        }
+        let value = self.value(id)?;
+        value.as_scalar().ok_or_else(|| {
+            let found = describe_dims(&value.dims);
+            let message = format!("expected a scalar, found an array {found}");
+            Problem::new(self.span(id), message)
+        })
     }
 
     /// The value of an expression in which everything must be known.
@@ -183,23 +173,15 @@ impl<'a> Evaluator<'a> {
 
     /// An Integer that must be known; `what` names it in the refusal.
     pub(super) fn known_integer(&mut self, id: ExprId, what: &str) -> Result<i64> {
-        match self.structural(id)? {
-            Value::Scalar(Scalar::Integer(value)) => Ok(value),
-            Value::Array(array) => {
-                let found = describe_dims(&array.dims);
-                let message = format!("{what} must be an Integer, found an array {found}");
-                Err(Problem::new(self.span(id), message))
-            }
-            Value::Scalar(found) => {
-                let kind = match found {
-                    Scalar::Boolean(_) => "Boolean",
-                    _ => "Real",
-                };
-                let message = format!("{what} must be an Integer, found a {kind}");
-                Err(Problem::new(self.span(id), message)
-                    .hint("`/` and `^` always give a Real: use `div(a, b)` or `integer(a)`"))
-            }
-        }
+        let value = self.structural(id)?;
+        let (found, hint) = match value.as_scalar() {
+            Some(Scalar::Integer(value)) => return Ok(value),
+            Some(Scalar::Boolean(_)) => ("a Boolean".to_owned(), Some(HOW_TO_BE_WHOLE)),
+            Some(Scalar::Real(_)) => ("a Real".to_owned(), Some(HOW_TO_BE_WHOLE)),
+            None => (format!("an array {}", describe_dims(&value.dims)), None),
+        };
+        let message = format!("{what} must be an Integer, found {found}");
+        Err(Problem::new(self.span(id), message).maybe_hint(hint.map(str::to_owned)))
     }
 
     pub(super) fn truth(&self, value: bool) -> Scalar {
@@ -240,7 +222,7 @@ impl<'a> Evaluator<'a> {
         }
         let message = format!("unknown name `{}`", shortened(name));
         if name.contains('.') {
-            let declared = self.scope.names();
+            let declared = self.symbols.names();
             let hint = did_you_mean(name, declared.into_iter()).unwrap_or_else(|| {
                 "components of other models are not supported, nor other constants of the \
                  library than those of `Modelica.Constants`"
@@ -249,7 +231,7 @@ impl<'a> Evaluator<'a> {
             return Problem::new(span, message).hint(hint);
         }
         let iterators = self.loops.iter().map(|(iterator, _)| *iterator);
-        let declared = self.scope.names();
+        let declared = self.symbols.names();
         let known = declared.into_iter().chain(iterators).chain(["time"]);
         let suggestion = did_you_mean(name, known);
         let for_pi = (name == "pi").then(|| "write `Modelica.Constants.pi`".to_owned());
@@ -262,8 +244,7 @@ impl<'a> Evaluator<'a> {
         match operator {
             UnaryOperator::Not => {
                 let node = self.boolean(&value, span)?;
-                let node = self.graph.unary(Unary::Not, node);
-                Ok(Value::Scalar(Scalar::Boolean(node)))
+                Ok(Scalar::Boolean(self.graph.unary(Unary::Not, node)).into())
             }
             UnaryOperator::Plus => self.map(value, span, |_, scalar, _| Ok(scalar)),
             UnaryOperator::Minus => self.map(value, span, Self::negated),
@@ -298,86 +279,57 @@ impl<'a> Evaluator<'a> {
         branches: &'a [(ExprId, ExprId)],
         otherwise: ExprId,
     ) -> Result<Value> {
-        let branches = self.branches(branches.iter().copied(), otherwise)?;
-        let around = self.pass(&branches);
-        let result = self.chosen(branches);
-        self.conditions.truncate(around);
-        result
-    }
-
-    /// The values of the branches, joined.
-    fn chosen(&mut self, branches: Branches<ExprId>) -> Result<Value> {
-        let mut result = self.value(branches.last)?;
-        for (condition, value) in branches.open.into_iter().rev() {
-            let span = self.span(value);
-            self.enter();
-            let value = self.value(value)?;
-            self.conditions.pop();
-            if value.dims() != result.dims() {
-                return Err(unequal_sizes(value.dims(), result.dims(), span));
+        let take = |evaluator: &mut Self, id: ExprId| Ok((evaluator.value(id)?, id));
+        let join = |evaluator: &mut Self, condition: Node, yes: (Value, ExprId), no: (Value, _)| {
+            let ((yes, id), (no, _)) = (yes, no);
+            let span = evaluator.span(id);
+            if yes.dims != no.dims {
+                return Err(unequal_sizes(&yes.dims, &no.dims, span));
             }
-            result = self.elementwise(value, result, span, |evaluator, a, b, span| {
-                evaluator.select(condition, a, b, span)
-            })?;
-        }
-        Ok(result)
+            let select = |evaluator: &Self, a, b, span| evaluator.select(condition, a, b, span);
+            Ok((evaluator.elementwise(yes, no, span, select)?, id))
+        };
+        let chosen = self.chosen(branches.iter().copied(), otherwise, take, join);
+        chosen.map(|(value, _)| value)
     }
-}
 
-/// A condition of an `if` around, and whether it holds in the branch that is taken.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct OnPath {
-    pub condition: Node,
-    pub holds: bool,
-}
-
-/// What a branch may hold, where that is not known before the variables are.
-pub(super) struct Branches<T> {
-    /// conditions that may hold, with their branches
-    pub open: Vec<(Node, T)>,
-    /// the branch where none of them does
-    pub last: T,
-}
-
-impl Evaluator<'_> {
-    /// A condition that is known takes its branch or leaves it unread, so that a loop may hold
-    /// `if i == 1 then … else x[i - 1]`.
-    pub(super) fn branches<T>(
+    /// What the branch gives whose condition holds; else what all that may be taken give, the last
+    /// first, joined by their conditions. A condition that is known takes its branch or leaves it
+    /// unread, so that a loop may hold `if i == 1 then … else x[i - 1]`.
+    pub(super) fn chosen<B, T>(
         &mut self,
-        branches: impl Iterator<Item = (ExprId, T)>,
-        otherwise: T,
-    ) -> Result<Branches<T>> {
-        let mut open = vec![];
+        branches: impl Iterator<Item = (ExprId, B)>,
+        otherwise: B,
+        mut take: impl FnMut(&mut Self, B) -> Result<T>,
+        mut join: impl FnMut(&mut Self, Node, T, T) -> Result<T>,
+    ) -> Result<T> {
+        let (mut open, mut last) = (vec![], otherwise);
         for (condition, branch) in branches {
             let node = self.condition(condition)?;
             match self.graph.constant_value(node) {
                 Some(0.0) => {}
-                Some(_) => return Ok(Branches { open, last: branch }),
+                Some(_) => {
+                    last = branch;
+                    break;
+                }
                 None => open.push((node, branch)),
             }
         }
-        Ok(Branches {
-            open,
-            last: otherwise,
-        })
-    }
-
-    /// Notes that none of the conditions holds; gives how many there were around.
-    pub(super) fn pass<T>(&mut self, branches: &Branches<T>) -> usize {
         let around = self.conditions.len();
-        let passed = branches.open.iter().map(|&(condition, _)| OnPath {
-            condition,
-            holds: false,
-        });
+        let passed = open.iter().map(|&(condition, _)| (condition, false));
         self.conditions.extend(passed);
-        around
-    }
-
-    /// The last condition that was passed holds.
-    pub(super) fn enter(&mut self) {
-        if let Some(on_path) = self.conditions.last_mut() {
-            on_path.holds = true;
-        }
+        let done = take(self, last).and_then(|mut result| {
+            for (condition, branch) in open.into_iter().rev() {
+                self.conditions.pop();
+                self.conditions.push((condition, true));
+                let taken = take(self, branch)?;
+                self.conditions.pop();
+                result = join(self, condition, taken, result)?;
+            }
+            Ok(result)
+        });
+        self.conditions.truncate(around);
+        done
     }
 }
 
@@ -385,7 +337,7 @@ impl<'a> Evaluator<'a> {
     pub(super) fn name(&mut self, span: Span) -> Result<Value> {
         let name = plain(self.text(span));
         if let Some(scalar) = self.iterator(&name) {
-            return Ok(Value::Scalar(scalar));
+            return Ok(scalar.into());
         }
         match self.local(&name) {
             Some(Ok(local)) => {
@@ -401,7 +353,7 @@ impl<'a> Evaluator<'a> {
         }
         match found {
             Named::Unknown => match self.builtin(&name) {
-                Some(scalar) => Ok(Value::Scalar(scalar)),
+                Some(scalar) => Ok(scalar.into()),
                 None => Err(self.unknown_name(span)),
             },
             found => self.meant(found, span),
@@ -411,9 +363,11 @@ impl<'a> Evaluator<'a> {
     /// The value that a name means.
     pub(super) fn meant(&mut self, found: Named<'a>, span: Span) -> Result<Value> {
         match found {
-            Named::Array([], [scalar]) => Ok(Value::Scalar(*scalar)),
-            Named::Array(dims, elements) => Ok(Value::new(dims.to_vec(), elements.to_vec())),
-            Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
+            Named::Array(dims, elements) => Ok(Value {
+                dims: dims.to_vec(),
+                elements: elements.to_vec(),
+            }),
+            Named::Scalar(scalar) => Ok(scalar.into()),
             Named::Varying => Err(self.varying(span)),
             Named::Valueless => Err(self.without_value(span)),
             Named::Unknown => Err(self.unknown_name(span)),
@@ -427,18 +381,18 @@ impl<'a> Evaluator<'a> {
             .map(|(_, value)| *value)
     }
 
-    /// The scope's meaning of a name, in full or as an import shortens it.
+    /// What the declarations say of a name, in full or as an import shortens it.
     pub(super) fn named(&self, name: &str) -> Named<'a> {
-        // The scope outlives this evaluator.
-        let scope = self.scope;
+        // The symbols outlive this evaluator.
+        let symbols = self.symbols;
         if !self.is_closed() {
-            match scope.named(name, self.mode) {
+            match symbols.named(name, self.mode) {
                 Named::Unknown => {}
                 found => return found,
             }
         }
         let full = self.full_names(name).into_iter();
-        let mut found = full.map(|full| scope.constant(&full, self.mode));
+        let mut found = full.map(|full| symbols.constant(&full, self.mode));
         found
             .find(|found| !matches!(found, Named::Unknown))
             .unwrap_or(Named::Unknown)
@@ -450,9 +404,9 @@ impl<'a> Evaluator<'a> {
     }
 
     pub(super) fn full_names(&self, name: &str) -> Vec<String> {
-        match self.classes {
-            Some(classes) if !self.scopes.is_empty() => classes.full_names(name, &self.scopes),
-            _ => vec![],
+        match self.scopes[..] {
+            [] => vec![],
+            _ => self.symbols.classes.full_names(name, &self.scopes),
         }
     }
 
@@ -464,8 +418,8 @@ impl<'a> Evaluator<'a> {
         match found {
             found @ (Named::Array(..) | Named::Scalar(_)) => self.meant(found, span),
             _ => match self.builtin(name) {
-                Some(scalar) => Ok(Value::Scalar(scalar)),
-                None if self.scope.dims(name).is_some() => {
+                Some(scalar) => Ok(scalar.into()),
+                None if self.symbols.dims(name).is_some() => {
                     let message = format!("`{name}` is not a variable of this function");
                     Err(Problem::new(span, message)
                         .hint("functions read their own variables and constants: add an input"))
@@ -477,11 +431,10 @@ impl<'a> Evaluator<'a> {
 
     fn builtin(&self, name: &str) -> Option<Scalar> {
         if name == "time" {
-            return self.scope.time(self.mode).map(Scalar::Real);
+            let is_known = self.mode == Mode::Continuous;
+            return is_known.then(|| Scalar::Real(self.symbols.time()));
         }
-        if let Some(classes) = self.classes
-            && let Some(ordinal) = classes.literal(name, &self.scopes)
-        {
+        if let Some(ordinal) = self.symbols.classes.literal(name, &self.scopes) {
             return Some(Scalar::Integer(ordinal));
         }
         let known = constant(name);
@@ -508,7 +461,7 @@ impl<'a> Evaluator<'a> {
         if let Some(literal) = literal.filter(|literal| self.is_known(literal)) {
             return self.value_named(&literal, span);
         }
-        self.index_named(&named, &subscripts, span)
+        self.index_named(&named, &subscripts, span, span)
     }
 
     fn is_known(&self, name: &str) -> bool {

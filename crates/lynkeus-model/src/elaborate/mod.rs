@@ -15,24 +15,20 @@ mod symbols;
 mod tables;
 mod value;
 
-use std::cell::RefCell;
-use std::collections::{BTreeSet, HashSet};
+use std::collections::HashSet;
 
 use lynkeus_expr::{Graph, Spent};
 
 use crate::diagnostic::{Problem, Result, Span};
 use crate::flat::{Classes, FlatModel, flat_model, title};
-use crate::limits::elaboration;
 use crate::names::choose;
 use crate::syntax::ast::{Ast, Class, ClassKind};
 use crate::syntax::parse_file;
 use crate::{LoadOptions, Plant};
-use scope::Context;
-use symbols::Symbols;
+use scope::Mode;
+use symbols::{Names, Symbols};
 
 pub(crate) use evaluate::Evaluator;
-pub(crate) use scope::{GivenNames, Mode};
-pub(crate) use value::Value;
 
 /// The plant of a Modelica text, with what looks wrong in it.
 pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<Problem>)> {
@@ -43,25 +39,29 @@ pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<P
     let classes = Classes::new(source, &ast.classes);
     let graph = Graph::new();
     graph.set_budget(options.budget.clone());
-    let budget = elaboration();
-    let context = Context {
-        source,
-        ast,
-        model,
-        classes: &classes,
-        graph: &graph,
-        budget: &budget,
-        options,
-        table_points: &RefCell::new(BTreeSet::new()),
-    };
     let done = graph.budgeted(options.budget.clone(), || {
-        let symbols = Symbols::new(&context)?;
-        let flat = flatten::flatten(&context, &symbols)?;
-        assemble::plant(&context, &symbols, flat)
+        let symbols = Symbols::new(source, ast, &graph, model, &classes, options).declared()?;
+        let flat = flatten::flatten(&symbols)?;
+        assemble::plant(&symbols, flat)
     });
     let (plant, mut warnings) = done.map_err(|spent| ended(model, spent))??;
     warnings.extend(crate::units::check(source, ast, model));
     Ok((Plant { graph, ..plant }, warnings))
+}
+
+/// Evaluates expressions of a text that stand by themselves; `names` gives the meaning of names.
+pub(crate) fn evaluated<T>(
+    source: &str,
+    ast: &Ast,
+    graph: &Graph,
+    names: Names<'_>,
+    run: impl FnOnce(&mut Evaluator<'_>) -> Result<T>,
+) -> Result<T> {
+    let (model, classes) = (FlatModel::default(), Classes::default());
+    let options = LoadOptions::default();
+    let mut symbols = Symbols::new(source, ast, graph, &model, &classes, &options);
+    symbols.given = Some(names);
+    run(&mut Evaluator::new(&symbols, Mode::Continuous))
 }
 
 /// A limit ended the reading.

@@ -7,10 +7,9 @@ use lynkeus_expr::Node;
 use super::lexer::Mention;
 use super::parser::{Equation, ParsedModel, is_elementary};
 use crate::diagnostic::{Problem, Result, Span};
-use crate::elaborate::{Evaluator, GivenNames, Mode};
-use crate::limits::{Budget, MAX_SCALARS, elaboration};
+use crate::limits::{Budget, MAX_SCALARS};
 use crate::names::did_you_mean;
-use crate::{Attributes, LoadOptions, Model, Plant};
+use crate::{Attributes, LoadOptions, Model, Plant, elaborate};
 
 /// What a name is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -185,25 +184,24 @@ fn equations(
     model: &Model,
     nodes: &HashMap<&str, Node>,
 ) -> Result<()> {
-    let (graph, budget) = (model.graph(), elaboration());
+    let graph = model.graph();
     let names = &|name: &str| nodes.get(name).copied();
-    let names = GivenNames { graph, names };
-    let mode = Mode::Continuous;
-    let mut evaluator = Evaluator::new(source, &syntax.ast, graph, &budget, &names, mode);
-    for equation in &syntax.equations {
-        let text = equation.name.text(source);
-        let value = evaluator.scalar(equation.right)?.real(graph);
-        let value = value.ok_or_else(|| {
-            let span = syntax.ast.expression(equation.right).span;
-            Problem::new(span, "expected a number")
-        })?;
-        let value = graph.expr(value);
-        match equation.is_derivative {
-            true => model.der(graph.symbol(text), value),
-            false => model.output(text, value, Attributes::default()),
+    elaborate::evaluated(source, &syntax.ast, graph, names, |evaluator| {
+        for equation in &syntax.equations {
+            let text = equation.name.text(source);
+            let value = evaluator.scalar(equation.right)?.real(graph);
+            let value = value.ok_or_else(|| {
+                let span = syntax.ast.expression(equation.right).span;
+                Problem::new(span, "expected a number")
+            })?;
+            let value = graph.expr(value);
+            match equation.is_derivative {
+                true => model.der(graph.symbol(text), value),
+                false => model.output(text, value, Attributes::default()),
+            }
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// Refuses values for what is no parameter, and values that are no numbers.
