@@ -234,7 +234,10 @@ pub(crate) struct Loop {
 }
 
 impl Loop {
-    pub(crate) fn new(simulation: &Simulation, sensors: Sensors) -> Result<Self, Error> {
+    /// Of a simulation whose process noise is held for `hold`.
+    pub(crate) fn new(simulation: &Simulation, hold: f64) -> Result<Self, Error> {
+        let Simulation { plant, noise, .. } = simulation;
+        let sensors = Sensors::new(noise, plant.outputs(), plant.states(), hold)?;
         let wiring = Wiring::new(simulation)?;
         Ok(Self {
             joined: wiring.joined(&sensors)?.evaluation(),
