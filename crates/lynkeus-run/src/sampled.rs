@@ -286,7 +286,7 @@ mod tests {
         // a snapshot is of these numbers
         let mut other = self::tuned(3.0).estimator().unwrap();
         assert!(other.restore(&pair[1].snapshot()).is_err());
-        let step = |of: &Blueprint| crate::needed_step(of, &[], &[]).unwrap().length;
+        let step = |of: &Blueprint| crate::fastest_mode(of, &[], &[]).unwrap().step();
         assert!((step(&fixed) - step(&tuned)).abs() < 1e-12 * step(&fixed));
     }
 

@@ -8,7 +8,7 @@
 
 use nalgebra::DMatrix;
 
-use super::series::{Series, Transition};
+use super::series::{Series, Transition, largest_row};
 use crate::Evaluation;
 use crate::filter::belief::Belief;
 use crate::filter::profile::Profile;
@@ -244,11 +244,7 @@ impl Piecewise {
     /// The largest row sum of F at the start of a segment, times its length.
     fn rates(&mut self, driven: &mut Evaluation, segment: Piece, x: &[f64]) -> Result<f64, Error> {
         let values = self.scaled(driven, segment.from, x, segment.length())?;
-        let mut sums = vec![0.0; x.len()];
-        for (&(i, _), value) in self.entries.iter().zip(values) {
-            sums[i] += value.abs();
-        }
-        Ok(sums.into_iter().fold(0.0, f64::max))
+        Ok(largest_row(x.len(), &self.sparse(&values)))
     }
 
     /// Writes x̂ at the end of a piece; F·h as a polynomial in the share of the piece, none where F
