@@ -202,7 +202,7 @@ impl Adaptive {
             let mut step = self.accepted_step(method, leg)?;
             match leg.f.is_unwatched() {
                 true => leg.x.copy_from_slice(method.reached()),
-                false => step = self.to_event(method, leg, step)?,
+                false => step = self.up_to_event(method, leg, step)?,
             }
             leg.pass(step);
             if leg.at_the_end() {
@@ -242,7 +242,7 @@ impl Adaptive {
 
     /// Takes the step that was just accepted, or a shorter one up to the first surface or bend in it:
     /// the step up to there.
-    fn to_event(
+    fn up_to_event(
         &mut self,
         method: &mut impl OneStep,
         leg: &mut Leg<'_, '_, impl Dynamics>,

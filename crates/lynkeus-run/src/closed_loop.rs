@@ -33,14 +33,11 @@ fn place(
 
 /// What runs, and where the signals of each system come from.
 struct Wiring {
-    inputs: System,
-    plant: System,
-    observer: Option<System>,
+    simulation: Simulation,
     /// which input each signal of the plant is
     plant_wires: Vec<usize>,
     /// which sensor each signal of the observer is, or, counted on from them, which input
     observer_wires: Vec<usize>,
-    record_outputs: bool,
 }
 
 /// The inputs of the joined system.
@@ -75,17 +72,18 @@ impl Wiring {
         Ok(Self {
             plant_wires: plant_wires.collect::<Result<_, _>>()?,
             observer_wires: observer_wires.collect::<Result<_, _>>()?,
-            inputs: inputs.clone(),
-            plant: plant.clone(),
-            observer: observer.clone(),
-            record_outputs: simulation.record_outputs,
+            simulation: simulation.clone(),
         })
     }
 
     fn parts(&self) -> impl Iterator<Item = &System> {
-        [&self.inputs, &self.plant]
-            .into_iter()
-            .chain(&self.observer)
+        let Simulation {
+            plant,
+            inputs,
+            observer,
+            ..
+        } = &self.simulation;
+        [inputs, plant].into_iter().chain(observer)
     }
 
     /// The signals of the plant, given the inputs.
@@ -102,6 +100,12 @@ impl Wiring {
     /// One system: its states are the plant's, then the observer's, its signals what disturbs each
     /// sensor and each moved state, its outputs the values of a row.
     fn joined(&self, sensors: &Sensors) -> Result<System, Error> {
+        let Simulation {
+            plant,
+            inputs,
+            observer,
+            ..
+        } = &self.simulation;
         let g = Graph::new();
         let fresh = |count: usize| (0..count).map(|_| g.fresh("x").node()).collect::<Vec<_>>();
         let own = |part: Option<&System>| {
@@ -110,14 +114,9 @@ impl Wiring {
         };
         let symbols = Symbols {
             time: g.fresh("time").node(),
-            noise: fresh(self.plant.outputs().len()),
+            noise: fresh(plant.outputs().len()),
             drives: fresh(sensors.moved().count()),
-            own: [
-                Some(&self.inputs),
-                Some(&self.plant),
-                self.observer.as_ref(),
-            ]
-            .map(own),
+            own: [Some(inputs), Some(plant), observer.as_ref()].map(own),
         };
         let free = self.roots(&g, sensors, &symbols, false).held;
         let roots = Roots {
@@ -130,16 +129,10 @@ impl Wiring {
             jumps.extend(part.jumps.iter().map(|jump| jump.after(surfaces)));
             surfaces += part.roots.surfaces.len();
         }
-        let of_observer = self.observer.iter().flat_map(System::states);
+        let of_observer = observer.iter().flat_map(System::states);
         let of_observer = of_observer.map(|name| format!("observer's {name}"));
         let equations = Equations {
-            states: self
-                .plant
-                .states()
-                .iter()
-                .cloned()
-                .chain(of_observer)
-                .collect(),
+            states: plant.states().iter().cloned().chain(of_observer).collect(),
             signals: vec![String::new(); symbols.noise.len() + symbols.drives.len()],
             outputs: vec![String::new(); roots.free.outputs.len()],
             inputs: symbols.all(),
@@ -165,10 +158,11 @@ impl Wiring {
             }
             roots
         };
+        let simulation = &self.simulation;
         let [own_inputs, own_plant, own_observer] = &symbols.own;
-        let u = over(&self.inputs, own_inputs, &[]).held.outputs;
+        let u = over(&simulation.inputs, own_inputs, &[]).held.outputs;
         let w = self.applied(&u);
-        let mut roots = over(&self.plant, own_plant, &w);
+        let mut roots = over(&simulation.plant, own_plant, &w);
         let Both {
             derivatives,
             outputs: y,
@@ -178,10 +172,10 @@ impl Wiring {
         }
         let shown = symbols.shown(g, sensors, y);
         let mut row = [&own_plant[0][..], &w].concat();
-        if self.record_outputs {
+        if simulation.record_outputs {
             row.extend(y.iter().chain(&shown));
         }
-        if let Some(observer) = &self.observer {
+        if let Some(observer) = &simulation.observer {
             let made = over(observer, own_observer, &self.observed(&u, &shown));
             roots.surfaces.extend(made.surfaces);
             roots.bends.extend(made.bends);
@@ -240,7 +234,10 @@ pub(crate) struct Loop {
 }
 
 impl Loop {
-    pub(crate) fn new(simulation: &Simulation, sensors: Sensors) -> Result<Self, Error> {
+    /// Of a simulation whose process noise is held for `hold`.
+    pub(crate) fn new(simulation: &Simulation, hold: f64) -> Result<Self, Error> {
+        let Simulation { plant, noise, .. } = simulation;
+        let sensors = Sensors::new(noise, plant.outputs(), plant.states(), hold)?;
         let wiring = Wiring::new(simulation)?;
         Ok(Self {
             joined: wiring.joined(&sensors)?.evaluation(),
@@ -256,16 +253,16 @@ impl Loop {
 
     /// Columns that are not estimates.
     pub(crate) fn known_columns(&self) -> usize {
-        let observer = self.wiring.observer.as_ref();
+        let observer = self.wiring.simulation.observer.as_ref();
         let estimates = observer.map_or(0, |observer| observer.estimates().len());
         self.joined.system().outputs().len() - estimates
     }
 
     /// Names and values of the observer's states.
     pub(crate) fn estimate<'a>(&'a self, x: &'a [f64]) -> (&'a [String], &'a [f64]) {
-        let observer = self.wiring.observer.as_ref();
+        let observer = self.wiring.simulation.observer.as_ref();
         let names = observer.map_or(&[][..], System::states);
-        (names, &x[self.wiring.plant.states().len()..])
+        (names, &x[self.wiring.simulation.plant.states().len()..])
     }
 
     /// Draws what moves the states, and the next noise sample, if it is time.
@@ -287,7 +284,7 @@ impl Loop {
         let Some(time) = error.time() else {
             return error;
         };
-        let (plant_x, observer_x) = x.split_at(self.wiring.plant.states().len());
+        let (plant_x, observer_x) = x.split_at(self.wiring.simulation.plant.states().len());
         let scale = plant_x.iter().fold(scale, |most, x| most.max(x.abs()));
         match &mut self.parts(time, x).0[..] {
             [_, _, observer] => observer.explained(error, observer_x, scale),
@@ -308,7 +305,7 @@ impl Loop {
     /// Inputs, plant and observer by themselves where the loop is, since a message names one of them:
     /// the first whose values are not finite, or else the last.
     fn parts(&self, t: f64, x: &[f64]) -> (Vec<Evaluation>, usize) {
-        let Wiring { inputs, plant, .. } = &self.wiring;
+        let Simulation { inputs, plant, .. } = &self.wiring.simulation;
         let plant_x = &x[..plant.states().len()];
         let (mut modes, mut held) = self.joined.modes().split_at(self.joined.system().modes());
         let mut part = |system: &System, signals: &[f64], x: &[f64]| {
@@ -327,9 +324,9 @@ impl Loop {
         let (plant, y) = part(plant, &self.wiring.applied(&u), plant_x);
         let guilty = if are_finite(&u) { 1 } else { 0 };
         let mut parts = vec![inputs, plant];
-        if let Some(observer) = &self.wiring.observer {
+        if let Some(observer) = &self.wiring.simulation.observer {
             let measured = |(i, &y): (usize, &f64)| self.sensors.measured(i, y);
-            let outputs = self.wiring.plant.outputs().len();
+            let outputs = self.wiring.simulation.plant.outputs().len();
             let shown: Vec<f64> = y[..outputs].iter().enumerate().map(measured).collect();
             let signals = self.wiring.observed(&u, &shown);
             parts.push(part(observer, &signals, &x[plant_x.len()..]).0);
@@ -371,7 +368,7 @@ impl Dynamics for Loop {
     /// Blames the first part whose values are not finite.
     fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
         let (mut parts, guilty) = self.parts(t, x);
-        let plant = self.wiring.plant.states().len();
+        let plant = self.wiring.simulation.plant.states().len();
         let own = [0..0, 0..plant, plant..x.len()];
         parts[guilty].not_finite(t, &x[own[guilty].clone()])
     }

@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 
 use crate::closed_loop::Loop;
 use crate::divergence::Bound;
-use crate::noise::Sensors;
 use crate::{
     Error, Events, Integrator, Interrupted, Role, Simulation, System, Trajectory, process_draws,
 };
@@ -84,14 +83,7 @@ struct Run {
 impl Run {
     fn new(simulation: &Simulation) -> Result<Self, Error> {
         let itinerary = Itinerary::new(simulation)?;
-        let plant = &simulation.plant;
-        let sensors = Sensors::new(
-            &simulation.noise,
-            plant.outputs(),
-            plant.states(),
-            itinerary.hold(),
-        )?;
-        let mut system = Loop::new(simulation, sensors)?;
+        let mut system = Loop::new(simulation, itinerary.hold())?;
         let x = system.joined().system().start().to_vec();
         Ok(Self {
             itinerary: itinerary.exact(system.is_exact()),

@@ -240,14 +240,13 @@ const D: [Row; 4] = [
 /// Working memory of the method; nothing is allocated from step to step.
 #[derive(Clone, Debug)]
 pub(super) struct Dop853 {
-    /// the derivative at the start of the step, then those of the stages
-    slopes: [Vec<f64>; STAGES],
+    /// the derivative at the start of the step, then those of the stages; those of the dense output,
+    /// where they were needed
+    slopes: [Vec<f64>; STAGES + FURTHER],
     stage: Vec<f64>,
     /// Σ bᵢ kᵢ
     segment: Vec<f64>,
     reached: Vec<f64>,
-    /// those of the dense output, once they were needed
-    further: [Vec<f64>; FURTHER],
     /// a step before this one was rejected
     is_retry: bool,
     /// the last point at which a stage had no finite derivative
@@ -261,7 +260,6 @@ impl OneStep for Dop853 {
             stage: vec![0.0; dimension],
             segment: vec![0.0; dimension],
             reached: vec![0.0; dimension],
-            further: Default::default(),
             is_retry: false,
             bad: None,
         }
@@ -292,14 +290,8 @@ impl OneStep for Dop853 {
         tolerances: &Tolerances,
     ) -> Result<f64, f64> {
         for (i, (c, row)) in C.iter().zip(A).enumerate() {
-            self.stage.copy_from_slice(x);
-            for &(j, a) in row {
-                add(&mut self.stage, a * h, &self.slopes[j]);
-            }
-            let at = t + c * h;
-            f.derivatives(at, &self.stage, &mut self.slopes[i + 1]);
-            if !are_finite(&self.slopes[i + 1]) {
-                self.bad = Some((at, self.stage.clone()));
+            if !self.look(f, (t, x), h, (i + 1, *c, row)) {
+                self.bad = Some((t + c * h, self.stage.clone()));
                 return self.rejected(h * LEAST);
             }
         }
@@ -393,37 +385,39 @@ impl Dop853 {
 
     /// The largest derivative of a state at any stage of the step tried last.
     fn fastest(&self, state: usize) -> f64 {
-        let slopes = self.slopes.iter().map(|slope| slope[state].abs());
+        let slopes = self.slopes[..STAGES].iter();
+        let slopes = slopes.map(|slope| slope[state].abs());
         slopes.fold(0.0, f64::max)
     }
 
+    /// Takes the derivative of a stage: its place, its node and what it takes of those before it. False
+    /// where it is not finite.
+    fn look(
+        &mut self,
+        f: &mut impl Dynamics,
+        (t, x): (f64, &[f64]),
+        h: f64,
+        (place, c, row): (usize, f64, Row),
+    ) -> bool {
+        self.stage.copy_from_slice(x);
+        for &(j, a) in row {
+            add(&mut self.stage, a * h, &self.slopes[j]);
+        }
+        f.derivatives(t + c * h, &self.stage, &mut self.slopes[place]);
+        are_finite(&self.slopes[place])
+    }
+
     /// Finds what is between the ends of the step tried last; false where a derivative is not finite.
-    fn look_inside(&mut self, f: &mut impl Dynamics, (t, x): (f64, &[f64]), h: f64) -> bool {
-        for slope in &mut self.further {
-            slope.resize(x.len(), 0.0);
-        }
-        let [end, ..] = &mut self.further;
-        f.derivatives(t + h, &self.reached, end);
-        for (i, (c, row)) in C_BETWEEN.iter().zip(A_BETWEEN).enumerate() {
-            self.stage.copy_from_slice(x);
-            for &(j, a) in row {
-                let slope = self
-                    .slopes
-                    .get(j)
-                    .unwrap_or_else(|| &self.further[j - STAGES]);
-                add(&mut self.stage, a * h, slope);
-            }
-            f.derivatives(t + c * h, &self.stage, &mut self.further[i + 1]);
-        }
-        self.further.iter().all(|slope| are_finite(slope))
+    fn look_inside(&mut self, f: &mut impl Dynamics, at: (f64, &[f64]), h: f64) -> bool {
+        f.derivatives(at.0 + h, &self.reached, &mut self.slopes[STAGES]);
+        let further = (STAGES + 1..).zip(C_BETWEEN.into_iter().zip(A_BETWEEN));
+        let mut looks = further.map(|(place, (c, row))| self.look(f, at, h, (place, c, row)));
+        looks.all(|is_finite| is_finite) && are_finite(&self.slopes[STAGES])
     }
 
     /// What a state is between the ends of a step, after [`Dop853::look_inside`].
     fn between(&self, state: usize, from: f64, h: f64) -> Poly {
-        let slope = |j: usize| match self.slopes.get(j) {
-            Some(slope) => slope[state],
-            None => self.further[j - STAGES][state],
-        };
+        let slope = |j: usize| self.slopes[j][state];
         let rise = self.reached[state] - from;
         let (begins, ends) = (h * slope(0), h * slope(STAGES));
         let mut terms = [
@@ -459,7 +453,7 @@ fn add(to: &mut [f64], factor: f64, values: &[f64]) {
     }
 }
 
-fn combine(to: &mut [f64], row: Row, slopes: &[Vec<f64>; STAGES]) {
+fn combine(to: &mut [f64], row: Row, slopes: &[Vec<f64>]) {
     to.fill(0.0);
     for &(j, b) in row {
         add(to, b, &slopes[j]);

@@ -11,7 +11,7 @@ use crate::integrator::{check_interval, fixed_steps, pieces};
 use crate::noise::Sensors;
 use crate::routine::Backend;
 use crate::run::{Itinerary, Stop};
-use crate::{Error, Events, Method, Simulation, Step};
+use crate::{Error, Events, Method, Noise, Simulation, Step};
 
 /// What all trajectories do next.
 #[derive(Debug)]
@@ -76,7 +76,7 @@ impl Plan {
             return Ok(None);
         };
         let itinerary = Itinerary::new(simulation)?;
-        let mut clock = Loop::new(simulation, sensors(simulation, itinerary.hold(), 0)?)?;
+        let mut clock = Loop::new(simulation, itinerary.hold())?;
         let Some(program) = program(&mut clock)? else {
             return Ok(None);
         };
@@ -91,7 +91,13 @@ impl Plan {
 
     /// The sensors of the run of a seed.
     pub fn sensors(&self, simulation: &Simulation, seed: u64) -> Result<Sensors, Error> {
-        sensors(simulation, self.itinerary.hold(), seed)
+        let noise = Noise {
+            seed,
+            ..simulation.noise.clone()
+        };
+        let plant = &simulation.plant;
+        let hold = self.itinerary.hold();
+        Sensors::new(&noise, plant.outputs(), plant.states(), hold)
     }
 
     /// Number of rows in all.
@@ -145,15 +151,6 @@ impl Plan {
         clock.enter(t);
         clock.modes().to_vec()
     }
-}
-
-fn sensors(simulation: &Simulation, hold: f64, seed: u64) -> Result<Sensors, Error> {
-    let plant = &simulation.plant;
-    let noise = crate::Noise {
-        seed,
-        ..simulation.noise.clone()
-    };
-    Sensors::new(&noise, plant.outputs(), plant.states(), hold)
 }
 
 /// The code of a step and of a row.

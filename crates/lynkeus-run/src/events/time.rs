@@ -51,7 +51,7 @@ impl TimeEvents {
         Self {
             indicators,
             values: values.evaluator(),
-            effort: Effort::default(),
+            effort: Effort::new(),
         }
     }
 
@@ -104,7 +104,7 @@ impl Persist for TimeEvents {
 }
 
 /// What following the switches may still cost: in the run, and over the interval under way.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Effort {
     /// start of the first interval
     since: Option<f64>,
@@ -124,25 +124,17 @@ struct Effort {
     doubtful: f64,
 }
 
-impl Default for Effort {
-    fn default() -> Self {
+impl Effort {
+    /// Before the first interval.
+    fn new() -> Self {
         Self {
-            since: None,
             switches_of_run: INTERVALS * SWITCHES,
             granted: INTERVALS * SWITCHES,
             looks_of_run: INTERVALS * LOOKS,
-            from: 0.0,
-            to: 0.0,
-            switches: 0,
-            looks: 0,
-            counted_from: 0.0,
-            limit: 0,
-            doubtful: 0.0,
+            ..Self::default()
         }
     }
-}
 
-impl Effort {
     /// An interval begins.
     fn begin(&mut self, from: f64, to: f64) {
         let since = *self.since.get_or_insert(from);
