@@ -121,7 +121,7 @@ fn assigned_name(source: &str, at: usize) -> Option<&str> {
 }
 
 /// Operators and punctuation; longer ones first.
-const SYMBOLS: [&str; 11] = ["//", "+", "-", "*", "/", "^", "=", "(", ")", ",", "'"];
+pub(super) const SYMBOLS: [&str; 11] = ["//", "+", "-", "*", "/", "^", "=", "(", ")", ",", "'"];
 
 /// Words of Julia that cannot be names.
 const RESERVED: [&str; 16] = [

@@ -2,7 +2,7 @@
 
 use lynkeus_expr::Binary;
 
-use super::lexer::token;
+use super::lexer::{SYMBOLS, token};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::names::did_you_mean;
 use crate::syntax::ast::{Ast, Call, ExprId, Kind};
@@ -49,6 +49,10 @@ impl<'s> Language<'s> for ParsedModel<'s> {
 
     fn next(&mut self) -> Result<(Token, Span)> {
         token(&mut self.lexer)
+    }
+
+    fn is_fixed(text: &str) -> bool {
+        SYMBOLS.contains(&text)
     }
 
     fn level(operator: &str) -> Option<u8> {

@@ -1,7 +1,7 @@
 //! Expressions, by precedence; names with what stands behind them: parts, subscripts, arguments.
 
 use super::ast::{Call, ExprId, Kind, PathPart};
-use super::lexer::{Lexer, Token, shortened};
+use super::lexer::{Lexer, Token, is_fixed, shortened};
 use super::parser::{Language, POWER, PRODUCT, Parser, RELATION, SUM};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_RANK;
@@ -16,6 +16,10 @@ impl<'s> Language<'s> for Lexer<'s> {
 
     fn next(&mut self) -> Result<(Token, Span)> {
         self.token()
+    }
+
+    fn is_fixed(text: &str) -> bool {
+        is_fixed(text)
     }
 
     fn level(operator: &str) -> Option<u8> {

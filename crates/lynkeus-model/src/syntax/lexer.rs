@@ -86,6 +86,11 @@ pub(crate) fn unquoted(token: &str) -> String {
     text
 }
 
+/// Whether Modelica has a token that is always written so.
+pub(super) fn is_fixed(text: &str) -> bool {
+    RESERVED.contains(text) || SYMBOLS.contains(&text)
+}
+
 /// Reads tokens from a text.
 #[derive(Clone)]
 pub(crate) struct Lexer<'s> {
