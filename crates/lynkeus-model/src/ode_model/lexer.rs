@@ -242,7 +242,7 @@ mod tests {
     #[test]
     fn what_has_no_end() {
         for text in ["#=", "\"", "\"\"\" \"", "\"\\"] {
-            let message = heads(text, "?").unwrap_err().message;
+            let message = heads(text, "?").unwrap_err().into_details().message;
             assert!(message.contains("no end"), "{text}");
         }
     }

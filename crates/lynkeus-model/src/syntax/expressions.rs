@@ -38,7 +38,7 @@ impl<'s> Language<'s> for Lexer<'s> {
         parser.prefixed(least)
     }
 
-    fn too_large(&self, limit: &str, span: Span) -> Box<Problem> {
+    fn too_large(&self, limit: &str, span: Span) -> Problem {
         let message = format!("the text has more than {limit} operands and operators");
         Problem::new(span, message).hint("write repetition as `for` loops")
     }
@@ -190,7 +190,7 @@ impl Parser<'_> {
 }
 
 /// Refuses arrays of more dimensions than the limit.
-pub(crate) fn too_many_dimensions(span: Span) -> Box<Problem> {
+pub(crate) fn too_many_dimensions(span: Span) -> Problem {
     Problem::new(span, format!("an array of more than {MAX_RANK} dimensions"))
 }
 

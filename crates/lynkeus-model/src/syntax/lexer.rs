@@ -243,7 +243,7 @@ impl<'s> Lexer<'s> {
 }
 
 /// The refusal of what begins somewhere and does not end.
-pub(crate) fn no_end(what: &str, start: usize, opening: &str, closing: &str) -> Box<Problem> {
+pub(crate) fn no_end(what: &str, start: usize, opening: &str, closing: &str) -> Problem {
     let span = Span::new(start, start + opening.len());
     Problem::new(span, format!("this {what} has no end")).hint(format!("close it with `{closing}`"))
 }
@@ -352,13 +352,8 @@ mod tests {
     #[test]
     fn unterminated() {
         for text in ["/* x", "\"x", "'x", "\"x\\"] {
-            assert!(
-                Lexer::new(text)
-                    .token()
-                    .unwrap_err()
-                    .message
-                    .contains("no end")
-            );
+            let refused = Lexer::new(text).token().unwrap_err();
+            assert!(refused.into_details().message.contains("no end"));
         }
     }
 

@@ -31,7 +31,7 @@ pub(crate) trait Language<'s>: Sized {
     fn operand(parser: &mut Parser<'s, Self>, least: u8) -> Result<ExprId>;
 
     /// The refusal of more than so many parts.
-    fn too_large(&self, limit: &str, span: Span) -> Box<Problem>;
+    fn too_large(&self, limit: &str, span: Span) -> Problem;
 
     /// What to do where the text ends too early.
     fn hint_at_end(&self) -> Option<String> {
@@ -155,7 +155,7 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
     }
 
     /// Points behind the last token when `;` is missing at the end of its line.
-    fn missing_semicolon(&self) -> Box<Problem> {
+    fn missing_semicolon(&self) -> Problem {
         let between = Span::new(self.last.end as usize, self.span.start as usize);
         if !between.text(self.source).contains('\n') && self.token != Token::End {
             return self.unexpected("`;`");
@@ -167,7 +167,7 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
     }
 
     /// "expected …, found …" at the current token.
-    pub(crate) fn unexpected(&self, expected: &str) -> Box<Problem> {
+    pub(crate) fn unexpected(&self, expected: &str) -> Problem {
         let found = self.token.describe(self.span.text(self.source));
         let problem = Problem::new(self.span, format!("expected {expected}, found {found}"));
         let is_end = self.token == Token::End;
@@ -343,7 +343,7 @@ impl Parser<'_> {
     }
 
     /// "… is not supported" at the current token.
-    pub(super) fn refuse(&self, what: &str, hint: &str) -> Box<Problem> {
+    pub(super) fn refuse(&self, what: &str, hint: &str) -> Problem {
         Problem::new(self.span, format!("{what} is not supported")).hint(hint)
     }
 
