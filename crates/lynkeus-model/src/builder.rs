@@ -7,39 +7,6 @@ use lynkeus_expr::{Expr, Graph, Node};
 
 use crate::{Parameter, Plant, Variable};
 
-/// What a declaration says of a variable.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Attributes {
-    /// value at the start
-    pub start: Option<f64>,
-    /// smallest value of the range
-    pub min: f64,
-    /// largest value of the range
-    pub max: f64,
-    /// typical size
-    pub nominal: Option<f64>,
-    /// the value at the start is known
-    pub fixed: bool,
-    /// physical unit
-    pub unit: Option<String>,
-    /// one line about it
-    pub description: Option<String>,
-}
-
-impl Default for Attributes {
-    fn default() -> Self {
-        Self {
-            start: None,
-            min: f64::NEG_INFINITY,
-            max: f64::INFINITY,
-            nominal: None,
-            fixed: false,
-            unit: None,
-            description: None,
-        }
-    }
-}
-
 /// Why a model written in Rust is not a plant.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -114,26 +81,31 @@ impl Model {
         self.graph.symbol("time")
     }
 
-    /// Declares a state.
-    pub fn state(&self, name: &str, attributes: Attributes) -> Expr<'_> {
+    /// Declares a state; `describe` says what is known of it, as `|_| ()` where nothing is.
+    pub fn state(&self, name: &str, describe: impl FnOnce(&mut Variable)) -> Expr<'_> {
         let symbol = self.graph.symbol(name);
-        let state = variable(name, symbol.node(), attributes);
+        let state = variable(name, symbol.node(), describe);
         self.parts.borrow_mut().states.push(state);
         symbol
     }
 
-    /// Declares an input.
-    pub fn input(&self, name: &str, attributes: Attributes) -> Expr<'_> {
+    /// Declares an input; `describe` says what is known of it.
+    pub fn input(&self, name: &str, describe: impl FnOnce(&mut Variable)) -> Expr<'_> {
         let symbol = self.graph.symbol(name);
-        let input = variable(name, symbol.node(), attributes);
+        let input = variable(name, symbol.node(), describe);
         self.parts.borrow_mut().inputs.push(input);
         symbol
     }
 
     /// Declares a parameter that stays a symbol; `None` where its value is unknown.
-    pub fn parameter(&self, name: &str, value: Option<f64>, attributes: Attributes) -> Expr<'_> {
+    pub fn parameter(
+        &self,
+        name: &str,
+        value: Option<f64>,
+        describe: impl FnOnce(&mut Variable),
+    ) -> Expr<'_> {
         let symbol = self.graph.symbol(name);
-        let variable = variable(name, symbol.node(), attributes);
+        let variable = variable(name, symbol.node(), describe);
         let parameter = Parameter { variable, value };
         self.parts.borrow_mut().parameters.push(parameter);
         symbol
@@ -147,10 +119,10 @@ impl Model {
         }
     }
 
-    /// Declares an output with its value.
-    pub fn output(&self, name: &str, value: Expr<'_>, attributes: Attributes) {
+    /// Declares an output with its value; `describe` says what is known of it.
+    pub fn output(&self, name: &str, value: Expr<'_>, describe: impl FnOnce(&mut Variable)) {
         if self.is_own(value, &format!("the value of output `{name}`")) {
-            let output = variable(name, value.node(), attributes);
+            let output = variable(name, value.node(), describe);
             self.parts.borrow_mut().outputs.push(output);
         }
     }
@@ -260,20 +232,22 @@ impl Parts {
     }
 }
 
-fn variable(name: &str, node: Node, attributes: Attributes) -> Variable {
-    Variable {
+fn variable(name: &str, node: Node, describe: impl FnOnce(&mut Variable)) -> Variable {
+    let mut variable = Variable {
         name: name.to_owned(),
         node,
-        unit: attributes.unit,
-        description: attributes.description,
-        start: attributes.start,
+        unit: None,
+        description: None,
+        start: None,
         start_node: None,
-        min: attributes.min,
-        max: attributes.max,
-        nominal: attributes.nominal,
+        min: f64::NEG_INFINITY,
+        max: f64::INFINITY,
+        nominal: None,
         integer: false,
-        fixed: attributes.fixed,
-    }
+        fixed: false,
+    };
+    describe(&mut variable);
+    variable
 }
 
 #[cfg(test)]
@@ -282,7 +256,7 @@ mod tests {
 
     fn with_state() -> Model {
         let model = Model::new("M");
-        let x = model.state("x", Attributes::default());
+        let x = model.state("x", |_| ());
         model.der(x, -x);
         model
     }
@@ -290,7 +264,7 @@ mod tests {
     #[test]
     fn duplicate_names() {
         let model = with_state();
-        model.input("x", Attributes::default());
+        model.input("x", |_| ());
         assert_eq!(
             model.finish().unwrap_err(),
             ModelError::Duplicate("x".into())
@@ -300,7 +274,7 @@ mod tests {
     #[test]
     fn derivatives_are_counted() {
         let model = with_state();
-        model.state("z", Attributes::default());
+        model.state("z", |_| ());
         let missing = ModelError::MissingDerivative("z".into());
         assert_eq!(model.finish().unwrap_err(), missing);
         let model = with_state();
@@ -311,7 +285,7 @@ mod tests {
             ModelError::TwoDerivatives("x".into())
         );
         let model = with_state();
-        let u = model.input("u", Attributes::default());
+        let u = model.input("u", |_| ());
         model.der(u, u);
         assert_eq!(
             model.finish().unwrap_err(),
@@ -323,7 +297,7 @@ mod tests {
     fn undeclared_symbols() {
         let model = with_state();
         let q = model.graph().symbol("q");
-        model.output("y", q, Attributes::default());
+        model.output("y", q, |_| ());
         let error = model.finish().unwrap_err();
         assert_eq!(
             error.to_string(),
@@ -335,7 +309,7 @@ mod tests {
     fn expressions_of_another_model() {
         let (model, other) = (with_state(), with_state());
         let x = other.graph().symbol("x");
-        model.output("y", x, Attributes::default());
+        model.output("y", x, |_| ());
         let error = model.finish().unwrap_err();
         assert_eq!(
             error.to_string(),
@@ -346,12 +320,7 @@ mod tests {
     #[test]
     fn ranges() {
         let model = with_state();
-        let range = Attributes {
-            min: 1.0,
-            max: 0.0,
-            ..Attributes::default()
-        };
-        model.input("u", range);
+        model.input("u", |u| (u.min, u.max) = (1.0, 0.0));
         assert_eq!(
             model.finish().unwrap_err(),
             ModelError::EmptyRange("u".into())

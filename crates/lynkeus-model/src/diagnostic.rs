@@ -44,43 +44,51 @@ impl Span {
     }
 }
 
-/// What is wrong and where, before it is tied to a file.
+/// What is wrong and where, before it is tied to a file. Boxed, so that the results of the
+/// recursive parts of the reader stay small.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Problem {
+pub(crate) struct Problem(Box<Details>);
+
+/// The parts of a [`Problem`].
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Details {
     pub span: Span,
     pub message: String,
     pub label: Option<String>,
     pub hint: Option<String>,
 }
 
-/// Boxed, so that the results of the recursive parts of the reader stay small.
-pub(crate) type Result<T> = std::result::Result<T, Box<Problem>>;
+pub(crate) type Result<T> = std::result::Result<T, Problem>;
 
 impl Problem {
-    pub(crate) fn new(span: Span, message: impl Into<String>) -> Box<Self> {
-        Box::new(Self {
+    pub(crate) fn new(span: Span, message: impl Into<String>) -> Self {
+        Self(Box::new(Details {
             span,
             message: message.into(),
             label: None,
             hint: None,
-        })
+        }))
     }
 
     /// Text beside the caret.
-    pub(crate) fn label(mut self: Box<Self>, label: impl Into<String>) -> Box<Self> {
-        self.label = Some(label.into());
+    pub(crate) fn label(mut self, label: impl Into<String>) -> Self {
+        self.0.label = Some(label.into());
         self
     }
 
     /// What to do about it.
-    pub(crate) fn hint(self: Box<Self>, hint: impl Into<String>) -> Box<Self> {
+    pub(crate) fn hint(self, hint: impl Into<String>) -> Self {
         self.maybe_hint(Some(hint))
     }
 
     /// A hint where there is one.
-    pub(crate) fn maybe_hint(mut self: Box<Self>, hint: Option<impl Into<String>>) -> Box<Self> {
-        self.hint = hint.map(Into::into);
+    pub(crate) fn maybe_hint(mut self, hint: Option<impl Into<String>>) -> Self {
+        self.0.hint = hint.map(Into::into);
         self
+    }
+
+    pub(crate) fn into_details(self) -> Details {
+        *self.0
     }
 }
 
@@ -132,7 +140,8 @@ struct Excerpt {
 }
 
 impl Diagnostic {
-    pub(crate) fn new(problem: Box<Problem>, file: &str, source: &str) -> Self {
+    pub(crate) fn new(problem: Problem, file: &str, source: &str) -> Self {
+        let problem = problem.into_details();
         let start = source.floor_char_boundary(problem.span.start as usize);
         let end = source.floor_char_boundary(problem.span.end as usize);
         let line_start = source[..start].rfind('\n').map_or(0, |i| i + 1);
@@ -157,7 +166,7 @@ impl Diagnostic {
     }
 
     /// What looks wrong but is taken.
-    pub(crate) fn warning(problem: Box<Problem>, file: &str, source: &str) -> Self {
+    pub(crate) fn warning(problem: Problem, file: &str, source: &str) -> Self {
         let mut warning = Self::new(problem, file, source);
         warning.excerpt.is_warning = true;
         warning

@@ -7,7 +7,7 @@
 //!
 //! ```
 //! use lynkeus_expr::Tape;
-//! use lynkeus_model::{Attributes, LoadOptions, Model, Plant};
+//! use lynkeus_model::{LoadOptions, Model, Plant, Variable};
 //!
 //! let text = r#"
 //! model Tank "A tank that a pump fills"
@@ -22,11 +22,14 @@
 //! let from_text = Plant::from_modelica(text, "tank.mo", &LoadOptions::default())?;
 //!
 //! let model = Model::new("Tank");
-//! let range = Attributes { min: 0.0, max: 10.0, ..Attributes::default() };
-//! let pump = model.input("pump", Attributes { unit: Some("V".into()), ..range.clone() });
-//! let h = model.state("h", Attributes { start: Some(4.0), min: 0.05, ..range });
+//! let within = |min, max| move |of: &mut Variable| (of.min, of.max) = (min, max);
+//! let pump = model.input("pump", within(0.0, 10.0));
+//! let h = model.state("h", |h| {
+//!     within(0.05, 10.0)(h);
+//!     h.start = Some(4.0);
+//! });
 //! model.der(h, pump - 0.04 * h.sqrt());
-//! model.output("y", h, Attributes::default());
+//! model.output("y", h, |y| y.unit = Some("m".into()));
 //! let from_rust = model.finish()?;
 //!
 //! for plant in [from_text, from_rust] {
@@ -73,7 +76,7 @@ mod plant;
 mod syntax;
 mod units;
 
-pub use builder::{Attributes, Model, ModelError};
+pub use builder::{Model, ModelError};
 pub use diagnostic::{Diagnostic, LoadError, Span};
 pub use load::{model_names, parse_expression};
 pub use plant::{Assertion, LoadOptions, Parameter, Plant, Tables, Variable};

@@ -232,7 +232,7 @@ const MOST: usize = 20;
 const TIMES: [f64; 8] = [1e-9, 1e-6, 1e-3, 1.0, 60.0, 3600.0, 86400.0, 31_557_600.0];
 
 /// Warnings where declared units do not fit.
-pub(crate) fn check(source: &str, ast: &Ast, model: &FlatModel) -> Vec<Box<Problem>> {
+pub(crate) fn check(source: &str, ast: &Ast, model: &FlatModel) -> Vec<Problem> {
     let mut declared = HashMap::new();
     for declaration in &model.declarations {
         let mut attributes = declaration.attributes.iter();
@@ -279,7 +279,7 @@ struct Walk<'a> {
     declared: HashMap<&'a str, BaseUnit>,
     /// seconds in the model's unit of time, with the line that says so
     tick: Option<(f64, usize)>,
-    found: Vec<Box<Problem>>,
+    found: Vec<Problem>,
 }
 
 impl Walk<'_> {
@@ -338,7 +338,7 @@ impl Walk<'_> {
         Some(one)
     }
 
-    fn warn(&mut self, problem: Box<Problem>) {
+    fn warn(&mut self, problem: Problem) {
         if self.found.len() < MOST {
             self.found.push(problem);
         }

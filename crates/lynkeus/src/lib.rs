@@ -4,7 +4,7 @@
 //! give the same observer and the same estimate:
 //!
 //! ```
-//! use lynkeus::model::{Attributes, LoadOptions, Model, Plant};
+//! use lynkeus::model::{LoadOptions, Model, Plant};
 //! use lynkeus::observers::{Family, Tuning, triangular::Triangular};
 //! use lynkeus::run::{Estimator, EstimatorSettings};
 //! use lynkeus::structure::{AugmentedPlant, Sensors};
@@ -23,11 +23,13 @@
 //! )?;
 //!
 //! let model = Model::new("Tank");
-//! let inflow = model.input("inflow", Attributes::default());
-//! let range = Attributes { start: Some(4.0), min: 0.1, max: 10.0, ..Attributes::default() };
-//! let level = model.state("level", range);
+//! let inflow = model.input("inflow", |_| ());
+//! let level = model.state("level", |level| {
+//!     level.start = Some(4.0);
+//!     (level.min, level.max) = (0.1, 10.0);
+//! });
 //! model.der(level, inflow - 0.5 * level.sqrt());
-//! model.output("y", level, Attributes::default());
+//! model.output("y", level, |_| ());
 //! let in_rust = model.finish()?;
 //!
 //! // The sensor shows a tank at rest at 4: what flows in?

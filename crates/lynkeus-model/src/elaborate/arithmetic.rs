@@ -241,11 +241,11 @@ impl Evaluator<'_> {
     }
 }
 
-pub(super) fn overflow(span: Span) -> Box<Problem> {
+pub(super) fn overflow(span: Span) -> Problem {
     Problem::new(span, "this Integer does not fit in 64 bits").hint("use Real numbers")
 }
 
-fn no_product(left: &[usize], right: &[usize], span: Span) -> Box<Problem> {
+fn no_product(left: &[usize], right: &[usize], span: Span) -> Problem {
     let (left, right) = (describe_dims(left), describe_dims(right));
     Problem::new(span, format!("no product of sizes {left} and {right}"))
         .hint("the inner sizes of a matrix product must agree; `.*` multiplies element by element")

@@ -366,7 +366,7 @@ impl<'a> Evaluator<'a> {
         self.concatenate(axis.saturating_sub(1), arrays, span)
     }
 
-    fn no_dimension(&self, axis: i64, dims: &[usize], at: ExprId) -> Box<Problem> {
+    fn no_dimension(&self, axis: i64, dims: &[usize], at: ExprId) -> Problem {
         let found = describe_dims(dims);
         let message = format!("there is no dimension {axis}: the size is {found}");
         Problem::new(self.span(at), message)
@@ -562,12 +562,12 @@ fn within(text: &str, dim: usize, value: i64, span: Span) -> Result<usize> {
     })
 }
 
-fn not_an_array(text: &str, span: Span) -> Box<Problem> {
+fn not_an_array(text: &str, span: Span) -> Problem {
     let message = format!("`{text}` is a scalar and takes no subscripts");
     Problem::new(span, message)
 }
 
-fn not_whole(span: Span) -> Box<Problem> {
+fn not_whole(span: Span) -> Problem {
     let message = "a subscript must be an Integer or a range of Integers";
     Problem::new(span, message).hint(HOW_TO_BE_WHOLE)
 }

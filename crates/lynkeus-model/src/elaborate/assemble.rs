@@ -17,7 +17,7 @@ use crate::syntax::{plain, unquoted};
 use crate::{Assertion, Parameter, Plant, Variable, balance};
 
 /// The plant, with what looks wrong in it. Its graph is still the caller's: this one is empty.
-pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec<Box<Problem>>)> {
+pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec<Problem>)> {
     let (graph, model) = (symbols.graph, symbols.model);
     let (unknowns, inputs) = unknowns(symbols, &flat.equations)?;
     let equations = std::mem::take(&mut flat.equations);
@@ -344,7 +344,7 @@ fn fix_starts(
     flat: &Flat,
     solution: &HashMap<Node, Node>,
     states: &mut [Variable],
-) -> Vec<Box<Problem>> {
+) -> Vec<Problem> {
     let graph = symbols.graph;
     let mut at_start = solution.clone();
     at_start.insert(symbols.time(), graph.constant(0.0).node());
@@ -354,8 +354,7 @@ fn fix_starts(
         states: states.iter().map(|state| state.node).zip(0..).collect(),
     };
     let unread = flat.initial_unread.iter();
-    let mut warnings: Vec<Box<Problem>> =
-        unread.map(|&span| without_effect(span, UNREAD)).collect();
+    let mut warnings: Vec<Problem> = unread.map(|&span| without_effect(span, UNREAD)).collect();
     for equation in &flat.initial {
         let sides = graph.substitute(&[equation.left, equation.right], &at_start);
         let (left, right) = (sides[0], sides[1]);
@@ -446,7 +445,7 @@ const UNREAD: &str = "an initial equation of a derivative has no effect";
 const FIXES_NONE: &str =
     "this initial equation fixes the start of no state by itself: it has no effect";
 
-fn without_effect(span: Span, message: &str) -> Box<Problem> {
+fn without_effect(span: Span, message: &str) -> Problem {
     Problem::new(span, message)
         .hint("starts are taken from `start = …` and from initial equations as `x = …`")
 }
@@ -470,7 +469,7 @@ fn failing_at_start(
     symbols: &Symbols<'_>,
     assertions: &[(Assertion, Span)],
     plant: &Plant,
-) -> Vec<Box<Problem>> {
+) -> Vec<Problem> {
     let mut known = symbols.parameter_values();
     known.insert(symbols.time(), Some(0.0));
     let variables = plant.states.iter().chain(&plant.inputs);

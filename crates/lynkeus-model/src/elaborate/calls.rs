@@ -14,11 +14,8 @@ const MAX_CALLS: usize = 40;
 impl<'a> Evaluator<'a> {
     /// The class of the text that a name means.
     fn class(&self, name: Span, scopes: &[&str]) -> Option<&'a Class> {
-        let place = self
-            .symbols
-            .classes
-            .class(&plain(self.text(name)), scopes)?;
-        self.ast.classes.get(place)
+        let name = plain(self.text(name));
+        self.symbols.classes.class(&name, scopes)
     }
 
     fn class_called(&self, call: &Call) -> Option<&'a Class> {

@@ -260,7 +260,7 @@ fn sort(declarations: &[Declaration], needs: &[Vec<usize>]) -> Result<Vec<usize>
     Ok(sequence)
 }
 
-fn cycle(declarations: &[Declaration], path: &[(usize, usize)], closing: usize) -> Box<Problem> {
+fn cycle(declarations: &[Declaration], path: &[(usize, usize)], closing: usize) -> Problem {
     let start = path.iter().position(|(place, _)| *place == closing);
     let cycle = &path[start.unwrap_or(0)..];
     let name = |place: usize| format!("`{}`", declarations[place].label);
@@ -441,7 +441,7 @@ impl Parts<'_> {
         }
     }
 
-    fn no_value(&self) -> Box<Problem> {
+    fn no_value(&self) -> Problem {
         let name = self.name;
         let hint = format!("write `{name} = …` here, or give the value on loading");
         let message = format!("parameter `{name}` has no value");
@@ -508,7 +508,7 @@ fn check_settable(name: &str, declaration: &Declaration) -> Result<()> {
     Err(Problem::new(declaration.name, message).hint("only parameters can be set"))
 }
 
-fn unknown(model: &FlatModel, name: &str) -> Box<Problem> {
+fn unknown(model: &FlatModel, name: &str) -> Problem {
     let declarations = model.declarations.iter();
     let settable = declarations.filter(|d| d.is_settable());
     let names: Vec<&str> = settable.map(|d| d.label.as_str()).collect();

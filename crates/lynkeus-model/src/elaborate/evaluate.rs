@@ -209,14 +209,14 @@ impl<'a> Evaluator<'a> {
             .ok_or_else(outside)
     }
 
-    pub(super) fn varying(&self, span: Span) -> Box<Problem> {
+    pub(super) fn varying(&self, span: Span) -> Problem {
         let name = self.text(span);
         let message = format!("`{name}` is a variable, but a known value is needed here");
         Problem::new(span, message)
             .hint("sizes, loop bounds, subscripts, attributes and parameters use parameters only")
     }
 
-    pub(super) fn without_value(&mut self, span: Span) -> Box<Problem> {
+    pub(super) fn without_value(&mut self, span: Span) -> Problem {
         self.valueless = true;
         let name = self.text(span);
         let message = format!("parameter `{name}` has no value, but one is needed here");
@@ -225,7 +225,7 @@ impl<'a> Evaluator<'a> {
         ))
     }
 
-    pub(super) fn unknown_name(&self, span: Span) -> Box<Problem> {
+    pub(super) fn unknown_name(&self, span: Span) -> Problem {
         let name = self.text(span);
         if name == "time" {
             return self.varying(span);
@@ -437,7 +437,7 @@ impl<'a> Evaluator<'a> {
         Some(Scalar::Real(self.graph.constant(known?).node()))
     }
 
-    pub(super) fn unassigned(&self, name: &str, span: Span) -> Box<Problem> {
+    pub(super) fn unassigned(&self, name: &str, span: Span) -> Problem {
         let message = format!("`{name}` is read before it has a value in every case");
         Problem::new(span, message).hint("assign it first, in each branch of an `if`")
     }

@@ -114,7 +114,7 @@ impl<'a> Evaluator<'a> {
         name.strip_prefix(LIBRARY).unwrap_or(name)
     }
 
-    fn unknown_function(&self, span: Span, name: &str) -> Box<Problem> {
+    fn unknown_function(&self, span: Span, name: &str) -> Problem {
         if let Some((_, hint)) = REFUSED.iter().find(|(refused, _)| *refused == name) {
             return Problem::new(span, format!("`{name}` is not supported")).hint(*hint);
         }
@@ -314,7 +314,7 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    fn no_derivative(&self, span: Span) -> Box<Problem> {
+    fn no_derivative(&self, span: Span) -> Problem {
         let name = self.text(span);
         let message = format!("`der({name})`: `{name}` is not a Real variable");
         Problem::new(span, message)

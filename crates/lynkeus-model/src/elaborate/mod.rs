@@ -31,12 +31,12 @@ use symbols::{Names, Symbols};
 pub(crate) use evaluate::Evaluator;
 
 /// The plant of a Modelica text, with what looks wrong in it.
-pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<Box<Problem>>)> {
-    let mut ast = parse_file(source)?;
-    let place = choose_model(&ast, options)?;
-    let model = flat_model(source, &mut ast, place)?;
+pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<Problem>)> {
+    let (mut ast, classes) = parse_file(source)?;
+    let class = choose_model(&classes, options)?;
+    let classes = Classes::new(source, &classes);
+    let model = flat_model(source, &mut ast, &classes, class)?;
     let (ast, model) = (&ast, &model);
-    let classes = Classes::new(source, &ast.classes);
     let graph = Graph::new();
     graph.set_budget(options.budget.clone());
     let done = graph.budgeted(options.budget.clone(), || {
@@ -65,19 +65,19 @@ pub(crate) fn evaluated<T>(
 }
 
 /// A limit ended the reading.
-fn ended(model: &FlatModel, spent: Spent) -> Box<Problem> {
+fn ended(model: &FlatModel, spent: Spent) -> Problem {
     Problem::new(model.name, format!("the model was not read: {spent}"))
 }
 
 /// The model that is asked for, or the only one.
-fn choose_model(ast: &Ast, options: &LoadOptions) -> Result<usize> {
+fn choose_model<'a>(classes: &'a [Class], options: &LoadOptions) -> Result<&'a Class> {
     let none = || {
         Problem::new(Span::default(), "the text holds no model")
             .hint("a model reads `model Name … equation … end Name;`")
     };
-    let places: Vec<usize> = models(ast).collect();
-    let classes = places.iter().filter_map(|&place| ast.classes.get(place));
-    let names: Vec<(&str, Span)> = classes.map(|c| (title(&c.path), c.name)).collect();
+    let models: Vec<&Class> = models(classes).collect();
+    let names = models.iter().map(|class| (title(&class.path), class.name));
+    let names: Vec<(&str, Span)> = names.collect();
     let wanted = options.model.as_deref().map(|wanted| {
         // the last part of a name is enough where it says which
         let is_exact = names.iter().any(|(name, _)| *name == wanted);
@@ -89,32 +89,26 @@ fn choose_model(ast: &Ast, options: &LoadOptions) -> Result<usize> {
         }
     });
     let place = choose(&names, wanted, none)?;
-    places.get(place).copied().ok_or_else(none)
+    models.get(place).copied().ok_or_else(none)
 }
 
-/// Places of the classes that may be a plant.
-fn models(ast: &Ast) -> impl Iterator<Item = usize> {
+/// The classes that may be a plant.
+fn models(classes: &[Class]) -> impl Iterator<Item = &Class> {
     let is_model = |class: &&Class| class.kind == ClassKind::Model;
-    let paths = ast
-        .classes
-        .iter()
-        .filter(is_model)
-        .map(|class| class.path.as_str());
-    let paths: HashSet<&str> = paths.collect();
+    let paths = classes.iter().filter(is_model);
+    let paths: HashSet<&str> = paths.map(|class| class.path.as_str()).collect();
     // a class inside of a model is a part of it
     let is_inside = move |class: &Class| {
         let around = class.path.rsplit_once('.');
         around.is_some_and(|(above, _)| paths.contains(above))
     };
-    let classes = ast.classes.iter().enumerate();
-    let whole =
-        classes.filter(move |(_, class)| is_model(class) && !class.is_partial && !is_inside(class));
-    whole.map(|(place, _)| place)
+    let classes = classes.iter().filter(is_model);
+    classes.filter(move |class| !class.is_partial && !is_inside(class))
 }
 
 /// The names of the models of a Modelica text.
 pub(crate) fn names(source: &str) -> Result<Vec<String>> {
-    let ast = parse_file(source)?;
-    let name = |place: usize| Some(title(&ast.classes.get(place)?.path).to_owned());
-    Ok(models(&ast).filter_map(name).collect())
+    let (_, classes) = parse_file(source)?;
+    let name = |class: &Class| title(&class.path).to_owned();
+    Ok(models(&classes).map(name).collect())
 }

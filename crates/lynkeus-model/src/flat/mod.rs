@@ -38,24 +38,32 @@ pub(crate) struct FlatModel {
 }
 
 /// The flat model of a class.
-pub(crate) fn flat_model(source: &str, ast: &mut Ast, place: usize) -> Result<FlatModel> {
-    let classes = std::mem::take(&mut ast.classes);
+pub(crate) fn flat_model(
+    source: &str,
+    ast: &mut Ast,
+    classes: &Classes<'_>,
+    class: &Class,
+) -> Result<FlatModel> {
+    let own = |declaration: &Declaration| declaration.label.clone();
     let mut flattening = Flattening {
         source,
-        classes: Classes::new(source, &classes),
+        classes,
         ast,
         model: FlatModel::default(),
-        declared: HashSet::new(),
+        declared: class.declarations.iter().map(own).collect(),
     };
-    let done = flattening.whole(place);
-    let model = flattening.model;
-    ast.classes = classes;
-    done.map(|()| model)
+    flattening.constants()?;
+    flattening.whole(class)?;
+    let mut model = flattening.model;
+    model.name = class.name;
+    model.title = title(&class.path).to_owned();
+    elements_by_themselves(source, ast, &mut model.declarations);
+    Ok(model)
 }
 
 struct Flattening<'a> {
     source: &'a str,
-    classes: Classes<'a>,
+    classes: &'a Classes<'a>,
     ast: &'a mut Ast,
     model: FlatModel,
     /// labels of the declarations so far
@@ -63,15 +71,7 @@ struct Flattening<'a> {
 }
 
 impl<'a> Flattening<'a> {
-    fn whole(&mut self, place: usize) -> Result<()> {
-        let Some(class) = self.classes.list.get(place) else {
-            return Ok(());
-        };
-        self.model.name = class.name;
-        self.model.title = title(&class.path).to_owned();
-        let own = |declaration: &Declaration| declaration.label.clone();
-        self.declared = class.declarations.iter().map(own).collect();
-        self.constants()?;
+    fn whole(&mut self, class: &'a Class) -> Result<()> {
         let mut scopes = vec![];
         let parts = self.parts(class, vec![], &[], &mut scopes)?;
         self.model.scopes = scopes;
@@ -85,7 +85,6 @@ impl<'a> Flattening<'a> {
             model.initial.extend(class.initial.iter().cloned());
             model.algorithms.extend(class.algorithms.iter().cloned());
         }
-        elements_by_themselves(self.source, self.ast, &mut self.model.declarations);
         Ok(())
     }
 
@@ -116,7 +115,7 @@ impl<'a> Flattening<'a> {
 
     fn base(&self, class: &Class, name: Span) -> Result<&'a Class> {
         let text = plain(name.text(self.source));
-        match self.classes.of_name(&text, &[&class.path]) {
+        match self.classes.class(&text, &[&class.path]) {
             Some(found) if found.kind != ClassKind::Function => Ok(found),
             _ => {
                 let message = format!("the model is not flat: `extends {text}` of another file");
@@ -137,7 +136,7 @@ impl<'a> Flattening<'a> {
                 return self.scalar_or_array(declaration);
             };
             let text = plain(name.text(self.source));
-            let Some(class) = self.classes.of_name(&text, &[&path]) else {
+            let Some(class) = self.classes.class(&text, &[&path]) else {
                 return self.of_library(declaration, &text, name, &path);
             };
             match (class.kind, &class.alias) {
@@ -439,8 +438,9 @@ fn is_meant(names: &HashSet<String>, full: &str) -> bool {
 /// The classes of a text by their names in full.
 #[derive(Debug, Default)]
 pub(crate) struct Classes<'a> {
-    list: &'a [Class],
-    by_path: HashMap<&'a str, usize>,
+    /// in the order of the text
+    pub list: &'a [Class],
+    by_path: HashMap<&'a str, &'a Class>,
     imports: HashMap<&'a str, &'a [Import]>,
     /// last parts of the names that lead to classes
     last: HashSet<&'a str>,
@@ -454,8 +454,8 @@ impl<'a> Classes<'a> {
             list: classes,
             ..Self::default()
         };
-        for (place, class) in classes.iter().enumerate() {
-            index.by_path.entry(&class.path).or_insert(place);
+        for class in classes {
+            index.by_path.entry(&class.path).or_insert(class);
             index.last.insert(last(&class.path));
             let shorts = class.imports.iter().filter_map(|i| i.short.as_deref());
             index.last.extend(shorts);
@@ -471,12 +471,8 @@ impl<'a> Classes<'a> {
         index
     }
 
-    fn of_name(&self, name: &str, scopes: &[&str]) -> Option<&'a Class> {
-        self.list.get(self.class(name, scopes)?)
-    }
-
     /// The class that a name means in the first of some scopes that know it.
-    pub(crate) fn class(&self, name: &str, scopes: &[&str]) -> Option<usize> {
+    pub(crate) fn class(&self, name: &str, scopes: &[&str]) -> Option<&'a Class> {
         if !self.last.contains(last(name)) {
             return None;
         }

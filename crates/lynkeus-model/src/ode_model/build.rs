@@ -9,7 +9,7 @@ use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::{Budget, MAX_SCALARS};
 use crate::names::did_you_mean;
 use crate::syntax::ast::Ast;
-use crate::{Attributes, LoadOptions, Model, Plant, elaborate};
+use crate::{LoadOptions, Model, Plant, elaborate};
 
 /// What the names of a model are.
 struct Names<'s> {
@@ -123,16 +123,16 @@ pub(super) fn plant(
     let model = Model::new(name);
     let mut nodes: HashMap<&str, Node> = HashMap::from([("t", model.time().node())]);
     for (text, _) in names.of(Role::State) {
-        nodes.insert(text, model.state(text, Attributes::default()).node());
+        nodes.insert(text, model.state(text, |_| ()).node());
     }
     for (text, _) in names.of(Role::Input) {
-        nodes.insert(text, model.input(text, Attributes::default()).node());
+        nodes.insert(text, model.input(text, |_| ()).node());
     }
     for (text, span) in names.of(Role::Parameter) {
         let value = options.parameters.get(text).copied();
         let symbolic =
             options.symbolic_parameters && (value.is_none() || !options.numbers.contains(text));
-        let symbol = model.parameter(text, value, Attributes::default());
+        let symbol = model.parameter(text, value, |_| ());
         let node = match (value, symbolic) {
             (_, true) => symbol.node(),
             (Some(value), false) => model.graph().constant(value).node(),
@@ -167,7 +167,7 @@ fn equations(
             let value = graph.expr(value.ok_or_else(expected)?);
             match role {
                 Role::State => model.der(graph.symbol(text), value),
-                _ => model.output(text, value, Attributes::default()),
+                _ => model.output(text, value, |_| ()),
             }
         }
         Ok(())

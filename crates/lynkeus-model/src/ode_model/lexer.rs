@@ -121,7 +121,7 @@ fn assigned_name(source: &str, at: usize) -> Option<&str> {
 }
 
 /// Operators and punctuation; longer ones first.
-const SYMBOLS: [&str; 11] = ["//", "+", "-", "*", "/", "^", "=", "(", ")", ",", "'"];
+pub(super) const SYMBOLS: [&str; 11] = ["//", "+", "-", "*", "/", "^", "=", "(", ")", ",", "'"];
 
 /// Words of Julia that cannot be names.
 const RESERVED: [&str; 16] = [
@@ -242,7 +242,7 @@ mod tests {
     #[test]
     fn what_has_no_end() {
         for text in ["#=", "\"", "\"\"\" \"", "\"\\"] {
-            let message = heads(text, "?").unwrap_err().message;
+            let message = heads(text, "?").unwrap_err().into_details().message;
             assert!(message.contains("no end"), "{text}");
         }
     }

@@ -2,7 +2,7 @@
 
 use lynkeus_expr::Binary;
 
-use super::lexer::token;
+use super::lexer::{SYMBOLS, token};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::names::did_you_mean;
 use crate::syntax::ast::{Ast, Call, ExprId, Kind};
@@ -51,6 +51,10 @@ impl<'s> Language<'s> for ParsedModel<'s> {
         token(&mut self.lexer)
     }
 
+    fn is_fixed(text: &str) -> bool {
+        SYMBOLS.contains(&text)
+    }
+
     fn level(operator: &str) -> Option<u8> {
         Some(match operator {
             "+" | "-" => SUM,
@@ -65,7 +69,7 @@ impl<'s> Language<'s> for ParsedModel<'s> {
         parser.operand()
     }
 
-    fn too_large(&self, limit: &str, span: Span) -> Box<Problem> {
+    fn too_large(&self, limit: &str, span: Span) -> Problem {
         let message = format!("the model has more than {limit} operands and operators");
         Problem::new(span, message)
     }
@@ -152,7 +156,7 @@ impl<'s> Parser<'s, ParsedModel<'s>> {
         })
     }
 
-    fn second_derivative(&self, name: Span) -> Box<Problem> {
+    fn second_derivative(&self, name: Span) -> Problem {
         let text = name.text(self.source);
         let span = name.to(self.span);
         Problem::new(span, "derivatives of higher order are not supported").hint(format!(
@@ -298,7 +302,7 @@ impl<'s> Parser<'s, ParsedModel<'s>> {
         self.push(Kind::Call(call), function, first)
     }
 
-    fn derivative(&self, name: Span) -> Box<Problem> {
+    fn derivative(&self, name: Span) -> Problem {
         let text = name.text(self.source);
         let span = name.to(self.span);
         Problem::new(span, "a derivative on a right side is not supported").hint(format!(
@@ -306,7 +310,7 @@ impl<'s> Parser<'s, ParsedModel<'s>> {
         ))
     }
 
-    fn unknown_function(&self, name: Span) -> Box<Problem> {
+    fn unknown_function(&self, name: Span) -> Problem {
         let text = name.text(self.source);
         let hint = did_you_mean(text, FUNCTIONS.into_iter()).unwrap_or_else(|| {
             let known = FUNCTIONS.join(" ");

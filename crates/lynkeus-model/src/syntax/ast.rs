@@ -13,8 +13,6 @@ pub(crate) struct ExprId(pub(crate) u32);
 #[derive(Debug, Default)]
 pub(crate) struct Ast {
     pub expressions: Vec<Expression>,
-    /// every class of the text, inner ones before those around them
-    pub classes: Vec<Class>,
 }
 
 impl Ast {

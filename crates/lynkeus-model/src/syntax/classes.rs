@@ -53,7 +53,7 @@ impl Parser<'_> {
             self.class_end(name)?;
         }
         self.ending()?;
-        self.ast.classes.push(class);
+        self.classes.push(class);
         Ok(())
     }
 

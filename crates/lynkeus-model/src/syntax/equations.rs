@@ -10,6 +10,9 @@ use super::unquoted;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_ITERATORS;
 
+/// Conditions with what holds under them.
+type Cases<T> = Vec<(ExprId, Vec<T>)>;
+
 const NO_EVENTS: &str = "an observer needs continuous equations: use `if` expressions";
 const WHERE_DECLARATIONS_STAND: &str =
     "declarations come before the word `equation`, or after `public`";
@@ -124,7 +127,7 @@ impl Parser<'_> {
     fn branches<T, K>(
         &mut self,
         one: fn(&mut Self) -> Result<T>,
-        kind: fn(Vec<(ExprId, Vec<T>)>, Vec<T>) -> K,
+        kind: fn(Cases<T>, Vec<T>) -> K,
     ) -> Result<K> {
         self.advance()?;
         let branches = self.cases(|parser| parser.until_end(one))?;

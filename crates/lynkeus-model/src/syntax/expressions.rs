@@ -1,7 +1,7 @@
 //! Expressions, by precedence; names with what stands behind them: parts, subscripts, arguments.
 
 use super::ast::{Call, ExprId, Kind, PathPart};
-use super::lexer::{Lexer, Token, shortened};
+use super::lexer::{Lexer, Token, is_fixed, shortened};
 use super::parser::{Language, POWER, PRODUCT, Parser, RELATION, SUM};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_RANK;
@@ -16,6 +16,10 @@ impl<'s> Language<'s> for Lexer<'s> {
 
     fn next(&mut self) -> Result<(Token, Span)> {
         self.token()
+    }
+
+    fn is_fixed(text: &str) -> bool {
+        is_fixed(text)
     }
 
     fn level(operator: &str) -> Option<u8> {
@@ -34,7 +38,7 @@ impl<'s> Language<'s> for Lexer<'s> {
         parser.prefixed(least)
     }
 
-    fn too_large(&self, limit: &str, span: Span) -> Box<Problem> {
+    fn too_large(&self, limit: &str, span: Span) -> Problem {
         let message = format!("the text has more than {limit} operands and operators");
         Problem::new(span, message).hint("write repetition as `for` loops")
     }
@@ -186,7 +190,7 @@ impl Parser<'_> {
 }
 
 /// Refuses arrays of more dimensions than the limit.
-pub(crate) fn too_many_dimensions(span: Span) -> Box<Problem> {
+pub(crate) fn too_many_dimensions(span: Span) -> Problem {
     Problem::new(span, format!("an array of more than {MAX_RANK} dimensions"))
 }
 

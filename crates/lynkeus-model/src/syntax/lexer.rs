@@ -86,6 +86,11 @@ pub(crate) fn unquoted(token: &str) -> String {
     text
 }
 
+/// Whether Modelica has a token that is always written so.
+pub(super) fn is_fixed(text: &str) -> bool {
+    RESERVED.contains(text) || SYMBOLS.contains(&text)
+}
+
 /// Reads tokens from a text.
 #[derive(Clone)]
 pub(crate) struct Lexer<'s> {
@@ -238,7 +243,7 @@ impl<'s> Lexer<'s> {
 }
 
 /// The refusal of what begins somewhere and does not end.
-pub(crate) fn no_end(what: &str, start: usize, opening: &str, closing: &str) -> Box<Problem> {
+pub(crate) fn no_end(what: &str, start: usize, opening: &str, closing: &str) -> Problem {
     let span = Span::new(start, start + opening.len());
     Problem::new(span, format!("this {what} has no end")).hint(format!("close it with `{closing}`"))
 }
@@ -347,13 +352,8 @@ mod tests {
     #[test]
     fn unterminated() {
         for text in ["/* x", "\"x", "'x", "\"x\\"] {
-            assert!(
-                Lexer::new(text)
-                    .token()
-                    .unwrap_err()
-                    .message
-                    .contains("no end")
-            );
+            let refused = Lexer::new(text).token().unwrap_err();
+            assert!(refused.into_details().message.contains("no end"));
         }
     }
 

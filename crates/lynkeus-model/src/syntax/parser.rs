@@ -2,7 +2,7 @@
 
 use lynkeus_expr::Binary;
 
-use super::ast::{Ast, ExprId, Expression, Kind, Term};
+use super::ast::{Ast, Class, ExprId, Expression, Kind, Term};
 use super::lexer::{Lexer, Token, shortened, unquoted};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::{MAX_NESTING, MAX_SOURCE_BYTES, MAX_SYNTAX_NODES, grouped};
@@ -21,6 +21,9 @@ pub(crate) trait Language<'s>: Sized {
     /// The next token; `Token::End` from the end of the text on.
     fn next(&mut self) -> Result<(Token, Span)>;
 
+    /// Whether there is a token that is always written so.
+    fn is_fixed(text: &str) -> bool;
+
     /// How tightly an operator between two operands binds.
     fn level(operator: &str) -> Option<u8>;
 
@@ -28,7 +31,7 @@ pub(crate) trait Language<'s>: Sized {
     fn operand(parser: &mut Parser<'s, Self>, least: u8) -> Result<ExprId>;
 
     /// The refusal of more than so many parts.
-    fn too_large(&self, limit: &str, span: Span) -> Box<Problem>;
+    fn too_large(&self, limit: &str, span: Span) -> Problem;
 
     /// What to do where the text ends too early.
     fn hint_at_end(&self) -> Option<String> {
@@ -47,6 +50,7 @@ pub(crate) struct Parser<'s, L = Lexer<'s>> {
     depth: usize,
     nodes: usize,
     pub(crate) ast: Ast,
+    pub(super) classes: Vec<Class>,
 }
 
 /// Refuses texts whose positions would not fit a [`Span`].
@@ -59,14 +63,15 @@ pub(crate) fn check_length(source: &str) -> Result<()> {
     Ok(())
 }
 
-/// Parses a whole file.
-pub(crate) fn parse_file(source: &str) -> Result<Ast> {
+/// Parses a whole file: its expressions, and every class of it, inner ones before those around
+/// them.
+pub(crate) fn parse_file(source: &str) -> Result<(Ast, Vec<Class>)> {
     let mut parser = modelica(source)?;
     parser.within_clause()?;
     while parser.token != Token::End {
         parser.class("")?;
     }
-    Ok(parser.ast)
+    Ok((parser.ast, parser.classes))
 }
 
 /// Parses a text that is one expression.
@@ -98,6 +103,7 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
             depth: 0,
             nodes: 0,
             ast: Ast::default(),
+            classes: vec![],
         }
     }
 
@@ -110,6 +116,7 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
 
     /// True at what is always written so.
     pub(crate) fn at(&self, text: &'static str) -> bool {
+        debug_assert!(L::is_fixed(text), "nothing is always written `{text}`");
         self.token == Token::Fixed(text)
     }
 
@@ -148,7 +155,7 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
     }
 
     /// Points behind the last token when `;` is missing at the end of its line.
-    fn missing_semicolon(&self) -> Box<Problem> {
+    fn missing_semicolon(&self) -> Problem {
         let between = Span::new(self.last.end as usize, self.span.start as usize);
         if !between.text(self.source).contains('\n') && self.token != Token::End {
             return self.unexpected("`;`");
@@ -160,7 +167,7 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
     }
 
     /// "expected …, found …" at the current token.
-    pub(crate) fn unexpected(&self, expected: &str) -> Box<Problem> {
+    pub(crate) fn unexpected(&self, expected: &str) -> Problem {
         let found = self.token.describe(self.span.text(self.source));
         let problem = Problem::new(self.span, format!("expected {expected}, found {found}"));
         let is_end = self.token == Token::End;
@@ -336,7 +343,7 @@ impl Parser<'_> {
     }
 
     /// "… is not supported" at the current token.
-    pub(super) fn refuse(&self, what: &str, hint: &str) -> Box<Problem> {
+    pub(super) fn refuse(&self, what: &str, hint: &str) -> Problem {
         Problem::new(self.span, format!("{what} is not supported")).hint(hint)
     }
 

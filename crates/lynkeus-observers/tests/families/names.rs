@@ -1,7 +1,7 @@
 //! Names that read like the labels of the observers' own symbols.
 
 use lynkeus_expr::Expr;
-use lynkeus_model::{Attributes, Model, Plant};
+use lynkeus_model::{Model, Plant, Variable};
 use lynkeus_observers::{
     Family, Tuning, Value, block_triangular::BlockTriangular, drift_observable::DriftObservable,
     state_affine::StateAffine, triangular::Triangular,
@@ -23,11 +23,7 @@ const NAMES: &[[&str; 4]] = &[
 
 /// a' = b (1 + u/10) − a, b' = −sin(b) + u, y = a.
 fn plant([a, b, u, y]: [&str; 4]) -> Plant {
-    let within = |min: f64, max: f64| Attributes {
-        min,
-        max,
-        ..Attributes::default()
-    };
+    let within = |min: f64, max: f64| move |of: &mut Variable| (of.min, of.max) = (min, max);
     let model = Model::new("named");
     let (a_, b_) = (
         model.state(a, within(-1.0, 1.0)),
@@ -37,7 +33,7 @@ fn plant([a, b, u, y]: [&str; 4]) -> Plant {
     let der = |x: Expr<'_>, value: Expr<'_>| model.der(x, value);
     der(a_, b_ * (u_ * 0.1 + 1.0) - a_);
     der(b_, u_ - b_.sin());
-    model.output(y, a_, Attributes::default());
+    model.output(y, a_, |_| ());
     model.finish().unwrap()
 }
 
