@@ -218,6 +218,16 @@ impl Error {
         }
     }
 
+    /// The same of a switch that reads so.
+    pub(crate) fn about(mut self, switch: &str) -> Self {
+        if let Self::TooManySwitches { expression, .. }
+        | Self::UnresolvedSwitches { expression, .. } = &mut self
+        {
+            switch.clone_into(expression);
+        }
+        self
+    }
+
     pub(crate) fn setting(
         what: impl Into<String>,
         expected: impl Into<String>,

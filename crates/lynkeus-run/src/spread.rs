@@ -222,7 +222,7 @@ impl Spread {
 
     /// The flow's outputs, the entries of the Jacobians.
     fn evaluate(&mut self, t: f64, z: &[f64]) {
-        let evaluation = &mut self.propagation.driven.evaluation;
+        let evaluation = &mut self.propagation.driven;
         evaluation.enter(t);
         evaluation.outputs(t, z, &mut self.values);
     }

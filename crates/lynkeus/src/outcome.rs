@@ -17,7 +17,7 @@ use crate::headers::{Headers, log_time};
 use crate::interval::Intervals;
 use crate::judge::{self, By, Doubt, Evidence, Innovations, Judged, Trace, innovations};
 use crate::outside::{self, Outside, outside};
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, StudyDesign};
 use crate::study::EstimateSettings;
 use crate::systems::hat;
 use crate::{Error, Quantity, Series, Study, expected, headers, saturated};
@@ -54,7 +54,7 @@ pub struct Outcome {
     /// name of the plant
     pub plant: String,
     /// the observer that ran
-    pub design: Design,
+    pub design: StudyDesign,
     /// times of the rows
     pub time: Series,
     /// header of their column: `t` unless the model has that name
@@ -188,7 +188,7 @@ impl Outcome {
 /// A run before its columns have headers.
 pub(crate) struct Raw<'r> {
     pub prepared: &'r Prepared<'r>,
-    pub design: Design,
+    pub design: StudyDesign,
     /// times of the rows
     pub time: Series,
     pub course: Course,
