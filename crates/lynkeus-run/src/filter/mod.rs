@@ -46,6 +46,7 @@ mod model;
 mod profile;
 pub(crate) mod root;
 mod sensing;
+mod settings;
 mod smoother;
 pub(crate) mod transition;
 mod ukf;
@@ -55,8 +56,8 @@ pub(crate) use belief::Belief;
 pub use health::{Health, Innovation, Reading, SensorHealth};
 pub(crate) use model::check_counts;
 pub use model::{NoisyModel, NoisyPlant, Sensor};
+pub use settings::{FilterKind, FilterSettings, SigmaPoints, Weights};
 pub use smoother::Smoothed;
-pub use ukf::{SigmaPoints, Weights};
 
 use crate::divergence::{Bound, check_deviations};
 use crate::runner::{Runner, Sample};
@@ -70,50 +71,6 @@ use sensing::Sensing;
 use smoother::{History, Step};
 use transition::Propagation;
 use ukf::Ukf;
-
-/// Which filter.
-#[derive(Clone, Debug, PartialEq)]
-pub enum FilterKind {
-    /// the extended Kalman filter, continuous-discrete: the covariance follows the plant's
-    /// linearisation along the estimate
-    Extended,
-    /// the unscented Kalman filter: sigma points follow the plant
-    Unscented(SigmaPoints),
-    /// moving-horizon estimation over so many samples, the states within the model's ranges
-    MovingHorizon(usize),
-}
-
-/// How a filter works.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FilterSettings {
-    /// which filter
-    pub kind: FilterKind,
-    /// a reading whose innovation exceeds so many of its standard deviations is rejected
-    pub gate: Option<f64>,
-    /// keep what a smoother needs
-    pub keep_history: bool,
-    /// the estimate is kept in the model's ranges: after each prediction and correction it is put to the
-    /// nearest place inside by the covariance's metric. The covariance stays: a bound says where
-    /// the estimate is, and not how sure it is
-    pub projects: bool,
-    /// readings are what the model shows, and only covariances are asked for: a sensor with limits
-    /// counts as its readings do on average (Fisher's information of a clipped normal number)
-    pub foresees: bool,
-}
-
-impl FilterSettings {
-    /// No gate, no history, no bounds.
-    #[must_use]
-    pub fn of(kind: FilterKind) -> Self {
-        Self {
-            kind,
-            gate: None,
-            keep_history: false,
-            projects: false,
-            foresees: false,
-        }
-    }
-}
 
 /// What the filters differ in.
 #[derive(Clone, Debug)]
@@ -152,7 +109,7 @@ impl Filter {
     ) -> Result<Self, Error> {
         let flow = model.flow.system();
         let n = flow.states().len();
-        check(settings, n, model.ranges.len())?;
+        settings.check(n, model.ranges.len())?;
         let propagation = |flow| Propagation::new(flow, &model.process_noise, run);
         Ok(Self {
             propagation: propagation(&model.flow)?,
@@ -358,26 +315,6 @@ impl Runner for Filter {
     fn copied(&self) -> Box<dyn Runner> {
         Box::new(self.clone())
     }
-}
-
-/// That the settings can be, for n states with so many ranges.
-fn check(settings: &FilterSettings, n: usize, ranges: usize) -> Result<(), Error> {
-    if let Some(gate) = settings.gate
-        && !(gate > 0.0 && gate.is_finite())
-    {
-        let expected = "a number of standard deviations above 0";
-        return Err(Error::setting("gate", expected, gate));
-    }
-    let is_bounded = settings.projects || matches!(settings.kind, FilterKind::MovingHorizon(_));
-    if is_bounded && ranges != n {
-        let expected = format!("{n}, one pair per state");
-        return Err(Error::setting("bounds", expected, ranges));
-    }
-    if settings.projects && settings.keep_history {
-        let found = "a smoother beside them";
-        return Err(Error::setting("bounds", "no smoother", found));
-    }
-    Ok(())
 }
 
 /// Whether the plant has no value where it was asked for.

@@ -6,6 +6,9 @@ use super::root::dot;
 use crate::Place;
 use crate::snapshot::{Damaged, Walk};
 
+/// An entry of a sparse matrix.
+pub(crate) type Entry = (Place, f64);
+
 /// n × n, row by row; what is outside the span of a row is 0 and never touched. The powers of a
 /// banded matrix are of this kind, and grow with their exponent only.
 #[derive(Clone, Debug, Default)]
@@ -93,7 +96,7 @@ impl Profile {
     }
 
     /// Adds factor · A · other for a sparse A.
-    pub fn add_product(&mut self, factor: f64, sparse: &[(Place, f64)], other: &Self) {
+    pub fn add_product(&mut self, factor: f64, sparse: &[Entry], other: &Self) {
         for (at, value) in sparse {
             self.add_row(at.row, factor * value, other, at.column);
         }
@@ -194,7 +197,7 @@ impl Profile {
 mod tests {
     use super::*;
 
-    fn entry(row: usize, column: usize, value: f64) -> (Place, f64) {
+    fn entry(row: usize, column: usize, value: f64) -> Entry {
         (Place { row, column }, value)
     }
 
@@ -225,7 +228,7 @@ mod tests {
     /// [[0, 2, 0], [0, −1, 0], [3, 0, 0]] after [[1, 0, 0], [4, 0, 5], [0, 0, 6]].
     #[test]
     fn one_after_the_other_is_the_product() {
-        let rows = |entries: &[(Place, f64)]| {
+        let rows = |entries: &[Entry]| {
             let mut matrix = Profile::zero(3);
             entries
                 .iter()

@@ -14,8 +14,8 @@ use super::belief::Belief;
 use super::health::{Health, Innovation, Reading};
 use super::model::{NoisyModel, Sensor};
 use super::root::dot;
+use super::settings::FilterSettings;
 use super::smoother::Correction;
-use super::{FilterKind, FilterSettings};
 use crate::Error;
 use crate::linearised::OutputMap;
 use crate::noise::Limits;
@@ -88,7 +88,7 @@ pub(crate) struct Sensing {
     pub output_map: OutputMap,
     sensors: Vec<Sensor>,
     gate: Option<f64>,
-    /// of readings that only stand for others ([`super::FilterSettings::foresees`])
+    /// of readings that only stand for others ([`FilterSettings::foresees`])
     foresees: bool,
     /// of the readings of each sensor that were rejected in a row, those that differ from the one before
     moved: Vec<usize>,
@@ -108,8 +108,7 @@ impl Sensing {
     pub fn new(model: &NoisyModel, settings: &FilterSettings) -> Self {
         let (n, count) = (model.process_noise.len(), model.sensors.len());
         // a window finds its own
-        let is_window = matches!(settings.kind, FilterKind::MovingHorizon(_));
-        let keeps_corrections = settings.keep_history && !is_window;
+        let keeps_corrections = settings.keep_history && !settings.is_window();
         Self {
             output_map: OutputMap::new(&model.output_map),
             sensors: model.sensors.clone(),

@@ -4,6 +4,7 @@ use super::belief::Belief;
 use super::profile::Profile;
 use super::root::{Factor, Root, dot, factor, substitute};
 use super::sensing::{Believed, Sensing};
+use super::settings::{SigmaPoints, Weights};
 use super::smoother::Correction;
 use super::transition::Propagation;
 use crate::runner::Sample;
@@ -12,68 +13,6 @@ use crate::{Error, Integrator, Method};
 
 /// Images of two points that differ by no more than this share of their size do not differ.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
-
-/// How sigma points are spread and weighed, after Julier, Uhlmann and van der Merwe; the
-/// default makes the cubature filter of Arasaratnam and Haykin.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SigmaPoints {
-    /// α > 0
-    pub alpha: f64,
-    /// β
-    pub beta: f64,
-    /// κ, with n + κ > 0
-    pub kappa: f64,
-}
-
-impl Default for SigmaPoints {
-    fn default() -> Self {
-        Self {
-            alpha: 1.0,
-            beta: 0.0,
-            kappa: 0.0,
-        }
-    }
-}
-
-/// Weights of 2n + 1 points x̂, x̂ ± columns of √(n+λ) L.
-#[derive(Clone, Copy, Debug)]
-pub struct Weights {
-    /// √(n+λ): how far the points lie from x̂, in columns of L
-    pub spread: f64,
-    /// of x̂ in means
-    pub mean_of_centre: f64,
-    /// of x̂ in covariances
-    pub centre: f64,
-    /// of each other point
-    pub other: f64,
-}
-
-impl SigmaPoints {
-    /// The weights for n states.
-    ///
-    /// # Errors
-    /// [`Error::Setting`] where α²(n + κ) is not above 0.
-    pub fn weights(&self, n: usize) -> Result<Weights, Error> {
-        let n = n as f64;
-        let both = self.alpha.powi(2) * (n + self.kappa);
-        if !(both > 0.0 && both.is_finite() && self.beta.is_finite()) {
-            let found = format!(
-                "alpha = {}, beta = {}, kappa = {}",
-                self.alpha, self.beta, self.kappa
-            );
-            let expected =
-                format!("alpha² (n + kappa) above 0 for n = {n} states, and finite numbers");
-            return Err(Error::setting("sigma points", expected, found));
-        }
-        let mean_of_centre = (both - n) / both;
-        Ok(Weights {
-            spread: both.sqrt(),
-            mean_of_centre,
-            centre: mean_of_centre + 1.0 - self.alpha.powi(2) + self.beta,
-            other: 0.5 / both,
-        })
-    }
-}
 
 /// Sigma points under way.
 #[derive(Clone, Debug)]

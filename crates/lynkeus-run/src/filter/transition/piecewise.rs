@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 use super::series::{Series, Transition, largest_row};
 use crate::Evaluation;
 use crate::filter::belief::Belief;
-use crate::filter::profile::Profile;
+use crate::filter::profile::{Entry, Profile};
 use crate::method::resolution;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place};
@@ -187,7 +187,7 @@ impl Piecewise {
         pairs.map(|(q, unit)| q * h / (unit * unit)).collect()
     }
 
-    fn sparse(&self, values: &[f64]) -> Vec<(Place, f64)> {
+    fn sparse(&self, values: &[f64]) -> Vec<Entry> {
         let pairs = self.entries.iter().zip(values);
         let all = pairs.map(|(&(row, column), &value)| (Place { row, column }, value));
         all.filter(|entry| entry.1 != 0.0).collect()
@@ -255,7 +255,7 @@ impl Piecewise {
         piece: Piece,
         x: &[f64],
         end: &mut Vec<f64>,
-    ) -> Result<Option<Vec<Vec<(Place, f64)>>>, Error> {
+    ) -> Result<Option<Vec<Vec<Entry>>>, Error> {
         let h = piece.length();
         let first = self.scaled(driven, piece.from, x, h)?;
         let mut middle = x.to_vec();

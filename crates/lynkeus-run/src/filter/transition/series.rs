@@ -3,8 +3,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::Place;
-use crate::filter::profile::Profile;
+use crate::filter::profile::{Entry, Profile};
 
 /// Terms after which a series is given up.
 const MOST_TERMS: usize = 60;
@@ -79,7 +78,7 @@ impl Series {
     /// cancels too much.
     pub fn advance(
         &mut self,
-        polynomial: &[Vec<(Place, f64)>],
+        polynomial: &[Vec<Entry>],
         drive: &[f64],
         transition: &mut Transition<Profile>,
         n: usize,
@@ -137,7 +136,7 @@ impl Series {
     fn term(
         &self,
         k: usize,
-        polynomial: &[Vec<(Place, f64)>],
+        polynomial: &[Vec<Entry>],
         drive: &[f64],
         next: &mut Transition<Profile>,
     ) {
@@ -160,7 +159,7 @@ impl Series {
 }
 
 /// The largest sum of absolute values of a row.
-pub(crate) fn largest_row(n: usize, g: &[(Place, f64)]) -> f64 {
+pub(crate) fn largest_row(n: usize, g: &[Entry]) -> f64 {
     let mut sums = vec![0.0; n];
     for (at, value) in g {
         sums[at.row] += value.abs();
@@ -178,12 +177,7 @@ impl Transition<DMatrix<f64>> {
     /// Over one time unit of Φ' = GΦ, W' = GW + WGᵀ + V with constant G: the series over 2⁻ᵏ of
     /// it, then k times Φ ← ΦΦ, W ← W + ΦWΦᵀ. Sums of what is not negative: decay does not
     /// cancel. None where G is too fast to double up from.
-    pub fn constant(
-        n: usize,
-        g: &[(Place, f64)],
-        drive: &[f64],
-        series: &mut Series,
-    ) -> Option<Self> {
+    pub fn constant(n: usize, g: &[Entry], drive: &[f64], series: &mut Series) -> Option<Self> {
         let doublings = largest_row(n, g).max(1.0).log2().ceil() as u32;
         if doublings > MOST_DOUBLINGS {
             return None;

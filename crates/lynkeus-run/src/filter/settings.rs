@@ -1,0 +1,132 @@
+//! Which filter, and how it works.
+
+use crate::Error;
+
+/// Which filter.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FilterKind {
+    /// the extended Kalman filter, continuous-discrete: the covariance follows the plant's
+    /// linearisation along the estimate
+    Extended,
+    /// the unscented Kalman filter: sigma points follow the plant
+    Unscented(SigmaPoints),
+    /// moving-horizon estimation over so many samples, the states within the model's ranges
+    MovingHorizon(usize),
+}
+
+/// How a filter works.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilterSettings {
+    /// which filter
+    pub kind: FilterKind,
+    /// a reading whose innovation exceeds so many of its standard deviations is rejected
+    pub gate: Option<f64>,
+    /// keep what a smoother needs
+    pub keep_history: bool,
+    /// the estimate is kept in the model's ranges: after each prediction and correction it is put to the
+    /// nearest place inside by the covariance's metric. The covariance stays: a bound says where
+    /// the estimate is, and not how sure it is
+    pub projects: bool,
+    /// readings are what the model shows, and only covariances are asked for: a sensor with limits
+    /// counts as its readings do on average (Fisher's information of a clipped normal number)
+    pub foresees: bool,
+}
+
+impl FilterSettings {
+    /// No gate, no history, no bounds.
+    #[must_use]
+    pub fn of(kind: FilterKind) -> Self {
+        Self {
+            kind,
+            gate: None,
+            keep_history: false,
+            projects: false,
+            foresees: false,
+        }
+    }
+
+    /// That they can be, for n states with so many ranges.
+    pub(crate) fn check(&self, n: usize, ranges: usize) -> Result<(), Error> {
+        if let Some(gate) = self.gate
+            && !(gate > 0.0 && gate.is_finite())
+        {
+            let expected = "a number of standard deviations above 0";
+            return Err(Error::setting("gate", expected, gate));
+        }
+        if (self.projects || self.is_window()) && ranges != n {
+            let expected = format!("{n}, one pair per state");
+            return Err(Error::setting("bounds", expected, ranges));
+        }
+        if self.projects && self.keep_history {
+            let found = "a smoother beside them";
+            return Err(Error::setting("bounds", "no smoother", found));
+        }
+        Ok(())
+    }
+
+    pub(crate) fn is_window(&self) -> bool {
+        matches!(self.kind, FilterKind::MovingHorizon(_))
+    }
+}
+
+/// How sigma points are spread and weighed, after Julier, Uhlmann and van der Merwe; the
+/// default makes the cubature filter of Arasaratnam and Haykin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SigmaPoints {
+    /// α > 0
+    pub alpha: f64,
+    /// β
+    pub beta: f64,
+    /// κ, with n + κ > 0
+    pub kappa: f64,
+}
+
+impl Default for SigmaPoints {
+    fn default() -> Self {
+        Self {
+            alpha: 1.0,
+            beta: 0.0,
+            kappa: 0.0,
+        }
+    }
+}
+
+/// Weights of 2n + 1 points x̂, x̂ ± columns of √(n+λ) L.
+#[derive(Clone, Copy, Debug)]
+pub struct Weights {
+    /// √(n+λ): how far the points lie from x̂, in columns of L
+    pub spread: f64,
+    /// of x̂ in means
+    pub mean_of_centre: f64,
+    /// of x̂ in covariances
+    pub centre: f64,
+    /// of each other point
+    pub other: f64,
+}
+
+impl SigmaPoints {
+    /// The weights for n states.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] where α²(n + κ) is not above 0.
+    pub fn weights(&self, n: usize) -> Result<Weights, Error> {
+        let n = n as f64;
+        let both = self.alpha.powi(2) * (n + self.kappa);
+        if !(both > 0.0 && both.is_finite() && self.beta.is_finite()) {
+            let found = format!(
+                "alpha = {}, beta = {}, kappa = {}",
+                self.alpha, self.beta, self.kappa
+            );
+            let expected =
+                format!("alpha² (n + kappa) above 0 for n = {n} states, and finite numbers");
+            return Err(Error::setting("sigma points", expected, found));
+        }
+        let mean_of_centre = (both - n) / both;
+        Ok(Weights {
+            spread: both.sqrt(),
+            mean_of_centre,
+            centre: mean_of_centre + 1.0 - self.alpha.powi(2) + self.beta,
+            other: 0.5 / both,
+        })
+    }
+}
