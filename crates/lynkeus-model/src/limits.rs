@@ -55,16 +55,10 @@ impl Budget {
     /// Takes `amount` from the budget.
     pub(crate) fn charge(&self, amount: u64, span: Span) -> Result<()> {
         let Some(left) = self.left.get().checked_sub(amount) else {
-            return Err(Problem::new(
-                span,
-                format!(
-                    "the model needs more than {} {}",
-                    grouped(self.limit),
-                    self.what
-                ),
-            )
-            .label("the limit is passed here")
-            .hint("use fewer loop turns or smaller arrays"));
+            let (limit, what) = (grouped(self.limit), self.what);
+            let problem = Problem::new(span, format!("the model needs more than {limit} {what}"));
+            let problem = problem.label("the limit is passed here");
+            return Err(problem.hint("use fewer loop turns or smaller arrays"));
         };
         self.left.set(left);
         Ok(())
@@ -82,14 +76,6 @@ pub(crate) fn grouped(number: u64) -> String {
         text.push(digit);
     }
     text
-}
-
-/// The budget of writing out one text.
-pub(crate) fn elaboration() -> Budget {
-    Budget::new(
-        MAX_ELABORATED,
-        "scalar operations when loops and arrays are written out",
-    )
 }
 
 #[cfg(test)]

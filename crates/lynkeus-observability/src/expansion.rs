@@ -3,14 +3,9 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use lynkeus_expr::Budget;
-
 use crate::model::{First, Model, Role};
 use crate::series::{Functions, Run, Stop};
 use lynkeus_expr::modular::{Modular, Random};
-
-/// Bytes of a series where nothing limits the memory.
-const ROOM: usize = 1 << 30;
 
 /// The unknowns with respect to which a series is differentiated, as columns: the named
 /// quantities, the derivatives of unknown inputs, directions in which known starts move.
@@ -30,7 +25,7 @@ impl Columns {
             named: model.named.len(),
             unknown_inputs: model.unknown_inputs,
             orders: if model.unknown_inputs > 0 { orders } else { 0 },
-            moving: Affine::default(),
+            moving: vec![],
         }
     }
 
@@ -41,7 +36,7 @@ impl Columns {
     }
 
     pub fn width(&self) -> usize {
-        self.named + self.unknown_inputs * self.orders + self.moving.directions.len()
+        self.named + self.unknown_inputs * self.orders + self.moving.len()
     }
 
     /// The columns of the unknown inputs' k-th derivatives.
@@ -66,7 +61,7 @@ impl Columns {
     }
 
     fn first_of_moving(&self) -> usize {
-        self.width() - self.moving.directions.len()
+        self.width() - self.moving.len()
     }
 }
 
@@ -85,18 +80,16 @@ pub(crate) struct Expansion<'a> {
     /// values of the named quantities at the start
     pub point: Vec<Modular>,
     next: usize,
-    budget: Budget,
 }
 
 impl<'a> Expansion<'a> {
-    pub fn new(model: &'a Model, start: &'a Start, columns: Columns, budget: &Budget) -> Self {
-        let room = budget.room().unwrap_or(ROOM) / size_of::<Modular>();
+    pub fn new(model: &'a Model, start: &'a Start, columns: Columns) -> Self {
         let functions = Functions::new(start.seed, &start.turned);
         let width = columns.width();
         let none = Functions::new(start.seed, &Default::default());
         Self {
-            run: Run::new(&model.program, width, functions, budget.clone(), room),
-            computed: Run::new(&model.starts, width, none, budget.clone(), room),
+            run: Run::new(&model.program, width, functions, &model.budget),
+            computed: Run::new(&model.starts, width, none, &model.budget),
             coefficients: vec![(Modular::ZERO, vec![]); model.symbols.len()],
             point: vec![Modular::ZERO; columns.named],
             random: Random::new(start.seed.wrapping_mul(0x1000_0000_01b3) + 7),
@@ -104,39 +97,25 @@ impl<'a> Expansion<'a> {
             columns,
             start,
             model,
-            budget: budget.clone(),
         }
     }
 
     /// Computes the next coefficient of everything.
     pub fn advance(&mut self) -> Result<(), Stop> {
         self.next_coefficients()?;
-        let coefficients = std::mem::take(&mut self.coefficients);
-        let advanced = self.run.advance(&|place| coefficients[place].clone());
-        self.coefficients = coefficients;
-        advanced
+        self.run.advance(&|place| self.coefficients[place].clone())
     }
 
     /// The first coefficients without sensitivities: whether the start is a good one.
     pub fn first(&mut self) -> Result<(), Stop> {
         self.next_coefficients()?;
-        let coefficients = std::mem::take(&mut self.coefficients);
-        self.run.advance(&|place| (coefficients[place].0, vec![]))
+        self.run
+            .advance(&|place| (self.coefficients[place].0, vec![]))
     }
 
     /// The latest coefficient of a state's derivative with its sensitivities.
     pub fn derivative(&self, state: usize) -> (Modular, Vec<Modular>) {
         self.run.root(state)
-    }
-
-    /// How far a first value is from the known start.
-    pub fn moved_by(&self, place: usize) -> Modular {
-        self.start.moved_by(self.model, place)
-    }
-
-    /// The latest coefficient of a state's derivative.
-    pub fn velocity(&self, state: usize) -> Modular {
-        self.run.root(state).0
     }
 
     /// Sensitivities of the latest coefficient of a root.
@@ -170,9 +149,9 @@ impl<'a> Expansion<'a> {
                 .columns
                 .width()
                 .saturating_mul(self.model.symbols.len());
-            self.budget
-                .affords(numbers.saturating_mul(size_of::<Modular>()));
-            Stop::where_spent(&self.budget)?;
+            let budget = &self.model.budget;
+            budget.affords(numbers.saturating_mul(size_of::<Modular>()));
+            Stop::where_spent(budget)?;
             return self.first_coefficients();
         }
         let mut unknown_input = 0;
@@ -198,9 +177,9 @@ impl<'a> Expansion<'a> {
 
     fn first_coefficients(&mut self) -> Result<(), Stop> {
         self.constants();
-        let coefficients = std::mem::take(&mut self.coefficients);
-        let computed = self.computed.advance(&|place| coefficients[place].clone());
-        self.coefficients = coefficients;
+        let computed = self
+            .computed
+            .advance(&|place| self.coefficients[place].clone());
         // no number of the search can mend a start that is not defined
         computed.map_err(|stop| match stop {
             Stop::Point(_) => Stop::Point(usize::MAX),
@@ -235,7 +214,7 @@ impl<'a> Expansion<'a> {
     /// A row of sensitivities with those to the directions in which known starts move.
     fn moved(&self, place: usize, mut row: Vec<Modular>) -> Vec<Modular> {
         let first = self.columns.first_of_moving();
-        for (i, direction) in self.columns.moving.directions.iter().enumerate() {
+        for (i, direction) in self.columns.moving.iter().enumerate() {
             if !direction[place].is_zero() {
                 row.resize(self.columns.width(), Modular::ZERO);
                 row[first + i] = direction[place];
@@ -245,13 +224,9 @@ impl<'a> Expansion<'a> {
     }
 }
 
-/// An affine set c + span(d₁, d₂, …) in the coordinates of the model's symbols, c being the known
+/// An affine set c + span(d₁, d₂, …) in the coordinates of the model's symbols, by its directions: c are the known
 /// starts; what is free is free in it as well.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Affine {
-    /// per direction one number for each symbol
-    pub directions: Vec<Vec<Modular>>,
-}
+pub(crate) type Affine = Vec<Vec<Modular>>;
 
 /// Where a series starts: random numbers, redrawn one by one where they do not suit.
 #[derive(Clone, Debug)]
@@ -264,7 +239,7 @@ pub(crate) struct Start {
     /// the known starts are those of a random point of this set
     set: Affine,
     /// time starts at zero, and not at any moment
-    at_zero: bool,
+    pub at_zero: bool,
 }
 
 impl Start {
@@ -274,7 +249,7 @@ impl Start {
             seed,
             draws: vec![0; model.symbols.len()],
             turned: BTreeSet::new(),
-            set: Affine::default(),
+            set: vec![],
             at_zero: false,
         }
     }
@@ -287,7 +262,7 @@ impl Start {
     /// The known starts anywhere in a set.
     pub fn within(self, model: &Model, set: &Affine) -> Self {
         Self {
-            draws: vec![0; model.symbols.len() + set.directions.len()],
+            draws: vec![0; model.symbols.len() + set.len()],
             set: set.clone(),
             ..self
         }
@@ -326,7 +301,7 @@ impl Start {
 
     /// How far the point of the set is from the known start.
     pub fn moved_by(&self, model: &Model, place: usize) -> Modular {
-        let directions = self.set.directions.iter().enumerate();
+        let directions = self.set.iter().enumerate();
         directions.fold(Modular::ZERO, |sum, (i, direction)| {
             match direction[place].is_zero() {
                 true => sum,
@@ -343,7 +318,7 @@ impl Start {
             Role::Time => !self.at_zero,
             _ => matches!(symbol.first, First::Free),
         };
-        let directions = self.set.directions.iter().enumerate();
+        let directions = self.set.iter().enumerate();
         let moving = directions.filter(|(_, direction)| !direction[place].is_zero());
         let moving = moving.map(|(i, _)| model.symbols.len() + i);
         free.then_some(place).into_iter().chain(moving).collect()

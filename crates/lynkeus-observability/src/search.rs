@@ -2,8 +2,6 @@
 
 use std::collections::{BTreeSet, VecDeque};
 
-use lynkeus_expr::Budget;
-
 use crate::expansion::{Columns, Expansion, Start};
 use crate::model::{Model, Role};
 use crate::series::Stop;
@@ -21,21 +19,21 @@ pub(crate) struct Search<'a> {
     signals: Echelon,
     /// gradients of the expressions asked about, at the start
     about: Vec<Vec<Modular>>,
-    /// what counts as measured beside the outputs
-    succession: Succession,
+    /// what counts as measured beside the outputs; nothing where the ranks cost little
+    succession: Option<Succession<'a>>,
     /// coefficients taken so far
     taken: usize,
 }
 
 impl<'a> Search<'a> {
-    pub fn new(model: &'a Model, start: &'a Start, columns: Columns, budget: &Budget) -> Self {
+    pub fn new(model: &'a Model, start: &'a Start, columns: Columns) -> Self {
         let width = columns.width();
         Self {
-            expansion: Expansion::new(model, start, columns, budget),
+            expansion: Expansion::new(model, start, columns),
             rows: Echelon::new(width),
             signals: Echelon::new(width),
             about: vec![],
-            succession: Succession::default(),
+            succession: None,
             taken: 0,
             model,
         }
@@ -49,11 +47,12 @@ impl<'a> Search<'a> {
             let expressions = 0..self.model.about;
             self.about = expressions.map(|i| self.expansion.about(i)).collect();
             if self.is_large() {
-                self.succession = self.follow();
+                self.succession = Some(self.follow());
             }
         }
         self.add_outputs();
-        for place in self.succession.places.clone() {
+        let places = self.succession.as_ref().map(|s| s.places.clone());
+        for place in places.into_iter().flatten() {
             let row = self.expansion.symbol(place).to_vec();
             self.add(row);
         }
@@ -93,13 +92,13 @@ impl<'a> Search<'a> {
     }
 
     /// What follows one after another from the coefficients taken last, the first ones.
-    fn follow(&self) -> Succession {
-        succession(self.model, &|root| self.expansion.root(root))
+    fn follow(&self) -> Succession<'a> {
+        Succession::new(self.model, &|root| self.expansion.root(root))
     }
 
-    /// What counts as measured; nothing where the ranks cost little.
-    pub fn succession(&self) -> &Succession {
-        &self.succession
+    /// Derivatives of the outputs from which all is known.
+    pub fn outputs_order(&self) -> usize {
+        self.order() + self.succession.as_ref().map_or(0, |s| s.order)
     }
 
     /// Derivatives of the outputs, and of what counts as measured, that were taken.
@@ -187,37 +186,13 @@ impl<'a> Search<'a> {
     }
 }
 
-/// What follows, and from how much.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Succession {
+/// What follows one after another from the outputs, and from how much.
+pub(crate) struct Succession<'a> {
+    model: &'a Model,
     /// places of the symbols, in the order in which they are found
     pub places: Vec<usize>,
     /// derivatives of the outputs that they are found from
     pub order: usize,
-}
-
-/// What follows at a start, where `gradient` has the sensitivities of a root's first
-/// coefficient.
-pub(crate) fn succession(model: &Model, gradient: &dyn Fn(usize) -> Vec<Modular>) -> Succession {
-    let mut followed = Followed::new(model);
-    for output in model.states..model.states + model.outputs {
-        followed.know(output, 0);
-    }
-    while let Some(root) = followed.ready.pop_front() {
-        let Some(place) = followed.missing[root].first().copied() else {
-            continue;
-        };
-        let column = model.symbols[place].column;
-        let gives = |column: usize| gradient(root).get(column).is_some_and(|x| !x.is_zero());
-        if column.is_some_and(gives) {
-            followed.find(place, root);
-        }
-    }
-    followed.found
-}
-
-struct Followed<'a> {
-    model: &'a Model,
     /// of each root the places of symbols that are not known so far
     missing: Vec<BTreeSet<usize>>,
     /// of each place the roots that depend on it
@@ -226,11 +201,30 @@ struct Followed<'a> {
     known: Vec<Option<usize>>,
     /// known roots that miss one symbol
     ready: VecDeque<usize>,
-    found: Succession,
 }
 
-impl<'a> Followed<'a> {
-    fn new(model: &'a Model) -> Self {
+impl<'a> Succession<'a> {
+    /// What follows at a start, where `gradient` has the sensitivities of a root's first
+    /// coefficient.
+    fn new(model: &'a Model, gradient: &dyn Fn(usize) -> Vec<Modular>) -> Self {
+        let mut all = Self::unsought(model);
+        for output in model.states..model.states + model.outputs {
+            all.know(output, 0);
+        }
+        while let Some(root) = all.ready.pop_front() {
+            let Some(place) = all.missing[root].first().copied() else {
+                continue;
+            };
+            let column = model.symbols[place].column;
+            let gives = |column: usize| gradient(root).get(column).is_some_and(|x| !x.is_zero());
+            if column.is_some_and(gives) {
+                all.find(place, root);
+            }
+        }
+        all
+    }
+
+    fn unsought(model: &'a Model) -> Self {
         let is_unknown = |place: &usize| {
             let symbol = &model.symbols[*place];
             // a given start says nothing of later values
@@ -254,7 +248,8 @@ impl<'a> Followed<'a> {
         Self {
             known: vec![None; roots],
             ready: VecDeque::new(),
-            found: Succession::default(),
+            places: vec![],
+            order: 0,
             missing,
             readers,
             model,
@@ -275,9 +270,9 @@ impl<'a> Followed<'a> {
 
     /// A symbol is known from a root.
     fn find(&mut self, place: usize, root: usize) {
-        self.found.places.push(place);
+        self.places.push(place);
         let order = self.known[root].unwrap_or_default();
-        self.found.order = self.found.order.max(order);
+        self.order = self.order.max(order);
         for reader in std::mem::take(&mut self.readers[place]) {
             self.missing[reader].remove(&place);
             // what it is found from next is known no earlier than this
@@ -297,6 +292,7 @@ mod tests {
 
     use super::*;
     use crate::Question;
+    use crate::model::measured;
 
     /// Names of what follows, in order, with the derivatives used. The ranks, which
     /// know nothing of it, say the same.
@@ -306,18 +302,17 @@ mod tests {
             ..LoadOptions::default()
         };
         let plant = Plant::from_modelica(text, "p.mo", &options).unwrap();
-        let model = Model::new(&plant, question, None, &[])
-            .unwrap()
+        let outputs = measured(&plant, question).unwrap();
+        let model = Model::new(&plant, question, (&outputs, &[]), None)
             .ok()
             .unwrap();
-        let budget = Budget::default();
-        let start = crate::hull::find(&model, Start::new(&model, 1), &budget).unwrap();
+        let start = crate::hull::find(&model, Start::new(&model, 1)).unwrap();
         let columns = Columns::new(&model, model.depth);
-        let mut search = Search::new(&model, &start, columns, &budget);
+        let mut search = Search::new(&model, &start, columns);
         search.advance().unwrap();
         let found = search.follow();
         search.until(None, model.depth).unwrap();
-        assert_eq!(search.succession, Succession::default());
+        assert!(search.succession.is_none());
         let name = |place: &usize| {
             let column = model.symbols[*place].column.unwrap();
             let name = model.named[column].0.clone();

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use lynkeus_expr::flow::Flow;
 use lynkeus_expr::{Graph, MissingInput, Node, flow};
 use lynkeus_model::Variable;
-use lynkeus_run::filter::{Bounds, FilterKind};
+use lynkeus_run::filter::FilterKind;
 use lynkeus_structure::AugmentedPlant;
 
 /// A named symbol.
@@ -88,8 +88,11 @@ pub struct Observer {
     /// the filter that corrects the estimate when sensors report; none where the correction
     /// is part of the derivatives
     pub filter: Option<FilterTuning>,
-    /// numbers of the derivatives that may be changed while it runs
-    pub tunables: Tunables,
+    /// numbers of the derivatives that may be changed while it runs; none where the
+    /// [tuning](crate::Tuning::tunable) does not ask for them
+    pub tunables: Vec<Tunable>,
+    /// the gain is made, and proved, as a whole: there are none, whatever the tuning asks for
+    pub is_whole: bool,
 }
 
 /// A Kalman filter over the observer's flow. The noises are the study's, not the family's.
@@ -99,8 +102,8 @@ pub struct FilterTuning {
     pub kind: FilterKind,
     /// a reading further from what is expected, in standard deviations, is rejected
     pub gate: Option<f64>,
-    /// where the estimate is kept, one pair per state; none where it may go anywhere
-    pub bounds: Option<Vec<Bounds>>,
+    /// the estimate is kept in the declared ranges
+    pub projects: bool,
     /// h(t, x̂, u), one per measured output
     pub outputs: Vec<Node>,
     /// variance of the first estimate, one per state
@@ -151,7 +154,7 @@ impl Signal {
 }
 
 /// An observer whose measurements w are states, to be set to each reading: see
-/// [`lynkeus_run::SampledObserver`].
+/// [`lynkeus_run::Updates::Jumps`].
 #[derive(Clone, Debug)]
 pub struct Sampled {
     /// states z, then w; known inputs, then one switch s per sensor; nothing measured
@@ -233,13 +236,4 @@ pub struct Tunable {
     pub value: f64,
     /// what it does, for people
     pub meaning: String,
-}
-
-/// What may be changed while an observer runs.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Tunables {
-    /// the numbers; none where the [tuning](crate::Tuning::tunable) does not ask for them
-    pub numbers: Vec<Tunable>,
-    /// why there are none, where it does
-    pub refused: Option<&'static str>,
 }

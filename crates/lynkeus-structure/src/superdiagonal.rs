@@ -14,9 +14,9 @@ use lynkeus_proof::matrix::{IntervalMatrix, points, sum};
 use nalgebra::DMatrix;
 
 use crate::chains::names;
-use crate::rank::subsets;
+use crate::rank::gram;
 use crate::region::{inside, spread};
-use crate::{AugmentedPlant, Finding, Matrix, Point, Region, Verdict, sign};
+use crate::{AugmentedPlant, Finding, Misfit, Point, Reason, Region, Shown, Verdict, sign};
 
 /// One rectangular block: F_k.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,12 +42,6 @@ impl Superdiagonal {
         self.factors.iter().map(|factor| &factor.columns[..])
     }
 
-    /// In words: `(x1) → (x2, x3)`.
-    pub fn describe(&self, augmented: &AugmentedPlant<'_>) -> String {
-        let block = |states: Vec<usize>| format!("({})", names(augmented, states));
-        self.declared().map(block).collect::<Vec<_>>().join(" → ")
-    }
-
     /// The blocks with their states in the order of declaration, for people.
     pub fn declared(&self) -> impl Iterator<Item = Vec<usize>> {
         self.blocks().map(|block| {
@@ -62,9 +56,9 @@ impl Superdiagonal {
 ///
 /// # Errors
 /// The first output or equation that breaks the form; the states that no block reaches.
-pub fn find(augmented: &AugmentedPlant<'_>) -> Result<Superdiagonal, String> {
-    let outputs: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
-    let output = |i: usize| format!("the output {}", augmented.outputs[i].variable.name);
+pub fn find(augmented: &AugmentedPlant<'_>) -> Result<Superdiagonal, Misfit> {
+    let outputs = augmented.output_nodes();
+    let output = |i: usize| (augmented.outputs[i].variable.name.clone(), true);
     let all: Vec<usize> = (0..augmented.states.len()).collect();
     let rows: Vec<usize> = (0..outputs.len()).collect();
     let mut factors = vec![factor(augmented, rows, &outputs, &all, output)?];
@@ -77,13 +71,10 @@ pub fn find(augmented: &AugmentedPlant<'_>) -> Result<Superdiagonal, String> {
             return Ok(Superdiagonal { factors });
         }
         let derivatives: Vec<Node> = block.iter().map(|&i| augmented.derivatives[i]).collect();
-        let equation = |i: usize| format!("the equation of {}", augmented.states[block[i]].name);
+        let equation = |i: usize| (augmented.states[block[i]].name.clone(), false);
         let next = factor(augmented, block.clone(), &derivatives, &left, equation)?;
         if next.columns.is_empty() {
-            return Err(format!(
-                "no equation on the way from the outputs depends on {}; measure another output",
-                names(augmented, left)
-            ));
+            return Err(Misfit::NoWay(names(augmented, left)));
         }
         factors.push(next);
     }
@@ -145,8 +136,8 @@ fn factor(
     rows: Vec<usize>,
     functions: &[Node],
     candidates: &[usize],
-    title: impl Fn(usize) -> String,
-) -> Result<Factor, String> {
+    title: impl Fn(usize) -> (String, bool),
+) -> Result<Factor, Misfit> {
     let graph = augmented.graph();
     let symbol = |&i: &usize| augmented.states[i].node;
     let symbols: Vec<Node> = candidates.iter().map(symbol).collect();
@@ -155,13 +146,15 @@ fn factor(
     let columns: Vec<usize> = new.map(|j| candidates[j]).collect();
     let symbols: Vec<Node> = columns.iter().map(symbol).collect();
     for (i, &function) in functions.iter().enumerate() {
-        if let Some(culprit) = not_affine(graph, function, &symbols) {
-            return Err(format!(
-                "{} is not affine in {}: {}",
-                title(i),
-                names(augmented, columns.iter().copied()),
-                culprit
-            ));
+        if let Some((by, expression)) = not_affine(graph, function, &symbols) {
+            let (of, is_output) = title(i);
+            return Err(Misfit::NotAffine {
+                of,
+                is_output,
+                states: names(augmented, columns),
+                by,
+                expression,
+            });
         }
     }
     let jacobian = jacobian::forward(graph, functions, &symbols);
@@ -172,20 +165,17 @@ fn factor(
     })
 }
 
-/// What keeps a function from being affine in `symbols`.
-fn not_affine(graph: &Graph, function: Node, symbols: &[Node]) -> Option<String> {
+/// What keeps a function from being affine in `symbols`: a slope, behind the symbol that it is by, or a step.
+fn not_affine(graph: &Graph, function: Node, symbols: &[Node]) -> Option<(Option<String>, String)> {
     let depends = |node: Node| !jacobian::pattern(graph, &[node], symbols)[0].is_empty();
     let step = |node: &Node| graph.jumps(*node) && depends(*node);
     if let Some(step) = graph.reachable(&[function]).into_iter().find(step) {
-        return Some(format!("it switches with {}", graph.render(step, 60)));
+        return Some((None, graph.render(step, 60)));
     }
     let slopes = jacobian::forward(graph, &[function], symbols).entries;
     let (_, column, slope) = slopes.into_iter().find(|&(.., slope)| depends(slope))?;
-    Some(format!(
-        "∂/∂{} = {}",
-        graph.symbol_name(symbols[column]).unwrap_or_default(),
-        graph.render(slope, 60)
-    ))
+    let by = graph.symbol_name(symbols[column]).unwrap_or_default();
+    Some((Some(by), graph.render(slope, 60)))
 }
 
 impl Factor {
@@ -202,11 +192,6 @@ impl Factor {
     }
 }
 
-/// Larger minors are not expanded.
-const MAX_COLUMNS: usize = 5;
-/// More minors than this are left undecided.
-const MAX_MINORS: usize = 250;
-
 impl Factor {
     /// Has F_k full column rank everywhere on the box? Then x^{k+1} shows in x^k
     /// whatever the input. Refuted, with the direction ξ that F_k ξ = 0 hides,
@@ -222,33 +207,35 @@ impl Factor {
         region: &Region,
     ) -> Result<Finding, MissingInput> {
         let graph = augmented.graph();
-        let shape = format!("F_{k} is {}×{}", self.rows.len(), self.columns.len());
+        let size = (self.rows.len(), self.columns.len());
+        let because = |shows: Shown| Reason::Factor { k, size, shows };
         if let Some(F) = self.constant(graph) {
-            return Ok(self.constant_rank(augmented, &F, &shape));
+            return Ok(self.constant_rank(augmented, &F, because));
         }
-        let entries: Vec<Node> = self.entries.iter().map(|&(.., node)| node).collect();
-        let used = region.restricted(&graph.symbols_of(&entries));
-        let sides = used.named(&used.cell());
-        let Some(minors) = self.minors(graph) else {
-            let detail = format!(
-                "{shape}: it shows these states only while its entries move, so convergence rests on the excitation (A4)"
-            );
+        let entry = |i: usize, j: usize| {
+            let found = self.entries.iter().find(|&&(k, l, _)| (k, l) == (i, j));
+            found.map(|&(.., node)| node)
+        };
+        let open = || {
+            let entries: Vec<Node> = self.entries.iter().map(|&(.., node)| node).collect();
+            let used = region.restricted(&graph.symbols_of(&entries));
+            Verdict::Undecided(used.named(&used.cell()))
+        };
+        let Some(gram) = gram(graph, size, entry) else {
             return Ok(Finding {
-                verdict: Verdict::Undecided(sides),
-                detail,
+                verdict: open(),
+                reason: because(Shown::WhileMoving),
             });
         };
-        let found = sign::keeps_sign(graph, minors, region)?.finding;
-        Ok(match found.verdict {
+        let Finding { verdict, reason } = sign::keeps_sign(graph, gram, region)?.finding;
+        Ok(match verdict {
             Verdict::Refuted(witness) => Finding {
-                detail: format!(
-                    "{shape} and loses rank (det F_{k}ᵀF_{k}: {witness}); convergence rests on inputs that do not stay there (A4)"
-                ),
-                verdict: Verdict::Undecided(sides),
+                verdict: open(),
+                reason: because(Shown::NotAt(witness)),
             },
             verdict => Finding {
-                detail: format!("{shape}; det F_{k}ᵀF_{k} = {}", found.detail),
                 verdict,
+                reason: because(Shown::Gram(Box::new(reason))),
             },
         })
     }
@@ -268,55 +255,21 @@ impl Factor {
         &self,
         augmented: &AugmentedPlant<'_>,
         F: &DMatrix<f64>,
-        shape: &str,
+        because: impl Fn(Shown) -> Reason,
     ) -> Finding {
-        let kernel = kernel(F);
-        let Kernel::Direction(ξ) = kernel else {
-            let (verdict, detail) = match kernel {
-                Kernel::Zero => (
-                    Verdict::Proved,
-                    format!(
-                        "{shape} and constant, its columns independent by elimination in interval arithmetic"
-                    ),
-                ),
-                _ => (
-                    Verdict::open(),
-                    format!(
-                        "{shape} and constant, so near to one that hides a direction that rounding errors keep from telling whether it does"
-                    ),
-                ),
-            };
-            return Finding { verdict, detail };
-        };
-        let component = |(&i, x): (&usize, f64)| (augmented.states[i].name.clone(), x).into();
-        let direction = Point {
-            coordinates: self.columns.iter().zip(ξ).map(component).collect(),
-            value: 0.0,
-        };
-        let detail = format!(
-            "{shape} and constant: whatever the input, the layer before does not show this direction, so that this arrangement of the states does not fit; measure another output"
-        );
-        Finding::refuted(direction, detail)
-    }
-
-    /// det FᵀF as the sum of the squared minors (Cauchy and Binet); none where F
-    /// is wider than tall or the minors are too many.
-    fn minors(&self, graph: &Graph) -> Option<Node> {
-        let (rows, columns) = (self.rows.len(), self.columns.len());
-        if columns > rows || columns > MAX_COLUMNS {
-            return None;
+        match kernel(F) {
+            (Shown::Always, _) => Finding::proved(because(Shown::Always)),
+            (shows, None) => Finding::undecided(because(shows)),
+            (shows, Some(ξ)) => {
+                let component =
+                    |(&i, x): (&usize, f64)| (augmented.states[i].name.clone(), x).into();
+                let direction = Point {
+                    coordinates: self.columns.iter().zip(ξ).map(component).collect(),
+                    value: 0.0,
+                };
+                Finding::refuted(direction, because(shows))
+            }
         }
-        let entry = |i: usize, j: usize| {
-            let found = self.entries.iter().find(|&&(k, l, _)| (k, l) == (i, j));
-            found.map(|&(.., node)| node)
-        };
-        let matrix = Matrix::from_fn(graph, (rows, columns), entry);
-        let squares = subsets(rows, columns, MAX_MINORS)?
-            .into_iter()
-            .filter_map(|rows| matrix.select_rows(&rows).determinant())
-            .map(|minor| graph.expr(minor).powi(2));
-        let zero = || graph.constant(0.0);
-        Some(squares.reduce(|a, b| a + b).unwrap_or_else(zero).node())
     }
 }
 
@@ -325,19 +278,9 @@ const GRID: f64 = 1_048_576.0;
 /// Components below this share of the largest are not taken for the unit of a direction.
 const SIGNIFICANT: f64 = 1e-6;
 
-/// What F ξ = 0 leaves of ξ.
-#[derive(Clone, Debug, PartialEq)]
-enum Kernel {
-    /// nothing but zero
-    Zero,
-    /// this direction, exactly; or near to this one where F is wider than tall
-    Direction(Vec<f64>),
-    /// rounding errors hide it
-    Unknown,
-}
-
-/// The kernel of F.
-fn kernel(F: &DMatrix<f64>) -> Kernel {
+/// What a matrix of numbers shows of ξ in F ξ, and where it hides a direction that one, exactly; or one near to it
+/// where F is wider than tall.
+fn kernel(F: &DMatrix<f64>) -> (Shown, Option<Vec<f64>>) {
     let mut rows = points(F);
     // per column the row of the one that is left there
     let mut pivots: Vec<Option<usize>> = vec![];
@@ -352,7 +295,7 @@ fn kernel(F: &DMatrix<f64>) -> Kernel {
         pivots.push(pivot);
     }
     if pivots.iter().all(Option::is_some) {
-        return Kernel::Zero;
+        return (Shown::Always, None);
     }
     let free = (0..F.ncols()).filter(|&column| pivots[column].is_none());
     let directions = free.map(|column| {
@@ -372,7 +315,10 @@ fn kernel(F: &DMatrix<f64>) -> Kernel {
         .into_iter()
         .next()
         .filter(|ξ| F.ncols() > F.nrows() && ξ.iter().all(|x| x.is_finite()));
-    exact.or(near).map_or(Kernel::Unknown, Kernel::Direction)
+    match exact.or(near) {
+        Some(ξ) => (Shown::Never, Some(ξ)),
+        None => (Shown::Unknown, None),
+    }
 }
 
 /// Divides a row by its pivot and takes it from all others.
@@ -423,8 +369,11 @@ mod tests {
         look(&AugmentedPlant::new(&plant, &Sensors::default()).unwrap())
     }
 
-    fn words(text: &str) -> Result<String, String> {
-        examined(text, |e| Ok(find(e)?.describe(e)))
+    fn blocks(text: &str) -> Result<Vec<Vec<String>>, Misfit> {
+        examined(text, |e| {
+            let form = find(e)?;
+            Ok(form.declared().map(|block| names(e, block)).collect())
+        })
     }
 
     fn verdicts(text: &str) -> Vec<Verdict> {
@@ -440,32 +389,36 @@ mod tests {
     fn blocks_are_found_in_any_order() {
         let text = "model P input Real u; Real d; Real a; Real c; Real b; output Real y = 2*a + u;
       equation der(a) = u*b + a^2*c + sin(a); der(b) = b*c*d - c^3; der(c) = d - b; der(d) = d^2; end P;";
-        assert_eq!(words(text).unwrap(), "(a) → (c, b) → (d)");
+        assert_eq!(blocks(text).unwrap(), [&["a"][..], &["c", "b"], &["d"]]);
     }
 
     #[test]
     fn what_breaks_the_form_is_named() {
         let square =
             "model P Real a; Real b; output Real y = a; equation der(a) = b^2; der(b) = 1; end P;";
-        let text = words(square).unwrap_err();
-        assert!(
-            text.contains("equation of a is not affine in b: ∂/∂b = b*2"),
-            "{text}"
-        );
+        let not_affine = |of: &str, is_output: bool, states: &[&str], by: &str, slope: &str| {
+            Err(Misfit::NotAffine {
+                of: of.to_owned(),
+                is_output,
+                states: states.iter().map(|&s| s.to_owned()).collect(),
+                by: Some(by.to_owned()),
+                expression: slope.to_owned(),
+            })
+        };
+        assert_eq!(blocks(square), not_affine("a", false, &["b"], "b", "b*2"));
         let product = "model P Real a; Real b; Real c; output Real y = a; equation der(a) = b*c; der(b) = 1; der(c) = 1; end P;";
-        assert!(words(product).unwrap_err().contains("∂/∂b = c"));
+        let found = not_affine("a", false, &["b", "c"], "b", "c");
+        assert_eq!(blocks(product), found);
         let output = "model P Real a; output Real y = a^2; equation der(a) = 1; end P;";
-        assert!(
-            words(output)
-                .unwrap_err()
-                .contains("output y is not affine in a")
-        );
+        assert_eq!(blocks(output), not_affine("y", true, &["a"], "a", "a*2"));
         let unseen =
             "model P Real a; Real b; output Real y = a; equation der(a) = 1; der(b) = a; end P;";
-        assert!(words(unseen).unwrap_err().contains("depends on b; measure"));
+        assert_eq!(blocks(unseen), Err(Misfit::NoWay(vec!["b".into()])));
         let switch = "model P Real a; Real b; output Real y = a; equation der(a) = b + (if b > 0 then 1 else 2); der(b) = 1; end P;";
-        let text = words(switch).unwrap_err();
-        assert!(text.contains("switches with"), "{text}");
+        assert!(matches!(
+            blocks(switch),
+            Err(Misfit::NotAffine { by: None, .. })
+        ));
     }
 
     #[test]
@@ -520,33 +473,36 @@ mod tests {
         assert!(matches!(verdicts(wide)[1], Verdict::Undecided(_)));
     }
 
-    fn of(rows: usize, columns: usize, entries: &[f64]) -> Kernel {
+    fn of(rows: usize, columns: usize, entries: &[f64]) -> (Shown, Option<Vec<f64>>) {
         kernel(&DMatrix::from_row_slice(rows, columns, entries))
     }
 
     #[test]
     fn small_numbers_are_no_zeros() {
-        assert_eq!(of(2, 2, &[1.0, 0.0, 0.0, 1e-14]), Kernel::Zero);
-        assert_eq!(of(2, 2, &[1.0, 0.0, 1e10, 1e-300]), Kernel::Zero);
-        assert_eq!(of(3, 1, &[0.0, 0.0, 5e-324]), Kernel::Zero);
+        assert_eq!(of(2, 2, &[1.0, 0.0, 0.0, 1e-14]), (Shown::Always, None));
+        assert_eq!(of(2, 2, &[1.0, 0.0, 1e10, 1e-300]), (Shown::Always, None));
+        assert_eq!(of(3, 1, &[0.0, 0.0, 5e-324]), (Shown::Always, None));
     }
 
     #[test]
     fn directions_are_exact() {
         assert_eq!(
             of(2, 2, &[3.0, 1.0, 6.0, 2.0]),
-            Kernel::Direction(vec![1.0, -3.0])
+            (Shown::Never, Some(vec![1.0, -3.0]))
         );
-        assert_eq!(of(2, 1, &[0.0, 0.0]), Kernel::Direction(vec![1.0]));
+        assert_eq!(of(2, 1, &[0.0, 0.0]), (Shown::Never, Some(vec![1.0])));
         // a kernel of two directions
-        assert_eq!(of(3, 3, &[1.0; 9]), Kernel::Direction(vec![1.0, -1.0, 0.0]));
+        assert_eq!(
+            of(3, 3, &[1.0; 9]),
+            (Shown::Never, Some(vec![1.0, -1.0, 0.0]))
+        );
         // 0.3 is not three times 0.1, and no number of few digits
-        assert_eq!(of(2, 2, &[0.1, 0.3, 0.2, 0.6]), Kernel::Unknown);
+        assert_eq!(of(2, 2, &[0.1, 0.3, 0.2, 0.6]), (Shown::Unknown, None));
     }
 
     #[test]
     fn what_is_wider_than_tall_has_a_direction() {
-        let Kernel::Direction(ξ) = of(1, 2, &[0.1, 0.3]) else {
+        let (Shown::Never, Some(ξ)) = of(1, 2, &[0.1, 0.3]) else {
             panic!()
         };
         assert!((0.1 * ξ[0] + 0.3 * ξ[1]).abs() < 1e-15 && ξ[1] == 1.0);

@@ -2,6 +2,7 @@
 
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
+use std::ops::{Deref, DerefMut};
 use std::time::Duration;
 
 use lynkeus_expr::{Budget, Spent};
@@ -9,6 +10,7 @@ use lynkeus_model::{LoadError, LoadOptions, Plant, Variable};
 pub(crate) use lynkeus_observers::is_certified_gain;
 use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning};
 use lynkeus_structure::{AugmentedPlant, Dimension, Region, Sensors, SensorsError, range};
+use lynkeus_words::Words;
 
 use crate::choice::Choice;
 use crate::declared::Declared;
@@ -119,6 +121,28 @@ pub struct Prepared<'a> {
     examinations: OnceCell<Vec<Examination>>,
     /// the same
     choice: OnceCell<Option<Choice>>,
+}
+
+/// The observer of a study.
+#[derive(Clone, Debug)]
+pub struct StudyDesign {
+    design: Design,
+    /// what its reader should know: what the family notes of it, how it was chosen, and where it starts
+    pub notes: Vec<String>,
+}
+
+impl Deref for StudyDesign {
+    type Target = Design;
+
+    fn deref(&self) -> &Design {
+        &self.design
+    }
+}
+
+impl DerefMut for StudyDesign {
+    fn deref_mut(&mut self) -> &mut Design {
+        &mut self.design
+    }
 }
 
 /// Sides of a smaller box: name, least and greatest value.
@@ -234,7 +258,7 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// No family fits ([`ErrorKind::Refused`](crate::ErrorKind)), or a key of
     /// `[observer]` cannot be used.
-    pub fn design(&self) -> Result<Design, Error> {
+    pub fn design(&self) -> Result<StudyDesign, Error> {
         self.design_with(&self.study.observer.tuning)
     }
 
@@ -254,7 +278,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// The same with another tuning.
-    pub(crate) fn design_with(&self, tuning: &Tuning) -> Result<Design, Error> {
+    pub(crate) fn design_with(&self, tuning: &Tuning) -> Result<StudyDesign, Error> {
         let examinations = self.examinations()?;
         let Some(choice) = self.choice()? else {
             return Err(none_fits(self.study, examinations));
@@ -263,9 +287,10 @@ impl<'a> Prepared<'a> {
         if let (Some(_), Some(spent)) = (choice.ended, self.study.budget.spent()) {
             return Err(limited(self.study, spent));
         }
-        let mut design = self.made(choice, tuning)?;
-        design.notes.extend(choice.notes());
-        Ok(design)
+        let design = self.made(choice, tuning)?;
+        let mut notes: Vec<String> = design.notes.iter().map(Words::words).collect();
+        notes.extend(choice.notes());
+        Ok(StudyDesign { design, notes })
     }
 
     fn made(&self, choice: &Choice, tuning: &Tuning) -> Result<Design, Error> {
@@ -359,7 +384,7 @@ impl<'a> Prepared<'a> {
         let study = self.study;
         match &error {
             DesignError::Tuning(tuning) => study.observer.blame(tuning, &study.file),
-            DesignError::Refused(_) => Error::refused(error.to_string())
+            DesignError::Refused(_) => Error::refused(error.words())
                 .caused_by(error)
                 .at(&study.file),
             DesignError::NoGain { key, .. } => study.observer.place(key, &study.file, &error),
@@ -403,7 +428,7 @@ fn tube(study: &Study, augmented: &mut AugmentedPlant<'_>) -> Result<(), Error> 
 fn blame(study: &Study, error: SensorsError) -> Error {
     let name = match &error {
         SensorsError::NoSuchName { name, .. } | SensorsError::Twice { name, .. } => name,
-        SensorsError::NothingMeasured { .. } => {
+        _ => {
             return Error::from_source(error).at(&study.file);
         }
     };
@@ -435,7 +460,7 @@ fn none_fits(study: &Study, examinations: &[Examination]) -> Error {
     }
     let reasons: Vec<String> = examinations
         .iter()
-        .map(|e| DesignError::Refused(Box::new(e.clone())).to_string())
+        .map(|e| DesignError::Refused(Box::new(e.clone())).words())
         .collect();
     Error::refused(reasons.join("\n"))
         .at(&study.file)

@@ -2,10 +2,10 @@
 //! that knows what certificates look like.
 
 use lynkeus::observers::{
-    Certificate, Check, Design, Examination, FAMILIES, Statement, Tuning, UltimateBound,
+    Certificate, Check, Examination, FAMILIES, Statement, Tuning, UltimateBound,
 };
-use lynkeus::prepare::Prepared;
-use lynkeus::structure::{AugmentedPlant, Side, Standing, Verdict};
+use lynkeus::prepare::{Prepared, StudyDesign};
+use lynkeus::structure::{AugmentedPlant, Dimension, Standing, Verdict};
 use nalgebra::DMatrix;
 
 use super::tally::Counts;
@@ -25,7 +25,7 @@ pub struct Claim {
     /// V = eᵀPe falls at 2·rate without disturbance and noise
     pub lyapunov: Option<DMatrix<f64>>,
     /// the box by names
-    pub sides: Vec<Side>,
+    pub sides: Vec<Dimension>,
 }
 
 /// A condition that is said to fail, with the points that are to show it.
@@ -40,7 +40,7 @@ pub struct Refutation {
 /// Everything said about one case.
 pub struct Findings {
     /// none where the family does not take the plant
-    pub design: Option<Design>,
+    pub design: Option<StudyDesign>,
     pub claims: Vec<Claim>,
     pub refutations: Vec<Refutation>,
     /// the family that the study asks for
@@ -165,7 +165,7 @@ fn claim(certificate: &Certificate) -> Option<Claim> {
         return None;
     }
     Some(Claim {
-        basis: certificate.basis.clone(),
+        basis: certificate.basis.to_owned(),
         rate: certificate.rate.unwrap_or(0.0),
         overshoot: certificate.overshoot,
         ultimate: certificate.ultimate_bound,

@@ -2,84 +2,60 @@
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Binary, Implicit, ImplicitUnknown, Node, Unary};
+use lynkeus_expr::{Binary, Implicit, ImplicitUnknown, Node, Unary, components};
 
-use super::linear::{Core, Given, Linear, Row, core};
-use super::loops::{Torn, check_regular};
-use super::matching::Matching;
-use super::system::{FlatEquation, Incidence, System, Unknown, arguments, lines, listed};
-use crate::diagnostic::{Problem, Result};
-use crate::limits::{Budget, MAX_COUPLED, MAX_SOLVE_STEPS};
+use super::linear::{Elimination, Given, Row};
+use super::loops::Torn;
+use super::system::{FlatEquation, System, Unknown, arguments};
+use crate::diagnostic::{Problem, Result, Span};
+use crate::limits::MAX_COUPLED;
 
-pub(super) struct Solver<'a> {
+/// Solves blocks of equations that need each other, each behind those it needs.
+pub(super) fn solve(system: &System<'_>) -> Result<HashMap<Node, Node>> {
+    let mut solver = Solver {
+        system,
+        solution: HashMap::new(),
+        replaced: HashMap::new(),
+    };
+    // an equation needs those that give its unknowns
+    let given_by = |&unknown: &usize| system.matching.of_unknown[unknown];
+    let needs = |unknowns: &Vec<usize>| unknowns.iter().filter_map(given_by).collect();
+    let needs: Vec<Vec<usize>> = system.pattern.iter().map(needs).collect();
+    for block in components(&needs) {
+        let pair = |equation| Some((equation, system.matching.of_equation[equation]?));
+        solver.block(&block.into_iter().filter_map(pair).collect::<Vec<_>>())?;
+    }
+    Ok(solver.solution)
+}
+
+struct Solver<'a> {
     system: &'a System<'a>,
-    incidence: &'a Incidence,
-    source: &'a str,
-    budget: Budget,
     /// every solved unknown
     solution: HashMap<Node, Node>,
     /// nodes with the unknowns in them replaced
     replaced: HashMap<Node, Node>,
 }
 
-impl<'a> Solver<'a> {
-    pub(super) fn new(system: &'a System<'a>, incidence: &'a Incidence, source: &'a str) -> Self {
-        let budget = Budget::new(MAX_SOLVE_STEPS, "steps to solve its equations");
-        let (solution, replaced) = (HashMap::new(), HashMap::new());
-        Self {
-            system,
-            incidence,
-            source,
-            budget,
-            solution,
-            replaced,
+/// A block is given as its pairs of equation and unknown, by their places.
+impl Solver<'_> {
+    fn block(&mut self, block: &[(usize, usize)]) -> Result<()> {
+        if let &[(equation, unknown)] = block
+            && self.single(
+                &self.system.equations[equation],
+                &self.system.unknowns[unknown],
+            )?
+        {
+            return Ok(());
         }
-    }
-
-    pub(super) fn solve(
-        mut self,
-        blocks: &[Vec<usize>],
-        matching: &Matching,
-    ) -> Result<HashMap<Node, Node>> {
-        let System {
-            equations,
-            unknowns,
-            ..
-        } = self.system;
-        for block in blocks {
-            let places: Vec<(usize, usize)> = block
-                .iter()
-                .filter_map(|&e| Some((e, matching.of_equation.get(e).copied().flatten()?)))
-                .collect();
-            let solved = match places[..] {
-                [(equation, unknown)] => self.single(&equations[equation], &unknowns[unknown])?,
-                _ => false,
-            };
-            if !solved {
-                self.coupled(&places)?;
-            }
-        }
-        Ok(self.solution)
-    }
-
-    fn linear(&self) -> Linear<'_> {
-        let System { graph, .. } = self.system;
-        Linear {
-            graph,
-            incidence: self.incidence,
-            budget: &self.budget,
-        }
+        self.coupled(block)
     }
 
     /// Whether the equation is linear in the unknown, which is then solved.
     fn single(&mut self, equation: &FlatEquation, unknown: &Unknown) -> Result<bool> {
-        let linear = self.linear();
-        let left = linear.form(equation.left, unknown.symbol, equation.span)?;
-        let right = linear.form(equation.right, unknown.symbol, equation.span)?;
-        let (Some(left), Some(right)) = (left, right) else {
+        let Some(sides) = self.system.sides(equation, unknown.symbol)? else {
             return Ok(false);
         };
-        let value = linear.solution(left, right);
+        let value = self.system.solution(sides);
         let value = value.ok_or_else(|| undetermined(equation, unknown))?;
         let value = self.replace(value);
         self.solution.insert(unknown.symbol, value);
@@ -89,44 +65,43 @@ impl<'a> Solver<'a> {
     /// Unknowns that need each other: what follows with a constant factor is taken out, the core
     /// is a system of linear equations; where it is not, it is an implicit function.
     fn coupled(&mut self, block: &[(usize, usize)]) -> Result<()> {
-        let System {
-            equations,
-            unknowns,
-            ..
-        } = self.system;
-        let pairs: Vec<(&FlatEquation, &Unknown)> = block
-            .iter()
-            .map(|&(equation, unknown)| (&equations[equation], &unknowns[unknown]))
-            .collect();
-        let Some(rows) = self.rows(&pairs)? else {
+        let Some(rows) = self.rows(block)? else {
             return self.implicit(block);
         };
-        let span = pairs.first().map(|(equation, _)| equation.span);
-        let graph = self.system.graph;
-        let core = core(graph, &self.budget, span.unwrap_or_default(), rows)?;
-        if let Some((place, _)) = core.rows.iter().find(|(_, row)| row.len() == 0) {
-            return Err(dependent(self.source, &pairs, *place));
+        let span = block.first().map(|pair| self.system.equations[pair.0].span);
+        let elimination = Elimination::new(self.system, span.unwrap_or_default(), rows)?;
+        let mut left = elimination.left();
+        if let Some((place, _)) = left.find(|(_, row)| row.coefficients.is_empty()) {
+            return Err(self.dependent(block, place));
         }
-        if core.columns.len() > MAX_COUPLED {
-            return Err(too_many_coupled(&pairs, core.columns.len()));
+        let columns = elimination.columns();
+        if columns.len() > MAX_COUPLED {
+            return Err(self.too_many_coupled(block, columns.len()));
         }
-        let values = self.linear_core(&core);
-        for (&column, value) in core.columns.iter().zip(values) {
-            self.solution.insert(pairs[column].1.symbol, value);
+        let values = self.linear_core(&elimination, &columns);
+        let system = self.system;
+        let symbol = |column: usize| system.unknowns[block[column].1].symbol;
+        let symbols = columns.iter().map(|&column| symbol(column));
+        self.solution.extend(symbols.zip(values));
+        let value = |given: &Given| (symbol(given.column), self.value_of(given, symbol));
+        let values: Vec<(Node, Node)> = elimination.given.iter().map(value).collect();
+        // each is made of those that were taken out later
+        for (symbol, value) in values.into_iter().rev() {
+            let value = self.replace(value);
+            self.solution.insert(symbol, value);
         }
-        self.taken_out(&pairs, &core.given);
         Ok(())
     }
 
     /// A loop that is not linear, torn: the roots of what is left, and what follows from them.
     fn implicit(&mut self, block: &[(usize, usize)]) -> Result<()> {
-        let torn = Torn::new(self.system, self.incidence, &self.linear(), block)?;
+        let torn = Torn::new(self.system, block)?;
         if torn.unknowns.len() > MAX_COUPLED {
             return Err(self.too_many_torn(block));
         }
-        check_regular(self.system.graph, &torn, self.source)?;
+        torn.check_regular()?;
         let roots = self.roots(&torn)?;
-        let symbols = torn.unknowns.iter().map(|unknown| unknown.symbol);
+        let symbols = torn.unknowns().map(|unknown| unknown.symbol);
         self.solution.extend(symbols.zip(roots));
         let (symbols, values): (Vec<Node>, Vec<Node>) = torn.explicit.into_iter().unzip();
         let values = self.system.graph.substitute(&values, &self.solution);
@@ -137,40 +112,45 @@ impl<'a> Solver<'a> {
     fn roots(&self, torn: &Torn<'_>) -> Result<Vec<Node>> {
         let graph = self.system.graph;
         let residuals = graph.substitute(&torn.residuals, &self.solution);
-        let unknowns: Vec<ImplicitUnknown> = torn
-            .unknowns
-            .iter()
-            .map(|unknown| ImplicitUnknown {
-                symbol: unknown.symbol,
-                start: unknown.start,
-                range: unknown.range,
-            })
-            .collect();
+        let unknown = |unknown: &Unknown| ImplicitUnknown {
+            symbol: unknown.symbol,
+            start: unknown.start,
+            range: unknown.range,
+        };
+        let unknowns: Vec<ImplicitUnknown> = torn.unknowns().map(unknown).collect();
         Implicit::solve(graph, &unknowns, &residuals).map_err(|error| {
-            let span = torn.equations.first().map(|equation| equation.span);
+            let first = torn.equations.first();
+            let span = first.map(|&place| self.system.equations[place].span);
             Problem::new(span.unwrap_or_default(), error.to_string())
         })
     }
 
     /// The equations as rows; none where one of them is not linear.
-    fn rows(&self, pairs: &[(&FlatEquation, &Unknown)]) -> Result<Option<Vec<Row>>> {
-        let graph = self.system.graph;
-        let symbols = pairs.iter().map(|(_, unknown)| unknown.symbol);
-        let places = symbols.enumerate().map(|(place, symbol)| (symbol, place));
-        let (linear, places) = (self.linear(), places.collect());
-        let row = |(equation, _): &(&FlatEquation, &Unknown)| {
-            let residual = graph.binary(Binary::Sub, equation.left, equation.right);
-            linear.row(residual, &places, equation.span)
+    fn rows(&self, block: &[(usize, usize)]) -> Result<Option<Vec<Row>>> {
+        let System {
+            graph,
+            equations,
+            unknowns,
+            ..
+        } = self.system;
+        let symbols = block.iter().map(|&(_, unknown)| unknowns[unknown].symbol);
+        let places = symbols.zip(0..).collect();
+        let row = |&(equation, _): &(usize, usize)| {
+            let FlatEquation {
+                left, right, span, ..
+            } = equations[equation];
+            let residual = graph.binary(Binary::Sub, left, right);
+            self.system.row(residual, &places, span)
         };
-        pairs.iter().map(row).collect()
+        block.iter().map(row).collect()
     }
 
-    fn linear_core(&mut self, core: &Core) -> Vec<Node> {
+    fn linear_core(&mut self, elimination: &Elimination<'_>, columns: &[usize]) -> Vec<Node> {
         let graph = self.system.graph;
         let zero = graph.constant(0.0).node();
         let (mut matrix, mut right) = (vec![], vec![]);
-        for (_, row) in &core.rows {
-            for column in &core.columns {
+        for (_, row) in elimination.left() {
+            for column in columns {
                 let coefficient = row.coefficients.get(column);
                 matrix.push(coefficient.map_or(zero, |&node| self.replace(node)));
             }
@@ -184,52 +164,13 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// The unknowns that were taken out, each behind those it needs.
-    fn taken_out(&mut self, pairs: &[(&FlatEquation, &Unknown)], given: &[Given]) {
-        let of_column: HashMap<usize, usize> = given
-            .iter()
-            .enumerate()
-            .map(|(place, g)| (g.column, place))
-            .collect();
-        let values: Vec<Node> = given
-            .iter()
-            .map(|given| self.value_of(pairs, given))
-            .collect();
-        let needs = |place: usize| -> Vec<usize> {
-            let Given { column, row, .. } = &given[place];
-            let others = row.coefficients.keys().filter(|&other| other != column);
-            others
-                .filter_map(|other| of_column.get(other).copied())
-                .collect()
-        };
-        let mut done = vec![false; given.len()];
-        let mut path: Vec<(usize, Vec<usize>)> = vec![];
-        for root in (0..given.len()).rev() {
-            if !std::mem::replace(&mut done[root], true) {
-                path.push((root, needs(root)));
-            }
-            while let Some((place, open)) = path.last_mut() {
-                if let Some(need) = open.pop() {
-                    if !std::mem::replace(&mut done[need], true) {
-                        path.push((need, needs(need)));
-                    }
-                    continue;
-                }
-                let (symbol, value) = (pairs[given[*place].column].1.symbol, values[*place]);
-                let value = self.replace(value);
-                self.solution.insert(symbol, value);
-                path.pop();
-            }
-        }
-    }
-
     /// −(rest + Σ coefficient · unknown) / factor
-    fn value_of(&self, pairs: &[(&FlatEquation, &Unknown)], given: &Given) -> Node {
+    fn value_of(&self, given: &Given, symbol: impl Fn(usize) -> Node) -> Node {
         let graph = self.system.graph;
         let mut sum = given.row.rest;
         for (&column, &coefficient) in &given.row.coefficients {
             if column != given.column {
-                let term = graph.binary(Binary::Mul, coefficient, pairs[column].1.symbol);
+                let term = graph.binary(Binary::Mul, coefficient, symbol(column));
                 sum = Some(sum.map_or(term, |sum| graph.binary(Binary::Add, sum, term)));
             }
         }
@@ -254,7 +195,7 @@ impl<'a> Solver<'a> {
             let open = arguments(self.system.graph.op(node))
                 .filter(|argument| !self.replaced.contains_key(argument));
             let before = stack.len();
-            if self.incidence.contains(node) {
+            if self.system.contains(node) {
                 stack.extend(open);
             }
             if stack.len() == before {
@@ -269,7 +210,7 @@ impl<'a> Solver<'a> {
     fn rebuilt(&self, node: Node) -> Node {
         let graph = self.system.graph;
         let new = |argument: Node| self.replaced.get(&argument).copied().unwrap_or(argument);
-        if !self.incidence.contains(node) {
+        if !self.system.contains(node) {
             return node;
         }
         match self.solution.get(&node) {
@@ -278,55 +219,48 @@ impl<'a> Solver<'a> {
         }
     }
 
-    fn too_many_torn(&self, block: &[(usize, usize)]) -> Problem {
-        let System {
-            equations,
-            unknowns,
-            ..
-        } = self.system;
-        let spans = block.iter().map(|&(equation, _)| equations[equation].span);
-        let span = spans.min_by_key(|span| span.start).unwrap_or_default();
+    fn too_many_torn(&self, block: &[(usize, usize)]) -> Box<Problem> {
         let message = format!(
             "{} unknowns need each other: {}; at most {MAX_COUPLED} may be left when equations \
              like `v = R*i` are used",
             block.len(),
-            listed(block.iter().map(|&(_, unknown)| &unknowns[unknown])),
+            self.system.listed(block.iter().map(|pair| pair.1)),
         );
-        Problem::new(span, message)
+        Problem::new(self.first_span(block), message)
             .hint("write more of the equations solved for a variable, as `a = …`")
+    }
+
+    fn too_many_coupled(&self, block: &[(usize, usize)], left: usize) -> Box<Problem> {
+        let n = block.len();
+        let message = format!(
+            "{n} unknowns share their equations, {left} of them with factors that vary; at most \
+             {MAX_COUPLED} may"
+        );
+        Problem::new(self.first_span(block), message)
+            .hint("write the equations solved for their unknowns")
+    }
+
+    fn first_span(&self, block: &[(usize, usize)]) -> Span {
+        let spans = block.iter().map(|pair| self.system.equations[pair.0].span);
+        spans.min_by_key(|span| span.start).unwrap_or_default()
+    }
+
+    /// One equation of a linear loop follows from the others, or contradicts them.
+    fn dependent(&self, block: &[(usize, usize)], place: usize) -> Box<Problem> {
+        let names = self.system.listed(block.iter().map(|pair| pair.1));
+        let lines = self.system.lines(block.iter().map(|pair| pair.0));
+        let message = format!("these equations do not determine {names}");
+        Problem::new(self.system.equations[block[place].0].span, message)
+            .label(format!("this one repeats or contradicts others on {lines}"))
+            .hint(
+                "a circuit without ground and a network without a fixed pressure look like this, \
+                 and a constraint between states that is hidden in the loop (index above 1): \
+                 leave one equation out, or replace it by its derivative with respect to time",
+            )
     }
 }
 
-fn too_many_coupled(pairs: &[(&FlatEquation, &Unknown)], left: usize) -> Problem {
-    let span = pairs
-        .iter()
-        .map(|(equation, _)| equation.span)
-        .min_by_key(|span| span.start);
-    let n = pairs.len();
-    let message = format!(
-        "{n} unknowns share their equations, {left} of them with factors that vary; at most \
-         {MAX_COUPLED} may"
-    );
-    Problem::new(span.unwrap_or_default(), message)
-        .hint("write the equations solved for their unknowns")
-}
-
-/// One equation of a linear loop follows from the others, or contradicts them.
-fn dependent(source: &str, pairs: &[(&FlatEquation, &Unknown)], place: usize) -> Problem {
-    let names = listed(pairs.iter().map(|(_, unknown)| *unknown));
-    let spans = pairs.iter().map(|(equation, _)| equation.span);
-    let lines = lines(source, spans);
-    let message = format!("these equations do not determine {names}");
-    Problem::new(pairs[place].0.span, message)
-        .label(format!("this one repeats or contradicts others on {lines}"))
-        .hint(
-            "a circuit without ground and a network without a fixed pressure look like this, and a \
-             constraint between states that is hidden in the loop (index above 1): leave one \
-             equation out, or replace it by its derivative with respect to time",
-        )
-}
-
-fn undetermined(equation: &FlatEquation, unknown: &Unknown) -> Problem {
+fn undetermined(equation: &FlatEquation, unknown: &Unknown) -> Box<Problem> {
     let message = format!(
         "this equation{} cannot be solved for {}: its terms in it cancel",
         equation.which_element(),

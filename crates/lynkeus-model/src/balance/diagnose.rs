@@ -2,69 +2,53 @@
 
 use lynkeus_expr::Node;
 
-use super::matching::Matching;
-use super::system::{FlatEquation, Incidence, System, Unknown, lines, listed};
+use super::system::System;
 use crate::diagnostic::{Problem, Result, Span};
 
-/// A system with a maximum matching, which shows what is wrong with its balance.
-pub(super) struct Balance<'a> {
-    pub system: &'a System<'a>,
-    pub incidence: &'a Incidence,
-    pub matching: &'a Matching,
-    pub source: &'a str,
-}
-
-impl Balance<'_> {
-    pub(super) fn check(&self, model: Span) -> Result<()> {
-        let System {
-            equations,
-            unknowns,
-            inputs,
-            ..
-        } = self.system;
-        if !unknowns.iter().any(|unknown| unknown.state.is_some()) {
+impl System<'_> {
+    /// Refuses a system in which an equation is missing or one too many, as its maximum matching
+    /// shows.
+    pub(super) fn check_balance(&self, model: Span) -> Result<()> {
+        if self.unknowns.iter().all(|unknown| unknown.state.is_none()) {
             return Err(
                 Problem::new(model, "the model has no state: nothing stands under `der`")
                     .hint("a plant has at least one equation `der(x) = …`"),
             );
         }
-        let surplus = first_free(&self.matching.of_equation);
         let missing = first_free(&self.matching.of_unknown);
-        let lacking = missing.and_then(|place| Some((place, unknowns.get(place)?)));
-        if let Some(place) = surplus
-            && let Some(equation) = equations.get(place)
-        {
-            return Err(self.surplus(place, equation, lacking, inputs));
-        }
-        match lacking {
-            Some((place, unknown)) => Err(self.missing(place, unknown)),
-            None => Ok(()),
+        match (first_free(&self.matching.of_equation), missing) {
+            (Some(surplus), missing) => Err(self.surplus(surplus, missing)),
+            (None, Some(missing)) => Err(self.missing(missing)),
+            (None, None) => Ok(()),
         }
     }
 
     fn count(&self) -> String {
-        let (equations, unknowns) = (self.system.equations.len(), self.system.unknowns.len());
+        let (equations, unknowns) = (self.equations.len(), self.unknowns.len());
         let plural = |n: usize| if n == 1 { "" } else { "s" };
         let (e, u) = (plural(equations), plural(unknowns));
         format!("{equations} equation{e} for {unknowns} unknown{u}")
     }
 
     /// The unknowns and equations that share the lack, by alternating paths.
-    fn missing(&self, place: usize, unknown: &Unknown) -> Problem {
-        let (unknowns, equations) = self.reached_from_unknown(place);
-        let name = &unknown.name;
+    fn missing(&self, place: usize) -> Box<Problem> {
+        let mut of_unknown = vec![vec![]; self.unknowns.len()];
+        for (equation, unknowns) in self.pattern.iter().enumerate() {
+            for &unknown in unknowns {
+                of_unknown[unknown].push(equation);
+            }
+        }
+        let (unknowns, equations) = reached(place, &of_unknown, &self.matching.of_equation);
+        let name = &self.unknowns[place].name;
         let message = format!("variable `{name}` lacks an equation");
-        let problem = Problem::new(unknown.span, message).label(self.count());
+        let problem = Problem::new(self.unknowns[place].span, message).label(self.count());
         if equations.is_empty() {
             return problem.hint(format!(
                 "no equation contains `{name}`: add one, as `{name} = …` or `der({name}) = …`, \
                  or declare it as a parameter or an input"
             ));
         }
-        let spans = equations
-            .iter()
-            .filter_map(|&e| Some(self.system.equations.get(e)?.span));
-        let lines = lines(self.source, spans);
+        let lines = self.lines(equations.iter().copied());
         let (equations, verb) = match equations.len() {
             1 => ("1 equation".to_owned(), "contains"),
             n => (format!("{n} equations"), "contain"),
@@ -72,62 +56,47 @@ impl Balance<'_> {
         problem.hint(format!(
             "{equations} on {lines} {verb} {} unknowns: {}",
             unknowns.len(),
-            self.listed(&unknowns)
+            self.listed(unknowns.iter().copied())
         ))
     }
 
-    fn surplus(
-        &self,
-        place: usize,
-        equation: &FlatEquation,
-        lacking: Option<(usize, &Unknown)>,
-        inputs: &[Node],
-    ) -> Problem {
+    fn surplus(&self, place: usize, missing: Option<usize>) -> Box<Problem> {
+        let equation = &self.equations[place];
         let message = format!("one equation too many{}", equation.which_element());
         let problem = Problem::new(equation.span, message).label(self.count());
-        let mut hint = self.surplus_hint(place, equation, inputs);
-        if let Some((_, unknown)) = lacking {
-            hint.push_str(&format!("; variable `{}` lacks an equation", unknown.name));
+        let mut hint = self.surplus_hint(place);
+        if let Some(missing) = missing {
+            let name = &self.unknowns[missing].name;
+            hint.push_str(&format!("; variable `{name}` lacks an equation"));
         }
         problem.hint(hint)
     }
 
-    fn surplus_hint(&self, place: usize, equation: &FlatEquation, inputs: &[Node]) -> String {
-        let graph = self.system.graph;
-        let name = |node: Node| graph.symbol_name(node).unwrap_or_default();
-        let contained = self
-            .incidence
-            .of_equation
-            .get(place)
-            .map_or(&[][..], Vec::as_slice);
-        if !contained.is_empty() {
-            let (unknowns, equations) = self.reached_from_equation(place);
-            let others = equations.iter().filter(|&&other| other != place);
-            let spans = others.filter_map(|&e| Some(self.system.equations.get(e)?.span));
-            let lines = lines(self.source, spans);
-            return format!("{lines} already determines {}", self.listed(&unknowns));
+    fn surplus_hint(&self, place: usize) -> String {
+        if !self.pattern[place].is_empty() {
+            let (equations, unknowns) = reached(place, &self.pattern, &self.matching.of_unknown);
+            let lines = self.lines(equations.into_iter().filter(|&other| other != place));
+            let unknowns = self.listed(unknowns.into_iter());
+            return format!("{lines} already determines {unknowns}");
         }
-        let sides = [equation.left, equation.right];
-        if let Some(&input) = sides.iter().find(|side| inputs.contains(side)) {
+        let name = |node: Node| self.graph.symbol_name(node).unwrap_or_default();
+        let sides = [self.equations[place].left, self.equations[place].right];
+        if let Some(&input) = sides.iter().find(|side| self.inputs.contains(side)) {
             let name = name(input);
             return format!("`{name}` is an input and must not be defined by an equation");
         }
-        let is_state = |side: &&Node| {
-            self.system
-                .unknowns
+        let states = || {
+            self.unknowns
                 .iter()
-                .any(|unknown| unknown.state == Some(**side))
+                .filter_map(|u| Some((u.state?, &u.name)))
         };
-        if let Some(&state) = sides.iter().find(is_state) {
+        if let Some(&state) = sides.iter().find(|&&side| states().any(|(s, _)| s == side)) {
             let name = name(state);
             return format!("`{name}` is a state, as `der({name})` is used: it follows from that");
         }
-        let tied = graph.symbols_of(&sides);
-        let tied = self.system.unknowns.iter().filter(|unknown| {
-            let state = unknown.state.as_ref();
-            state.is_some_and(|state| tied.contains(state))
-        });
-        let names: Vec<String> = tied.take(4).map(|u| format!("`{}`", u.name)).collect();
+        let read = self.graph.symbols_of(&sides);
+        let tied = states().filter(|(state, _)| read.contains(state));
+        let names: Vec<String> = tied.take(4).map(|(_, name)| format!("`{name}`")).collect();
         let nothing = "it contains nothing that is still to be determined: states follow from \
                        their derivatives, inputs and parameters are given";
         match names.is_empty() {
@@ -139,27 +108,6 @@ impl Balance<'_> {
                 names.join(", ")
             ),
         }
-    }
-
-    fn listed(&self, unknowns: &[usize]) -> String {
-        let unknowns = unknowns.iter();
-        listed(unknowns.filter_map(|&place| self.system.unknowns.get(place)))
-    }
-
-    fn reached_from_unknown(&self, start: usize) -> (Vec<usize>, Vec<usize>) {
-        let mut of_unknown = vec![vec![]; self.system.unknowns.len()];
-        for (equation, unknowns) in self.incidence.of_equation.iter().enumerate() {
-            for &unknown in unknowns {
-                of_unknown[unknown].push(equation);
-            }
-        }
-        reached(start, &of_unknown, &self.matching.of_equation)
-    }
-
-    fn reached_from_equation(&self, start: usize) -> (Vec<usize>, Vec<usize>) {
-        let edges = &self.incidence.of_equation;
-        let (equations, unknowns) = reached(start, edges, &self.matching.of_unknown);
-        (unknowns, equations)
     }
 }
 

@@ -5,9 +5,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
 
-use super::system::{Incidence, arguments};
+use super::system::{FlatEquation, System, arguments};
 use crate::diagnostic::{Result, Span};
-use crate::limits::Budget;
 
 /// coefficient · unknown + rest; `None` is zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,48 +16,52 @@ pub(super) struct Form {
 }
 
 /// Takes expressions apart.
-pub(super) struct Linear<'a> {
-    pub graph: &'a Graph,
-    pub incidence: &'a Incidence,
-    pub budget: &'a Budget,
-}
+impl System<'_> {
+    /// The forms of both sides of an equation; `None` where it is not linear in the unknown.
+    pub(super) fn sides(
+        &self,
+        equation: &FlatEquation,
+        unknown: Node,
+    ) -> Result<Option<[Form; 2]>> {
+        let left = self.form(equation.left, unknown, equation.span)?;
+        let right = self.form(equation.right, unknown, equation.span)?;
+        Ok(left.zip(right).map(|(left, right)| [left, right]))
+    }
 
-impl Linear<'_> {
     /// The form of an expression; `None` where it is not linear in the unknown.
-    pub(super) fn form(&self, root: Node, unknown: Node, span: Span) -> Result<Option<Form>> {
+    fn form(&self, root: Node, unknown: Node, span: Span) -> Result<Option<Form>> {
         let mut forms: HashMap<Node, Option<Form>> = HashMap::new();
         for node in self.below(root, span)? {
-            let form = match node == unknown {
-                true => {
-                    let one = self.graph.constant(1.0).node();
-                    Some(Form {
-                        coefficient: Some(one),
-                        rest: None,
-                    })
-                }
-                false => {
-                    let op = self.graph.op(node);
-                    if !arguments(op).any(|argument| forms.contains_key(&argument)) {
-                        continue;
-                    }
-                    self.combined(op, &forms)
-                }
-            };
-            forms.insert(node, form);
+            let op = self.graph.op(node);
+            if node == unknown {
+                let one = self.graph.constant(1.0).node();
+                let form = Form {
+                    coefficient: Some(one),
+                    rest: None,
+                };
+                forms.insert(node, Some(form));
+            } else if arguments(op).any(|argument| forms.contains_key(&argument)) {
+                forms.insert(node, self.combined(op, &forms));
+            }
         }
-        let constant = Form {
-            coefficient: None,
-            rest: self.nonzero(root),
-        };
+        let constant = self.constant_form(root);
         Ok(forms.remove(&root).unwrap_or(Some(constant)))
     }
 
+    /// The form of what is free of the unknown.
+    fn constant_form(&self, node: Node) -> Form {
+        Form {
+            coefficient: None,
+            rest: self.nonzero(node),
+        }
+    }
+
     /// Nodes of the expression that contain unknowns, arguments first.
-    pub(super) fn below(&self, root: Node, span: Span) -> Result<Vec<Node>> {
+    fn below(&self, root: Node, span: Span) -> Result<Vec<Node>> {
         let mut found: HashSet<Node> = HashSet::new();
         let mut stack = vec![root];
         while let Some(node) = stack.pop() {
-            if self.incidence.contains(node) && found.insert(node) {
+            if self.contains(node) && found.insert(node) {
                 self.budget.charge(1, span)?;
                 stack.extend(arguments(self.graph.op(node)));
             }
@@ -77,35 +80,25 @@ impl Linear<'_> {
         let is_free = |node: Node| !forms.contains_key(&node);
         let form = |node: Node| match forms.get(&node) {
             Some(form) => *form,
-            None => Some(Form {
-                coefficient: None,
-                rest: self.nonzero(node),
-            }),
+            None => Some(self.constant_form(node)),
         };
         match op {
             Op::Unary(Unary::Neg, a) => Some(form(a)?.map(|part| self.negated(part))),
-            Op::Binary(Binary::Add, a, b) => Some(self.sum(form(a)?, form(b)?)),
-            Op::Binary(Binary::Sub, a, b) => Some(self.difference(form(a)?, form(b)?)),
-            Op::Binary(Binary::Mul, a, b) if is_free(b) => {
-                Some(form(a)?.map(|part| self.times(part, b)))
-            }
-            Op::Binary(Binary::Mul, a, b) if is_free(a) => {
-                Some(form(b)?.map(|part| self.times(part, a)))
+            Op::Binary(Binary::Add, a, b) => Some(form(a)?.with(form(b)?, |a, b| self.plus(a, b))),
+            Op::Binary(Binary::Sub, a, b) => Some(form(a)?.with(form(b)?, |a, b| self.minus(a, b))),
+            Op::Binary(Binary::Mul, a, b) | Op::Binary(Binary::Mul, b, a) if is_free(b) => {
+                Some(form(a)?.map(|part| self.graph.binary(Binary::Mul, part, b)))
             }
             Op::Binary(Binary::Div, a, b) if is_free(b) => {
                 Some(form(a)?.map(|part| self.graph.binary(Binary::Div, part, b)))
             }
             Op::Select(c, a, b) if is_free(c) => {
-                let (a, b) = (form(a)?, form(b)?);
                 let zero = self.graph.constant(0.0).node();
                 let choose = |a: Option<Node>, b: Option<Node>| {
                     let either = a.or(b).is_some();
                     either.then(|| self.graph.select(c, a.unwrap_or(zero), b.unwrap_or(zero)))
                 };
-                Some(Form {
-                    coefficient: choose(a.coefficient, b.coefficient),
-                    rest: choose(a.rest, b.rest),
-                })
+                Some(form(a)?.with(form(b)?, choose))
             }
             _ => None,
         }
@@ -115,26 +108,10 @@ impl Linear<'_> {
         self.graph.unary(Unary::Neg, node)
     }
 
-    fn times(&self, a: Node, b: Node) -> Node {
-        self.graph.binary(Binary::Mul, a, b)
-    }
-
-    fn sum(&self, a: Form, b: Form) -> Form {
-        let add = |a: Option<Node>, b: Option<Node>| match (a, b) {
+    fn plus(&self, a: Option<Node>, b: Option<Node>) -> Option<Node> {
+        match (a, b) {
             (Some(a), Some(b)) => self.nonzero(self.graph.binary(Binary::Add, a, b)),
             (one, other) => one.or(other),
-        };
-        Form {
-            coefficient: add(a.coefficient, b.coefficient),
-            rest: add(a.rest, b.rest),
-        }
-    }
-
-    /// a − b
-    pub(super) fn difference(&self, a: Form, b: Form) -> Form {
-        Form {
-            coefficient: self.minus(a.coefficient, b.coefficient),
-            rest: self.minus(a.rest, b.rest),
         }
     }
 
@@ -147,7 +124,7 @@ impl Linear<'_> {
     }
 
     /// The unknown from left = right; `None` where its coefficient is zero.
-    pub(super) fn solution(&self, left: Form, right: Form) -> Option<Node> {
+    pub(super) fn solution(&self, [left, right]: [Form; 2]) -> Option<Node> {
         let coefficient = self.minus(left.coefficient, right.coefficient)?;
         let zero = || self.graph.constant(0.0).node();
         let value = self.minus(right.rest, left.rest).unwrap_or_else(zero);
@@ -162,9 +139,14 @@ impl Linear<'_> {
 
 impl Form {
     fn map(self, part: impl Fn(Node) -> Node) -> Self {
+        self.with(self, |a, _| a.map(&part))
+    }
+
+    /// Both parts joined with those of another form.
+    fn with(self, other: Self, join: impl Fn(Option<Node>, Option<Node>) -> Option<Node>) -> Self {
         Self {
-            coefficient: self.coefficient.map(&part),
-            rest: self.rest.map(&part),
+            coefficient: join(self.coefficient, other.coefficient),
+            rest: join(self.rest, other.rest),
         }
     }
 }
@@ -177,14 +159,7 @@ pub(super) struct Row {
     pub rest: Option<Node>,
 }
 
-impl Row {
-    /// Number of unknowns.
-    pub(super) fn len(&self) -> usize {
-        self.coefficients.len()
-    }
-}
-
-impl Linear<'_> {
+impl System<'_> {
     /// The row of a residual, in one walk from the root to the unknowns: every node passes its
     /// factor on. None where it is not linear.
     ///
@@ -274,35 +249,20 @@ impl Passed {
 
     /// Both factors of one node, which counts where either does.
     fn plus(self, graph: &Graph, other: Self) -> Self {
-        let (one, two) = match (self.guard, other.guard) {
-            (Some(one), Some(two)) => (one, two),
-            (None, None) => {
-                return self.with_factor(graph.binary(Binary::Add, self.factor, other.factor));
-            }
-            _ => {
-                let (one, two) = (
-                    self.guarded(graph, self.factor),
-                    other.guarded(graph, other.factor),
-                );
-                return Self {
-                    factor: graph.binary(Binary::Add, one, two),
-                    guard: None,
-                };
-            }
-        };
-        if graph.unary(Unary::Not, one) == two {
+        if let (Some(one), Some(two)) = (self.guard, other.guard)
+            && graph.unary(Unary::Not, one) == two
+        {
             return Self {
                 factor: graph.select(one, self.factor, other.factor),
                 guard: None,
             };
         }
-        let (a, b) = (
-            self.guarded(graph, self.factor),
-            other.guarded(graph, other.factor),
-        );
+        let guards = self.guard.zip(other.guard);
+        let one = self.guarded(graph, self.factor);
+        let two = other.guarded(graph, other.factor);
         Self {
-            factor: graph.binary(Binary::Add, a, b),
-            guard: Some(graph.binary(Binary::Or, one, two)),
+            factor: graph.binary(Binary::Add, one, two),
+            guard: guards.map(|(one, two)| graph.binary(Binary::Or, one, two)),
         }
     }
 }
@@ -365,8 +325,9 @@ impl Walk<'_> {
                 self.pass(a, passed);
                 self.pass(b, negative());
             }
-            Op::Binary(Binary::Mul, a, b) if free(b) => self.pass(a, times(Binary::Mul, b)),
-            Op::Binary(Binary::Mul, a, b) if free(a) => self.pass(b, times(Binary::Mul, a)),
+            Op::Binary(Binary::Mul, a, b) | Op::Binary(Binary::Mul, b, a) if free(b) => {
+                self.pass(a, times(Binary::Mul, b));
+            }
             Op::Binary(Binary::Div, a, b) if free(b) => self.pass(a, times(Binary::Div, b)),
             Op::Select(c, a, b) if free(c) => {
                 self.pass(a, passed.under(graph, c));
@@ -391,64 +352,53 @@ pub(super) struct Given {
     pub factor: f64,
 }
 
-/// What is left of a block.
-pub(super) struct Core {
-    pub given: Vec<Given>,
-    /// rows that are left, by their place in the block
-    pub rows: Vec<(usize, Row)>,
-    pub columns: Vec<usize>,
-}
-
-/// Takes out what can be taken out, short rows first.
-pub(super) fn core(graph: &Graph, budget: &Budget, span: Span, rows: Vec<Row>) -> Result<Core> {
-    let count = rows.len();
-    let mut elimination = Elimination::new(graph, budget, span, rows);
-    elimination.run()?;
-    let mut left: BTreeSet<usize> = (0..count).collect();
-    for given in &elimination.given {
-        left.remove(&given.column);
-    }
-    let rows = elimination.rows.into_iter().enumerate();
-    Ok(Core {
-        given: elimination.given,
-        rows: rows
-            .filter_map(|(place, row)| Some((place, row?)))
-            .collect(),
-        columns: left.into_iter().collect(),
-    })
-}
-
-struct Elimination<'a> {
-    graph: &'a Graph,
-    budget: &'a Budget,
+/// A block from which is taken out what can be, short rows first.
+pub(super) struct Elimination<'a> {
+    system: &'a System<'a>,
     span: Span,
-    /// `None` once a row gives its unknown
+    /// by their place in the block; `None` once a row gives its unknown
     rows: Vec<Option<Row>>,
     /// rows that hold each unknown
     holding: Vec<BTreeSet<usize>>,
     queue: BTreeSet<(usize, usize)>,
-    given: Vec<Given>,
+    pub given: Vec<Given>,
 }
 
 impl<'a> Elimination<'a> {
-    fn new(graph: &'a Graph, budget: &'a Budget, span: Span, rows: Vec<Row>) -> Self {
+    pub(super) fn new(system: &'a System<'a>, span: Span, rows: Vec<Row>) -> Result<Self> {
         let mut holding = vec![BTreeSet::new(); rows.len()];
         let mut queue = BTreeSet::new();
         for (place, row) in rows.iter().enumerate() {
-            queue.insert((row.len(), place));
+            queue.insert((row.coefficients.len(), place));
             for &column in row.coefficients.keys() {
                 holding[column].insert(place);
             }
         }
-        Self {
-            graph,
-            budget,
+        let mut elimination = Self {
+            system,
             span,
             rows: rows.into_iter().map(Some).collect(),
             holding,
             queue,
             given: vec![],
+        };
+        elimination.run()?;
+        Ok(elimination)
+    }
+
+    /// The rows that are left, by their place in the block.
+    pub(super) fn left(&self) -> impl Iterator<Item = (usize, &Row)> {
+        let rows = self.rows.iter().enumerate();
+        rows.filter_map(|(place, row)| Some((place, row.as_ref()?)))
+    }
+
+    /// The unknowns that are left.
+    pub(super) fn columns(&self) -> Vec<usize> {
+        let mut left: BTreeSet<usize> = (0..self.rows.len()).collect();
+        for given in &self.given {
+            left.remove(&given.column);
         }
+        left.into_iter().collect()
     }
 
     fn run(&mut self) -> Result<()> {
@@ -469,7 +419,7 @@ impl<'a> Elimination<'a> {
     /// The unknown with a constant factor that stands in the fewest rows.
     fn pivot(&self, row: &Row) -> Option<(usize, f64)> {
         let factors = row.coefficients.iter().filter_map(|(&column, &node)| {
-            let value = self.graph.constant_value(node)?;
+            let value = self.system.graph.constant_value(node)?;
             (value != 0.0).then_some((column, value))
         });
         let factors: Vec<(usize, f64)> = factors.collect();
@@ -489,11 +439,13 @@ impl<'a> Elimination<'a> {
         }
         let others: Vec<usize> = self.holding[column].iter().copied().collect();
         for other in others {
-            self.budget.charge(row.len() as u64, self.span)?;
+            self.system
+                .budget
+                .charge(row.coefficients.len() as u64, self.span)?;
             let Some(mut changed) = self.rows[other].take() else {
                 continue;
             };
-            self.queue.remove(&(changed.len(), other));
+            self.queue.remove(&(changed.coefficients.len(), other));
             self.substitute(&mut changed, column, factor, &row);
             for &now in changed.coefficients.keys() {
                 self.holding[now].insert(other);
@@ -504,7 +456,7 @@ impl<'a> Elimination<'a> {
                 }
             }
             self.holding[column].remove(&other);
-            self.queue.insert((changed.len(), other));
+            self.queue.insert((changed.coefficients.len(), other));
             self.rows[other] = Some(changed);
         }
         self.given.push(Given {
@@ -520,7 +472,7 @@ impl<'a> Elimination<'a> {
         let Some(own) = into.coefficients.remove(&column) else {
             return;
         };
-        let graph = self.graph;
+        let graph = self.system.graph;
         let ratio = graph.binary(Binary::Div, own, graph.constant(factor).node());
         for (&other, &coefficient) in &row.coefficients {
             if other == column {
@@ -540,7 +492,7 @@ impl<'a> Elimination<'a> {
 
     /// a − b; `None` where nothing is left but rounding.
     fn difference(&self, a: Option<Node>, b: Node) -> Option<Node> {
-        let graph = self.graph;
+        let graph = self.system.graph;
         let Some(a) = a else {
             return Some(graph.unary(Unary::Neg, b));
         };

@@ -1,11 +1,9 @@
 //! Maximum matching of equations and unknowns (Hopcroft and Karp), without recursion.
 
-use std::collections::{HashMap, VecDeque};
-
-use super::System;
+use std::collections::VecDeque;
 
 /// Partners of equations and unknowns.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub(super) struct Matching {
     pub of_equation: Vec<Option<usize>>,
     pub of_unknown: Vec<Option<usize>>,
@@ -13,47 +11,26 @@ pub(super) struct Matching {
 
 const FAR: usize = usize::MAX;
 
-/// As many pairs as possible. Equations that read `v = …` take `v` first, so that what is
-/// left over is what a reader of the model would name.
-pub(super) fn maximum(system: &System<'_>, edges: &[Vec<usize>]) -> Matching {
-    let mut matching = Matching {
-        of_equation: vec![None; edges.len()],
-        of_unknown: vec![None; system.unknowns.len()],
-    };
-    let unknowns = system.unknowns.iter().enumerate();
-    let place: HashMap<_, _> = unknowns
-        .map(|(place, unknown)| (unknown.symbol, place))
-        .collect();
-    for (equation, flat) in system.equations.iter().enumerate() {
-        let sides = [flat.left, flat.right];
-        let explicit = sides.iter().find_map(|side| place.get(side).copied());
-        if let Some(unknown) = explicit {
-            matching.pair_if_free(equation, unknown);
-        }
-    }
-    // Derivatives before other unknowns: a missing equation is seldom one of a derivative.
-    for derivatives in [true, false] {
-        for (equation, unknowns) in edges.iter().enumerate() {
-            let of_kind = |&&unknown: &&usize| {
-                system
-                    .unknowns
-                    .get(unknown)
-                    .is_some_and(|u| u.state.is_some() == derivatives)
-            };
-            for &unknown in unknowns.iter().filter(of_kind) {
-                matching.pair_if_free(equation, unknown);
+impl Matching {
+    /// As many pairs of an equation and one of its unknowns as possible, those that are `wished`
+    /// first, where both are still free.
+    pub(super) fn new(
+        edges: &[Vec<usize>],
+        unknowns: usize,
+        wished: impl Iterator<Item = (usize, usize)>,
+    ) -> Self {
+        let mut matching = Self {
+            of_equation: vec![None; edges.len()],
+            of_unknown: vec![None; unknowns],
+        };
+        for (equation, unknown) in wished {
+            let partners = (matching.of_equation[equation], matching.of_unknown[unknown]);
+            if partners == (None, None) {
+                matching.pair(equation, unknown);
             }
         }
-    }
-    matching.augment(edges);
-    matching
-}
-
-impl Matching {
-    fn pair_if_free(&mut self, equation: usize, unknown: usize) {
-        if self.of_equation[equation].is_none() && self.of_unknown[unknown].is_none() {
-            self.pair(equation, unknown);
-        }
+        matching.augment(edges);
+        matching
     }
 
     fn pair(&mut self, equation: usize, unknown: usize) {
@@ -142,12 +119,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn matched(edges: &[Vec<usize>], unknowns: usize) -> Matching {
-        let mut matching = Matching {
-            of_equation: vec![None; edges.len()],
-            of_unknown: vec![None; unknowns],
-        };
-        matching.augment(edges);
-        matching
+        Matching::new(edges, unknowns, std::iter::empty())
     }
 
     /// Largest matching by trying every assignment.

@@ -8,12 +8,10 @@
 
 use std::collections::{HashMap, HashSet};
 
-use lynkeus_expr::{Binary, Node, jacobian};
+use lynkeus_expr::{Binary, Graph, Node, jacobian};
 
 use super::diagnose::reached;
-use super::matching;
-use super::matching::Matching;
-use super::system::{FlatEquation, Incidence, System, Unknown};
+use super::system::{FlatEquation, System, Unknown};
 use crate::diagnostic::{Problem, Result};
 
 /// Most times that constraints are looked for.
@@ -21,22 +19,18 @@ const MAX_PASSES: usize = 60;
 
 /// The system without constraints among its states; `None` where it has none, or where they
 /// cannot be resolved.
-pub(super) fn reduced<'a>(system: &'a System<'a>) -> Result<Option<Reduction<'a>>> {
-    let states = system
-        .unknowns
-        .iter()
-        .filter_map(|u| Some((u.state?, u.symbol)));
+pub(super) fn reduced(system: System<'_>) -> Result<Option<System<'_>>> {
+    let states = system.unknowns.iter();
+    let states = states.filter_map(|u| Some((u.state?, u.symbol)));
     let mut reduction = Reduction {
-        system,
         derivative: states.collect(),
-        equations: system.equations.to_vec(),
-        unknowns: system.unknowns.to_vec(),
+        system,
         differentiated: HashSet::new(),
     };
     for _ in 0..MAX_PASSES {
         let constraints = reduction.constraints();
         if constraints.is_empty() {
-            return Ok(Some(reduction));
+            return Ok(Some(reduction.system));
         }
         let mut is_stuck = true;
         for (equations, unknowns) in constraints {
@@ -45,17 +39,16 @@ pub(super) fn reduced<'a>(system: &'a System<'a>) -> Result<Option<Reduction<'a>
         if is_stuck {
             break;
         }
+        reduction.system.arrange();
     }
     Ok(None)
 }
 
-/// Equations and unknowns in which constraints are differentiated.
-pub(super) struct Reduction<'a> {
-    system: &'a System<'a>,
+/// A system in which constraints are differentiated.
+struct Reduction<'a> {
+    system: System<'a>,
     /// symbols of derivatives by what they are the derivatives of
     derivative: HashMap<Node, Node>,
-    pub equations: Vec<FlatEquation>,
-    pub unknowns: Vec<Unknown>,
     /// equations whose derivative is among the equations
     differentiated: HashSet<usize>,
 }
@@ -65,25 +58,15 @@ impl Reduction<'_> {
     /// unknowns; none where every equation has its unknown.
     fn constraints(&self) -> Vec<(Vec<usize>, Vec<usize>)> {
         let System {
-            graph,
-            inputs,
-            time,
-            ..
-        } = *self.system;
-        let now = System {
-            graph,
-            equations: &self.equations,
-            unknowns: &self.unknowns,
-            inputs,
-            time,
-        };
-        let incidence = Incidence::new(&now);
-        let matching = matching::maximum(&now, &incidence.of_equation);
+            pattern, matching, ..
+        } = &self.system;
         let mut used: HashSet<usize> = HashSet::new();
         let mut found = vec![];
-        for start in free(&matching) {
-            let (equations, unknowns) =
-                reached(start, &incidence.of_equation, &matching.of_unknown);
+        for start in 0..pattern.len() {
+            if matching.of_equation[start].is_some() {
+                continue;
+            }
+            let (equations, unknowns) = reached(start, pattern, &matching.of_unknown);
             if equations.iter().any(|equation| used.contains(equation)) {
                 continue;
             }
@@ -105,22 +88,23 @@ impl Reduction<'_> {
             if !self.differentiated.insert(place) {
                 continue;
             }
-            let equation = self.equations[place].clone();
+            let equation = self.system.equations[place].clone();
             let left = self.total(equation.left, &equation)?;
             let right = self.total(equation.right, &equation)?;
-            self.equations.push(FlatEquation {
+            self.system.equations.push(FlatEquation {
                 left,
                 right,
                 ..equation
             });
         }
-        let Some(place) = self.unknowns.iter().position(|u| u.state == Some(given_up)) else {
+        let unknowns = &mut self.system.unknowns;
+        let Some(place) = unknowns.iter().position(|u| u.state == Some(given_up)) else {
             return Ok(false);
         };
-        let state = self.unknowns[place].clone();
-        self.unknowns[place].state = None;
-        self.unknowns[place].name = format!("der({})", state.name);
-        self.unknowns.push(Unknown {
+        let state = unknowns[place].clone();
+        unknowns[place].state = None;
+        unknowns[place].name = format!("der({})", state.name);
+        unknowns.push(Unknown {
             symbol: given_up,
             state: None,
             ..state
@@ -130,7 +114,7 @@ impl Reduction<'_> {
 
     /// The derivative of an unknown becomes an unknown as well.
     fn differentiated_unknown(&mut self, place: usize) {
-        let unknown = self.unknowns[place].clone();
+        let unknown = self.system.unknowns[place].clone();
         if self.derivative.contains_key(&unknown.symbol) {
             return;
         }
@@ -140,7 +124,7 @@ impl Reduction<'_> {
         };
         let symbol = self.system.graph.fresh(name.clone()).node();
         self.derivative.insert(unknown.symbol, symbol);
-        self.unknowns.push(Unknown {
+        self.system.unknowns.push(Unknown {
             symbol,
             name,
             state: None,
@@ -152,29 +136,23 @@ impl Reduction<'_> {
     /// factor.
     fn candidate(&self, equations: &[usize]) -> Option<Node> {
         let graph = self.system.graph;
-        let states: HashMap<Node, (i32, usize)> = self
-            .unknowns
-            .iter()
-            .enumerate()
+        let unknowns = self.system.unknowns.iter().enumerate();
+        let states: HashMap<Node, (i32, usize)> = unknowns
             .filter_map(|(place, u)| Some((u.state?, (u.rank, usize::MAX - place))))
             .collect();
         let mut best: Option<((i32, usize), Node)> = None;
         for &place in equations {
-            let equation = &self.equations[place];
+            let equation = &self.system.equations[place];
             let residual = graph.binary(Binary::Sub, equation.left, equation.right);
-            let symbols = graph.symbols_of(&[residual]);
-            let symbols: Vec<Node> = symbols
-                .into_iter()
-                .filter(|symbol| states.contains_key(symbol))
-                .collect();
+            let mut symbols = graph.symbols_of(&[residual]);
+            symbols.retain(|symbol| states.contains_key(symbol));
             let slopes = jacobian::reverse(graph, &[residual], &symbols);
             for (column, slope) in slopes.row(0) {
-                let is_constant = graph
-                    .constant_value(slope)
-                    .is_some_and(|value| value != 0.0);
-                let state = symbols[column];
-                let key = states[&state];
-                if is_constant && best.is_none_or(|(least, _)| key < least) {
+                let slope = graph.constant_value(slope);
+                let (state, key) = (symbols[column], states[&symbols[column]]);
+                if slope.is_some_and(|value| value != 0.0)
+                    && best.is_none_or(|(least, _)| key < least)
+                {
                     best = Some((key, state));
                 }
             }
@@ -184,26 +162,19 @@ impl Reduction<'_> {
 
     /// The derivative in time of one side of an equation.
     fn total(&self, side: Node, equation: &FlatEquation) -> Result<Node> {
-        let graph = self.system.graph;
-        let symbols = graph.symbols_of(&[side]);
-        let slopes = jacobian::reverse(graph, &[side], &symbols);
-        let mut sum: Option<Node> = None;
-        for (column, slope) in slopes.row(0) {
-            let symbol = symbols[column];
-            if self.system.inputs.contains(&symbol) {
-                return Err(self.input_bound(symbol, equation));
-            }
-            let term = match self.derivative.get(&symbol) {
-                Some(&derivative) => graph.binary(Binary::Mul, slope, derivative),
-                None if symbol == self.system.time => slope,
-                None => continue,
-            };
-            sum = Some(sum.map_or(term, |sum| graph.binary(Binary::Add, sum, term)));
-        }
-        Ok(sum.unwrap_or_else(|| graph.constant(0.0).node()))
+        let System {
+            graph,
+            time,
+            inputs,
+            ..
+        } = self.system;
+        total_derivative(graph, side, time, |symbol| match inputs.contains(&symbol) {
+            true => Err(self.input_bound(symbol, equation)),
+            false => Ok(self.derivative.get(&symbol).copied()),
+        })
     }
 
-    fn input_bound(&self, input: Node, equation: &FlatEquation) -> Problem {
+    fn input_bound(&self, input: Node, equation: &FlatEquation) -> Box<Problem> {
         let name = self.system.graph.symbol_name(input).unwrap_or_default();
         let message = format!("this equation binds states to the input `{name}`");
         Problem::new(equation.span, message)
@@ -215,10 +186,23 @@ impl Reduction<'_> {
     }
 }
 
-fn free(matching: &Matching) -> Vec<usize> {
-    let partners = matching.of_equation.iter().enumerate();
-    partners
-        .filter(|(_, partner)| partner.is_none())
-        .map(|(place, _)| place)
-        .collect()
+/// Σ ∂e/∂s der(s) over the symbols of an expression that have a derivative, and ∂e/∂t.
+pub(crate) fn total_derivative(
+    graph: &Graph,
+    expression: Node,
+    time: Node,
+    derivative: impl Fn(Node) -> Result<Option<Node>>,
+) -> Result<Node> {
+    let symbols = graph.symbols_of(&[expression]);
+    let slopes = jacobian::reverse(graph, &[expression], &symbols);
+    let mut sum: Option<Node> = None;
+    for (column, slope) in slopes.row(0) {
+        let term = match derivative(symbols[column])? {
+            Some(derivative) => graph.binary(Binary::Mul, slope, derivative),
+            None if symbols[column] == time => slope,
+            None => continue,
+        };
+        sum = Some(sum.map_or(term, |sum| graph.binary(Binary::Add, sum, term)));
+    }
+    Ok(sum.unwrap_or_else(|| graph.constant(0.0).node()))
 }

@@ -4,7 +4,9 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{Graph, Interval, Node, Op};
 
+use super::matching::Matching;
 use crate::diagnostic::Span;
+use crate::limits::{Budget, MAX_SOLVE_STEPS};
 
 /// An equation between two expressions.
 #[derive(Clone, Debug)]
@@ -57,62 +59,63 @@ impl Unknown {
     }
 }
 
-/// `` `a`, `b`, … ``
-pub(super) fn listed<'a>(unknowns: impl Iterator<Item = &'a Unknown>) -> String {
-    let mut names: Vec<String> = unknowns.take(9).map(Unknown::quoted).collect();
-    let more = if names.len() > 8 { ", …" } else { "" };
-    names.truncate(8);
-    format!("{}{more}", names.join(", "))
-}
-
-/// The equations and what they must determine.
+/// The equations and what they must determine, with which unknowns stand in which equations and
+/// the pairs of a maximum matching. Equations and unknowns are told by their places.
 pub(crate) struct System<'a> {
     pub graph: &'a Graph,
-    pub equations: &'a [FlatEquation],
-    pub unknowns: &'a [Unknown],
+    pub source: &'a str,
+    pub equations: Vec<FlatEquation>,
+    pub unknowns: Vec<Unknown>,
     pub inputs: &'a [Node],
     pub time: Node,
-}
-
-/// "line 4" or "lines 4, 5 and 9".
-pub(super) fn lines(source: &str, spans: impl Iterator<Item = Span>) -> String {
-    let mut numbers: Vec<usize> = spans.take(8).map(|span| span.line(source)).collect();
-    numbers.sort_unstable();
-    numbers.dedup();
-    let words: Vec<String> = numbers.iter().map(usize::to_string).collect();
-    match words.split_last() {
-        None => "no line".to_owned(),
-        Some((only, [])) => format!("line {only}"),
-        Some((last, before)) => format!("lines {} and {last}", before.join(", ")),
-    }
-}
-
-/// The pattern of a system.
-pub(super) struct Incidence {
+    /// for the steps of its solution
+    pub(super) budget: Budget,
     /// unknowns of each equation, in order
-    pub of_equation: Vec<Vec<usize>>,
+    pub(super) pattern: Vec<Vec<usize>>,
+    pub(super) matching: Matching,
     /// place of each unknown by its symbol
-    pub place: HashMap<Node, usize>,
+    place: HashMap<Node, usize>,
     /// by index of the node: false for those of the equations that contain no unknown
     contains: Vec<bool>,
 }
 
-impl Incidence {
-    pub(super) fn new(system: &System<'_>) -> Self {
-        let symbols = system.unknowns.iter().enumerate();
-        let place = symbols
+impl<'a> System<'a> {
+    pub(crate) fn new(
+        graph: &'a Graph,
+        source: &'a str,
+        equations: Vec<FlatEquation>,
+        unknowns: Vec<Unknown>,
+        inputs: &'a [Node],
+        time: Node,
+    ) -> Self {
+        let mut system = Self {
+            graph,
+            source,
+            equations,
+            unknowns,
+            inputs,
+            time,
+            budget: Budget::new(MAX_SOLVE_STEPS, "steps to solve its equations"),
+            pattern: vec![],
+            matching: Matching::default(),
+            place: HashMap::new(),
+            contains: vec![],
+        };
+        system.arrange();
+        system
+    }
+
+    /// Finds pattern and matching, also anew where equations or unknowns were added.
+    pub(super) fn arrange(&mut self) {
+        let symbols = self.unknowns.iter().enumerate();
+        self.place = symbols
             .map(|(place, unknown)| (unknown.symbol, place))
             .collect();
         // what stands elsewhere, as in an assertion, may be met again in a solution
-        let contains = vec![true; system.graph.len()];
-        let mut incidence = Self {
-            of_equation: vec![],
-            place,
-            contains,
-        };
-        incidence.mark(system);
-        incidence.collect(system);
-        incidence
+        self.contains = vec![true; self.graph.len()];
+        self.mark();
+        self.pattern = self.collected();
+        self.matching = Matching::new(&self.pattern, self.unknowns.len(), self.wished());
     }
 
     /// True where a node may contain an unknown.
@@ -120,39 +123,73 @@ impl Incidence {
         self.contains.get(node.index()).copied().unwrap_or(true)
     }
 
-    fn mark(&mut self, system: &System<'_>) {
-        let sides = system
-            .equations
-            .iter()
-            .flat_map(|equation| [equation.left, equation.right]);
-        let mut nodes = system.graph.reachable(&sides.collect::<Vec<_>>());
-        nodes.sort_unstable();
-        for node in nodes {
-            let below = arguments(system.graph.op(node)).any(|argument| self.contains(argument));
-            let found = below || self.place.contains_key(&node);
-            if let Some(flag) = self.contains.get_mut(node.index()) {
-                *flag = found;
-            }
+    fn mark(&mut self) {
+        let sides = self.equations.iter().flat_map(|e| [e.left, e.right]);
+        for node in self.graph.reachable(&sides.collect::<Vec<_>>()) {
+            let below = arguments(self.graph.op(node)).any(|argument| self.contains(argument));
+            self.contains[node.index()] = below || self.place.contains_key(&node);
         }
     }
 
-    fn collect(&mut self, system: &System<'_>) {
-        let mut seen = vec![usize::MAX; system.graph.len()];
-        for (number, equation) in system.equations.iter().enumerate() {
+    fn collected(&self) -> Vec<Vec<usize>> {
+        let mut seen = vec![usize::MAX; self.graph.len()];
+        let unknowns = |(number, equation): (usize, &FlatEquation)| {
             let mut found = vec![];
             let mut stack = vec![equation.right, equation.left];
             while let Some(node) = stack.pop() {
-                let fresh = seen
-                    .get_mut(node.index())
-                    .is_some_and(|last| std::mem::replace(last, number) != number);
-                if !fresh || !self.contains(node) {
+                let before = std::mem::replace(&mut seen[node.index()], number);
+                if before == number || !self.contains(node) {
                     continue;
                 }
                 found.extend(self.place.get(&node));
-                stack.extend(arguments(system.graph.op(node)));
+                stack.extend(arguments(self.graph.op(node)));
             }
             found.sort_unstable();
-            self.of_equation.push(found);
+            found
+        };
+        self.equations.iter().enumerate().map(unknowns).collect()
+    }
+
+    /// Pairs that the matching begins with. Equations that read `v = …` take `v` first, so that
+    /// what is left over is what a reader of the model would name; then derivatives before other
+    /// unknowns, for a missing equation is seldom one of a derivative.
+    fn wished(&self) -> impl Iterator<Item = (usize, usize)> {
+        let explicit = self.equations.iter().enumerate().filter_map(|(place, e)| {
+            let mut sides = [e.left, e.right].into_iter();
+            Some((place, *sides.find_map(|side| self.place.get(&side))?))
+        });
+        let edges = || {
+            let equations = self.pattern.iter().enumerate();
+            equations.flat_map(|(place, unknowns)| unknowns.iter().map(move |&u| (place, u)))
+        };
+        let is_derivative = |&(_, unknown): &(usize, usize)| self.unknowns[unknown].state.is_some();
+        let derivatives = edges().filter(is_derivative);
+        let others = edges().filter(move |edge| !is_derivative(edge));
+        explicit.chain(derivatives).chain(others)
+    }
+
+    /// `` `a`, `b`, … ``
+    pub(super) fn listed(&self, unknowns: impl Iterator<Item = usize>) -> String {
+        let names = unknowns
+            .take(9)
+            .map(|unknown| self.unknowns[unknown].quoted());
+        let mut names: Vec<String> = names.collect();
+        let more = if names.len() > 8 { ", …" } else { "" };
+        names.truncate(8);
+        format!("{}{more}", names.join(", "))
+    }
+
+    /// "line 4" or "lines 4, 5 and 9", where equations stand.
+    pub(super) fn lines(&self, equations: impl Iterator<Item = usize>) -> String {
+        let spans = equations.map(|equation| self.equations[equation].span);
+        let mut numbers: Vec<usize> = spans.take(8).map(|span| span.line(self.source)).collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        let words: Vec<String> = numbers.iter().map(usize::to_string).collect();
+        match words.split_last() {
+            None => "no line".to_owned(),
+            Some((only, [])) => format!("line {only}"),
+            Some((last, before)) => format!("lines {} and {last}", before.join(", ")),
         }
     }
 }

@@ -1,12 +1,10 @@
 //! Operators on scalars, arrays and matrices.
 
-use super::value::unequal_sizes;
 use lynkeus_expr::{Binary, Node, Unary};
 
 use super::evaluate::Evaluator;
-use super::value::{Array, Scalar, Value, describe_dims, expected_number};
+use super::value::{Scalar, Value, describe_dims, expected_number, unequal_sizes};
 use crate::diagnostic::{Problem, Result, Span};
-use crate::syntax::ast::{BinaryOperator, Relation};
 
 impl Evaluator<'_> {
     /// A number as a Real expression.
@@ -17,8 +15,8 @@ impl Evaluator<'_> {
 
     /// A truth value.
     pub(super) fn boolean(&self, value: &Value, span: Span) -> Result<Node> {
-        match value {
-            Value::Scalar(Scalar::Boolean(node)) => Ok(*node),
+        match value.as_scalar() {
+            Some(Scalar::Boolean(node)) => Ok(node),
             _ => Err(Problem::new(span, "expected a condition, found a number")
                 .hint("compare it, as in `u > 0`")),
         }
@@ -27,16 +25,15 @@ impl Evaluator<'_> {
     /// Applies an operation to every element.
     pub(super) fn map(
         &self,
-        value: Value,
+        mut value: Value,
         span: Span,
         operation: impl Fn(&Self, Scalar, Span) -> Result<Scalar>,
     ) -> Result<Value> {
-        let Array { dims, mut elements } = value.into_array();
-        self.budget.charge(elements.len() as u64, span)?;
-        for element in &mut elements {
+        self.budget.charge(value.elements.len() as u64, span)?;
+        for element in &mut value.elements {
             *element = operation(self, *element, span)?;
         }
-        Ok(Value::new(dims, elements))
+        Ok(value)
     }
 
     /// Applies an operation to the elements of two arrays of one size, or of an array and a
@@ -48,90 +45,72 @@ impl Evaluator<'_> {
         span: Span,
         operation: impl Fn(&Self, Scalar, Scalar, Span) -> Result<Scalar>,
     ) -> Result<Value> {
-        let (left, right) = (left.into_array(), right.into_array());
         if !left.dims.is_empty() && !right.dims.is_empty() && left.dims != right.dims {
             return Err(unequal_sizes(&left.dims, &right.dims, span));
         }
-        let count = left.elements.len().max(right.elements.len());
-        let count = if left.elements.is_empty() || right.elements.is_empty() {
-            0
-        } else {
-            count
+        let (dims, count) = match left.dims[..] {
+            [] => (&right.dims, right.elements.len()),
+            _ => (&left.dims, left.elements.len()),
         };
         self.budget.charge(count as u64, span)?;
-        let at = |array: &Array, i: usize| match array.dims.is_empty() {
-            true => array.elements.first().copied(),
-            false => array.elements.get(i).copied(),
+        let at = |value: &Value, i: usize| match value.dims[..] {
+            [] => value.elements[0],
+            _ => value.elements[i],
         };
-        let pairs = (0..count).filter_map(|i| Some((at(&left, i)?, at(&right, i)?)));
-        let elements: Result<Vec<Scalar>> =
-            pairs.map(|(a, b)| operation(self, a, b, span)).collect();
-        let dims = if left.dims.is_empty() {
-            right.dims
-        } else {
-            left.dims
-        };
-        Ok(Value::new(dims, elements?))
+        let pairs = (0..count).map(|i| (at(&left, i), at(&right, i)));
+        let elements = pairs.map(|(a, b)| operation(self, a, b, span));
+        Ok(Value {
+            elements: elements.collect::<Result<_>>()?,
+            dims: dims.clone(),
+        })
     }
 
     pub(super) fn binary(
         &self,
-        operator: BinaryOperator,
+        operation: Binary,
+        elementwise: bool,
         left: Value,
         right: Value,
         span: Span,
     ) -> Result<Value> {
-        use BinaryOperator as B;
-        let scalars = left.dims().is_empty() && right.dims().is_empty();
-        match operator {
-            B::And | B::Or => {
+        match operation {
+            Binary::And | Binary::Or => {
                 let (left, right) = (self.boolean(&left, span)?, self.boolean(&right, span)?);
-                let operation = if operator == B::And {
-                    Binary::And
-                } else {
-                    Binary::Or
-                };
                 let node = self.graph.binary(operation, left, right);
-                return Ok(Value::Scalar(Scalar::Boolean(node)));
+                return Ok(Scalar::Boolean(node).into());
             }
-            B::Add | B::Subtract if left.dims() != right.dims() => {
-                let problem = unequal_sizes(left.dims(), right.dims(), span);
-                return Err(match left.dims().is_empty() || right.dims().is_empty() {
+            _ if elementwise => {}
+            Binary::Add | Binary::Sub if left.dims != right.dims => {
+                let problem = unequal_sizes(&left.dims, &right.dims, span);
+                return Err(match left.dims.is_empty() || right.dims.is_empty() {
                     true => problem.hint("`.+` and `.-` take a scalar with every element"),
                     false => problem,
                 });
             }
-            B::Multiply if !left.dims().is_empty() && !right.dims().is_empty() => {
-                return self.product(left.into_array(), right.into_array(), span);
+            Binary::Mul if !left.dims.is_empty() && !right.dims.is_empty() => {
+                return self.product(&left, &right, span);
             }
-            B::Divide if !right.dims().is_empty() => {
+            Binary::Div if !right.dims.is_empty() => {
                 return Err(Problem::new(span, "division by an array")
                     .hint("`./` divides by every element"));
             }
             _ => {}
         }
-        let operation =
-            |evaluator: &Self, a, b, span| evaluator.scalar_binary(operator, a, b, span);
-        if let (true, Value::Scalar(a), Value::Scalar(b)) = (scalars, &left, &right) {
-            return Ok(Value::Scalar(operation(self, *a, *b, span)?));
+        if let (Some(a), Some(b)) = (left.as_scalar(), right.as_scalar()) {
+            return Ok(self.scalar_binary(operation, a, b, span)?.into());
         }
-        self.elementwise(left, right, span, operation)
+        self.elementwise(left, right, span, |evaluator, a, b, span| {
+            evaluator.scalar_binary(operation, a, b, span)
+        })
     }
 
     pub(super) fn scalar_binary(
         &self,
-        operator: BinaryOperator,
+        operation: Binary,
         left: Scalar,
         right: Scalar,
         span: Span,
     ) -> Result<Scalar> {
-        use BinaryOperator as B;
-        let operation = match operator {
-            B::Add | B::ElementAdd => Binary::Add,
-            B::Subtract | B::ElementSubtract => Binary::Sub,
-            B::Multiply | B::ElementMultiply => Binary::Mul,
-            _ => Binary::Div,
-        };
         if let (Scalar::Integer(a), Scalar::Integer(b)) = (left, right) {
             let exact = match operation {
                 Binary::Add => Some(a.checked_add(b)),
@@ -166,7 +145,7 @@ impl Evaluator<'_> {
         elementwise: bool,
         span: Span,
     ) -> Result<Value> {
-        let are_scalars = base.dims().is_empty() && exponent.dims().is_empty();
+        let are_scalars = base.dims.is_empty() && exponent.dims.is_empty();
         if !elementwise && !are_scalars {
             return Err(Problem::new(span, "powers of arrays are not supported")
                 .hint("`.^` takes the power of every element"));
@@ -191,58 +170,35 @@ impl Evaluator<'_> {
 
     pub(super) fn compare(
         &self,
-        relation: Relation,
+        relation: &str,
         left: Scalar,
         right: Scalar,
         span: Span,
-    ) -> Result<Scalar> {
-        let (left, right) = match (left, right) {
-            (Scalar::Boolean(a), Scalar::Boolean(b)) => (a, b),
-            _ => (self.real(left, span)?, self.real(right, span)?),
-        };
-        let node = match relation {
-            Relation::Less => self.graph.binary(Binary::Less, left, right),
-            Relation::LessEqual => self.graph.binary(Binary::LessEq, left, right),
-            Relation::Greater => self.graph.binary(Binary::Less, right, left),
-            Relation::GreaterEqual => self.graph.binary(Binary::LessEq, right, left),
-            Relation::Equal => self.graph.binary(Binary::Equal, left, right),
-            Relation::NotEqual => {
+    ) -> Result<Node> {
+        let sides = left.with(right, self.graph);
+        let (left, right) = sides.ok_or_else(|| expected_number(span))?;
+        Ok(match relation {
+            "<" => self.graph.binary(Binary::Less, left, right),
+            "<=" => self.graph.binary(Binary::LessEq, left, right),
+            ">" => self.graph.binary(Binary::Less, right, left),
+            ">=" => self.graph.binary(Binary::LessEq, right, left),
+            "==" => self.graph.binary(Binary::Equal, left, right),
+            _ => {
                 let equal = self.graph.binary(Binary::Equal, left, right);
                 self.graph.unary(Unary::Not, equal)
             }
-        };
-        Ok(Scalar::Boolean(node))
-    }
-
-    pub(super) fn select(
-        &self,
-        condition: Node,
-        left: Scalar,
-        right: Scalar,
-        span: Span,
-    ) -> Result<Scalar> {
-        if let (Scalar::Boolean(a), Scalar::Boolean(b)) = (left, right) {
-            return Ok(Scalar::Boolean(self.graph.select(condition, a, b)));
-        }
-        let (left, right) = (self.real(left, span)?, self.real(right, span)?);
-        Ok(Scalar::Real(self.graph.select(condition, left, right)))
+        })
     }
 
     /// Scalar product, or product of matrices and vectors.
-    fn product(&self, left: Array, right: Array, span: Span) -> Result<Value> {
-        let (rows, inner) = match left.dims[..] {
-            [inner] => (1, inner),
-            [rows, inner] => (rows, inner),
-            _ => return Err(no_product(&left.dims, &right.dims, span)),
+    fn product(&self, left: &Value, right: &Value, span: Span) -> Result<Value> {
+        let (rows, inner, columns) = match (&left.dims[..], &right.dims[..]) {
+            (&[inner], &[across]) if inner == across => (1, inner, 1),
+            (&[inner], &[across, columns]) if inner == across => (1, inner, columns),
+            (&[rows, inner], &[across]) if inner == across => (rows, inner, 1),
+            (&[rows, inner], &[across, columns]) if inner == across => (rows, inner, columns),
+            (left, right) => return Err(no_product(left, right, span)),
         };
-        let (across, columns) = match right.dims[..] {
-            [across] => (across, 1),
-            [across, columns] => (across, columns),
-            _ => return Err(no_product(&left.dims, &right.dims, span)),
-        };
-        if inner != across {
-            return Err(no_product(&left.dims, &right.dims, span));
-        }
         let work = (rows as u64)
             .saturating_mul(inner as u64)
             .saturating_mul(columns as u64);
@@ -251,17 +207,16 @@ impl Evaluator<'_> {
         let mut elements = Vec::with_capacity(rows * columns);
         for row in 0..rows {
             for column in 0..columns {
-                let terms = (0..inner).filter_map(|k| {
-                    let a = left.elements.get(row * inner + k)?;
-                    Some((*a, *right.elements.get(k * columns + column)?))
-                });
+                let left = left.elements[row * inner..].iter().take(inner);
+                let right = right.elements.iter().skip(column).step_by(columns);
+                let terms = left.copied().zip(right.copied());
                 elements.push(self.sum_of_products(terms, span)?);
             }
         }
         let mut dims = vec![];
         dims.extend((left.dims.len() == 2).then_some(rows));
         dims.extend((right.dims.len() == 2).then_some(columns));
-        Ok(Value::new(dims, elements))
+        Ok(Value { dims, elements })
     }
 
     fn sum_of_products(
@@ -276,9 +231,9 @@ impl Evaluator<'_> {
             if a.number(self.graph) == Some(0.0) || b.number(self.graph) == Some(0.0) {
                 continue;
             }
-            let term = self.scalar_binary(BinaryOperator::Multiply, a, b, span)?;
+            let term = self.scalar_binary(Binary::Mul, a, b, span)?;
             sum = Some(match sum {
-                Some(sum) => self.scalar_binary(BinaryOperator::Add, sum, term, span)?,
+                Some(sum) => self.scalar_binary(Binary::Add, sum, term, span)?,
                 None => term,
             });
         }
@@ -286,11 +241,11 @@ impl Evaluator<'_> {
     }
 }
 
-pub(super) fn overflow(span: Span) -> Problem {
+pub(super) fn overflow(span: Span) -> Box<Problem> {
     Problem::new(span, "this Integer does not fit in 64 bits").hint("use Real numbers")
 }
 
-fn no_product(left: &[usize], right: &[usize], span: Span) -> Problem {
+fn no_product(left: &[usize], right: &[usize], span: Span) -> Box<Problem> {
     let (left, right) = (describe_dims(left), describe_dims(right));
     Problem::new(span, format!("no product of sizes {left} and {right}"))
         .hint("the inner sizes of a matrix product must agree; `.*` multiplies element by element")

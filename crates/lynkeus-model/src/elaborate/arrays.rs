@@ -1,13 +1,14 @@
 //! Arrays: constructors (`{…}`, `[…; …]`, ranges, comprehensions), subscripts (`x[2:end]`), and the
 //! functions that make, measure and reduce them.
 
-use super::arithmetic::overflow;
-use super::evaluate::Evaluator;
+use lynkeus_expr::Binary;
+
+use super::evaluate::{Evaluator, HOW_TO_BE_WHOLE};
 use super::scope::Named;
-use super::value::{Array, Scalar, Value, describe_dims, element_count, unequal_sizes};
+use super::value::{Scalar, Value, describe_dims, element_count, unequal_sizes};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_RANK;
-use crate::syntax::ast::{BinaryOperator, Call, ExprId, ForIndex, Kind};
+use crate::syntax::ast::{Call, ExprId, ForIndex, Kind};
 use crate::syntax::{plain, too_many_dimensions};
 
 impl<'a> Evaluator<'a> {
@@ -22,19 +23,18 @@ impl<'a> Evaluator<'a> {
         let Some(first) = values.first() else {
             return Ok(Value::vector(vec![]));
         };
-        if let Some(other) = values.iter().find(|value| value.dims() != first.dims()) {
-            let (one, two) = (describe_dims(first.dims()), describe_dims(other.dims()));
+        if let Some(other) = values.iter().find(|value| value.dims != first.dims) {
+            let (one, two) = (describe_dims(&first.dims), describe_dims(&other.dims));
             let message = format!("the elements differ in size: {one} and {two}");
             return Err(Problem::new(span, message));
         }
-        let mut dims = vec![values.len()];
-        dims.extend(first.dims());
+        let dims = [&[values.len()], &first.dims[..]].concat();
         let mut elements = Vec::with_capacity(values.len());
         for value in &values {
-            self.budget.charge(value.elements().len() as u64, span)?;
-            elements.extend_from_slice(value.elements());
+            self.budget.charge(value.elements.len() as u64, span)?;
+            elements.extend_from_slice(&value.elements);
         }
-        Ok(Value::Array(Array { dims, elements }))
+        Ok(Value { dims, elements })
     }
 
     /// `[a, b; c, d]`
@@ -43,34 +43,31 @@ impl<'a> Evaluator<'a> {
         for row in rows {
             let mut parts = vec![];
             for &id in row {
-                parts.push(as_matrix(self.value(id)?, self.span(id))?);
+                let part = self.value(id)?;
+                let message = "expected a scalar, a vector or a matrix";
+                let dims = matrix_dims(&part.dims);
+                let dims = dims.ok_or_else(|| Problem::new(self.span(id), message))?;
+                parts.push(Value { dims, ..part });
             }
             stacked.push(self.concatenate(1, parts, span)?);
         }
-        let Array { dims, elements } = self.concatenate(0, stacked, span)?;
-        Ok(Value::new(dims, elements))
+        self.concatenate(0, stacked, span)
     }
 
     /// Joins arrays along an axis (from 0); the other sizes must agree.
-    pub(super) fn concatenate(&self, axis: usize, parts: Vec<Array>, span: Span) -> Result<Array> {
+    fn concatenate(&self, axis: usize, parts: Vec<Value>, span: Span) -> Result<Value> {
         let Some(first) = parts.first() else {
-            return Ok(Array {
-                dims: vec![0],
-                elements: vec![],
-            });
+            return Ok(Value::vector(vec![]));
         };
+        // matrices, or arrays that have this axis
         let mut dims = first.dims.clone();
-        let without_axis = |dims: &[usize]| {
-            let mut dims = dims.to_vec();
-            if let Some(dim) = dims.get_mut(axis) {
-                *dim = 0;
+        for part in &parts[1..] {
+            dims[axis] = part.dims.get(axis).copied().unwrap_or_default();
+            if part.dims != dims {
+                return Err(unequal_sizes(&first.dims, &part.dims, span));
             }
-            dims
-        };
-        let differs = |part: &&Array| without_axis(&part.dims) != without_axis(&dims);
-        if let Some(other) = parts.iter().find(differs) {
-            return Err(unequal_sizes(&dims, &other.dims, span));
         }
+        dims[axis] = parts.iter().map(|part| part.dims[axis]).sum();
         let total: usize = parts.iter().map(|part| part.elements.len()).sum();
         self.budget.charge(total as u64, span)?;
         let outer: usize = dims.iter().take(axis).product();
@@ -81,10 +78,7 @@ impl<'a> Evaluator<'a> {
                 elements.extend(part.elements.iter().skip(row * chunk).take(chunk));
             }
         }
-        if let Some(dim) = dims.get_mut(axis) {
-            *dim = parts.iter().filter_map(|part| part.dims.get(axis)).sum();
-        }
-        Ok(Array { dims, elements })
+        Ok(Value { dims, elements })
     }
 
     /// `{e for i in r, j in s}`: the first iterator varies fastest.
@@ -116,12 +110,12 @@ impl<'a> Evaluator<'a> {
 
     /// The elements of what a loop goes over.
     pub(super) fn range_elements(&self, value: Value, span: Span) -> Result<Vec<Scalar>> {
-        if value.dims().len() != 1 {
-            let found = describe_dims(value.dims());
+        if value.dims.len() != 1 {
+            let found = describe_dims(&value.dims);
             let message = format!("expected a range, found {found}");
             return Err(Problem::new(span, message).hint("write `for i in 1:N`"));
         }
-        Ok(value.into_array().elements)
+        Ok(value.elements)
     }
 
     /// `a:b` and `a:step:b`
@@ -132,9 +126,9 @@ impl<'a> Evaluator<'a> {
         stop: ExprId,
         span: Span,
     ) -> Result<Value> {
-        let mut bound = |id: ExprId| match self.structural(id)? {
-            Value::Scalar(scalar) => Ok(scalar),
-            Value::Array(_) => Err(Problem::new(self.span(id), "a bound must be a scalar")),
+        let mut bound = |id: ExprId| {
+            let scalar = self.structural(id)?.as_scalar();
+            scalar.ok_or_else(|| Problem::new(self.span(id), "a bound must be a scalar"))
         };
         let step = step.map_or(Ok(Scalar::Integer(1)), &mut bound)?;
         let (start, stop) = (bound(start)?, bound(stop)?);
@@ -148,34 +142,20 @@ impl<'a> Evaluator<'a> {
     }
 
     fn integer_range(&self, start: i64, step: i64, stop: i64, span: Span) -> Result<Value> {
-        let turns = (i128::from(stop) - i128::from(start)) / i128::from(step) + 1;
-        let forward = if step > 0 {
-            start <= stop
-        } else {
-            start >= stop
-        };
-        let count = if forward {
-            u64::try_from(turns).unwrap_or(u64::MAX)
-        } else {
-            0
-        };
+        let [start, step, stop] = [start, step, stop].map(i128::from);
+        let turns = ((stop - start) * step.signum()).div_euclid(step.abs()) + 1;
+        let count = u64::try_from(turns.max(0)).unwrap_or(u64::MAX);
         self.budget.charge(count, span)?;
-        let mut elements = vec![];
-        for turn in 0..count as i64 {
-            let value = turn
-                .checked_mul(step)
-                .and_then(|offset| start.checked_add(offset));
-            elements.push(Scalar::Integer(value.ok_or_else(|| overflow(span))?));
-        }
-        Ok(Value::vector(elements))
+        // between the bounds, and so in 64 bits
+        let value = |turn: u64| Scalar::Integer((start + i128::from(turn) * step) as i64);
+        Ok(Value::vector((0..count).map(value).collect()))
     }
 
     fn real_range(&self, start: Scalar, step: Scalar, stop: Scalar, span: Span) -> Result<Value> {
         let known = |scalar: Scalar| {
             let message = "the bounds of a range must be known numbers";
-            scalar
-                .number(self.graph)
-                .ok_or_else(|| Problem::new(span, message))
+            let number = scalar.number(self.graph);
+            number.ok_or_else(|| Problem::new(span, message))
         };
         let (start, step, stop) = (known(start)?, known(step)?, known(stop)?);
         let turns = ((stop - start) / step).floor() + 1.0;
@@ -185,84 +165,44 @@ impl<'a> Evaluator<'a> {
         // A saturating cast: anything too large is refused by the budget.
         let count = turns.max(0.0) as u64;
         self.budget.charge(count, span)?;
-        let value = |turn: u64| self.graph.constant(start + turn as f64 * step).node();
-        Ok(Value::vector(
-            (0..count).map(|turn| Scalar::Real(value(turn))).collect(),
-        ))
-    }
-
-    /// The sum of scalars, from the left.
-    pub(super) fn sum(&self, elements: &[Scalar], span: Span) -> Result<Scalar> {
-        self.fold(BinaryOperator::Add, elements, Scalar::Integer(0), span)
+        let value = |turn: u64| self.graph.constant(start + turn as f64 * step);
+        let values = (0..count).map(|turn| Scalar::Real(value(turn).node()));
+        Ok(Value::vector(values.collect()))
     }
 
     /// The elements joined by an operator; `empty` where there are none.
-    pub(super) fn fold(
-        &self,
-        operator: BinaryOperator,
-        elements: &[Scalar],
-        empty: Scalar,
-        span: Span,
-    ) -> Result<Scalar> {
+    fn fold(&self, operator: Binary, elements: &[Scalar], empty: i64, span: Span) -> Result<Value> {
         self.budget.charge(elements.len() as u64, span)?;
         let Some((&first, rest)) = elements.split_first() else {
-            return Ok(empty);
+            return Ok(Scalar::Integer(empty).into());
         };
-        rest.iter().try_fold(first, |sum, &next| {
-            self.scalar_binary(operator, sum, next, span)
-        })
+        let join = |sum, &next| self.scalar_binary(operator, sum, next, span);
+        rest.iter().try_fold(first, join).map(Value::from)
     }
-}
-
-/// A scalar as 1 × 1, a vector as a column.
-fn as_matrix(value: Value, span: Span) -> Result<Array> {
-    let Array { mut dims, elements } = value.into_array();
-    if dims.len() > 2 {
-        return Err(Problem::new(
-            span,
-            "expected a scalar, a vector or a matrix",
-        ));
-    }
-    dims.resize(2, 1);
-    Ok(Array { dims, elements })
 }
 
 impl<'a> Evaluator<'a> {
-    /// `None` where there is no such function.
-    pub(super) fn array_function(
-        &mut self,
-        name: &str,
-        call: &'a Call,
-        span: Span,
-    ) -> Result<Option<Value>> {
-        let value = match name {
-            "sum" => {
-                let elements = self.reduced(call, span)?;
-                Value::Scalar(self.sum(&elements, span)?)
-            }
-            "product" => {
-                let elements = self.reduced(call, span)?;
-                let empty = Scalar::Integer(1);
-                Value::Scalar(self.fold(BinaryOperator::Multiply, &elements, empty, span)?)
-            }
-            "array" if !call.iterators.is_empty() => self.iterated(call, span)?,
-            "array" => self.array(&call.arguments, span)?,
-            "size" => self.size(call)?,
-            "ndims" => {
-                let [argument] = self.arguments(call)?;
-                Value::Scalar(integer(self.dims_of(argument)?.len()))
-            }
-            "zeros" => self.filled(Scalar::Integer(0), &call.arguments, span)?,
-            "ones" => self.filled(Scalar::Integer(1), &call.arguments, span)?,
-            "fill" => self.fill(call, span)?,
-            "linspace" => self.linspace(call, span)?,
-            "identity" | "diagonal" => self.diagonal(name, call, span)?,
-            "transpose" => self.transpose(call, span)?,
-            "cat" => self.cat(call, span)?,
-            "scalar" | "vector" | "matrix" => self.reshaped(name, call, span)?,
-            _ => return Ok(None),
-        };
-        Ok(Some(value))
+    pub(super) fn sum(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+        let elements = self.reduced(call, span)?;
+        self.fold(Binary::Add, &elements, 0, span)
+    }
+
+    pub(super) fn product_of_all(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+        let elements = self.reduced(call, span)?;
+        self.fold(Binary::Mul, &elements, 1, span)
+    }
+
+    /// `array(a, b)` or `array(e for i in r)`
+    pub(super) fn array_of(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+        match call.iterators.is_empty() {
+            true => self.array(&call.arguments, span),
+            false => self.iterated(call, span),
+        }
+    }
+
+    pub(super) fn ndims(&mut self, call: &'a Call) -> Result<Value> {
+        let [argument] = self.arguments(call)?;
+        Ok(integer(self.dims_of(argument)?.len()).into())
     }
 
     /// The elements that `sum(A)` or `sum(e for i in r)` goes over.
@@ -271,7 +211,7 @@ impl<'a> Evaluator<'a> {
             true => self.only_argument(call)?,
             false => self.iterated(call, span)?,
         };
-        Ok(value.into_array().elements)
+        Ok(value.elements)
     }
 
     fn iterated(&mut self, call: &'a Call, span: Span) -> Result<Value> {
@@ -285,18 +225,17 @@ impl<'a> Evaluator<'a> {
     fn dims_of(&mut self, argument: ExprId) -> Result<Vec<usize>> {
         if matches!(self.ast.expression(argument).kind, Kind::Name) {
             let name = plain(self.text(self.span(argument)));
-            let known = match self.local(&name) {
-                Some(local) => local.ok().map(|local| local.dims.as_slice()),
-                None => self.scope.dims(&name),
-            };
+            let declared = || self.symbols.dims(&name).filter(|_| !self.is_closed());
+            let local = self.local(&name).map(|local| local.dims.as_slice());
+            let known = local.or_else(declared);
             if let Some(dims) = known.filter(|_| self.iterator(&name).is_none()) {
                 return Ok(dims.to_vec());
             }
         }
-        Ok(self.value(argument)?.dims().to_vec())
+        Ok(self.value(argument)?.dims)
     }
 
-    fn size(&mut self, call: &Call) -> Result<Value> {
+    pub(super) fn size(&mut self, call: &'a Call) -> Result<Value> {
         if call.arguments.len() == 1 {
             let [array] = self.arguments(call)?;
             let dims = self.dims_of(array)?;
@@ -308,27 +247,29 @@ impl<'a> Evaluator<'a> {
         let dim = usize::try_from(number)
             .ok()
             .and_then(|axis| dims.get(axis.checked_sub(1)?));
-        dim.map(|&dim| Value::Scalar(integer(dim))).ok_or_else(|| {
-            let found = describe_dims(&dims);
-            let message = format!("there is no dimension {number}: the size is {found}");
-            Problem::new(self.span(axis), message)
-        })
+        let dim = dim.copied().map(|dim| integer(dim).into());
+        dim.ok_or_else(|| self.no_dimension(number, &dims, axis))
     }
 
-    fn fill(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn fill(&mut self, call: &'a Call, span: Span) -> Result<Value> {
         match call.arguments.split_first() {
-            Some((&value, dims)) if !dims.is_empty() => {
+            Some((&value, sizes)) if !sizes.is_empty() => {
                 let value = self.scalar(value)?;
-                self.filled(value, dims, span)
+                self.with_all(value, sizes, span)
             }
-            _ => Err(Problem::new(
-                span,
-                "`fill` takes a value and at least one size",
-            )),
+            _ => {
+                let message = "`fill` takes a value and at least one size";
+                Err(Problem::new(span, message))
+            }
         }
     }
 
-    fn filled(&mut self, value: Scalar, sizes: &[ExprId], span: Span) -> Result<Value> {
+    /// `zeros(2, 3)` and `ones(2, 3)`
+    pub(super) fn filled(&mut self, value: i64, call: &Call, span: Span) -> Result<Value> {
+        self.with_all(Scalar::Integer(value), &call.arguments, span)
+    }
+
+    fn with_all(&mut self, value: Scalar, sizes: &[ExprId], span: Span) -> Result<Value> {
         let dims: Result<Vec<usize>> = sizes.iter().map(|&size| self.length(size)).collect();
         let dims = dims?;
         if dims.is_empty() {
@@ -341,22 +282,20 @@ impl<'a> Evaluator<'a> {
         let walked: Vec<usize> = dims.iter().map(|&dim| dim.max(1)).collect();
         self.budget
             .charge(element_count(&walked).unwrap_or(u64::MAX), span)?;
-        let count = dims.iter().product();
-        Ok(Value::new(dims, vec![value; count]))
+        let elements = vec![value; dims.iter().product()];
+        Ok(Value { dims, elements })
     }
 
     /// A size: an Integer from 0 on.
     pub(crate) fn length(&mut self, id: ExprId) -> Result<usize> {
         let value = self.known_integer(id, "a size")?;
         usize::try_from(value).map_err(|_| {
-            Problem::new(
-                self.span(id),
-                format!("a size must not be negative, this is {value}"),
-            )
+            let message = format!("a size must not be negative, this is {value}");
+            Problem::new(self.span(id), message)
         })
     }
 
-    fn linspace(&mut self, call: &Call, span: Span) -> Result<Value> {
+    pub(super) fn linspace(&mut self, call: &'a Call, span: Span) -> Result<Value> {
         let [from, to, count] = self.arguments(call)?;
         let (from, to) = (self.scalar(from)?, self.scalar(to)?);
         let (from, to) = (self.real(from, span)?, self.real(to, span)?);
@@ -373,16 +312,19 @@ impl<'a> Evaluator<'a> {
         Ok(Value::vector((0..count).map(point).collect()))
     }
 
-    fn diagonal(&mut self, name: &str, call: &Call, span: Span) -> Result<Value> {
+    pub(super) fn identity(&mut self, call: &'a Call, span: Span) -> Result<Value> {
         let [argument] = self.arguments(call)?;
-        let entries = match name {
-            "identity" => {
-                let n = self.length(argument)?;
-                self.budget.charge(n as u64, span)?;
-                vec![Scalar::Integer(1); n]
-            }
-            _ => self.value(argument)?.into_array().elements,
-        };
+        let n = self.length(argument)?;
+        self.budget.charge(n as u64, span)?;
+        self.with_diagonal(vec![Scalar::Integer(1); n], span)
+    }
+
+    pub(super) fn diagonal(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+        let entries = self.only_argument(call)?.elements;
+        self.with_diagonal(entries, span)
+    }
+
+    fn with_diagonal(&self, entries: Vec<Scalar>, span: Span) -> Result<Value> {
         let n = entries.len();
         let count = element_count(&[n, n]).unwrap_or(u64::MAX);
         self.budget.charge(count, span)?;
@@ -390,76 +332,85 @@ impl<'a> Evaluator<'a> {
         for (place, entry) in elements.iter_mut().step_by(n + 1).zip(entries) {
             *place = entry;
         }
-        Ok(Value::new(vec![n, n], elements))
+        let dims = vec![n, n];
+        Ok(Value { dims, elements })
     }
 
-    fn transpose(&mut self, call: &Call, span: Span) -> Result<Value> {
-        let Array { dims, elements } = self.only_argument(call)?.into_array();
+    pub(super) fn transpose(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+        let Value { dims, elements } = self.only_argument(call)?;
         let [rows, columns] = dims[..] else {
             let message = format!("`transpose` takes a matrix, found {}", describe_dims(&dims));
             return Err(Problem::new(span, message));
         };
         self.budget.charge(elements.len() as u64, span)?;
         let places = (0..columns).flat_map(|j| (0..rows).map(move |i| i * columns + j));
-        let turned = places
-            .filter_map(|place| elements.get(place).copied())
-            .collect();
-        Ok(Value::new(vec![columns, rows], turned))
+        Ok(Value {
+            dims: vec![columns, rows],
+            elements: places.map(|place| elements[place]).collect(),
+        })
     }
 
-    fn cat(&mut self, call: &Call, span: Span) -> Result<Value> {
+    pub(super) fn cat(&mut self, call: &'a Call, span: Span) -> Result<Value> {
         let Some((&axis, parts)) = call.arguments.split_first() else {
             return Err(Problem::new(span, "`cat` takes a dimension and arrays"));
         };
         let axis = self.length(axis)?;
         let mut arrays = vec![];
         for &part in parts {
-            let array = self.value(part)?.into_array();
+            let array = self.value(part)?;
             if axis == 0 || axis > array.dims.len() {
-                let found = describe_dims(&array.dims);
-                let message = format!("there is no dimension {axis}: the size is {found}");
-                return Err(Problem::new(self.span(part), message));
+                return Err(self.no_dimension(axis as i64, &array.dims, part));
             }
             arrays.push(array);
         }
-        let Array { dims, elements } = self.concatenate(axis.saturating_sub(1), arrays, span)?;
-        Ok(Value::new(dims, elements))
+        self.concatenate(axis.saturating_sub(1), arrays, span)
     }
 
-    fn reshaped(&mut self, name: &str, call: &Call, span: Span) -> Result<Value> {
-        let Array { dims, elements } = self.only_argument(call)?.into_array();
-        let long = dims.iter().filter(|&&dim| dim != 1).count();
-        let allowed = match name {
-            "scalar" => elements.len() == 1,
-            "vector" => long <= 1,
-            _ => dims.len() <= 2,
-        };
-        if !allowed {
-            let message = format!("`{name}` of an array of size {}", describe_dims(&dims));
-            return Err(Problem::new(span, message));
-        }
-        let dims = match name {
-            "scalar" => vec![],
-            "vector" => vec![elements.len()],
-            _ => {
-                let mut dims = dims;
-                dims.resize(2, 1);
-                dims
-            }
-        };
-        Ok(Value::new(dims, elements))
+    fn no_dimension(&self, axis: i64, dims: &[usize], at: ExprId) -> Box<Problem> {
+        let found = describe_dims(dims);
+        let message = format!("there is no dimension {axis}: the size is {found}");
+        Problem::new(self.span(at), message)
     }
+
+    /// `scalar(A)`, `vector(A)`, `matrix(A)`: the same elements with other dimensions; none where
+    /// the size is not one of these.
+    pub(super) fn reshaped(
+        &mut self,
+        call: &'a Call,
+        span: Span,
+        reshape: impl Fn(&[usize]) -> Option<Vec<usize>>,
+    ) -> Result<Value> {
+        let mut value = self.only_argument(call)?;
+        let dims = reshape(&value.dims).ok_or_else(|| {
+            let (name, found) = (self.function_name(call), describe_dims(&value.dims));
+            Problem::new(span, format!("`{name}` of an array of size {found}"))
+        })?;
+        value.dims = dims;
+        Ok(value)
+    }
+}
+
+/// The size of an array with a single element as that of a scalar.
+pub(super) fn scalar_dims(dims: &[usize]) -> Option<Vec<usize>> {
+    dims.iter().all(|&dim| dim == 1).then(Vec::new)
+}
+
+/// That of one which is long in one direction at most as that of a vector.
+pub(super) fn vector_dims(dims: &[usize]) -> Option<Vec<usize>> {
+    let long = dims.iter().filter(|&&dim| dim != 1).count();
+    (long <= 1).then(|| vec![dims.iter().product()])
+}
+
+/// A scalar's as 1 × 1, a vector's as that of a column.
+pub(super) fn matrix_dims(dims: &[usize]) -> Option<Vec<usize>> {
+    let mut matrix = dims.to_vec();
+    matrix.resize(2, 1);
+    (dims.len() <= 2).then_some(matrix)
 }
 
 /// Sizes fit an Integer: every one of them is below the limit on elements.
 fn integer(size: usize) -> Scalar {
     Scalar::Integer(i64::try_from(size).unwrap_or(i64::MAX))
-}
-
-/// The places that one subscript selects, from 0.
-enum Places {
-    One(usize),
-    Many(Vec<usize>),
 }
 
 impl<'a> Evaluator<'a> {
@@ -471,16 +422,14 @@ impl<'a> Evaluator<'a> {
     ) -> Result<Value> {
         let name = self.span(base);
         if !matches!(self.ast.expression(base).kind, Kind::Name) {
-            let Array { dims, elements } = self.value(base)?.into_array();
-            self.check_rank("the array", &dims, subscripts, span)?;
-            let places = self.places("the array", &dims, subscripts)?;
-            return self.gather(&dims, &elements, &places, span);
+            let Value { dims, elements } = self.value(base)?;
+            return self.gather("the array", &dims, &elements, subscripts, span);
         }
         let text = plain(self.text(name));
         if self.iterator(&text).is_some() {
             return Err(not_an_array(&text, name));
         }
-        self.index_at(&text, subscripts, name, span)
+        self.index_named(&text, subscripts, name, span)
     }
 
     /// Elements of the array of this name.
@@ -488,52 +437,24 @@ impl<'a> Evaluator<'a> {
         &mut self,
         text: &str,
         subscripts: &[ExprId],
-        span: Span,
-    ) -> Result<Value> {
-        self.index_at(text, subscripts, span, span)
-    }
-
-    fn index_at(
-        &mut self,
-        text: &str,
-        subscripts: &[ExprId],
         name: Span,
         span: Span,
     ) -> Result<Value> {
-        if let Some(Ok(local)) = self.local(text) {
+        if let Some(local) = self.local(text) {
             let dims = local.dims.clone();
-            let (kept, offsets) = self.selected(text, &dims, subscripts, span)?;
-            let local = self.local(text).and_then(std::result::Result::ok);
-            let element = |&offset: &usize| local?.elements.get(offset).copied()?;
+            let (dims, offsets) = self.selected(text, &dims, subscripts, span)?;
+            let local = self.local(text);
+            let element = |&offset: &usize| local?.elements[offset];
             let elements: Option<Vec<Scalar>> = offsets.iter().map(element).collect();
             let elements = elements.ok_or_else(|| self.unassigned(text, name))?;
-            return Ok(Value::new(kept, elements));
+            return Ok(Value { dims, elements });
         }
         match self.named(text) {
-            Named::Array(dims, elements) => {
-                self.check_rank(text, dims, subscripts, span)?;
-                let places = self.places(text, dims, subscripts)?;
-                self.gather(dims, elements, &places, span)
-            }
+            Named::Array(dims, elements) => self.gather(text, dims, elements, subscripts, span),
             Named::Scalar(_) => Err(not_an_array(text, name)),
             Named::Unknown => self.index_by_full_name(text, name, subscripts),
             found => self.meant(found, name),
         }
-    }
-
-    /// The size that subscripts select, and the offsets of its elements.
-    pub(super) fn selected(
-        &mut self,
-        text: &str,
-        dims: &[usize],
-        subscripts: &[ExprId],
-        span: Span,
-    ) -> Result<(Vec<usize>, Vec<usize>)> {
-        if !subscripts.is_empty() {
-            self.check_rank(text, dims, subscripts, span)?;
-        }
-        let places = self.places(text, dims, subscripts)?;
-        self.offsets(dims, &places, span)
     }
 
     /// Names such as `x[3]` that the caller of a single expression knows.
@@ -543,25 +464,36 @@ impl<'a> Evaluator<'a> {
         name: Span,
         subscripts: &[ExprId],
     ) -> Result<Value> {
-        let mut numbers = vec![];
-        for &subscript in subscripts {
-            if matches!(self.ast.expression(subscript).kind, Kind::All | Kind::End) {
-                return Err(self.unknown_name(name));
-            }
-            numbers.push(self.known_integer(subscript, "a subscript")?.to_string());
+        let is_open = |&id: &ExprId| matches!(self.ast.expression(id).kind, Kind::All | Kind::End);
+        if subscripts.iter().any(is_open) {
+            return Err(self.unknown_name(name));
         }
-        let full = format!("{text}[{}]", numbers.join(","));
+        let full = format!("{text}[{}]", self.numbers(subscripts)?);
         self.meant(self.named(&full), name)
     }
 
-    fn check_rank(
-        &self,
+    fn gather(
+        &mut self,
+        text: &str,
+        dims: &[usize],
+        elements: &[Scalar],
+        subscripts: &[ExprId],
+        span: Span,
+    ) -> Result<Value> {
+        let (dims, offsets) = self.selected(text, dims, subscripts, span)?;
+        let elements = offsets.into_iter().map(|offset| elements[offset]).collect();
+        Ok(Value { dims, elements })
+    }
+
+    /// The size that subscripts select, and the offsets of its elements: all, where there are none.
+    pub(super) fn selected(
+        &mut self,
         text: &str,
         dims: &[usize],
         subscripts: &[ExprId],
         span: Span,
-    ) -> Result<()> {
-        if dims.is_empty() {
+    ) -> Result<(Vec<usize>, Vec<usize>)> {
+        if dims.is_empty() && !subscripts.is_empty() {
             return Err(not_an_array(text, span));
         }
         if subscripts.len() > dims.len() {
@@ -569,84 +501,54 @@ impl<'a> Evaluator<'a> {
             let message = format!("{given} subscripts, but `{text}` has the size {has}");
             return Err(Problem::new(span, message));
         }
-        Ok(())
-    }
-
-    fn places(&mut self, text: &str, dims: &[usize], subscripts: &[ExprId]) -> Result<Vec<Places>> {
-        let mut places = Vec::with_capacity(subscripts.len());
-        for (&subscript, &dim) in subscripts.iter().zip(dims) {
-            self.ends.push(dim);
-            let place = self.place(text, dim, subscript);
-            self.ends.pop();
-            places.push(place?);
-        }
-        Ok(places)
-    }
-
-    fn place(&mut self, text: &str, dim: usize, subscript: ExprId) -> Result<Places> {
-        let span = self.span(subscript);
-        if matches!(self.ast.expression(subscript).kind, Kind::All) {
-            self.budget.charge(dim as u64, span)?;
-            return Ok(Places::Many((0..dim).collect()));
-        }
-        match self.structural(subscript)? {
-            Value::Array(Array { dims, elements }) if dims.len() == 1 => {
-                let places = elements.into_iter().map(|element| match element {
-                    Scalar::Integer(value) => within(text, dim, value, span),
-                    _ => Err(not_whole(span)),
-                });
-                Ok(Places::Many(places.collect::<Result<_>>()?))
-            }
-            Value::Scalar(Scalar::Integer(value)) => {
-                Ok(Places::One(within(text, dim, value, span)?))
-            }
-            _ => Err(not_whole(span)),
-        }
-    }
-
-    fn gather(
-        &self,
-        dims: &[usize],
-        elements: &[Scalar],
-        places: &[Places],
-        span: Span,
-    ) -> Result<Value> {
-        let (kept, offsets) = self.offsets(dims, places, span)?;
-        let selected = offsets
-            .iter()
-            .filter_map(|&offset| elements.get(offset).copied());
-        Ok(Value::new(kept, selected.collect()))
-    }
-
-    fn offsets(
-        &self,
-        dims: &[usize],
-        places: &[Places],
-        span: Span,
-    ) -> Result<(Vec<usize>, Vec<usize>)> {
-        let mut kept = vec![];
-        let mut offsets = vec![0usize];
+        let (mut kept, mut offsets) = (vec![], vec![0usize]);
         for (axis, &dim) in dims.iter().enumerate() {
-            let whole;
-            let selected = match places.get(axis) {
-                Some(Places::One(place)) => std::slice::from_ref(place),
-                Some(Places::Many(places)) => {
-                    kept.push(places.len());
-                    places.as_slice()
+            let (size, places) = match subscripts.get(axis) {
+                Some(&subscript) => {
+                    self.ends.push(dim);
+                    let places = self.places(text, dim, subscript);
+                    self.ends.pop();
+                    places?
                 }
-                None => {
-                    self.budget.charge(dim as u64, span)?;
-                    kept.push(dim);
-                    whole = (0..dim).collect::<Vec<_>>();
-                    whole.as_slice()
-                }
+                None => self.all_places(dim, span)?,
             };
-            let count = element_count(&[offsets.len(), selected.len()]).unwrap_or(u64::MAX);
+            kept.extend(size);
+            let count = element_count(&[offsets.len(), places.len()]).unwrap_or(u64::MAX);
             self.budget.charge(count, span)?;
-            let step = |&offset: &usize| selected.iter().map(move |place| offset * dim + place);
+            let step = |&offset: &usize| places.iter().map(move |place| offset * dim + place);
             offsets = offsets.iter().flat_map(step).collect();
         }
         Ok((kept, offsets))
+    }
+
+    /// The places that one subscript selects, from 0, and how many these are, where it is not one by
+    /// itself.
+    fn places(
+        &mut self,
+        text: &str,
+        dim: usize,
+        subscript: ExprId,
+    ) -> Result<(Option<usize>, Vec<usize>)> {
+        let span = self.span(subscript);
+        if matches!(self.ast.expression(subscript).kind, Kind::All) {
+            return self.all_places(dim, span);
+        }
+        let value = self.structural(subscript)?;
+        let size = match value.dims[..] {
+            [] => None,
+            [size] => Some(size),
+            _ => return Err(not_whole(span)),
+        };
+        let places = value.elements.into_iter().map(|element| match element {
+            Scalar::Integer(value) => within(text, dim, value, span),
+            _ => Err(not_whole(span)),
+        });
+        Ok((size, places.collect::<Result<_>>()?))
+    }
+
+    fn all_places(&self, dim: usize, span: Span) -> Result<(Option<usize>, Vec<usize>)> {
+        self.budget.charge(dim as u64, span)?;
+        Ok((Some(dim), (0..dim).collect()))
     }
 }
 
@@ -655,25 +557,17 @@ fn within(text: &str, dim: usize, value: i64, span: Span) -> Result<usize> {
         .ok()
         .filter(|place| (1..=dim).contains(place));
     place.map(|place| place - 1).ok_or_else(|| {
-        Problem::new(
-            span,
-            format!("subscript {value} of `{text}` is outside 1..{dim}"),
-        )
-        .label(format!("this is {value}"))
+        let message = format!("subscript {value} of `{text}` is outside 1..{dim}");
+        Problem::new(span, message).label(format!("this is {value}"))
     })
 }
 
-fn not_an_array(text: &str, span: Span) -> Problem {
-    Problem::new(
-        span,
-        format!("`{text}` is a scalar and takes no subscripts"),
-    )
+fn not_an_array(text: &str, span: Span) -> Box<Problem> {
+    let message = format!("`{text}` is a scalar and takes no subscripts");
+    Problem::new(span, message)
 }
 
-fn not_whole(span: Span) -> Problem {
-    Problem::new(
-        span,
-        "a subscript must be an Integer or a range of Integers",
-    )
-    .hint("`/` and `^` always give a Real: use `div(a, b)` or `integer(a)`")
+fn not_whole(span: Span) -> Box<Problem> {
+    let message = "a subscript must be an Integer or a range of Integers";
+    Problem::new(span, message).hint(HOW_TO_BE_WHOLE)
 }

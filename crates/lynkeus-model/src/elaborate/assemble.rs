@@ -5,36 +5,29 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use lynkeus_expr::{Binary, Graph, Interval, Node, Tape, Unary, jacobian};
 
+use super::evaluate::Evaluator;
 use super::flatten::Flat;
-use super::scope::{Context, Mode};
+use super::scope::Mode;
 use super::symbols::{Component, Symbols, is_outer_input};
 use super::value::{Scalar, describe_dims, element_name};
 use crate::balance::{FlatEquation, System, Unknown};
 use crate::diagnostic::{Problem, Result, Span};
-use crate::syntax::ast::{Causality, Declaration, ExprId, Kind, TypeName, Variability};
+use crate::syntax::ast::{Attribute, Causality, Declaration, ExprId, Kind, TypeName, Variability};
 use crate::syntax::{plain, unquoted};
 use crate::{Assertion, Parameter, Plant, Variable, balance};
 
 /// The plant, with what looks wrong in it. Its graph is still the caller's: this one is empty.
-pub(super) fn plant<'a>(
-    context: &Context<'a>,
-    symbols: &Symbols<'a>,
-    flat: Flat,
-) -> Result<(Plant, Vec<Problem>)> {
-    let (unknowns, inputs) = unknowns(context, symbols, &flat.equations)?;
-    let graph = context.graph;
-    let system = System {
-        graph,
-        equations: &flat.equations,
-        unknowns: &unknowns,
-        inputs: &inputs,
-        time: symbols.time,
-    };
-    let solution = balance::solve(&system, context.source, context.model.name)?;
+pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec<Box<Problem>>)> {
+    let (graph, model) = (symbols.graph, symbols.model);
+    let (unknowns, inputs) = unknowns(symbols, &flat.equations)?;
+    let equations = std::mem::take(&mut flat.equations);
+    let time = symbols.time();
+    let system = System::new(graph, symbols.source, equations, unknowns, &inputs, time);
+    let solution = balance::solve(system, model.name)?;
     let mut plant = Plant {
-        name: context.model.title.clone(),
+        name: model.title.clone(),
         graph: Graph::new(),
-        time: symbols.time,
+        time,
         states: vec![],
         derivatives: vec![],
         inputs: vec![],
@@ -46,44 +39,40 @@ pub(super) fn plant<'a>(
         warnings: vec![],
     };
     let inputs: HashSet<Node> = inputs.into_iter().collect();
-    for (place, declaration, component) in symbols.placed() {
+    for (place, declaration, component) in symbols.all() {
         if declaration.package.is_some() {
             continue;
         }
-        let attributes = Declared::new(context, symbols, declaration, component)?;
-        if declaration.prefix.variability == Variability::Continuous {
-            variables(symbols, &attributes, &inputs, &solution, &mut plant);
-        } else if !symbols.dependent.get(place).copied().unwrap_or_default() {
-            parameters(graph, &attributes, &mut plant);
+        let elements = elements(symbols, declaration, component)?;
+        if declaration.variability == Variability::Continuous {
+            let is_output = declaration.causality == Causality::Output;
+            for element in elements {
+                variable(symbols, element, is_output, &inputs, &solution, &mut plant);
+            }
+        } else if !symbols.dependent[place] {
+            parameters(graph, declaration, component, elements, &mut plant);
         }
     }
-    let mut warnings = fix_starts(graph, symbols, &flat, &solution, &mut plant.states);
-    let found = assertions(context, flat.claims, &solution);
-    let variables: Vec<&Variable> = plant.states.iter().chain(&plant.inputs).collect();
-    warnings.extend(failing_at_start(graph, symbols, &found, &variables));
-    plant.table_points = context.table_points.take();
+    let mut warnings = fix_starts(symbols, &flat, &solution, &mut plant.states);
+    let found = assertions(graph, flat.claims, &solution);
+    warnings.extend(failing_at_start(symbols, &found, &plant));
+    plant.table_points = symbols.table_points.take();
     plant.assertions = found.into_iter().map(|(assertion, _)| assertion).collect();
     Ok((plant, warnings))
 }
 
 /// Derivatives of the states and all other variables, and the inputs apart.
 fn unknowns(
-    context: &Context<'_>,
     symbols: &Symbols<'_>,
     equations: &[FlatEquation],
 ) -> Result<(Vec<Unknown>, Vec<Node>)> {
     let (mut unknowns, mut inputs) = (vec![], vec![]);
-    let equated: HashSet<Node> = equations
-        .iter()
-        .flat_map(|equation| [equation.left, equation.right])
-        .collect();
-    for (declaration, component) in symbols.all() {
-        if component.is_known {
-            continue;
-        }
-        let is_input = declaration.prefix.causality == Causality::Input;
-        let attributes = Declared::new(context, symbols, declaration, component)?;
-        for (offset, node) in nodes(component).enumerate() {
+    let sides = equations.iter().flat_map(|e| [e.left, e.right]);
+    let equated: HashSet<Node> = sides.collect();
+    for (_, declaration, component) in symbols.all().filter(|(.., c)| !c.is_known) {
+        let is_input = declaration.causality == Causality::Input;
+        for element in elements(symbols, declaration, component)? {
+            let node = element.node;
             let is_open = declaration.binding.is_none() && !equated.contains(&node);
             if is_input && (is_open || is_outer_input(declaration)) {
                 inputs.push(node);
@@ -93,14 +82,14 @@ fn unknowns(
             // nothing is declared of derivatives
             let (start, range) = match derivative {
                 Some(_) => (0.0, Interval::ENTIRE),
-                None => attributes.search(offset),
+                None => search(&element),
             };
             unknowns.push(Unknown {
                 symbol: derivative.unwrap_or(node),
-                name: element_name(&declaration.label, &component.dims, offset),
+                name: element.name,
                 span: declaration.name,
                 state: derivative.map(|_| node),
-                rank: rank(context, declaration),
+                rank: rank(symbols, declaration),
                 start,
                 range,
             });
@@ -109,14 +98,21 @@ fn unknowns(
     Ok((unknowns, inputs))
 }
 
+/// Where the search for a variable begins that a loop determines, and where it may end.
+fn search(variable: &Variable) -> (f64, Interval) {
+    let range = Interval::new(variable.min, variable.max).unwrap_or(Interval::ENTIRE);
+    let start = variable.start.unwrap_or(0.0);
+    (start.clamp(range.lo(), range.hi()), range)
+}
+
 /// How much a variable is wanted as a state, where the equations leave a choice.
-fn rank(context: &Context<'_>, declaration: &Declaration) -> i32 {
+fn rank(symbols: &Symbols<'_>, declaration: &Declaration) -> i32 {
     let given = |name: &str| {
         let mut attributes = declaration.attributes.iter();
-        attributes.find(|attribute| attribute.name.text(context.source) == name)
+        attributes.find(|attribute| attribute.name.text(symbols.source) == name)
     };
     let selected = given("stateSelect").and_then(|attribute| attribute.value);
-    let selected = selected.map(|id| plain(context.ast.expression(id).span.text(context.source)));
+    let selected = selected.map(|id| plain(symbols.ast.expression(id).span.text(symbols.source)));
     let wanted = match selected.as_deref() {
         Some("StateSelect.always") => 40,
         Some("StateSelect.prefer") => 20,
@@ -129,85 +125,151 @@ fn rank(context: &Context<'_>, declaration: &Declaration) -> i32 {
     wanted + 4 * (known("min") + known("max")) + 2 * known("fixed") + known("start")
 }
 
-fn nodes(component: &Component) -> impl Iterator<Item = Node> {
-    component
-        .elements
-        .iter()
-        .filter_map(|element| match element {
-            Scalar::Real(node) | Scalar::Boolean(node) => Some(*node),
-            Scalar::Integer(_) => None,
-        })
-}
-
-/// Puts the elements of a declared variable where they belong.
-fn variables(
+/// Puts an element of a declared variable where it belongs.
+fn variable(
     symbols: &Symbols<'_>,
-    declared: &Declared<'_>,
+    element: Variable,
+    is_output: bool,
     inputs: &HashSet<Node>,
     solution: &HashMap<Node, Node>,
     plant: &mut Plant,
 ) {
-    let causality = declared.declaration.prefix.causality;
-    for (offset, symbol) in nodes(declared.component).enumerate() {
-        if inputs.contains(&symbol) {
-            plant.inputs.push(declared.variable(offset, symbol));
-            continue;
-        }
-        let derivative = symbols.derivative_of(symbol);
-        let derivative = derivative.and_then(|symbol| solution.get(&symbol).copied());
-        // what was under `der` and follows from other states is none itself
-        let derivative = derivative.filter(|_| !solution.contains_key(&symbol));
-        let is_state = derivative.is_some();
-        if let Some(derivative) = derivative {
-            plant.states.push(declared.variable(offset, symbol));
-            plant.derivatives.push(derivative);
-        }
-        let value = solution.get(&symbol).copied().unwrap_or(symbol);
-        if causality == Causality::Output {
-            plant.outputs.push(declared.variable(offset, value));
-        } else if !is_state {
-            plant.algebraics.push(declared.variable(offset, value));
-        }
+    let symbol = element.node;
+    if inputs.contains(&symbol) {
+        plant.inputs.push(element);
+        return;
+    }
+    let derivative = symbols.derivative_of(symbol);
+    let derivative = derivative.and_then(|symbol| solution.get(&symbol).copied());
+    // what was under `der` and follows from other states is none itself
+    let derivative = derivative.filter(|_| !solution.contains_key(&symbol));
+    let is_state = derivative.is_some();
+    if let Some(derivative) = derivative {
+        plant.states.push(element.clone());
+        plant.derivatives.push(derivative);
+    }
+    let node = solution.get(&symbol).copied().unwrap_or(symbol);
+    let element = Variable { node, ..element };
+    if is_output {
+        plant.outputs.push(element);
+    } else if !is_state {
+        plant.algebraics.push(element);
     }
 }
 
 /// The elements of a declared parameter, where a caller may set them.
-fn parameters(graph: &Graph, declared: &Declared<'_>, plant: &mut Plant) {
-    let Declared {
-        declaration,
-        component,
-        ..
-    } = declared;
-    let prefix = &declaration.prefix;
-    let is_fixed = prefix.variability == Variability::Constant || prefix.is_final;
-    if is_fixed || prefix.type_name == TypeName::Boolean {
+fn parameters(
+    graph: &Graph,
+    declaration: &Declaration,
+    component: &Component,
+    elements: Vec<Variable>,
+    plant: &mut Plant,
+) {
+    let is_fixed = declaration.variability == Variability::Constant || declaration.is_final;
+    if is_fixed || declaration.type_name == TypeName::Boolean {
         return;
     }
-    for offset in 0..component.elements.len() {
-        let full = element_name(&declaration.label, &component.dims, offset);
-        let values = component.values.as_ref();
-        let value = values.and_then(|values| values.get(offset));
+    for (offset, mut variable) in elements.into_iter().enumerate() {
+        variable.node = graph.symbol(&variable.name).node();
+        let value = component.values.as_ref().map(|values| values[offset]);
         plant.parameters.push(Parameter {
-            variable: declared.variable(offset, graph.symbol(&full).node()),
+            variable,
             value: value.and_then(|value| value.number(graph)),
         });
     }
 }
 
-/// What a declaration says of all its elements. Numbers are one for all elements or one for each;
-/// none where nothing is given.
-struct Declared<'s> {
-    declaration: &'s Declaration,
-    component: &'s Component,
-    start: Vec<f64>,
-    /// the start as expressions
-    start_nodes: Vec<Node>,
-    min: Vec<f64>,
-    max: Vec<f64>,
-    nominal: Vec<f64>,
-    /// 1 for true
-    fixed: Vec<f64>,
-    unit: Option<String>,
+/// The elements of a declared name, with what its attributes say of them: one value for all, or one
+/// for each.
+fn elements(
+    symbols: &Symbols<'_>,
+    declaration: &Declaration,
+    component: &Component,
+) -> Result<Vec<Variable>> {
+    let library = symbols.model.library.get(&declaration.label);
+    let element = |(offset, scalar): (usize, &Scalar)| Variable {
+        name: element_name(&declaration.label, &component.dims, offset),
+        node: match *scalar {
+            Scalar::Real(node) | Scalar::Boolean(node) => node,
+            // only a parameter may be one; these get their symbols later
+            Scalar::Integer(_) => symbols.time(),
+        },
+        unit: library.map(|library| library.unit.to_owned()),
+        description: declaration.description.clone(),
+        start: None,
+        start_node: None,
+        min: library
+            .and_then(|library| library.min)
+            .unwrap_or(f64::NEG_INFINITY),
+        max: f64::INFINITY,
+        nominal: None,
+        integer: declaration.is_integer(),
+        fixed: false,
+    };
+    let elements = component.elements.iter().enumerate().map(element);
+    let mut elements: Vec<Variable> = elements.collect();
+    let mut given: Vec<&str> = vec![];
+    for attribute in &declaration.attributes {
+        let name = attribute.name.text(symbols.source);
+        if given.contains(&name) {
+            let message = "this attribute is given twice";
+            return Err(Problem::new(attribute.name, message));
+        }
+        given.push(name);
+        set(symbols, declaration, component, attribute, &mut elements)?;
+    }
+    for element in &mut elements {
+        // A start that cannot be computed from parameters is not known, however fixed.
+        let is_unknown = element.start.is_none() && element.start_node.is_none();
+        element.fixed &= !(is_unknown && given.contains(&"start"));
+        let Variable { name, min, max, .. } = element;
+        if min > max {
+            let message = format!("the range of `{name}` is empty: min {min} > max {max}");
+            return Err(Problem::new(declaration.name, message));
+        }
+    }
+    Ok(elements)
+}
+
+/// Sets what an attribute says of the elements.
+fn set(
+    symbols: &Symbols<'_>,
+    declaration: &Declaration,
+    component: &Component,
+    attribute: &Attribute,
+    elements: &mut [Variable],
+) -> Result<()> {
+    let name = attribute.name.text(symbols.source);
+    let Some(value) = attribute.value else {
+        let message = format!("expected a value for `{name}`");
+        return Err(Problem::new(attribute.name, message));
+    };
+    let set: fn(&mut Variable, Option<f64>) = match name {
+        "start" => |element, start| element.start = start,
+        "min" => |element, min| element.min = min.unwrap_or(f64::NEG_INFINITY),
+        "max" => |element, max| element.max = max.unwrap_or(f64::INFINITY),
+        "nominal" => |element, nominal| element.nominal = nominal,
+        "fixed" => |element, fixed| element.fixed = fixed == Some(1.0),
+        "unit" => {
+            let unit = text(symbols, value)?;
+            elements
+                .iter_mut()
+                .for_each(|e| e.unit = Some(unit.clone()));
+            return Ok(());
+        }
+        _ => return Ok(()),
+    };
+    let numbers = numbers(symbols, declaration, component, name, value)?;
+    for (offset, element) in elements.iter_mut().enumerate() {
+        set(element, at(&numbers, offset));
+    }
+    if name == "start" {
+        let nodes = symbolic(symbols, value)?;
+        for (offset, element) in elements.iter_mut().enumerate() {
+            element.start_node = at(&nodes, offset);
+        }
+    }
+    Ok(())
 }
 
 /// The one for all elements, or that of an element.
@@ -218,130 +280,23 @@ fn at<T: Copy>(values: &[T], offset: usize) -> Option<T> {
     }
 }
 
-impl<'s> Declared<'s> {
-    fn new<'a>(
-        context: &Context<'a>,
-        symbols: &Symbols<'a>,
-        declaration: &'s Declaration,
-        component: &'s Component,
-    ) -> Result<Self> {
-        let library = context.model.library.get(&declaration.label);
-        let mut attributes = Self {
-            declaration,
-            component,
-            start: vec![],
-            start_nodes: vec![],
-            min: library
-                .and_then(|library| library.min)
-                .into_iter()
-                .collect(),
-            max: vec![],
-            nominal: vec![],
-            fixed: vec![],
-            unit: library.map(|library| library.unit.to_owned()),
-        };
-        let mut given: Vec<&str> = vec![];
-        for attribute in &declaration.attributes {
-            let name = attribute.name.text(context.source);
-            if given.contains(&name) {
-                let message = "this attribute is given twice";
-                return Err(Problem::new(attribute.name, message));
-            }
-            given.push(name);
-            let Some(value) = attribute.value else {
-                let message = format!("expected a value for `{name}`");
-                return Err(Problem::new(attribute.name, message));
-            };
-            if name == "unit" {
-                attributes.unit = Some(text(context, value)?);
-            } else if let Some(slot) = attributes.numbers_of(name) {
-                *slot = numbers(context, symbols, declaration, component, name, value)?;
-            }
-            if name == "start" {
-                attributes.start_nodes = symbolic(context, symbols, value)?;
-            }
-        }
-        // A start that cannot be computed from parameters is not known, however fixed.
-        let unknown = attributes.start.is_empty() && attributes.start_nodes.is_empty();
-        if unknown && given.contains(&"start") {
-            attributes.fixed.clear();
-        }
-        attributes.check_range()?;
-        Ok(attributes)
-    }
-
-    fn numbers_of(&mut self, name: &str) -> Option<&mut Vec<f64>> {
-        match name {
-            "start" => Some(&mut self.start),
-            "min" => Some(&mut self.min),
-            "max" => Some(&mut self.max),
-            "nominal" => Some(&mut self.nominal),
-            "fixed" => Some(&mut self.fixed),
-            _ => None,
-        }
-    }
-
-    fn check_range(&self) -> Result<()> {
-        for offset in 0..self.component.elements.len() {
-            if let (Some(min), Some(max)) = (at(&self.min, offset), at(&self.max, offset))
-                && min > max
-            {
-                let name = self.name(offset);
-                let message = format!("the range of `{name}` is empty: min {min} > max {max}");
-                return Err(Problem::new(self.declaration.name, message));
-            }
-        }
-        Ok(())
-    }
-
-    fn name(&self, offset: usize) -> String {
-        element_name(&self.declaration.label, &self.component.dims, offset)
-    }
-
-    /// Where the search for an element begins that a loop determines, and where it may end.
-    fn search(&self, offset: usize) -> (f64, Interval) {
-        let low = at(&self.min, offset).unwrap_or(f64::NEG_INFINITY);
-        let high = at(&self.max, offset).unwrap_or(f64::INFINITY);
-        let range = Interval::new(low, high).unwrap_or(Interval::ENTIRE);
-        let start = at(&self.start, offset).unwrap_or(0.0);
-        (start.clamp(range.lo(), range.hi()), range)
-    }
-
-    /// One element as a variable of the plant.
-    fn variable(&self, offset: usize, node: Node) -> Variable {
-        Variable {
-            name: self.name(offset),
-            node,
-            unit: self.unit.clone(),
-            description: self.declaration.description.clone(),
-            start: at(&self.start, offset),
-            start_node: at(&self.start_nodes, offset),
-            min: at(&self.min, offset).unwrap_or(f64::NEG_INFINITY),
-            max: at(&self.max, offset).unwrap_or(f64::INFINITY),
-            nominal: at(&self.nominal, offset),
-            integer: self.declaration.prefix.is_integer(),
-            fixed: at(&self.fixed, offset) == Some(1.0),
-        }
-    }
-}
-
-fn text(context: &Context<'_>, value: ExprId) -> Result<String> {
-    let expression = context.ast.expression(value);
+fn text(symbols: &Symbols<'_>, value: ExprId) -> Result<String> {
+    let expression = symbols.ast.expression(value);
     match expression.kind {
-        Kind::Text => Ok(unquoted(expression.span.text(context.source))),
+        Kind::Text => Ok(unquoted(expression.span.text(symbols.source))),
         _ => Err(Problem::new(expression.span, "expected a string")
             .hint("write units as in `unit = \"m/s\"`")),
     }
 }
 
 /// The value of an attribute as expressions, where it depends on parameters that are symbols.
-fn symbolic<'a>(context: &Context<'a>, symbols: &Symbols<'a>, value: ExprId) -> Result<Vec<Node>> {
-    let graph = context.graph;
-    if !context.options.symbolic_parameters {
+fn symbolic(symbols: &Symbols<'_>, value: ExprId) -> Result<Vec<Node>> {
+    let graph = symbols.graph;
+    if !symbols.options.symbolic_parameters {
         return Ok(vec![]);
     }
-    let value = symbols.evaluator(context, Mode::Parametric).value(value)?;
-    let nodes = value.elements().iter().map(|scalar| scalar.real(graph));
+    let value = Evaluator::new(symbols, Mode::Parametric).value(value)?;
+    let nodes = value.elements.iter().map(|scalar| scalar.real(graph));
     let nodes: Vec<Node> = nodes.collect::<Option<_>>().unwrap_or_default();
     match graph.symbols_of(&nodes).is_empty() {
         true => Ok(vec![]),
@@ -350,24 +305,21 @@ fn symbolic<'a>(context: &Context<'a>, symbols: &Symbols<'a>, value: ExprId) -> 
 }
 
 /// The numbers of an attribute; none where it needs a parameter that has no value.
-fn numbers<'a>(
-    context: &Context<'a>,
-    symbols: &Symbols<'a>,
+fn numbers(
+    symbols: &Symbols<'_>,
     declaration: &Declaration,
     component: &Component,
     name: &str,
     id: ExprId,
 ) -> Result<Vec<f64>> {
     let is_truth = name == "fixed";
-    let is_boolean = declaration.prefix.type_name == TypeName::Boolean;
-    let mut evaluator = symbols.evaluator(context, Mode::Structural);
-    let span = context.ast.expression(id).span;
-    let value = match evaluator.value(id) {
-        Ok(value) => value,
-        Err(_) if evaluator.valueless && context.options.symbolic_parameters => return Ok(vec![]),
-        Err(problem) => return Err(problem),
+    let is_boolean = declaration.type_name == TypeName::Boolean;
+    let mut evaluator = Evaluator::new(symbols, Mode::Structural);
+    let span = evaluator.span(id);
+    let Some(value) = evaluator.value_if_known(id)? else {
+        return Ok(vec![]);
     };
-    let graph = context.graph;
+    let graph = symbols.graph;
     let number = |&scalar: &Scalar| {
         let (value, expected) = match (scalar, is_truth) {
             (Scalar::Boolean(node), _) if is_truth || is_boolean => {
@@ -378,56 +330,47 @@ fn numbers<'a>(
         };
         value.ok_or_else(|| Problem::new(span, expected))
     };
-    if !value.dims().is_empty() && value.dims() != component.dims {
-        let (has, found) = (describe_dims(&component.dims), describe_dims(value.dims()));
+    if !value.dims.is_empty() && value.dims != component.dims {
+        let (has, found) = (describe_dims(&component.dims), describe_dims(&value.dims));
         let message = format!("the attribute has the size {found}, its variable has {has}");
         return Err(Problem::new(span, message));
     }
-    value.elements().iter().map(number).collect()
+    value.elements.iter().map(number).collect()
 }
 
 /// Sets the start of each state that an initial equation fixes; a warning for every other.
-fn fix_starts<'a>(
-    graph: &Graph,
-    symbols: &Symbols<'a>,
+fn fix_starts(
+    symbols: &Symbols<'_>,
     flat: &Flat,
     solution: &HashMap<Node, Node>,
     states: &mut [Variable],
-) -> Vec<Problem> {
+) -> Vec<Box<Problem>> {
+    let graph = symbols.graph;
     let mut at_start = solution.clone();
-    at_start.insert(symbols.time, graph.constant(0.0).node());
-    let by_symbol: HashMap<Node, usize> = states
-        .iter()
-        .enumerate()
-        .map(|(place, state)| (state.node, place))
-        .collect();
+    at_start.insert(symbols.time(), graph.constant(0.0).node());
     let starts = Starts {
         graph,
         values: symbols.parameter_values(),
-        by_symbol,
+        states: states.iter().map(|state| state.node).zip(0..).collect(),
     };
-    let mut warnings: Vec<Problem> = flat
-        .initial_unread
-        .iter()
-        .map(|&span| unread(span))
-        .collect();
+    let unread = flat.initial_unread.iter();
+    let mut warnings: Vec<Box<Problem>> =
+        unread.map(|&span| without_effect(span, UNREAD)).collect();
     for equation in &flat.initial {
         let sides = graph.substitute(&[equation.left, equation.right], &at_start);
-        let [left, right] = sides[..] else {
-            continue;
-        };
+        let (left, right) = (sides[0], sides[1]);
         let found = starts
             .explicit(left, right)
-            .or_else(|| starts.explicit(right, left));
-        let found = found.or_else(|| starts.solved(graph.binary(Binary::Sub, left, right)));
+            .or_else(|| starts.explicit(right, left))
+            .or_else(|| starts.solved(graph.binary(Binary::Sub, left, right)));
         match found {
-            Some((place, node, value)) if place < states.len() => {
+            Some((place, node, value)) => {
                 let state = &mut states[place];
                 state.start = value;
                 state.start_node = (!graph.symbols_of(&[node]).is_empty()).then_some(node);
                 state.fixed = true;
             }
-            _ => warnings.push(does_not_fix(equation)),
+            None => warnings.push(without_effect(equation.span, FIXES_NONE)),
         }
     }
     warnings
@@ -437,88 +380,83 @@ struct Starts<'g> {
     graph: &'g Graph,
     /// values of the parameters that are symbols, where they have one
     values: HashMap<Node, Option<f64>>,
-    by_symbol: HashMap<Node, usize>,
+    /// places of the states by their symbols
+    states: HashMap<Node, usize>,
 }
 
 impl Starts<'_> {
     /// `x = e` with e free of variables.
     fn explicit(&self, state: Node, start: Node) -> Option<(usize, Node, Option<f64>)> {
-        let place = *self.by_symbol.get(&state)?;
+        let place = *self.states.get(&state)?;
         let symbols = self.graph.symbols_of(&[start]);
-        let known = symbols
-            .iter()
-            .all(|symbol| self.values.contains_key(symbol));
-        let value = self.number(start);
-        (known && (value.is_some() || !symbols.is_empty())).then_some((place, start, value))
+        let mut known = symbols.iter();
+        if !known.all(|symbol| self.values.contains_key(symbol)) {
+            return None;
+        }
+        self.with_value(place, start)
     }
 
     /// The state that a residual fixes, with its start as an expression of the parameters and
     /// as a number.
     fn solved(&self, residual: Node) -> Option<(usize, Node, Option<f64>)> {
         let graph = self.graph;
-        let symbols = graph.symbols_of(&[residual]);
-        let is_state = |symbol: &&Node| self.by_symbol.contains_key(symbol);
-        let others = |symbol: &&Node| !is_state(symbol) && !self.values.contains_key(symbol);
-        if symbols.iter().any(|symbol| others(&symbol)) {
-            return None;
-        }
-        let mut states = symbols.iter().filter(is_state);
-        let (&state, None) = (states.next()?, states.next()) else {
+        let mut symbols = graph.symbols_of(&[residual]);
+        symbols.retain(|symbol| !self.values.contains_key(symbol));
+        let [state] = symbols[..] else {
             return None;
         };
+        let place = *self.states.get(&state)?;
         let slope = jacobian::reverse(graph, &[residual], &[state]).get(0, 0)?;
         if graph.symbols_of(&[slope]).contains(&state) {
             return None;
         }
         let zero = HashMap::from([(state, graph.constant(0.0).node())]);
-        let rest = *graph.substitute(&[residual], &zero).first()?;
+        let rest = graph.substitute(&[residual], &zero)[0];
         let start = match graph.constant_value(slope) {
             Some(0.0) => return None,
             Some(1.0) => graph.unary(Unary::Neg, rest),
             Some(-1.0) => rest,
             _ => graph.unary(Unary::Neg, graph.binary(Binary::Div, rest, slope)),
         };
-        let value = self.number(start);
-        if value.is_none() && graph.symbols_of(&[start]).is_empty() {
-            return None;
-        }
-        Some((*self.by_symbol.get(&state)?, start, value))
+        self.with_value(place, start)
     }
 
-    fn number(&self, node: Node) -> Option<f64> {
-        if let Some(value) = self.graph.constant_value(node) {
-            return Some(value);
-        }
-        let symbols = self.graph.symbols_of(&[node]);
-        let values: Option<Vec<f64>> = symbols
-            .iter()
-            .map(|symbol| self.values.get(symbol).copied()?)
-            .collect();
-        let tape = Tape::new(self.graph, &symbols, &[node]).ok()?;
-        let mut out = [f64::NAN];
-        tape.evaluator().eval(&values?, &mut out);
-        out[0].is_finite().then_some(out[0])
+    /// None where the start has neither a value nor symbols.
+    fn with_value(&self, place: usize, start: Node) -> Option<(usize, Node, Option<f64>)> {
+        let value = self.graph.constant_value(start).or_else(|| {
+            let value = |symbol| self.values.get(&symbol).copied()?;
+            computed(self.graph, start, value).filter(|value| value.is_finite())
+        });
+        let is_symbolic = !self.graph.symbols_of(&[start]).is_empty();
+        (value.is_some() || is_symbolic).then_some((place, start, value))
     }
 }
 
-fn unread(span: Span) -> Problem {
-    Problem::new(span, "an initial equation of a derivative has no effect")
-        .hint("starts are taken from `start = …` and from initial equations as `x = …`")
+/// The number that an expression is for values of its symbols; none where one has no value.
+fn computed(graph: &Graph, node: Node, value: impl Fn(Node) -> Option<f64>) -> Option<f64> {
+    let symbols = graph.symbols_of(&[node]);
+    let values: Option<Vec<f64>> = symbols.iter().map(|&symbol| value(symbol)).collect();
+    let tape = Tape::new(graph, &symbols, &[node]).ok()?;
+    let mut out = [f64::NAN];
+    tape.evaluator().eval(&values?, &mut out);
+    Some(out[0])
 }
 
-fn does_not_fix(equation: &FlatEquation) -> Problem {
-    let message = "this initial equation fixes the start of no state by itself: it has no effect";
-    Problem::new(equation.span, message)
+const UNREAD: &str = "an initial equation of a derivative has no effect";
+const FIXES_NONE: &str =
+    "this initial equation fixes the start of no state by itself: it has no effect";
+
+fn without_effect(span: Span, message: &str) -> Box<Problem> {
+    Problem::new(span, message)
         .hint("starts are taken from `start = …` and from initial equations as `x = …`")
 }
 
 /// What is to hold along a run, over states and inputs; what holds whatever happens is left out.
 fn assertions(
-    context: &Context<'_>,
+    graph: &Graph,
     claims: Vec<(Assertion, Span)>,
     solution: &HashMap<Node, Node>,
 ) -> Vec<(Assertion, Span)> {
-    let graph = context.graph;
     let conditions: Vec<Node> = claims.iter().map(|(claim, _)| claim.condition).collect();
     let conditions = graph.substitute(&conditions, solution);
     let pairs = claims.into_iter().zip(conditions);
@@ -529,25 +467,17 @@ fn assertions(
 
 /// A warning for each assertion that fails at the declared starts.
 fn failing_at_start(
-    graph: &Graph,
     symbols: &Symbols<'_>,
     assertions: &[(Assertion, Span)],
-    variables: &[&Variable],
-) -> Vec<Problem> {
-    let mut known: HashMap<Node, f64> = HashMap::from([(symbols.time, 0.0)]);
-    let values = symbols.parameter_values().into_iter();
-    known.extend(values.filter_map(|(node, value)| Some((node, value?))));
-    known.extend(variables.iter().filter_map(|v| Some((v.node, v.start?))));
+    plant: &Plant,
+) -> Vec<Box<Problem>> {
+    let mut known = symbols.parameter_values();
+    known.insert(symbols.time(), Some(0.0));
+    let variables = plant.states.iter().chain(&plant.inputs);
+    known.extend(variables.map(|variable| (variable.node, variable.start)));
     let fails = |assertion: &Assertion| {
-        let read = graph.symbols_of(&[assertion.condition]);
-        let values: Option<Vec<f64>> = read.iter().map(|node| known.get(node).copied()).collect();
-        let tape = Tape::new(graph, &read, &[assertion.condition]).ok();
-        let (Some(values), Some(tape)) = (values, tape) else {
-            return false;
-        };
-        let mut out = [1.0];
-        tape.evaluator().eval(&values, &mut out);
-        out[0] == 0.0
+        let value = |symbol| known.get(&symbol).copied()?;
+        computed(symbols.graph, assertion.condition, value) == Some(0.0)
     };
     let failing = assertions.iter().filter(|(assertion, _)| fails(assertion));
     failing

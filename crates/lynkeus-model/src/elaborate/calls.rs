@@ -1,8 +1,8 @@
 //! Functions and records of the text, written out where they are called.
 
-use super::evaluate::{Evaluator, joined};
+use super::evaluate::{Evaluator, reference};
 use super::scope::{Frame, Local};
-use super::value::{Outcome, Record, Value, check_size, element_count};
+use super::value::{Members, Value, check_size, element_count, member, member_name, number};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::flat::constant_label;
 use crate::syntax::ast::{Call, Causality, Class, ClassKind, Declaration, ExprId, Kind, TypeName};
@@ -12,46 +12,47 @@ use crate::syntax::{plain, shortened};
 const MAX_CALLS: usize = 40;
 
 impl<'a> Evaluator<'a> {
-    /// The class of the text that a call names.
-    pub(super) fn class_called(&self, call: &Call) -> Option<(usize, &'a Class)> {
-        let name = plain(self.text(call.function));
-        let place = self.classes?.class(&name, &self.scopes)?;
-        Some((place, self.ast.classes.get(place)?))
+    /// The class of the text that a name means.
+    fn class(&self, name: Span, scopes: &[&str]) -> Option<&'a Class> {
+        let place = self
+            .symbols
+            .classes
+            .class(&plain(self.text(name)), scopes)?;
+        self.ast.classes.get(place)
+    }
+
+    fn class_called(&self, call: &Call) -> Option<&'a Class> {
+        self.class(call.function, &self.scopes)
     }
 
     /// The value of a call of a function of the text; `None` where there is no such function.
     pub(super) fn own_function(&mut self, call: &'a Call, span: Span) -> Result<Option<Value>> {
-        let Some((place, class)) = self.class_called(call) else {
+        let class = self.class_called(call);
+        let Some(class) = class.filter(|class| class.kind == ClassKind::Function) else {
             return Ok(None);
         };
-        if class.kind != ClassKind::Function {
-            return Ok(None);
-        }
-        match self.inlined(place, call, span)?.into_iter().next() {
-            Some(Outcome::Value(value)) => Ok(Some(value)),
-            Some(Outcome::Record(_)) => {
-                Err(Problem::new(span, "expected a number, found a record"))
-            }
-            None => {
-                let name = &class.path;
-                let message = format!("function `{name}` has no output");
-                Err(Problem::new(span, message).hint("declare one: `output Real y;`"))
-            }
-        }
+        let mut outcomes = self.inlined(class, call, span)?.into_iter();
+        let first = outcomes.next().ok_or_else(|| {
+            let message = format!("function `{}` has no output", class.path);
+            Problem::new(span, message).hint("declare one: `output Real y;`")
+        })?;
+        let value = number(first);
+        let value = value.map_err(|_| Problem::new(span, "expected a number, found a record"));
+        value.map(Some)
     }
 
     /// The values of `(a, b) = f(x)`.
-    pub(super) fn outcomes(&mut self, id: ExprId, wanted: usize) -> Result<Vec<Outcome>> {
+    pub(super) fn outcomes(&mut self, id: ExprId, wanted: usize) -> Result<Vec<Members>> {
         let span = self.span(id);
         let Kind::Call(call) = &self.ast.expression(id).kind else {
             return Err(Problem::new(span, "expected a call of a function"));
         };
-        let Some((place, class)) = self.class_called(call) else {
+        let Some(class) = self.class_called(call) else {
             let name = shortened(self.text(call.function));
             let message = format!("the text has no function `{name}` with several outputs");
             return Err(Problem::new(call.function, message));
         };
-        let outcomes = self.inlined(place, call, span)?;
+        let outcomes = self.inlined(class, call, span)?;
         if outcomes.len() < wanted {
             let (name, has) = (&class.path, outcomes.len());
             let message = format!("function `{name}` has {has} outputs, {wanted} are taken here");
@@ -61,34 +62,25 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Declarations of a class and of its bases, those of the bases first.
-    pub(super) fn declarations_of(&self, place: usize) -> Result<Vec<&'a Declaration>> {
-        let classes = self.with_bases(place)?;
-        Ok(classes
-            .into_iter()
-            .flat_map(|class| &class.declarations)
-            .collect())
+    fn declarations_of(&self, class: &'a Class) -> Result<Vec<&'a Declaration>> {
+        let classes = self.with_bases(class)?.into_iter();
+        Ok(classes.flat_map(|class| &class.declarations).collect())
     }
 
     /// A class behind its bases.
-    fn with_bases(&self, place: usize) -> Result<Vec<&'a Class>> {
-        let (mut found, mut open) = (vec![], vec![place]);
-        while let Some(place) = open.pop() {
-            let Some(class) = self.ast.classes.get(place) else {
-                continue;
-            };
+    fn with_bases(&self, class: &'a Class) -> Result<Vec<&'a Class>> {
+        let (mut found, mut open) = (vec![], vec![class]);
+        while let Some(class) = open.pop() {
             found.push(class);
             if found.len() > MAX_CALLS {
                 let message = format!("`{}` is made from itself", class.path);
                 return Err(Problem::new(class.name, message).hint("remove the `extends`"));
             }
             for base in &class.bases {
-                let name = plain(self.text(base.name));
-                let known = self
-                    .classes
-                    .and_then(|classes| classes.class(&name, &[&class.path]));
+                let known = self.class(base.name, &[&class.path]);
                 open.push(known.ok_or_else(|| {
-                    let message = format!("`extends {name}` of another file");
-                    Problem::new(base.name, message)
+                    let name = plain(self.text(base.name));
+                    Problem::new(base.name, format!("`extends {name}` of another file"))
                 })?);
             }
         }
@@ -97,43 +89,40 @@ impl<'a> Evaluator<'a> {
     }
 
     /// True where the first output of a function is a record.
-    pub(super) fn gives_record(&self, place: usize) -> bool {
-        let declarations = self.declarations_of(place).unwrap_or_default();
-        let first = declarations
-            .into_iter()
-            .find(|d| d.prefix.causality == Causality::Output);
-        let path = self
-            .ast
-            .classes
-            .get(place)
-            .map_or("", |class| class.path.as_str());
-        first.is_some_and(|first| self.record_type(first, path).is_some())
+    fn gives_record(&self, class: &'a Class) -> bool {
+        let declarations = self.declarations_of(class).unwrap_or_default();
+        let first = with_causality(&declarations, Causality::Output).next();
+        first.is_some_and(|first| self.record_type(first, class).is_some())
     }
 
     /// Carries out a function for the arguments of a call; gives its outputs in order.
-    pub(super) fn inlined(
-        &mut self,
-        place: usize,
-        call: &'a Call,
-        span: Span,
-    ) -> Result<Vec<Outcome>> {
-        let Some(class) = self.ast.classes.get(place) else {
-            return Ok(vec![]);
-        };
-        self.check_callable(place, class, span)?;
-        let parts = self.with_bases(place)?;
-        let declarations = self.declarations_of(place)?;
-        let given = self.given(&declarations, class, call, span)?;
-        self.calls.push(place);
+    fn inlined(&mut self, class: &'a Class, call: &'a Call, span: Span) -> Result<Vec<Members>> {
+        self.check_callable(class, span)?;
+        let parts = self.with_bases(class)?;
+        let declarations = self.declarations_of(class)?;
+        let mut given = self.given(&declarations, class, call, span)?.into_iter();
+        self.calls.push(&class.path);
         let done = self.inside(class, |evaluator| {
-            evaluator.carried_out(class, &parts, &declarations, given, span)
+            for declaration in &declarations {
+                let value = match declaration.causality {
+                    Causality::Input => given.next().flatten(),
+                    _ => None,
+                };
+                evaluator.introduce(class, declaration, value, span)?;
+            }
+            for algorithm in parts.iter().flat_map(|part| &part.algorithms) {
+                evaluator.execute(algorithm)?;
+            }
+            let outputs = with_causality(&declarations, Causality::Output);
+            let outcomes = outputs.map(|output| evaluator.outcome(class, output));
+            outcomes.collect()
         });
         self.calls.pop();
         done
     }
 
     /// What stands in a class that knows nothing of what is around it but constants.
-    pub(super) fn inside<T>(
+    fn inside<T>(
         &mut self,
         class: &'a Class,
         run: impl FnOnce(&mut Self) -> Result<T>,
@@ -148,9 +137,9 @@ impl<'a> Evaluator<'a> {
         done
     }
 
-    fn check_callable(&self, place: usize, class: &Class, span: Span) -> Result<()> {
-        let name = &class.path;
-        if self.calls.contains(&place) {
+    fn check_callable(&self, class: &Class, span: Span) -> Result<()> {
+        let name = class.path.as_str();
+        if self.calls.contains(&name) {
             let message = format!("function `{name}` calls itself");
             return Err(Problem::new(span, message)
                 .hint("a recursion has no end when it is written out: use a `for` loop"));
@@ -175,32 +164,23 @@ impl<'a> Evaluator<'a> {
         class: &'a Class,
         call: &'a Call,
         span: Span,
-    ) -> Result<Vec<Option<Outcome>>> {
-        let inputs = declarations
-            .iter()
-            .filter(|d| d.prefix.causality == Causality::Input);
-        let inputs: Vec<&Declaration> = inputs.copied().collect();
+    ) -> Result<Vec<Option<Members>>> {
+        let inputs: Vec<_> = with_causality(declarations, Causality::Input).collect();
         let mut found = vec![];
-        for (input, id) in inputs
-            .iter()
-            .zip(self.arguments_of(class, &inputs, call, span)?)
-        {
-            let Some(id) = id else {
-                found.push(None);
-                continue;
-            };
-            let is_record = self.record_type(input, &class.path).is_some();
-            found.push(Some(match self.record(id)?.filter(|_| is_record) {
-                Some(record) => Outcome::Record(record),
-                None => Outcome::Value(self.value(id)?),
-            }));
+        let arguments = self.arguments_of(class, &inputs, call, span)?;
+        for (input, id) in inputs.into_iter().zip(arguments) {
+            found.push(match (id, self.record_type(input, class)) {
+                (Some(id), Some(_)) => Some(self.members(id)?),
+                (Some(id), None) => Some(number_of(self.value(id)?)),
+                (None, _) => None,
+            });
         }
         Ok(found)
     }
 
     /// The expressions that a call gives to each input of a function or member of a record, in
     /// order or by name.
-    pub(super) fn arguments_of(
+    fn arguments_of(
         &self,
         class: &Class,
         declarations: &[&Declaration],
@@ -234,96 +214,57 @@ impl<'a> Evaluator<'a> {
         Ok(found)
     }
 
-    fn carried_out(
-        &mut self,
-        class: &'a Class,
-        parts: &[&'a Class],
-        declarations: &[&'a Declaration],
-        given: Vec<Option<Outcome>>,
-        span: Span,
-    ) -> Result<Vec<Outcome>> {
-        let mut given = given.into_iter();
-        for declaration in declarations {
-            let value = match declaration.prefix.causality {
-                Causality::Input => given.next().flatten(),
-                _ => None,
-            };
-            self.introduce(class, declaration, value, span)?;
-        }
-        for part in parts {
-            for algorithm in &part.algorithms {
-                self.execute(algorithm)?;
-            }
-        }
-        let outputs = declarations
-            .iter()
-            .filter(|d| d.prefix.causality == Causality::Output);
-        let mut outcomes = vec![];
-        for output in outputs {
-            outcomes.push(self.outcome(class, output)?);
-        }
-        Ok(outcomes)
-    }
-
-    fn outcome(&self, class: &Class, output: &Declaration) -> Result<Outcome> {
-        let missing = |name: &str| {
-            let function = &class.path;
-            let message = format!("output `{name}` of function `{function}` is not given a value");
-            Problem::new(output.name, message)
-                .hint("assign it in the algorithm, in every case of an `if`")
-        };
+    fn outcome(&self, class: &Class, output: &Declaration) -> Result<Members> {
+        let label = &output.label;
         let frame = self.frame.as_ref();
-        let value = |name: &str| {
-            let local = frame.and_then(|frame| frame.locals.get(name));
-            local.and_then(Local::value).ok_or_else(|| missing(name))
+        let of_number = [String::new()];
+        let names = frame.and_then(|frame| frame.records.get(label));
+        let names = names.map_or(&of_number[..], Vec::as_slice);
+        let member = |name: &String| {
+            let full = member_name(label, name);
+            let local = frame.and_then(|frame| frame.locals.get(&full));
+            let value = local.and_then(Local::value).ok_or_else(|| {
+                let function = &class.path;
+                let message =
+                    format!("output `{full}` of function `{function}` is not given a value");
+                Problem::new(output.name, message)
+                    .hint("assign it in the algorithm, in every case of an `if`")
+            });
+            Ok((name.clone(), value?))
         };
-        let Some(names) = frame.and_then(|frame| frame.records.get(&output.label)) else {
-            return Ok(Outcome::Value(value(&output.label)?));
-        };
-        let members = names.iter().map(|name| {
-            let full = format!("{}.{name}", output.label);
-            Ok((name.clone(), value(&full)?))
-        });
-        Ok(Outcome::Record(Record {
-            members: members.collect::<Result<_>>()?,
-        }))
+        names.iter().map(member).collect()
     }
 }
 
 impl<'a> Evaluator<'a> {
-    /// The record that a variable is declared as.
-    pub(super) fn record_type(&self, declaration: &Declaration, path: &str) -> Option<usize> {
-        let TypeName::Named(name) = declaration.prefix.type_name else {
+    /// The record that a variable of a class is declared as.
+    fn record_type(&self, declaration: &Declaration, of: &Class) -> Option<&'a Class> {
+        let TypeName::Named(name) = declaration.type_name else {
             return None;
         };
-        let place = self.classes?.class(&plain(self.text(name)), &[path])?;
-        (self.ast.classes.get(place)?.kind == ClassKind::Record).then_some(place)
+        let class = self.class(name, &[&of.path]);
+        class.filter(|class| class.kind == ClassKind::Record)
     }
 
-    /// A variable of a function with its argument, or with the value it is declared with.
-    pub(super) fn introduce(
+    /// A variable of a function with its argument, or with the value it is declared with; without a
+    /// value where its function assigns it.
+    fn introduce(
         &mut self,
         class: &'a Class,
         declaration: &'a Declaration,
-        given: Option<Outcome>,
+        given: Option<Members>,
         span: Span,
     ) -> Result<()> {
-        let name = declaration.label.clone();
-        if let Some(record) = self.record_type(declaration, &class.path) {
-            return match self.record_given(class, declaration, given, span)? {
-                Some(value) => {
-                    self.know_record(&name, value);
-                    Ok(())
-                }
-                None => self.open_record(record, &name),
-            };
+        if let Some(record) = self.record_type(declaration, class) {
+            return self.introduce_record(class, declaration, record, given, span);
         }
-        if let TypeName::Named(type_name) = declaration.prefix.type_name {
+        let name = &declaration.label;
+        if let TypeName::Named(type_name) = declaration.type_name {
             self.check_number(class, type_name)?;
         }
-        let value = match (given, declaration.binding) {
-            (Some(Outcome::Value(value)), _) => Some(value),
-            (Some(Outcome::Record(_)), _) => {
+        let value = match (given.map(number), declaration.binding) {
+            (Some(Ok(value)), _) => Some(value),
+            (Some(Err(_)), _) => {
                 let message = format!("`{name}` takes a number, found a record");
                 return Err(Problem::new(span, message));
             }
@@ -334,77 +275,68 @@ impl<'a> Evaluator<'a> {
             }
         };
         let dims = self.dims_declared(declaration, value.as_ref(), span)?;
-        let mut local = Local::without_value(dims, declaration.prefix.is_integer());
+        let mut local = Local::without_value(dims, declaration.is_integer());
         if let Some(value) = value {
-            check_size(&name, &local.dims, value.dims(), span)?;
-            let elements = value.into_array().elements.into_iter();
-            let graph = self.graph;
+            check_size(name, &local.dims, &value.dims, span)?;
+            let elements = value.elements.into_iter();
             local.elements = elements
-                .map(|scalar| Some(local.converted(scalar, graph)))
+                .map(|scalar| Some(local.converted(scalar, self.graph)))
                 .collect();
         }
         self.budget.charge(local.elements.len() as u64, span)?;
         if let Some(frame) = self.frame.as_mut() {
-            frame.locals.insert(name, local);
+            frame.locals.insert(name.clone(), local);
         }
         Ok(())
     }
 
     /// Refuses variables of functions that are no numbers.
     fn check_number(&self, class: &Class, type_name: Span) -> Result<()> {
-        let name = plain(self.text(type_name));
-        let place = self
-            .classes
-            .and_then(|classes| classes.class(&name, &[&class.path]));
-        let kind = place.and_then(|place| Some(self.ast.classes.get(place)?.kind));
-        match kind {
+        match self
+            .class(type_name, &[&class.path])
+            .map(|class| class.kind)
+        {
             None | Some(ClassKind::Type) => Ok(()),
             Some(_) => {
+                let name = plain(self.text(type_name));
                 let message = format!("`{name}` is not a type of numbers");
                 Err(Problem::new(type_name, message).hint("write the formula where it is used"))
             }
         }
     }
 
-    /// The value of a variable that is a record: its argument, or what it is declared with; none
-    /// of one that its function assigns.
-    fn record_given(
+    fn introduce_record(
         &mut self,
         class: &'a Class,
         declaration: &'a Declaration,
-        given: Option<Outcome>,
+        record: &'a Class,
+        given: Option<Members>,
         span: Span,
-    ) -> Result<Option<Record>> {
-        let number = |span: Span| {
-            let name = &declaration.label;
-            Problem::new(span, format!("`{name}` takes a record, found a number"))
-        };
-        match (given, declaration.binding) {
-            (Some(Outcome::Record(record)), _) => Ok(Some(record)),
-            (Some(Outcome::Value(_)), _) => Err(number(span)),
-            (None, Some(id)) => {
-                let record = self.record(id)?;
-                record.map(Some).ok_or_else(|| number(self.span(id)))
-            }
+    ) -> Result<()> {
+        let name = &declaration.label;
+        let (value, span) = match (given, declaration.binding) {
+            (Some(given), _) => (number(given).err(), span),
+            (None, Some(id)) => (self.record(id)?, self.span(id)),
             (None, None) => {
                 check_given(class, declaration, span)?;
-                Ok(None)
+                return self.open_record(record, name);
             }
-        }
-    }
-
-    fn know_record(&mut self, name: &str, value: Record) {
-        let members = value.members.into_iter();
-        let known = members.map(|(member, value)| (member, Local::of(&value)));
+        };
+        let value = value.ok_or_else(|| {
+            Problem::new(span, format!("`{name}` takes a record, found a number"))
+        })?;
+        let members = value.into_iter();
+        let known = members.map(|(member, value)| (member, Local::of(value)));
         self.insert_record(name, known.collect());
+        Ok(())
     }
 
     /// A record of which no member has a value yet.
-    fn open_record(&mut self, record: usize, name: &str) -> Result<()> {
+    fn open_record(&mut self, record: &'a Class, name: &str) -> Result<()> {
         let mut members = vec![];
         for declaration in self.declarations_of(record)? {
             let dims = self.dims_declared(declaration, None, declaration.name)?;
-            let local = Local::without_value(dims, declaration.prefix.is_integer());
+            let local = Local::without_value(dims, declaration.is_integer());
             members.push((declaration.label.clone(), local));
         }
         self.insert_record(name, members);
@@ -430,18 +362,16 @@ impl<'a> Evaluator<'a> {
         let mut dims = vec![];
         for (axis, &id) in declaration.dimensions.iter().enumerate() {
             let open = matches!(self.ast.expression(id).kind, Kind::All);
-            dims.push(
-                match (open, value.and_then(|value| value.dims().get(axis))) {
-                    (true, Some(&dim)) => dim,
-                    (true, None) => {
-                        let name = &declaration.label;
-                        let message =
-                            format!("the size `:` of `{name}` needs a value to be taken from");
-                        return Err(Problem::new(declaration.name, message));
-                    }
-                    (false, _) => self.length(id)?,
-                },
-            );
+            dims.push(match (open, value.and_then(|value| value.dims.get(axis))) {
+                (true, Some(&dim)) => dim,
+                (true, None) => {
+                    let name = &declaration.label;
+                    let message =
+                        format!("the size `:` of `{name}` needs a value to be taken from");
+                    return Err(Problem::new(declaration.name, message));
+                }
+                (false, _) => self.length(id)?,
+            });
         }
         let count = element_count(&dims).unwrap_or(u64::MAX);
         self.budget.charge(count, span)?;
@@ -451,7 +381,7 @@ impl<'a> Evaluator<'a> {
 
 /// Refuses an input that has no value; other variables are given theirs by statements.
 fn check_given(class: &Class, declaration: &Declaration, span: Span) -> Result<()> {
-    if declaration.prefix.causality != Causality::Input {
+    if declaration.causality != Causality::Input {
         return Ok(());
     }
     let (name, function) = (&declaration.label, &class.path);
@@ -461,48 +391,45 @@ fn check_given(class: &Class, declaration: &Declaration, span: Span) -> Result<(
 
 impl<'a> Evaluator<'a> {
     /// The record that an expression is; `None` where it is a number or an array.
-    pub(super) fn record(&mut self, id: ExprId) -> Result<Option<Record>> {
+    pub(super) fn record(&mut self, id: ExprId) -> Result<Option<Members>> {
         self.deeper(self.span(id), |evaluator| evaluator.record_here(id))
     }
 
-    fn record_here(&mut self, id: ExprId) -> Result<Option<Record>> {
+    fn record_here(&mut self, id: ExprId) -> Result<Option<Members>> {
         let expression = self.ast.expression(id);
         let span = expression.span;
         match &expression.kind {
-            Kind::Name => {
-                let name = plain(self.text(span));
-                self.record_named(&name, &[], span)
+            Kind::Member(record, name) => {
+                let record = self.record(*record)?;
+                Ok(record.and_then(|record| inner(&record, name)))
             }
-            Kind::Index(base, subscripts) => {
-                if !matches!(self.ast.expression(*base).kind, Kind::Name) {
-                    return Ok(None);
-                }
-                let whole = plain(self.text(span));
-                if let Some(record) = self.record_named(&whole, &[], span)? {
-                    return Ok(Some(record));
-                }
-                let name = plain(self.text(self.span(*base)));
-                self.record_named(&name, subscripts, span)
-            }
-            Kind::Path(parts) => {
-                let whole = plain(self.text(span));
-                if let Some(record) = self.record_named(&whole, &[], span)? {
-                    return Ok(Some(record));
-                }
-                let (subscripts, name) = joined(parts, self.source);
-                self.record_named(&name, &subscripts, span)
-            }
-            Kind::Member(record, name) => Ok(self.record(*record)?.and_then(|r| r.inner(name))),
             Kind::Call(call) => self.record_of_call(call, span),
             Kind::Array(elements) => self.array_of_records(elements, span),
-            _ => Ok(None),
+            _ => {
+                let Some((name, subscripts)) = reference(self.source, self.ast, id) else {
+                    return Ok(None);
+                };
+                let whole = plain(self.text(span));
+                match self.record_named(&whole, &[], span)? {
+                    None if whole != name => self.record_named(&name, &subscripts, span),
+                    found => Ok(found),
+                }
+            }
+        }
+    }
+
+    /// The record that an expression is, or its value.
+    pub(super) fn members(&mut self, id: ExprId) -> Result<Members> {
+        match self.record(id)? {
+            Some(record) => Ok(record),
+            None => Ok(number_of(self.value(id)?)),
         }
     }
 
     /// The member of a record, as `Kind::Member` has it.
     pub(super) fn member(&mut self, record: ExprId, name: &str, span: Span) -> Result<Value> {
         let found = self.record(record)?;
-        let value = found.as_ref().and_then(|record| record.member(name));
+        let value = found.as_ref().and_then(|record| member(record, name));
         value.cloned().ok_or_else(|| {
             Problem::new(span, format!("expected a record with the member `{name}`"))
         })
@@ -513,14 +440,14 @@ impl<'a> Evaluator<'a> {
             .frame
             .as_ref()
             .and_then(|frame| frame.records.get(name));
-        let of_model = || self.scope.members(name).filter(|_| !self.is_closed());
+        let records = &self.symbols.model.records;
+        let of_model = || records.get(name).filter(|_| !self.is_closed());
         let of_package = || {
             let full = self.full_names(name).into_iter();
             let mut labels = full.map(|full| constant_label(&full));
-            labels.find_map(|label| self.scope.members(&label))
+            labels.find_map(|label| records.get(&label))
         };
-        let members = of_frame.map(Vec::as_slice).or_else(of_model);
-        members.or_else(of_package).map(<[String]>::to_vec)
+        of_frame.or_else(of_model).or_else(of_package).cloned()
     }
 
     fn record_named(
@@ -528,7 +455,7 @@ impl<'a> Evaluator<'a> {
         name: &str,
         subscripts: &[ExprId],
         span: Span,
-    ) -> Result<Option<Record>> {
+    ) -> Result<Option<Members>> {
         let Some(names) = self.members_of(name) else {
             return Ok(None);
         };
@@ -537,20 +464,20 @@ impl<'a> Evaluator<'a> {
             let full = format!("{name}.{member}");
             self.budget.charge(1, span)?;
             if let Some(inner) = self.record_named(&full, subscripts, span)? {
-                let inner = inner.members.into_iter();
-                members.extend(inner.map(|(rest, value)| (format!("{member}.{rest}"), value)));
+                let inner = inner.into_iter();
+                members.extend(inner.map(|(rest, value)| (member_name(&member, &rest), value)));
                 continue;
             }
             let value = match subscripts {
                 [] => self.value_named(&full, span)?,
-                _ => self.index_named(&full, subscripts, span)?,
+                _ => self.index_named(&full, subscripts, span, span)?,
             };
             members.push((member, value));
         }
-        Ok(Some(Record { members }))
+        Ok(Some(members))
     }
 
-    fn array_of_records(&mut self, elements: &'a [ExprId], span: Span) -> Result<Option<Record>> {
+    fn array_of_records(&mut self, elements: &'a [ExprId], span: Span) -> Result<Option<Members>> {
         let Some((&first, rest)) = elements.split_first() else {
             return Ok(None);
         };
@@ -558,57 +485,39 @@ impl<'a> Evaluator<'a> {
             return Ok(None);
         };
         let mut columns: Vec<(String, Vec<Value>)> = first
-            .members
             .into_iter()
             .map(|(name, value)| (name, vec![value]))
             .collect();
         for &id in rest {
-            let record = self.record(id)?;
+            let record = self.record(id)?.unwrap_or_default();
             for (name, column) in &mut columns {
-                let value = record.as_ref().and_then(|record| record.member(name));
-                let value = value.cloned().ok_or_else(|| {
+                column.push(member(&record, name).cloned().ok_or_else(|| {
                     Problem::new(self.span(id), format!("expected a record with `{name}`"))
-                })?;
-                column.push(value);
+                })?);
             }
         }
         let stacked = columns
             .into_iter()
             .map(|(name, values)| Ok((name, self.stack(values, span)?)));
-        Ok(Some(Record {
-            members: stacked.collect::<Result<_>>()?,
-        }))
+        stacked.collect::<Result<_>>().map(Some)
     }
 
     /// `R(1, 2)`, or a function whose first output is a record.
-    fn record_of_call(&mut self, call: &'a Call, span: Span) -> Result<Option<Record>> {
-        let Some((place, class)) = self.class_called(call) else {
-            return Ok(None);
-        };
-        if class.kind == ClassKind::Function {
-            if !self.gives_record(place) {
-                return Ok(None);
+    fn record_of_call(&mut self, call: &'a Call, span: Span) -> Result<Option<Members>> {
+        match self.class_called(call) {
+            Some(class) if class.kind == ClassKind::Record => {
+                self.constructed(class, call, span).map(Some)
             }
-            let mut outcomes = self.inlined(place, call, span)?.into_iter();
-            return Ok(match outcomes.next() {
-                Some(Outcome::Record(record)) => Some(record),
-                _ => None,
-            });
+            Some(class) if class.kind == ClassKind::Function && self.gives_record(class) => {
+                let mut outcomes = self.inlined(class, call, span)?.into_iter();
+                Ok(outcomes.next().and_then(|first| number(first).err()))
+            }
+            _ => Ok(None),
         }
-        if class.kind != ClassKind::Record {
-            return Ok(None);
-        }
-        self.constructed(place, class, call, span).map(Some)
     }
 
-    fn constructed(
-        &mut self,
-        place: usize,
-        class: &'a Class,
-        call: &'a Call,
-        span: Span,
-    ) -> Result<Record> {
-        let declarations = self.declarations_of(place)?;
+    fn constructed(&mut self, class: &'a Class, call: &'a Call, span: Span) -> Result<Members> {
+        let declarations = self.declarations_of(class)?;
         let given = self.arguments_of(class, &declarations, call, span)?;
         let mut found = vec![];
         for (declaration, id) in declarations.iter().zip(&given) {
@@ -616,64 +525,70 @@ impl<'a> Evaluator<'a> {
             found.push(value.transpose()?);
         }
         // what is not given may be made from what is
-        let members = self.inside(class, |evaluator| {
-            found
-                .iter()
-                .flatten()
-                .for_each(|value| evaluator.know(value));
+        self.inside(class, |evaluator| {
+            let given = found.iter().flatten();
+            given.for_each(|value| evaluator.know(value));
             let mut members = vec![];
             for (declaration, value) in declarations.iter().zip(found) {
-                members.extend(match value {
-                    Some(value) => value,
-                    None => evaluator.default(declaration, span)?,
+                members.extend(match (value, declaration.binding) {
+                    (Some(value), _) => value,
+                    (None, Some(id)) => {
+                        let value = evaluator.member_value(declaration, id)?;
+                        evaluator.know(&value);
+                        value
+                    }
+                    (None, None) => {
+                        let label = &declaration.label;
+                        let message = format!("the member `{label}` of the record is not given");
+                        return Err(Problem::new(span, message));
+                    }
                 });
             }
             Ok(members)
-        })?;
-        Ok(Record { members })
-    }
-
-    /// What a member is where nothing is given to it.
-    fn default(
-        &mut self,
-        declaration: &'a Declaration,
-        span: Span,
-    ) -> Result<Vec<(String, Value)>> {
-        let Some(id) = declaration.binding else {
-            let label = &declaration.label;
-            let message = format!("the member `{label}` of the record is not given");
-            return Err(Problem::new(span, message));
-        };
-        let value = self.member_value(declaration, id)?;
-        self.know(&value);
-        Ok(value)
+        })
     }
 
     /// A member of a record with its value, or those of the record that it is.
-    fn member_value(
-        &mut self,
-        declaration: &Declaration,
-        id: ExprId,
-    ) -> Result<Vec<(String, Value)>> {
-        let label = &declaration.label;
-        if let TypeName::Named(_) = declaration.prefix.type_name
-            && let Some(inner) = self.record(id)?
-        {
-            let inner = inner.members.into_iter();
-            return Ok(inner
-                .map(|(rest, value)| (format!("{label}.{rest}"), value))
-                .collect());
-        }
-        Ok(vec![(label.clone(), self.value(id)?)])
+    fn member_value(&mut self, declaration: &Declaration, id: ExprId) -> Result<Members> {
+        let members = match declaration.type_name {
+            TypeName::Named(_) => self.members(id)?,
+            _ => number_of(self.value(id)?),
+        };
+        let full =
+            |(member, value): (String, Value)| (member_name(&declaration.label, &member), value);
+        Ok(members.into_iter().map(full).collect())
     }
 
     /// Makes values known by their names to what is evaluated next.
-    fn know(&mut self, members: &[(String, Value)]) {
+    fn know(&mut self, members: &Members) {
         let Some(frame) = &mut self.frame else {
             return;
         };
         for (name, value) in members {
-            frame.locals.insert(name.clone(), Local::of(value));
+            frame.locals.insert(name.clone(), Local::of(value.clone()));
         }
     }
+}
+
+fn with_causality<'a>(
+    declarations: &[&'a Declaration],
+    causality: Causality,
+) -> impl Iterator<Item = &'a Declaration> {
+    let declarations = declarations.iter().copied();
+    declarations.filter(move |declaration| declaration.causality == causality)
+}
+
+/// A number or an array as the one member without a name.
+fn number_of(value: Value) -> Members {
+    vec![(String::new(), value)]
+}
+
+/// The members behind `prefix.`, where there are any.
+fn inner(record: &Members, prefix: &str) -> Option<Members> {
+    let inner = |(name, value): &(String, Value)| {
+        let rest = name.strip_prefix(prefix)?.strip_prefix('.')?;
+        Some((rest.to_owned(), value.clone()))
+    };
+    let members: Members = record.iter().filter_map(inner).collect();
+    (!members.is_empty()).then_some(members)
 }

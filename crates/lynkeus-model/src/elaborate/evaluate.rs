@@ -1,28 +1,31 @@
 //! Expressions of the syntax tree to values over the graph; what dotted and subscripted names lead to.
 
-use crate::Assertion;
-use std::cell::RefCell;
-use std::collections::BTreeSet;
-
 use lynkeus_expr::{Graph, Node, Unary};
 
-use super::scope::{Context, Frame, Local, Mode, Named, Scope};
-use super::value::{Scalar, Value, describe_dims, unequal_sizes};
-use crate::Tables;
+use super::scope::{Frame, Local, Mode, Named};
+use super::symbols::Symbols;
+use super::value::{Scalar, Value, describe_dims, expected_number, unequal_sizes};
+use crate::Assertion;
+use crate::balance::FlatEquation;
 use crate::diagnostic::{Problem, Result, Span};
-use crate::flat::{Classes, constant};
+use crate::flat::constant;
 use crate::limits::{Budget, MAX_CALL_DEPTH};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{Ast, BinaryOperator, ExprId, Kind, PathPart, Relation, UnaryOperator};
+use crate::syntax::ast::{Ast, Declaration, ExprId, Kind, PathPart, Term};
 use crate::syntax::{plain, shortened};
 
-/// Evaluates expressions of one text. Recursion is bounded by the nesting of the text.
+/// What to do about a Real where an Integer is needed.
+pub(super) const HOW_TO_BE_WHOLE: &str =
+    "`/` and `^` always give a Real: use `div(a, b)` or `integer(a)`";
+
+/// Evaluates expressions of one text, carries out its statements and writes out its equations.
+/// Recursion is bounded by the nesting of the text.
 pub(crate) struct Evaluator<'a> {
     pub(super) source: &'a str,
     pub(super) ast: &'a Ast,
     pub(super) graph: &'a Graph,
     pub(super) budget: &'a Budget,
-    pub(super) scope: &'a dyn Scope,
+    pub(super) symbols: &'a Symbols<'a>,
     pub(super) mode: Mode,
     /// iterators of the loops around, innermost last
     pub(super) loops: Vec<(&'a str, Scalar)>,
@@ -30,65 +33,52 @@ pub(crate) struct Evaluator<'a> {
     pub(super) ends: Vec<usize>,
     /// set when an evaluation failed because a parameter has no value
     pub(super) valueless: bool,
-    /// the classes of the text, for functions and records
-    pub(super) classes: Option<&'a Classes<'a>>,
     /// where names of classes are looked up
     pub(super) scopes: Vec<&'a str>,
     /// variables of the function or algorithm around
     pub(super) frame: Option<Frame>,
-    /// functions around, innermost last
-    pub(super) calls: Vec<usize>,
+    /// names of the functions around, innermost last
+    pub(super) calls: Vec<&'a str>,
     /// expressions and statements around, those of the callers included
     pub(super) depth: usize,
-    /// conditions of the `if`s around
-    pub(super) conditions: Vec<OnPath>,
+    /// conditions of the `if`s around, each with whether it holds in the branch that is taken
+    pub(super) conditions: Vec<(Node, bool)>,
     /// what is to hold along a run
     pub(super) claims: Vec<(Assertion, Span)>,
-    /// what tables are between their points
-    pub(super) tables: Tables,
-    /// where it is told of what the points of tables are made
-    pub(super) table_points: Option<&'a RefCell<BTreeSet<Node>>>,
+    pub(super) equations: Vec<FlatEquation>,
 }
 
 impl<'a> Evaluator<'a> {
-    pub(crate) fn new(
-        source: &'a str,
-        ast: &'a Ast,
-        graph: &'a Graph,
-        budget: &'a Budget,
-        scope: &'a dyn Scope,
-        mode: Mode,
-    ) -> Self {
-        let (loops, ends, valueless) = (vec![], vec![], false);
+    pub(crate) fn new(symbols: &'a Symbols<'a>, mode: Mode) -> Self {
+        let scopes = symbols.model.scopes.iter();
         Self {
-            source,
-            ast,
-            graph,
-            budget,
-            scope,
+            source: symbols.source,
+            ast: symbols.ast,
+            graph: symbols.graph,
+            budget: &symbols.budget,
+            symbols,
             mode,
-            loops,
-            ends,
-            valueless,
-            classes: None,
-            scopes: vec![],
+            loops: vec![],
+            ends: vec![],
+            valueless: false,
+            scopes: scopes.map(String::as_str).collect(),
             frame: None,
             calls: vec![],
             depth: 0,
             conditions: vec![],
             claims: vec![],
-            tables: Tables::Linear,
-            table_points: None,
+            equations: vec![],
         }
     }
 
-    /// With the functions and records of a text.
-    pub(super) fn within(mut self, context: &Context<'a>) -> Self {
-        self.classes = Some(context.classes);
-        self.tables = context.options.tables;
-        self.table_points = Some(context.table_points);
-        self.scopes = context.model.scopes.iter().map(String::as_str).collect();
-        self
+    /// For what stands in a declaration: in one of a package, only what that knows.
+    pub(super) fn of(symbols: &'a Symbols<'a>, declaration: &'a Declaration, mode: Mode) -> Self {
+        let mut evaluator = Self::new(symbols, mode);
+        if let Some(package) = &declaration.package {
+            evaluator.scopes = vec![package];
+            evaluator.frame = Some(Frame::closed());
+        }
+        evaluator
     }
 
     pub(super) fn span(&self, id: ExprId) -> Span {
@@ -127,50 +117,54 @@ impl<'a> Evaluator<'a> {
         let expression = self.ast.expression(id);
         let span = expression.span;
         self.budget.charge(1, span)?;
-        let scalar = match &expression.kind {
-            Kind::Integer(value) => Scalar::Integer(*value),
-            Kind::Real(value) => Scalar::Real(self.graph.constant(*value).node()),
-            Kind::Boolean(value) => self.truth(*value),
+        match &expression.kind {
+            Kind::Integer(value) => Ok(Scalar::Integer(*value).into()),
+            Kind::Real(value) => Ok(Scalar::Real(self.graph.constant(*value).node()).into()),
+            Kind::Boolean(value) => Ok(self.truth(*value).into()),
             Kind::Text => {
-                return Err(
-                    Problem::new(span, "a string here is not supported").hint("use numbers")
-                );
+                Err(Problem::new(span, "a string here is not supported").hint("use numbers"))
             }
-            Kind::Path(parts) => return self.path(parts, span),
-            Kind::Member(record, name) => return self.member(*record, name, span),
-            Kind::All => return Err(Problem::new(span, "`:` stands only in subscripts")),
-            Kind::End => self.end(span)?,
-            Kind::Name => return self.name(span),
-            Kind::Index(base, subscripts) => return self.index(*base, subscripts, span),
-            Kind::Call(call) => return self.call(call, span),
-            Kind::Array(elements) => return self.array(elements, span),
-            Kind::Matrix(rows) => return self.matrix(rows, span),
-            Kind::Comprehension(body, iterators) => {
-                return self.comprehension(*body, iterators, span);
+            Kind::Path(parts) => self.path(id, parts, span),
+            Kind::Member(record, name) => self.member(*record, name, span),
+            Kind::All => Err(Problem::new(span, "`:` stands only in subscripts")),
+            Kind::End => self.end(span),
+            Kind::Name => self.name(span),
+            Kind::Index(base, subscripts) => self.index(*base, subscripts, span),
+            Kind::Call(call) => self.call(call, span),
+            Kind::Array(elements) => self.array(elements, span),
+            Kind::Matrix(rows) => self.matrix(rows, span),
+            Kind::Comprehension(body, iterators) => self.comprehension(*body, iterators, span),
+            Kind::Not(operand) => {
+                let node = self.condition(*operand)?;
+                Ok(Scalar::Boolean(self.graph.unary(Unary::Not, node)).into())
             }
-            Kind::Unary(operator, operand) => return self.unary(*operator, *operand),
-            Kind::Chain(head, rest) => return self.chain(*head, rest),
+            Kind::Plus(operand) => {
+                let value = self.value(*operand)?;
+                self.map(value, self.span(*operand), |_, scalar, _| Ok(scalar))
+            }
+            Kind::Minus(operand) => {
+                let value = self.value(*operand)?;
+                self.map(value, self.span(*operand), Self::negated)
+            }
+            Kind::Chain(head, rest) => self.chain(*head, rest),
             Kind::Power(base, exponent, elementwise) => {
                 let (base, exponent) = (self.value(*base)?, self.value(*exponent)?);
-                return self.power(base, exponent, *elementwise, span);
+                self.power(base, exponent, *elementwise, span)
             }
-            Kind::Relation(relation, left, right) => self.relation(*relation, *left, *right)?,
-            Kind::If(branches, otherwise) => return self.conditional(branches, *otherwise),
-            Kind::Range(start, step, stop) => return self.range(*start, *step, *stop, span),
-        };
-        Ok(Value::Scalar(scalar))
+            Kind::Relation(relation, left, right) => self.relation(relation, *left, *right),
+            Kind::If(branches, otherwise) => self.conditional(branches, *otherwise),
+            Kind::Range(start, step, stop) => self.range(*start, *step, *stop, span),
+        }
     }
 
     /// The value of an expression that must be scalar.
     pub(crate) fn scalar(&mut self, id: ExprId) -> Result<Scalar> {
-        match self.value(id)? {
-            Value::Scalar(scalar) => Ok(scalar),
-            Value::Array(array) => {
-                let found = describe_dims(&array.dims);
-                let message = format!("expected a scalar, found an array {found}");
-                Err(Problem::new(self.span(id), message))
-            }
-        }
+        let value = self.value(id)?;
+        value.as_scalar().ok_or_else(|| {
+            let found = describe_dims(&value.dims);
+            let message = format!("expected a scalar, found an array {found}");
+            Problem::new(self.span(id), message)
+        })
     }
 
     /// The value of an expression in which everything must be known.
@@ -181,66 +175,64 @@ impl<'a> Evaluator<'a> {
         value
     }
 
+    /// The value of an expression; `None` where it needs a parameter without value and these are
+    /// allowed.
+    pub(super) fn value_if_known(&mut self, id: ExprId) -> Result<Option<Value>> {
+        match self.value(id) {
+            Ok(value) => Ok(Some(value)),
+            Err(_) if self.valueless && self.symbols.options.symbolic_parameters => Ok(None),
+            Err(problem) => Err(problem),
+        }
+    }
+
     /// An Integer that must be known; `what` names it in the refusal.
     pub(super) fn known_integer(&mut self, id: ExprId, what: &str) -> Result<i64> {
-        match self.structural(id)? {
-            Value::Scalar(Scalar::Integer(value)) => Ok(value),
-            Value::Array(array) => {
-                let found = describe_dims(&array.dims);
-                let message = format!("{what} must be an Integer, found an array {found}");
-                Err(Problem::new(self.span(id), message))
-            }
-            Value::Scalar(found) => {
-                let kind = match found {
-                    Scalar::Boolean(_) => "Boolean",
-                    _ => "Real",
-                };
-                let message = format!("{what} must be an Integer, found a {kind}");
-                Err(Problem::new(self.span(id), message)
-                    .hint("`/` and `^` always give a Real: use `div(a, b)` or `integer(a)`"))
-            }
-        }
+        let value = self.structural(id)?;
+        let (found, hint) = match value.as_scalar() {
+            Some(Scalar::Integer(value)) => return Ok(value),
+            Some(Scalar::Boolean(_)) => ("a Boolean".to_owned(), Some(HOW_TO_BE_WHOLE)),
+            Some(Scalar::Real(_)) => ("a Real".to_owned(), Some(HOW_TO_BE_WHOLE)),
+            None => (format!("an array {}", describe_dims(&value.dims)), None),
+        };
+        let message = format!("{what} must be an Integer, found {found}");
+        Err(Problem::new(self.span(id), message).maybe_hint(hint.map(str::to_owned)))
     }
 
     pub(super) fn truth(&self, value: bool) -> Scalar {
         Scalar::Boolean(self.graph.constant(f64::from(u8::from(value))).node())
     }
 
-    fn end(&self, span: Span) -> Result<Scalar> {
+    fn end(&self, span: Span) -> Result<Value> {
         let size = self.ends.last().and_then(|&size| i64::try_from(size).ok());
         let outside = || Problem::new(span, "`end` stands only in subscripts");
-        size.map(Scalar::Integer).ok_or_else(outside)
+        size.map(|size| Scalar::Integer(size).into())
+            .ok_or_else(outside)
     }
 
-    pub(super) fn varying(&self, span: Span) -> Problem {
+    pub(super) fn varying(&self, span: Span) -> Box<Problem> {
         let name = self.text(span);
-        Problem::new(
-            span,
-            format!("`{name}` is a variable, but a known value is needed here"),
-        )
-        .hint("sizes, loop bounds, subscripts, attributes and parameters use parameters only")
+        let message = format!("`{name}` is a variable, but a known value is needed here");
+        Problem::new(span, message)
+            .hint("sizes, loop bounds, subscripts, attributes and parameters use parameters only")
     }
 
-    pub(super) fn without_value(&mut self, span: Span) -> Problem {
+    pub(super) fn without_value(&mut self, span: Span) -> Box<Problem> {
         self.valueless = true;
         let name = self.text(span);
-        Problem::new(
-            span,
-            format!("parameter `{name}` has no value, but one is needed here"),
-        )
-        .hint(format!(
+        let message = format!("parameter `{name}` has no value, but one is needed here");
+        Problem::new(span, message).hint(format!(
             "write `{name} = …` in its declaration, or give the value on loading"
         ))
     }
 
-    pub(super) fn unknown_name(&self, span: Span) -> Problem {
+    pub(super) fn unknown_name(&self, span: Span) -> Box<Problem> {
         let name = self.text(span);
         if name == "time" {
             return self.varying(span);
         }
         let message = format!("unknown name `{}`", shortened(name));
         if name.contains('.') {
-            let declared = self.scope.names();
+            let declared = self.symbols.names();
             let hint = did_you_mean(name, declared.into_iter()).unwrap_or_else(|| {
                 "components of other models are not supported, nor other constants of the \
                  library than those of `Modelica.Constants`"
@@ -249,42 +241,29 @@ impl<'a> Evaluator<'a> {
             return Problem::new(span, message).hint(hint);
         }
         let iterators = self.loops.iter().map(|(iterator, _)| *iterator);
-        let declared = self.scope.names();
+        let declared = self.symbols.names();
         let known = declared.into_iter().chain(iterators).chain(["time"]);
         let suggestion = did_you_mean(name, known);
         let for_pi = (name == "pi").then(|| "write `Modelica.Constants.pi`".to_owned());
         Problem::new(span, message).maybe_hint(for_pi.or(suggestion))
     }
 
-    fn unary(&mut self, operator: UnaryOperator, operand: ExprId) -> Result<Value> {
-        let value = self.value(operand)?;
-        let span = self.span(operand);
-        match operator {
-            UnaryOperator::Not => {
-                let node = self.boolean(&value, span)?;
-                let node = self.graph.unary(Unary::Not, node);
-                Ok(Value::Scalar(Scalar::Boolean(node)))
-            }
-            UnaryOperator::Plus => self.map(value, span, |_, scalar, _| Ok(scalar)),
-            UnaryOperator::Minus => self.map(value, span, Self::negated),
-        }
-    }
-
-    fn chain(&mut self, head: ExprId, rest: &'a [(BinaryOperator, ExprId)]) -> Result<Value> {
+    fn chain(&mut self, head: ExprId, rest: &'a [Term]) -> Result<Value> {
         let mut value = self.value(head)?;
         let start = self.span(head);
-        for &(operator, operand) in rest {
+        for &(operation, elementwise, operand) in rest {
             let right = self.value(operand)?;
             let span = start.to(self.span(operand));
-            value = self.binary(operator, value, right, span)?;
+            value = self.binary(operation, elementwise, value, right, span)?;
         }
         Ok(value)
     }
 
-    fn relation(&mut self, relation: Relation, left: ExprId, right: ExprId) -> Result<Scalar> {
+    fn relation(&mut self, relation: &str, left: ExprId, right: ExprId) -> Result<Value> {
         let span = self.span(left).to(self.span(right));
         let (left, right) = (self.scalar(left)?, self.scalar(right)?);
-        self.compare(relation, left, right, span)
+        let holds = self.compare(relation, left, right, span)?;
+        Ok(Scalar::Boolean(holds).into())
     }
 
     /// The truth value of a condition.
@@ -298,86 +277,59 @@ impl<'a> Evaluator<'a> {
         branches: &'a [(ExprId, ExprId)],
         otherwise: ExprId,
     ) -> Result<Value> {
-        let branches = self.branches(branches.iter().copied(), otherwise)?;
-        let around = self.pass(&branches);
-        let result = self.chosen(branches);
-        self.conditions.truncate(around);
-        result
-    }
-
-    /// The values of the branches, joined.
-    fn chosen(&mut self, branches: Branches<ExprId>) -> Result<Value> {
-        let mut result = self.value(branches.last)?;
-        for (condition, value) in branches.open.into_iter().rev() {
-            let span = self.span(value);
-            self.enter();
-            let value = self.value(value)?;
-            self.conditions.pop();
-            if value.dims() != result.dims() {
-                return Err(unequal_sizes(value.dims(), result.dims(), span));
+        let take = |evaluator: &mut Self, id| Ok((evaluator.value(id)?, evaluator.span(id)));
+        let join = |evaluator: &mut Self, condition, (yes, span): (Value, Span), no| {
+            let (no, _): (Value, Span) = no;
+            if yes.dims != no.dims {
+                return Err(unequal_sizes(&yes.dims, &no.dims, span));
             }
-            result = self.elementwise(value, result, span, |evaluator, a, b, span| {
-                evaluator.select(condition, a, b, span)
-            })?;
-        }
-        Ok(result)
+            let select = |evaluator: &Self, a: Scalar, b, span| {
+                let chosen = a.select(condition, b, evaluator.graph);
+                chosen.ok_or_else(|| expected_number(span))
+            };
+            Ok((evaluator.elementwise(yes, no, span, select)?, span))
+        };
+        let chosen = self.chosen(branches.iter().copied(), otherwise, take, join);
+        chosen.map(|(value, _)| value)
     }
-}
 
-/// A condition of an `if` around, and whether it holds in the branch that is taken.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct OnPath {
-    pub condition: Node,
-    pub holds: bool,
-}
-
-/// What a branch may hold, where that is not known before the variables are.
-pub(super) struct Branches<T> {
-    /// conditions that may hold, with their branches
-    pub open: Vec<(Node, T)>,
-    /// the branch where none of them does
-    pub last: T,
-}
-
-impl Evaluator<'_> {
-    /// A condition that is known takes its branch or leaves it unread, so that a loop may hold
-    /// `if i == 1 then … else x[i - 1]`.
-    pub(super) fn branches<T>(
+    /// What the branch gives whose condition holds; else what all that may be taken give, the last
+    /// first, joined by their conditions. A condition that is known takes its branch or leaves it
+    /// unread, so that a loop may hold `if i == 1 then … else x[i - 1]`.
+    pub(super) fn chosen<B, T>(
         &mut self,
-        branches: impl Iterator<Item = (ExprId, T)>,
-        otherwise: T,
-    ) -> Result<Branches<T>> {
-        let mut open = vec![];
+        branches: impl Iterator<Item = (ExprId, B)>,
+        otherwise: B,
+        mut take: impl FnMut(&mut Self, B) -> Result<T>,
+        mut join: impl FnMut(&mut Self, Node, T, T) -> Result<T>,
+    ) -> Result<T> {
+        let (mut open, mut last) = (vec![], otherwise);
         for (condition, branch) in branches {
             let node = self.condition(condition)?;
             match self.graph.constant_value(node) {
                 Some(0.0) => {}
-                Some(_) => return Ok(Branches { open, last: branch }),
+                Some(_) => {
+                    last = branch;
+                    break;
+                }
                 None => open.push((node, branch)),
             }
         }
-        Ok(Branches {
-            open,
-            last: otherwise,
-        })
-    }
-
-    /// Notes that none of the conditions holds; gives how many there were around.
-    pub(super) fn pass<T>(&mut self, branches: &Branches<T>) -> usize {
         let around = self.conditions.len();
-        let passed = branches.open.iter().map(|&(condition, _)| OnPath {
-            condition,
-            holds: false,
-        });
+        let passed = open.iter().map(|&(condition, _)| (condition, false));
         self.conditions.extend(passed);
-        around
-    }
-
-    /// The last condition that was passed holds.
-    pub(super) fn enter(&mut self) {
-        if let Some(on_path) = self.conditions.last_mut() {
-            on_path.holds = true;
-        }
+        let done = take(self, last).and_then(|mut result| {
+            for (condition, branch) in open.into_iter().rev() {
+                self.conditions.pop();
+                self.conditions.push((condition, true));
+                let taken = take(self, branch)?;
+                self.conditions.pop();
+                result = join(self, condition, taken, result)?;
+            }
+            Ok(result)
+        });
+        self.conditions.truncate(around);
+        done
     }
 }
 
@@ -385,35 +337,47 @@ impl<'a> Evaluator<'a> {
     pub(super) fn name(&mut self, span: Span) -> Result<Value> {
         let name = plain(self.text(span));
         if let Some(scalar) = self.iterator(&name) {
-            return Ok(Value::Scalar(scalar));
+            return Ok(scalar.into());
         }
-        match self.local(&name) {
-            Some(Ok(local)) => {
-                self.budget.charge(local.elements.len() as u64, span)?;
-                return local.value().ok_or_else(|| self.unassigned(&name, span));
-            }
-            Some(Err(())) => return self.outside_of_function(&name, span),
-            None => {}
+        if let Some(local) = self.local(&name) {
+            self.budget.charge(local.elements.len() as u64, span)?;
+            return local.value().ok_or_else(|| self.unassigned(&name, span));
         }
-        let found = self.named(&name);
+        // names in a function lead to its own variables, and to constants
+        let is_closed = self.is_closed();
+        let mode = if is_closed {
+            Mode::Structural
+        } else {
+            self.mode
+        };
+        let found = self.named_in(mode, &name);
         if let Named::Array([_, ..], elements) = found {
             self.budget.charge(elements.len() as u64, span)?;
         }
         match found {
-            Named::Unknown => match self.builtin(&name) {
-                Some(scalar) => Ok(Value::Scalar(scalar)),
-                None => Err(self.unknown_name(span)),
-            },
-            found => self.meant(found, span),
+            Named::Array(..) | Named::Scalar(_) => return self.meant(found, span),
+            Named::Varying | Named::Valueless if !is_closed => return self.meant(found, span),
+            _ => {}
         }
+        let builtin = self.builtin(&name).map(Value::from);
+        builtin.ok_or_else(|| match is_closed && self.symbols.dims(&name).is_some() {
+            true => {
+                let message = format!("`{name}` is not a variable of this function");
+                Problem::new(span, message)
+                    .hint("functions read their own variables and constants: add an input")
+            }
+            false => self.unknown_name(span),
+        })
     }
 
     /// The value that a name means.
     pub(super) fn meant(&mut self, found: Named<'a>, span: Span) -> Result<Value> {
         match found {
-            Named::Array([], [scalar]) => Ok(Value::Scalar(*scalar)),
-            Named::Array(dims, elements) => Ok(Value::new(dims.to_vec(), elements.to_vec())),
-            Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
+            Named::Array(dims, elements) => Ok(Value {
+                dims: dims.to_vec(),
+                elements: elements.to_vec(),
+            }),
+            Named::Scalar(scalar) => Ok(scalar.into()),
             Named::Varying => Err(self.varying(span)),
             Named::Valueless => Err(self.without_value(span)),
             Named::Unknown => Err(self.unknown_name(span)),
@@ -427,18 +391,22 @@ impl<'a> Evaluator<'a> {
             .map(|(_, value)| *value)
     }
 
-    /// The scope's meaning of a name, in full or as an import shortens it.
+    /// What the declarations say of a name, in full or as an import shortens it.
     pub(super) fn named(&self, name: &str) -> Named<'a> {
-        // The scope outlives this evaluator.
-        let scope = self.scope;
+        self.named_in(self.mode, name)
+    }
+
+    fn named_in(&self, mode: Mode, name: &str) -> Named<'a> {
+        // The symbols outlive this evaluator.
+        let symbols = self.symbols;
         if !self.is_closed() {
-            match scope.named(name, self.mode) {
+            match symbols.named(name, mode) {
                 Named::Unknown => {}
                 found => return found,
             }
         }
         let full = self.full_names(name).into_iter();
-        let mut found = full.map(|full| scope.constant(&full, self.mode));
+        let mut found = full.map(|full| symbols.constant(&full, mode));
         found
             .find(|found| !matches!(found, Named::Unknown))
             .unwrap_or(Named::Unknown)
@@ -450,38 +418,18 @@ impl<'a> Evaluator<'a> {
     }
 
     pub(super) fn full_names(&self, name: &str) -> Vec<String> {
-        match self.classes {
-            Some(classes) if !self.scopes.is_empty() => classes.full_names(name, &self.scopes),
-            _ => vec![],
-        }
-    }
-
-    /// Names in a function lead to its own variables, and to constants.
-    fn outside_of_function(&mut self, name: &str, span: Span) -> Result<Value> {
-        let mode = std::mem::replace(&mut self.mode, Mode::Structural);
-        let found = self.named(name);
-        self.mode = mode;
-        match found {
-            found @ (Named::Array(..) | Named::Scalar(_)) => self.meant(found, span),
-            _ => match self.builtin(name) {
-                Some(scalar) => Ok(Value::Scalar(scalar)),
-                None if self.scope.dims(name).is_some() => {
-                    let message = format!("`{name}` is not a variable of this function");
-                    Err(Problem::new(span, message)
-                        .hint("functions read their own variables and constants: add an input"))
-                }
-                None => Err(self.unknown_name(span)),
-            },
+        match self.scopes[..] {
+            [] => vec![],
+            _ => self.symbols.classes.full_names(name, &self.scopes),
         }
     }
 
     fn builtin(&self, name: &str) -> Option<Scalar> {
         if name == "time" {
-            return self.scope.time(self.mode).map(Scalar::Real);
+            let is_known = self.mode == Mode::Continuous;
+            return is_known.then(|| Scalar::Real(self.symbols.time()));
         }
-        if let Some(classes) = self.classes
-            && let Some(ordinal) = classes.literal(name, &self.scopes)
-        {
+        if let Some(ordinal) = self.symbols.classes.literal(name, &self.scopes) {
             return Some(Scalar::Integer(ordinal));
         }
         let known = constant(name);
@@ -489,79 +437,79 @@ impl<'a> Evaluator<'a> {
         Some(Scalar::Real(self.graph.constant(known?).node()))
     }
 
-    pub(super) fn unassigned(&self, name: &str, span: Span) -> Problem {
-        Problem::new(
-            span,
-            format!("`{name}` is read before it has a value in every case"),
-        )
-        .hint("assign it first, in each branch of an `if`")
+    pub(super) fn unassigned(&self, name: &str, span: Span) -> Box<Problem> {
+        let message = format!("`{name}` is read before it has a value in every case");
+        Problem::new(span, message).hint("assign it first, in each branch of an `if`")
     }
 
     /// `a[1].b[2].c`: a name as it is written, or the member `a.b.c` with all subscripts.
-    pub(super) fn path(&mut self, parts: &'a [PathPart], span: Span) -> Result<Value> {
+    fn path(&mut self, id: ExprId, parts: &'a [PathPart], span: Span) -> Result<Value> {
         let whole = plain(self.text(span));
         if self.is_known(&whole) {
             return self.name(span);
         }
-        let (subscripts, named) = joined(parts, self.source);
         let literal = self.with_numbers(parts);
         if let Some(literal) = literal.filter(|literal| self.is_known(literal)) {
             return self.value_named(&literal, span);
         }
-        self.index_named(&named, &subscripts, span)
+        let (name, subscripts) = reference(self.source, self.ast, id).unwrap_or_default();
+        self.index_named(&name, &subscripts, span, span)
     }
 
     fn is_known(&self, name: &str) -> bool {
-        matches!(self.local(name), Some(Ok(_))) || !matches!(self.named(name), Named::Unknown)
+        self.local(name).is_some() || !matches!(self.named(name), Named::Unknown)
     }
 
     /// `c[2].x` for `c[i].x` with i = 2; `None` where a subscript is a range.
     fn with_numbers(&mut self, parts: &'a [PathPart]) -> Option<String> {
-        let mut name = String::new();
+        let mut names = vec![];
         for part in parts {
-            if !name.is_empty() {
-                name.push('.');
+            let mut name = plain(self.text(part.name)).into_owned();
+            if !part.subscripts.is_empty() {
+                let numbers = self.numbers(&part.subscripts).ok()?;
+                name.push_str(&format!("[{numbers}]"));
             }
-            name.push_str(&plain(self.text(part.name)));
-            let mut numbers = vec![];
-            for &subscript in &part.subscripts {
-                numbers.push(
-                    self.known_integer(subscript, "a subscript")
-                        .ok()?
-                        .to_string(),
-                );
-            }
-            if !numbers.is_empty() {
-                name.push_str(&format!("[{}]", numbers.join(",")));
-            }
+            names.push(name);
         }
-        Some(name)
+        Some(names.join("."))
+    }
+
+    /// Subscripts that are known, as `1,2`.
+    pub(super) fn numbers(&mut self, subscripts: &[ExprId]) -> Result<String> {
+        let mut numbers = vec![];
+        for &subscript in subscripts {
+            numbers.push(self.known_integer(subscript, "a subscript")?.to_string());
+        }
+        Ok(numbers.join(","))
     }
 
     pub(super) fn value_named(&mut self, name: &str, span: Span) -> Result<Value> {
-        if let Some(Ok(local)) = self.local(name) {
+        if let Some(local) = self.local(name) {
             return local.value().ok_or_else(|| self.unassigned(name, span));
         }
         self.meant(self.named(name), span)
     }
 
-    /// A variable of the function or algorithm around; `Err` where a function has none of that
-    /// name.
-    pub(super) fn local(&self, name: &str) -> Option<std::result::Result<&Local, ()>> {
-        let frame = self.frame.as_ref()?;
-        match frame.locals.get(name) {
-            Some(local) => Some(Ok(local)),
-            None if frame.is_function => Some(Err(())),
-            None => None,
-        }
+    /// A variable of the function or algorithm around.
+    pub(super) fn local(&self, name: &str) -> Option<&Local> {
+        self.frame.as_ref()?.locals.get(name)
     }
 }
 
-/// The subscripts of all parts, and their names joined.
-pub(super) fn joined(parts: &[PathPart], source: &str) -> (Vec<ExprId>, String) {
-    let subscripts = parts
-        .iter()
-        .flat_map(|part| part.subscripts.iter().copied());
-    let names = parts.iter().map(|part| plain(part.name.text(source)));
-    (subscripts.collect(), names.collect::<Vec<_>>().join("."))
+/// The name that an expression is, and its subscripts: `a.b` of `a[1].b[2]`.
+pub(super) fn reference(source: &str, ast: &Ast, id: ExprId) -> Option<(String, Vec<ExprId>)> {
+    let name = |span: Span| plain(span.text(source));
+    match &ast.expression(id).kind {
+        Kind::Name => Some((name(ast.expression(id).span).into_owned(), vec![])),
+        Kind::Index(base, subscripts) => {
+            let base = name(ast.expression(*base).span);
+            Some((base.into_owned(), subscripts.clone()))
+        }
+        Kind::Path(parts) => {
+            let names: Vec<_> = parts.iter().map(|part| name(part.name)).collect();
+            let subscripts = parts.iter().flat_map(|part| &part.subscripts);
+            Some((names.join("."), subscripts.copied().collect()))
+        }
+        _ => None,
+    }
 }

@@ -1,14 +1,13 @@
 //! Statements, carried out on expressions: what is left are the values of the variables.
 
-use crate::Assertion;
-use lynkeus_expr::{Binary, Unary};
+use lynkeus_expr::{Binary, Node, Unary};
 
-use super::evaluate::{Branches, Evaluator, joined};
-use super::scope::{Frame, Local};
-use super::value::{Array, Outcome, Record, Scalar, Value, describe_dims};
+use super::evaluate::{Evaluator, reference};
+use super::scope::Frame;
+use super::value::{Value, describe_dims, member_name};
+use crate::Assertion;
 use crate::diagnostic::{Problem, Result, Span};
-use crate::syntax::ast::{Assert, Ast, ExprId, ForIndex, Kind, Statement, StatementKind};
-use crate::syntax::plain;
+use crate::syntax::ast::{Assert, Ast, ExprId, ForIndex, Statement, StatementKind};
 
 /// How a list of statements ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,9 +22,9 @@ pub(super) fn targets(source: &str, ast: &Ast, statements: &[Statement], into: &
     for statement in statements {
         match &statement.kind {
             StatementKind::Assign(targets, _) => {
-                for &id in targets.iter().flatten() {
-                    into.push(target_name(source, ast, id));
-                }
+                let targets = targets.iter().flatten();
+                let names = targets.filter_map(|&id| Some(reference(source, ast, id)?.0));
+                into.extend(names);
             }
             StatementKind::For(_, body) | StatementKind::While(_, body) => {
                 self::targets(source, ast, body, into);
@@ -38,15 +37,6 @@ pub(super) fn targets(source: &str, ast: &Ast, statements: &[Statement], into: &
             }
             _ => {}
         }
-    }
-}
-
-fn target_name(source: &str, ast: &Ast, id: ExprId) -> String {
-    let expression = ast.expression(id);
-    match &expression.kind {
-        Kind::Index(base, _) => target_name(source, ast, *base),
-        Kind::Path(parts) => joined(parts, source).1,
-        _ => plain(expression.span.text(source)).into_owned(),
     }
 }
 
@@ -82,10 +72,10 @@ impl<'a> Evaluator<'a> {
     pub(super) fn claim(&mut self, assert: &Assert, span: Span) -> Result<()> {
         let mut condition = self.condition(assert.condition)?;
         self.budget.charge(self.conditions.len() as u64, span)?;
-        for on_path in &self.conditions {
-            let elsewhere = match on_path.holds {
-                true => self.graph.unary(Unary::Not, on_path.condition),
-                false => on_path.condition,
+        for &(on_path, holds) in &self.conditions {
+            let elsewhere = match holds {
+                true => self.graph.unary(Unary::Not, on_path),
+                false => on_path,
             };
             condition = self.graph.binary(Binary::Or, elsewhere, condition);
         }
@@ -157,33 +147,29 @@ impl<'a> Evaluator<'a> {
         otherwise: &'a [Statement],
         span: Span,
     ) -> Result<Ended> {
-        let pairs = branches.iter().map(|(c, body)| (*c, body.as_slice()));
-        let branches = self.branches(pairs, otherwise)?;
-        if branches.open.is_empty() {
-            return self.execute(branches.last);
-        }
-        let around = self.pass(&branches);
-        let done = self.each_branch(branches, span);
-        self.conditions.truncate(around);
-        done.map(|()| Ended::AtItsEnd)
-    }
-
-    fn each_branch(&mut self, branches: Branches<&'a [Statement]>, span: Span) -> Result<()> {
-        let Some(before) = self.frame.clone() else {
-            return Ok(());
-        };
-        self.whole(branches.last, span)?;
-        for (condition, body) in branches.open.into_iter().rev() {
-            self.budget.charge(before.size() as u64, span)?;
-            self.enter();
-            let no = self.frame.replace(before.clone());
-            self.whole(body, span)?;
-            self.conditions.pop();
-            if let (Some(yes), Some(no)) = (self.frame.take(), no) {
-                self.frame = Some(Frame::joined(condition, yes, no, self.graph));
+        let around = self.conditions.len();
+        let take = |evaluator: &mut Self, body: &'a [Statement]| {
+            if evaluator.conditions.len() == around {
+                let ended = evaluator.execute(body)?;
+                return Ok((ended, evaluator.frame.take()));
             }
-        }
-        Ok(())
+            let before = evaluator.frame.clone();
+            evaluator.whole(body, span)?;
+            let after = std::mem::replace(&mut evaluator.frame, before);
+            Ok((Ended::AtItsEnd, after))
+        };
+        let join = |evaluator: &mut Self, condition: Node, (_, yes): (_, Option<Frame>), no| {
+            let (ended, no): (Ended, Option<Frame>) = no;
+            let size = yes.as_ref().map_or(0, Frame::size);
+            evaluator.budget.charge(size as u64, span)?;
+            let frames = yes.zip(no);
+            let joined = |(yes, no)| Frame::joined(condition, yes, no, evaluator.graph);
+            Ok((ended, frames.map(joined)))
+        };
+        let pairs = branches.iter().map(|(c, body)| (*c, body.as_slice()));
+        let (ended, frame) = self.chosen(pairs, otherwise, take, join)?;
+        self.frame = frame;
+        Ok(ended)
     }
 
     /// Statements from which nothing leads away.
@@ -203,50 +189,27 @@ impl<'a> Evaluator<'a> {
         value: ExprId,
         span: Span,
     ) -> Result<()> {
-        if let [Some(target)] = targets {
-            if let Some(record) = self.record(value)? {
-                return self.assign_record(*target, record, span);
-            }
-            let value = self.value(value)?;
-            return self.assign(*target, value, span);
-        }
-        let outcomes = self.outcomes(value, targets.len())?;
+        let outcomes = match targets {
+            [Some(_)] => vec![self.members(value)?],
+            _ => self.outcomes(value, targets.len())?,
+        };
         for (target, outcome) in targets.iter().zip(outcomes) {
-            match (target, outcome) {
-                (Some(target), Outcome::Value(value)) => self.assign(*target, value, span)?,
-                (Some(target), Outcome::Record(record)) => {
-                    self.assign_record(*target, record, span)?;
-                }
-                (None, _) => {}
+            let Some(target) = *target else {
+                continue;
+            };
+            let (name, subscripts) = reference(self.source, self.ast, target).ok_or_else(|| {
+                let message = "expected a variable before `:=`";
+                Problem::new(self.span(target), message)
+            })?;
+            for (member, value) in outcome {
+                let subscripts = match member.as_str() {
+                    "" => &subscripts[..],
+                    _ => &[],
+                };
+                self.assign_to(&member_name(&name, &member), subscripts, value, span)?;
             }
         }
         Ok(())
-    }
-
-    fn assign_record(&mut self, target: ExprId, record: Record, span: Span) -> Result<()> {
-        let name = target_name(self.source, self.ast, target);
-        for (member, value) in record.members {
-            let full = format!("{name}.{member}");
-            self.assign_to(&full, &[], value, span)?;
-        }
-        Ok(())
-    }
-
-    fn assign(&mut self, target: ExprId, value: Value, span: Span) -> Result<()> {
-        let expression = self.ast.expression(target);
-        let name = target_name(self.source, self.ast, target);
-        match &expression.kind {
-            Kind::Name => self.assign_to(&name, &[], value, span),
-            Kind::Index(_, subscripts) => self.assign_to(&name, subscripts, value, span),
-            Kind::Path(parts) => {
-                let subscripts = joined(parts, self.source).0;
-                self.assign_to(&name, &subscripts, value, span)
-            }
-            _ => Err(Problem::new(
-                expression.span,
-                "expected a variable before `:=`",
-            )),
-        }
     }
 
     fn assign_to(
@@ -261,12 +224,9 @@ impl<'a> Evaluator<'a> {
             Problem::new(span, message)
                 .hint("an algorithm assigns its own variables: outputs and protected ones")
         };
-        let dims = match self.local(name) {
-            Some(Ok(local)) => local.dims.clone(),
-            _ => return Err(unknown()),
-        };
+        let dims = self.local(name).ok_or_else(unknown)?.dims.clone();
         let (kept, offsets) = self.selected(name, &dims, subscripts, span)?;
-        let Array { dims, elements } = value.into_array();
+        let Value { dims, elements } = value;
         if kept != dims {
             let (has, found) = (describe_dims(&kept), describe_dims(&dims));
             let message = format!("`{name}` takes {has} here, its value has {found}");
@@ -275,14 +235,10 @@ impl<'a> Evaluator<'a> {
         self.budget.charge(offsets.len() as u64, span)?;
         let graph = self.graph;
         let frame = self.frame.as_mut();
-        let local: &mut Local = frame
-            .and_then(|frame| frame.locals.get_mut(name))
-            .ok_or_else(unknown)?;
+        let local = frame.and_then(|frame| frame.locals.get_mut(name));
+        let local = local.ok_or_else(unknown)?;
         for (offset, scalar) in offsets.into_iter().zip(elements) {
-            let converted: Scalar = local.converted(scalar, graph);
-            if let Some(slot) = local.elements.get_mut(offset) {
-                *slot = Some(converted);
-            }
+            local.elements[offset] = Some(local.converted(scalar, graph));
         }
         Ok(())
     }

@@ -1,85 +1,84 @@
-//! The functions of scalars, and operators that are written as functions: `der`, `semiLinear`,
-//! `cross`. Arrays are taken element by element.
+//! The functions by their names, and those of scalars; operators that are written as functions:
+//! `der`, `semiLinear`, `cross`. Arrays are taken element by element.
 
-use lynkeus_expr::{Binary, Node, Unary, jacobian};
+use lynkeus_expr::{Binary, Expr, Node, Unary};
 
 use super::arithmetic::overflow;
+use super::arrays::{matrix_dims, scalar_dims, vector_dims};
 use super::evaluate::Evaluator;
-use super::scope::Mode;
-use super::value::{Scalar, Value};
+use super::value::{Scalar, Value, expected_number};
+use crate::balance::total_derivative;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{BinaryOperator, Call, ExprId, Kind, Relation};
+use crate::syntax::ast::{Call, ExprId, Kind};
 use crate::syntax::shortened;
 
-const UNARY: [(&str, Unary); 14] = [
-    ("sqrt", Unary::Sqrt),
-    ("exp", Unary::Exp),
-    ("log", Unary::Ln),
-    ("sin", Unary::Sin),
-    ("cos", Unary::Cos),
-    ("tan", Unary::Tan),
-    ("asin", Unary::Asin),
-    ("acos", Unary::Acos),
-    ("atan", Unary::Atan),
-    ("sinh", Unary::Sinh),
-    ("cosh", Unary::Cosh),
-    ("tanh", Unary::Tanh),
-    ("abs", Unary::Abs),
-    ("sign", Unary::Sign),
+/// Where the library has functions that are known without it.
+const LIBRARY: &str = "Modelica.Math.";
+
+const INTERPOLATE: &str = "Modelica.Math.Vectors.interpolate";
+
+/// What a function makes of a call, which stands at the span.
+type Function = for<'e, 'a> fn(&'e mut Evaluator<'a>, &'a Call, Span) -> Result<Value>;
+
+/// By name: what an evaluator `e` makes of a call `c` at the span `s`.
+const FUNCTIONS: [(&str, Function); 47] = [
+    ("sqrt", |e, c, s| e.math(c, s, Unary::Sqrt)),
+    ("exp", |e, c, s| e.math(c, s, Unary::Exp)),
+    ("log", |e, c, s| e.math(c, s, Unary::Ln)),
+    ("log10", |e, c, s| e.each(c, s, Evaluator::log10)),
+    ("sin", |e, c, s| e.math(c, s, Unary::Sin)),
+    ("cos", |e, c, s| e.math(c, s, Unary::Cos)),
+    ("tan", |e, c, s| e.math(c, s, Unary::Tan)),
+    ("asin", |e, c, s| e.math(c, s, Unary::Asin)),
+    ("acos", |e, c, s| e.math(c, s, Unary::Acos)),
+    ("atan", |e, c, s| e.math(c, s, Unary::Atan)),
+    ("atan2", |e, c, s| e.pairs(c, s, Evaluator::atan2)),
+    ("sinh", |e, c, s| e.math(c, s, Unary::Sinh)),
+    ("cosh", |e, c, s| e.math(c, s, Unary::Cosh)),
+    ("tanh", |e, c, s| e.math(c, s, Unary::Tanh)),
+    ("abs", |e, c, s| e.math(c, s, Unary::Abs)),
+    ("sign", |e, c, s| e.math(c, s, Unary::Sign)),
+    ("floor", |e, c, s| e.each(c, s, Evaluator::floor)),
+    ("ceil", |e, c, s| e.each(c, s, Evaluator::ceil)),
+    ("integer", |e, c, s| e.each(c, s, Evaluator::integer)),
+    ("div", |e, c, s| e.divided(c, s, i64::checked_div, quotient)),
+    ("rem", |e, c, s| e.divided(c, s, i64::checked_rem, rest)),
+    ("mod", |e, c, s| e.divided(c, s, exact_modulus, modulus)),
+    ("min", |e, c, s| e.extreme(c, s, Binary::Min, i64::min)),
+    ("max", |e, c, s| e.extreme(c, s, Binary::Max, i64::max)),
+    ("der", |e, c, _| e.der(c)),
+    ("noEvent", |e, c, _| e.only_argument(c)),
+    ("smooth", |e, c, _| Ok(e.two_arguments(c)?.1)),
+    ("homotopy", |e, c, _| Ok(e.two_arguments(c)?.0)),
+    ("semiLinear", |e, c, s| e.semi_linear(c, s)),
+    ("cross", |e, c, s| e.cross(c, s)),
+    (INTERPOLATE, |e, c, s| e.interpolate(c, s)),
+    ("sum", |e, c, s| e.sum(c, s)),
+    ("product", |e, c, s| e.product_of_all(c, s)),
+    ("array", |e, c, s| e.array_of(c, s)),
+    ("size", |e, c, _| e.size(c)),
+    ("ndims", |e, c, _| e.ndims(c)),
+    ("zeros", |e, c, s| e.filled(0, c, s)),
+    ("ones", |e, c, s| e.filled(1, c, s)),
+    ("fill", |e, c, s| e.fill(c, s)),
+    ("linspace", |e, c, s| e.linspace(c, s)),
+    ("identity", |e, c, s| e.identity(c, s)),
+    ("diagonal", |e, c, s| e.diagonal(c, s)),
+    ("transpose", |e, c, s| e.transpose(c, s)),
+    ("cat", |e, c, s| e.cat(c, s)),
+    ("scalar", |e, c, s| e.reshaped(c, s, scalar_dims)),
+    ("vector", |e, c, s| e.reshaped(c, s, vector_dims)),
+    ("matrix", |e, c, s| e.reshaped(c, s, matrix_dims)),
 ];
 
-/// The other functions, for suggestions.
-const OTHERS: [&str; 33] = [
-    "homotopy",
-    "semiLinear",
-    "cross",
-    "Modelica.Math.Vectors.interpolate",
-    "der",
-    "log10",
-    "floor",
-    "ceil",
-    "integer",
-    "atan2",
-    "mod",
-    "rem",
-    "div",
-    "min",
-    "max",
-    "sum",
-    "product",
-    "noEvent",
-    "smooth",
-    "size",
-    "ndims",
-    "zeros",
-    "ones",
-    "fill",
-    "linspace",
-    "identity",
-    "diagonal",
-    "transpose",
-    "cat",
-    "scalar",
-    "vector",
-    "matrix",
-    "array",
-];
+const NO_EVENTS: &str = "models with events are not supported: use `if` expressions";
 
 /// Functions that an observer's model cannot have, and what to do instead.
 const REFUSED: [(&str, &str); 10] = [
-    (
-        "pre",
-        "models with events are not supported: use `if` expressions",
-    ),
-    (
-        "edge",
-        "models with events are not supported: use `if` expressions",
-    ),
-    (
-        "change",
-        "models with events are not supported: use `if` expressions",
-    ),
+    ("pre", NO_EVENTS),
+    ("edge", NO_EVENTS),
+    ("change", NO_EVENTS),
     ("sample", "sampling is set in the study, not in the model"),
     ("initial", "give the starting values with `start = …`"),
     ("terminal", "models with events are not supported"),
@@ -94,68 +93,36 @@ const REFUSED: [(&str, &str); 10] = [
 
 impl<'a> Evaluator<'a> {
     pub(super) fn call(&mut self, call: &'a Call, span: Span) -> Result<Value> {
-        if self.classes.is_some()
-            && let Some(value) = self.own_function(call, span)?
-        {
+        if let Some(value) = self.own_function(call, span)? {
             return Ok(value);
         }
-        let name = self.text(call.function);
-        let name = name.strip_prefix("Modelica.Math.").unwrap_or(name);
         if let Some((name, _)) = call.named.first() {
             let problem = Problem::new(*name, "a named argument is not supported");
             return Err(problem.hint("give the arguments in order, without names"));
         }
-        if let Some(&(_, operation)) = UNARY.iter().find(|(known, _)| *known == name) {
-            let value = self.only_argument(call)?;
-            return self.map(value, span, |evaluator, scalar, span| {
-                evaluator.unary_function(operation, scalar, span)
-            });
-        }
-        match name {
-            "der" => self.der(call),
-            "log10" => {
-                let value = self.only_argument(call)?;
-                self.map(value, span, |evaluator, scalar, span| {
-                    let node = evaluator.real(scalar, span)?;
-                    let logarithm = evaluator.graph.expr(node).log10();
-                    Ok(Scalar::Real(logarithm.node()))
-                })
-            }
-            "floor" | "ceil" | "integer" => {
-                let value = self.only_argument(call)?;
-                self.map(value, span, |evaluator, scalar, span| {
-                    evaluator.rounded(name, scalar, span)
-                })
-            }
-            "atan2" | "mod" | "rem" | "div" => {
-                let (left, right) = self.two_arguments(call)?;
-                self.elementwise(left, right, span, |evaluator, a, b, span| {
-                    evaluator.binary_function(name, a, b, span)
-                })
-            }
-            "min" | "max" => self.extreme(name, call, span),
-            "Vectors.interpolate" => self.interpolate(call, span),
-            "noEvent" => self.only_argument(call),
-            "smooth" => Ok(self.two_arguments(call)?.1),
-            "homotopy" => Ok(self.two_arguments(call)?.0),
-            "semiLinear" => self.semi_linear(call, span),
-            "cross" => self.cross(call, span),
-            _ => match self.array_function(name, call, span)? {
-                Some(value) => Ok(value),
-                None => Err(self.unknown_function(call.function, name)),
-            },
+        let name = self.function_name(call);
+        let is_called = |known: &str| known.strip_prefix(LIBRARY).unwrap_or(known) == name;
+        match FUNCTIONS.iter().find(|(known, _)| is_called(known)) {
+            Some((_, function)) => function(self, call, span),
+            None => Err(self.unknown_function(call.function, name)),
         }
     }
 
-    fn unknown_function(&self, span: Span, name: &str) -> Problem {
+    /// The function that is called, without the name of the library.
+    pub(super) fn function_name(&self, call: &Call) -> &'a str {
+        let name = self.text(call.function);
+        name.strip_prefix(LIBRARY).unwrap_or(name)
+    }
+
+    fn unknown_function(&self, span: Span, name: &str) -> Box<Problem> {
         if let Some((_, hint)) = REFUSED.iter().find(|(refused, _)| *refused == name) {
             return Problem::new(span, format!("`{name}` is not supported")).hint(*hint);
         }
-        let known = UNARY.iter().map(|(name, _)| *name).chain(OTHERS);
+        let known = FUNCTIONS.iter().map(|(name, _)| *name);
         let hint = did_you_mean(name, known).unwrap_or_else(|| match name {
             "ln" => "the natural logarithm is `log`".to_owned(),
             "pow" => "write `a^b`".to_owned(),
-            _ if self.scope.dims(name).is_some() => "subscripts stand in `[…]`".to_owned(),
+            _ if self.symbols.dims(name).is_some() => "subscripts stand in `[…]`".to_owned(),
             _ => "the text holds no function of this name".to_owned(),
         });
         Problem::new(span, format!("unknown function `{}`", shortened(name))).hint(hint)
@@ -186,113 +153,142 @@ impl<'a> Evaluator<'a> {
         Ok((self.value(left)?, self.value(right)?))
     }
 
-    fn unary_function(&self, operation: Unary, scalar: Scalar, span: Span) -> Result<Scalar> {
-        if let Scalar::Integer(value) = scalar {
-            match operation {
-                Unary::Abs => {
-                    let magnitude = value.checked_abs();
-                    return magnitude.map(Scalar::Integer).ok_or_else(|| overflow(span));
-                }
-                Unary::Sign => return Ok(Scalar::Integer(value.signum())),
-                _ => {}
-            }
-        }
-        let node = self.real(scalar, span)?;
-        Ok(Scalar::Real(self.graph.unary(operation, node)))
+    /// A function of every element of the only argument.
+    fn each(
+        &mut self,
+        call: &Call,
+        span: Span,
+        function: impl Fn(&Self, Scalar, Span) -> Result<Scalar>,
+    ) -> Result<Value> {
+        let value = self.only_argument(call)?;
+        self.map(value, span, function)
     }
 
-    fn rounded(&self, name: &str, scalar: Scalar, span: Span) -> Result<Scalar> {
-        let node = self.real(scalar, span)?;
-        let rounded = match name {
-            "ceil" => {
-                let negative = self.graph.unary(Unary::Neg, node);
-                let floor = self.graph.unary(Unary::Floor, negative);
-                self.graph.unary(Unary::Neg, floor)
-            }
-            _ => self.graph.unary(Unary::Floor, node),
-        };
-        match self.graph.constant_value(rounded) {
-            Some(value) if name == "integer" => {
-                if value.abs() > 2f64.powi(53) {
-                    return Err(overflow(span));
-                }
-                Ok(Scalar::Integer(value as i64))
-            }
-            _ => Ok(Scalar::Real(rounded)),
-        }
+    /// A function of the elements of two arguments.
+    fn pairs(
+        &mut self,
+        call: &Call,
+        span: Span,
+        function: impl Fn(&Self, Scalar, Scalar, Span) -> Result<Scalar>,
+    ) -> Result<Value> {
+        let (left, right) = self.two_arguments(call)?;
+        self.elementwise(left, right, span, function)
     }
 
-    fn binary_function(&self, name: &str, a: Scalar, b: Scalar, span: Span) -> Result<Scalar> {
-        if b.number(self.graph) == Some(0.0) && name != "atan2" {
-            return Err(Problem::new(span, "division by zero"));
-        }
-        if let (Scalar::Integer(a), Scalar::Integer(b)) = (a, b) {
-            let exact = match name {
-                "div" => Some(a.checked_div(b)),
-                "rem" => Some(a.checked_rem(b)),
-                "mod" => Some(a.checked_rem(b).map(|rest| match (rest < 0) == (b < 0) {
-                    true => rest,
-                    false if rest == 0 => 0,
-                    false => rest + b,
-                })),
-                _ => None,
+    fn math(&mut self, call: &Call, span: Span, operation: Unary) -> Result<Value> {
+        self.each(call, span, |evaluator, scalar, span| {
+            let exact = match (scalar, operation) {
+                (Scalar::Integer(value), Unary::Abs) => value.checked_abs(),
+                (Scalar::Integer(value), Unary::Sign) => Some(value.signum()),
+                _ => {
+                    let node = evaluator.real(scalar, span)?;
+                    return Ok(Scalar::Real(evaluator.graph.unary(operation, node)));
+                }
             };
-            if let Some(exact) = exact {
-                return exact.map(Scalar::Integer).ok_or_else(|| overflow(span));
-            }
-        }
-        let graph = self.graph;
-        let (a, b) = (
-            graph.expr(self.real(a, span)?),
-            graph.expr(self.real(b, span)?),
-        );
-        let truncated = || {
-            let quotient = a / b;
-            quotient.sign() * quotient.abs().floor()
-        };
-        let result = match name {
-            "atan2" => graph.expr(graph.binary(Binary::Atan2, a.node(), b.node())),
-            "div" => truncated(),
-            "rem" => a - truncated() * b,
-            _ => a - (a / b).floor() * b,
-        };
-        Ok(Scalar::Real(result.node()))
+            exact.map(Scalar::Integer).ok_or_else(|| overflow(span))
+        })
     }
 
-    fn extreme(&mut self, name: &str, call: &'a Call, span: Span) -> Result<Value> {
-        let operation = if name == "min" {
-            Binary::Min
-        } else {
-            Binary::Max
+    fn log10(&self, scalar: Scalar, span: Span) -> Result<Scalar> {
+        let node = self.real(scalar, span)?;
+        Ok(Scalar::Real(self.graph.expr(node).log10().node()))
+    }
+
+    fn floor(&self, scalar: Scalar, span: Span) -> Result<Scalar> {
+        let node = self.real(scalar, span)?;
+        Ok(Scalar::Real(self.graph.unary(Unary::Floor, node)))
+    }
+
+    fn ceil(&self, scalar: Scalar, span: Span) -> Result<Scalar> {
+        let node = self.graph.expr(self.real(scalar, span)?);
+        Ok(Scalar::Real((-(-node).floor()).node()))
+    }
+
+    fn integer(&self, scalar: Scalar, span: Span) -> Result<Scalar> {
+        let floor = self.floor(scalar, span)?;
+        match floor.number(self.graph) {
+            Some(value) if value.abs() > 2f64.powi(53) => Err(overflow(span)),
+            Some(value) => Ok(Scalar::Integer(value as i64)),
+            None => Ok(floor),
+        }
+    }
+
+    fn atan2(&self, a: Scalar, b: Scalar, span: Span) -> Result<Scalar> {
+        let (a, b) = (self.real(a, span)?, self.real(b, span)?);
+        Ok(Scalar::Real(self.graph.binary(Binary::Atan2, a, b)))
+    }
+
+    /// What is left of a division: of Integers `exact`, where it fits.
+    fn divided(
+        &mut self,
+        call: &Call,
+        span: Span,
+        exact: impl Fn(i64, i64) -> Option<i64>,
+        real: impl for<'g> Fn(Expr<'g>, Expr<'g>) -> Expr<'g>,
+    ) -> Result<Value> {
+        self.pairs(call, span, |evaluator, a, b, span| {
+            let graph = evaluator.graph;
+            if b.number(graph) == Some(0.0) {
+                return Err(Problem::new(span, "division by zero"));
+            }
+            if let (Scalar::Integer(a), Scalar::Integer(b)) = (a, b) {
+                let exact = exact(a, b).map(Scalar::Integer);
+                return exact.ok_or_else(|| overflow(span));
+            }
+            let (a, b) = (evaluator.real(a, span)?, evaluator.real(b, span)?);
+            Ok(Scalar::Real(real(graph.expr(a), graph.expr(b)).node()))
+        })
+    }
+
+    /// The smallest or largest: of two arguments element by element, or of all elements of one.
+    fn extreme(
+        &mut self,
+        call: &'a Call,
+        span: Span,
+        operation: Binary,
+        exact: impl Fn(i64, i64) -> i64,
+    ) -> Result<Value> {
+        let of_two = |evaluator: &Self, a: Scalar, b: Scalar, span: Span| {
+            if let (Scalar::Integer(a), Scalar::Integer(b)) = (a, b) {
+                return Ok(Scalar::Integer(exact(a, b)));
+            }
+            let (a, b) = (evaluator.real(a, span)?, evaluator.real(b, span)?);
+            Ok(Scalar::Real(evaluator.graph.binary(operation, a, b)))
         };
         if call.arguments.len() == 2 {
-            let (left, right) = self.two_arguments(call)?;
-            return self.elementwise(left, right, span, |evaluator, a, b, span| {
-                evaluator.larger_or_smaller(operation, a, b, span)
-            });
+            return self.pairs(call, span, of_two);
         }
         let elements = self.reduced(call, span)?;
         self.budget.charge(elements.len() as u64, span)?;
         let Some((&first, rest)) = elements.split_first() else {
+            let name = self.function_name(call);
             return Err(Problem::new(span, format!("`{name}` of no elements")));
         };
-        let result = rest.iter().try_fold(first, |best, &next| {
-            self.larger_or_smaller(operation, best, next, span)
-        });
-        Ok(Value::Scalar(result?))
+        let better = |best, &next| of_two(self, best, next, span);
+        rest.iter().try_fold(first, better).map(Value::from)
     }
+}
 
-    fn larger_or_smaller(&self, op: Binary, a: Scalar, b: Scalar, span: Span) -> Result<Scalar> {
-        if let (Scalar::Integer(a), Scalar::Integer(b)) = (a, b) {
-            return Ok(Scalar::Integer(if op == Binary::Min {
-                a.min(b)
-            } else {
-                a.max(b)
-            }));
-        }
-        let (a, b) = (self.real(a, span)?, self.real(b, span)?);
-        Ok(Scalar::Real(self.graph.binary(op, a, b)))
-    }
+/// The quotient without its fraction.
+fn quotient<'g>(a: Expr<'g>, b: Expr<'g>) -> Expr<'g> {
+    let quotient = a / b;
+    quotient.sign() * quotient.abs().floor()
+}
+
+/// The rest with the sign of a.
+fn rest<'g>(a: Expr<'g>, b: Expr<'g>) -> Expr<'g> {
+    a - quotient(a, b) * b
+}
+
+/// The rest with the sign of b.
+fn modulus<'g>(a: Expr<'g>, b: Expr<'g>) -> Expr<'g> {
+    a - (a / b).floor() * b
+}
+
+fn exact_modulus(a: i64, b: i64) -> Option<i64> {
+    let rest = a.checked_rem(b)?;
+    let has_other_sign = rest != 0 && (rest < 0) != (b < 0);
+    Some(if has_other_sign { rest + b } else { rest })
 }
 
 impl<'a> Evaluator<'a> {
@@ -309,7 +305,7 @@ impl<'a> Evaluator<'a> {
                 _ => return Err(evaluator.no_derivative(span)),
             };
             if is_variable {
-                let derivative = evaluator.scope.derivative(node);
+                let derivative = evaluator.symbols.derivative(node);
                 return derivative
                     .map(Scalar::Real)
                     .ok_or_else(|| evaluator.no_derivative(span));
@@ -318,7 +314,7 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    fn no_derivative(&self, span: Span) -> Problem {
+    fn no_derivative(&self, span: Span) -> Box<Problem> {
         let name = self.text(span);
         let message = format!("`der({name})`: `{name}` is not a Real variable");
         Problem::new(span, message)
@@ -328,31 +324,19 @@ impl<'a> Evaluator<'a> {
     /// Σ ∂e/∂v der(v) over the variables of e, and ∂e/∂t.
     fn total_derivative(&self, node: Node, span: Span) -> Result<Node> {
         let graph = self.graph;
-        let symbols = graph.symbols_of(&[node]);
-        self.budget.charge(symbols.len() as u64, span)?;
-        let row = jacobian::reverse(graph, &[node], &symbols);
-        let mut sum: Option<Node> = None;
-        let mut add = |term: Node| {
-            sum = Some(sum.map_or(term, |sum| graph.binary(Binary::Add, sum, term)));
-        };
-        for (place, slope) in row.row(0) {
-            let symbol = symbols[place];
-            if Some(symbol) == self.scope.time(Mode::Continuous) {
-                add(slope);
-                continue;
+        let symbols = graph.symbols_of(&[node]).len();
+        self.budget.charge(symbols as u64, span)?;
+        let time = self.symbols.time();
+        total_derivative(graph, node, time, |symbol| {
+            let derivative = self.symbols.derivative(symbol);
+            if derivative.is_some() || symbol == time || self.symbols.parameters.contains(&symbol) {
+                return Ok(derivative);
             }
-            if self.scope.is_parameter(symbol) {
-                continue;
-            }
-            let derivative = self.scope.derivative(symbol).ok_or_else(|| {
-                let name = graph.symbol_name(symbol).unwrap_or_default();
-                let message = format!("`der` of an expression with `{name}`, which has none");
-                Problem::new(span, message)
-                    .hint("inputs and parameters have no derivative in the equations")
-            })?;
-            add(graph.binary(Binary::Mul, slope, derivative));
-        }
-        Ok(sum.unwrap_or_else(|| graph.constant(0.0).node()))
+            let name = graph.symbol_name(symbol).unwrap_or_default();
+            let message = format!("`der` of an expression with `{name}`, which has none");
+            Err(Problem::new(span, message)
+                .hint("inputs and parameters have no derivative in the equations"))
+        })
     }
 
     /// `semiLinear(x, a, b)`: a x where x ≥ 0, else b x.
@@ -361,28 +345,24 @@ impl<'a> Evaluator<'a> {
         let x = self.scalar(x)?;
         let (above, below) = (self.scalar(above)?, self.scalar(below)?);
         let zero = Scalar::Integer(0);
-        let Scalar::Boolean(positive) = self.compare(Relation::GreaterEqual, x, zero, span)? else {
-            return Err(Problem::new(span, "expected a number"));
-        };
-        let slope = self.select(positive, above, below, span)?;
-        let product = self.scalar_binary(BinaryOperator::Multiply, slope, x, span)?;
-        Ok(Value::Scalar(product))
+        let positive = self.compare(">=", x, zero, span)?;
+        let slope = above.select(positive, below, self.graph);
+        let slope = slope.ok_or_else(|| expected_number(span))?;
+        let product = self.scalar_binary(Binary::Mul, slope, x, span)?;
+        Ok(product.into())
     }
 
     /// The cross product of two vectors of three elements.
     pub(super) fn cross(&mut self, call: &'a Call, span: Span) -> Result<Value> {
         let (a, b) = self.two_arguments(call)?;
-        let (a, b) = (a.into_array(), b.into_array());
         let ([a1, a2, a3], [b1, b2, b3]) = (&a.elements[..], &b.elements[..]) else {
-            return Err(Problem::new(
-                span,
-                "`cross` takes two vectors of three elements",
-            ));
+            let message = "`cross` takes two vectors of three elements";
+            return Err(Problem::new(span, message));
         };
         let term = |p: &Scalar, q: &Scalar, r: &Scalar, s: &Scalar| {
-            let first = self.scalar_binary(BinaryOperator::Multiply, *p, *q, span)?;
-            let second = self.scalar_binary(BinaryOperator::Multiply, *r, *s, span)?;
-            self.scalar_binary(BinaryOperator::Subtract, first, second, span)
+            let first = self.scalar_binary(Binary::Mul, *p, *q, span)?;
+            let second = self.scalar_binary(Binary::Mul, *r, *s, span)?;
+            self.scalar_binary(Binary::Sub, first, second, span)
         };
         let elements = vec![
             term(a2, b3, a3, b2)?,

@@ -15,27 +15,23 @@ mod symbols;
 mod tables;
 mod value;
 
-use std::cell::RefCell;
-use std::collections::{BTreeSet, HashSet};
+use std::collections::HashSet;
 
 use lynkeus_expr::{Graph, Spent};
 
 use crate::diagnostic::{Problem, Result, Span};
 use crate::flat::{Classes, FlatModel, flat_model, title};
-use crate::limits::elaboration;
 use crate::names::choose;
 use crate::syntax::ast::{Ast, Class, ClassKind};
 use crate::syntax::parse_file;
 use crate::{LoadOptions, Plant};
-use scope::Context;
-use symbols::Symbols;
+use scope::Mode;
+use symbols::{Names, Symbols};
 
 pub(crate) use evaluate::Evaluator;
-pub(crate) use scope::{GivenNames, Mode};
-pub(crate) use value::Value;
 
 /// The plant of a Modelica text, with what looks wrong in it.
-pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<Problem>)> {
+pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<Box<Problem>>)> {
     let mut ast = parse_file(source)?;
     let place = choose_model(&ast, options)?;
     let model = flat_model(source, &mut ast, place)?;
@@ -43,29 +39,33 @@ pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<P
     let classes = Classes::new(source, &ast.classes);
     let graph = Graph::new();
     graph.set_budget(options.budget.clone());
-    let budget = elaboration();
-    let context = Context {
-        source,
-        ast,
-        model,
-        classes: &classes,
-        graph: &graph,
-        budget: &budget,
-        options,
-        table_points: &RefCell::new(BTreeSet::new()),
-    };
     let done = graph.budgeted(options.budget.clone(), || {
-        let symbols = Symbols::new(&context)?;
-        let flat = flatten::flatten(&context, &symbols)?;
-        assemble::plant(&context, &symbols, flat)
+        let symbols = Symbols::new(source, ast, &graph, model, &classes, options).declared()?;
+        let flat = flatten::flatten(&symbols)?;
+        assemble::plant(&symbols, flat)
     });
     let (plant, mut warnings) = done.map_err(|spent| ended(model, spent))??;
     warnings.extend(crate::units::check(source, ast, model));
     Ok((Plant { graph, ..plant }, warnings))
 }
 
+/// Evaluates expressions of a text that stand by themselves; `names` gives the meaning of names.
+pub(crate) fn evaluated<T>(
+    source: &str,
+    ast: &Ast,
+    graph: &Graph,
+    names: Names<'_>,
+    run: impl FnOnce(&mut Evaluator<'_>) -> Result<T>,
+) -> Result<T> {
+    let (model, classes) = (FlatModel::default(), Classes::default());
+    let options = LoadOptions::default();
+    let mut symbols = Symbols::new(source, ast, graph, &model, &classes, &options);
+    symbols.given = Some(names);
+    run(&mut Evaluator::new(&symbols, Mode::Continuous))
+}
+
 /// A limit ended the reading.
-fn ended(model: &FlatModel, spent: Spent) -> Problem {
+fn ended(model: &FlatModel, spent: Spent) -> Box<Problem> {
     Problem::new(model.name, format!("the model was not read: {spent}"))
 }
 
@@ -77,43 +77,39 @@ fn choose_model(ast: &Ast, options: &LoadOptions) -> Result<usize> {
     };
     let places: Vec<usize> = models(ast).collect();
     let classes = places.iter().filter_map(|&place| ast.classes.get(place));
-    let mut names: Vec<(&str, Span)> = classes.map(|c| (title(&c.path), c.name)).collect();
-    let wanted = options.model.as_deref();
-    let last = |name: &str| name.rsplit('.').next().map(str::to_owned);
-    if let Some(wanted) = wanted
-        && names.iter().all(|(name, _)| *name != wanted)
-    {
+    let names: Vec<(&str, Span)> = classes.map(|c| (title(&c.path), c.name)).collect();
+    let wanted = options.model.as_deref().map(|wanted| {
         // the last part of a name is enough where it says which
-        let matching = names.iter_mut();
-        let mut matching = matching.filter(|(name, _)| last(name).as_deref() == Some(wanted));
-        if let (Some((name, _)), None) = (matching.next(), matching.next()) {
-            *name = wanted;
+        let is_exact = names.iter().any(|(name, _)| *name == wanted);
+        let names = names.iter().map(|(name, _)| *name);
+        let mut ends = names.filter(|name| name.rsplit('.').next() == Some(wanted));
+        match (ends.next(), ends.next()) {
+            (Some(name), None) if !is_exact => name,
+            _ => wanted,
         }
-    }
+    });
     let place = choose(&names, wanted, none)?;
     places.get(place).copied().ok_or_else(none)
 }
 
 /// Places of the classes that may be a plant.
 fn models(ast: &Ast) -> impl Iterator<Item = usize> {
-    let models: HashSet<&str> = ast
+    let is_model = |class: &&Class| class.kind == ClassKind::Model;
+    let paths = ast
         .classes
         .iter()
-        .filter(|class| class.kind == ClassKind::Model)
-        .map(|class| class.path.as_str())
-        .collect();
+        .filter(is_model)
+        .map(|class| class.path.as_str());
+    let paths: HashSet<&str> = paths.collect();
     // a class inside of a model is a part of it
     let is_inside = move |class: &Class| {
         let around = class.path.rsplit_once('.');
-        around.is_some_and(|(above, _)| models.contains(above))
-    };
-    let is_model = move |class: &Class| {
-        class.kind == ClassKind::Model && !class.is_partial && !is_inside(class)
+        around.is_some_and(|(above, _)| paths.contains(above))
     };
     let classes = ast.classes.iter().enumerate();
-    classes
-        .filter(move |(_, class)| is_model(class))
-        .map(|(place, _)| place)
+    let whole =
+        classes.filter(move |(_, class)| is_model(class) && !class.is_partial && !is_inside(class));
+    whole.map(|(place, _)| place)
 }
 
 /// The names of the models of a Modelica text.

@@ -1,16 +1,11 @@
 //! What names mean where an expression stands: in a model, and in a function or an algorithm whose
 //! statements are carried out.
 
-use std::cell::RefCell;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashMap};
 
 use lynkeus_expr::{Graph, Node};
 
 use super::value::{Scalar, Value};
-use crate::LoadOptions;
-use crate::flat::{Classes, FlatModel};
-use crate::limits::Budget;
-use crate::syntax::ast::Ast;
 
 /// How much may be unknown in an expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,95 +30,10 @@ pub(crate) enum Named<'a> {
     Unknown,
 }
 
-pub(crate) trait Scope {
-    fn named(&self, name: &str, mode: Mode) -> Named<'_>;
-
-    /// A constant by its name in full.
-    fn constant(&self, _full: &str, _mode: Mode) -> Named<'_> {
-        Named::Unknown
-    }
-
-    /// Dimensions of a declared name.
-    fn dims(&self, name: &str) -> Option<&[usize]>;
-
-    /// The names of the members, where the name is a record's.
-    fn members(&self, _record: &str) -> Option<&[String]> {
-        None
-    }
-
-    /// The symbol of the derivative, where the node is a variable that may have one.
-    fn derivative(&self, variable: Node) -> Option<Node>;
-
-    /// True for the symbol of a parameter.
-    fn is_parameter(&self, _symbol: Node) -> bool {
-        false
-    }
-
-    /// Declared names, for suggestions.
-    fn names(&self) -> Vec<&str>;
-
-    /// The symbol of time, where it has one.
-    fn time(&self, mode: Mode) -> Option<Node>;
-}
-
-/// Names whose meaning a function gives; behind them `pi`, and `time` where nothing must be known.
-pub(crate) struct GivenNames<'a> {
-    pub graph: &'a Graph,
-    pub names: &'a dyn Fn(&str) -> Option<Node>,
-}
-
-impl Scope for GivenNames<'_> {
-    fn named(&self, name: &str, mode: Mode) -> Named<'_> {
-        let unquoted = || name.strip_prefix('\'')?.strip_suffix('\'');
-        let node = (self.names)(name).or_else(|| (self.names)(unquoted()?));
-        let node = node.or_else(|| {
-            let pi = || self.graph.constant(std::f64::consts::PI).node();
-            (name == "pi").then(pi)
-        });
-        match node {
-            Some(node) if mode != Mode::Continuous => match self.graph.constant_value(node) {
-                Some(_) => Named::Scalar(Scalar::Real(node)),
-                None => Named::Varying,
-            },
-            Some(node) => Named::Scalar(Scalar::Real(node)),
-            None => Named::Unknown,
-        }
-    }
-
-    fn dims(&self, _name: &str) -> Option<&[usize]> {
-        None
-    }
-
-    fn derivative(&self, _variable: Node) -> Option<Node> {
-        None
-    }
-
-    fn names(&self) -> Vec<&str> {
-        vec!["pi", "time"]
-    }
-
-    fn time(&self, mode: Mode) -> Option<Node> {
-        (mode == Mode::Continuous).then(|| self.graph.symbol("time").node())
-    }
-}
-
-/// What all parts of the elaboration share.
-pub(crate) struct Context<'a> {
-    pub source: &'a str,
-    pub ast: &'a Ast,
-    pub graph: &'a Graph,
-    pub budget: &'a Budget,
-    pub options: &'a LoadOptions,
-    pub model: &'a FlatModel,
-    pub classes: &'a Classes<'a>,
-    /// of which the points of tables are made, found on the way
-    pub table_points: &'a RefCell<BTreeSet<Node>>,
-}
-
 /// What the statements have given values to so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Frame {
-    pub locals: HashMap<String, Local>,
+    pub locals: BTreeMap<String, Local>,
     /// names of the members of its records
     pub records: HashMap<String, Vec<String>>,
     /// names outside of it are constants only
@@ -149,10 +59,10 @@ impl Local {
     }
 
     /// A Real with this value.
-    pub(super) fn of(value: &Value) -> Self {
+    pub(super) fn of(value: Value) -> Self {
         Self {
-            dims: value.dims().to_vec(),
-            elements: value.elements().iter().copied().map(Some).collect(),
+            dims: value.dims,
+            elements: value.elements.into_iter().map(Some).collect(),
             is_integer: false,
         }
     }
@@ -160,7 +70,10 @@ impl Local {
     /// All elements; `None` where one has no value.
     pub(super) fn value(&self) -> Option<Value> {
         let elements: Option<Vec<Scalar>> = self.elements.iter().copied().collect();
-        Some(Value::new(self.dims.clone(), elements?))
+        Some(Value {
+            dims: self.dims.clone(),
+            elements: elements?,
+        })
     }
 
     /// A value of this variable's type: what stands in a Real is a Real.
@@ -205,12 +118,8 @@ impl Frame {
 
 fn either(condition: Node, a: Option<Scalar>, b: Option<Scalar>, graph: &Graph) -> Option<Scalar> {
     let (a, b) = (a?, b?);
-    if a == b {
-        return Some(a);
+    match a == b {
+        true => Some(a),
+        false => a.select(condition, b, graph),
     }
-    if let (Scalar::Boolean(a), Scalar::Boolean(b)) = (a, b) {
-        return Some(Scalar::Boolean(graph.select(condition, a, b)));
-    }
-    let (a, b) = (a.real(graph)?, b.real(graph)?);
-    Some(Scalar::Real(graph.select(condition, a, b)))
 }

@@ -1,17 +1,16 @@
 //! The declared names of a model, with sizes, symbols and values.
 
-use super::scope::Context;
 use std::cell::RefCell;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use lynkeus_expr::{Graph, Node};
 
-use super::evaluate::Evaluator;
-use super::scope::{Frame, Mode, Named, Scope};
+use super::scope::{Mode, Named};
 use super::value::Scalar;
-use crate::flat::{FlatModel, constant_label};
-use crate::limits::MAX_RANK;
-use crate::syntax::ast::{Causality, Declaration, Variability};
+use crate::LoadOptions;
+use crate::flat::{Classes, FlatModel, constant_label};
+use crate::limits::{Budget, MAX_ELABORATED, MAX_RANK, MAX_SCALARS, MAX_TEXT};
+use crate::syntax::ast::{Ast, Causality, Declaration, Variability};
 
 /// A declared name.
 #[derive(Debug)]
@@ -24,56 +23,83 @@ pub(crate) struct Component {
     pub is_known: bool,
 }
 
-/// All declared names of a model.
+/// What a name means to the caller who has a single expression read.
+pub(crate) type Names<'a> = &'a dyn Fn(&str) -> Option<Node>;
+
+/// All declared names of a model, and the text that they stand in.
 pub(crate) struct Symbols<'a> {
-    pub declarations: &'a [Declaration],
+    pub source: &'a str,
+    pub ast: &'a Ast,
+    pub graph: &'a Graph,
+    pub model: &'a FlatModel,
+    pub classes: &'a Classes<'a>,
+    pub options: &'a LoadOptions,
+    /// where there is no model; behind them `pi`, and `time` where nothing must be known
+    pub given: Option<Names<'a>>,
+    pub budget: Budget,
+    /// what declarations are written out to
+    pub(super) scalars: Budget,
+    pub(super) texts: Budget,
+    /// of which the points of tables are made, found on the way
+    pub table_points: RefCell<BTreeSet<Node>>,
     pub(super) by_name: HashMap<&'a str, usize>,
     pub(super) components: Vec<Option<Component>>,
     /// arrays whose elements are declared by themselves: `x` of `x[1]` and `x[2]`
     pub(super) gathered: HashMap<String, Component>,
     /// symbols of parameters
     pub(super) parameters: HashSet<Node>,
-    pub(super) model: &'a FlatModel,
     /// symbols that may stand in `der`, with the symbols of their derivatives once they do
     pub(super) derivatives: RefCell<HashMap<Node, Option<Node>>>,
-    pub time: Node,
-    pub(super) graph: &'a Graph,
+    /// of each declaration: true where the value of a parameter is made from other parameters
     pub dependent: Vec<bool>,
 }
 
 impl<'a> Symbols<'a> {
-    /// Declarations with their components, in order of the text.
-    pub(crate) fn all(&self) -> impl Iterator<Item = (&'a Declaration, &Component)> {
-        self.placed()
-            .map(|(_, declaration, component)| (declaration, component))
+    /// A text of which no declaration is known yet.
+    pub(crate) fn new(
+        source: &'a str,
+        ast: &'a Ast,
+        graph: &'a Graph,
+        model: &'a FlatModel,
+        classes: &'a Classes<'a>,
+        options: &'a LoadOptions,
+    ) -> Self {
+        Self {
+            source,
+            ast,
+            graph,
+            model,
+            classes,
+            options,
+            given: None,
+            budget: Budget::new(
+                MAX_ELABORATED,
+                "scalar operations when loops and arrays are written out",
+            ),
+            scalars: Budget::new(MAX_SCALARS, "scalar variables and parameters"),
+            texts: Budget::new(MAX_TEXT, "bytes of names, units and descriptions"),
+            table_points: RefCell::default(),
+            by_name: HashMap::new(),
+            components: vec![],
+            gathered: HashMap::new(),
+            parameters: HashSet::new(),
+            derivatives: RefCell::default(),
+            dependent: vec![],
+        }
     }
 
-    /// The same with their places among the declarations.
-    pub(crate) fn placed(&self) -> impl Iterator<Item = (usize, &'a Declaration, &Component)> {
-        let pairs = self.declarations.iter().zip(&self.components).enumerate();
+    /// Places of the declarations, with their components, in order of the text.
+    pub(crate) fn all(&self) -> impl Iterator<Item = (usize, &'a Declaration, &Component)> {
+        let pairs = self.model.declarations.iter().zip(&self.components);
+        let pairs = pairs.enumerate();
         pairs.filter_map(|(place, (declaration, component))| {
             Some((place, declaration, component.as_ref()?))
         })
     }
 
-    pub(crate) fn evaluator<'e>(&'e self, context: &'e Context<'a>, mode: Mode) -> Evaluator<'e> {
-        let (source, ast) = (context.source, context.ast);
-        Evaluator::new(source, ast, context.graph, context.budget, self, mode).within(context)
-    }
-
-    /// For the declaration of a name: of a package, only what it knows.
-    pub(super) fn evaluator_of<'e>(
-        &'e self,
-        context: &'e Context<'a>,
-        declaration: &'e Declaration,
-        mode: Mode,
-    ) -> Evaluator<'e> {
-        let mut evaluator = self.evaluator(context, mode);
-        if let Some(package) = &declaration.package {
-            evaluator.scopes = vec![package];
-            evaluator.frame = Some(Frame::closed());
-        }
-        evaluator
+    /// The symbol of time.
+    pub(crate) fn time(&self) -> Node {
+        self.graph.symbol("time").node()
     }
 
     /// The symbols of parameters with their values, where they have one.
@@ -81,10 +107,7 @@ impl<'a> Symbols<'a> {
         let mut found = HashMap::new();
         for component in self.components.iter().flatten().filter(|c| c.is_known) {
             for (offset, element) in component.elements.iter().enumerate() {
-                let value = component
-                    .values
-                    .as_ref()
-                    .and_then(|values| values.get(offset));
+                let value = component.values.as_ref().map(|values| values[offset]);
                 let value = value.and_then(|value| value.number(self.graph));
                 if let Some(node) = element.real(self.graph) {
                     found.insert(node, value);
@@ -100,11 +123,18 @@ impl<'a> Symbols<'a> {
     }
 }
 
-impl Scope for Symbols<'_> {
-    fn named(&self, name: &str, mode: Mode) -> Named<'_> {
+impl Symbols<'_> {
+    fn component_named(&self, name: &str) -> Option<&Component> {
         let place = self.by_name.get(name).copied();
         let declared = place.and_then(|place| self.components.get(place)?.as_ref());
-        let Some(component) = declared.or_else(|| self.gathered.get(name)) else {
+        declared.or_else(|| self.gathered.get(name))
+    }
+
+    pub(super) fn named(&self, name: &str, mode: Mode) -> Named<'_> {
+        if let Some(names) = self.given {
+            return self.named_by(names, name, mode);
+        }
+        let Some(component) = self.component_named(name) else {
             return Named::Unknown;
         };
         match (mode, &component.values) {
@@ -115,9 +145,22 @@ impl Scope for Symbols<'_> {
         }
     }
 
+    fn named_by(&self, names: Names<'_>, name: &str, mode: Mode) -> Named<'_> {
+        let unquoted = || name.strip_prefix('\'')?.strip_suffix('\'');
+        let pi = || (name == "pi").then(|| self.graph.constant(std::f64::consts::PI).node());
+        let node = names(name).or_else(|| names(unquoted()?)).or_else(pi);
+        match node {
+            Some(node) if mode != Mode::Continuous && self.graph.constant_value(node).is_none() => {
+                Named::Varying
+            }
+            Some(node) => Named::Scalar(Scalar::Real(node)),
+            None => Named::Unknown,
+        }
+    }
+
     /// One of a package, or of the model and its bases; flat texts declare those of packages in
     /// the model, by their names in full.
-    fn constant(&self, full: &str, mode: Mode) -> Named<'_> {
+    pub(super) fn constant(&self, full: &str, mode: Mode) -> Named<'_> {
         match self.named(&constant_label(full), mode) {
             Named::Unknown => {}
             found => return found,
@@ -125,29 +168,22 @@ impl Scope for Symbols<'_> {
         let in_class = |class: &String| full.strip_prefix(class.as_str())?.strip_prefix('.');
         let own = self.model.scopes.iter().find_map(in_class);
         let own = own.or(full.contains('.').then_some(full));
-        let place = own.and_then(|name| self.by_name.get(name));
-        let declaration = place.and_then(|&place| self.declarations.get(place));
-        match (own, declaration) {
-            (Some(name), Some(declaration))
-                if declaration.prefix.variability == Variability::Constant =>
-            {
-                self.named(name, mode)
-            }
-            _ => Named::Unknown,
-        }
+        let is_constant = |name: &&str| {
+            let place = self.by_name.get(name);
+            let declaration = place.and_then(|&place| self.model.declarations.get(place));
+            declaration.is_some_and(|d| d.variability == Variability::Constant)
+        };
+        let name = own.filter(is_constant);
+        name.map_or(Named::Unknown, |name| self.named(name, mode))
     }
 
-    fn dims(&self, name: &str) -> Option<&[usize]> {
-        let place = self.by_name.get(name).copied();
-        let declared = place.and_then(|place| self.components.get(place)?.as_ref());
-        Some(&declared.or_else(|| self.gathered.get(name))?.dims)
+    /// Dimensions of a declared name.
+    pub(super) fn dims(&self, name: &str) -> Option<&[usize]> {
+        Some(&self.component_named(name)?.dims)
     }
 
-    fn members(&self, record: &str) -> Option<&[String]> {
-        self.model.records.get(record).map(Vec::as_slice)
-    }
-
-    fn derivative(&self, variable: Node) -> Option<Node> {
+    /// The symbol of the derivative, where the node is a variable that may have one.
+    pub(super) fn derivative(&self, variable: Node) -> Option<Node> {
         let mut derivatives = self.derivatives.borrow_mut();
         let slot = derivatives.get_mut(&variable)?;
         if slot.is_none() {
@@ -157,26 +193,22 @@ impl Scope for Symbols<'_> {
         *slot
     }
 
-    fn is_parameter(&self, symbol: Node) -> bool {
-        self.parameters.contains(&symbol)
-    }
-
-    fn names(&self) -> Vec<&str> {
+    /// Declared names, for suggestions.
+    pub(super) fn names(&self) -> Vec<&str> {
+        if self.given.is_some() {
+            return vec!["pi", "time"];
+        }
         let names = self.by_name.keys();
         names
             .map(|name| name.strip_prefix('.').unwrap_or(name))
             .collect()
-    }
-
-    fn time(&self, mode: Mode) -> Option<Node> {
-        (mode == Mode::Continuous).then_some(self.time)
     }
 }
 
 /// True for an input that nothing in the model can determine: one of a part, as `r1.u`, may be
 /// equated with another variable.
 pub(super) fn is_outer_input(declaration: &Declaration) -> bool {
-    declaration.prefix.causality == Causality::Input
+    declaration.causality == Causality::Input
         && declaration.binding.is_none()
         && !declaration.label.contains('.')
 }
@@ -189,20 +221,17 @@ pub(super) fn gathered(
     let mut groups: HashMap<&str, Vec<(Vec<usize>, &Component)>> = HashMap::new();
     for (&name, &place) in by_name {
         if let Some((base, subscripts)) = literal_subscripts(name)
-            && let Some(Some(component)) = components.get(place)
+            && !by_name.contains_key(base)
+            && let Some(component) = &components[place]
             && component.dims.is_empty()
         {
-            groups
-                .entry(base)
-                .or_default()
-                .push((subscripts, component));
+            let group = groups.entry(base).or_default();
+            group.push((subscripts, component));
         }
     }
-    let whole = groups
-        .into_iter()
-        .filter_map(|(base, elements)| Some((base.to_owned(), gather(elements)?)));
-    whole
-        .filter(|(base, _)| !by_name.contains_key(base.as_str()))
+    let groups = groups.into_iter();
+    groups
+        .filter_map(|(base, elements)| Some((base.to_owned(), gather(elements)?)))
         .collect()
 }
 
@@ -220,24 +249,19 @@ fn gather(mut elements: Vec<(Vec<usize>, &Component)>) -> Option<Component> {
     let dims = elements.last()?.0.clone();
     let count = dims.iter().try_fold(1usize, |n, &dim| n.checked_mul(dim))?;
     let fits = |(subscripts, _): &(Vec<usize>, &Component)| {
-        let within = subscripts
-            .iter()
-            .zip(&dims)
-            .all(|(s, dim)| (1..=*dim).contains(s));
-        subscripts.len() == dims.len() && within
+        let mut pairs = subscripts.iter().zip(&dims);
+        subscripts.len() == dims.len() && pairs.all(|(s, dim)| (1..=*dim).contains(s))
     };
     if count != elements.len() || !elements.iter().all(fits) {
         return None;
     }
-    let values = elements
-        .iter()
-        .map(|(_, c)| c.values.as_ref()?.first().copied());
+    let components = || elements.iter().map(|(_, component)| *component);
+    let values = components().map(|c| Some(c.values.as_ref()?[0]));
     Some(Component {
         values: values.collect(),
-        is_known: elements.iter().all(|(_, component)| component.is_known),
-        elements: elements
-            .iter()
-            .filter_map(|(_, c)| c.elements.first().copied())
+        is_known: components().all(|component| component.is_known),
+        elements: components()
+            .map(|component| component.elements[0])
             .collect(),
         dims,
     })

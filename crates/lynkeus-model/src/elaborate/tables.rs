@@ -33,14 +33,14 @@ impl<'a> Evaluator<'a> {
             return Err(Problem::new(span, message));
         }
         self.increasing(&x, abscissas)?;
-        if let Some(found) = self.table_points {
-            found.borrow_mut().extend(self.graph.symbols_of(&x));
-        }
+        let mut points = self.symbols.table_points.borrow_mut();
+        points.extend(self.graph.symbols_of(&x));
+        drop(points);
         self.budget.charge(x.len() as u64, span)?;
         let at = self.value(at)?;
         self.map(at, span, |evaluator, at, span| {
             let at = evaluator.real(at, span)?;
-            Ok(Scalar::Real(match evaluator.tables {
+            Ok(Scalar::Real(match evaluator.symbols.options.tables {
                 Tables::Linear => evaluator.piecewise_linear(&x, &y, at),
                 Tables::Monotone => monotone_cubic(evaluator.graph, &x, &y, at),
             }))
@@ -49,7 +49,7 @@ impl<'a> Evaluator<'a> {
 
     fn points(&mut self, argument: ExprId) -> Result<Vec<Node>> {
         let span = self.span(argument);
-        let elements = self.value(argument)?.into_array().elements;
+        let elements = self.value(argument)?.elements;
         elements.into_iter().map(|e| self.real(e, span)).collect()
     }
 

@@ -23,6 +23,24 @@ impl Scalar {
         }
     }
 
+    /// Both as expressions, of Booleans those of their truth; `None` of a Boolean and a number.
+    pub(crate) fn with(self, other: Self, graph: &Graph) -> Option<(Node, Node)> {
+        match (self, other) {
+            (Scalar::Boolean(a), Scalar::Boolean(b)) => Some((a, b)),
+            _ => Some((self.real(graph)?, other.real(graph)?)),
+        }
+    }
+
+    /// `if condition then self else other`
+    pub(crate) fn select(self, condition: Node, other: Self, graph: &Graph) -> Option<Self> {
+        let (a, b) = self.with(other, graph)?;
+        let node = graph.select(condition, a, b);
+        Some(match self {
+            Scalar::Boolean(_) => Scalar::Boolean(node),
+            _ => Scalar::Real(node),
+        })
+    }
+
     /// The number, where it is known.
     pub(crate) fn number(self, graph: &Graph) -> Option<f64> {
         match self {
@@ -33,54 +51,32 @@ impl Scalar {
     }
 }
 
-/// Elements row by row.
+/// A scalar, which has no dimensions, or an array: its elements row by row.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Array {
+pub(crate) struct Value {
     pub dims: Vec<usize>,
     pub elements: Vec<Scalar>,
 }
 
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Value {
-    Scalar(Scalar),
-    Array(Array),
+impl From<Scalar> for Value {
+    fn from(scalar: Scalar) -> Self {
+        Self {
+            dims: vec![],
+            elements: vec![scalar],
+        }
+    }
 }
 
 impl Value {
     pub(crate) fn vector(elements: Vec<Scalar>) -> Self {
         let dims = vec![elements.len()];
-        Value::Array(Array { dims, elements })
+        Self { dims, elements }
     }
 
-    /// An array, or a scalar where there are no dimensions.
-    pub(crate) fn new(dims: Vec<usize>, elements: Vec<Scalar>) -> Self {
-        match (dims.as_slice(), elements.as_slice()) {
-            ([], [scalar]) => Value::Scalar(*scalar),
-            _ => Value::Array(Array { dims, elements }),
-        }
-    }
-
-    pub(crate) fn dims(&self) -> &[usize] {
-        match self {
-            Value::Scalar(_) => &[],
-            Value::Array(array) => &array.dims,
-        }
-    }
-
-    pub(crate) fn elements(&self) -> &[Scalar] {
-        match self {
-            Value::Scalar(scalar) => std::slice::from_ref(scalar),
-            Value::Array(array) => &array.elements,
-        }
-    }
-
-    pub(crate) fn into_array(self) -> Array {
-        match self {
-            Value::Scalar(scalar) => Array {
-                dims: vec![],
-                elements: vec![scalar],
-            },
-            Value::Array(array) => array,
+    pub(crate) fn as_scalar(&self) -> Option<Scalar> {
+        match self.dims[..] {
+            [] => self.elements.first().copied(),
+            _ => None,
         }
     }
 }
@@ -115,43 +111,40 @@ pub(crate) fn element_name(name: &str, dims: &[usize], offset: usize) -> String 
     format!("{name}[{}]", subscripts.join(","))
 }
 
-pub(super) fn unequal_sizes(left: &[usize], right: &[usize], span: Span) -> Problem {
+pub(super) fn unequal_sizes(left: &[usize], right: &[usize], span: Span) -> Box<Problem> {
     let (left, right) = (describe_dims(left), describe_dims(right));
-    Problem::new(
-        span,
-        format!("the sizes differ: left is {left}, right is {right}"),
-    )
+    let message = format!("the sizes differ: left is {left}, right is {right}");
+    Problem::new(span, message)
 }
 
-/// The members of a record, those of inner records by their names in full, as `z.re`.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Record {
-    pub members: Vec<(String, Value)>,
-}
+/// The members of a record, those of inner records by their names in full, as `z.re`; a number or
+/// an array is the one member without a name.
+pub(super) type Members = Vec<(String, Value)>;
 
-impl Record {
-    pub(super) fn member(&self, name: &str) -> Option<&Value> {
-        let mut members = self.members.iter();
-        members
-            .find(|(member, _)| member == name)
-            .map(|(_, value)| value)
-    }
-
-    /// The members behind `prefix.`, where there are any.
-    pub(super) fn inner(&self, prefix: &str) -> Option<Record> {
-        let inner = |(name, value): &(String, Value)| {
-            let rest = name.strip_prefix(prefix)?.strip_prefix('.')?;
-            Some((rest.to_owned(), value.clone()))
-        };
-        let members: Vec<(String, Value)> = self.members.iter().filter_map(inner).collect();
-        (!members.is_empty()).then_some(Record { members })
+/// The number or array that this is; the members back where it is a record.
+pub(super) fn number(mut members: Members) -> std::result::Result<Value, Members> {
+    match members.pop() {
+        Some((name, value)) if name.is_empty() => Ok(value),
+        last => {
+            members.extend(last);
+            Err(members)
+        }
     }
 }
 
-/// What one output of a function gives.
-pub(super) enum Outcome {
-    Value(Value),
-    Record(Record),
+/// The member of this name.
+pub(super) fn member<'m>(members: &'m Members, name: &str) -> Option<&'m Value> {
+    let mut members = members.iter();
+    let found = members.find(|(member, _)| member == name);
+    found.map(|(_, value)| value)
+}
+
+/// `z`, or its member `z.re`.
+pub(super) fn member_name(record: &str, member: &str) -> String {
+    match member {
+        "" => record.to_owned(),
+        _ => format!("{record}.{member}"),
+    }
 }
 
 /// Refuses a value of another size than its variable has.
@@ -165,7 +158,7 @@ pub(super) fn check_size(name: &str, has: &[usize], found: &[usize], span: Span)
 }
 
 /// Refuses a truth value where a number must stand.
-pub(super) fn expected_number(span: Span) -> Problem {
+pub(super) fn expected_number(span: Span) -> Box<Problem> {
     Problem::new(span, "expected a number, found a Boolean").hint("write `if a then 1 else 0`")
 }
 

@@ -58,15 +58,6 @@ impl Deviations {
     }
 }
 
-/// The factor with columns of length one, and what made them so.
-struct Balanced {
-    factor: DMatrix<f64>,
-    /// lengths of the columns; 1 for a column that is only rounding
-    lengths: Vec<f64>,
-    /// accuracy of the balanced columns
-    accuracy: f64,
-}
-
 /// Standard errors, and which of them rest on parts of unseen directions that were taken as rounding.
 pub(super) struct Judged {
     pub deviations: Deviations,
@@ -86,13 +77,11 @@ pub(super) fn of(
     budget: &Budget,
 ) -> Option<Judged> {
     let count = scales.len();
-    let balanced = balance(information, accuracy);
-    let Singular { values, directions } = singular(balanced.factor, budget)?;
-    let rank = decide(&values, balanced.accuracy);
+    let (factor, lengths, accuracy) = balance(information, accuracy);
+    let (values, directions) = singular(factor, budget)?;
+    let rank = decide(&values, accuracy);
     // errors in units of the scales, one column per direction
-    let start = DMatrix::from_fn(count, count, |i, j| {
-        directions[(i, j)] / balanced.lengths[i]
-    });
+    let start = DMatrix::from_fn(count, count, |i, j| directions[(i, j)] / lengths[i]);
     let present = transition * &start;
     let blur = (MARGIN * rank.threshold / rank.weakest_seen).clamp(1e-9, 1e-2);
     let split = Split {
@@ -101,13 +90,13 @@ pub(super) fn of(
         reach: start.column_iter().map(|c| c.amax()).collect(),
     };
     let at_start = |i: usize| {
-        let noise = blur / balanced.lengths[i];
+        let noise = blur / lengths[i];
         let (σ, is_doubted) = split.error(&|j| start[(i, j)], noise, 1.0);
         (scales[i] * σ, is_doubted)
     };
     let at_present = |i: usize| {
         let row = transition.row(i);
-        let terms = row.iter().zip(&balanced.lengths);
+        let terms = row.iter().zip(&lengths);
         let noise = blur * terms.map(|(phi, e)| (phi / e).abs()).fold(0.0, f64::max);
         split.error(&|j| present[(i, j)], noise, scales[i])
     };
@@ -160,8 +149,9 @@ impl Split<'_> {
     }
 }
 
-/// Scales the columns; one whose terms cancel down to their rounding becomes zero.
-fn balance(information: &Information, accuracy: f64) -> Balanced {
+/// The factor with columns of length one, the lengths that they had, and their accuracy. A column whose terms cancel
+/// down to their rounding becomes zero, its length 1.
+fn balance(information: &Information, accuracy: f64) -> (DMatrix<f64>, Vec<f64>, f64) {
     let mut factor = information.triangle().clone();
     let mut lengths = vec![1.0; factor.ncols()];
     let mut worst: f64 = 1.0;
@@ -175,11 +165,7 @@ fn balance(information: &Information, accuracy: f64) -> Balanced {
             factor.column_mut(j).fill(0.0);
         }
     }
-    Balanced {
-        factor,
-        lengths,
-        accuracy: accuracy * worst,
-    }
+    (factor, lengths, accuracy * worst)
 }
 
 fn decide(values: &[f64], accuracy: f64) -> Rank {
@@ -202,7 +188,6 @@ const BLOCK: usize = 2;
 /// A triangle R with RᵀR = Σ rowᵀ·row, gathered by orthogonal transformations.
 #[derive(Clone, Debug)]
 pub(super) struct Information {
-    columns: usize,
     triangle: DMatrix<f64>,
     /// rows not yet worked in, one after the other
     pending: Vec<f64>,
@@ -213,7 +198,6 @@ pub(super) struct Information {
 impl Information {
     pub fn new(columns: usize) -> Self {
         Self {
-            columns,
             triangle: DMatrix::zeros(0, columns),
             pending: vec![],
             gross: vec![0.0; columns],
@@ -242,21 +226,23 @@ impl Information {
         for (sum, entry) in self.gross.iter_mut().zip(gross) {
             *sum += entry * entry;
         }
-        if self.pending.len() >= BLOCK * self.columns * self.columns.max(1) {
+        let columns = self.gross.len();
+        if self.pending.len() >= BLOCK * columns * columns.max(1) {
             self.settle();
         }
     }
 
     /// Works all rows into the triangle.
     pub fn settle(&mut self) {
-        if self.pending.is_empty() || self.columns == 0 {
+        let columns = self.gross.len();
+        if self.pending.is_empty() || columns == 0 {
             return;
         }
         let old = self.triangle.nrows();
-        let rows = old + self.pending.len() / self.columns;
-        let stacked = DMatrix::from_fn(rows, self.columns, |i, j| match i.checked_sub(old) {
+        let rows = old + self.pending.len() / columns;
+        let stacked = DMatrix::from_fn(rows, columns, |i, j| match i.checked_sub(old) {
             None => self.triangle[(i, j)],
-            Some(i) => self.pending[i * self.columns + j],
+            Some(i) => self.pending[i * columns + j],
         });
         self.triangle = stacked.qr().r();
         self.pending.clear();
@@ -279,16 +265,9 @@ const SWEEPS: usize = 60;
 /// Columns count as orthogonal below this cosine.
 const COSINE: f64 = 4.0 * f64::EPSILON;
 
-/// A·V has orthogonal columns whose norms are the singular values.
-pub(super) struct Singular {
-    /// not sorted
-    pub values: Vec<f64>,
-    /// the directions V, one per column
-    pub directions: DMatrix<f64>,
-}
-
-/// The singular values and right singular vectors of `a`; none where the budget is spent.
-pub(super) fn singular(mut a: DMatrix<f64>, budget: &Budget) -> Option<Singular> {
+/// The singular values of A, not sorted, and its right singular vectors, one per column of V: AV has orthogonal columns
+/// of these norms. None where the budget is spent.
+pub(super) fn singular(mut a: DMatrix<f64>, budget: &Budget) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let columns = a.ncols();
     let mut v = DMatrix::identity(columns, columns);
     for _ in 0..SWEEPS {
@@ -309,10 +288,7 @@ pub(super) fn singular(mut a: DMatrix<f64>, budget: &Budget) -> Option<Singular>
             break;
         }
     }
-    Some(Singular {
-        values: a.column_iter().map(|column| column.norm()).collect(),
-        directions: v,
-    })
+    Some((a.column_iter().map(|column| column.norm()).collect(), v))
 }
 
 /// Cosine and sine that make two columns orthogonal; none where they are.
@@ -345,7 +321,7 @@ mod tests {
         // columns nearly parallel: singular values √2 and ε/√2
         let epsilon = 1e-9;
         let a = DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 0.0, epsilon]);
-        let mut found = singular(a, &Budget::default()).unwrap().values;
+        let (mut found, _) = singular(a, &Budget::default()).unwrap();
         found.sort_by(f64::total_cmp);
         assert!(
             (found[0] / (epsilon / 2.0_f64.sqrt()) - 1.0).abs() < 1e-6,
@@ -358,7 +334,7 @@ mod tests {
     fn fewer_rows_than_columns_leave_zeros() {
         let a = DMatrix::from_row_slice(1, 3, &[3.0, 0.0, 4.0]);
         let found = singular(a.clone(), &Budget::default());
-        let Singular { values, directions } = found.unwrap();
+        let (values, directions) = found.unwrap();
         assert!((values.iter().copied().fold(0.0, f64::max) - 5.0).abs() < 1e-12);
         assert_eq!(values.iter().filter(|s| **s < 1e-12).count(), 2);
         assert!((&directions * directions.transpose() - DMatrix::identity(3, 3)).norm() < 1e-12);

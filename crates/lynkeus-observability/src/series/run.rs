@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use lynkeus_expr::{Budget, Spent};
 
-use crate::series::functions::Arc;
-use crate::series::program::{Inverse, Step};
+use crate::series::functions::Inverse;
+use crate::series::program::Step;
 use crate::series::{Functions, Program};
 use lynkeus_expr::modular::{Modular, Wide};
 
@@ -40,6 +40,9 @@ impl Stop {
     }
 }
 
+/// Bytes of a series where nothing limits the memory.
+const ROOM: usize = 1 << 30;
+
 /// A program under evaluation.
 pub(crate) struct Run<'a> {
     program: &'a Program,
@@ -52,20 +55,14 @@ pub(crate) struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    pub fn new(
-        program: &'a Program,
-        width: usize,
-        functions: Functions,
-        budget: Budget,
-        room: usize,
-    ) -> Self {
+    pub fn new(program: &'a Program, width: usize, functions: Functions, budget: &Budget) -> Self {
         Self {
             program,
             width,
             slots: vec![Series::default(); program.steps.len()],
             functions,
-            budget,
-            room,
+            budget: budget.clone(),
+            room: budget.room().unwrap_or(ROOM) / size_of::<Modular>(),
         }
     }
 
@@ -324,15 +321,15 @@ impl<'a> Run<'a> {
             }
             Inverse::Logarithm => Ok(self.functions.logarithm(argument)),
             // 1/√(1 − a²) has the cosine below, 1/(1 + a²) is its square
-            Inverse::Arc(Arc::Sine) => {
+            Inverse::Sine => {
                 let cosine = derivative.inverse();
                 let root = cosine.is_some_and(|c| c * c + argument * argument == Modular::ONE);
                 let cosine = cosine.filter(|_| root);
-                Ok(self.functions.arc(Arc::Sine, argument, cosine))
+                Ok(self.functions.arc(Inverse::Sine, argument, cosine))
             }
-            Inverse::Arc(Arc::Tangent) => {
+            Inverse::Tangent => {
                 let cosine = derivative.root();
-                Ok(self.functions.arc(Arc::Tangent, argument, cosine))
+                Ok(self.functions.arc(Inverse::Tangent, argument, cosine))
             }
         }
     }

@@ -4,6 +4,7 @@ use lynkeus_model::Diagnostic;
 use lynkeus_observability::Verdict;
 use lynkeus_observers::{Check, Examination, fit_word};
 use lynkeus_structure as structure;
+use lynkeus_words::Words;
 use serde_json::{Value, json};
 
 use super::{Knowledge, Next, Report, Uniform, observability, point, uniform};
@@ -47,9 +48,9 @@ impl Report {
 fn family(examination: &Examination) -> Value {
     let check = |check: &Check| {
         let mut entry = json!({
-            "name": check.statement.to_string(),
+            "name": check.statement.words(),
             "verdict": check.verdict.word(),
-            "detail": check.detail,
+            "detail": check.reason.words(),
         });
         match &check.verdict {
             structure::Verdict::Proved => {}
@@ -68,7 +69,7 @@ fn family(examination: &Examination) -> Value {
     json!({
         "family": examination.family,
         "fit": fit_word(examination.fit()),
-        "summary": examination.summary,
+        "summary": examination.summary.words(),
         "chains": examination.chains,
         "checks": examination.conditions().map(check).collect::<Vec<_>>(),
     })

@@ -6,7 +6,7 @@ const PLAIN: std::ops::Range<i32> = -5..6;
 /// So many significant digits, without zeros at the end: `0.3`, `-12.5`, `1.2e-9`.
 ///
 /// ```
-/// use lynkeus_structure::figures;
+/// use lynkeus_words::figures;
 /// assert_eq!(figures(0.1 + 0.2, 6), "0.3");
 /// assert_eq!(figures(31.4159, 4), "31.42");
 /// assert_eq!(figures(3e20, 4), "3e20");
