@@ -4,8 +4,8 @@
 //! given up whole ([`Graph::budgeted`](crate::Graph::budgeted)).
 
 use std::fmt;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 /// Time, memory and the wish to go on. Parts of it may end on their own: one that used too much
@@ -78,15 +78,8 @@ struct Shared {
     /// raised by somebody who asks to stop
     flag: Option<Arc<AtomicBool>>,
     /// why the work ended, once it has: what is spent stays spent
-    mark: AtomicU8,
+    mark: OnceLock<Spent>,
 }
-
-const GOING: u8 = 0;
-const TIME: u8 = 1;
-const MEMORY: u8 = 2;
-const CANCELLED: u8 = 3;
-/// The budget that this is a part of is spent.
-const WHOLE: u8 = 4;
 
 impl Budget {
     /// A budget from now on, that can be [cancelled](Budget::cancel) as well.
@@ -128,7 +121,7 @@ impl Budget {
             time: named.unwrap_or_default(),
             memory,
             flag,
-            mark: AtomicU8::new(GOING),
+            mark: OnceLock::new(),
         });
         Self {
             shared: Some(shared),
@@ -165,7 +158,7 @@ impl Budget {
     /// Ends all work under this budget soon. Nothing happens to a budget without limits.
     pub fn cancel(&self) {
         if let Some(shared) = self.shared.as_deref() {
-            shared.set(CANCELLED);
+            let _ = shared.mark.set(Spent::Cancelled);
         }
     }
 
@@ -176,8 +169,10 @@ impl Budget {
             return Some(known);
         }
         // memory comes back when a part that took too much of it has ended: the whole goes on
-        if !self.is_over() && shared.memory.is_some_and(|m| m.own() > m.limit) {
-            shared.set(MEMORY);
+        if !self.is_over()
+            && let Some(memory) = shared.memory
+        {
+            shared.bound(memory, 0);
         }
         self.marked()
     }
@@ -188,26 +183,24 @@ impl Budget {
             return false;
         };
         let is_raised = |flag: &Arc<AtomicBool>| flag.load(Ordering::Relaxed);
-        if shared.flag.as_ref().is_some_and(is_raised) {
-            shared.set(CANCELLED);
+        let reason = if shared.flag.as_ref().is_some_and(is_raised) {
+            Some(Spent::Cancelled)
         } else if shared.whole.is_over() {
-            shared.set(WHOLE);
-        } else if shared.ends.is_some_and(|ends| Instant::now() >= ends) {
-            shared.set(TIME);
-        }
-        shared.mark.load(Ordering::Relaxed) != GOING
+            shared.whole.marked()
+        } else {
+            let is_past = |ends: Instant| Instant::now() >= ends;
+            shared
+                .ends
+                .is_some_and(is_past)
+                .then_some(Spent::Time(shared.time))
+        };
+        // the first reason stays
+        reason.is_some_and(|reason| shared.mark.set(reason).is_ok()) || shared.mark.get().is_some()
     }
 
     /// What ended the work as far as anybody noticed.
     pub fn marked(&self) -> Option<Spent> {
-        let shared = self.shared.as_deref()?;
-        match shared.mark.load(Ordering::Relaxed) {
-            GOING => None,
-            TIME => Some(Spent::Time(shared.time)),
-            MEMORY => Some(Spent::Memory(shared.memory.map_or(0, |m| m.limit))),
-            WHOLE => shared.whole.marked(),
-            _ => Some(Spent::Cancelled),
-        }
+        self.shared.as_deref()?.mark.get().copied()
     }
 
     /// Bytes that may still be asked for; none where memory has no limit.
@@ -219,22 +212,21 @@ impl Budget {
     /// Whether there is room for so many more bytes; the budget is spent where there is not,
     /// before they are asked for.
     pub fn affords(&self, bytes: usize) -> bool {
-        let Some(shared) = self.shared.as_deref() else {
-            return true;
-        };
-        let over = |m: Memory| m.own().saturating_add(bytes) > m.limit;
-        if shared.memory.is_some_and(over) {
-            shared.set(MEMORY);
+        if let Some(shared) = self.shared.as_deref()
+            && let Some(memory) = shared.memory
+        {
+            shared.bound(memory, bytes);
         }
         self.marked().is_none()
     }
 }
 
 impl Shared {
-    /// The first reason stays.
-    fn set(&self, mark: u8) {
-        let order = Ordering::Relaxed;
-        let _ = self.mark.compare_exchange(GOING, mark, order, order);
+    /// Ends the work where so many more bytes are too many.
+    fn bound(&self, memory: Memory, more: usize) {
+        if memory.own().saturating_add(more) > memory.limit {
+            let _ = self.mark.set(Spent::Memory(memory.limit));
+        }
     }
 }
 

@@ -102,23 +102,6 @@ pub(crate) struct Code {
     pub(crate) outputs: Vec<Register>,
 }
 
-impl Code {
-    pub(crate) fn written(&self, instruction: &Instruction) -> impl Iterator<Item = Register> {
-        let (single, many): (Option<Register>, &[(usize, Register)]) = match *instruction {
-            Instruction::Add(to, ..)
-            | Instruction::Sub(to, ..)
-            | Instruction::Mul(to, ..)
-            | Instruction::Div(to, ..)
-            | Instruction::Unary(_, to, _)
-            | Instruction::Powi(_, to, _)
-            | Instruction::Binary(_, to, ..)
-            | Instruction::Select(to, ..) => (Some(to), &[]),
-            Instruction::Solve(index) => (None, &self.systems[index as usize].results),
-        };
-        single.into_iter().chain(many.iter().map(|&(_, r)| r))
-    }
-}
-
 /// The function p ↦ z with g(z, p) = 0 and z in its declared range. A clone shares the code;
 /// two functions are equal where one is a clone of the other.
 ///

@@ -38,9 +38,8 @@ pub fn derivatives(
     outputs: &[Node],
     order: usize,
 ) -> Result<Vec<Vec<Node>>, MissingInput> {
-    let read = Program::new(graph, flow, outputs)?;
-    let x = states(graph, flow, order)?;
-    let mut y = read.run(graph, flow, &x, order);
+    let read = along(graph, flow, outputs)?;
+    let mut y = read(&states(graph, flow, order)?, order);
     for jet in &mut y {
         let mut factorial = 1.0;
         *jet = (0..=order)
@@ -55,13 +54,13 @@ pub fn derivatives(
 
 /// The Taylor coefficients of the states along the flow.
 fn states(graph: &Graph, flow: &Flow<'_>, order: usize) -> Result<Vec<Vec<Node>>, MissingInput> {
-    let right = Program::new(graph, flow, flow.derivatives)?;
+    let right = along(graph, flow, flow.derivatives)?;
     let mut x: Vec<Vec<Node>> = flow.states.iter().map(|&s| vec![s]).collect();
     for k in 0..order {
         if graph.is_spent() {
             break;
         }
-        let f = right.run(graph, flow, &x, k);
+        let f = right(&x, k);
         for (jet, f) in x.iter_mut().zip(f) {
             let next = coefficient(graph, &f, k);
             jet.push((graph.expr(next) / (k + 1) as f64).node());
@@ -76,50 +75,35 @@ fn coefficient(graph: &Graph, jet: &[Node], k: usize) -> Node {
         .unwrap_or_else(|| graph.constant(0.0).node())
 }
 
-/// Expressions as a tape over all the symbols they depend on.
-struct Program {
-    tape: Tape,
-    symbols: Vec<Node>,
-}
-
-impl Program {
-    fn new(graph: &Graph, flow: &Flow<'_>, outputs: &[Node]) -> Result<Self, MissingInput> {
-        let mut symbols = graph.symbols_of(outputs);
-        symbols.extend(flow.states);
-        symbols.sort_unstable();
-        symbols.dedup();
-        let tape = Tape::new(graph, &symbols, outputs)?;
-        Ok(Self { tape, symbols })
-    }
-
-    /// The outputs' Taylor coefficients up to `order`, from those of the states.
-    fn run(&self, graph: &Graph, flow: &Flow<'_>, x: &[Vec<Node>], order: usize) -> Vec<Vec<Node>> {
+/// Functions along the flow: their Taylor coefficients up to an order, from those of the states.
+fn along<'a>(
+    graph: &'a Graph,
+    flow: &'a Flow<'_>,
+    functions: &[Node],
+) -> Result<impl Fn(&[Vec<Node>], usize) -> Vec<Vec<Node>> + 'a, MissingInput> {
+    let mut symbols = graph.symbols_of(functions);
+    symbols.extend(flow.states);
+    symbols.sort_unstable();
+    symbols.dedup();
+    let tape = Tape::new(graph, &symbols, functions)?;
+    Ok(move |x: &[Vec<Node>], order: usize| {
         let jet = |symbol: &Node| -> Vec<Node> {
             if let Some(i) = flow.states.iter().position(|s| s == symbol) {
                 return x[i][..=order.min(x[i].len() - 1)].to_vec();
             }
-            if let Some(input) = flow
-                .inputs
-                .iter()
-                .find(|i| i.symbol == *symbol && !i.derivatives.is_empty())
-            {
-                return input_coefficients(graph, &input.derivatives, order);
+            let input = flow.inputs.iter().find(|i| i.symbol == *symbol);
+            match input.filter(|input| !input.derivatives.is_empty()) {
+                Some(input) => input_coefficients(graph, &input.derivatives, order),
+                None if *symbol == flow.time && order > 0 => {
+                    vec![*symbol, graph.constant(1.0).node()]
+                }
+                None => vec![*symbol],
             }
-            if *symbol == flow.time && order > 0 {
-                return vec![*symbol, graph.constant(1.0).node()];
-            }
-            vec![*symbol]
         };
-        let inputs: Vec<Vec<Node>> = self.symbols.iter().map(jet).collect();
-        let nodes = Nodes(graph);
-        self.tape.eval_in(
-            &Jets {
-                inner: &nodes,
-                order,
-            },
-            &inputs,
-        )
-    }
+        let inputs: Vec<Vec<Node>> = symbols.iter().map(jet).collect();
+        let inner = &Nodes(graph);
+        tape.eval_in(&Jets { inner, order }, &inputs)
+    })
 }
 
 /// u^(k)/k!
@@ -200,7 +184,7 @@ fn slopes(
 ) -> Result<Series, MissingInput> {
     let entries = jacobian::forward(graph, functions, flow.states).entries;
     let nodes: Vec<Node> = entries.iter().map(|&(.., node)| node).collect();
-    let jets = Program::new(graph, flow, &nodes)?.run(graph, flow, x, order);
+    let jets = along(graph, flow, &nodes)?(x, order);
     let places = entries.into_iter().zip(jets);
     Ok(places.map(|((i, j, _), jet)| (i, j, jet)).collect())
 }

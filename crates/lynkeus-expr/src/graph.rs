@@ -10,7 +10,7 @@ use std::hash::Hash;
 use std::sync::Arc;
 
 use crate::code::System;
-use crate::{Binary, Budget, Node, Op, Spent, Unary, real};
+use crate::{Algebra, Binary, Budget, Implicit, Node, Op, Reals, Spent, Unary};
 
 /// Nodes between two looks at the clock.
 const OFTEN: u32 = 64;
@@ -189,15 +189,14 @@ impl Graph {
 
     /// The free variable of this name; the same name is the same node.
     pub fn symbol(&self, name: &str) -> Expr<'_> {
-        let mut inner = self.inner.borrow_mut();
-        if let Some(&node) = inner.by_name.get(name) {
+        let known = self.inner.borrow().by_name.get(name).copied();
+        if let Some(node) = known {
             return Expr::new(self, node);
         }
-        let index = inner.names.len() as u32;
-        inner.names.push(name.to_owned());
-        let node = inner.intern(Key::Symbol(index), Op::Symbol(index));
-        inner.by_name.insert(name.to_owned(), node);
-        Expr::new(self, node)
+        let symbol = self.fresh(name);
+        let by_name = &mut self.inner.borrow_mut().by_name;
+        by_name.insert(name.to_owned(), symbol.node);
+        symbol
     }
 
     /// A free variable that is no other's: no name finds it, whatever it is called. The label
@@ -222,7 +221,7 @@ impl Graph {
     /// A number.
     pub fn constant(&self, value: f64) -> Expr<'_> {
         let key = Key::Constant(value.to_bits());
-        let node = self.inner.borrow_mut().intern(key, Op::Constant(value));
+        let node = self.intern(key, Op::Constant(value));
         Expr::new(self, node)
     }
 
@@ -297,19 +296,21 @@ impl Graph {
         facts.insert(kind, answers);
     }
 
+    fn intern(&self, key: Key, op: Op) -> Node {
+        self.inner.borrow_mut().intern(key, op)
+    }
+
     /// A function of one node.
     pub fn unary(&self, op: Unary, a: Node) -> Node {
         if let Some(x) = self.constant_value(a)
-            && let Some(folded) = self.fold(real::unary(op, x))
+            && let Some(folded) = self.fold(Reals.unary(op, &x))
         {
             return folded;
         }
         if let (Unary::Neg, Op::Unary(Unary::Neg, inner)) = (op, self.op(a)) {
             return inner;
         }
-        self.inner
-            .borrow_mut()
-            .intern(Key::Unary(op, a), Op::Unary(op, a))
+        self.intern(Key::Unary(op, a), Op::Unary(op, a))
     }
 
     /// An integer power.
@@ -322,9 +323,7 @@ impl Graph {
         {
             return folded;
         }
-        self.inner
-            .borrow_mut()
-            .intern(Key::Powi(a, n), Op::Powi(a, n))
+        self.intern(Key::Powi(a, n), Op::Powi(a, n))
     }
 
     /// A function of two nodes. A power with a constant whole exponent becomes
@@ -332,7 +331,7 @@ impl Graph {
     pub fn binary(&self, op: Binary, a: Node, b: Node) -> Node {
         let (x, y) = (self.constant_value(a), self.constant_value(b));
         if let (Some(x), Some(y)) = (x, y)
-            && let Some(folded) = self.fold(real::binary(op, x, y))
+            && let Some(folded) = self.fold(Reals.binary(op, &x, &y))
         {
             return folded;
         }
@@ -347,9 +346,7 @@ impl Graph {
         } else {
             (a, b)
         };
-        self.inner
-            .borrow_mut()
-            .intern(Key::Binary(op, a, b), Op::Binary(op, a, b))
+        self.intern(Key::Binary(op, a, b), Op::Binary(op, a, b))
     }
 
     /// Identities that hold for every `f64`, NaN, infinities and −0 included:
@@ -389,9 +386,7 @@ impl Graph {
             Some(c) if !c.is_nan() => return if c != 0.0 { a } else { b },
             _ => {}
         }
-        self.inner
-            .borrow_mut()
-            .intern(Key::Select(condition, a, b), Op::Select(condition, a, b))
+        self.intern(Key::Select(condition, a, b), Op::Select(condition, a, b))
     }
 
     /// Every node that the roots need, arguments before their users. The work is that of what
@@ -499,6 +494,47 @@ impl<'g> Expr<'g> {
     /// The graph the node lives in.
     pub fn graph(self) -> &'g Graph {
         self.graph
+    }
+}
+
+/// The nodes of a graph: evaluation builds expressions.
+#[derive(Clone, Copy, Debug)]
+pub struct Nodes<'g>(pub &'g Graph);
+
+impl Algebra for Nodes<'_> {
+    type Value = Node;
+
+    fn constant(&self, value: f64) -> Node {
+        self.0.constant(value).node()
+    }
+
+    fn unary(&self, op: Unary, x: &Node) -> Node {
+        self.0.unary(op, *x)
+    }
+
+    fn powi(&self, x: &Node, n: i32) -> Node {
+        self.0.powi(*x, n)
+    }
+
+    fn binary(&self, op: Binary, x: &Node, y: &Node) -> Node {
+        self.0.binary(op, *x, *y)
+    }
+
+    fn select(&self, condition: &Node, x: &Node, y: &Node) -> Node {
+        self.0.select(*condition, *x, *y)
+    }
+
+    fn solve(&self, a: &[Node], b: &[Node]) -> (Vec<Node>, Node) {
+        let solution = self.0.solve(a, b);
+        (solution.x, solution.rcond)
+    }
+
+    fn implicit(&self, function: &Implicit, p: &[Node]) -> Vec<Node> {
+        self.0.implicit(function, p)
+    }
+
+    fn is_spent(&self) -> bool {
+        self.0.is_spent()
     }
 }
 

@@ -49,8 +49,7 @@ impl Implicit {
         let z: Vec<Node> = unknowns.iter().map(|unknown| unknown.symbol).collect();
         let fixed = graph.largest(residuals, |symbol| !z.contains(symbol));
         let cut = graph.replaced(residuals, fixed);
-        let p: Vec<Node> = cut.parts.iter().map(|part| part.symbol).collect();
-        let inputs = [&z[..], &p].concat();
+        let inputs = [&z[..], &cut.symbols].concat();
         let name = |&symbol: &Node| graph.symbol_name(symbol).unwrap_or_default();
         let equation = |&residual: &Node| format!("{} = 0", graph.render(residual, SHOWN));
         let slopes = |columns: &[Node]| Slopes::new(graph, &cut.roots, columns, &inputs);
@@ -59,14 +58,13 @@ impl Implicit {
             equations: residuals.iter().map(equation).collect(),
             start: unknowns.iter().map(|unknown| unknown.start).collect(),
             range: unknowns.iter().map(|unknown| unknown.range).collect(),
-            parameters: p.len(),
+            parameters: cut.symbols.len(),
             residual: Tape::new(graph, &inputs, &cut.roots)?,
             by_unknowns: slopes(&z)?,
-            by_parameters: slopes(&p)?,
+            by_parameters: slopes(&cut.symbols)?,
             steps: Tape::new(graph, &inputs, &steps(graph, &cut.roots))?,
         }));
-        let values: Vec<Node> = cut.parts.iter().map(|part| part.value).collect();
-        Ok(graph.implicit(&function, &values))
+        Ok(graph.implicit(&function, &cut.values))
     }
 
     /// g at (z, p).
@@ -295,11 +293,8 @@ impl<'a> Newton<'a> {
     /// The point where Newton's method ends, be it a root or not. The size of the residual is
     /// measured in rows scaled to one, so that no unit counts more than another.
     fn newton(&mut self, start: &[f64]) -> Vec<f64> {
-        let mut z: Vec<f64> = start
-            .iter()
-            .enumerate()
-            .map(|(i, &z)| self.within(z, i))
-            .collect();
+        let start = start.iter().enumerate();
+        let mut z: Vec<f64> = start.map(|(i, &z)| self.within(z, i)).collect();
         for _ in 0..STEPS {
             let g = self.residual(&z);
             if g.iter().all(|&g| g == 0.0) {
@@ -312,10 +307,8 @@ impl<'a> Newton<'a> {
             if step.iter().any(|step| !step.is_finite()) {
                 return z;
             }
-            let last = step
-                .iter()
-                .zip(&z)
-                .all(|(step, z)| step.abs() <= LAST * z.abs());
+            let mut pairs = step.iter().zip(&z);
+            let last = pairs.all(|(step, z)| step.abs() <= LAST * z.abs());
             match self.damped(&z, &step, size(&g, &scales), &scales) {
                 Some(next) if last => return next,
                 Some(next) => z = next,

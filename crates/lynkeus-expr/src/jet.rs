@@ -79,19 +79,16 @@ impl<A: Algebra> Jets<'_, A> {
         value.unwrap_or_else(|| self.inner.constant(0.0))
     }
 
-    fn entrywise(&self, x: &[A::Value], f: impl Fn(&A::Value) -> A::Value) -> Jet<A::Value> {
-        x.iter().map(f).collect()
+    fn add(&self, x: &[A::Value], y: &[A::Value]) -> Jet<A::Value> {
+        let both = |k| x.get(k).into_iter().chain(y.get(k)).cloned();
+        let places = 0..x.len().max(y.len());
+        places.map(|k| self.or_zero(self.sum(both(k)))).collect()
     }
 
-    fn add_sub(&self, op: Binary, x: &[A::Value], y: &[A::Value]) -> Jet<A::Value> {
-        (0..x.len().max(y.len()))
-            .map(|k| match (x.get(k), y.get(k), op) {
-                (Some(x), Some(y), _) => self.two(op, x, y),
-                (Some(x), None, _) => x.clone(),
-                (None, Some(y), Binary::Sub) => self.neg(y),
-                (None, Some(y), _) => y.clone(),
-                (None, None, _) => self.inner.constant(0.0),
-            })
+    fn sub(&self, x: &[A::Value], y: &[A::Value]) -> Jet<A::Value> {
+        let places = 0..x.len().max(y.len());
+        places
+            .map(|k| self.difference(x.get(k), y.get(k).cloned()))
             .collect()
     }
 
@@ -111,10 +108,7 @@ impl<A: Algebra> Jets<'_, A> {
         let mut q: Jet<A::Value> = Vec::with_capacity(last + 1);
         for k in 0..=last {
             // Σ_{j≥1} y_j q_{k−j}
-            let known = match k {
-                0 => None,
-                _ => self.convolution(y, &q, k, 1, k),
-            };
+            let known = self.convolution(y, &q, k, 1, k);
             let numerator = self.difference(x.get(k), known);
             q.push(self.two(Binary::Div, &numerator, &y[0]));
         }
@@ -126,9 +120,7 @@ impl<A: Algebra> Jets<'_, A> {
         let twice = self.scaled(2, &root);
         let mut s = vec![root];
         for k in 1..=self.order {
-            let known = (k > 1)
-                .then(|| self.convolution(&s, &s, k, 1, k - 1))
-                .flatten();
+            let known = self.convolution(&s, &s, k, 1, k - 1);
             let numerator = self.difference(x.get(k), known);
             s.push(self.two(Binary::Div, &numerator, &twice));
         }
@@ -191,12 +183,12 @@ impl<A: Algebra> Jets<'_, A> {
         let one = vec![self.inner.constant(1.0)];
         let square = self.product(x, x);
         match op {
-            Unary::Atan => self.quotient(&one, &self.add_sub(Binary::Add, &one, &square)),
+            Unary::Atan => self.quotient(&one, &self.add(&one, &square)),
             _ => {
-                let root = self.sqrt(&self.add_sub(Binary::Sub, &one, &square));
+                let root = self.sqrt(&self.sub(&one, &square));
                 let slope = self.quotient(&one, &root);
                 match op {
-                    Unary::Acos => self.entrywise(&slope, |v| self.neg(v)),
+                    Unary::Acos => slope.iter().map(|v| self.neg(v)).collect(),
                     _ => slope,
                 }
             }
@@ -224,7 +216,7 @@ impl<A: Algebra> Jets<'_, A> {
     /// f with f' = (x y' − y x')/(x² + y²).
     fn atan2(&self, y: &[A::Value], x: &[A::Value]) -> Jet<A::Value> {
         let f0 = self.two(Binary::Atan2, &y[0], &x[0]);
-        let norm = self.add_sub(Binary::Add, &self.product(x, x), &self.product(y, y));
+        let norm = self.add(&self.product(x, x), &self.product(y, y));
         let along_y = self.primitive(f0, y, &self.quotient(x, &norm));
         let zero = self.inner.constant(0.0);
         let along_x = self.primitive(zero, x, &self.quotient(y, &norm));
@@ -287,7 +279,7 @@ impl<A: Algebra> Algebra for Jets<'_, A> {
             return vec![value()];
         }
         match op {
-            Unary::Neg => self.entrywise(x, |v| self.neg(v)),
+            Unary::Neg => x.iter().map(|v| self.neg(v)).collect(),
             Unary::Sign | Unary::Floor | Unary::Not => vec![value()],
             Unary::Abs => {
                 let sign = self.inner.unary(Unary::Sign, &x[0]);
@@ -337,7 +329,8 @@ impl<A: Algebra> Algebra for Jets<'_, A> {
     fn binary(&self, op: Binary, x: &Self::Value, y: &Self::Value) -> Self::Value {
         match op {
             _ if self.is_spent() => vec![self.two(op, &x[0], &y[0])],
-            Binary::Add | Binary::Sub => self.add_sub(op, x, y),
+            Binary::Add => self.add(x, y),
+            Binary::Sub => self.sub(x, y),
             Binary::Mul => self.product(x, y),
             Binary::Div => self.quotient(x, y),
             Binary::Pow if x.len() == 1 && y.len() == 1 => vec![self.two(op, &x[0], &y[0])],

@@ -44,14 +44,15 @@ mod rebuild;
 mod render;
 mod tape;
 
-pub use algebra::{Algebra, Nodes, Reals};
+pub use algebra::Algebra;
 pub use budget::{Budget, Memory, Spent};
 pub use code::{Implicit, Tape};
 pub use components::components;
-pub use graph::{Call, Expr, Graph, Solution};
+pub use graph::{Call, Expr, Graph, Nodes, Solution};
 pub use implicit::ImplicitUnknown;
 pub use interval::Interval;
 pub use jet::{Jet, Jets};
 pub use op::{Binary, Node, Op, Unary};
-pub use rebuild::{Hoisted, HoistedPart};
+pub use real::Reals;
+pub use rebuild::Hoisted;
 pub use tape::{Evaluator, MissingInput};

@@ -68,16 +68,9 @@ pub struct Hoisted {
     /// the expressions, in the order in which they were given
     pub roots: Vec<Node>,
     /// what they read instead, each made of the symbols alone
-    pub parts: Vec<HoistedPart>,
-}
-
-/// A value made elsewhere.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct HoistedPart {
-    /// the [fresh](Graph::fresh) symbol that stands for it
-    pub symbol: Node,
-    /// what it is
-    pub value: Node,
+    pub values: Vec<Node>,
+    /// the [fresh](Graph::fresh) symbols that stand for the values
+    pub symbols: Vec<Node>,
 }
 
 /// Characters of the value that a fresh symbol is named after.
@@ -117,15 +110,13 @@ impl Graph {
 
     /// The roots with a fresh symbol for each of the values.
     pub(crate) fn replaced(&self, roots: &[Node], values: Vec<Node>) -> Hoisted {
-        let part = |value: Node| HoistedPart {
-            symbol: self.fresh(self.render(value, SHOWN)).node(),
-            value,
-        };
-        let parts: Vec<HoistedPart> = values.into_iter().map(part).collect();
-        let images = parts.iter().map(|part| (part.value, part.symbol)).collect();
+        let fresh = |&value: &Node| self.fresh(self.render(value, SHOWN)).node();
+        let symbols: Vec<Node> = values.iter().map(fresh).collect();
+        let images = values.iter().copied().zip(symbols.iter().copied());
         Hoisted {
-            roots: self.substitute(roots, &images),
-            parts,
+            roots: self.substitute(roots, &images.collect()),
+            values,
+            symbols,
         }
     }
 }
@@ -184,14 +175,15 @@ mod tests {
             (a * x * b).node(),
         ];
         let found = g.hoisted(&roots, &[a.node(), b.node()]);
-        let values: Vec<Node> = found.parts.iter().map(|part| part.value).collect();
         let mut expected = vec![gain.node(), a.node(), b.node(), (a * b).node()];
         expected.sort_unstable();
-        assert_eq!(values, expected);
-        let symbols: Vec<Node> = found.parts.iter().map(|part| part.symbol).collect();
+        assert_eq!(found.values, expected);
         let read = g.symbols_of(&found.roots);
-        assert!(read.iter().all(|s| *s == x.node() || symbols.contains(s)));
-        let back = found.parts.iter().map(|part| (part.symbol, part.value));
+        assert!(
+            read.iter()
+                .all(|s| *s == x.node() || found.symbols.contains(s))
+        );
+        let back = found.symbols.iter().copied().zip(found.values);
         assert_eq!(g.substitute(&found.roots, &back.collect()), roots);
     }
 
@@ -202,8 +194,7 @@ mod tests {
         let solved = g.solve(&[(a + 1.0).node()], &[g.constant(3.0).node()]);
         let root = (g.expr(solved.x[0]) * x).node();
         let found = g.hoisted(&[root], &[a.node()]);
-        assert_eq!(found.parts.len(), 1);
-        assert_eq!(found.parts[0].value, solved.x[0]);
+        assert_eq!(found.values, [solved.x[0]]);
         // without the symbol nothing changes
         assert_eq!(g.hoisted(&[root], &[]).roots, [root]);
     }

@@ -60,7 +60,9 @@ impl Tape {
         registers[..code.inputs].copy_from_slice(inputs);
         for (instruction, &source) in code.instructions.iter().zip(&code.sources) {
             code.step(&Reals, &mut registers, instruction);
-            let mut written = code.written(instruction).map(|r| registers[r as usize]);
+            // no instruction writes to inputs and constants, and those before wrote numbers
+            let first = code.inputs + code.constants.len();
+            let mut written = registers[first..code.registers].iter();
             if let Some(value) = written.find(|value| !value.is_finite()) {
                 let failure = code.failure(instruction, &registers);
                 let failure = failure.map_or_else(String::new, |how| format!(": {how}"));

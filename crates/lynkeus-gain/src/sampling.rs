@@ -37,25 +37,20 @@ pub struct Limits {
 /// None where errors do not shrink with short intervals either, and where M is too large or
 /// not finite.
 #[must_use]
-pub fn limits(M: &[Vec<f64>], C: &[Vec<f64>]) -> Option<Limits> {
-    let (size, sensors) = (M.len(), C.len());
+pub fn limits(M: &DMatrix<f64>, C: &DMatrix<f64>) -> Option<Limits> {
+    let (size, sensors) = (M.nrows(), C.nrows());
     let n = size.checked_sub(sensors).filter(|n| *n > 0)?;
-    let is_fit = M
-        .iter()
-        .all(|row| row.len() == size && row.iter().all(|x| x.is_finite()))
-        && C.iter().all(|row| row.len() == n);
+    let is_fit = (M.ncols(), C.ncols()) == (size, n) && M.iter().all(|x| x.is_finite());
     if !is_fit || size > LARGEST {
         return None;
     }
-    let M = DMatrix::from_fn(size, size, |i, j| M[i][j]);
-    let C = DMatrix::from_fn(sensors, n, |i, j| C[i][j]);
     let hold = 2.0 / radius(C * M.view((0, n), (n, sensors)))?;
     let fastest = radius(M.view((0, 0), (n, n)).into_owned())?;
     if fastest <= 0.0 || !fastest.is_finite() {
         return None;
     }
     let shrinks = |interval: f64| {
-        let step = &M * interval;
+        let step = M * interval;
         // also where the flow is not a number: nothing is seen to shrink
         step.amax() < LARGEST_STEP && {
             let flow = step.exp().view((0, 0), (n, n)).into_owned();
@@ -104,34 +99,41 @@ mod tests {
     use super::*;
 
     /// M for a chain of integrators with gain (θ c₁, θ² c₂, …) from its first state.
-    fn chain(θ: f64, c: &[f64]) -> Vec<Vec<f64>> {
+    fn chain(θ: f64, c: &[f64]) -> DMatrix<f64> {
         let n = c.len();
-        let mut M = vec![vec![0.0; n + 1]; n + 1];
+        let mut M = DMatrix::zeros(n + 1, n + 1);
         let mut power = 1.0;
         for i in 0..n {
             power *= θ;
-            M[i][0] = -power * c[i];
-            M[i][n] = power * c[i];
+            M[(i, 0)] = -power * c[i];
+            M[(i, n)] = power * c[i];
             if i + 1 < n {
-                M[i][i + 1] += 1.0;
+                M[(i, i + 1)] += 1.0;
             }
         }
-        M[n][1] = 1.0;
+        M[(n, 1)] = 1.0;
         M
     }
 
-    const FIRST: [f64; 3] = [1.0, 0.0, 0.0];
+    /// What shows the first state of n.
+    fn first(n: usize) -> DMatrix<f64> {
+        DMatrix::identity(1, n)
+    }
+
+    fn rows<const N: usize>(rows: [[f64; N]; N]) -> DMatrix<f64> {
+        DMatrix::from_row_slice(N, N, rows.as_flattened())
+    }
 
     /// By hand: with q = exp(−2θτ) ≈ 0, Ψ = [[1/4 − θτ/2, τ], [−θ/2, 1]] has determinant 1/4 and
     /// trace 5/4 − θτ/2, which reaches −5/4 at θτ = 5. The chain of three: by SciPy.
     #[test]
     fn a_chain_stands_an_interval_inversely_to_its_gain() {
         for θ in [1.0, 30.0] {
-            let two = limits(&chain(θ, &[2.0, 1.0]), &[FIRST[..2].to_vec()]).unwrap();
+            let two = limits(&chain(θ, &[2.0, 1.0]), &first(2)).unwrap();
             assert!((θ * two.predict - 5.001).abs() < 0.06, "{two:?}");
             // CK = 2θ
             assert!((θ * two.hold - 1.0).abs() < 1e-12, "{two:?}");
-            let three = limits(&chain(θ, &[3.0, 3.0, 1.0]), &[FIRST.to_vec()]).unwrap();
+            let three = limits(&chain(θ, &[3.0, 3.0, 1.0]), &first(3)).unwrap();
             assert!((θ * three.predict - 2.899).abs() < 0.04, "{three:?}");
         }
     }
@@ -139,12 +141,9 @@ mod tests {
     /// x' = a x, K = 3: stable plants stand any interval; an unstable one 3.896 at a = 1/2 (SciPy).
     #[test]
     fn what_decays_by_itself_stands_any_interval() {
-        let M = |a: f64| vec![vec![a - 3.0, 3.0], vec![a, 0.0]];
-        assert_eq!(
-            limits(&M(-0.5), &[vec![1.0]]).unwrap().predict,
-            f64::INFINITY
-        );
-        let unstable = limits(&M(0.5), &[vec![1.0]]).unwrap().predict;
+        let M = |a: f64| rows([[a - 3.0, 3.0], [a, 0.0]]);
+        assert_eq!(limits(&M(-0.5), &first(1)).unwrap().predict, f64::INFINITY);
+        let unstable = limits(&M(0.5), &first(1)).unwrap().predict;
         assert!((unstable - 3.896).abs() < 0.04, "{unstable}");
     }
 
@@ -152,30 +151,22 @@ mod tests {
     #[test]
     fn a_flow_out_of_range_ends() {
         for size in [1e40, 1e150, 1e300] {
-            let M = vec![
-                vec![-1.0, size, 1.0],
-                vec![0.0, -1.0, 1.0],
-                vec![0.0, size, 0.0],
-            ];
-            assert_eq!(limits(&M, &[vec![1.0, 0.0]]), None);
-            let alone = vec![vec![-1.0, 1.0], vec![size, 0.0]];
-            assert_eq!(limits(&alone, &[vec![1.0]]), None);
+            let M = rows([[-1.0, size, 1.0], [0.0, -1.0, 1.0], [0.0, size, 0.0]]);
+            assert_eq!(limits(&M, &first(2)), None);
+            let alone = rows([[-1.0, 1.0], [size, 0.0]]);
+            assert_eq!(limits(&alone, &first(1)), None);
         }
     }
 
     #[test]
     fn where_nothing_shrinks_nothing_is_said() {
         // a second state that nobody sees and nothing moves
-        let M = vec![
-            vec![-1.0, 0.0, 1.0],
-            vec![0.0, 0.0, 0.0],
-            vec![0.0, 0.0, 0.0],
-        ];
-        assert_eq!(limits(&M, &[vec![1.0, 0.0]]), None);
+        let M = rows([[-1.0, 0.0, 1.0], [0.0; 3], [0.0; 3]]);
+        assert_eq!(limits(&M, &first(2)), None);
         assert_eq!(
-            limits(&[vec![f64::NAN, 0.0], vec![0.0, 0.0]], &[vec![1.0]]),
+            limits(&rows([[f64::NAN, 0.0], [0.0, 0.0]]), &first(1)),
             None
         );
-        assert_eq!(limits(&[], &[]), None);
+        assert_eq!(limits(&DMatrix::zeros(0, 0), &DMatrix::zeros(0, 0)), None);
     }
 }

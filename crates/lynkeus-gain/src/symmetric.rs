@@ -20,14 +20,20 @@ impl Tridiagonal {
                 off_diagonal: off_diagonal.len(),
             });
         }
-        let matrix = Self {
+        // the pivots D of S = L D Lᵀ, from the first row down
+        let mut pivot = diagonal[0];
+        for size in 1..=diagonal.len() {
+            if pivot.is_nan() || pivot <= 0.0 {
+                return Err(FactorError::Indefinite { size });
+            }
+            if let Some(off) = off_diagonal.get(size - 1) {
+                pivot = diagonal[size] - off.powi(2) / pivot;
+            }
+        }
+        Ok(Self {
             diagonal,
             off_diagonal,
-        };
-        match matrix.pivots().iter().position(|&d| d.is_nan() || d <= 0.0) {
-            Some(k) => Err(FactorError::Indefinite { size: k + 1 }),
-            None => Ok(matrix),
-        }
+        })
     }
 
     /// Number of rows.
@@ -52,24 +58,6 @@ impl Tridiagonal {
             1 => self.off_diagonal[i.min(j)],
             _ => 0.0,
         }
-    }
-
-    /// True if every pivot of S = L D Lᵀ is positive.
-    pub fn is_positive_definite(&self) -> bool {
-        self.pivots().iter().all(|&d| d > 0.0)
-    }
-
-    /// The pivots D of S = L D Lᵀ, from the first row down.
-    fn pivots(&self) -> Vec<f64> {
-        let mut pivots: Vec<f64> = Vec::with_capacity(self.size());
-        for (k, &s) in self.diagonal.iter().enumerate() {
-            let d = match k {
-                0 => s,
-                _ => s - self.off_diagonal[k - 1].powi(2) / pivots[k - 1],
-            };
-            pivots.push(d);
-        }
-        pivots
     }
 
     /// S⁻¹Cᵀ with C = (1, 0, …, 0): the first column of the inverse. With

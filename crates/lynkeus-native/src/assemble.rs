@@ -4,28 +4,17 @@
 /// A vector register, 0 to 15.
 pub(crate) type Register = u8;
 
-/// What an address is counted from.
+/// What an address is counted from: a register that holds a pointer, by its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Base {
     /// rbx
-    Inputs,
+    Inputs = 3,
     /// r14
-    Outputs,
+    Outputs = 14,
     /// r13
-    Frame,
+    Frame = 13,
     /// r15
-    Shared,
-}
-
-impl Base {
-    fn number(self) -> u8 {
-        match self {
-            Self::Inputs => 3,
-            Self::Outputs => 14,
-            Self::Frame => 13,
-            Self::Shared => 15,
-        }
-    }
+    Shared = 15,
 }
 
 /// A place in memory: bytes from a base.
@@ -106,7 +95,7 @@ impl Assembler {
     fn vex(&mut self, (pp, l): (u8, u8), map: u8, opcode: u8, reg: u8, vvvv: u8, rm: Operand) {
         let base = match rm {
             Operand::Register(r) => r,
-            Operand::Memory(address) => address.base.number(),
+            Operand::Memory(address) => address.base as u8,
         };
         let inverted = |number: u8, bit: u8| (!number >> 3 & 1) << bit;
         self.bytes.extend([
@@ -218,7 +207,7 @@ impl Assembler {
     /// The next integer arguments of a call (rdi, rsi, rdx): addresses.
     pub fn pass(&mut self, argument: usize, address: Address) {
         const NUMBERS: [u8; 3] = [7, 6, 2];
-        let base = address.base.number();
+        let base = address.base as u8;
         self.bytes.extend([
             0x48 | base >> 3,
             0x8d,

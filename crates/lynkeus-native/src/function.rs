@@ -72,13 +72,13 @@ impl<const LANES: usize> Function<LANES> {
     fn compiled(program: &Program, shared: usize, spacing: Option<usize>) -> Option<Self> {
         let emitter = emit::<LANES>(program, shared, spacing);
         let outputs = spacing.unwrap_or(program.outputs.len());
-        let places = [program.inputs, outputs, emitter.frame.len() + 1];
+        let places = [program.inputs, outputs, emitter.frame() + 1];
         let is_large = |&count: &usize| count > LARGEST_PLACE / (8 * LANES);
         if places.iter().any(is_large) {
             return None;
         }
-        let mut frame = Buffer::new(emitter.frame.len() + 1);
-        for (place, &constant) in frame.values_mut().iter_mut().zip(&emitter.frame.constants) {
+        let mut frame = Buffer::new(emitter.frame() + 1);
+        for (place, &constant) in frame.values_mut().iter_mut().zip(&emitter.constants) {
             *place = [constant; LANES];
         }
         let compiled = Arc::new(Compiled {

@@ -59,10 +59,8 @@ impl Program {
             Value::Binary(_, a, b) => [a, b].into_iter().for_each(give),
             Value::Select(c, a, b) => [c, a, b].into_iter().for_each(give),
             Value::Solve(system) => {
-                self.systems[system as usize]
-                    .iter()
-                    .copied()
-                    .for_each(&mut give);
+                let arguments = self.systems[system as usize].iter();
+                arguments.copied().for_each(give);
             }
         }
     }

@@ -8,63 +8,6 @@ use crate::record::{Id, Program, Value};
 const REGISTERS: usize = 14;
 pub(crate) const TEMPORARY: [Register; 2] = [14, 15];
 
-/// Where things stand in the frame, in units of one value (one number or four lanes).
-#[derive(Debug, Default)]
-pub(crate) struct Frame {
-    /// the constants stand first
-    pub constants: Vec<f64>,
-    /// places after the constants
-    extra: usize,
-    free: Vec<usize>,
-}
-
-impl Frame {
-    /// A place for a constant; all of them come before the first [`Frame::slot`].
-    pub fn constant(&mut self, value: f64) -> usize {
-        let is_same = |c: &f64| c.to_bits() == value.to_bits();
-        self.constants
-            .iter()
-            .position(is_same)
-            .unwrap_or_else(|| self.add(value))
-    }
-
-    /// As [`Frame::constant`], for one that is known to be new.
-    pub fn add(&mut self, value: f64) -> usize {
-        self.constants.push(value);
-        self.constants.len() - 1
-    }
-
-    /// A place for a value.
-    pub fn slot(&mut self) -> usize {
-        self.free.pop().unwrap_or_else(|| self.block(1))
-    }
-
-    /// Places side by side.
-    pub fn block(&mut self, count: usize) -> usize {
-        let first = self.constants.len() + self.extra;
-        self.extra += count;
-        first
-    }
-
-    /// The value of a slot is not needed any more.
-    pub fn release(&mut self, slot: usize) {
-        self.free.push(slot);
-    }
-
-    /// Number of places.
-    pub fn len(&self) -> usize {
-        self.constants.len() + self.extra
-    }
-
-    /// The address of a place; a value has `bytes` bytes.
-    pub fn address(place: usize, bytes: usize) -> Address {
-        Address {
-            base: Base::Frame,
-            offset: (place * bytes) as i32,
-        }
-    }
-}
-
 /// Where a value is.
 #[derive(Clone, Copy, Default)]
 struct Home {
@@ -74,10 +17,16 @@ struct Home {
     slot: Option<usize>,
 }
 
+/// The frame is counted in units of one value (one number or four lanes).
 pub(crate) struct Emitter<'p, const LANES: usize> {
     pub program: &'p Program,
     pub assembler: Assembler,
-    pub frame: Frame,
+    /// they stand first in the frame, and are all there before the first value
+    pub constants: Vec<f64>,
+    /// places of the frame after the constants
+    extra: usize,
+    /// of these, those whose values are not needed any more
+    free: Vec<usize>,
     homes: Vec<Home>,
     holds: [Option<Id>; REGISTERS],
     /// every place where a value is used, the next one last
@@ -93,7 +42,11 @@ pub(crate) struct Emitter<'p, const LANES: usize> {
 }
 
 impl<'p, const LANES: usize> Emitter<'p, LANES> {
-    const BYTES: usize = 8 * LANES;
+    /// A place counted from a base, in values.
+    fn address(base: Base, place: usize) -> Address {
+        let offset = (place * 8 * LANES) as i32;
+        Address { base, offset }
+    }
 
     /// With constants, inputs and systems in their places; `constants` are those that the operations
     /// read from memory.
@@ -114,7 +67,9 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
         let mut emitter = Self {
             program,
             assembler: Assembler::new(LANES > 1),
-            frame: Frame::default(),
+            constants: vec![],
+            extra: 0,
+            free: vec![],
             homes: vec![Home::default(); count],
             holds: [None; REGISTERS],
             uses,
@@ -129,37 +84,35 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
 
     /// Constants, inputs and systems have their places before anything is computed.
     fn place_leaves(&mut self, shared: usize, constants: &[f64]) {
-        for &constant in constants {
-            self.frame.constant(constant);
-        }
+        self.constants.extend(constants);
         for (i, &value) in self.program.values.iter().enumerate() {
             self.homes[i].memory = match value {
-                Value::Constant(c) => Some(Frame::address(self.frame.add(c), Self::BYTES)),
-                Value::Input(k) => {
-                    let k = k as usize;
-                    let (base, place) = match k.checked_sub(shared) {
-                        Some(own) => (Base::Inputs, own),
-                        None => (Base::Shared, k),
-                    };
-                    Some(Address {
-                        base,
-                        offset: (place * Self::BYTES) as i32,
-                    })
+                Value::Constant(c) => {
+                    self.constants.push(c);
+                    Some(Self::address(Base::Frame, self.constants.len() - 1))
                 }
+                Value::Input(k) => Some(match (k as usize).checked_sub(shared) {
+                    Some(own) => Self::address(Base::Inputs, own),
+                    None => Self::address(Base::Shared, k as usize),
+                }),
                 _ => None,
             };
         }
         for system in &self.program.systems {
-            self.systems.push(self.frame.block(system.len() + 1));
+            self.systems.push(self.frame());
+            self.extra += system.len() + 1;
         }
+    }
+
+    /// Length of the frame.
+    pub fn frame(&self) -> usize {
+        self.constants.len() + self.extra
     }
 
     /// Whether a value is to be made: begins its operation. Slots that the operation before it may
     /// still have read are free from now on.
     pub fn begin(&mut self, id: Id, value: Value) -> bool {
-        for slot in self.leaving.drain(..) {
-            self.frame.release(slot);
-        }
+        self.free.append(&mut self.leaving);
         let is_idle = self.uses[id as usize].is_empty() && self.results[id as usize].is_empty();
         !(is_idle && Program::is_pure(value))
     }
@@ -167,10 +120,7 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
     /// Ends the operation: writes the value to the outputs that it is.
     pub fn finish(&mut self, id: Id) {
         for output in std::mem::take(&mut self.results[id as usize]) {
-            let to = Address {
-                base: Base::Outputs,
-                offset: (output as usize * Self::BYTES) as i32,
-            };
+            let to = Self::address(Base::Outputs, output as usize);
             let from = self.source(id, TEMPORARY[0]);
             self.assembler.store(from, to);
         }
@@ -179,7 +129,7 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
 
     /// A place of a linear system: its arguments, where the solution stands afterwards.
     pub fn place(&self, system: u32, place: usize) -> Address {
-        Frame::address(self.systems[system as usize] + place, Self::BYTES)
+        Self::address(Base::Frame, self.systems[system as usize] + place)
     }
 
     /// A value stands in memory.
@@ -259,10 +209,12 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
         self.homes[id as usize].register.is_none()
     }
 
-    /// A constant of the operations.
-    pub fn constant(&mut self, value: f64) -> Operand {
-        let place = self.frame.constant(value);
-        Operand::Memory(Frame::address(place, Self::BYTES))
+    /// A constant of the operations, one of those that the emitter was made with.
+    pub fn constant(&self, value: f64) -> Operand {
+        let is_same = |c: &f64| c.to_bits() == value.to_bits();
+        let place = self.constants.iter().position(is_same);
+        debug_assert!(place.is_some(), "{value} is none of them");
+        Operand::Memory(Self::address(Base::Frame, place.unwrap_or(0)))
     }
 
     /// A register for the result of the operation at hand, whose arguments are consumed.
@@ -307,8 +259,11 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
         if let Some(address) = self.homes[id as usize].memory {
             return address;
         }
-        let slot = self.frame.slot();
-        let address = Frame::address(slot, Self::BYTES);
+        let slot = self.free.pop().unwrap_or_else(|| {
+            self.extra += 1;
+            self.frame() - 1
+        });
+        let address = Self::address(Base::Frame, slot);
         self.assembler.store(register, address);
         let home = &mut self.homes[id as usize];
         (home.memory, home.slot) = (Some(address), Some(slot));

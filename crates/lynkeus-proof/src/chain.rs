@@ -289,12 +289,12 @@ fn push(chain: &Chain, drift: &[f64], noise: f64) -> Option<Interval> {
         let d = *drift.get(state)?;
         q.push(Interval::point(d) / chain.scales[j]);
     }
-    let form = |x: &[Interval], S: &dyn Fn(usize, usize) -> Interval| {
+    let form = |x: &[Interval], S: &IntervalMatrix| {
         let terms = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
-        sum(terms.map(|(i, j)| x[i] * S(i, j) * x[j]))
+        sum(terms.map(|(i, j)| x[i] * S[i][j] * x[j]))
     };
-    let drift = form(&q, &|i, j| chain.S[i][j].abs());
-    let noisy = form(&chain.g, &|i, j| chain.S[i][j]);
+    let drift = form(&q, &square(n, |i, j| chain.S[i][j].abs()));
+    let noisy = form(&chain.g, &chain.S);
     let β = drift.sqrt() + Interval::point(noise) * noisy.sqrt();
     β.hi().is_finite().then_some(β)
 }

@@ -59,11 +59,7 @@ pub fn norm(A: &[Vec<f64>]) -> f64 {
     let frobenius = length(&A.concat());
     let columns = A.first().map_or(0, Vec::len);
     let rows = A.iter().map(|row| total(row.iter().copied()));
-    let column = |j: usize| total(A.iter().map(|row| row[j]));
-    let largest = |sums: &mut dyn Iterator<Item = f64>| sums.fold(0.0, f64::max);
-    let mixed = times(
-        largest(&mut rows.into_iter()),
-        largest(&mut (0..columns).map(column)),
-    );
+    let columns = (0..columns).map(|j| total(A.iter().map(|row| row[j])));
+    let mixed = times(rows.fold(0.0, f64::max), columns.fold(0.0, f64::max));
     frobenius.min(root(mixed))
 }

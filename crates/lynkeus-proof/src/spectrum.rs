@@ -9,6 +9,11 @@ fn sweeps(size: usize) -> usize {
     100 * size.max(10)
 }
 
+/// Whether there are entries, and all are finite.
+fn is_sound(matrix: &DMatrix<f64>) -> bool {
+    !matrix.is_empty() && matrix.iter().all(|x| x.is_finite())
+}
+
 /// The power of two just below a number, or nearest to it in range: dividing by it changes no
 /// digit. One for zero.
 pub(crate) fn power_of_two(x: f64) -> f64 {
@@ -21,11 +26,11 @@ pub(crate) fn power_of_two(x: f64) -> f64 {
 /// The eigenvalues of a square matrix; none where an entry or an eigenvalue is not finite, or
 /// the iteration does not converge.
 pub fn eigenvalues(matrix: DMatrix<f64>) -> Option<DVector<Complex<f64>>> {
-    if !matrix.iter().all(|x| x.is_finite()) {
-        return None;
-    }
     if matrix.is_empty() {
         return Some(DVector::zeros(0));
+    }
+    if !is_sound(&matrix) {
+        return None;
     }
     // neither squares nor products of two entries leave the range of numbers
     let unit = power_of_two(matrix.amax());
@@ -59,7 +64,7 @@ fn on_the_diagonal(T: &DMatrix<f64>) -> DVector<Complex<f64>> {
 /// The singular values of a matrix, the largest first, with the left and the right vectors asked
 /// for; none as for [`eigenvalues`], and for a matrix without entries.
 pub fn singular(matrix: DMatrix<f64>, left: bool, right: bool) -> Option<SVD<f64, Dyn, Dyn>> {
-    if matrix.is_empty() || !matrix.iter().all(|x| x.is_finite()) {
+    if !is_sound(&matrix) {
         return None;
     }
     let sweeps = sweeps(matrix.nrows().max(matrix.ncols()));
@@ -76,7 +81,7 @@ pub fn singular(matrix: DMatrix<f64>, left: bool, right: bool) -> Option<SVD<f64
 /// The eigenvalues of a symmetric matrix, in no order, with its eigenvectors; none as for
 /// [`singular`]. Only the lower triangle is read.
 pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
-    if matrix.is_empty() || !matrix.iter().all(|x| x.is_finite()) {
+    if !is_sound(&matrix) {
         return None;
     }
     let sweeps = sweeps(matrix.nrows());

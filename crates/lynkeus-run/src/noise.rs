@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-use lynkeus_expr::{Binary, real};
+use lynkeus_expr::{Algebra, Binary, Reals};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
@@ -122,8 +122,8 @@ impl Limits {
     /// What the sensor shows of a value.
     #[must_use]
     pub fn shown(self, value: f64) -> f64 {
-        let capped = real::binary(Binary::Min, value, self.high);
-        real::binary(Binary::Max, capped, self.low)
+        let capped = Reals.binary(Binary::Min, &value, &self.high);
+        Reals.binary(Binary::Max, &capped, &self.low)
     }
 
     /// Whether a reading only says "at most" or "at least".

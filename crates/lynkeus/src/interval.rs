@@ -5,6 +5,7 @@ use lynkeus_gain::sampling;
 use lynkeus_observers::{Design, Observer};
 use lynkeus_structure::AugmentedPlant;
 use lynkeus_words::figures;
+use nalgebra::DMatrix;
 use serde_json::{Value, json};
 
 use crate::course::{Course, Samples};
@@ -144,14 +145,14 @@ impl Path<'_> {
             values[first..first + sensors].copy_from_slice(&y);
             let mut entries = vec![0.0; nodes.len()];
             slope_values.evaluator().eval(&values, &mut entries);
-            let mut M = vec![vec![0.0; states.len()]; states.len()];
+            let mut M = DMatrix::zeros(states.len(), states.len());
             for (&(i, j, _), value) in slopes.entries.iter().zip(&entries) {
-                M[i][j] += value;
+                M[(i, j)] += value;
             }
-            let mut C = vec![vec![0.0; states.len() - sensors]; sensors];
+            let mut C = DMatrix::zeros(sensors, states.len() - sensors);
             let rest = entries.iter().skip(slopes.entries.len());
             for (&(i, j, _), value) in views.entries.iter().zip(rest) {
-                C[i][j] += value;
+                C[(i, j)] += value;
             }
             sampling::limits(&M, &C)
         };

@@ -241,17 +241,16 @@ fn tuned(
     let roots: Vec<Node> = places.iter().map(|place| **place).collect();
     let symbols: Vec<Node> = signals.iter().map(|signal| signal.1).collect();
     let hoisted = graph.hoisted(&roots, &symbols);
-    if hoisted.parts.is_empty() {
+    if hoisted.values.is_empty() {
         return Ok(None);
     }
     for (place, root) in places.into_iter().zip(hoisted.roots) {
         *place = root;
     }
     let (mut made, mut read) = (vec![], vec![]);
-    for (i, part) in hoisted.parts.iter().enumerate() {
+    for (i, (value, symbol)) in hoisted.values.into_iter().zip(hoisted.symbols).enumerate() {
         let name = format!("tuned {}", i + 1);
-        made.push((name.clone(), part.value));
-        let symbol = part.symbol;
+        made.push((name.clone(), value));
         read.push(Signal { name, symbol });
     }
     observer.inputs.extend(read);

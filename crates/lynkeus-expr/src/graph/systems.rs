@@ -2,9 +2,9 @@
 
 use std::collections::HashSet;
 
-use super::{Call, Graph, Key, Solution};
+use super::{Call, Graph, Key, Nodes, Solution};
 use crate::code::System;
-use crate::{Implicit, Node, Nodes, Op};
+use crate::{Implicit, Node, Op};
 
 impl Call {
     /// Number of unknowns.
@@ -162,9 +162,7 @@ impl Graph {
 
     /// One result of a system built before.
     pub(crate) fn entry(&self, solve: Node, i: u32) -> Node {
-        self.inner
-            .borrow_mut()
-            .intern(Key::Entry(solve, i), Op::Entry(solve, i))
+        self.intern(Key::Entry(solve, i), Op::Entry(solve, i))
     }
 }
 

@@ -30,7 +30,7 @@ impl Algebra for Intervals {
             Unary::Sinh => x.sinh(),
             Unary::Cosh => x.cosh(),
             Unary::Tanh => x.tanh(),
-            Unary::Not => x.not(),
+            Unary::Not => x.relation(*x, x.is_zero(), x.is_true()),
         }
     }
 
@@ -48,11 +48,21 @@ impl Algebra for Intervals {
             Binary::Atan2 => x.atan2(*y),
             Binary::Min => x.min(*y),
             Binary::Max => x.max(*y),
-            Binary::Less => x.less(*y),
-            Binary::LessEq => x.less_eq(*y),
-            Binary::Equal => x.equal(*y),
-            Binary::And => x.and(*y),
-            Binary::Or => x.or(*y),
+            Binary::Less => x.relation(*y, x.hi < y.lo, x.lo >= y.hi),
+            Binary::LessEq => x.relation(*y, x.hi <= y.lo, x.lo > y.hi),
+            // certain only for two points
+            Binary::Equal => {
+                let same = x.is_point() && y.is_point() && x.lo == y.lo;
+                x.relation(*y, same, x.hi < y.lo || y.hi < x.lo)
+            }
+            Binary::And => {
+                let never = x.is_zero() || y.is_zero();
+                x.relation(*y, x.is_true() && y.is_true(), never)
+            }
+            Binary::Or => {
+                let never = x.is_zero() && y.is_zero();
+                x.relation(*y, x.is_true() || y.is_true(), never)
+            }
         }
     }
 

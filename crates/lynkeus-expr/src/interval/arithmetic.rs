@@ -5,7 +5,7 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::Interval;
-use super::rounding::{Rounded, product, quotient, root, sum};
+use super::rounding::{product, quotient, root, sum};
 use crate::real;
 
 impl Neg for Interval {
@@ -40,10 +40,10 @@ impl Mul for Interval {
             if a.lo >= 0.0 && b.lo >= 0.0 {
                 return (product(a.lo, b.lo).down(), product(a.hi, b.hi).up());
             }
-            let corners = [(a.lo, b.lo), (a.lo, b.hi), (a.hi, b.lo), (a.hi, b.hi)];
-            let products = corners.map(|(x, y)| product(x, y));
-            let (lo, hi) = (products.map(Rounded::down), products.map(Rounded::up));
-            (smallest(lo), largest(hi))
+            a.corners(b, |x, y| {
+                let product = product(x, y);
+                (product.down(), product.up())
+            })
         })
     }
 }
@@ -73,6 +73,14 @@ impl Interval {
         }
         let (lo, hi) = f(self, other);
         Self::raw(lo, hi, self.defined && other.defined)
+    }
+
+    /// From the smallest to the largest of the bounds that `f` gives at the corners of the box of both.
+    pub(super) fn corners(self, other: Self, f: impl Fn(f64, f64) -> (f64, f64)) -> (f64, f64) {
+        let (a, b) = (self, other);
+        let corners = [(a.lo, b.lo), (a.lo, b.hi), (a.hi, b.lo), (a.hi, b.hi)];
+        let [(l1, h1), (l2, h2), (l3, h3), (l4, h4)] = corners.map(|(x, y)| f(x, y));
+        (l1.min(l2).min(l3).min(l4), h1.max(h2).max(h3).max(h4))
     }
 
     fn div_by_non_negative(self, divisor: Self) -> Self {
@@ -135,51 +143,8 @@ impl Interval {
     }
 }
 
-/// The smallest of some bounds, none of which is NaN.
-pub(super) fn smallest<const N: usize>(bounds: [f64; N]) -> f64 {
-    bounds.into_iter().fold(f64::INFINITY, f64::min)
-}
-
-/// The largest of some bounds, none of which is NaN.
-pub(super) fn largest<const N: usize>(bounds: [f64; N]) -> f64 {
-    bounds.into_iter().fold(f64::NEG_INFINITY, f64::max)
-}
-
 impl Interval {
     const UNDECIDED: Self = Self::raw(0.0, 1.0, true);
-
-    /// Whether members of `self` are below members of `other`.
-    pub(super) fn less(self, other: Self) -> Self {
-        self.relation(other, self.hi < other.lo, self.lo >= other.hi)
-    }
-
-    /// Whether members of `self` are at most members of `other`.
-    pub(super) fn less_eq(self, other: Self) -> Self {
-        self.relation(other, self.hi <= other.lo, self.lo > other.hi)
-    }
-
-    /// Whether members are equal: certain only for two points.
-    pub(super) fn equal(self, other: Self) -> Self {
-        let same = self.is_point() && other.is_point() && self.lo == other.lo;
-        self.relation(other, same, self.hi < other.lo || other.hi < self.lo)
-    }
-
-    /// Whether both are true.
-    pub(super) fn and(self, other: Self) -> Self {
-        let always = self.is_true() && other.is_true();
-        self.relation(other, always, self.is_zero() || other.is_zero())
-    }
-
-    /// Whether one is true.
-    pub(super) fn or(self, other: Self) -> Self {
-        let never = self.is_zero() && other.is_zero();
-        self.relation(other, self.is_true() || other.is_true(), never)
-    }
-
-    /// The opposite truth values.
-    pub(super) fn not(self) -> Self {
-        self.relation(self, self.is_zero(), self.is_true())
-    }
 
     /// `chosen` where `self` is true, `other` where it is false, the hull of both when it may be either.
     ///
@@ -196,7 +161,8 @@ impl Interval {
         result.and_defined(self.defined)
     }
 
-    fn relation(self, other: Self, always: bool, never: bool) -> Self {
+    /// A truth value of members of both.
+    pub(super) fn relation(self, other: Self, always: bool, never: bool) -> Self {
         if self.is_empty() || other.is_empty() {
             return Self::EMPTY;
         }
@@ -209,7 +175,7 @@ impl Interval {
     }
 
     /// Whether every member counts as true.
-    fn is_true(self) -> bool {
+    pub(super) fn is_true(self) -> bool {
         !self.contains_zero()
     }
 }
@@ -217,6 +183,8 @@ impl Interval {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interval::Intervals;
+    use crate::{Algebra, Binary, Unary};
 
     const INF: f64 = f64::INFINITY;
 
@@ -304,28 +272,40 @@ mod tests {
     #[test]
     fn order_is_decided_where_it_can_be() {
         let (x, y) = (interval(0.0, 1.0), interval(1.0, 2.0));
-        assert_eq!(x.less(y), MAYBE);
-        assert_eq!(x.less_eq(y), YES);
-        assert_eq!(y.less(x), NO);
-        assert_eq!(y.less_eq(x), MAYBE);
-        assert_eq!(x.less(interval(1.5, 2.0)), YES);
-        assert_eq!(x.equal(interval(1.5, 2.0)), NO);
-        assert_eq!(x.equal(x), MAYBE);
-        assert_eq!(YES.equal(YES), YES);
-        assert!(x.less(Interval::EMPTY).is_empty());
-        assert_eq!(Interval::ENTIRE.less(Interval::ENTIRE), MAYBE);
+        assert_eq!(Intervals.binary(Binary::Less, &x, &y), MAYBE);
+        assert_eq!(Intervals.binary(Binary::LessEq, &x, &y), YES);
+        assert_eq!(Intervals.binary(Binary::Less, &y, &x), NO);
+        assert_eq!(Intervals.binary(Binary::LessEq, &y, &x), MAYBE);
+        assert_eq!(Intervals.binary(Binary::Less, &x, &interval(1.5, 2.0)), YES);
+        assert_eq!(Intervals.binary(Binary::Equal, &x, &interval(1.5, 2.0)), NO);
+        assert_eq!(Intervals.binary(Binary::Equal, &x, &x), MAYBE);
+        assert_eq!(Intervals.binary(Binary::Equal, &YES, &YES), YES);
+        assert!(
+            Intervals
+                .binary(Binary::Less, &x, &Interval::EMPTY)
+                .is_empty()
+        );
+        assert_eq!(
+            Intervals.binary(Binary::Less, &Interval::ENTIRE, &Interval::ENTIRE),
+            MAYBE
+        );
     }
 
     #[test]
     fn truth_tables_of_three_values() {
-        assert_eq!(YES.and(MAYBE), MAYBE);
-        assert_eq!(NO.and(MAYBE), NO);
-        assert_eq!(YES.and(interval(-3.0, -2.0)), YES);
-        assert_eq!(YES.or(MAYBE), YES);
-        assert_eq!(NO.or(MAYBE), MAYBE);
-        assert_eq!(NO.or(NO), NO);
-        assert_eq!((YES.not(), NO.not(), MAYBE.not()), (NO, YES, MAYBE));
-        assert!(Interval::EMPTY.not().is_empty());
+        assert_eq!(Intervals.binary(Binary::And, &YES, &MAYBE), MAYBE);
+        assert_eq!(Intervals.binary(Binary::And, &NO, &MAYBE), NO);
+        assert_eq!(
+            Intervals.binary(Binary::And, &YES, &interval(-3.0, -2.0)),
+            YES
+        );
+        assert_eq!(Intervals.binary(Binary::Or, &YES, &MAYBE), YES);
+        assert_eq!(Intervals.binary(Binary::Or, &NO, &MAYBE), MAYBE);
+        assert_eq!(Intervals.binary(Binary::Or, &NO, &NO), NO);
+        for (x, not) in [(YES, NO), (NO, YES), (MAYBE, MAYBE)] {
+            assert_eq!(Intervals.unary(Unary::Not, &x), not);
+        }
+        assert!(Intervals.unary(Unary::Not, &Interval::EMPTY).is_empty());
     }
 
     #[test]

@@ -7,13 +7,17 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::Interval;
-use super::arithmetic::{largest, smallest};
 use super::rounding::{Rounded, library_down, library_up, product};
 
 impl Interval {
     /// The exponentials.
     pub fn exp(self) -> Self {
-        self.image(|x| (exp_down(x.lo), exp_up(x.hi)))
+        self.image(|x| {
+            let least = if x.lo >= 0.0 { 1.0 } else { 0.0 };
+            let most = if x.hi <= 0.0 { 1.0 } else { f64::INFINITY };
+            let (lo, hi) = (libm::exp(x.lo), libm::exp(x.hi));
+            (library_down(lo).max(least), library_up(hi).min(most))
+        })
     }
 
     /// The natural logarithms of the members above zero.
@@ -21,12 +25,18 @@ impl Interval {
         if self.is_empty() || self.hi <= 0.0 {
             return Self::EMPTY;
         }
-        let lo = if self.lo > 0.0 {
-            ln_down(self.lo)
+        let lo = match self.lo > 0.0 {
+            true => library_down(libm::log(self.lo)),
+            false => f64::NEG_INFINITY,
+        };
+        let least = if self.lo >= 1.0 {
+            0.0
         } else {
             f64::NEG_INFINITY
         };
-        Self::raw(lo, ln_up(self.hi), self.defined && self.lo > 0.0)
+        let most = if self.hi <= 1.0 { 0.0 } else { f64::INFINITY };
+        let hi = library_up(libm::log(self.hi));
+        Self::raw(lo.max(least), hi.min(most), self.defined && self.lo > 0.0)
     }
 
     /// The angles in [−π/2, π/2] whose sine is a member.
@@ -36,15 +46,11 @@ impl Interval {
 
     /// The angles in [0, π] whose cosine is a member.
     pub fn acos(self) -> Self {
-        let down = |x: f64| library_down(libm::acos(x)).max(0.0);
-        let up = |x: f64| {
-            if x == 1.0 {
-                0.0
-            } else {
-                library_up(libm::acos(x)).min(Self::PI.hi)
-            }
-        };
-        self.within_one().image(|x| (down(x.hi), up(x.lo)))
+        self.within_one().image(|x| {
+            let most = if x.lo == 1.0 { 0.0 } else { Self::PI.hi };
+            let (lo, hi) = (libm::acos(x.hi), libm::acos(x.lo));
+            (library_down(lo).max(0.0), library_up(hi).min(most))
+        })
     }
 
     /// The angles in [−π/2, π/2] whose tangent is a member.
@@ -59,18 +65,11 @@ impl Interval {
 
     /// The hyperbolic cosines.
     pub fn cosh(self) -> Self {
-        let up = |x: f64| {
-            if x == 0.0 {
-                1.0
-            } else {
-                library_up(libm::cosh(x))
-            }
-        };
         self.image(|x| {
-            (
-                library_down(libm::cosh(x.mignitude())).max(1.0),
-                up(x.magnitude()),
-            )
+            let (near, far) = (x.mignitude(), x.magnitude());
+            let most = if far == 0.0 { 1.0 } else { f64::INFINITY };
+            let (lo, hi) = (libm::cosh(near), libm::cosh(far));
+            (library_down(lo).max(1.0), library_up(hi).min(most))
         })
     }
 
@@ -94,22 +93,6 @@ impl Interval {
         };
         self.image(|x| (-up(-x.lo), up(x.hi)))
     }
-}
-
-fn exp_down(x: f64) -> f64 {
-    library_down(libm::exp(x)).max(if x >= 0.0 { 1.0 } else { 0.0 })
-}
-
-fn exp_up(x: f64) -> f64 {
-    library_up(libm::exp(x)).min(if x <= 0.0 { 1.0 } else { f64::INFINITY })
-}
-
-fn ln_down(x: f64) -> f64 {
-    library_down(libm::log(x)).max(if x >= 1.0 { 0.0 } else { f64::NEG_INFINITY })
-}
-
-fn ln_up(x: f64) -> f64 {
-    library_up(libm::log(x)).min(if x <= 1.0 { 0.0 } else { f64::INFINITY })
 }
 
 impl Interval {
@@ -184,14 +167,13 @@ impl Interval {
             return Self::EMPTY;
         }
         // x^y is monotone in x for every y and in y for every x: the extremes are at corners.
-        let corners = [
-            (self.lo, exponent.lo),
-            (self.lo, exponent.hi),
-            (self.hi, exponent.lo),
-            (self.hi, exponent.hi),
-        ];
-        let lo = smallest(corners.map(|(x, y)| pow_down(x, y)));
-        let hi = largest(corners.map(|(x, y)| pow_up(x, y)));
+        let (lo, hi) = self.corners(exponent, |x, y| {
+            let value = libm::pow(x, y);
+            match is_exact(x, y) {
+                true => (value, value),
+                false => (library_down(value).max(0.0), library_up(value)),
+            }
+        });
         let inside = self.lo > 0.0 || exponent.lo >= 0.0;
         Self::raw(lo, hi, self.defined && exponent.defined && inside)
     }
@@ -220,24 +202,6 @@ fn is_exact(x: f64, y: f64) -> bool {
     x == 0.0 || x == 1.0 || y == 0.0 || x.is_infinite() || y.is_infinite()
 }
 
-fn pow_down(x: f64, y: f64) -> f64 {
-    let value = libm::pow(x, y);
-    if is_exact(x, y) {
-        value
-    } else {
-        library_down(value).max(0.0)
-    }
-}
-
-fn pow_up(x: f64, y: f64) -> f64 {
-    let value = libm::pow(x, y);
-    if is_exact(x, y) {
-        value
-    } else {
-        library_up(value)
-    }
-}
-
 impl Interval {
     /// The sines.
     pub fn sin(self) -> Self {
@@ -262,11 +226,8 @@ impl Interval {
         if self.meets(Self::PI / Self::point(2.0), Self::PI) {
             return Self::ENTIRE.and_defined(false);
         }
-        Self::raw(
-            library_down(libm::tan(self.lo)),
-            library_up(libm::tan(self.hi)),
-            self.defined,
-        )
+        let (lo, hi) = (libm::tan(self.lo), libm::tan(self.hi));
+        Self::raw(library_down(lo), library_up(hi), self.defined)
     }
 
     /// The image under `f`, of period 2π, which rises to 1 at `peak` and falls to −1 at `trough`.
@@ -315,9 +276,7 @@ impl Interval {
         if has_origin {
             return y.angles_at_origin(x);
         }
-        let corners = [(y.lo, x.lo), (y.lo, x.hi), (y.hi, x.lo), (y.hi, x.hi)];
-        let lo = smallest(corners.map(|(y, x)| angle_down(y, x)));
-        let hi = largest(corners.map(|(y, x)| angle_up(y, x)));
+        let (lo, hi) = y.corners(x, |y, x| (-angle_up(-y, x), angle_up(y, x)));
         Self::raw(lo, hi, defined)
     }
 
@@ -342,10 +301,6 @@ impl Interval {
         };
         Self::raw(lo, hi, false)
     }
-}
-
-fn angle_down(y: f64, x: f64) -> f64 {
-    -angle_up(-y, x)
 }
 
 /// The angle is monotone along the edges of a box off the branch cut and the origin, so corners bound it.

@@ -83,20 +83,15 @@ impl Search<'_> {
             let (Some(slopes), Some(image)) = (slopes, image) else {
                 break;
             };
-            let inside = image.iter().zip(&sides).all(|(n, x)| n.is_subset(*x));
+            let pairs = || image.iter().zip(&sides);
+            let inside = pairs().all(|(n, x)| n.is_subset(*x));
             proved = proved || inside || self.changes_sign(&sides, &slopes);
-            let next: Sides = image
-                .iter()
-                .zip(&sides)
-                .map(|(n, x)| n.intersection(*x))
-                .collect();
+            let next: Sides = pairs().map(|(n, x)| n.intersection(*x)).collect();
             if next.iter().any(|side| side.is_empty()) {
                 return None;
             }
-            let gains = next
-                .iter()
-                .zip(&sides)
-                .any(|(n, x)| n.width() < 0.9 * x.width());
+            let mut pairs = next.iter().zip(&sides);
+            let gains = pairs.any(|(n, x)| n.width() < 0.9 * x.width());
             sides = next;
             if !gains {
                 break;
@@ -173,21 +168,15 @@ impl Search<'_> {
             for half in self.halves(&widest) {
                 match self.shrunk(half) {
                     None => {}
-                    Some(Shrunk {
-                        sides,
-                        proved: true,
-                    }) if single.is_none() => single = Some(sides),
-                    Some(Shrunk { sides, .. }) => open.push_back(sides),
+                    Some(part) if part.proved && single.is_none() => single = Some(part.sides),
+                    Some(part) => open.push_back(part.sides),
                 }
             }
             let all = || open.iter().chain(&single);
             all().next()?;
-            if let (Some(sides), true) = (&single, open.is_empty()) {
-                let sides = sides.clone();
-                return Some(self.shaved(Shrunk {
-                    sides,
-                    proved: true,
-                }));
+            if open.is_empty() {
+                let proved = true;
+                return single.map(|sides| self.shaved(Shrunk { sides, proved }));
             }
             if turn % OFTEN == 0 {
                 let tried = self.shrunk(self.widened(&hull(all())))?;
@@ -255,20 +244,22 @@ impl Search<'_> {
         if !(cut.is_finite() && cut > 4.0 * f64::EPSILON * side.magnitude()) {
             return None;
         }
-        let (rest, slice) = match upper {
-            true => (
-                Interval::new(side.lo(), side.hi() - cut),
-                Interval::new(side.hi() - cut, side.hi()),
-            ),
-            false => (
-                Interval::new(side.lo() + cut, side.hi()),
-                Interval::new(side.lo(), side.lo() + cut),
-            ),
+        let at = if upper {
+            side.hi() - cut
+        } else {
+            side.lo() + cut
+        };
+        let below = Interval::new(side.lo(), at).ok()?;
+        let above = Interval::new(at, side.hi()).ok()?;
+        let (rest, slice) = if upper {
+            (below, above)
+        } else {
+            (above, below)
         };
         let mut there = sides.to_vec();
-        there[i] = slice.ok()?;
+        there[i] = slice;
         let g = self.function.residual(&Intervals, &self.at(&there));
-        let rest = rest.ok()?.and_defined(side.is_defined());
+        let rest = rest.and_defined(side.is_defined());
         g.iter().any(|g| !g.contains_zero()).then_some(rest)
     }
 }

@@ -263,31 +263,20 @@ fn excess<V: Vector>(z: V) -> V {
     z * above / below
 }
 
-/// Where |x| ≥ ½ the angle is found from s = √((1 − |x|)/2), else from x itself.
-struct Chord<V> {
-    is_far: V,
-    /// s or |x|
-    s: V,
-    /// arcsin s − s
-    curve: V,
-}
-
+/// [is_far, s, arcsin s − s]: where |x| ≥ ½ the angle is found from s = √((1 − |x|)/2), else from
+/// |x| itself.
 #[inline(always)]
-fn chord<V: Vector>(a: V) -> Chord<V> {
+fn chord<V: Vector>(a: V) -> [V; 3] {
     let is_far = V::splat(0.5).at_most(a);
     let z = V::choose(is_far, (V::splat(1.0) - a) * V::splat(0.5), a * a);
     let s = V::choose(is_far, z.sqrt(), a);
-    Chord {
-        is_far,
-        s,
-        curve: s * excess(z),
-    }
+    [is_far, s, s * excess(z)]
 }
 
 /// The inverse sine.
 #[inline(always)]
 pub fn asin<V: Vector>(x: V) -> V {
-    let Chord { is_far, s, curve } = chord(x.abs());
+    let [is_far, s, curve] = chord(x.abs());
     let two = V::splat(2.0);
     let far = (V::splat(FRAC_PI_2) - two * s) - (two * curve - V::splat(2.0 * QUARTER_LOW));
     V::choose(is_far, far, s + curve).or(x.signs())
@@ -296,7 +285,7 @@ pub fn asin<V: Vector>(x: V) -> V {
 /// The inverse cosine.
 #[inline(always)]
 pub fn acos<V: Vector>(x: V) -> V {
-    let Chord { is_far, s, curve } = chord(x.abs());
+    let [is_far, s, curve] = chord(x.abs());
     let two = V::splat(2.0);
     let low = V::splat(2.0 * QUARTER_LOW);
     let (signed, bent) = (s.xor(x.signs()), curve.xor(x.signs()));

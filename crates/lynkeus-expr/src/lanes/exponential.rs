@@ -15,13 +15,6 @@ const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
 /// Beyond, 2ᵏ may be no normal number.
 const LARGE: f64 = 708.0;
 
-/// eˣ = p·2ᵏ with p from √½ to √2.
-struct Parts<V> {
-    pub p: V,
-    /// k + [`MAGIC`]
-    pub shifted: V,
-}
-
 /// x − k ln 2, and k + [`MAGIC`], for |x| below 10⁶.
 #[inline(always)]
 fn reduced<V: Vector>(x: V) -> [V; 2] {
@@ -31,9 +24,9 @@ fn reduced<V: Vector>(x: V) -> [V; 2] {
     [r, shifted]
 }
 
-/// eʳ·2ᵏ, from r of at most ½ ln 2 and k + [`MAGIC`].
+/// eʳ for r of at most ½ ln 2: from √½ to √2.
 #[inline(always)]
-fn parts<V: Vector>([r, shifted]: [V; 2]) -> Parts<V> {
+fn mantissa<V: Vector>(r: V) -> V {
     // (eʳ − 1 − r)/r² for |r| ≤ ½ ln 2, from Chebyshev's nodes
     let rest = polynomial(
         r,
@@ -52,10 +45,7 @@ fn parts<V: Vector>([r, shifted]: [V; 2]) -> Parts<V> {
             2.510_037_611_136_142e-8,
         ],
     );
-    Parts {
-        p: V::splat(1.0) + rest.mul_add(r * r, r),
-        shifted,
-    }
+    V::splat(1.0) + rest.mul_add(r * r, r)
 }
 
 /// 2ᵏ·unit, from k + [`MAGIC`].
@@ -64,19 +54,17 @@ fn power<V: Vector>(shifted: V, unit: f64) -> V {
     shifted.up::<52>().plus_bits(V::splat(unit))
 }
 
-impl<V: Vector> Parts<V> {
-    /// p·2ᵏ·unit where that is normal.
-    #[inline(always)]
-    pub fn value(self, unit: f64) -> V {
-        self.p * power(self.shifted, unit)
-    }
+/// eʳ·2ᵏ·unit where that is normal, from r and k + [`MAGIC`].
+#[inline(always)]
+fn joined<V: Vector>([r, shifted]: [V; 2], unit: f64) -> V {
+    mantissa(r) * power(shifted, unit)
 }
 
 /// eˣ·unit for a unit of 1 or ½.
 #[inline(always)]
 fn scaled<V: Vector>(x: V, unit: f64) -> V {
     if x.abs().below(V::splat(LARGE)).all() {
-        return parts(reduced(x)).value(unit);
+        return joined(reduced(x), unit);
     }
     extreme(x, unit)
 }
@@ -86,11 +74,11 @@ fn scaled<V: Vector>(x: V, unit: f64) -> V {
 fn extreme<V: Vector>(x: V, unit: f64) -> V {
     let x = V::splat(760.0).smaller(x);
     let x = V::choose(x.below(V::splat(-760.0)), V::splat(-760.0), x);
-    let Parts { p, shifted } = parts(reduced(x));
+    let [r, shifted] = reduced(x);
     let k = shifted - V::splat(MAGIC);
     let half = k.mul_add(V::splat(0.5), V::splat(MAGIC));
     let rest = (k - (half - V::splat(MAGIC))) + V::splat(MAGIC);
-    p * power(half, 1.0) * power(rest, unit)
+    mantissa(r) * power(half, 1.0) * power(rest, unit)
 }
 
 /// eˣ.
@@ -165,7 +153,7 @@ pub fn tanh<V: Vector>(x: V) -> V {
         ],
     );
     let small = rest.mul_add(a * z, a);
-    let square = parts(reduced(a + a)).value(1.0);
+    let square = joined(reduced(a + a), 1.0);
     let large = V::splat(1.0) - V::splat(2.0) / (square + V::splat(1.0));
     V::choose(a.below(V::splat(0.55)), small, large).or(x.signs())
 }
@@ -173,33 +161,24 @@ pub fn tanh<V: Vector>(x: V) -> V {
 const TWO_52: f64 = 4_503_599_627_370_496.0;
 const BIAS: u64 = 1024;
 
-/// x = 2ᵏ·m with m from √½ to √2.
-struct Split<V> {
-    k: V,
-    m: V,
-    /// where x is positive and normal: the parts mean something
-    inside: V,
-}
-
+/// [k, m, inside] of x = 2ᵏ·m with m from √½ to √2; `inside` where x is positive and normal: the parts
+/// mean something there.
 #[inline(always)]
-fn split<V: Vector>(x: V) -> Split<V> {
+fn split<V: Vector>(x: V) -> [V; 3] {
     let root = FRAC_1_SQRT_2.to_bits();
     let bits = |bits: u64| V::splat(f64::from_bits(bits));
     let above = x.plus_bits(bits((BIAS << 52).wrapping_sub(root)));
     let k = above.down::<52>().or(V::splat(TWO_52)) - V::splat(TWO_52 + BIAS as f64);
     let fraction = above.and(bits((1 << 52) - 1));
     let is_normal = V::splat(f64::MIN_POSITIVE).at_most(x);
-    Split {
-        k,
-        m: fraction.plus_bits(bits(root)),
-        inside: is_normal.and(x.at_most(V::splat(f64::MAX))),
-    }
+    let inside = is_normal.and(x.at_most(V::splat(f64::MAX)));
+    [k, fraction.plus_bits(bits(root)), inside]
 }
 
 /// The natural logarithm, after fdlibm; of subnormal numbers the library's.
 #[inline(always)]
 pub fn ln<V: Vector>(x: V) -> V {
-    let Split { k, m, inside } = split(x);
+    let [k, m, inside] = split(x);
     let f = m - V::splat(1.0);
     let s = f / (V::splat(2.0) + f);
     let z = s * s;
@@ -316,12 +295,12 @@ fn precise<V: Vector>(k: V, m: V) -> Double<V> {
 /// library's.
 #[inline(always)]
 pub fn pow<V: Vector>(x: V, y: V) -> V {
-    let Split { k, m, inside } = split(x);
+    let [k, m, inside] = split(x);
     let ln = precise(k, m);
     let exponent = product(y, ln.high);
     let [r, shifted] = reduced(exponent.high);
     let r = r + y.mul_add(ln.low, exponent.low);
-    let power = parts([r, shifted]).value(1.0);
+    let power = joined([r, shifted], 1.0);
     let is_normal = exponent.high.abs().below(V::splat(708.0));
     let inside = inside.and(is_normal);
     if inside.all() {

@@ -103,27 +103,27 @@ impl<const N: usize> Algebra for Lanes<N> {
     }
 
     fn solve(&self, a: &[[f64; N]], b: &[[f64; N]]) -> (Vec<[f64; N]>, [f64; N]) {
-        let mut x = vec![[0.0; N]; b.len()];
-        let mut rcond = [0.0; N];
-        for lane in 0..N {
-            let of = |values: &[[f64; N]]| values.iter().map(|v| v[lane]).collect::<Vec<_>>();
-            let (solution, condition) = Reals.solve(&of(a), &of(b));
-            for (to, from) in x.iter_mut().zip(solution) {
-                to[lane] = from;
-            }
-            rcond[lane] = condition;
-        }
+        let mut x = by_lane(&[a, b].concat(), |lane: &[f64]| {
+            let (a, b) = lane.split_at(a.len());
+            let (mut x, rcond) = Reals.solve(a, b);
+            x.push(rcond);
+            x
+        });
+        let rcond = x.pop().unwrap_or([1.0; N]);
         (x, rcond)
     }
 
     fn implicit(&self, function: &Implicit, p: &[[f64; N]]) -> Vec<[f64; N]> {
-        let mut z = vec![[0.0; N]; function.size()];
-        for lane in 0..N {
-            let own: Vec<f64> = p.iter().map(|p| p[lane]).collect();
-            for (to, from) in z.iter_mut().zip(Reals.implicit(function, &own)) {
-                to[lane] = from;
-            }
-        }
-        z
+        by_lane(p, |lane| Reals.implicit(function, lane))
     }
+}
+
+/// What a function of several numbers gives, lane by lane.
+fn by_lane<const N: usize>(values: &[[f64; N]], f: impl Fn(&[f64]) -> Vec<f64>) -> Vec<[f64; N]> {
+    let lanes: [Vec<f64>; N] = from_fn(|lane| {
+        let own: Vec<f64> = values.iter().map(|value| value[lane]).collect();
+        f(&own)
+    });
+    let count = lanes.iter().map(Vec::len).min().unwrap_or(0);
+    (0..count).map(|k| from_fn(|lane| lanes[lane][k])).collect()
 }

@@ -146,9 +146,7 @@ impl ErrorModel {
 
     /// The rows e_{s_k}ᵀ: which state each uncertain term reads.
     fn reads(&self) -> DMatrix<f64> {
-        DMatrix::from_fn(self.sectors.len(), self.size(), |k, i| {
-            f64::from(u8::from(self.sectors[k].column == i))
-        })
+        unit_rows(self.sectors.iter().map(|s| s.column), self.size())
     }
 
     /// Whether every number is finite.
@@ -190,6 +188,15 @@ impl ErrorModel {
         let sectors = vec![];
         Self { constant, sectors }
     }
+}
+
+/// The rows e_sᵀ of n entries, for the places s.
+fn unit_rows(places: impl ExactSizeIterator<Item = usize>, n: usize) -> DMatrix<f64> {
+    let mut rows = DMatrix::zeros(places.len(), n);
+    for (k, place) in places.enumerate() {
+        rows[(k, place)] = 1.0;
+    }
+    rows
 }
 
 /// The same error systems by their vertices where these are at most `limit`: an

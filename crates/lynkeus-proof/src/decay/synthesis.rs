@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::analysis::{Extent, inequality, is_large, prove};
 use super::frame::Frame;
-use super::{ErrorModel, Proof};
+use super::{ErrorModel, Proof, unit_rows};
 use crate::lmi::{Affine, Failure, Problem};
 use crate::lyapunov::symmetric;
 use crate::spectrum;
@@ -92,10 +92,7 @@ pub enum NoGain {
 /// # Errors
 /// [`NoGain`].
 pub fn design(models: &[ErrorModel], request: &Request) -> Result<Gain, NoGain> {
-    if models.is_empty() || !models.iter().all(ErrorModel::is_bounded) {
-        return Err(NoGain::Unproved);
-    }
-    let scaled = Scaled::new(models, request);
+    let scaled = Scaled::new(models, request).ok_or(NoGain::Unproved)?;
     let mut K = scaled.direct().map_err(|failure| match failure {
         Failure::Spent(spent) => NoGain::Spent(spent),
         _ => NoGain::Unproved,
@@ -124,10 +121,9 @@ pub fn design(models: &[ErrorModel], request: &Request) -> Result<Gain, NoGain> 
 /// itself. A `quick` look at a large system tries Lyapunov matrices without entries between
 /// states that are far from each other, and no others.
 pub fn is_reachable(models: &[ErrorModel], request: &Request, quick: bool) -> bool {
-    if models.is_empty() || !models.iter().all(ErrorModel::is_bounded) {
+    let Some(scaled) = Scaled::new(models, request) else {
         return false;
-    }
-    let scaled = Scaled::new(models, request);
+    };
     let exists = |extent| {
         let all = scaled.inequalities(extent).bounded(WIDEST);
         all.has_inside().is_ok()
@@ -146,14 +142,16 @@ struct Scaled<'a> {
 }
 
 impl<'a> Scaled<'a> {
-    fn new(models: &[ErrorModel], request: &'a Request) -> Self {
-        let frame = Frame::plain(models, &request.scale);
-        Self {
+    /// None of models of which no gain can be sought: without any, or without bounds.
+    fn new(models: &[ErrorModel], request: &'a Request) -> Option<Self> {
+        let is_sound = !models.is_empty() && models.iter().all(ErrorModel::is_bounded);
+        let frame = is_sound.then(|| Frame::plain(models, &request.scale))?;
+        Some(Self {
             models: models.iter().map(|m| frame.scaled(m)).collect(),
             rate: request.rate * frame.unit * (1.0 + RESERVE),
             request,
             frame,
-        }
+        })
     }
 
     fn size(&self) -> usize {
@@ -162,11 +160,7 @@ impl<'a> Scaled<'a> {
 
     /// C, one row per output.
     fn selector(&self) -> DMatrix<f64> {
-        let mut C = DMatrix::zeros(self.request.measured.len(), self.size());
-        for (j, &state) in self.request.measured.iter().enumerate() {
-            C[(j, state)] = 1.0;
-        }
-        C
+        unit_rows(self.request.measured.iter().copied(), self.size())
     }
 
     /// One factor per entry of K: from scaled to the user's units.
@@ -214,7 +208,11 @@ impl<'a> Scaled<'a> {
             {
                 return Ok(all.like(&near, &found));
             }
-            all.may_have_inside()?;
+            // what the arithmetic did not decide may be decided with other bounds
+            match all.bounded(WIDEST).has_inside() {
+                Ok(()) | Err(Failure::Numerical) => {}
+                Err(decided) => return Err(decided),
+            }
         }
         all.normalised()
     }
@@ -249,23 +247,16 @@ impl<'a> Scaled<'a> {
     /// Squares of the outputs' errors in scaled units, the largest as one.
     fn weights(&self) -> DMatrix<f64> {
         let states = &self.frame.sizes;
-        let Request {
-            measured, slopes, ..
-        } = self.request;
-        let relative = |(j, noise): (usize, &f64)| noise / (slopes[j] * states[measured[j]]);
-        let sizes: Vec<f64> = self
-            .request
-            .noise
-            .iter()
-            .enumerate()
-            .map(relative)
-            .collect();
-        let largest = sizes.iter().fold(0.0, |a: f64, b| a.max(*b));
-        let weight = |j: usize| match largest > 0.0 {
-            true => (sizes[j] / largest).powi(2).max(1e-4),
+        let request = self.request;
+        let relative =
+            |j: usize, noise: f64| noise / (request.slopes[j] * states[request.measured[j]]);
+        let sizes = DVector::from_column_slice(&request.noise);
+        let sizes = sizes.map_with_location(|j, _, noise| relative(j, noise));
+        let largest = sizes.iter().copied().fold(0.0, f64::max);
+        DMatrix::from_diagonal(&sizes.map(|size| match largest > 0.0 {
+            true => (size / largest).powi(2).max(1e-4),
             false => 1.0,
-        };
-        DMatrix::from_diagonal(&DVector::from_fn(sizes.len(), |j, _| weight(j)))
+        }))
     }
 
     /// Smaller largest entries: P for K, then K for that P, while it helps.
@@ -346,15 +337,6 @@ impl Inequalities {
         let (rows, columns) = (wide(self.Y.rows()), wide(self.Y.columns()));
         bounded.positive(Affine::symmetric_blocks(&rows, &self.Y, &columns));
         bounded
-    }
-
-    /// Fails where it is decided that no point is inside, or a limit ended the search; what the
-    /// arithmetic did not decide may be decided with other bounds.
-    pub fn may_have_inside(&self) -> Result<(), Failure> {
-        match self.bounded(WIDEST).has_inside() {
-            Err(Failure::Numerical) => Ok(()),
-            told => told,
-        }
     }
 
     /// A point inside, from the same problem with P and Y bounded above, scaled so that

@@ -238,17 +238,19 @@ impl Divided {
     ) -> Result<Self, MissingInput> {
         let common = [&inputs[..own.start], &inputs[own.end..]].concat();
         let divided = g.hoisted(outputs, &common);
-        let parts = divided.parts.iter();
-        let (read, values): (Vec<Node>, Vec<Node>) = parts.map(|p| (p.symbol, p.value)).unzip();
-        let shared = values.len();
+        let shared = divided.values.len();
         let rounds = |node: &Node| match g.op(*node) {
             Op::Unary(op, _) => lanes::unary::<Portable<1>>(op).is_some(),
             Op::Binary(op, ..) => lanes::binary::<Portable<1>>(op).is_some(),
             _ => false,
         };
-        let common = Tape::new(g, &common, &values)?;
+        let common = Tape::new(g, &common, &divided.values)?;
         let own_inputs = own.len();
-        let own = Tape::new(g, &[&read, &inputs[own]].concat(), &divided.roots)?;
+        let own = Tape::new(
+            g,
+            &[&divided.symbols, &inputs[own]].concat(),
+            &divided.roots,
+        )?;
         let sweeping = |own: &Tape| Function::sweeping(own, shared, spacing);
         Ok(Self {
             common: Engine::new(&common, Function::compile),

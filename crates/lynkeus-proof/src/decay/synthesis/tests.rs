@@ -41,7 +41,7 @@ fn a_near_point_is_one_of_the_full_problem() {
         limit: None,
         budget: Budget::default(),
     };
-    let scaled = Scaled::new(&models, &request);
+    let scaled = Scaled::new(&models, &request).unwrap();
     let near = scaled.inequalities(Extent::Near);
     let full = scaled.inequalities(Extent::Full);
     let found = near.normalised().unwrap();
@@ -72,7 +72,7 @@ fn what_is_out_of_reach_is_seen_without_a_point() {
         budget: Budget::default(),
     };
     assert!(!is_reachable(std::slice::from_ref(&model), &request, false));
-    let scaled = Scaled::new(std::slice::from_ref(&model), &request);
+    let scaled = Scaled::new(std::slice::from_ref(&model), &request).unwrap();
     let full = scaled.inequalities(Extent::Full).bounded(WIDEST);
     assert_eq!(full.has_inside(), Err(Failure::Infeasible));
     model.constant[11][11] = Interval::point(-1.0);
