@@ -74,7 +74,7 @@ impl ErrorSystem {
         region: &Region,
     ) -> Result<Self, MissingInput> {
         let (symbols, derivatives) = (augmented.symbols(), &augmented.derivatives);
-        let slopes = Slopes::new(augmented.graph(), derivatives, &symbols, region)?;
+        let slopes = Slopes::new(augmented.graph(), derivatives, &symbols, &[], region)?;
         Self::of(augmented, derivatives, &symbols, region.clone(), slopes)
     }
 
@@ -171,7 +171,7 @@ fn around_innovations(
     let graph = augmented.graph();
     let derivatives = graph.substitute(&observer.derivatives, &found.images);
     let innovations = &found.innovations;
-    Slopes::around(graph, &derivatives, symbols, innovations, &found.region)
+    Slopes::new(graph, &derivatives, symbols, innovations, &found.region)
 }
 
 /// What the system is where the estimate is right: what is measured is then h at the
