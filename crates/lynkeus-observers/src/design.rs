@@ -269,3 +269,27 @@ pub struct Found<F> {
 
 /// A form, or the examination that says why there is none.
 pub type Searched<F> = Result<Result<Found<F>, Examination>, DesignError>;
+
+/// Of the candidates the first whose conditions are proved, else the first that no condition refutes, else
+/// the first; there is one.
+pub fn first_fit<C, F>(
+    candidates: impl IntoIterator<Item = C>,
+    examined: impl Fn(C) -> Result<Found<F>, DesignError>,
+) -> Searched<F> {
+    let mut best: Option<Found<F>> = None;
+    for candidate in candidates {
+        let found = examined(candidate)?;
+        let fit = found.examination.fit();
+        if best
+            .as_ref()
+            .is_none_or(|best| fit < best.examination.fit())
+        {
+            best = Some(found);
+        }
+        if fit == Standing::Proved {
+            break;
+        }
+    }
+    let none = || TuningError::new("chains", "a chain", "none");
+    best.map(Ok).ok_or_else(|| none().into())
+}

@@ -22,8 +22,7 @@ use lynkeus_structure::{AugmentedPlant, Measurement, Region};
 use crate::conditions::Partial;
 use crate::tuning::is_or_has;
 use crate::{
-    Estimate, Initial, KeySpec, Observer, Reason, Shape, Signal, Tunable, Tunables, Tuning,
-    TuningError,
+    Estimate, Initial, KeySpec, Observer, Reason, Shape, Signal, Tunable, Tuning, TuningError,
 };
 
 /// The keys of every observer, read.
@@ -179,7 +178,8 @@ impl PlantCopy<'_, '_> {
             estimates: self.estimates(),
             monitors: vec![],
             filter: None,
-            tunables: Tunables::default(),
+            tunables: vec![],
+            is_whole: false,
         })
     }
 }
@@ -280,10 +280,8 @@ pub(crate) fn note(common: &Common, augmented: &AugmentedPlant<'_>, region: &Reg
 pub(crate) struct Speed {
     /// the study's value
     value: f64,
-    /// its symbol, where it may be changed
-    symbol: Option<Node>,
-    name: String,
-    meaning: String,
+    /// where it may be changed
+    tunable: Option<Tunable>,
 }
 
 impl Speed {
@@ -294,15 +292,15 @@ impl Speed {
         meaning: String,
     ) -> Self {
         let name = name.into();
-        let graph = copy.augmented.graph();
+        let tunable = |name: String| Tunable {
+            symbol: copy.augmented.graph().fresh(name.as_str()).node(),
+            name,
+            value,
+            meaning,
+        };
         Self {
             value,
-            symbol: copy
-                .common
-                .tunable
-                .then(|| graph.fresh(name.as_str()).node()),
-            name,
-            meaning,
+            tunable: copy.common.tunable.then(|| tunable(name)),
         }
     }
 
@@ -329,8 +327,8 @@ impl Speed {
 
     /// The speed.
     pub fn expr<'g>(&self, graph: &'g Graph) -> Expr<'g> {
-        match self.symbol {
-            Some(symbol) => graph.expr(symbol),
+        match &self.tunable {
+            Some(tunable) => graph.expr(tunable.symbol),
             None => graph.constant(self.value),
         }
     }
@@ -338,9 +336,9 @@ impl Speed {
     /// A gain that is `gain` at the study's value and grows like a power of the speed.
     pub fn scaled<'g>(&self, graph: &'g Graph, gain: f64, exponent: f64) -> Expr<'g> {
         let gain = graph.constant(gain);
-        match self.symbol {
-            Some(symbol) => {
-                let ratio = graph.expr(symbol) / graph.constant(self.value);
+        match self.tunable {
+            Some(_) => {
+                let ratio = self.expr(graph) / graph.constant(self.value);
                 gain * ratio.pow(graph.constant(exponent))
             }
             None => gain,
@@ -351,15 +349,8 @@ impl Speed {
 impl Observer {
     /// The same, of which these may be changed where the tuning asks for that.
     pub(crate) fn tuned_by<'s>(mut self, speeds: impl IntoIterator<Item = &'s Speed>) -> Self {
-        let numbers = speeds.into_iter().filter_map(|speed| {
-            Some(Tunable {
-                name: speed.name.clone(),
-                symbol: speed.symbol?,
-                value: speed.value,
-                meaning: speed.meaning.clone(),
-            })
-        });
-        self.tunables.numbers.extend(numbers);
+        let numbers = speeds.into_iter().filter_map(|speed| speed.tunable.clone());
+        self.tunables.extend(numbers);
         self
     }
 }

@@ -187,6 +187,10 @@ pub trait Family: Sync {
     fn is_filter(&self) -> bool {
         false
     }
+    /// Whether what it estimates over a log can be smoothed.
+    fn smooths(&self) -> bool {
+        false
+    }
     /// Whether every key has a value that can be used; a required one may be absent.
     ///
     /// # Errors

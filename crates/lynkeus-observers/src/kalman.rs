@@ -176,6 +176,10 @@ impl Family for Filter {
         true
     }
 
+    fn smooths(&self) -> bool {
+        self.name == EKF.name
+    }
+
     fn verify(&self, augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<(), TuningError> {
         self.read(augmented, tuning).map(drop)
     }

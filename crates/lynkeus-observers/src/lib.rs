@@ -35,13 +35,13 @@ pub use block_triangular::Lee;
 pub use certificate::{Assumptions, Bounds, Certificate, Constant, UltimateBound};
 pub use design::{ChainGain, Design, DesignError, Examination, ParameterValue, Shown, fit_word};
 pub use family::Family;
-pub use generator::{Generator, GeneratorError, Prefilter};
+pub use generator::{Generator, GeneratorError};
 pub use guarantee::{Claim, Correction, Inequality, Injection, certify, is_certified_gain};
 pub use lynkeus_gain::integrators::Pole;
 pub use observer::{
-    Estimate, FilterTuning, InputDerivative, Monitor, Observer, Sampled, Signal, Tunable, Tunables,
+    Estimate, FilterTuning, InputDerivative, Monitor, Observer, Sampled, Signal, Tunable,
 };
-pub use statement::{Check, Reason, Statement, Weight};
+pub use statement::{Check, Reason, Statement};
 pub use triangular::Hammouri;
 pub use tuning::{Initial, KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 

@@ -235,27 +235,18 @@ pub struct Check {
     pub verdict: Verdict,
     /// what decides it
     pub reason: Reason,
-    /// what it weighs
-    pub weight: Weight,
-}
-
-/// What a condition weighs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Weight {
-    /// where it is refuted the whole is
-    Required,
-    /// it can leave the whole undecided and refuses nothing, as where the observer itself
-    /// watches it
-    Advisory,
+    /// it can leave the whole undecided and refutes nothing, as where the observer itself watches it
+    pub is_advisory: bool,
 }
 
 impl Check {
     /// What it makes of the whole.
     pub fn standing(&self) -> Standing {
-        match self.weight {
-            Weight::Required => self.verdict.standing(),
-            Weight::Advisory => self.verdict.standing().min(Standing::Undecided),
-        }
+        let most = match self.is_advisory {
+            true => Standing::Undecided,
+            false => Standing::Refuted,
+        };
+        self.verdict.standing().min(most)
     }
 
     /// Whether the statement is proved.
@@ -263,10 +254,12 @@ impl Check {
         self.verdict == Verdict::Proved
     }
 
-    /// The same as [`Weight::Advisory`].
+    /// The same as advice.
     pub(crate) fn advisory(self) -> Self {
-        let weight = Weight::Advisory;
-        Self { weight, ..self }
+        Self {
+            is_advisory: true,
+            ..self
+        }
     }
 }
 
@@ -287,7 +280,7 @@ impl Statement {
             statement: self,
             verdict,
             reason: reason.into(),
-            weight: Weight::Required,
+            is_advisory: false,
         }
     }
 }

@@ -23,16 +23,6 @@ pub struct Layers<'p> {
     pub factors: Matrix<'p>,
 }
 
-impl Layers<'_> {
-    /// Names of the states of each layer.
-    pub fn names(&self, augmented: &AugmentedPlant<'_>) -> Vec<Vec<String>> {
-        let layers = self.layers.iter();
-        layers
-            .map(|l| names(augmented, l.iter().copied()))
-            .collect()
-    }
-}
-
 /// The layers of a plant with unknown inputs.
 ///
 /// # Errors

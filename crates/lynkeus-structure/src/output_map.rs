@@ -143,8 +143,8 @@ fn along(
     flow::derivatives(augmented.graph(), &flow, &outputs, order)
 }
 
-/// L_g of a function with the gradient `row`.
-fn along_column(graph: &Graph, row: &[Option<Node>], column: &[Option<Node>]) -> Option<Node> {
+/// L_g of a function with the gradient `row`; none where it is zero by its pattern.
+pub fn along_column(graph: &Graph, row: &[Option<Node>], column: &[Option<Node>]) -> Option<Node> {
     let pairs = row.iter().zip(column);
     let terms = pairs.filter_map(|(&q, &g)| Some(graph.expr(q?) * graph.expr(g?)));
     terms.reduce(|a, b| a + b).map(Expr::node)

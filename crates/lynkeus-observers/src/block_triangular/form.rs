@@ -10,12 +10,12 @@ use lynkeus_proof::chain::Chain;
 use lynkeus_proof::hurwitz::Stability;
 use lynkeus_proof::lyapunov;
 use lynkeus_proof::matrix::points;
-use lynkeus_structure::{AugmentedPlant, Blocks, Region, Standing, blocks};
+use lynkeus_structure::{AugmentedPlant, Blocks, Region, blocks};
 
 use super::said::{Correction, Lee, Said};
 use super::settings::Settings;
 use crate::conditions::{GainedChain, Partial, lipschitz, names, output_slope, partials};
-use crate::design::{Found, Searched};
+use crate::design::{Found, Searched, first_fit};
 use crate::statement::{proved, refuted, undecided};
 use crate::{Check, DesignError, Examination, Reason, TuningError};
 
@@ -46,25 +46,10 @@ pub(super) fn form(
         Ok(arrangements) => arrangements,
         Err(summary) => return refusal(Reason::from(summary)),
     };
-    let mut best: Option<Found<Form>> = None;
-    for choice in distinct(augmented, settings, &arrangements)?
-        .into_iter()
-        .take(EXAMINED)
-    {
-        let form = examined(augmented, settings, region, choice)?;
-        let better = |best: &Found<Form>| form.examination.fit() < best.examination.fit();
-        if best.as_ref().is_none_or(better) {
-            best = Some(form);
-        }
-        if best
-            .as_ref()
-            .is_some_and(|b| b.examination.fit() == Standing::Proved)
-        {
-            break;
-        }
-    }
-    best.map(Ok)
-        .ok_or_else(|| TuningError::new("chains", "a chain", "none").into())
+    let choices = distinct(augmented, settings, &arrangements)?;
+    first_fit(choices.into_iter().take(EXAMINED), |choice| {
+        examined(augmented, settings, region, choice)
+    })
 }
 
 /// One arrangement of those with the same chains.
@@ -122,15 +107,16 @@ fn examined(
         .iter()
         .flatten()
         .map(|partial| graph.constant_value(partial.node));
-    let chains = blocks.names(augmented);
+    let ordered = blocks.order.iter();
     let summary = Said::Form {
-        chains: chains.clone(),
+        chains: ordered.map(|(_, c)| names(augmented, c)).collect(),
         correction: settings.correction,
         ones: numbers.clone().all(|a| a == Some(1.0)),
         // which are 1 in other units
         numbers: numbers.clone().all(|a| a.is_some()),
         orders,
     };
+    let chains = blocks.names(augmented);
     let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
     let form = Form {
         blocks,

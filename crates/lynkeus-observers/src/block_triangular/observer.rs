@@ -71,9 +71,9 @@ pub(super) fn observer(
             Some(constant) => gains.push(constant),
             None => {
                 if correction == Correction::Lee {
-                    let found = transformation(augmented, chain);
-                    let L: Vec<_> = found.L.into_iter().map(|l| vec![l]).collect();
-                    parameters.push((format!("M{}", output + 1), start.table(&found.M)));
+                    let found = Steps::new(augmented, chain);
+                    let L: Vec<_> = found.L.iter().map(|&l| vec![l]).collect();
+                    parameters.push((format!("M{}", output + 1), start.table(&found.M(graph))));
                     parameters.push((format!("L{}", output + 1), start.table(&L)));
                 }
                 let constants: Vec<f64> = steady.iter().map(|gain| gain.0).collect();
@@ -113,42 +113,34 @@ pub(super) fn low_power(
     let (blocks, graph) = (&form.blocks, augmented.graph());
     let copy = PlantCopy::new(augmented, &settings.common);
     let θ = settings.θ()?;
-    let part = |place: usize| {
-        let (output, chain) = &blocks.order[place];
-        let f: Vec<Node> = chain.iter().map(|&i| augmented.derivatives[i]).collect();
-        Part {
-            output: *output,
-            states: chain,
-            f: graph.substitute(&f, &injected(&copy, blocks, place)),
-            partials: &form.partials[place],
-            δ: 1.0,
-        }
+    let part = |place: usize| Part {
+        output: blocks.order[place].0,
+        states: &blocks.order[place].1,
+        partials: &form.partials[place],
+        δ: 1.0,
     };
     let parts: Vec<Part<'_>> = (0..blocks.order.len()).map(part).collect();
+    let derivative = |&state: &usize| augmented.derivatives[state];
+    let f = |place: usize| {
+        let f: Vec<Node> = parts[place].states.iter().map(derivative).collect();
+        graph.substitute(&f, &injected(&copy, blocks, place))
+    };
     let advice = Some("declare min and max in the model");
-    let lengths = blocks.lengths();
-    let mut design = peaking::low_power(
-        &copy,
-        &settings.remedies,
-        &θ,
-        &lengths,
-        &parts,
-        advice,
-        examination,
-    )?;
+    let remedies = &settings.remedies;
+    let mut design = peaking::low_power(&copy, remedies, &θ, &parts, f, advice, examination)?;
     design.notes.extend(chain_rule(blocks, &θ));
     Ok(design)
 }
 
-/// M̄, L and W of the five steps.
-struct Steps {
+/// M̄, L and W of the five steps: they make the similarity transformation M = W⁻¹M̄ of the error.
+pub(super) struct Steps {
     M̄: Vec<Vec<Sparse>>,
-    L: Vec<Sparse>,
+    pub L: Vec<Sparse>,
     W: Vec<Vec<Sparse>>,
 }
 
 impl Steps {
-    fn new(augmented: &AugmentedPlant<'_>, chain: &Chain) -> Self {
+    pub fn new(augmented: &AugmentedPlant<'_>, chain: &Chain) -> Self {
         let graph = augmented.graph();
         let n = chain.len();
         let F = own_jacobian(augmented, chain);
@@ -177,11 +169,30 @@ impl Steps {
         }
         Self { M̄, L, W }
     }
+
+    /// M, row by row; the observer does without.
+    pub fn M(&self, graph: &Graph) -> Vec<Vec<Sparse>> {
+        solved(graph, &self.W, &self.M̄)
+    }
+
+    /// M⁻¹ = M̄⁻¹W.
+    pub fn inverse(&self, graph: &Graph) -> Vec<Vec<Sparse>> {
+        solved(graph, &self.M̄, &self.W)
+    }
+}
+
+/// A⁻¹B for a lower triangular A.
+fn solved(graph: &Graph, A: &[Vec<Sparse>], B: &[Vec<Sparse>]) -> Vec<Vec<Sparse>> {
+    let n = A.len();
+    let column = |j: usize| solve_lower(graph, A, B.iter().map(|row| row[j]).collect());
+    let columns: Vec<Vec<Sparse>> = (0..n).map(column).collect();
+    let row = |i: usize| columns.iter().map(|c| c[i]).collect();
+    (0..n).map(row).collect()
 }
 
 /// M⁻¹(L + Δ⁻¹K) by the five steps. Since M = W⁻¹M̄, it is M̄⁻¹W(L + Δ⁻¹K): one
 /// triangular solve.
-pub(super) fn lee(augmented: &AugmentedPlant<'_>, chain: &Chain, gains: &[Node]) -> Vec<Node> {
+fn lee(augmented: &AugmentedPlant<'_>, chain: &Chain, gains: &[Node]) -> Vec<Node> {
     let graph = augmented.graph();
     let Steps { M̄, L, W } = Steps::new(augmented, chain);
     // Step 5, multiplied out
@@ -194,34 +205,6 @@ pub(super) fn lee(augmented: &AugmentedPlant<'_>, chain: &Chain, gains: &[Node])
     let zero = graph.constant(0.0).node();
     let gain = solve_lower(graph, &M̄, right);
     gain.into_iter().map(|g| g.unwrap_or(zero)).collect()
-}
-
-/// The similarity transformation of the error, row by row.
-pub(super) struct Transformation {
-    /// M = W⁻¹M̄
-    pub M: Vec<Vec<Sparse>>,
-    /// M⁻¹ = M̄⁻¹W
-    pub inverse: Vec<Vec<Sparse>>,
-    /// L
-    pub L: Vec<Sparse>,
-}
-
-/// M, M⁻¹ and L of Step 5, for the proof; the observer needs none of them.
-pub(super) fn transformation(augmented: &AugmentedPlant<'_>, chain: &Chain) -> Transformation {
-    let graph = augmented.graph();
-    let Steps { M̄, L, W } = Steps::new(augmented, chain);
-    let solved = |A: &[Vec<Sparse>], B: &[Vec<Sparse>]| {
-        let n = A.len();
-        let column = |j: usize| solve_lower(graph, A, B.iter().map(|row| row[j]).collect());
-        let columns: Vec<Vec<Sparse>> = (0..n).map(column).collect();
-        let row = |i: usize| columns.iter().map(|c| c[i]).collect();
-        (0..n).map(row).collect()
-    };
-    Transformation {
-        M: solved(&W, &M̄),
-        inverse: solved(&M̄, &W),
-        L,
-    }
 }
 
 /// An entry that may be zero everywhere.

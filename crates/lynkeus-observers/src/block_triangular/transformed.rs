@@ -18,7 +18,7 @@ use lynkeus_proof::magnitude::{plus, product, times};
 use lynkeus_proof::matrix::sum;
 use lynkeus_structure::{AugmentedPlant, Blocks, Chain, Matrix, range};
 
-use super::observer::{Sparse, own_jacobian, transformation};
+use super::observer::{Sparse, Steps, own_jacobian};
 use crate::theorem::magnitude;
 use crate::{Assumptions, DesignError};
 
@@ -85,17 +85,15 @@ impl Plant<'_> {
     }
 
     pub fn similar(&self, place: usize) -> Result<Similar, DesignError> {
-        let found = transformation(self.augmented, self.chain(place));
-        let L = found
-            .L
-            .iter()
-            .map(|&l| self.size(l))
-            .collect::<Result<_, _>>()?;
+        let graph = self.augmented.graph();
+        let found = Steps::new(self.augmented, self.chain(place));
+        let nodes = found.M(graph);
+        let L = found.L.iter().map(|&l| self.size(l));
         Ok(Similar {
-            M: self.table(&found.M)?,
-            inverse: self.table(&found.inverse)?,
-            L,
-            nodes: found.M,
+            L: L.collect::<Result<_, _>>()?,
+            M: self.table(&nodes)?,
+            inverse: self.table(&found.inverse(graph))?,
+            nodes,
         })
     }
 

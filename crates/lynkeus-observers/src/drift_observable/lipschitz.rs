@@ -19,7 +19,7 @@ use std::collections::HashMap;
 use lynkeus_expr::{MissingInput, Node};
 use lynkeus_proof::magnitude::{length, norm, plus, product, times};
 use lynkeus_structure::output_map::{
-    Rows, affine_form, jacobian_rows, lie_derivatives, output_derivatives,
+    Rows, affine_form, along_column, jacobian_rows, lie_derivatives, output_derivatives,
 };
 use lynkeus_structure::{AugmentedPlant, Finding, Matrix, Region, regularity};
 
@@ -127,7 +127,8 @@ struct Remainder {
 
 impl Remainder {
     fn new(augmented: &AugmentedPlant<'_>, form: &Form) -> Result<Self, MissingInput> {
-        let zero = augmented.graph().constant(0.0).node();
+        let graph = augmented.graph();
+        let zero = graph.constant(0.0).node();
         let order = form.indices.iter().copied().max().unwrap_or(0);
         let (mut inputs, mut w) = (vec![], vec![]);
         let affine = match form.variant {
@@ -136,8 +137,11 @@ impl Remainder {
         };
         let y = match &affine {
             Some(affine) => {
+                let L_g = |row: &Vec<_>, g| along_column(graph, row, g).unwrap_or(zero);
                 let columns = affine.input_columns.iter();
-                inputs = columns.map(|g| along(augmented, &form.Q, g)).collect();
+                inputs = columns
+                    .map(|g| form.Q.iter().map(|row| L_g(row, g)).collect())
+                    .collect();
                 lie_derivatives(augmented, affine, order)?
             }
             None => output_derivatives(augmented, &form.further, order)?,
@@ -159,19 +163,6 @@ impl Remainder {
             w,
         })
     }
-}
-
-/// L_g of every row of the map.
-fn along(augmented: &AugmentedPlant<'_>, Q: &Rows, g: &[Option<Node>]) -> Vec<Node> {
-    let graph = augmented.graph();
-    let of_row = |row: &Vec<Option<Node>>| {
-        let pairs = row.iter().zip(g);
-        let terms = pairs.filter_map(|(q, g)| Some(graph.expr((*q)?) * graph.expr((*g)?)));
-        terms
-            .reduce(|a, b| a + b)
-            .map_or_else(|| graph.constant(0.0).node(), |sum| sum.node())
-    };
-    Q.iter().map(of_row).collect()
 }
 
 /// Bounds of |n̄ w| row by row. y^(μ) is affine in w, so that n̄ reads none of it.

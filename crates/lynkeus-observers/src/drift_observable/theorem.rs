@@ -42,7 +42,7 @@ use crate::design::Found;
 use crate::statement::{sufficient, undecided};
 use crate::{
     Assumptions, Bounds, Certificate, Check, Constant, DesignError, Germani, Reason, Statement,
-    TuningError, UltimateBound, Weight,
+    TuningError, UltimateBound,
 };
 
 pub(super) fn certificate(
@@ -60,7 +60,7 @@ pub(super) fn certificate(
     };
     // not that on inputs, which is about slopes without bounds
     let mut hypotheses = examination.checks;
-    hypotheses.retain(|check| check.weight == Weight::Required);
+    hypotheses.retain(|check| !check.is_advisory);
     let continuous = lipschitz.continuous.clone();
     hypotheses.push(Statement::from(Germani::ContinuousRows).with(continuous));
     hypotheses.extend(of_the_map(augmented, &form, &slopes, &lipschitz));

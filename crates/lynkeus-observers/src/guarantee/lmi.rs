@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use lynkeus_expr::{Budget, MissingInput};
+use lynkeus_expr::Budget;
 use lynkeus_proof::decay;
 use lynkeus_proof::decay::{Aim, ErrorModel, Gain, NoGain, Request};
 use lynkeus_structure::{AugmentedPlant, Measurement, Slopes, range};
@@ -20,10 +20,6 @@ use crate::{
     ChainGain, Design, DesignError, Examination, KeySpec, ParameterValue, Shape, Tuning,
     TuningError, Value, estimate,
 };
-
-/// Why nothing of such an observer may be changed.
-const NO_SPEED: &str =
-    "a gain by linear matrix inequalities has no θ: it is made, and proved, as a whole";
 
 /// Bisections of the rate where only the gain is limited.
 const HALVINGS: usize = 9;
@@ -103,7 +99,7 @@ pub(crate) fn design_lmi(
 ) -> Result<Design, DesignError> {
     estimate::refuse(common, "gain = \"lmi\"")?;
     let copy = PlantCopy::new(augmented, common);
-    let (measured, slopes) = shown(augmented, &copy)?;
+    let (measured, slopes) = shown(augmented)?;
     let system = ErrorSystem::open_loop(augmented, &augmented.region())?;
     if let Some((slope, undeclared)) = system.slopes.unbounded(&system.region) {
         let term = slope.term.clone();
@@ -133,20 +129,24 @@ pub(crate) fn design_lmi(
 
 /// Of each output the state that it shows, and |c| of y = c·x + d: the smallest on the box where it
 /// varies.
-fn shown(
-    augmented: &AugmentedPlant<'_>,
-    copy: &PlantCopy<'_, '_>,
-) -> Result<(Vec<usize>, Vec<f64>), DesignError> {
+fn shown(augmented: &AugmentedPlant<'_>) -> Result<(Vec<usize>, Vec<f64>), DesignError> {
+    let graph = augmented.graph();
     let (mut measured, mut slopes) = (vec![], vec![]);
-    for (i, output) in augmented.outputs.iter().enumerate() {
+    for output in &augmented.outputs {
         let wrong = |expected: &str| {
             let name = &output.variable.name;
             TuningError::new("gain", expected, format!("the output {name}"))
         };
-        let Some((state, _)) = copy.measured_state(i) else {
+        let Some((state, slope, _)) = output.state else {
             return Err(wrong("outputs that each show one state (y = c·x + d)").into());
         };
-        let c = slope(augmented, i)?;
+        let c = match graph.constant_value(slope) {
+            Some(c) => c.abs(),
+            None => {
+                let values = range(graph, slope, &augmented.region())?;
+                values.enclosure.mignitude()
+            }
+        };
         if c <= 0.0 || !c.is_finite() {
             return Err(wrong("outputs y = c·x + d with a c that is 0 nowhere on the box").into());
         }
@@ -154,20 +154,6 @@ fn shown(
         slopes.push(c);
     }
     Ok((measured, slopes))
-}
-
-/// The smallest |c| on the box of an output y = c·x + d; 0 where it is none.
-fn slope(augmented: &AugmentedPlant<'_>, output: usize) -> Result<f64, MissingInput> {
-    let Some((_, slope, _)) = augmented.outputs[output].state else {
-        return Ok(0.0);
-    };
-    let graph = augmented.graph();
-    match graph.constant_value(slope) {
-        Some(c) => Ok(c.abs()),
-        None => Ok(range(graph, slope, &augmented.region())?
-            .enclosure
-            .mignitude()),
-    }
 }
 
 /// Sizes of the measurement errors, one per output: as declared, and all the same where none is.
@@ -280,7 +266,7 @@ fn assemble(
         });
     }
     let mut observer = copy.observer(family, derivatives)?;
-    observer.tunables.refused = copy.common.tunable.then_some(NO_SPEED);
+    observer.is_whole = copy.common.tunable;
     let slopes = gain.proof.multipliers.first().map_or(0, |t| t.len());
     let row = |name: &str, value| (name.to_owned(), value);
     let largest = ParameterValue::Computed(request.largest(&gain.K));

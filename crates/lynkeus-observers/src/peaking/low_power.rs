@@ -184,8 +184,6 @@ pub(crate) struct Part<'a> {
     pub output: usize,
     /// places of its states, sensor end first
     pub states: &'a [usize],
-    /// f_1, …, f_n over the plant's symbols
-    pub f: Vec<Node>,
     pub partials: &'a [Partial],
     /// ℓ = θ^δ
     pub δ: f64,
@@ -194,6 +192,8 @@ pub(crate) struct Part<'a> {
 /// A chain with what corrects it.
 pub(super) struct Blocks<'a> {
     pub part: &'a Part<'a>,
+    /// f_1, …, f_n over the plant's symbols
+    pub f: &'a [Node],
     /// what the second gain of each block is divided by, over the plant's symbols
     pub divisors: &'a [Node],
     /// x̂_1 − y
@@ -226,7 +226,7 @@ impl Run<'_, '_, '_> {
         for i in 0..n.max(2) - 1 {
             let e = self.innovation(blocks, &signals, i);
             let here = self.seen(part, &signals, &[i + 1]);
-            let f = self.copy.at_estimate_with(&part.f[i..=i], &here)[0];
+            let f = self.copy.at_estimate_with(&blocks.f[i..=i], &here)[0];
             self.derivatives[part.states[i]] = plus(graph, f, gains[2 * i], e);
             names.push(self.copy.hats[part.states[i]].name.clone());
             if i + 1 == n {
@@ -235,7 +235,7 @@ impl Run<'_, '_, '_> {
             let divisor = self.copy.at_estimate_with(&blocks.divisors[i..=i], &here)[0];
             let gain = graph.expr(gains[2 * i + 1]) / graph.expr(divisor);
             let next = self.seen(part, &signals, &[i + 1, i + 2]);
-            let f = self.copy.at_estimate_with(&part.f[i + 1..=i + 1], &next)[0];
+            let f = self.copy.at_estimate_with(&blocks.f[i + 1..=i + 1], &next)[0];
             let derivative = plus(graph, f, gain.node(), e);
             names.push(signals[i + 1].name.clone());
             if i + 2 == n {

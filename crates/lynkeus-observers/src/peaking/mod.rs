@@ -125,22 +125,25 @@ pub(crate) fn departure(
     Some(undecided(statement, Reason::AnotherObserver { key }))
 }
 
-/// The observer with every chain in the low-power form; `lengths` and `θ` are by output. The gains are divided
-/// by constants in the middle of the partials' bounds, with `advice` for where there is none, or by the partials at
-/// the estimate.
+/// The observer with every chain in the low-power form; `θ` is by output, `f` has f_1, …, f_n of a part over
+/// the plant's symbols. The gains are divided by constants in the middle of the partials' bounds, with `advice` for
+/// where there is none, or by the partials at the estimate.
 pub(crate) fn low_power(
     copy: &PlantCopy<'_, '_>,
     remedies: &Remedies,
     θ: &[f64],
-    lengths: &[usize],
     parts: &[Part<'_>],
+    f: impl Fn(usize) -> Vec<Node>,
     advice: Option<&str>,
     examination: Examination,
 ) -> Result<Design, TuningError> {
-    let K = remedies.coefficients(lengths)?;
+    let mut lengths = vec![0; parts.len()];
+    for part in parts {
+        lengths[part.output] = part.states.len();
+    }
+    let K = remedies.coefficients(&lengths)?;
     let starts = copy.states()?.into_iter().map(|(_, start)| start);
     let transient = remedies.transient.as_ref();
-    let speeds = Speed::of_chains(copy, θ);
     let mut run = Run {
         copy,
         transient,
@@ -148,6 +151,7 @@ pub(crate) fn low_power(
         derivatives: copy.at_estimate(&copy.augmented.derivatives),
         copies: vec![],
     };
+    let speeds = Speed::of_chains(copy, θ);
     let mut parameters = vec![("θ".to_owned(), θ.to_vec().into())];
     parameters.extend(transient.map(Transient::parameter));
     let pairs = K.iter().enumerate().map(|(i, K)| {
@@ -156,7 +160,7 @@ pub(crate) fn low_power(
     });
     parameters.extend(pairs);
     let mut notes = vec![];
-    for part in parts {
+    for (place, part) in parts.iter().enumerate() {
         let Some(innovation) = remedies.innovation(copy, part.output) else {
             continue;
         };
@@ -171,6 +175,7 @@ pub(crate) fn low_power(
         }
         let blocks = Blocks {
             part,
+            f: &f(place),
             divisors: &divisors(copy.augmented.graph(), part.partials, advice)?,
             innovation,
             K,

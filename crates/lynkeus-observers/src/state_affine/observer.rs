@@ -52,16 +52,16 @@ use lynkeus_expr::{Expr, Graph, Node, jacobian};
 use lynkeus_gain::UnitFactor;
 use lynkeus_proof::matrix::square;
 use lynkeus_structure::output_map::Rows;
-use lynkeus_structure::{AugmentedPlant, Matrix, Measurement, Superdiagonal, range};
+use lynkeus_structure::{AugmentedPlant, Matrix, Measurement, range};
 
+use super::form::{Form, NAME};
 use super::said::Said;
 use super::settings::Settings;
 use crate::conditions::names;
+use crate::design::Found;
 use crate::estimate::{PlantCopy, Speed};
 use crate::printed::{StartPoint, expressions};
-use crate::{Design, DesignError, Examination, Monitor, ParameterValue, Signal};
-
-pub(super) const NAME: &str = "state-affine";
+use crate::{Design, DesignError, Monitor, ParameterValue, Reason, Signal};
 
 /// The smallest d_i that forgetting leaves.
 const D_LEAST: f64 = 1e-100;
@@ -77,62 +77,44 @@ const ALARM: f64 = 1e-6;
 pub(super) fn assemble(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
-    form: &Superdiagonal,
-    examination: Examination,
+    Found { form, examination }: Found<Form>,
 ) -> Result<Design, DesignError> {
     let graph = augmented.graph();
-    let order: Vec<usize> = form.blocks().flatten().copied().collect();
-    let (study, S0) = (settings.θ()?, settings.S0(&order)?);
+    let (given, S0) = (settings.θ()?, settings.S0(&form.order)?);
     let copy = PlantCopy::new(augmented, &settings.common);
-    let matrices = matrices(augmented, form, &order);
-    let [C, F] = matrices.each_ref().map(|A| at_estimate(&copy, A));
-    let named = names(augmented, &order);
-    let factor = Factor::new(graph, &named, &S0);
+    let [C, F] = [&form.C, &form.F].map(|A| at_estimate(&copy, A));
+    let factor = Factor::new(graph, &names(augmented, &form.order), &S0);
     let mut derivatives = copy.at_estimate(&augmented.derivatives);
-    prolong(&copy, &F, &order, &mut derivatives);
+    prolong(&copy, &F, &form.order, &mut derivatives);
     let v: Vec<Vec<Sparse<'_>>> = C.iter().map(|row| factor.forward(row)).collect();
     // θΔ_θ⁻¹ = diag(θI, θ²I, …) over the blocks
     let meaning = "the speed θ of the gain and of S".to_owned();
-    let θ = Speed::new(&copy, "theta", study, meaning);
-    let exponents = form
-        .blocks()
-        .enumerate()
-        .flat_map(|(k, block)| block.iter().map(move |_| k as i32 + 1));
+    let θ = Speed::new(&copy, "theta", given, meaning);
     let correction = factor.gain(&v, &innovations(&copy));
-    for ((&state, exponent), z) in order.iter().zip(exponents).zip(correction) {
+    for ((&state, &k), z) in form.order.iter().zip(&form.block).zip(correction) {
         if let Some(z) = z {
-            let power = θ.scaled(graph, study.powi(exponent), f64::from(exponent));
+            let power = θ.scaled(graph, given.powi(k as i32 + 1), (k + 1) as f64);
             derivatives[state] = (graph.expr(derivatives[state]) - power * z).node();
         }
     }
     derivatives.extend(factor.derivatives(θ.expr(graph), &F, &v));
-    let alarm = alarm(augmented, form, settings)?;
+    let alarm = alarm(augmented, &form, settings)?;
     let mut observer = copy.observer(NAME, derivatives)?.tuned_by([&θ]);
     observer.monitors.extend(monitor(&factor, alarm));
     observer.states.extend(factor.states);
-    let start = StartPoint::new(&copy)?;
-    let [C, F] = matrices.map(|A| Matrix::from_fn(graph, (A.len(), order.len()), |i, j| A[i][j]));
-    let gain = gain(&start.values(&C)?, form, study, &S0);
-    let mut parameters: Vec<(String, ParameterValue)> = vec![("θ".into(), study.into())];
-    let mut add = |name: &str, value| parameters.push((name.to_owned(), value));
-    add("blocks", ParameterValue::Blocks(examination.chains.clone()));
-    add("alarm", ParameterValue::Alarm(alarm));
-    add("rows", named.into());
-    add("C(u)", expressions(&C));
-    if form.factors.len() > 1 {
-        add("F(u, x)", expressions(&F));
-    }
-    add("S(0)", ParameterValue::Matrix(product(&S0)));
-    add("θΔ⁻¹S⁻¹Cᵀ at the start", ParameterValue::Matrix(gain));
+    let outside = outside_last(augmented, &form).into_iter();
     Ok(Design {
         observer,
-        notes: outside_last(augmented, form)
-            .into_iter()
-            .map(Into::into)
-            .collect(),
-        examination,
+        notes: outside.map(Reason::from).collect(),
         gains: vec![],
-        parameters,
+        parameters: parameters(
+            &copy,
+            &form,
+            (given, &S0),
+            alarm,
+            examination.chains.clone(),
+        )?,
+        examination,
     })
 }
 
@@ -163,7 +145,7 @@ fn prolong<'g>(
 /// Below this excitation the flag is raised.
 pub(super) fn alarm(
     augmented: &AugmentedPlant<'_>,
-    form: &Superdiagonal,
+    form: &Form,
     settings: &Settings,
 ) -> Result<f64, DesignError> {
     match settings.alarm.clone()? {
@@ -182,31 +164,6 @@ fn monitor(factor: &Factor<'_>, alarm_below: f64) -> Option<Monitor> {
         meaning: "excitation is lost: the inputs and the estimate do not move enough to tell every state apart (A4), so some states are not corrected any more".into(),
         matrix: None,
     })
-}
-
-/// C(u) and F(u, x) with the states in the order of the blocks; C has a row per output.
-pub(super) fn matrices(
-    augmented: &AugmentedPlant<'_>,
-    form: &Superdiagonal,
-    order: &[usize],
-) -> [Rows; 2] {
-    let n = order.len();
-    let place = |state: usize| order.iter().position(|&i| i == state);
-    let mut C = vec![vec![None; n]; augmented.outputs.len()];
-    let mut F = vec![vec![None; n]; n];
-    for (k, factor) in form.factors.iter().enumerate() {
-        for &(i, j, node) in &factor.entries {
-            let column = place(factor.columns[j]);
-            let (table, row) = match k {
-                0 => (&mut C, Some(factor.rows[i])),
-                _ => (&mut F, place(factor.rows[i])),
-            };
-            if let (Some(row), Some(column)) = (row, column) {
-                table[row][column] = Some(node);
-            }
-        }
-    }
-    [C, F]
 }
 
 /// The entries at the estimate.
@@ -239,11 +196,11 @@ fn innovations<'g>(copy: &PlantCopy<'_, 'g>) -> Vec<Expr<'g>> {
 /// How large the diagonal of S could be at best for the least visible state:
 /// g = 1 for an output, g_j = Σ_i g_i max|F_ij|² for a state. It carries the units
 /// of F, so that the alarm does not depend on them. Unbounded entries count as 1.
-fn least_reach(augmented: &AugmentedPlant<'_>, form: &Superdiagonal) -> Result<f64, DesignError> {
+fn least_reach(augmented: &AugmentedPlant<'_>, form: &Form) -> Result<f64, DesignError> {
     let (graph, region) = (augmented.graph(), augmented.region());
     let mut reach = vec![1.0; augmented.outputs.len()];
     let mut least = f64::INFINITY;
-    for factor in &form.factors {
+    for factor in &form.blocks.factors {
         let mut next = vec![0.0; factor.columns.len()];
         for &(i, j, node) in &factor.entries {
             let found = range(graph, node, &region)?.enclosure;
@@ -259,9 +216,9 @@ fn least_reach(augmented: &AugmentedPlant<'_>, form: &Superdiagonal) -> Result<f
 
 /// (1) has ε in the last block only. Elsewhere its trace in the blocks behind
 /// does not shrink as θ grows: worth a note, no reason to refuse.
-fn outside_last(augmented: &AugmentedPlant<'_>, form: &Superdiagonal) -> Option<Said> {
+fn outside_last(augmented: &AugmentedPlant<'_>, form: &Form) -> Option<Said> {
     let plant = augmented.plant;
-    let last = form.declared().last()?;
+    let last = form.blocks.declared().last()?;
     let known = |v: &lynkeus_model::Variable| {
         augmented.inputs.iter().any(|i| i.node == v.node)
             || augmented.state_index(&v.name).is_some()
@@ -284,40 +241,58 @@ fn outside_last(augmented: &AugmentedPlant<'_>, form: &Superdiagonal) -> Option<
     })
 }
 
+fn parameters(
+    copy: &PlantCopy<'_, '_>,
+    form: &Form,
+    (θ, S0): (f64, &UnitFactor),
+    alarm: f64,
+    chains: Vec<Vec<String>>,
+) -> Result<Vec<(String, ParameterValue)>, DesignError> {
+    let augmented = copy.augmented;
+    let [C, F] = [&form.C, &form.F].map(|A| {
+        let size = (A.len(), form.order.len());
+        Matrix::from_fn(augmented.graph(), size, |i, j| A[i][j])
+    });
+    let gain = gain(&StartPoint::new(copy)?.values(&C)?, form, θ, S0);
+    let mut found: Vec<(String, ParameterValue)> = vec![("θ".into(), θ.into())];
+    let mut add = |name: &str, value| found.push((name.to_owned(), value));
+    add("blocks", ParameterValue::Blocks(chains));
+    add("alarm", ParameterValue::Alarm(alarm));
+    add("rows", names(augmented, &form.order).into());
+    add("C(u)", expressions(&C));
+    if form.blocks.factors.len() > 1 {
+        add("F(u, x)", expressions(&F));
+    }
+    add("S(0)", ParameterValue::Matrix(product(S0)));
+    add("θΔ⁻¹S⁻¹Cᵀ at the start", ParameterValue::Matrix(gain));
+    Ok(found)
+}
+
 /// S = UᵀDU
 fn product(S: &UnitFactor) -> Vec<Vec<f64>> {
     square(S.diagonal.len(), |i, j| {
-        let terms = (0..=i.min(j)).map(|k| U(S, k, i) * S.diagonal[k] * U(S, k, j));
+        let terms = (0..=i.min(j)).map(|k| S.U(k, i) * S.diagonal[k] * S.U(k, j));
         terms.sum()
     })
 }
 
-/// An entry of U, j ≥ k.
-fn U(S: &UnitFactor, k: usize, j: usize) -> f64 {
-    match j == k {
-        true => 1.0,
-        false => S.upper[k][j - k - 1],
-    }
-}
-
 /// θ Δ_θ⁻¹ S(0)⁻¹ Cᵀ: by Uᵀv = Cᵀ and then Uz = D⁻¹v, as the observer has it.
-fn gain(C: &[Vec<f64>], form: &Superdiagonal, θ: f64, S: &UnitFactor) -> Vec<Vec<f64>> {
+fn gain(C: &[Vec<f64>], form: &Form, θ: f64, S: &UnitFactor) -> Vec<Vec<f64>> {
     let n = S.diagonal.len();
     let column = |c: &Vec<f64>| {
         let mut v = c.clone();
         for i in 0..n {
-            let known: f64 = (0..i).map(|k| U(S, k, i) * v[k]).sum();
+            let known: f64 = (0..i).map(|k| S.U(k, i) * v[k]).sum();
             v[i] -= known;
         }
         for i in (0..n).rev() {
-            let known: f64 = (i + 1..n).map(|k| U(S, i, k) * v[k]).sum();
+            let known: f64 = (i + 1..n).map(|k| S.U(i, k) * v[k]).sum();
             v[i] = v[i] / S.diagonal[i] - known;
         }
         v
     };
     let columns: Vec<Vec<f64>> = C.iter().map(column).collect();
-    let blocks = form.blocks().enumerate();
-    let powers = blocks.flat_map(|(k, block)| block.iter().map(move |_| θ.powi(k as i32 + 1)));
+    let powers = form.block.iter().map(|&k| θ.powi(k as i32 + 1));
     powers
         .enumerate()
         .map(|(i, power)| columns.iter().map(|z| power * z[i]).collect())

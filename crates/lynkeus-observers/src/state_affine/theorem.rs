@@ -29,9 +29,10 @@ use lynkeus_proof::matrix::{IntervalMatrix, square, sum, upper};
 use lynkeus_proof::metzler::spectral_radius;
 use lynkeus_proof::search::first;
 use lynkeus_structure::output_map::Rows;
-use lynkeus_structure::{AugmentedPlant, Region, Standing, Superdiagonal, Verdict};
+use lynkeus_structure::{AugmentedPlant, Region, Standing, Verdict};
 
-use super::observer::{alarm, matrices};
+use super::form::Form;
+use super::observer::alarm;
 use super::said::Said;
 use super::settings::Settings;
 use crate::design::Found;
@@ -47,16 +48,10 @@ pub(super) const BASIS: &str = "Theorem 1 of Ltaief, Maatoug, Farza, Ménard, M'
 pub(super) fn certificate(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
-    Found { form, examination }: Found<Superdiagonal>,
+    Found { form, examination }: Found<Form>,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
-    let order: Vec<usize> = form.blocks().flatten().copied().collect();
-    let (θ, S0) = (settings.θ()?, settings.S0(&order)?);
-    let block: Vec<usize> = form
-        .blocks()
-        .enumerate()
-        .flat_map(|(k, b)| b.iter().map(move |_| k))
-        .collect();
+    let (θ, S0) = (settings.θ()?, settings.S0(&form.order)?);
     let alarm = alarm(augmented, &form, settings)?;
     let shows = |c: &&Check| matches!(&c.statement, Statement::Ltaief(Ltaief::BlockShows { .. }));
     let always_shown = examination
@@ -67,10 +62,7 @@ pub(super) fn certificate(
     let study = Study {
         augmented,
         assumptions,
-        matrices: matrices(augmented, &form, &order),
         form: &form,
-        order,
-        block,
         θ,
         S0,
         common: &settings.common,
@@ -86,13 +78,7 @@ pub(super) fn certificate(
 struct Study<'a> {
     augmented: &'a AugmentedPlant<'a>,
     assumptions: &'a Assumptions,
-    form: &'a Superdiagonal,
-    /// the states in the order of the blocks
-    order: Vec<usize>,
-    /// the block of each place
-    block: Vec<usize>,
-    /// C(u) and F(u, x)
-    matrices: [Rows; 2],
+    form: &'a Form,
     θ: f64,
     S0: UnitFactor,
     common: &'a Common,
@@ -110,12 +96,12 @@ impl Study<'_> {
     }
 
     fn place(&self, state: usize) -> Option<usize> {
-        self.order.iter().position(|s| *s == state)
+        self.form.order.iter().position(|s| *s == state)
     }
 
     fn certificate(&self, mut checks: Vec<Check>) -> Result<Certificate, DesignError> {
         let next = |row: usize, column: usize| match (self.place(row), self.place(column)) {
-            (Some(p), Some(q)) => self.block[q] > self.block[p],
+            (Some(p), Some(q)) => self.form.block[q] > self.form.block[p],
             _ => false,
         };
         let (slopes, lipschitz) = slopes(self.augmented, self.region(), next)?;
@@ -148,7 +134,13 @@ impl Study<'_> {
         let graph = self.augmented.graph();
         let size = |node| magnitude(graph, node, self.region());
         let mut open = vec![];
-        for &(.., node) in self.form.factors.iter().flat_map(|factor| &factor.entries) {
+        for &(.., node) in self
+            .form
+            .blocks
+            .factors
+            .iter()
+            .flat_map(|factor| &factor.entries)
+        {
             if size(node)?.is_infinite() {
                 open.push(node);
             }
@@ -167,15 +159,14 @@ impl Study<'_> {
                 .map(|row| row.iter().map(entry).collect())
                 .collect()
         };
-        let [C, F] = &self.matrices;
-        Ok(([table(C)?, table(F)?], check))
+        Ok(([table(&self.form.C)?, table(&self.form.F)?], check))
     }
 
     /// A3: the uncertainty is bounded.
     fn uncertainty(&self) -> Check {
         let drift = &self.assumptions.drift;
         let known = |&state: &usize| drift.get(state).is_some_and(|d| d.is_finite());
-        match self.order.iter().find(|state| !known(state)) {
+        match self.form.order.iter().find(|state| !known(state)) {
             None => {
                 let constant = self.assumptions.constant(self.augmented.plant_states());
                 let constant = constant.into_iter().map(str::to_owned).collect();
@@ -197,8 +188,8 @@ impl Study<'_> {
                 .map(|row| row.iter().map(entry).collect())
                 .collect()
         };
-        let [C, F] = &self.matrices;
-        below(&numbers(C)?, &numbers(F)?, self.form.factors.len())
+        let Form { C, F, blocks, .. } = self.form;
+        below(&numbers(C)?, &numbers(F)?, blocks.factors.len())
     }
 
     fn a4(&self, excitation: Option<f64>) -> Check {
@@ -222,7 +213,7 @@ impl Study<'_> {
         excitation: Option<f64>,
         constants: &mut Vec<Constant>,
     ) -> [f64; 2] {
-        let largest = spectral_radius(&above(&self.S0, C, F, &self.block));
+        let largest = spectral_radius(&above(&self.S0, C, F, &self.form.block));
         let (smallest, source) = match excitation {
             Some(λ) => (λ, "lower bound of the eigenvalues of S(t), t ≥ 10/θ"),
             None => (
@@ -250,11 +241,12 @@ impl Study<'_> {
 
     /// ‖G(θ)‖ ≤ √ρ(GᵀG)
     fn coupling(&self, slopes: &[Slope], θ: f64) -> f64 {
-        let n = self.order.len();
+        let n = self.form.order.len();
         let mut G = vec![vec![0.0; n]; n];
         for slope in slopes {
             if let (Some(p), Some(q)) = (self.place(slope.row), self.place(slope.column)) {
-                let power = Interval::point(θ).powi((self.block[p] - self.block[q]) as i32);
+                let power =
+                    Interval::point(θ).powi((self.form.block[p] - self.form.block[q]) as i32);
                 G[p][q] = (Interval::point(slope.size) / power).hi();
             }
         }
@@ -324,8 +316,8 @@ impl Study<'_> {
     /// constants that hold while the monitor raises no flag.
     fn conclude(&self, certificate: &mut Certificate, rate: f64, [smallest, largest]: [f64; 2]) {
         let θ = Interval::point(self.θ);
-        let scale = |p: usize| θ.powi(self.block[p] as i32);
-        let drift = self.order.iter().enumerate().map(|(p, &state)| {
+        let scale = |p: usize| θ.powi(self.form.block[p] as i32);
+        let drift = self.form.order.iter().enumerate().map(|(p, &state)| {
             let d = Interval::point(self.assumptions.drift[state]) / scale(p);
             d * d
         });
@@ -345,16 +337,17 @@ impl Study<'_> {
             let v = (b + (b * b + twice * (θ * w2 + added)).sqrt()) / twice;
             v / Interval::point(smallest).sqrt()
         };
-        let densities = self.order.iter().enumerate().map(|(p, &state)| {
+        let densities = self.form.order.iter().enumerate().map(|(p, &state)| {
             Interval::point(self.assumptions.process_noise[state]) / scale(p).powi(2)
         });
         let moved = Interval::point(largest) * sum(densities);
         let radius = root(Interval::ZERO);
-        let last = self.block.iter().copied().max().unwrap_or(0);
+        let last = self.form.block.iter().copied().max().unwrap_or(0);
         let norm = |radius: Interval| (θ.powi(last as i32).max(Interval::ONE) * radius).hi();
         let bounds = |radius: Interval| {
-            let name = |p: usize| self.augmented.states[self.order[p]].name.clone();
-            let each = (0..self.order.len()).map(|p| (name(p), (scale(p) * radius).hi()).into());
+            let name = |p: usize| self.augmented.states[self.form.order[p]].name.clone();
+            let each =
+                (0..self.form.order.len()).map(|p| (name(p), (scale(p) * radius).hi()).into());
             let norm = norm(radius);
             norm.is_finite().then(|| Bounds {
                 norm,
@@ -419,11 +412,7 @@ fn above(S0: &UnitFactor, C: &[Vec<f64>], F: &[Vec<f64>], block: &[usize]) -> Ve
 /// UᵀDU
 fn product(S0: &UnitFactor) -> IntervalMatrix {
     let n = S0.diagonal.len();
-    let U = |k: usize, j: usize| match j.cmp(&k) {
-        std::cmp::Ordering::Less => Interval::ZERO,
-        std::cmp::Ordering::Equal => Interval::ONE,
-        std::cmp::Ordering::Greater => Interval::point(S0.upper[k][j - k - 1]),
-    };
+    let U = |k: usize, j: usize| Interval::point(S0.U(k, j));
     square(n, |i, j| {
         sum((0..n).map(|k| U(k, i) * Interval::point(S0.diagonal[k]) * U(k, j)))
     })

@@ -4,16 +4,16 @@
 use lynkeus_expr::{MissingInput, Tape, jacobian};
 use lynkeus_proof::hurwitz::Stability;
 use lynkeus_proof::spectrum;
-use lynkeus_structure::{Assignment, AugmentedPlant, Region, Standing, chains};
+use lynkeus_structure::{Assignment, AugmentedPlant, Region, chains};
 use nalgebra::DMatrix;
 
 use super::form::{Form, Gains, NAME, Window};
 use super::said::{Hammouri, Loose, Said};
 use super::settings::Settings;
 use crate::conditions::{GainedChain, along, lipschitz, names};
-use crate::design::{Found, Searched};
+use crate::design::{Found, Searched, first_fit};
 use crate::statement::undecided;
-use crate::{DesignError, Examination, Reason, TuningError};
+use crate::{DesignError, Examination, Reason};
 
 /// The first assignment whose conditions are proved, else the first that no condition
 /// refutes, else the first with its refusal; or the examination that says why there is none.
@@ -39,26 +39,9 @@ pub(super) fn form(
             .for_each(|a| lead_within_window(a, δ));
     }
     let choices = assignments.len();
-    let mut best: Option<Found<Form>> = None;
-    for assignment in assignments {
-        let form = examined(augmented, settings, region, assignment, choices)?;
-        match form.examination.fit() {
-            Standing::Proved => return Ok(Ok(form)),
-            Standing::Undecided
-                if best
-                    .as_ref()
-                    .is_none_or(|b| b.examination.fit() == Standing::Refuted) =>
-            {
-                best = Some(form);
-            }
-            _ => {
-                best.get_or_insert(form);
-            }
-        }
-    }
-    // chains::find never returns an empty list
-    best.map(Ok)
-        .ok_or_else(|| TuningError::new("chains", "a chain", "none").into())
+    first_fit(assignments, |assignment| {
+        examined(augmented, settings, region, assignment, choices)
+    })
 }
 
 /// Where several chains can lead, the first for which the given exponents lie in the window.

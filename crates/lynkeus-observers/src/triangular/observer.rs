@@ -104,29 +104,19 @@ pub(super) fn low_power(
     estimate::refuse(&settings.common, "form = \"low-power\"")?;
     let (θ, δ) = (settings.θ()?, exponents(&form, settings));
     let copy = PlantCopy::new(augmented, &settings.common);
-    let part = |i: usize| {
-        let states = &form.assignment.chains[i];
-        Part {
-            output: i,
-            states,
-            f: states.iter().map(|&i| augmented.derivatives[i]).collect(),
-            partials: &form.partials[i],
-            δ: δ[i],
-        }
+    let part = |i: usize| Part {
+        output: i,
+        states: &form.assignment.chains[i],
+        partials: &form.partials[i],
+        δ: δ[i],
     };
     let parts: Vec<Part<'_>> = (0..δ.len()).map(part).collect();
-    let advice =
-        (!settings.divided).then_some("declare min and max in the model, or set partials = true");
-    let lengths = form.assignment.lengths();
-    let mut design = peaking::low_power(
-        &copy,
-        &settings.remedies,
-        &θ,
-        &lengths,
-        &parts,
-        advice,
-        examination,
-    )?;
+    let derivative = |&state: &usize| augmented.derivatives[state];
+    let f = |i: usize| parts[i].states.iter().map(derivative).collect();
+    let advice = "declare min and max in the model, or set partials = true";
+    let advice = (!settings.divided).then_some(advice);
+    let remedies = &settings.remedies;
+    let mut design = peaking::low_power(&copy, remedies, &θ, &parts, f, advice, examination)?;
     let windows = Window::of(&form.assignment, &δ);
     design.notes.extend(windows.iter().filter_map(Window::note));
     design.parameters.insert(1, ("δ".to_owned(), δ.into()));

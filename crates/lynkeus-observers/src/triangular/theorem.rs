@@ -43,8 +43,19 @@ pub(super) fn certificate(
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
     let region = &assumptions.region;
-    let facts = Facts::new(augmented, &form, region)?;
-    let mut checks = facts.checks.clone();
+    let chains = &form.assignment.chains;
+    let places = chains.iter().map(|c| &c[..]);
+    let (partials, mut checks) = along(augmented, places.enumerate(), region)?;
+    let bounds = partials
+        .iter()
+        .map(|chain| chain.iter().map(|p| p.bounds).collect());
+    let bounds: Vec<Vec<(f64, f64)>> = bounds.collect();
+    let skip = |a: usize, b: usize| {
+        let mut chains = chains.iter();
+        chains.any(|c| c.windows(2).any(|p| p == [a, b]))
+    };
+    let (slopes, check) = slopes(augmented, region, skip)?;
+    checks.push(check);
     let basis = match form.assignment.chains.len() {
         1 | 2 => BASIS,
         _ => MANY,
@@ -57,18 +68,14 @@ pub(super) fn certificate(
         checks.push(check);
         return Ok(Certificate::new(basis, assumptions, checks));
     }
-    let unbounded = facts
-        .bounds
-        .iter()
-        .flatten()
-        .any(|&(low, high)| !(low > 0.0 && high.is_finite()));
+    let unbounded = bounds.iter().flatten().any(is_open);
     let given = settings.S.is_some() || settings.divided;
     if unbounded {
-        checks.extend(without_bounds(augmented, &form, &facts, region));
+        checks.extend(without_bounds(augmented, &form, &bounds, region));
     }
     if standing(&checks) == Standing::Refuted || (unbounded && !given) {
         let mut certificate = Certificate::new(basis, assumptions, checks);
-        certificate.notes.push(remainder(&facts));
+        certificate.notes.push(remainder(&bounds));
         return Ok(certificate);
     }
     // the observer under study, for its refusals and its gain
@@ -82,8 +89,9 @@ pub(super) fn certificate(
         settings,
         assumptions,
         form: &form,
-        facts: &facts,
         gains: &gains,
+        bounds,
+        slopes,
         basis,
     }
     .certificate(checks)
@@ -94,8 +102,10 @@ struct Study<'a> {
     settings: &'a Settings,
     assumptions: &'a Assumptions,
     form: &'a Form,
-    facts: &'a Facts,
     gains: &'a Gains<'a>,
+    /// per chain (α₁, α₂) of every partial
+    bounds: Vec<Vec<(f64, f64)>>,
+    slopes: Vec<Slope>,
     basis: &'static str,
 }
 
@@ -119,13 +129,14 @@ impl Study<'_> {
         }
         let windows = Window::of(&self.form.assignment, &self.gains.δ);
         checks.extend(windows.iter().map(|w| windowed(w, count, &mut constants)));
-        let (lipschitz, known) = self.steepest();
+        let steepest = self.slopes.iter().fold(0.0, |m: f64, s| m.max(s.size));
         constants.push(Constant::new(
             "c",
-            lipschitz,
+            steepest,
             "upper bound of every |∂f/∂x| beside the chains' own partials",
         ));
-        let ready = known && μ.len() == count && standing(&checks) != Standing::Refuted;
+        let ready =
+            steepest.is_finite() && μ.len() == count && standing(&checks) != Standing::Refuted;
         let rate = if ready {
             self.rate(&μ, &windows, &mut checks, &mut constants)
         } else {
@@ -152,7 +163,7 @@ impl Study<'_> {
         let states = self.form.assignment.chains[i].clone();
         let gains = self.gains;
         let speed = Interval::point(θ).pow(Interval::point(gains.δ[i]));
-        let bounds = &self.facts.bounds[i];
+        let bounds = &self.bounds[i];
         let mut T = Interval::ONE;
         let mut scales = vec![speed];
         for (j, &(low, high)) in bounds.iter().enumerate() {
@@ -189,7 +200,7 @@ impl Study<'_> {
 
     fn comparison(&self, μ: &[f64], θ: impl Fn(usize) -> f64, c: &[f64]) -> Comparison {
         let chains: Vec<Chain> = (0..μ.len()).map(|i| self.chain(i, θ(i), c[i])).collect();
-        Comparison::new(&chains, μ, &self.facts.slopes)
+        Comparison::new(&chains, μ, &self.slopes)
     }
 
     /// (c, θ0) for V = V1 + c2·V2 + …; the paper has c2 = 1.
@@ -200,23 +211,8 @@ impl Study<'_> {
 
     /// `partials = true` divides by the partials at the estimate.
     fn constant_gain(&self) -> Option<Check> {
-        let varies = self
-            .facts
-            .bounds
-            .iter()
-            .flatten()
-            .any(|(low, high)| low != high);
+        let varies = self.bounds.iter().flatten().any(|(low, high)| low != high);
         (self.gains.divided && varies).then(|| undecided(Hammouri::ConstantGain, Said::GainVaries))
-    }
-
-    /// (largest |∂f/∂x| beside the chains, whether all are known)
-    fn steepest(&self) -> (f64, bool) {
-        let largest = self
-            .facts
-            .slopes
-            .iter()
-            .fold(0.0, |m: f64, s| m.max(s.size));
-        (largest, largest.is_finite())
     }
 
     /// (σ, c) at the study's θ, with the hypothesis θ ≥ θ0; c has a weight for each chain.
@@ -338,53 +334,16 @@ fn windowed(window: &Window, count: usize, constants: &mut Vec<Constant>) -> Che
     sufficient(Hammouri::Window, inside, said)
 }
 
-/// What is known of the plant on the box of the assumptions.
-struct Facts {
-    pub checks: Vec<Check>,
-    /// per chain (α₁, α₂) of every partial
-    pub bounds: Vec<Vec<(f64, f64)>>,
-    pub slopes: Vec<Slope>,
-}
-
-impl Facts {
-    pub fn new(
-        augmented: &AugmentedPlant<'_>,
-        form: &Form,
-        region: &Region,
-    ) -> Result<Self, DesignError> {
-        let chains = &form.assignment.chains;
-        let places = chains.iter().map(|c| &c[..]);
-        let (partials, mut checks) = along(augmented, places.enumerate(), region)?;
-        let bounds = partials
-            .iter()
-            .map(|chain| chain.iter().map(|p| p.bounds).collect());
-        let skip = |a: usize, b: usize| {
-            let mut chains = chains.iter();
-            chains.any(|c| c.windows(2).any(|p| p == [a, b]))
-        };
-        let (slopes, check) = slopes(augmented, region, skip)?;
-        checks.push(check);
-        Ok(Self {
-            checks,
-            bounds: bounds.collect(),
-            slopes,
-        })
-    }
-}
-
 /// Partials without bounds: Lemma 1 has nothing to start from.
 fn without_bounds(
     augmented: &AugmentedPlant<'_>,
     form: &Form,
-    facts: &Facts,
+    bounds: &[Vec<(f64, f64)>],
     region: &Region,
 ) -> Option<Check> {
-    let partials = form
-        .partials
-        .iter()
-        .flatten()
-        .zip(facts.bounds.iter().flatten());
-    let open = partials.filter(|(_, (low, high))| !(*low > 0.0 && high.is_finite()));
+    let partials = form.partials.iter().flatten();
+    let open = partials.zip(bounds.iter().flatten());
+    let open = open.filter(|(_, bounds)| is_open(bounds));
     let nodes: Vec<_> = open.map(|(partial, _)| partial.node).collect();
     let said = Said::NoBounds {
         partial: augmented.graph().render(*nodes.first()?, 60),
@@ -393,10 +352,15 @@ fn without_bounds(
     Some(undecided(Hammouri::PartialsAreBounded, said))
 }
 
-fn remainder(facts: &Facts) -> Reason {
-    let bounds = facts.bounds.iter().flatten();
-    let known = bounds.clone().filter(|(l, h)| *l > 0.0 && h.is_finite());
-    let (known, all) = (known.count(), bounds.count());
+/// Whether Lemma 1 has nothing to start from.
+fn is_open((low, high): &(f64, f64)) -> bool {
+    !(*low > 0.0 && high.is_finite())
+}
+
+fn remainder(bounds: &[Vec<(f64, f64)>]) -> Reason {
+    let all = bounds.iter().flatten().count();
+    let open = bounds.iter().flatten().filter(|bounds| is_open(bounds));
+    let known = all - open.count();
     Said::BoundsKnown { known, all }.into()
 }
 

@@ -452,7 +452,7 @@ fn a_singular_map_is_refused_with_the_point() {
          equation der(a) = b^2; der(b) = -b; end Q;",
     );
     let error = design_with(&DriftObservable, &plant, &[], &Tuning::default()).unwrap_err();
-    let text = error.to_string();
+    let text = error.words();
     assert!(
         text.contains("Q(x) is regular on the box (drift-observable): refuted"),
         "{text}"

@@ -146,7 +146,7 @@ fn a_square_is_refused_at_its_zero() {
          equation der(x1) = x2^2; der(x2) = 0; end Square;",
     );
     let error = design(&plant, &[], &Tuning::from([("theta", 1.0)])).unwrap_err();
-    let text = error.to_string();
+    let text = error.words();
     assert!(
         text.contains("∂f(x1)/∂x2 keeps its sign: refuted: it is 0 at x2 = 0"),
         "{text}"
