@@ -64,25 +64,12 @@ pub struct Innovation {
 }
 
 impl Slopes {
-    /// The error system of x' = `derivatives` in `states`.
+    /// The error system of x' = `derivatives` in `states`, or of an observer x̂' = F(x̂, ε) with the innovations ε among
+    /// the sides of the region, their ranges around 0.
     ///
     /// # Errors
     /// [`MissingInput`] where an expression reads a symbol outside the region.
     pub fn new(
-        graph: &Graph,
-        derivatives: &[Node],
-        states: &[Node],
-        region: &Region,
-    ) -> Result<Self, MissingInput> {
-        Self::around(graph, derivatives, states, &[], region)
-    }
-
-    /// The error system of an observer x̂' = F(x̂, ε), with the innovations ε among the
-    /// sides of the region, their ranges around 0.
-    ///
-    /// # Errors
-    /// [`MissingInput`] where an expression reads a symbol outside the region.
-    pub fn around(
         graph: &Graph,
         derivatives: &[Node],
         states: &[Node],

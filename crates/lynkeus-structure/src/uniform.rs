@@ -66,7 +66,7 @@ pub fn uniformity(
     }
     let graph = augmented.graph();
     let region = augmented.region();
-    let derivatives = Derivatives::new(augmented)?;
+    let derivatives = derivatives(augmented)?;
     let Some((node, regular)) = map(augmented, &derivatives, &region)? else {
         return Ok(None);
     };
@@ -80,7 +80,7 @@ pub fn uniformity(
     // more rows than states may tell apart what no choice of them does
     let together = regular.is_proved() || augmented.outputs.len() > 1;
     Ok(Some(Uniformity {
-        one_to_one: derivatives.one_to_one(augmented, known, together, &region)?,
+        one_to_one: are_one_to_one(augmented, &derivatives, known, together, &region)?,
         blind: match regular.verdict {
             Verdict::Proved => vec![],
             _ => blind(augmented, node, &region)?,
@@ -112,13 +112,13 @@ pub fn apart_whatever(
         return Ok(known.to_vec());
     }
     let graph = augmented.graph();
-    let mut derivatives = Derivatives::new(augmented)?;
+    let mut derivatives = derivatives(augmented)?;
     let reads = |y: &Node| graph.symbols_of(&[*y]).iter().any(|s| signals.contains(s));
-    for of_output in &mut derivatives.values {
+    for of_output in &mut derivatives {
         let kept = of_output.iter().position(reads);
         of_output.truncate(kept.unwrap_or(of_output.len()));
     }
-    let found = derivatives.one_to_one(augmented, known, true, &augmented.region())?;
+    let found = are_one_to_one(augmented, &derivatives, known, true, &augmented.region())?;
     Ok(found.known)
 }
 
@@ -138,15 +138,22 @@ fn without_jumps(found: Finding, region: &Region) -> Finding {
 /// first choice of rows for which that is proved, else of the first that is independent at generic points.
 fn map(
     augmented: &AugmentedPlant<'_>,
-    derivatives: &Derivatives,
+    derivatives: &[Vec<Node>],
     region: &Region,
 ) -> Result<Option<(Node, Finding)>, MissingInput> {
-    let mut codistribution = Codistribution::new(augmented, &derivatives.gradients)?;
+    let (graph, symbols) = (augmented.graph(), augmented.symbols());
+    let gradient = |y: &Vec<Node>| jacobian_rows(graph, y, &symbols);
+    let gradients: Vec<Rows> = derivatives.iter().map(gradient).collect();
+    let examined = |indices: &[usize]| {
+        let (rows, map) = (chosen(&gradients, indices), chosen(derivatives, indices));
+        examined(augmented, &rows, &map, region)
+    };
+    let mut codistribution = Codistribution::new(augmented, &gradients)?;
     let first = codistribution.krener_respondek();
     if first.iter().sum::<usize>() < augmented.states.len() {
         return Ok(None);
     }
-    let Some(found) = examined(augmented, derivatives, &first, region)? else {
+    let Some(found) = examined(&first)? else {
         return Ok(None);
     };
     if found.1.is_proved() {
@@ -158,7 +165,7 @@ fn map(
         if codistribution.changes_sign(&indices) {
             continue;
         }
-        let other = examined(augmented, derivatives, &indices, region)?;
+        let other = examined(&indices)?;
         if other.as_ref().is_some_and(|other| other.1.is_proved()) {
             return Ok(other);
         }
@@ -166,81 +173,62 @@ fn map(
     Ok(Some(found))
 }
 
+/// So many of each output, in one list.
+fn chosen<T: Clone>(of_outputs: &[Vec<T>], indices: &[usize]) -> Vec<T> {
+    let pairs = of_outputs.iter().zip(indices);
+    let chosen = pairs.flat_map(|(all, &count)| all.iter().take(count));
+    chosen.cloned().collect()
+}
+
+/// The determinant of these rows, the Jacobian of this map; none where it is zero by its pattern.
 fn examined(
     augmented: &AugmentedPlant<'_>,
-    derivatives: &Derivatives,
-    indices: &[usize],
+    rows: &Rows,
+    map: &[Node],
     region: &Region,
 ) -> Result<Option<(Node, Finding)>, MissingInput> {
     let graph = augmented.graph();
-    let pairs = derivatives.gradients.iter().zip(indices);
-    let chosen: Rows = pairs
-        .flat_map(|(rows, &count)| rows.iter().take(count).cloned())
-        .collect();
-    let Some(node) = determinant(graph, &chosen) else {
+    let Some(node) = determinant(graph, rows) else {
         return Ok(None);
     };
-    let pairs = derivatives.values.iter().zip(indices);
-    let map: Vec<Node> = pairs
-        .flat_map(|(y, &count)| y.iter().take(count).copied())
-        .collect();
     // where the map itself jumps, its derivative tells nothing
     let mut moving = augmented.symbols();
     moving.push(augmented.plant.time);
-    let mut regular = regularity(graph, &map, &moving, region)?;
+    let mut regular = regularity(graph, map, &moving, region)?;
     if regular.is_proved() {
         regular = without_jumps(sign::keeps_sign(graph, node, region)?.finding, region);
     }
     Ok(Some((node, regular)))
 }
 
-/// The outputs' derivatives along the flow for constant inputs.
-struct Derivatives {
-    /// y_i^(k), k = 0 … n − 1
-    values: Vec<Vec<Node>>,
-    /// ∂y_i^(k)/∂x
-    gradients: Vec<Rows>,
+/// y_i^(k) along the flow for constant inputs, k = 0 … n − 1.
+fn derivatives(augmented: &AugmentedPlant<'_>) -> Result<Vec<Vec<Node>>, MissingInput> {
+    let n = augmented.states.len();
+    let zero = augmented.graph().constant(0.0).node();
+    let constant = |input: &lynkeus_model::Variable| {
+        let mut jet = vec![zero; n + 1];
+        jet[0] = input.node;
+        jet
+    };
+    let constant: Vec<Vec<Node>> = augmented.inputs.iter().map(constant).collect();
+    output_derivatives(augmented, &constant, n.saturating_sub(1))
 }
 
-impl Derivatives {
-    fn new(augmented: &AugmentedPlant<'_>) -> Result<Self, MissingInput> {
-        let n = augmented.states.len();
-        let graph = augmented.graph();
-        let zero = graph.constant(0.0).node();
-        let constant: Vec<Vec<Node>> = augmented
-            .inputs
-            .iter()
-            .map(|input| {
-                std::iter::once(input.node)
-                    .chain((0..n).map(|_| zero))
-                    .collect()
-            })
-            .collect();
-        let values = output_derivatives(augmented, &constant, n.saturating_sub(1))?;
-        let symbols = augmented.symbols();
-        let gradient = |y: &Vec<Node>| jacobian_rows(graph, y, &symbols);
-        Ok(Self {
-            gradients: values.iter().map(gradient).collect(),
-            values,
-        })
-    }
-
-    /// Whether all of them together are one-to-one on the box.
-    fn one_to_one(
-        &self,
-        augmented: &AugmentedPlant<'_>,
-        known: &[bool],
-        together: bool,
-        region: &Region,
-    ) -> Result<OneToOne, MissingInput> {
-        let map = one_to_one::Map {
-            graph: augmented.graph(),
-            functions: &self.values.concat(),
-            states: &augmented.symbols(),
-            region,
-        };
-        map.one_to_one(known, together)
-    }
+/// Whether all of them together are one-to-one on the box.
+fn are_one_to_one(
+    augmented: &AugmentedPlant<'_>,
+    derivatives: &[Vec<Node>],
+    known: &[bool],
+    together: bool,
+    region: &Region,
+) -> Result<OneToOne, MissingInput> {
+    let map = one_to_one::Map {
+        graph: augmented.graph(),
+        functions: &derivatives.concat(),
+        states: &augmented.symbols(),
+        region,
+    };
+    map.one_to_one(known, together)
 }
 
 /// Cells in which the determinant may be zero, and their share of the volume.

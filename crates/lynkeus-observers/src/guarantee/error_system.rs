@@ -74,7 +74,7 @@ impl ErrorSystem {
         region: &Region,
     ) -> Result<Self, MissingInput> {
         let (symbols, derivatives) = (augmented.symbols(), &augmented.derivatives);
-        let slopes = Slopes::new(augmented.graph(), derivatives, &symbols, region)?;
+        let slopes = Slopes::new(augmented.graph(), derivatives, &symbols, &[], region)?;
         Self::of(augmented, derivatives, &symbols, region.clone(), slopes)
     }
 
@@ -313,7 +313,7 @@ fn around_innovations(
         });
     }
     let derivatives = graph.substitute(&observer.derivatives, &images);
-    Slopes::around(graph, &derivatives, symbols, &innovations, &sides)
+    Slopes::new(graph, &derivatives, symbols, &innovations, &sides)
 }
 
 /// The plant's states as the observer estimates them.

@@ -11,7 +11,13 @@ fn slopes(plant: &Plant) -> (Slopes, Region) {
     let augmented = AugmentedPlant::new(plant, &Sensors::default()).unwrap();
     let region = augmented.region();
     let symbols = augmented.symbols();
-    let found = Slopes::new(augmented.graph(), &augmented.derivatives, &symbols, &region);
+    let found = Slopes::new(
+        augmented.graph(),
+        &augmented.derivatives,
+        &symbols,
+        &[],
+        &region,
+    );
     (found.unwrap(), region)
 }
 
@@ -188,7 +194,7 @@ fn a_gain_times_an_innovation_costs_the_range_of_the_gain() {
         symbol: error.node(),
         state: 0,
     }];
-    let found = Slopes::around(graph, &corrected, &[a, b], &innovations, &region).unwrap();
+    let found = Slopes::new(graph, &corrected, &[a, b], &innovations, &region).unwrap();
     let model = &found.models[0];
     assert_eq!(model.constant[0][0], Interval::point(-7.0));
     let of = |column: usize| model.sectors.iter().filter(move |s| s.column == column);
@@ -237,7 +243,7 @@ fn slopes_of_the_same_state_and_equation_are_added() {
         symbol: error.node(),
         state: 0,
     }];
-    let found = Slopes::around(graph, &corrected, &symbols, &innovations, &region).unwrap();
+    let found = Slopes::new(graph, &corrected, &symbols, &innovations, &region).unwrap();
     // −2a in [−8, 0] and −b in [−2, −1]
     assert_eq!(found.slopes.len(), 1, "{:?}", found.slopes);
     let sector = &found.models[0].sectors[0];
