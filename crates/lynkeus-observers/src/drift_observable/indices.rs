@@ -14,7 +14,7 @@ use lynkeus_structure::output_map::Codistribution;
 use lynkeus_structure::{AugmentedPlant, Region, Standing, Verdict};
 
 use super::form::{Form, Map, unfit};
-use super::said::{Known, Said};
+use super::said::{Known, Others, Said};
 use super::settings::{POLES, Settings};
 use crate::conditions::lasts;
 use crate::design::{Found, Searched};
@@ -108,7 +108,7 @@ fn best(
     rows: &mut Codistribution,
     candidates: &[Vec<usize>],
     form: impl Fn(&[usize]) -> Result<Found<Form>, DesignError>,
-) -> Result<(Found<Form>, Vec<(Vec<usize>, Known)>), DesignError> {
+) -> Result<(Found<Form>, Others), DesignError> {
     let mut best = form(&candidates[0])?;
     let (mut others, mut examined) = (vec![], 0);
     for μ in &candidates[1..] {

@@ -30,7 +30,7 @@ use crate::design::{Found, Searched};
 use crate::family::Stages;
 use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
 use form::{Form, NAME};
-pub use said::{Germani, Known, Said};
+pub use said::{Germani, Known, Others, Said};
 use settings::Settings;
 
 const PAPER: &str = "Germani, Manes 1999, http://dml.cz/dmlcz/135297";
