@@ -65,8 +65,6 @@ pub enum Statement {
 /// the sentences.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Reason {
-    /// a sentence that is not data yet
-    Text(String),
     /// found in the structure of the plant
     Structure(lynkeus_structure::Reason),
     /// a number that has to be at most a limit, and is or not
@@ -178,29 +176,6 @@ pub enum Reason {
     UnknownInput(unknown_input::Said),
     /// of the family `drift-observable`
     DriftObservable(drift_observable::Said),
-}
-
-impl Reason {
-    /// The sentence.
-    pub fn text(self) -> String {
-        match self {
-            Self::Text(text) => text,
-            Self::Structure(reason) => reason.text(),
-            said => format!("{said:?}"),
-        }
-    }
-}
-
-impl From<String> for Reason {
-    fn from(text: String) -> Self {
-        Self::Text(text)
-    }
-}
-
-impl From<&str> for Reason {
-    fn from(text: &str) -> Self {
-        Self::Text(text.to_owned())
-    }
 }
 
 impl From<lynkeus_structure::Reason> for Reason {
@@ -384,15 +359,18 @@ mod tests {
             coordinates: vec![],
             value: 0.0,
         };
-        let failing = || refuted(Germani::UniformlyObservable, zero.clone(), "");
-        let holding = || proved(Germani::Regular, "");
+        let failing = || refuted(Germani::UniformlyObservable, zero.clone(), Reason::Assumed);
+        let holding = || proved(Germani::Regular, Reason::Assumed);
         for (checks, expected) in [
             (vec![], Standing::Proved),
             (vec![holding(), holding()], Standing::Proved),
             (vec![holding(), failing().advisory()], Standing::Undecided),
             (vec![failing(), holding()], Standing::Refuted),
             (
-                vec![undecided(Germani::Degree, ""), failing().advisory()],
+                vec![
+                    undecided(Germani::Degree, Reason::Assumed),
+                    failing().advisory(),
+                ],
                 Standing::Undecided,
             ),
             (vec![holding().advisory()], Standing::Proved),

@@ -33,7 +33,6 @@ impl Words for Statement {
 impl Words for Reason {
     fn words(&self) -> String {
         match self {
-            Self::Text(text) => text.clone(),
             Self::Structure(reason) => reason.words(),
             Self::AtMost { found, limit } => {
                 let sign = if found <= limit { "≤" } else { ">" };
