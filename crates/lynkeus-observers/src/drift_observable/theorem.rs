@@ -436,7 +436,7 @@ impl Proof<'_, '_> {
         let mut start = 0;
         for (i, K) in self.gains.K.iter().enumerate() {
             let noise = assumptions.noise.get(i).copied().unwrap_or(0.0);
-            let mut column = vec![0.0; self.A.len()];
+            let mut column = vec![0.0; self.A.nrows()];
             column[start..start + K.len()].copy_from_slice(K);
             if noise > 0.0 && !K.is_empty() {
                 sum = plus(sum, times(P.weight(&column), noise));
