@@ -261,21 +261,24 @@ pub enum DesignError {
     Spent(#[from] Spent),
 }
 
+impl From<Examination> for DesignError {
+    fn from(refusal: Examination) -> Self {
+        Self::Refused(Box::new(refusal))
+    }
+}
+
 /// A form with what is known of its conditions.
 pub struct Found<F> {
     pub form: F,
     pub examination: Examination,
 }
 
-/// A form, or the examination that says why there is none.
-pub type Searched<F> = Result<Result<Found<F>, Examination>, DesignError>;
-
 /// Of the candidates the first whose conditions are proved, else the first that no condition refutes, else
 /// the first; there is one.
 pub fn first_fit<C, F>(
     candidates: impl IntoIterator<Item = C>,
     examined: impl Fn(C) -> Result<Found<F>, DesignError>,
-) -> Searched<F> {
+) -> Result<Found<F>, DesignError> {
     let mut best: Option<Found<F>> = None;
     for candidate in candidates {
         let found = examined(candidate)?;
@@ -291,5 +294,5 @@ pub fn first_fit<C, F>(
         }
     }
     let none = || TuningError::new("chains", "a chain", "none");
-    best.map(Ok).ok_or_else(|| none().into())
+    best.ok_or_else(|| none().into())
 }
