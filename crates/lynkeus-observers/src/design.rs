@@ -37,7 +37,7 @@ enum PlantFit {
     /// the form is another
     Unfit,
     /// it has the form; f and h have values and do not jump, or not
-    Form(Check),
+    Form(Box<Check>),
     /// any plant will do
     Any,
     /// a limit ended the examination before its end
@@ -62,7 +62,7 @@ impl Examination {
             summary: summary.into(),
             chains,
             checks,
-            plant: PlantFit::Form(regularity),
+            plant: PlantFit::Form(Box::new(regularity)),
         })
     }
 
@@ -126,7 +126,7 @@ impl Examination {
     /// Every condition: that the plant is regular on the box, then those of the family.
     pub fn conditions(&self) -> impl Iterator<Item = &Check> {
         let regularity = match &self.plant {
-            PlantFit::Form(regularity) => Some(regularity),
+            PlantFit::Form(regularity) => Some(&**regularity),
             PlantFit::Unfit | PlantFit::Any | PlantFit::Ended(_) => None,
         };
         regularity.into_iter().chain(&self.checks)
@@ -251,7 +251,7 @@ pub enum DesignError {
         /// the key that asks for too much
         key: &'static str,
         /// what blocks it
-        reason: Reason,
+        reason: Box<Reason>,
     },
     /// the plant has parameters without value
     #[error(transparent)]
@@ -261,21 +261,24 @@ pub enum DesignError {
     Spent(#[from] Spent),
 }
 
+impl From<Examination> for DesignError {
+    fn from(refusal: Examination) -> Self {
+        Self::Refused(Box::new(refusal))
+    }
+}
+
 /// A form with what is known of its conditions.
 pub struct Found<F> {
     pub form: F,
     pub examination: Examination,
 }
 
-/// A form, or the examination that says why there is none.
-pub type Searched<F> = Result<Result<Found<F>, Examination>, DesignError>;
-
 /// Of the candidates the first whose conditions are proved, else the first that no condition refutes, else
 /// the first; there is one.
 pub fn first_fit<C, F>(
     candidates: impl IntoIterator<Item = C>,
     examined: impl Fn(C) -> Result<Found<F>, DesignError>,
-) -> Searched<F> {
+) -> Result<Found<F>, DesignError> {
     let mut best: Option<Found<F>> = None;
     for candidate in candidates {
         let found = examined(candidate)?;
@@ -291,5 +294,5 @@ pub fn first_fit<C, F>(
         }
     }
     let none = || TuningError::new("chains", "a chain", "none");
-    best.map(Ok).ok_or_else(|| none().into())
+    best.ok_or_else(|| none().into())
 }

@@ -21,29 +21,18 @@ use lynkeus_structure::{AugmentedPlant, Measurement, Region};
 
 use crate::conditions::Partial;
 use crate::tuning::is_or_has;
-use crate::{
-    Estimate, Initial, KeySpec, Observer, Reason, Shape, Signal, Tunable, Tuning, TuningError,
-};
+use crate::{Estimate, KeySpec, Observer, Reason, Shape, Signal, Tunable, Tuning, TuningError};
 
-/// The keys of every observer, read.
-pub struct Common {
-    pub initial: Initial,
-    /// the plant's functions see the estimate limited to its range
-    pub clamp: bool,
-    /// outside of it they are continued (`prolongation`)
-    pub prolong: bool,
-    /// θ is a symbol
-    pub tunable: bool,
-}
+impl Tuning {
+    /// The same where the keys of every observer can be used.
+    pub(crate) fn checked(&self) -> Result<Self, TuningError> {
+        self.flag(PROLONG.name)?;
+        Ok(self.clone())
+    }
 
-impl Common {
-    pub fn read(tuning: &Tuning) -> Result<Self, TuningError> {
-        Ok(Self {
-            initial: tuning.initial.clone(),
-            clamp: tuning.clamp,
-            prolong: tuning.flag(PROLONG.name)?,
-            tunable: tuning.tunable,
-        })
+    /// Whether the plant's functions are continued outside of the declared ranges.
+    pub(crate) fn prolongs(&self) -> bool {
+        self.flag(PROLONG.name).unwrap_or(false)
     }
 }
 
@@ -56,11 +45,11 @@ pub(crate) struct PlantCopy<'e, 'p> {
     pub measured: Vec<Signal>,
     /// x ↦ x̂, limited to [min, max] if the tuning says so
     seen: HashMap<Node, Node>,
-    pub common: &'e Common,
+    pub common: &'e Tuning,
 }
 
 impl<'e, 'p> PlantCopy<'e, 'p> {
-    pub fn new(augmented: &'e AugmentedPlant<'p>, common: &'e Common) -> Self {
+    pub fn new(augmented: &'e AugmentedPlant<'p>, common: &'e Tuning) -> Self {
         let graph = augmented.graph();
         let hat = |state: &Variable| Signal::fresh(graph, "estimate of", &state.name);
         let y = |o: &Measurement| Signal::fresh(graph, "measured", &o.variable.name);
@@ -79,7 +68,7 @@ impl<'e, 'p> PlantCopy<'e, 'p> {
 
     /// How the plant's functions see a state whose estimate is `hat`.
     pub fn seen_as(&self, state: usize, hat: Node) -> Node {
-        match self.common.clamp || self.common.prolong {
+        match self.common.clamp || self.common.prolongs() {
             true => limited(self.augmented.graph(), hat, &self.augmented.states[state]),
             false => hat,
         }
@@ -221,7 +210,7 @@ pub(crate) fn prolong(
     partials: &[Partial],
     derivatives: &mut [Node],
 ) -> Result<(), TuningError> {
-    if !copy.common.prolong {
+    if !copy.common.prolongs() {
         return Ok(());
     }
     let graph = copy.augmented.graph();
@@ -244,8 +233,8 @@ pub(crate) fn prolong(
 }
 
 /// Refuses the key where an observer has no such form.
-pub(crate) fn refuse(common: &Common, observer: &str) -> Result<(), TuningError> {
-    match common.prolong {
+pub(crate) fn refuse(common: &Tuning, observer: &str) -> Result<(), TuningError> {
+    match common.prolongs() {
         true => Err(TuningError::new(
             PROLONG.name,
             format!("no prolongation with {observer}"),
@@ -259,14 +248,14 @@ pub(crate) fn refuse(common: &Common, observer: &str) -> Result<(), TuningError>
 ///
 /// Everywhere only where the box of the proof is the one that the observer projects on and
 /// takes its slopes from: a smaller one of states (`tube`) or of inputs has other bounds.
-pub(crate) fn note(common: &Common, augmented: &AugmentedPlant<'_>, region: &Region) -> Reason {
+pub(crate) fn note(common: &Tuning, augmented: &AugmentedPlant<'_>, region: &Region) -> Reason {
     let whole = |variable: &Variable| {
         let mut sides = region.dimensions.iter();
         let side = sides.find(|d| d.symbol == variable.node);
         side.is_none_or(|d| d.min <= variable.min && d.max >= variable.max)
     };
     let declared = augmented.plant.states.iter().chain(&augmented.plant.inputs);
-    match (common.prolong, declared.into_iter().all(whole)) {
+    match (common.prolongs(), declared.into_iter().all(whole)) {
         (true, true) => Reason::EveryStart,
         (true, false) => Reason::PartOfTheBox,
         (false, _) => Reason::InTheBox {

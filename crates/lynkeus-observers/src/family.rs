@@ -3,7 +3,7 @@
 
 use lynkeus_structure::{AugmentedPlant, Region, Standing};
 
-use crate::design::{Found, Searched};
+use crate::design::Found;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Tuning, TuningError,
 };
@@ -46,7 +46,7 @@ pub(crate) trait Stages: Sync {
         augmented: &'e AugmentedPlant<'p>,
         settings: &Self::Settings,
         region: &Region,
-    ) -> Searched<Self::Form<'e, 'p>>;
+    ) -> Result<Found<Self::Form<'e, 'p>>, DesignError>;
 
     /// The observer; no condition of the form is refuted.
     fn design<'e, 'p>(
@@ -100,14 +100,13 @@ impl<S: Stages> Family for S {
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
         let settings = S::read(augmented, tuning)?;
-        let examined = lasting(augmented, || {
-            Ok(match S::form(augmented, &settings, &augmented.region())? {
-                Ok(Found { examination, .. }) | Err(examination) => examination,
-            })
-        });
-        match examined {
+        match lasting(augmented, || {
+            S::form(augmented, &settings, &augmented.region())
+        }) {
+            Ok(found) => Ok(found.examination),
+            Err(DesignError::Refused(examination)) => Ok(*examination),
             Err(DesignError::Spent(spent)) => Ok(Examination::ended(S::NAME, spent)),
-            examined => examined,
+            Err(error) => Err(error),
         }
     }
 
@@ -117,15 +116,11 @@ impl<S: Stages> Family for S {
         tuning: &Tuning,
     ) -> Result<Design, DesignError> {
         let settings = S::read(augmented, tuning)?;
-        match lasting(augmented, || {
-            S::form(augmented, &settings, &augmented.region())
-        })? {
-            Ok(found) if found.examination.fit() != Standing::Refuted => {
-                lasting(augmented, || S::design(augmented, &settings, found))
-            }
-            Ok(Found { examination, .. }) | Err(examination) => {
-                Err(DesignError::Refused(Box::new(examination)))
-            }
+        let form = || S::form(augmented, &settings, &augmented.region());
+        let found = lasting(augmented, form)?;
+        match found.examination.fit() {
+            Standing::Refuted => Err(found.examination.into()),
+            _ => lasting(augmented, || S::design(augmented, &settings, found)),
         }
     }
 
@@ -152,17 +147,21 @@ fn theorem<S: Stages>(
         true => assumptions.region.clone(),
         false => augmented.region(),
     };
-    let refuted = |found: &Found<_>| found.examination.fit() == Standing::Refuted;
-    match lasting(augmented, || S::form(augmented, &settings, &region))? {
-        Ok(found) if !(S::FORM_ON_ASSUMED_BOX && refuted(&found)) => lasting(augmented, || {
-            S::theorem(augmented, &settings, found, assumptions)
-        }),
-        Ok(Found { examination, .. }) | Err(examination) if examination.refuted().is_some() => {
-            Ok(Certificate::new(S::BASIS, assumptions, examination.checks))
+    let examination = match lasting(augmented, || S::form(augmented, &settings, &region)) {
+        Ok(found) if S::FORM_ON_ASSUMED_BOX && found.examination.fit() == Standing::Refuted => {
+            found.examination
         }
-        Ok(Found { examination, .. }) | Err(examination) => {
-            Err(DesignError::Refused(Box::new(examination)))
+        Ok(found) => {
+            return lasting(augmented, || {
+                S::theorem(augmented, &settings, found, assumptions)
+            });
         }
+        Err(DesignError::Refused(examination)) => *examination,
+        Err(error) => return Err(error),
+    };
+    match examination.refuted() {
+        Some(_) => Ok(Certificate::new(S::BASIS, assumptions, examination.checks)),
+        None => Err(examination.into()),
     }
 }
 

@@ -17,7 +17,7 @@ use lynkeus_model::Variable;
 use lynkeus_run::filter::{FilterKind, SigmaPoints};
 use lynkeus_structure::{AugmentedPlant, Standing};
 
-use crate::estimate::{Common, PlantCopy, Speed, limited};
+use crate::estimate::{PlantCopy, Speed, limited};
 use crate::family::lasting;
 use crate::tuning::is_or_has;
 use crate::{
@@ -92,7 +92,7 @@ impl Filter {
     ) -> Result<Settings, TuningError> {
         Ok(Settings {
             kind: (self.kind)(tuning)?,
-            common: Common::read(tuning)?,
+            common: tuning.checked()?,
             gate: tuning.positive(GATE.name)?,
             projects: tuning.meant(&BOUNDS[0], [true])?.is_some(),
             variance: variances(augmented, tuning)?,
@@ -281,7 +281,7 @@ const WINDOW: [KeySpec; 1] = [KeySpec {
 
 /// The keys, read.
 struct Settings {
-    common: Common,
+    common: Tuning,
     kind: FilterKind,
     gate: Option<f64>,
     /// the estimate is kept in the declared ranges

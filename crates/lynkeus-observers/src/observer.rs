@@ -143,6 +143,15 @@ impl Observer {
     }
 }
 
+impl Observer {
+    /// Whether its states are the estimate itself, of so many quantities.
+    pub(crate) fn is_the_estimate(&self, count: usize) -> bool {
+        let pairs = self.states.iter().zip(&self.estimates);
+        let same = pairs.filter(|((s, _), e)| s.symbol == e.node).count();
+        same == self.states.len() && same == count
+    }
+}
+
 impl Signal {
     /// A signal called as the plant has it, with a symbol of its own: `label` of `name`.
     pub(crate) fn fresh(graph: &Graph, label: &str, name: &str) -> Self {

@@ -6,15 +6,12 @@
 use lynkeus_expr::{Interval, Spent};
 use lynkeus_structure::{Finding, Standing, Verdict, Witness};
 
-use crate::block_triangular::Lee;
-use crate::drift_observable::Germani;
-use crate::guarantee::Inequality;
-use crate::state_affine::Ltaief;
-use crate::triangular::Hammouri;
-use crate::unknown_input::Farza;
-use crate::{
-    block_triangular, drift_observable, guarantee, state_affine, triangular, unknown_input,
-};
+use crate::block_triangular::{Lee, Said as SaidOfBlockTriangular};
+use crate::drift_observable::{Germani, Said as SaidOfDriftObservable};
+use crate::guarantee::{Inequality, Said as SaidOfGuarantee};
+use crate::state_affine::{Ltaief, Said as SaidOfStateAffine};
+use crate::triangular::{Hammouri, Said as SaidOfTriangular};
+use crate::unknown_input::{Farza, Said as SaidOfUnknownInput};
 
 /// What has to hold: a condition of a family or a hypothesis of a theorem.
 #[derive(Clone, Debug, PartialEq)]
@@ -165,17 +162,17 @@ pub enum Reason {
     /// the gain of a filter depends on the run
     GainOfTheRun,
     /// of the certificate by linear matrix inequalities
-    Guarantee(guarantee::Said),
+    Guarantee(SaidOfGuarantee),
     /// of the family `triangular`
-    Triangular(triangular::Said),
+    Triangular(SaidOfTriangular),
     /// of the family `block-triangular`
-    BlockTriangular(block_triangular::Said),
+    BlockTriangular(SaidOfBlockTriangular),
     /// of the family `state-affine`
-    StateAffine(state_affine::Said),
+    StateAffine(SaidOfStateAffine),
     /// of the family `unknown-input`
-    UnknownInput(unknown_input::Said),
+    UnknownInput(SaidOfUnknownInput),
     /// of the family `drift-observable`
-    DriftObservable(drift_observable::Said),
+    DriftObservable(SaidOfDriftObservable),
 }
 
 impl From<lynkeus_structure::Misfit> for Reason {
@@ -190,38 +187,38 @@ impl From<lynkeus_structure::Reason> for Reason {
     }
 }
 
-impl From<state_affine::Said> for Reason {
-    fn from(said: state_affine::Said) -> Self {
+impl From<SaidOfStateAffine> for Reason {
+    fn from(said: SaidOfStateAffine) -> Self {
         Self::StateAffine(said)
     }
 }
 
-impl From<unknown_input::Said> for Reason {
-    fn from(said: unknown_input::Said) -> Self {
+impl From<SaidOfUnknownInput> for Reason {
+    fn from(said: SaidOfUnknownInput) -> Self {
         Self::UnknownInput(said)
     }
 }
 
-impl From<drift_observable::Said> for Reason {
-    fn from(said: drift_observable::Said) -> Self {
+impl From<SaidOfDriftObservable> for Reason {
+    fn from(said: SaidOfDriftObservable) -> Self {
         Self::DriftObservable(said)
     }
 }
 
-impl From<guarantee::Said> for Reason {
-    fn from(said: guarantee::Said) -> Self {
+impl From<SaidOfGuarantee> for Reason {
+    fn from(said: SaidOfGuarantee) -> Self {
         Self::Guarantee(said)
     }
 }
 
-impl From<triangular::Said> for Reason {
-    fn from(said: triangular::Said) -> Self {
+impl From<SaidOfTriangular> for Reason {
+    fn from(said: SaidOfTriangular) -> Self {
         Self::Triangular(said)
     }
 }
 
-impl From<block_triangular::Said> for Reason {
-    fn from(said: block_triangular::Said) -> Self {
+impl From<SaidOfBlockTriangular> for Reason {
+    fn from(said: SaidOfBlockTriangular) -> Self {
         Self::BlockTriangular(said)
     }
 }

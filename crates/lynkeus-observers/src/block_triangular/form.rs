@@ -15,7 +15,7 @@ use lynkeus_structure::{AugmentedPlant, Blocks, Region, blocks};
 use super::said::{Correction, Lee, Said};
 use super::settings::Settings;
 use crate::conditions::{GainedChain, Partial, lipschitz, names, output_slope, partials};
-use crate::design::{Found, Searched, first_fit};
+use crate::design::{Found, first_fit};
 use crate::statement::{proved, refuted, undecided};
 use crate::{Check, DesignError, Examination, Reason, TuningError};
 
@@ -37,14 +37,14 @@ pub(super) fn form(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     region: &Region,
-) -> Searched<Form> {
-    let refusal = |summary| Ok(Err(Examination::unfit(NAME, summary, vec![])));
+) -> Result<Found<Form>, DesignError> {
+    let refusal = |summary: Reason| Err(Examination::unfit(NAME, summary, vec![]).into());
     if settings.impossible() {
         return refusal(Said::OnlyClassical.into());
     }
     let arrangements = match blocks::find(augmented, &settings.request, settings.order.as_deref()) {
         Ok(arrangements) => arrangements,
-        Err(summary) => return refusal(Reason::from(summary)),
+        Err(summary) => return refusal(Reason::Structure(summary.into())),
     };
     let choices = distinct(augmented, settings, &arrangements)?;
     first_fit(choices.into_iter().take(EXAMINED), |choice| {

@@ -23,7 +23,7 @@ mod transformed;
 
 use lynkeus_structure::{AugmentedPlant, Region};
 
-use crate::design::{Found, Searched};
+use crate::design::Found;
 use crate::family::Stages;
 use crate::{
     Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError, guarantee,
@@ -58,7 +58,7 @@ impl Stages for BlockTriangular {
         augmented: &AugmentedPlant<'_>,
         settings: &Settings,
         region: &Region,
-    ) -> Searched<Form> {
+    ) -> Result<Found<Form>, DesignError> {
         form::form(augmented, settings, region)
     }
 

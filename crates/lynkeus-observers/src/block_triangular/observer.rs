@@ -143,7 +143,7 @@ impl Steps {
     pub fn new(augmented: &AugmentedPlant<'_>, chain: &Chain) -> Self {
         let graph = augmented.graph();
         let n = chain.len();
-        let F = own_jacobian(augmented, chain);
+        let F = slopes(augmented, chain, chain);
         // Step 1: M̄ = (C; CF; …; CF^{n−1}), lower triangular, and the next power CFⁿ
         let mut rows = vec![unit(graph, n)];
         for k in 0..n {
@@ -210,15 +210,17 @@ fn lee(augmented: &AugmentedPlant<'_>, chain: &Chain, gains: &[Node]) -> Vec<Nod
 /// An entry that may be zero everywhere.
 pub(super) type Sparse = Option<Node>;
 
-/// F_i = ∂f_i/∂x_i, row by row.
-pub(super) fn own_jacobian(augmented: &AugmentedPlant<'_>, chain: &Chain) -> Vec<Vec<Sparse>> {
-    let f: Vec<Node> = chain.iter().map(|&i| augmented.derivatives[i]).collect();
-    let x: Vec<Node> = chain.iter().map(|&i| augmented.states[i].node).collect();
+/// ∂f/∂x for the equations of `rows` and the states `columns`, row by row; F_i of a chain and itself.
+pub(super) fn slopes(
+    augmented: &AugmentedPlant<'_>,
+    rows: &[usize],
+    columns: &[usize],
+) -> Vec<Vec<Sparse>> {
+    let f: Vec<Node> = rows.iter().map(|&i| augmented.derivatives[i]).collect();
+    let x: Vec<Node> = columns.iter().map(|&i| augmented.states[i].node).collect();
     let jacobian = jacobian::forward(augmented.graph(), &f, &x);
-    let n = f.len();
-    (0..n)
-        .map(|i| (0..n).map(|j| jacobian.get(i, j)).collect())
-        .collect()
+    let row = |i: usize| (0..x.len()).map(|j| jacobian.get(i, j)).collect();
+    (0..f.len()).map(row).collect()
 }
 
 /// C = (1, 0, …, 0)

@@ -4,7 +4,7 @@ use lynkeus_structure::{AugmentedPlant, ChainRequest};
 
 use super::said::Correction;
 use crate::conditions::{CHAINS, chain_request};
-use crate::estimate::{Common, PROLONG};
+use crate::estimate::PROLONG;
 use crate::guarantee::{LMI, LMI_KEYS, Lmi};
 use crate::peaking::Remedies;
 use crate::tuning::Late;
@@ -65,7 +65,7 @@ pub(super) const KEYS: &[&[KeySpec]] = &[&OWN, &LMI_KEYS, &peaking::KEYS];
 
 /// The keys, read.
 pub struct Settings {
-    pub common: Common,
+    pub common: Tuning,
     /// per measured output, as in every list here
     pub θ: Late<Option<Vec<f64>>>,
     pub K: Option<Vec<Vec<f64>>>,
@@ -87,7 +87,7 @@ impl Settings {
         let K = coefficients(tuning)?;
         let lengths = K.as_ref().map(|k| k.iter().map(Vec::len).collect());
         Ok(Self {
-            common: Common::read(tuning)?,
+            common: tuning.checked()?,
             θ: tuning.positive_per_chain(THETA.name, count),
             K,
             given: tuning.values.contains_key(GIVEN.name),

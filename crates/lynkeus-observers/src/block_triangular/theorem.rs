@@ -19,11 +19,10 @@ use super::said::{Correction, Lee, Said};
 use super::settings::Settings;
 use super::transformed::{Plant, Similar, Table, Term};
 use crate::conditions::{GainedChain, Partial, along, names};
-use crate::estimate::Common;
 use crate::peaking::departure;
 use crate::statement::{proved, standing, undecided};
 use crate::theorem::{conclude, slopes, state_noise};
-use crate::{Assumptions, Certificate, Check, Constant, DesignError, Reason, estimate};
+use crate::{Assumptions, Certificate, Check, Constant, DesignError, Reason, Tuning, estimate};
 
 pub(super) const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
 
@@ -65,7 +64,7 @@ pub(super) fn certificate(
 
 struct Study<'a> {
     plant: &'a Plant<'a>,
-    common: &'a Common,
+    common: &'a Tuning,
     classical: bool,
     /// in the order of the blocks
     θ: Vec<f64>,

@@ -18,7 +18,7 @@ use lynkeus_proof::magnitude::{plus, product, times};
 use lynkeus_proof::matrix::sum;
 use lynkeus_structure::{AugmentedPlant, Blocks, Chain, Matrix, range};
 
-use super::observer::{Sparse, Steps, own_jacobian};
+use super::observer::{Sparse, Steps, slopes};
 use crate::theorem::magnitude;
 use crate::{Assumptions, DesignError};
 
@@ -143,10 +143,8 @@ impl Plant<'_> {
             })
         };
         let row = |row: &Vec<Sparse>| row.iter().map(width).collect();
-        own_jacobian(self.augmented, self.chain(i))
-            .iter()
-            .map(row)
-            .collect()
+        let own = self.chain(i);
+        slopes(self.augmented, own, own).iter().map(row).collect()
     }
 
     /// |∂f_i/∂x_j|
@@ -156,18 +154,7 @@ impl Plant<'_> {
 
     /// |∂f/∂x| for the equations of `rows` and the states `columns`.
     pub fn jacobian(&self, rows: &[usize], columns: &[usize]) -> Result<Table, DesignError> {
-        let f: Vec<Node> = rows
-            .iter()
-            .map(|&a| self.augmented.derivatives[a])
-            .collect();
-        let x: Vec<Node> = columns
-            .iter()
-            .map(|&b| self.augmented.states[b].node)
-            .collect();
-        let found = jacobian::forward(self.augmented.graph(), &f, &x);
-        let row = |a: usize| (0..x.len()).map(|b| found.get(a, b)).collect();
-        let nodes: Vec<Vec<Sparse>> = (0..f.len()).map(row).collect();
-        self.table(&nodes)
+        self.table(&slopes(self.augmented, rows, columns))
     }
 
     /// Adds Ṁ M⁻¹ to the terms of chain i.

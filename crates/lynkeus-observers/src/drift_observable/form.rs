@@ -47,29 +47,28 @@ pub(super) struct Map<'s> {
 }
 
 impl<'s> Map<'s> {
-    /// Inside: what breaks the form.
     pub fn new(
         augmented: &AugmentedPlant<'_>,
         settings: &'s Settings,
         region: &Region,
-    ) -> Result<Result<Self, Examination>, DesignError> {
+    ) -> Result<Self, DesignError> {
         let affine = match output_map::affine_form(augmented)? {
             Ok(affine) => affine,
-            Err(why) => return Ok(Err(unfit(why))),
+            Err(why) => return Err(unfit(Reason::Structure(why.into())).into()),
         };
         affordable(augmented, &affine)?;
         let order = augmented.states.len().saturating_sub(1);
         let lie = output_map::lie_derivatives(augmented, &affine, order)?;
         let gradients = output_map::lie_gradients(augmented, &affine, order)?;
         lasts(augmented)?;
-        Ok(Ok(Self {
+        Ok(Self {
             affine,
             gradients,
             lie,
             slopes: slopes(augmented),
             lipschitz: lipschitz(augmented, region)?,
             settings,
-        }))
+        })
     }
 }
 

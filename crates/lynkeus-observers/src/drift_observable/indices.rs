@@ -14,10 +14,10 @@ use lynkeus_structure::output_map::Codistribution;
 use lynkeus_structure::{AugmentedPlant, Region, Standing, Verdict};
 
 use super::form::{Form, Map, unfit};
-use super::said::{Known, Said};
+use super::said::{Known, Others, Said};
 use super::settings::{POLES, Settings};
 use crate::conditions::lasts;
-use crate::design::{Found, Searched};
+use crate::design::Found;
 use crate::{DesignError, Examination, Reason, TuningError};
 
 /// Further index vectors that are examined.
@@ -31,21 +31,18 @@ pub(super) fn form(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     region: &Region,
-) -> Searched<Form> {
-    let map = match Map::new(augmented, settings, region)? {
-        Ok(map) => map,
-        Err(examination) => return Ok(Err(examination)),
-    };
+) -> Result<Found<Form>, DesignError> {
+    let map = Map::new(augmented, settings, region)?;
     let asked: Option<Vec<usize>> = settings.indices.iter().copied().collect();
     if let Some(indices) = asked.filter(|indices| !indices.is_empty()) {
-        return Ok(Ok(Form::new(augmented, &map, &indices, region)?));
+        return Form::new(augmented, &map, &indices, region);
     }
     lasts(augmented)?;
     let mut rows = Codistribution::new(augmented, &map.gradients)?;
     lasts(augmented)?;
     let first = rows.krener_respondek();
     if first.iter().sum::<usize>() < augmented.states.len() {
-        return Ok(Err(blind(augmented)?));
+        return Err(blind(augmented)?.into());
     }
     let candidates = candidates(&mut rows, first, &settings.indices)?;
     let wide = declared(augmented, region);
@@ -58,7 +55,7 @@ pub(super) fn form(
     if let Reason::DriftObservable(Said::Form { others, .. }) = &mut chosen.examination.summary {
         *others = left;
     }
-    Ok(Ok(chosen))
+    Ok(chosen)
 }
 
 /// The region with the inputs' declared ranges.
@@ -108,7 +105,7 @@ fn best(
     rows: &mut Codistribution,
     candidates: &[Vec<usize>],
     form: impl Fn(&[usize]) -> Result<Found<Form>, DesignError>,
-) -> Result<(Found<Form>, Vec<(Vec<usize>, Known)>), DesignError> {
+) -> Result<(Found<Form>, Others), DesignError> {
     let mut best = form(&candidates[0])?;
     let (mut others, mut examined) = (vec![], 0);
     for μ in &candidates[1..] {

@@ -26,11 +26,11 @@ mod theorem;
 
 use lynkeus_structure::{AugmentedPlant, Region};
 
-use crate::design::{Found, Searched};
+use crate::design::Found;
 use crate::family::Stages;
 use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
 use form::{Form, NAME};
-pub use said::{Germani, Known, Said};
+pub use said::{Germani, Known, Others, Said};
 use settings::Settings;
 
 const PAPER: &str = "Germani, Manes 1999, http://dml.cz/dmlcz/135297";
@@ -56,7 +56,7 @@ impl Stages for DriftObservable {
         augmented: &AugmentedPlant<'_>,
         settings: &Settings,
         region: &Region,
-    ) -> Searched<Form> {
+    ) -> Result<Found<Form>, DesignError> {
         indices::form(augmented, settings, region)
     }
 

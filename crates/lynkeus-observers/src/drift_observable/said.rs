@@ -52,7 +52,7 @@ pub enum Said {
         /// how many derivatives of each output count
         indices: Vec<usize>,
         /// the choices that were not taken, with what is known of each
-        others: Vec<(Vec<usize>, Known)>,
+        others: Others,
     },
     /// with u = 0 the outputs and their derivatives do not determine the state
     Blind {
@@ -122,6 +122,9 @@ pub enum Said {
     /// where the correction is withdrawn
     Withdrawn,
 }
+
+/// Indices that were not chosen, with what is known of them.
+pub type Others = Vec<(Vec<usize>, Known)>;
 
 /// What is known of indices that were not chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,7 +7,6 @@ use lynkeus_expr::Node;
 use lynkeus_gain::integrators::{self, Lemma32, Pole};
 use lynkeus_structure::AugmentedPlant;
 
-use crate::estimate::Common;
 use crate::{KeySpec, Shape, Tuning, TuningError, Value};
 
 /// Numbers, or a single one.
@@ -113,7 +112,7 @@ pub(super) const KEYS: [KeySpec; 9] = [
 /// The keys, read as far as they do not depend on the form. Those that do are kept as they
 /// stand until the indices and the orders of the filters are known.
 pub struct Settings {
-    pub common: Common,
+    pub common: Tuning,
     pub variant: Option<Variant>,
     /// how many derivatives of each output count, where the study says so: under `indices`, or by
     /// the lengths of the lists under `poles`
@@ -130,7 +129,7 @@ impl Settings {
         let positive = |key: KeySpec| tuning.positive(key.name);
         let names = augmented.inputs.iter().map(|input| input.name.clone());
         Ok(Self {
-            common: Common::read(tuning)?,
+            common: tuning.checked()?,
             variant: tuning.meant(&VARIANT, Variant::ALL)?,
             indices: indices(augmented, tuning)?,
             lemma: [positive(ALPHA)?, positive(BETA)?, positive(GAMMA)?],

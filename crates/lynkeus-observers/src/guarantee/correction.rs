@@ -76,10 +76,8 @@ fn is_copy(
     observer: &Observer,
     K: &DMatrix<f64>,
 ) -> Result<bool, MissingInput> {
-    let pairs = observer.states.iter().zip(&observer.estimates);
-    let same = pairs.filter(|((s, _), e)| s.symbol == e.node).count();
     let n = augmented.states.len();
-    if same != n || observer.states.len() != n || !observer.input_derivatives.is_empty() {
+    if !observer.is_the_estimate(n) || !observer.input_derivatives.is_empty() {
         return Ok(false);
     }
     let graph = augmented.graph();

@@ -51,9 +51,7 @@ impl ErrorSystem {
         observer: &Observer,
         assumptions: &Assumptions,
     ) -> Result<Result<Self, Said>, MissingInput> {
-        let pairs = observer.states.iter().zip(&observer.estimates);
-        let same = pairs.filter(|((s, _), e)| s.symbol == e.node).count();
-        if same != observer.states.len() || same != augmented.states.len() {
+        if !observer.is_the_estimate(augmented.states.len()) {
             return Ok(Err(Said::OtherStates {
                 states: observer.states.len(),
                 estimated: augmented.states.len(),

@@ -15,7 +15,7 @@ use lynkeus_structure::{AugmentedPlant, Measurement, Slopes, range};
 use super::error_system::{ErrorSystem, expanded};
 use super::said::{Obstacle, Said};
 use crate::conditions::on_output;
-use crate::estimate::{Common, PlantCopy};
+use crate::estimate::PlantCopy;
 use crate::{
     ChainGain, Design, DesignError, Examination, KeySpec, ParameterValue, Shape, Tuning,
     TuningError, Value, estimate,
@@ -92,7 +92,7 @@ impl Lmi {
 /// The observer with a certified gain, under the name of the family that asked.
 pub(crate) fn design_lmi(
     augmented: &AugmentedPlant<'_>,
-    common: &Common,
+    common: &Tuning,
     asked: Lmi,
     family: &'static str,
     examination: Examination,
@@ -181,7 +181,7 @@ fn aim(tuning: &Tuning) -> Result<Aim, TuningError> {
 }
 
 fn none(key: &'static str, said: Said) -> DesignError {
-    let reason = said.into();
+    let reason = Box::new(said.into());
     DesignError::NoGain { key, reason }
 }
 

@@ -5,9 +5,9 @@ use lynkeus_structure::{AugmentedPlant, Region, Standing, Superdiagonal, superdi
 
 use super::said::{Ltaief, Said};
 use crate::conditions::{lipschitz, names};
-use crate::design::{Found, Searched};
+use crate::design::Found;
 use crate::statement::standing;
-use crate::{Examination, Statement};
+use crate::{DesignError, Examination, Reason, Statement};
 
 pub(super) const NAME: &str = "state-affine";
 
@@ -55,10 +55,15 @@ impl Form {
 }
 
 /// The blocks with what is known of A2 and A4.
-pub(super) fn form(augmented: &AugmentedPlant<'_>, region: &Region) -> Searched<Form> {
+pub(super) fn form(
+    augmented: &AugmentedPlant<'_>,
+    region: &Region,
+) -> Result<Found<Form>, DesignError> {
     let form = match superdiagonal::find(augmented) {
         Ok(blocks) => Form::new(augmented, blocks),
-        Err(summary) => return Ok(Err(Examination::unfit(NAME, summary, vec![]))),
+        Err(why) => {
+            return Err(Examination::unfit(NAME, Reason::Structure(why.into()), vec![]).into());
+        }
     };
     let mut checks = vec![];
     for (k, factor) in form.blocks.factors.iter().enumerate() {
@@ -81,5 +86,5 @@ pub(super) fn form(augmented: &AugmentedPlant<'_>, region: &Region) -> Searched<
         depends_on_inputs,
     };
     let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
-    Ok(Ok(Found { form, examination }))
+    Ok(Found { form, examination })
 }

@@ -23,7 +23,7 @@ mod theorem;
 
 use lynkeus_structure::{AugmentedPlant, Region};
 
-use crate::design::{Found, Searched};
+use crate::design::Found;
 use crate::family::Stages;
 use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
 use form::{Form, NAME};
@@ -51,7 +51,11 @@ impl Stages for StateAffine {
         settings.late()
     }
 
-    fn form(augmented: &AugmentedPlant<'_>, _: &Settings, region: &Region) -> Searched<Form> {
+    fn form(
+        augmented: &AugmentedPlant<'_>,
+        _: &Settings,
+        region: &Region,
+    ) -> Result<Found<Form>, DesignError> {
         form::form(augmented, region)
     }
 

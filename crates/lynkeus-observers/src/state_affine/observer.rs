@@ -128,7 +128,7 @@ fn prolong<'g>(
     order: &[usize],
     derivatives: &mut [Node],
 ) {
-    if !copy.common.prolong {
+    if !copy.common.prolongs() {
         return;
     }
     let graph: &'g Graph = copy.augmented.graph();

@@ -4,7 +4,7 @@ use lynkeus_gain::UnitFactor;
 use lynkeus_proof::matrix::square;
 use lynkeus_structure::AugmentedPlant;
 
-use crate::estimate::{Common, PROLONG};
+use crate::estimate::PROLONG;
 use crate::tuning::Late;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 
@@ -42,7 +42,7 @@ pub(super) const KEYS: [KeySpec; 4] = [THETA, START, ALARM, CONTINUED];
 
 /// The keys, read.
 pub struct Settings {
-    pub common: Common,
+    pub common: Tuning,
     θ: Late<Option<f64>>,
     /// S(0) in the order of the plant's states
     S0: Late<Given>,
@@ -52,7 +52,7 @@ pub struct Settings {
 impl Settings {
     pub fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
         Ok(Self {
-            common: Common::read(tuning)?,
+            common: tuning.checked()?,
             θ: tuning.positive(THETA.name),
             S0: start(tuning, augmented.states.len()),
             alarm: tuning.positive(ALARM.name),

@@ -36,11 +36,11 @@ use super::observer::alarm;
 use super::said::Said;
 use super::settings::Settings;
 use crate::design::Found;
-use crate::estimate::Common;
 use crate::statement::{proved, standing, sufficient, undecided};
 use crate::theorem::{magnitude, slopes, undeclared};
 use crate::{
-    Assumptions, Bounds, Certificate, Check, Constant, DesignError, Ltaief, Statement, estimate,
+    Assumptions, Bounds, Certificate, Check, Constant, DesignError, Ltaief, Statement, Tuning,
+    estimate,
 };
 
 pub(super) const BASIS: &str = "Theorem 1 of Ltaief, Maatoug, Farza, Ménard, M'Saad and Koubaa";
@@ -81,7 +81,7 @@ struct Study<'a> {
     form: &'a Form,
     θ: f64,
     S0: UnitFactor,
-    common: &'a Common,
+    common: &'a Tuning,
     alarm: f64,
     /// every F_k has full column rank on the box
     always_shown: bool,

@@ -11,7 +11,7 @@ use super::form::{Form, Gains, NAME, Window};
 use super::said::{Hammouri, Loose, Said};
 use super::settings::Settings;
 use crate::conditions::{GainedChain, along, lipschitz, names};
-use crate::design::{Found, Searched, first_fit};
+use crate::design::{Found, first_fit};
 use crate::statement::undecided;
 use crate::{DesignError, Examination, Reason};
 
@@ -21,11 +21,11 @@ pub(super) fn form(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     region: &Region,
-) -> Searched<Form> {
-    let refusal = |summary| Ok(Err(Examination::unfit(NAME, summary, vec![])));
+) -> Result<Found<Form>, DesignError> {
+    let refusal = |summary: Reason| Err(Examination::unfit(NAME, summary, vec![]).into());
     let mut assignments = match chains::find(augmented, &settings.request) {
         Ok(assignments) => assignments,
-        Err(summary) => return refusal(Reason::from(summary)),
+        Err(summary) => return refusal(Reason::Structure(summary.into())),
     };
     if let Some(leading) = settings.leading {
         assignments.retain(|a| a.leads.contains(&leading));

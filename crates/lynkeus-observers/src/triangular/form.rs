@@ -29,7 +29,6 @@ pub(super) struct Gains<'s> {
     pub S: Vec<Tridiagonal>,
     pub divided: bool,
     pub transient: Option<&'s Transient>,
-    pub notes: Vec<Reason>,
 }
 
 impl<'s> Gains<'s> {
@@ -46,18 +45,14 @@ impl<'s> Gains<'s> {
             // (9) with r = ρ/2; an explicit S comes without its ρ: the example's r = 1
             None => vec![ρ.map_or(1.0, |ρ| ρ / 2.0); count],
         };
-        let mut gains = Self {
+        Ok(Self {
             θ,
             δ: exponents(form, settings),
             r,
             S,
             divided,
             transient: settings.remedies.transient.as_ref(),
-            notes: vec![],
-        };
-        let windows = Window::of(&form.assignment, &gains.δ);
-        gains.notes.extend(windows.iter().filter_map(Window::note));
-        Ok(gains)
+        })
     }
 
     /// r Δ_θ S⁻¹Cᵀ of chain i.
@@ -162,6 +157,12 @@ impl Window {
         Self::all(&assignment.lengths(), assignment.leading, δ)
     }
 
+    /// What the reader should know of an observer with these exponents.
+    pub fn notes(assignment: &Assignment, δ: &[f64]) -> Vec<Reason> {
+        let windows = Self::of(assignment, δ);
+        windows.iter().filter_map(Self::note).collect()
+    }
+
     /// The same by the chains' lengths.
     pub fn all(lengths: &[usize], lead: usize, δ: &[f64]) -> Vec<Self> {
         let others = (0..lengths.len()).filter(|&i| i != lead);
@@ -188,7 +189,7 @@ impl Window {
     }
 
     /// What the reader should know of an observer outside of it.
-    pub fn note(&self) -> Option<Reason> {
+    fn note(&self) -> Option<Reason> {
         let Self {
             low, high, ratio, ..
         } = *self;

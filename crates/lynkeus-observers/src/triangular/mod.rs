@@ -18,7 +18,7 @@ mod theorem;
 
 use lynkeus_structure::{AugmentedPlant, Region};
 
-use crate::design::{Found, Searched};
+use crate::design::Found;
 use crate::family::Stages;
 use crate::{
     Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError, guarantee,
@@ -53,7 +53,7 @@ impl Stages for Triangular {
         augmented: &AugmentedPlant<'_>,
         settings: &Settings,
         region: &Region,
-    ) -> Searched<Form> {
+    ) -> Result<Found<Form>, DesignError> {
         conditions::form(augmented, settings, region)
     }
 

@@ -61,7 +61,7 @@ pub(super) fn observer(
     Ok(Design {
         observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
         parameters,
-        notes: gains.notes.clone(),
+        notes: Window::notes(&form.assignment, &gains.δ),
         gains: table,
         examination,
     })
@@ -117,8 +117,7 @@ pub(super) fn low_power(
     let advice = (!settings.divided).then_some(advice);
     let remedies = &settings.remedies;
     let mut design = peaking::low_power(&copy, remedies, &θ, &parts, f, advice, examination)?;
-    let windows = Window::of(&form.assignment, &δ);
-    design.notes.extend(windows.iter().filter_map(Window::note));
+    design.notes.extend(Window::notes(&form.assignment, &δ));
     design.parameters.insert(1, ("δ".to_owned(), δ.into()));
     Ok(design)
 }

@@ -4,7 +4,7 @@ use lynkeus_gain::Tridiagonal;
 use lynkeus_structure::{AugmentedPlant, ChainRequest};
 
 use crate::conditions::{CHAINS, chain_request};
-use crate::estimate::{Common, PROLONG};
+use crate::estimate::PROLONG;
 use crate::guarantee::{LMI, LMI_KEYS, Lmi};
 use crate::peaking::Remedies;
 use crate::tuning::Late;
@@ -86,7 +86,7 @@ pub(super) const KEYS: &[&[KeySpec]] = &[&OWN, &LMI_KEYS, &peaking::KEYS];
 
 /// The keys, read.
 pub struct Settings {
-    pub common: Common,
+    pub common: Tuning,
     /// per chain, as in every list here
     θ: Late<Option<Vec<f64>>>,
     pub δ: Option<Vec<f64>>,
@@ -114,7 +114,7 @@ impl Settings {
             None => &[MATRICES, FACTOR, GAIN],
         };
         Ok(Self {
-            common: Common::read(tuning)?,
+            common: tuning.checked()?,
             θ: tuning.positive_per_chain(THETA.name, count),
             δ: tuning.positive_per_chain(DELTA.name, count)?,
             r: tuning.positive_per_chain(FACTOR.name, count)?,

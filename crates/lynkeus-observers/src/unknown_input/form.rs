@@ -22,9 +22,9 @@ use lynkeus_structure::{
 use super::said::{Said, Shape};
 use super::settings::{Settings, wrong_size};
 use crate::conditions::{lipschitz, names, output_slope};
-use crate::design::{Found, Searched};
+use crate::design::Found;
 use crate::statement::{proved, standing, sufficient};
-use crate::{Check, DesignError, Examination, Farza, Statement, TuningError};
+use crate::{Check, DesignError, Examination, Farza, Reason, Statement, TuningError};
 
 pub(super) const NAME: &str = "unknown-input";
 
@@ -172,10 +172,12 @@ pub(super) fn search<'e, 'p>(
     augmented: &'e AugmentedPlant<'p>,
     settings: &Settings,
     region: &Region,
-) -> Searched<Form<'e, 'p>> {
+) -> Result<Found<Form<'e, 'p>>, DesignError> {
     let layers = match layers::find(augmented) {
         Ok(layers) => layers,
-        Err(summary) => return Ok(Err(Examination::unfit(NAME, summary, vec![]))),
+        Err(why) => {
+            return Err(Examination::unfit(NAME, Reason::Structure(why.into()), vec![]).into());
+        }
     };
     let given = given(augmented, &layers, settings)?;
     let shared = shared(augmented, &layers, region)?;
@@ -188,7 +190,7 @@ pub(super) fn search<'e, 'p>(
         let form = form(augmented, &layers, first);
         let own = conditions(&form, region)?;
         match standing(&own) {
-            Standing::Proved => return Ok(Ok(finish(form, region, shared, own)?)),
+            Standing::Proved => return Ok(finish(form, region, shared, own)?),
             Standing::Undecided => {
                 undecided.get_or_insert((form, own));
             }
@@ -196,9 +198,9 @@ pub(super) fn search<'e, 'p>(
         }
     }
     if let Some((form, own)) = undecided {
-        return Ok(Ok(finish(form, region, shared, own)?));
+        return Ok(finish(form, region, shared, own)?);
     }
-    Ok(Err(none(augmented, &layers, shared, refuted)))
+    Err(none(augmented, &layers, shared, refuted).into())
 }
 
 fn form<'e, 'p>(

@@ -27,7 +27,7 @@ mod theorem;
 
 use lynkeus_structure::{AugmentedPlant, Region};
 
-use crate::design::{Found, Searched};
+use crate::design::Found;
 use crate::family::Stages;
 use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
 use form::NAME;
@@ -61,7 +61,7 @@ impl Stages for UnknownInput {
         augmented: &'e AugmentedPlant<'p>,
         settings: &Settings,
         region: &Region,
-    ) -> Searched<form::Form<'e, 'p>> {
+    ) -> Result<Found<form::Form<'e, 'p>>, DesignError> {
         form::search(augmented, settings, region)
     }
 

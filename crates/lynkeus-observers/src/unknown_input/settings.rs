@@ -2,7 +2,6 @@
 
 use lynkeus_structure::AugmentedPlant;
 
-use crate::estimate::Common;
 use crate::tuning::Late;
 use crate::{KeySpec, Shape, Tuning, TuningError, Value};
 
@@ -28,7 +27,7 @@ pub(super) const KEYS: [KeySpec; 2] = [THETA, PARTITION];
 
 /// The keys, read.
 pub struct Settings {
-    pub common: Common,
+    pub common: Tuning,
     /// θ₁ and θ₂, none where the proof is to choose them; `theta` belongs to other families too,
     /// with another shape
     pub thetas: Late<Option<[f64; 2]>>,
@@ -39,7 +38,7 @@ pub struct Settings {
 impl Settings {
     pub fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
         Ok(Self {
-            common: Common::read(tuning)?,
+            common: tuning.checked()?,
             thetas: thetas(tuning),
             partition: partition(tuning, augmented)?,
         })
