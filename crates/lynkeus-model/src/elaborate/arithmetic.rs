@@ -1,6 +1,6 @@
 //! Operators on scalars, arrays and matrices.
 
-use lynkeus_expr::{Binary, Node, Unary};
+use lynkeus_expr::{Binary, Expr, Node, Unary};
 
 use super::evaluate::Evaluator;
 use super::value::{Scalar, Value, describe_dims, expected_number, unequal_sizes};
@@ -116,37 +116,62 @@ impl Evaluator<'_> {
         span: Span,
     ) -> Result<Scalar> {
         use BinaryOperator as B;
-        let operation = match operator {
-            B::Add | B::ElementAdd => Binary::Add,
-            B::Subtract | B::ElementSubtract => Binary::Sub,
-            B::Multiply | B::ElementMultiply => Binary::Mul,
-            _ => Binary::Div,
-        };
-        if let (Scalar::Integer(a), Scalar::Integer(b)) = (left, right) {
-            let exact = match operation {
-                Binary::Add => Some(a.checked_add(b)),
-                Binary::Sub => Some(a.checked_sub(b)),
-                Binary::Mul => Some(a.checked_mul(b)),
-                _ => None,
-            };
-            if let Some(exact) = exact {
-                return exact.map(Scalar::Integer).ok_or_else(|| overflow(span));
+        match operator {
+            B::Add | B::ElementAdd => {
+                self.of_two(left, right, span, i64::checked_add, |a, b| a + b)
+            }
+            B::Subtract | B::ElementSubtract => {
+                self.of_two(left, right, span, i64::checked_sub, |a, b| a - b)
+            }
+            B::Multiply | B::ElementMultiply => {
+                self.of_two(left, right, span, i64::checked_mul, |a, b| a * b)
+            }
+            _ => {
+                let (left, right) = (self.real(left, span)?, self.real(right, span)?);
+                if self.graph.constant_value(right) == Some(0.0) {
+                    return Err(Problem::new(span, "division by zero"));
+                }
+                Ok(Scalar::Real(self.graph.binary(Binary::Div, left, right)))
             }
         }
-        let (left, right) = (self.real(left, span)?, self.real(right, span)?);
-        if operation == Binary::Div && self.graph.constant_value(right) == Some(0.0) {
-            return Err(Problem::new(span, "division by zero"));
-        }
-        Ok(Scalar::Real(self.graph.binary(operation, left, right)))
     }
 
     pub(super) fn negated(&self, scalar: Scalar, span: Span) -> Result<Scalar> {
-        if let Scalar::Integer(value) = scalar {
-            let negated = value.checked_neg();
-            return negated.map(Scalar::Integer).ok_or_else(|| overflow(span));
+        self.of_one(scalar, span, i64::checked_neg, |a| -a)
+    }
+
+    /// Of an Integer the exact result, which must fit; else that of a Real.
+    pub(super) fn of_one(
+        &self,
+        a: Scalar,
+        span: Span,
+        exact: impl Fn(i64) -> Option<i64>,
+        real: impl for<'g> Fn(Expr<'g>) -> Expr<'g>,
+    ) -> Result<Scalar> {
+        if let Scalar::Integer(a) = a {
+            return exact(a).map(Scalar::Integer).ok_or_else(|| overflow(span));
         }
-        let node = self.real(scalar, span)?;
-        Ok(Scalar::Real(self.graph.unary(Unary::Neg, node)))
+        let a = self.graph.expr(self.real(a, span)?);
+        Ok(Scalar::Real(real(a).node()))
+    }
+
+    /// Of two Integers the exact result, which must fit; else that of Reals.
+    pub(super) fn of_two(
+        &self,
+        a: Scalar,
+        b: Scalar,
+        span: Span,
+        exact: impl Fn(i64, i64) -> Option<i64>,
+        real: impl for<'g> Fn(Expr<'g>, Expr<'g>) -> Expr<'g>,
+    ) -> Result<Scalar> {
+        if let (Scalar::Integer(a), Scalar::Integer(b)) = (a, b) {
+            let exact = exact(a, b).map(Scalar::Integer);
+            return exact.ok_or_else(|| overflow(span));
+        }
+        let (a, b) = (self.real(a, span)?, self.real(b, span)?);
+        Ok(Scalar::Real(
+            real(self.graph.expr(a), self.graph.expr(b)).node(),
+        ))
     }
 
     pub(super) fn power(

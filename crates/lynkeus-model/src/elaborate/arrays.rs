@@ -167,33 +167,24 @@ impl<'a> Evaluator<'a> {
         let values = (0..count).map(|turn| Scalar::Real(value(turn).node()));
         Ok(Value::vector(values.collect()))
     }
+}
 
-    /// The elements joined by an operator; `empty` where there are none.
-    fn fold(
-        &self,
-        operator: BinaryOperator,
-        elements: &[Scalar],
-        empty: i64,
+impl<'a> Evaluator<'a> {
+    /// `sum` and `product`: all elements joined by an operator; `empty` where there are none.
+    pub(super) fn fold(
+        &mut self,
+        call: &'a Call,
         span: Span,
+        operator: BinaryOperator,
+        empty: i64,
     ) -> Result<Value> {
+        let elements = self.reduced(call, span)?;
         self.budget.charge(elements.len() as u64, span)?;
         let Some((&first, rest)) = elements.split_first() else {
             return Ok(Scalar::Integer(empty).into());
         };
         let join = |sum, &next| self.scalar_binary(operator, sum, next, span);
         rest.iter().try_fold(first, join).map(Value::from)
-    }
-}
-
-impl<'a> Evaluator<'a> {
-    pub(super) fn sum(&mut self, call: &'a Call, span: Span) -> Result<Value> {
-        let elements = self.reduced(call, span)?;
-        self.fold(BinaryOperator::Add, &elements, 0, span)
-    }
-
-    pub(super) fn product_of_all(&mut self, call: &'a Call, span: Span) -> Result<Value> {
-        let elements = self.reduced(call, span)?;
-        self.fold(BinaryOperator::Multiply, &elements, 1, span)
     }
 
     /// `array(a, b)` or `array(e for i in r)`

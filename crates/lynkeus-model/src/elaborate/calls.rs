@@ -237,12 +237,17 @@ impl<'a> Evaluator<'a> {
 }
 
 impl<'a> Evaluator<'a> {
-    /// The record that a variable of a class is declared as.
+    /// The class that a variable of another class is declared as.
+    fn type_of(&self, declaration: &Declaration, of: &Class) -> Option<&'a Class> {
+        match declaration.prefix.type_name {
+            TypeName::Named(name) => self.class(name, &[&of.path]),
+            _ => None,
+        }
+    }
+
+    /// The record that it is declared as.
     fn record_type(&self, declaration: &Declaration, of: &Class) -> Option<&'a Class> {
-        let TypeName::Named(name) = declaration.prefix.type_name else {
-            return None;
-        };
-        let class = self.class(name, &[&of.path]);
+        let class = self.type_of(declaration, of);
         class.filter(|class| class.kind == ClassKind::Record)
     }
 
@@ -255,12 +260,19 @@ impl<'a> Evaluator<'a> {
         given: Option<Members>,
         span: Span,
     ) -> Result<()> {
-        if let Some(record) = self.record_type(declaration, class) {
-            return self.introduce_record(class, declaration, record, given, span);
-        }
         let name = &declaration.label;
-        if let TypeName::Named(type_name) = declaration.prefix.type_name {
-            self.check_number(class, type_name)?;
+        match (
+            self.type_of(declaration, class),
+            declaration.prefix.type_name,
+        ) {
+            (Some(record), _) if record.kind == ClassKind::Record => {
+                return self.introduce_record(class, declaration, record, given, span);
+            }
+            (Some(other), TypeName::Named(at)) if other.kind != ClassKind::Type => {
+                let message = format!("`{}` is not a type of numbers", plain(self.text(at)));
+                return Err(Problem::new(at, message).hint("write the formula where it is used"));
+            }
+            _ => {}
         }
         let value = match (given.map(number), declaration.binding) {
             (Some(Ok(value)), _) => Some(value),
@@ -288,21 +300,6 @@ impl<'a> Evaluator<'a> {
             frame.locals.insert(name.clone(), local);
         }
         Ok(())
-    }
-
-    /// Refuses variables of functions that are no numbers.
-    fn check_number(&self, class: &Class, type_name: Span) -> Result<()> {
-        match self
-            .class(type_name, &[&class.path])
-            .map(|class| class.kind)
-        {
-            None | Some(ClassKind::Type) => Ok(()),
-            Some(_) => {
-                let name = plain(self.text(type_name));
-                let message = format!("`{name}` is not a type of numbers");
-                Err(Problem::new(type_name, message).hint("write the formula where it is used"))
-            }
-        }
     }
 
     fn introduce_record(
