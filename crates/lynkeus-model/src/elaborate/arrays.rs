@@ -281,8 +281,22 @@ impl<'a> Evaluator<'a> {
         Ok(Value { dims, elements })
     }
 
+    /// Sizes as they are declared; `open` gives that of an axis for `:`.
+    pub(super) fn sizes(
+        &mut self,
+        dimensions: &[ExprId],
+        open: impl Fn(usize) -> Result<usize>,
+    ) -> Result<Vec<usize>> {
+        let sizes = dimensions.iter().enumerate();
+        let size = |(axis, &id)| match self.ast.expression(id).kind {
+            Kind::All => open(axis),
+            _ => self.length(id),
+        };
+        sizes.map(size).collect()
+    }
+
     /// A size: an Integer from 0 on.
-    pub(crate) fn length(&mut self, id: ExprId) -> Result<usize> {
+    pub(super) fn length(&mut self, id: ExprId) -> Result<usize> {
         let value = self.known_integer(id, "a size")?;
         usize::try_from(value).map_err(|_| {
             let message = format!("a size must not be negative, this is {value}");

@@ -261,10 +261,8 @@ impl<'a> Evaluator<'a> {
         span: Span,
     ) -> Result<()> {
         let name = &declaration.label;
-        match (
-            self.type_of(declaration, class),
-            declaration.prefix.type_name,
-        ) {
+        let type_name = declaration.prefix.type_name;
+        match (self.type_of(declaration, class), type_name) {
             (Some(record), _) if record.kind == ClassKind::Record => {
                 return self.introduce_record(class, declaration, record, given, span);
             }
@@ -311,42 +309,40 @@ impl<'a> Evaluator<'a> {
         span: Span,
     ) -> Result<()> {
         let name = &declaration.label;
-        let (value, span) = match (given, declaration.binding) {
-            (Some(given), _) => (number(given).err(), span),
-            (None, Some(id)) => (self.record(id)?, self.span(id)),
-            (None, None) => {
-                check_given(class, declaration, span)?;
-                return self.open_record(record, name);
-            }
+        let no_record = |span| {
+            let message = format!("`{name}` takes a record, found a number");
+            Problem::new(span, message)
         };
-        let value = value.ok_or_else(|| {
-            Problem::new(span, format!("`{name}` takes a record, found a number"))
-        })?;
-        let members = value.into_iter();
-        let known = members.map(|(member, value)| (member, Local::of(value)));
-        self.insert_record(name, known.collect());
-        Ok(())
-    }
-
-    /// A record of which no member has a value yet.
-    fn open_record(&mut self, record: &'a Class, name: &str) -> Result<()> {
+        let value = match (given, declaration.binding) {
+            (Some(given), _) => Some(number(given).err().ok_or_else(|| no_record(span))?),
+            (None, Some(id)) => {
+                let record = self.record(id)?;
+                Some(record.ok_or_else(|| no_record(self.span(id)))?)
+            }
+            (None, None) => None,
+        };
         let mut members = vec![];
-        for declaration in self.declarations_of(record)? {
-            let dims = self.dims_declared(declaration, None, declaration.name)?;
-            let local = Local::without_value(dims, declaration.prefix.is_integer());
-            members.push((declaration.label.clone(), local));
+        match value {
+            Some(value) => {
+                let known = value.into_iter();
+                members.extend(known.map(|(member, value)| (member, Local::of(value))));
+            }
+            None => {
+                check_given(class, declaration, span)?;
+                for member in self.declarations_of(record)? {
+                    let dims = self.dims_declared(member, None, member.name)?;
+                    let local = Local::without_value(dims, member.prefix.is_integer());
+                    members.push((member.label.clone(), local));
+                }
+            }
         }
-        self.insert_record(name, members);
-        Ok(())
-    }
-
-    fn insert_record(&mut self, name: &str, members: Vec<(String, Local)>) {
         if let Some(frame) = self.frame.as_mut() {
-            let names = members.iter().map(|(member, _)| member.clone()).collect();
-            frame.records.insert(name.to_owned(), names);
+            let names = members.iter().map(|(member, _)| member.clone());
+            frame.records.insert(name.clone(), names.collect());
             let full = |(member, local)| (format!("{name}.{member}"), local);
             frame.locals.extend(members.into_iter().map(full));
         }
+        Ok(())
     }
 
     /// The size of a variable of a function; `:` is taken from its value.
@@ -356,20 +352,14 @@ impl<'a> Evaluator<'a> {
         value: Option<&Value>,
         span: Span,
     ) -> Result<Vec<usize>> {
-        let mut dims = vec![];
-        for (axis, &id) in declaration.dimensions.iter().enumerate() {
-            let open = matches!(self.ast.expression(id).kind, Kind::All);
-            dims.push(match (open, value.and_then(|value| value.dims.get(axis))) {
-                (true, Some(&dim)) => dim,
-                (true, None) => {
-                    let name = &declaration.label;
-                    let message =
-                        format!("the size `:` of `{name}` needs a value to be taken from");
-                    return Err(Problem::new(declaration.name, message));
-                }
-                (false, _) => self.length(id)?,
-            });
-        }
+        let dims = self.sizes(&declaration.dimensions, |axis| {
+            let found = value.and_then(|value| value.dims.get(axis));
+            found.copied().ok_or_else(|| {
+                let name = &declaration.label;
+                let message = format!("the size `:` of `{name}` needs a value to be taken from");
+                Problem::new(declaration.name, message)
+            })
+        })?;
         let count = element_count(&dims).unwrap_or(u64::MAX);
         self.budget.charge(count, span)?;
         Ok(dims)

@@ -51,7 +51,8 @@ impl<'a> Symbols<'a> {
         if declaration.prefix.variability != Variability::Continuous {
             return self.parameter(declaration, self.dependent[place], given);
         }
-        let dims = self.dims_of(declaration, |_| {
+        let mut evaluator = Evaluator::of(self, declaration, Mode::Structural);
+        let dims = evaluator.sizes(&declaration.dimensions, |_| {
             let message = format!("the size of variable `{name}` must be given");
             Err(Problem::new(declaration.name, message)
                 .hint("write a number or a parameter instead of `:`"))
@@ -83,21 +84,6 @@ impl<'a> Symbols<'a> {
         })
     }
 
-    /// Sizes as declared; `open` gives that of an axis for `:`.
-    fn dims_of(
-        &self,
-        declaration: &Declaration,
-        open: impl Fn(usize) -> Result<usize>,
-    ) -> Result<Vec<usize>> {
-        let mut evaluator = Evaluator::of(self, declaration, Mode::Structural);
-        let sizes = declaration.dimensions.iter().enumerate();
-        let size = |(axis, &id)| match self.ast.expression(id).kind {
-            Kind::All => open(axis),
-            _ => evaluator.length(id),
-        };
-        sizes.map(size).collect()
-    }
-
     /// Takes what a declaration is written out to from the budgets.
     fn charge(&self, dims: &[usize], declaration: &Declaration) -> Result<()> {
         // A size beside a size of zero counts as well: slices walk along it.
@@ -105,14 +91,12 @@ impl<'a> Symbols<'a> {
         let count = element_count(&walked).unwrap_or(u64::MAX);
         self.scalars.charge(count, declaration.name)?;
         let description = declaration.description.as_ref().map_or(0, String::len);
-        let attributes = declaration.attributes.iter();
-        let values = attributes.filter_map(|attribute| Some(self.ast.expression(attribute.value?)));
+        let values = declaration.attributes.iter().filter_map(|a| a.value);
+        let values = values.map(|value| self.ast.expression(value));
         let texts = values.filter(|value| matches!(value.kind, Kind::Text));
-        let length: u64 = texts
-            .map(|text| text.span)
-            .chain([declaration.name])
-            .map(|span| u64::from(span.end.saturating_sub(span.start)))
-            .sum();
+        let spans = texts.map(|text| text.span).chain([declaration.name]);
+        let lengths = spans.map(|span| u64::from(span.end.saturating_sub(span.start)));
+        let length: u64 = lengths.sum();
         let each = length.saturating_add(description as u64);
         self.texts
             .charge(count.saturating_mul(each), declaration.name)
@@ -294,7 +278,8 @@ impl<'a> Symbols<'a> {
             return Err(Problem::new(declaration.name, message).hint("choose one of the two"));
         }
         let known = self.binding(declaration, Mode::Structural)?;
-        let dims = self.dims_of(declaration, |axis| {
+        let mut evaluator = Evaluator::of(self, declaration, Mode::Structural);
+        let dims = evaluator.sizes(&declaration.dimensions, |axis| {
             let found = known.as_ref().and_then(|(value, _)| value.dims.get(axis));
             found.copied().ok_or_else(|| {
                 let message = "the size `:` needs a value to be taken from";

@@ -122,7 +122,10 @@ impl<'a> Evaluator<'a> {
         match &expression.kind {
             Kind::Integer(value) => Ok(Scalar::Integer(*value).into()),
             Kind::Real(value) => Ok(Scalar::Real(self.graph.constant(*value).node()).into()),
-            Kind::Boolean(value) => Ok(self.truth(*value).into()),
+            Kind::Boolean(value) => {
+                let truth = self.graph.constant(f64::from(*value));
+                Ok(Scalar::Boolean(truth.node()).into())
+            }
             Kind::Text => {
                 Err(Problem::new(span, "a string here is not supported").hint("use numbers"))
             }
@@ -187,10 +190,6 @@ impl<'a> Evaluator<'a> {
         };
         let message = format!("{what} must be an Integer, found {found}");
         Err(Problem::new(self.span(id), message).maybe_hint(hint.map(str::to_owned)))
-    }
-
-    pub(super) fn truth(&self, value: bool) -> Scalar {
-        Scalar::Boolean(self.graph.constant(f64::from(u8::from(value))).node())
     }
 
     fn end(&self, span: Span) -> Result<Value> {

@@ -5,12 +5,12 @@ use lynkeus_expr::{Binary, Expr, Node, Unary};
 
 use super::arithmetic::overflow;
 use super::arrays::{matrix_dims, scalar_dims, vector_dims};
-use super::evaluate::Evaluator;
+use super::evaluate::{Evaluator, reference};
 use super::value::{Scalar, Value, expected_number};
 use crate::balance::total_derivative;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{BinaryOperator, Call, ExprId, Kind, Relation};
+use crate::syntax::ast::{BinaryOperator, Call, ExprId, Relation};
 use crate::syntax::shortened;
 
 /// Where the library has functions that are known without it.
@@ -288,21 +288,16 @@ impl<'a> Evaluator<'a> {
     pub(super) fn der(&mut self, call: &'a Call) -> Result<Value> {
         let [argument] = self.arguments(call)?;
         let span = self.span(argument);
-        let kind = &self.ast.expression(argument).kind;
-        let is_variable = matches!(kind, Kind::Name | Kind::Index(..) | Kind::Path(_));
+        let is_variable = reference(self.source, self.ast, argument).is_some();
         let value = self.value(argument)?;
         self.map(value, span, |evaluator, scalar, span| {
-            let node = match scalar {
-                Scalar::Real(node) => node,
-                _ => return Err(evaluator.no_derivative(span)),
+            let derivative = match scalar {
+                Scalar::Real(node) if is_variable => evaluator.symbols.derivative(node),
+                Scalar::Real(node) => Some(evaluator.total_derivative(node, span)?),
+                _ => None,
             };
-            if is_variable {
-                let derivative = evaluator.symbols.derivative(node);
-                return derivative
-                    .map(Scalar::Real)
-                    .ok_or_else(|| evaluator.no_derivative(span));
-            }
-            evaluator.total_derivative(node, span).map(Scalar::Real)
+            let derivative = derivative.map(Scalar::Real);
+            derivative.ok_or_else(|| evaluator.no_derivative(span))
         })
     }
 
