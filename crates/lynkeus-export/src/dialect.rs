@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Binary, Node, Op, Unary};
+use lynkeus_expr::{Binary, Call, Node, Op, Unary};
 
 use crate::code::is_truth;
 use crate::{Code, Names, Refusal};
@@ -225,7 +225,7 @@ impl Printer<'_> {
         let text = match self.code.graph().op(node) {
             Op::Symbol(_) => return Ok(()),
             Op::Constant(value) => self.dialect.number(value),
-            Op::Solve(_) | Op::Implicit(_) => self.solution(node)?,
+            Op::System(_) => self.solution(node)?,
             Op::Entry(system, place) => {
                 let solution = self.texts.get(&system).map_or("", |text| &text.text);
                 self.dialect.entry(solution, place as usize)
@@ -290,11 +290,12 @@ impl Printer<'_> {
 
     fn solution(&mut self, node: Node) -> Result<Text, Refusal> {
         let graph = self.code.graph();
-        let Some(system) = graph.system(node) else {
+        let call = graph.system(node);
+        let Some((a, b)) = call.as_ref().and_then(Call::linear) else {
             return Err(self.lacks("an implicit function"));
         };
         let texts = |nodes: &[Node]| nodes.iter().map(|&n| self.value(n)).collect::<Vec<_>>();
-        let (a, b) = (texts(system.matrix()), texts(system.right()));
+        let (a, b) = (texts(a), texts(b));
         let name = self.names.numbered('s');
         let lines = self.dialect.solution(&name, &a, &b);
         let lines = lines.ok_or_else(|| self.lacks("a linear system"))?;

@@ -36,46 +36,6 @@ pub trait Algebra {
     }
 }
 
-impl<A: Algebra> Algebra for &A {
-    type Value = A::Value;
-
-    fn constant(&self, value: f64) -> A::Value {
-        (**self).constant(value)
-    }
-
-    fn unary(&self, op: Unary, x: &A::Value) -> A::Value {
-        (**self).unary(op, x)
-    }
-
-    fn powi(&self, x: &A::Value, n: i32) -> A::Value {
-        (**self).powi(x, n)
-    }
-
-    fn binary(&self, op: Binary, x: &A::Value, y: &A::Value) -> A::Value {
-        (**self).binary(op, x, y)
-    }
-
-    fn select(&self, condition: &A::Value, x: &A::Value, y: &A::Value) -> A::Value {
-        (**self).select(condition, x, y)
-    }
-
-    fn solve(&self, a: &[A::Value], b: &[A::Value]) -> (Vec<A::Value>, A::Value) {
-        (**self).solve(a, b)
-    }
-
-    fn solve_in_place(&self, a: &mut [A::Value], b: &mut [A::Value]) -> A::Value {
-        (**self).solve_in_place(a, b)
-    }
-
-    fn implicit(&self, function: &Implicit, p: &[A::Value]) -> Vec<A::Value> {
-        (**self).implicit(function, p)
-    }
-
-    fn is_spent(&self) -> bool {
-        (**self).is_spent()
-    }
-}
-
 /// The numbers: `f64`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Reals;

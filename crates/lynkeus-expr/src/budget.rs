@@ -91,24 +91,19 @@ const WHOLE: u8 = 4;
 impl Budget {
     /// A budget from now on, that can be [cancelled](Budget::cancel) as well.
     pub fn new(time: Option<Duration>, memory: Option<Memory>) -> Self {
-        Self::part_of(Self::default(), time, time, memory)
+        Self::default().part_of(time, time, memory, None)
     }
 
     /// The same budget, which also ends once the flag is raised.
     #[must_use]
     pub fn stopped_by(self, flag: Arc<AtomicBool>) -> Self {
-        let (time, memory) = (self.named(), self.memory());
-        let mut shared = Shared::part_of(self, None, time, memory);
-        shared.flag = Some(flag);
-        Self {
-            shared: Some(Arc::new(shared)),
-        }
+        self.part_of(None, self.named(), self.memory(), Some(flag))
     }
 
     /// At most this time of what is left.
     #[must_use]
     pub fn within(&self, time: Duration) -> Self {
-        Self::part_of(self.clone(), Some(time), Some(time), self.memory())
+        self.part_of(Some(time), Some(time), self.memory(), None)
     }
 
     /// That share of the time that is left, in the words of the whole.
@@ -116,17 +111,27 @@ impl Budget {
     pub fn part(&self, share: f64) -> Self {
         let left = self.left();
         let time = left.map(|left| left.mul_f64(share.clamp(0.0, 1.0)));
-        Self::part_of(self.clone(), time, self.named(), self.memory())
+        self.part_of(time, self.named(), self.memory(), None)
     }
 
     fn part_of(
-        whole: Self,
+        &self,
         time: Option<Duration>,
         named: Option<Duration>,
         memory: Option<Memory>,
+        flag: Option<Arc<AtomicBool>>,
     ) -> Self {
+        let shared = Arc::new(Shared {
+            whole: self.clone(),
+            // a limit beyond what a clock can tell is none
+            ends: time.and_then(|time| Instant::now().checked_add(time)),
+            time: named.unwrap_or_default(),
+            memory,
+            flag,
+            mark: AtomicU8::new(GOING),
+        });
         Self {
-            shared: Some(Arc::new(Shared::part_of(whole, time, named, memory))),
+            shared: Some(shared),
         }
     }
 
@@ -226,23 +231,6 @@ impl Budget {
 }
 
 impl Shared {
-    fn part_of(
-        whole: Budget,
-        time: Option<Duration>,
-        named: Option<Duration>,
-        memory: Option<Memory>,
-    ) -> Self {
-        Self {
-            whole,
-            // a limit beyond what a clock can tell is none
-            ends: time.and_then(|time| Instant::now().checked_add(time)),
-            time: named.unwrap_or_default(),
-            memory,
-            flag: None,
-            mark: AtomicU8::new(GOING),
-        }
-    }
-
     /// The first reason stays.
     fn set(&self, mark: u8) {
         let order = Ordering::Relaxed;

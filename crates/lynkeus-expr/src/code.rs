@@ -36,7 +36,7 @@ impl Instruction {
 }
 
 /// What a system computes from its arguments.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum System {
     /// A x = b of n unknowns, from A and b
     Linear(usize),
@@ -93,6 +93,8 @@ pub(crate) struct Code {
     /// constants live in the registers after the inputs
     pub(crate) constants: Vec<f64>,
     pub(crate) registers: usize,
+    /// places behind the registers: for the arguments of the largest system
+    pub(crate) room: usize,
     pub(crate) instructions: Vec<Instruction>,
     /// the node each instruction computes
     pub(crate) sources: Vec<Node>,

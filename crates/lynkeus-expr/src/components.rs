@@ -1,84 +1,48 @@
 //! Strongly connected components (Tarjan), without recursion.
 
+/// The number of a member whose component is complete.
+const CLOSED: usize = usize::MAX;
+
 /// Groups of members that need each other, each group in increasing order and behind those it needs; `needs[i]` are the
 /// members that member i needs itself.
 pub fn components(needs: &[Vec<usize>]) -> Vec<Vec<usize>> {
-    let mut search = Search {
-        needs,
-        number: vec![None; needs.len()],
-        low: vec![0; needs.len()],
-        is_open: vec![false; needs.len()],
-        open: vec![],
-        count: 0,
-        components: vec![],
-    };
+    let (mut number, mut low) = (vec![None; needs.len()], vec![0; needs.len()]);
+    let (mut components, mut open, mut path) = (vec![], vec![], vec![]);
+    let mut count = 0;
     for root in 0..needs.len() {
-        if search.number[root].is_none() {
-            search.from(root);
-        }
-    }
-    search.components
-}
-
-struct Search<'a> {
-    needs: &'a [Vec<usize>],
-    number: Vec<Option<usize>>,
-    low: Vec<usize>,
-    is_open: Vec<bool>,
-    open: Vec<usize>,
-    count: usize,
-    components: Vec<Vec<usize>>,
-}
-
-impl Search<'_> {
-    fn enter(&mut self, member: usize, path: &mut Vec<(usize, usize)>) {
-        self.number[member] = Some(self.count);
-        self.low[member] = self.count;
-        self.count += 1;
-        self.open.push(member);
-        self.is_open[member] = true;
-        path.push((member, 0));
-    }
-
-    fn from(&mut self, root: usize) {
-        let mut path = vec![];
-        self.enter(root, &mut path);
-        while let Some((member, next)) = path.last_mut() {
-            let member = *member;
-            let Some(&needed) = self.needs[member].get(*next) else {
-                path.pop();
-                if let Some((above, _)) = path.last() {
-                    self.low[*above] = self.low[*above].min(self.low[member]);
-                }
-                self.close(member);
-                continue;
-            };
-            *next += 1;
-            match self.number[needed] {
-                None => self.enter(needed, &mut path),
-                Some(number) if self.is_open[needed] => {
-                    self.low[member] = self.low[member].min(number);
-                }
-                Some(_) => {}
+        let mut new = number[root].is_none().then_some(root);
+        loop {
+            if let Some(member) = new.take() {
+                (number[member], low[member]) = (Some(count), count);
+                count += 1;
+                open.push(member);
+                path.push((member, needs[member].iter()));
             }
-        }
-    }
-
-    fn close(&mut self, member: usize) {
-        if self.number[member] != Some(self.low[member]) {
-            return;
-        }
-        let mut component = vec![];
-        while let Some(last) = self.open.pop() {
-            self.is_open[last] = false;
-            component.push(last);
-            if last == member {
+            let Some((member, left)) = path.last_mut() else {
                 break;
+            };
+            let member = *member;
+            if let Some(&needed) = left.next() {
+                match number[needed] {
+                    None => new = Some(needed),
+                    Some(number) => low[member] = low[member].min(number),
+                }
+                continue;
+            }
+            path.pop();
+            if let Some(&(above, _)) = path.last() {
+                low[above] = low[above].min(low[member]);
+            }
+            if number[member] == Some(low[member]) {
+                let first = open.iter().rposition(|&m| m == member).unwrap_or(0);
+                let mut component = open.split_off(first);
+                component.iter().for_each(|&m| number[m] = Some(CLOSED));
+                component.sort_unstable();
+                components.push(component);
             }
         }
-        component.sort_unstable();
-        self.components.push(component);
     }
+    components
 }
 
 #[cfg(test)]

@@ -9,7 +9,8 @@ use std::collections::HashMap;
 use std::hash::Hash;
 use std::sync::Arc;
 
-use crate::{Binary, Budget, Implicit, Node, Op, Spent, Unary, real};
+use crate::code::System;
+use crate::{Binary, Budget, Node, Op, Spent, Unary, real};
 
 /// Nodes between two looks at the clock.
 const OFTEN: u32 = 64;
@@ -35,10 +36,8 @@ struct Inner {
     known: HashMap<Key, Node>,
     names: Vec<String>,
     by_name: HashMap<String, Node>,
-    systems: Vec<LinearSystem>,
-    known_systems: HashMap<LinearSystem, Node>,
-    implicits: Vec<ImplicitCall>,
-    known_implicits: HashMap<ImplicitCall, Node>,
+    systems: Vec<Call>,
+    known_systems: HashMap<Call, Node>,
     budget: Budget,
     /// nodes made, to look at the clock now and then
     made: u32,
@@ -87,21 +86,10 @@ impl Inner {
         match self.ops[node.index()] {
             Op::Constant(_) | Op::Symbol(_) => {}
             Op::Unary(_, a) | Op::Powi(a, _) | Op::Entry(a, _) => give(a),
-            Op::Binary(_, a, b) => {
-                give(a);
-                give(b);
-            }
-            Op::Select(c, a, b) => {
-                give(c);
-                give(a);
-                give(b);
-            }
-            Op::Solve(system) => {
+            Op::Binary(_, a, b) => [a, b].into_iter().for_each(give),
+            Op::Select(c, a, b) => [c, a, b].into_iter().for_each(give),
+            Op::System(system) => {
                 let arguments = &self.systems[system as usize].arguments;
-                arguments.iter().copied().for_each(give);
-            }
-            Op::Implicit(call) => {
-                let arguments = &self.implicits[call as usize].arguments;
                 arguments.iter().copied().for_each(give);
             }
         }
@@ -141,29 +129,12 @@ impl Marks {
 /// until either learns more.
 type Facts = HashMap<TypeId, Arc<dyn Any + Send + Sync>>;
 
-/// The linear system A x = b of an [`Op::Solve`] node.
+/// The system of an [`Op::System`] node, and where it is taken.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
-pub struct LinearSystem {
-    /// A row by row (n²), then b (n)
-    arguments: Vec<Node>,
-    n: usize,
-}
-
-impl LinearSystem {
-    /// Number of unknowns n.
-    pub fn size(&self) -> usize {
-        self.n
-    }
-
-    /// A, n×n, row by row.
-    pub fn matrix(&self) -> &[Node] {
-        &self.arguments[..self.n * self.n]
-    }
-
-    /// b, n entries.
-    pub fn right(&self) -> &[Node] {
-        &self.arguments[self.n * self.n..]
-    }
+pub struct Call {
+    pub(crate) system: System,
+    /// of a linear system A row by row (n²), then b (n); p of an implicit function
+    pub arguments: Vec<Node>,
 }
 
 /// The result of [`Graph::solve`].
@@ -175,15 +146,6 @@ pub struct Solution {
     /// `x` is the bounded answer of a truncated factorisation. Its derivative
     /// is taken as zero: it is a diagnostic, not part of the solution.
     pub rcond: Node,
-}
-
-/// The implicit function of an [`Op::Implicit`] node, and where it is taken.
-#[derive(Clone, PartialEq, Eq, Hash, Debug)]
-pub struct ImplicitCall {
-    /// z as a function of p
-    pub function: Implicit,
-    /// p
-    pub arguments: Vec<Node>,
 }
 
 /// A growing set of expressions in which equal expressions are one node.

@@ -5,7 +5,6 @@
 //! use shares them. By the implicit function theorem z' = −g_z⁻¹ g_p p', so that derivatives
 //! of any order, symbols and bounds need nothing but g, g_z, g_p and linear systems.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::code::{Body, Implicit, Slopes, Tape};
@@ -31,13 +30,6 @@ pub struct ImplicitUnknown {
     pub range: Interval,
 }
 
-/// A residual over symbols of its own, and the expressions that those stand for.
-struct Cut {
-    residuals: Vec<Node>,
-    symbols: Vec<Node>,
-    expressions: Vec<Node>,
-}
-
 impl Implicit {
     /// The root of `residuals`, one for each unknown: the entries of z, in order. Everything
     /// in the residuals that does not depend on an unknown becomes one argument of the
@@ -55,23 +47,26 @@ impl Implicit {
     ) -> Result<Vec<Node>, MissingInput> {
         assert_eq!(unknowns.len(), residuals.len(), "one equation per unknown");
         let z: Vec<Node> = unknowns.iter().map(|unknown| unknown.symbol).collect();
-        let cut = Cut::new(graph, residuals, &z);
-        let inputs = [&z[..], &cut.symbols].concat();
+        let fixed = graph.largest(residuals, |symbol| !z.contains(symbol));
+        let cut = graph.replaced(residuals, fixed);
+        let p: Vec<Node> = cut.parts.iter().map(|part| part.symbol).collect();
+        let inputs = [&z[..], &p].concat();
         let name = |&symbol: &Node| graph.symbol_name(symbol).unwrap_or_default();
         let equation = |&residual: &Node| format!("{} = 0", graph.render(residual, SHOWN));
-        let slopes = |columns: &[Node]| Slopes::new(graph, &cut.residuals, columns, &inputs);
+        let slopes = |columns: &[Node]| Slopes::new(graph, &cut.roots, columns, &inputs);
         let function = Self(Arc::new(Body {
             names: z.iter().map(name).collect(),
             equations: residuals.iter().map(equation).collect(),
             start: unknowns.iter().map(|unknown| unknown.start).collect(),
             range: unknowns.iter().map(|unknown| unknown.range).collect(),
-            parameters: cut.symbols.len(),
-            residual: Tape::new(graph, &inputs, &cut.residuals)?,
+            parameters: p.len(),
+            residual: Tape::new(graph, &inputs, &cut.roots)?,
             by_unknowns: slopes(&z)?,
-            by_parameters: slopes(&cut.symbols)?,
-            steps: Tape::new(graph, &inputs, &steps(graph, &cut.residuals))?,
+            by_parameters: slopes(&p)?,
+            steps: Tape::new(graph, &inputs, &steps(graph, &cut.roots))?,
         }));
-        Ok(graph.implicit(&function, &cut.expressions))
+        let values: Vec<Node> = cut.parts.iter().map(|part| part.value).collect();
+        Ok(graph.implicit(&function, &values))
     }
 
     /// g at (z, p).
@@ -152,37 +147,6 @@ impl Slopes {
     }
 }
 
-impl Cut {
-    fn new(graph: &Graph, residuals: &[Node], z: &[Node]) -> Self {
-        let mut moves: HashMap<Node, bool> = HashMap::new();
-        let mut symbols: HashMap<Node, Node> = HashMap::new();
-        let mut expressions = vec![];
-        let mut cut = |node: Node| {
-            if graph.constant_value(node).is_none() {
-                symbols.entry(node).or_insert_with(|| {
-                    expressions.push(node);
-                    graph.fresh(graph.render(node, SHOWN)).node()
-                });
-            }
-        };
-        for node in graph.reachable(residuals) {
-            let arguments = graph.arguments(node);
-            let moved = z.contains(&node) || arguments.iter().any(|a| moves[a]);
-            if moved {
-                arguments.iter().filter(|a| !moves[a]).for_each(|&a| cut(a));
-            }
-            moves.insert(node, moved);
-        }
-        let still = residuals.iter().filter(|residual| !moves[residual]);
-        still.for_each(|&residual| cut(residual));
-        Self {
-            residuals: graph.substitute(residuals, &symbols),
-            symbols: expressions.iter().map(|node| symbols[node]).collect(),
-            expressions,
-        }
-    }
-}
-
 /// The operations that are not continuous; a cut residual has none that depend on p alone.
 fn steps(graph: &Graph, residuals: &[Node]) -> Vec<Node> {
     let zero = graph.constant(0.0).node();
@@ -198,20 +162,18 @@ fn steps(graph: &Graph, residuals: &[Node]) -> Vec<Node> {
                 found.push(graph.binary(Binary::And, behind, crossing));
             }
             Op::Select(condition, ..) => found.push(graph.unary(Unary::Not, condition)),
-            Op::Implicit(_) => found.extend(inner_steps(graph, node)),
+            // what jumps in a loop within the loop
+            Op::System(_) => {
+                if let Some(call) = graph.system(node)
+                    && let Some(function) = call.function()
+                {
+                    found.extend(function.steps_in(&Nodes(graph), &call.at(graph, node)));
+                }
+            }
             _ => {}
         }
     }
     found
-}
-
-/// What jumps in a loop within the loop.
-fn inner_steps(graph: &Graph, node: Node) -> Vec<Node> {
-    let Some(call) = graph.implicit_call(node) else {
-        return vec![];
-    };
-    let at = call.at(graph, node);
-    call.function.steps_in(&Nodes(graph), &at)
 }
 
 /// Newton steps from one start.

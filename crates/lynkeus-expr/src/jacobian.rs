@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use crate::partials::{Variation, is_steep, variation};
-use crate::{Binary, Graph, Node, Nodes, Op, Unary};
+use crate::{Binary, Call, Graph, Node, Op, Unary};
 
 /// A sparse matrix of expressions ∂(outputs)/∂(inputs).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -49,10 +49,15 @@ fn plus(graph: &Graph, a: Option<Node>, b: Node) -> Node {
     }
 }
 
-fn minus(graph: &Graph, a: Option<Node>, b: Node) -> Node {
-    match a {
-        Some(a) => graph.binary(Binary::Sub, a, b),
-        None => graph.unary(Unary::Neg, b),
+/// sum − slope·d; without a slope, which is then −1, sum + d.
+fn less(graph: &Graph, sum: Option<Node>, slope: Option<Node>, d: Node) -> Node {
+    let Some(slope) = slope else {
+        return plus(graph, sum, d);
+    };
+    let term = times(graph, slope, d);
+    match sum {
+        Some(sum) => graph.binary(Binary::Sub, sum, term),
+        None => graph.unary(Unary::Neg, term),
     }
 }
 
@@ -63,13 +68,6 @@ fn add_to<K: Ord>(graph: &Graph, sums: &mut BTreeMap<K, Node>, key: K, term: Nod
 
 fn zero(graph: &Graph) -> Node {
     graph.constant(0.0).node()
-}
-
-/// Entries by their places among `n`, zero where there is none.
-fn dense(graph: &Graph, n: usize, entries: &BTreeMap<usize, Node>) -> Vec<Node> {
-    (0..n)
-        .map(|i| entries.get(&i).copied().unwrap_or_else(|| zero(graph)))
-        .collect()
 }
 
 /// The Jacobian by forward accumulation: cheap where each node depends on few
@@ -116,13 +114,8 @@ fn accumulated(
 ) -> HashMap<Node, Tangent> {
     let mut solved: HashMap<Node, BTreeMap<usize, Vec<Node>>> = HashMap::new();
     for node in graph.reachable(outputs) {
-        let results = match graph.op(node) {
-            Op::Solve(_) => Some(solve_tangents(graph, node, &tangents)),
-            Op::Implicit(_) => Some(implicit_tangents(graph, node, &tangents)),
-            _ => None,
-        };
-        if let Some(results) = results {
-            solved.insert(node, results);
+        if let Some(call) = graph.system(node) {
+            solved.insert(node, system_tangents(graph, node, &call, &tangents));
             continue;
         }
         let variation = variation(graph, node);
@@ -168,33 +161,29 @@ fn choice_tangent(
         .collect()
 }
 
-/// Of a linear system, A dx = db − dA x, for each input that A or b depend on.
-fn solve_tangents(
+/// Of a system g(z, p) = 0, g_z dz = −g_p dp: dz for each input that p depends on.
+fn system_tangents(
     graph: &Graph,
     node: Node,
+    call: &Call,
     tangents: &HashMap<Node, Tangent>,
 ) -> BTreeMap<usize, Vec<Node>> {
-    let Some(system) = graph.system(node) else {
-        return BTreeMap::new();
-    };
-    let (n, a, b) = (system.size(), system.matrix(), system.right());
     let mut right: BTreeMap<usize, BTreeMap<usize, Node>> = BTreeMap::new();
-    for (i, b) in b.iter().enumerate() {
-        for (&column, &db) in tangents.get(b).into_iter().flatten() {
-            right.entry(column).or_default().insert(i, db);
+    if !call.arguments.iter().any(|p| tangents.contains_key(p)) {
+        return BTreeMap::new();
+    }
+    for (row, argument, slope) in call.slopes(graph, node) {
+        for (&column, &dp) in tangents.get(&argument).into_iter().flatten() {
+            let sums = right.entry(column).or_default();
+            let sum = less(graph, sums.get(&row).copied(), slope, dp);
+            sums.insert(row, sum);
         }
     }
-    for (place, entry) in a.iter().enumerate() {
-        let x = graph.entry(node, (place % n) as u32);
-        for (&column, &da) in tangents.get(entry).into_iter().flatten() {
-            let row = right.entry(column).or_default();
-            let sum = minus(graph, row.get(&(place / n)).copied(), times(graph, da, x));
-            row.insert(place / n, sum);
-        }
-    }
+    let matrix = call.matrix(graph, node);
+    let solved = |sums| solve(graph, call, &matrix, sums);
+    let right = right.iter();
     right
-        .iter()
-        .map(|(&column, row)| (column, graph.solve(a, &dense(graph, n, row)).x))
+        .map(|(&column, sums)| (column, solved(sums)))
         .collect()
 }
 
@@ -222,10 +211,9 @@ fn adjoints(graph: &Graph, output: Node, inputs: &[Node]) -> BTreeMap<Node, Node
     let mut adjoints = BTreeMap::from([(output, graph.constant(1.0).node())]);
     let mut results: HashMap<Node, BTreeMap<usize, Node>> = HashMap::new();
     for node in graph.reachable(&[output]).into_iter().rev() {
-        if graph.op(node).is_system() {
+        if let Some(call) = graph.system(node) {
             if let Some(entries) = results.get(&node) {
-                solve_adjoints(graph, node, entries, &mut adjoints);
-                implicit_adjoints(graph, node, entries, &mut adjoints);
+                system_adjoints(graph, node, &call, entries, &mut adjoints);
             }
             continue;
         }
@@ -255,30 +243,34 @@ fn adjoints(graph: &Graph, output: Node, inputs: &[Node]) -> BTreeMap<Node, Node
     adjoints
 }
 
-/// Of a linear system, with Aᵀλ = x̄: b̄ += λ and Ā −= λ xᵀ.
-fn solve_adjoints(
+/// Of a system g(z, p) = 0, with g_zᵀ λ = z̄: p̄ −= g_pᵀ λ.
+fn system_adjoints(
     graph: &Graph,
     node: Node,
+    call: &Call,
     results: &BTreeMap<usize, Node>,
     adjoints: &mut BTreeMap<Node, Node>,
 ) {
-    let Some(system) = graph.system(node) else {
-        return;
-    };
-    let n = system.size();
-    let bar = dense(graph, n, results);
-    let transposed: Vec<Node> = (0..n * n)
-        .map(|k| system.matrix()[k % n * n + k / n])
-        .collect();
-    let λ = graph.solve(&transposed, &bar).x;
-    for (i, &λi) in λ.iter().enumerate() {
-        add_to(graph, adjoints, system.right()[i], λi);
-        for j in 0..n {
-            let entry = system.matrix()[i * n + j];
-            let term = times(graph, λi, graph.entry(node, j as u32));
-            let sum = minus(graph, adjoints.get(&entry).copied(), term);
-            adjoints.insert(entry, sum);
+    let n = call.size();
+    let matrix = call.matrix(graph, node);
+    let transposed: Vec<Node> = (0..n * n).map(|k| matrix[k % n * n + k / n]).collect();
+    let λ = solve(graph, call, &transposed, results);
+    for (row, argument, slope) in call.slopes(graph, node) {
+        let sum = less(graph, adjoints.get(&argument).copied(), slope, λ[row]);
+        adjoints.insert(argument, sum);
+    }
+}
+
+/// Solves with a matrix of slopes; that of a single unknown of an implicit function needs no
+/// factorisation.
+fn solve(graph: &Graph, call: &Call, matrix: &[Node], right: &BTreeMap<usize, Node>) -> Vec<Node> {
+    let entry = |i| right.get(&i).copied().unwrap_or_else(|| zero(graph));
+    let right: Vec<Node> = (0..call.size()).map(entry).collect();
+    match (matrix, &right[..]) {
+        (&[slope], &[right]) if call.function().is_some() => {
+            vec![graph.binary(Binary::Div, right, slope)]
         }
+        _ => graph.solve(matrix, &right).x,
     }
 }
 
@@ -321,7 +313,8 @@ pub fn size(graph: &Graph, outputs: &[Node], inputs: &[Node], most: usize) -> Op
 pub fn pattern(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Vec<Vec<usize>> {
     let column: HashMap<Node, usize> = inputs.iter().copied().zip(0..).collect();
     let row = |output: &Node| {
-        let mut row: Vec<usize> = local_symbols(graph, *output)
+        let mut row: Vec<usize> = graph
+            .symbols_of(&[*output])
             .into_iter()
             .filter_map(|symbol| column.get(&symbol).copied())
             .collect();
@@ -329,25 +322,6 @@ pub fn pattern(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Vec<Vec<usiz
         row
     };
     outputs.iter().map(row).collect()
-}
-
-/// Symbols below a node by a walk that visits only its own sub-graph.
-fn local_symbols(graph: &Graph, root: Node) -> Vec<Node> {
-    let mut seen = std::collections::HashSet::from([root]);
-    let mut stack = vec![root];
-    let mut symbols = vec![];
-    while let Some(node) = stack.pop() {
-        if let Op::Symbol(_) = graph.op(node) {
-            symbols.push(node);
-        }
-        stack.extend(
-            graph
-                .arguments(node)
-                .into_iter()
-                .filter(|&a| seen.insert(a)),
-        );
-    }
-    symbols
 }
 
 /// A derivative that is 0 where the guard holds, without that guard.
@@ -387,67 +361,6 @@ fn sum_tangent(
         add_to(graph, &mut sum, column, term);
     }
     sum
-}
-
-/// Of an implicit function, g_z dz = −g_p dp: dz for each input that p depends on.
-fn implicit_tangents(
-    graph: &Graph,
-    node: Node,
-    tangents: &HashMap<Node, Tangent>,
-) -> BTreeMap<usize, Vec<Node>> {
-    let Some(call) = graph.implicit_call(node) else {
-        return BTreeMap::new();
-    };
-    if !call.arguments.iter().any(|p| tangents.contains_key(p)) {
-        return BTreeMap::new();
-    }
-    let at = call.at(graph, node);
-    let mut right: BTreeMap<usize, BTreeMap<usize, Node>> = BTreeMap::new();
-    for (row, place, slope) in call.function.sensitivities(graph, &at) {
-        for (&column, &dp) in tangents.get(&call.arguments[place]).into_iter().flatten() {
-            let sums = right.entry(column).or_default();
-            let sum = minus(graph, sums.get(&row).copied(), times(graph, slope, dp));
-            sums.insert(row, sum);
-        }
-    }
-    let matrix = call.function.matrix(&Nodes(graph), &at);
-    let n = call.function.size();
-    let solved = |sums| solve(graph, &matrix, &dense(graph, n, sums));
-    right
-        .iter()
-        .map(|(&column, sums)| (column, solved(sums)))
-        .collect()
-}
-
-/// Of an implicit function, with g_zᵀ λ = z̄: p̄ −= g_pᵀ λ.
-fn implicit_adjoints(
-    graph: &Graph,
-    node: Node,
-    results: &BTreeMap<usize, Node>,
-    adjoints: &mut BTreeMap<Node, Node>,
-) {
-    let Some(call) = graph.implicit_call(node) else {
-        return;
-    };
-    let (n, at) = (call.function.size(), call.at(graph, node));
-    let matrix = call.function.matrix(&Nodes(graph), &at);
-    let transposed: Vec<Node> = (0..n * n).map(|k| matrix[k % n * n + k / n]).collect();
-    let bar = dense(graph, n, results);
-    let λ = solve(graph, &transposed, &bar);
-    for (row, place, slope) in call.function.sensitivities(graph, &at) {
-        let argument = call.arguments[place];
-        let term = times(graph, λ[row], slope);
-        let sum = minus(graph, adjoints.get(&argument).copied(), term);
-        adjoints.insert(argument, sum);
-    }
-}
-
-/// A single unknown needs no factorisation.
-fn solve(graph: &Graph, matrix: &[Node], right: &[Node]) -> Vec<Node> {
-    match (matrix, right) {
-        (&[slope], &[right]) => vec![graph.binary(Binary::Div, right, slope)],
-        _ => graph.solve(matrix, right).x,
-    }
 }
 
 /// Along which directions nothing moves: when each node stays what it is along a direction, whatever its slopes: where the direction has

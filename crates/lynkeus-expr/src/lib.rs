@@ -48,7 +48,7 @@ pub use algebra::{Algebra, Nodes, Reals};
 pub use budget::{Budget, Memory, Spent};
 pub use code::{Implicit, Tape};
 pub use components::components;
-pub use graph::{Expr, Graph, ImplicitCall, LinearSystem, Solution};
+pub use graph::{Call, Expr, Graph, Solution};
 pub use implicit::ImplicitUnknown;
 pub use interval::Interval;
 pub use jet::{Jet, Jets};

@@ -82,15 +82,12 @@ impl Modular {
             return if n < 0 { power.inverse() } else { Some(power) };
         }
         // the inverse modulo a prime, by Fermat's theorem
-        let (mut base, mut left, mut inverse) = (d.unsigned_abs(), SQUARES - 2, 1_u64);
         let times = |a: u64, b: u64| (u128::from(a) * u128::from(b) % u128::from(SQUARES)) as u64;
-        while left > 0 {
-            if left & 1 == 1 {
-                inverse = times(inverse, base);
-            }
-            base = times(base, base);
-            left >>= 1;
-        }
+        let bits = (0..u64::BITS).rev().map(|k| (SQUARES - 2) >> k & 1);
+        let inverse = bits.fold(1, |power, bit| match bit {
+            1 => times(times(power, power), d.unsigned_abs()),
+            _ => times(power, power),
+        });
         let exponent = times(inverse, n.unsigned_abs() % SQUARES);
         let power = self.is_positive().then(|| self.power(exponent))?;
         if n < 0 { power.inverse() } else { Some(power) }
@@ -116,10 +113,8 @@ impl Modular {
         }
         let digits: u64 = digits.parse().ok()?;
         let shift = exponent - fraction;
-        let scale = Self::new(10).power(shift.unsigned_abs());
-        let scale = if shift < 0 { scale.inverse()? } else { scale };
-        let magnitude = Self::new(digits) * scale;
-        Some(if value < 0.0 { -magnitude } else { magnitude })
+        let magnitude = Self::new(digits) * Self::new(10).rational_power(shift, 1)?;
+        Some(magnitude.signed(value))
     }
 
     /// The double itself, which is m·2ᵉ.
@@ -133,14 +128,13 @@ impl Modular {
             0 => (fraction, -1074),
             exponent => (fraction | 1 << 52, exponent - 1075),
         };
-        let scale = Self::new(2).power(exponent.unsigned_abs());
-        let scale = if exponent < 0 {
-            scale.inverse()?
-        } else {
-            scale
-        };
-        let magnitude = Self::new(mantissa) * scale;
-        Some(if value < 0.0 { -magnitude } else { magnitude })
+        let magnitude = Self::new(mantissa) * Self::new(2).rational_power(exponent, 1)?;
+        Some(magnitude.signed(value))
+    }
+
+    /// With the sign of a number.
+    fn signed(self, of: f64) -> Self {
+        if of < 0.0 { -self } else { self }
     }
 
     /// n/d, where that is the nearest double for a small d.
@@ -150,7 +144,7 @@ impl Modular {
         let exact = |&d: &f64| numerator(d) < 1e9 && numerator(d) / d == value.abs();
         let d = denominators.into_iter().find(exact)?;
         let magnitude = Self::new(numerator(d) as u64) * Self::new(d as u64).inverse()?;
-        Some(if value < 0.0 { -magnitude } else { magnitude })
+        Some(magnitude.signed(value))
     }
 
     /// A stream of random numbers that belongs to this element.

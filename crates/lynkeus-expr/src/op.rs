@@ -135,18 +135,17 @@ pub enum Op {
     Binary(Binary, Node, Node),
     /// `if` the first is true (non-zero) the second, else the third
     Select(Node, Node, Node),
-    /// a linear system; its index among the graph's systems. Has no value of its own
-    Solve(u32),
-    /// an implicit function of some nodes; its index among the graph's. Has no value of its own
-    Implicit(u32),
-    /// one result of a [`Op::Solve`] node: 0..n are the solution, n is the
-    /// reciprocal condition estimate; or one entry of an [`Op::Implicit`] node
+    /// a linear system, or an implicit function of some nodes; its index among the graph's systems.
+    /// Has no value of its own
+    System(u32),
+    /// one result of a system: 0..n are the solution, n is the reciprocal condition estimate of a
+    /// linear one
     Entry(Node, u32),
 }
 
 impl Op {
     /// Whether the node stands for several results, its entries, and has no value of its own.
     pub fn is_system(self) -> bool {
-        matches!(self, Self::Solve(_) | Self::Implicit(_))
+        matches!(self, Self::System(_))
     }
 }

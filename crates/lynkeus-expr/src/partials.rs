@@ -16,7 +16,7 @@ pub(crate) enum Variation {
 pub(crate) fn variation(graph: &Graph, node: Node) -> Variation {
     let value = graph.expr(node);
     match graph.op(node) {
-        Op::Constant(_) | Op::Symbol(_) | Op::Solve(_) | Op::Implicit(_) => Variation::Sum(vec![]),
+        Op::Constant(_) | Op::Symbol(_) | Op::System(_) => Variation::Sum(vec![]),
         Op::Unary(op, a) => Variation::Sum(
             unary(op, graph.expr(a), value)
                 .map(|slope| (a, slope.node()))

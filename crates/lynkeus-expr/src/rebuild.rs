@@ -1,7 +1,7 @@
 //! Nodes built again over other arguments: substitution, copies in another graph, and what depends
 //! on some symbols alone, taken out.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{HashMap, HashSet};
 
 use crate::{Graph, Node, Op};
 
@@ -52,16 +52,11 @@ impl Graph {
             Op::Powi(a, n) => self.powi(image(a), n),
             Op::Binary(op, a, b) => self.binary(op, image(a), image(b)),
             Op::Select(c, a, b) => self.select(image(c), image(a), image(b)),
-            Op::Solve(_) | Op::Implicit(_) => return None,
+            Op::System(_) => return None,
             Op::Entry(system, entry) => {
-                let images = |nodes: &[Node]| nodes.iter().map(|&n| image(n)).collect::<Vec<_>>();
-                if let Some(call) = from.implicit_call(system) {
-                    let z = self.implicit(&call.function, &images(&call.arguments));
-                    return z.get(entry as usize).copied();
-                }
-                let system = from.system(system)?;
-                let solution = self.solve(&images(system.matrix()), &images(system.right()));
-                *solution.x.get(entry as usize).unwrap_or(&solution.rcond)
+                let mut call = from.system(system)?;
+                call.arguments = call.arguments.iter().map(|&n| image(n)).collect();
+                return self.results(call).get(entry as usize).copied();
             }
         })
     }
@@ -85,43 +80,48 @@ pub struct HoistedPart {
     pub value: Node,
 }
 
-/// On what a node depends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Reads {
-    Nothing,
-    /// some of the symbols
-    Own,
-    /// other symbols, too
-    Others,
-}
+/// Characters of the value that a fresh symbol is named after.
+const SHOWN: usize = 60;
 
 impl Graph {
     /// Takes out of the roots every expression that depends on some of the `symbols` and on nothing
     /// else, as large as it can be, so that it is computed once where it would be again and again.
     pub fn hoisted(&self, roots: &[Node], symbols: &[Node]) -> Hoisted {
-        let mut reads: HashMap<Node, Reads> = HashMap::new();
-        let mut largest: BTreeSet<Node> = BTreeSet::new();
+        let mut values = self.largest(roots, |symbol| symbols.contains(symbol));
+        values.sort_unstable();
+        self.replaced(roots, values)
+    }
+
+    /// The expressions below the roots that read symbols, all of them own ones, as large as they
+    /// can be, in the order in which the roots need them.
+    pub(crate) fn largest(&self, roots: &[Node], is_own: impl Fn(&Node) -> bool) -> Vec<Node> {
+        // whether others are read; none where no symbol is
+        let mut reads: HashMap<Node, Option<bool>> = HashMap::new();
+        let (mut found, mut seen) = (vec![], HashSet::new());
         for node in self.reachable(roots) {
             let arguments = self.arguments(node);
-            let found = match self.op(node) {
-                Op::Symbol(_) if symbols.contains(&node) => Reads::Own,
-                Op::Symbol(_) => Reads::Others,
-                _ => {
-                    let each = arguments.iter().map(|argument| reads[argument]);
-                    each.max().unwrap_or(Reads::Nothing)
-                }
+            let own = match self.op(node) {
+                Op::Symbol(_) => Some(!is_own(&node)),
+                _ => arguments.iter().filter_map(|a| reads[a]).max(),
             };
-            if found == Reads::Others {
-                largest.extend(arguments.into_iter().filter(|a| reads[a] == Reads::Own));
+            if own == Some(true) {
+                let largest = arguments.into_iter().filter(|a| reads[a] == Some(false));
+                found.extend(largest.filter(|&a| seen.insert(a)));
             }
-            reads.insert(node, found);
+            reads.insert(node, own);
         }
-        largest.extend(roots.iter().filter(|root| reads[root] == Reads::Own));
+        let whole = roots.iter().filter(|root| reads[root] == Some(false));
+        found.extend(whole.filter(|root| seen.insert(**root)));
+        found
+    }
+
+    /// The roots with a fresh symbol for each of the values.
+    pub(crate) fn replaced(&self, roots: &[Node], values: Vec<Node>) -> Hoisted {
         let part = |value: Node| HoistedPart {
-            symbol: self.fresh(self.render(value, 60)).node(),
+            symbol: self.fresh(self.render(value, SHOWN)).node(),
             value,
         };
-        let parts: Vec<HoistedPart> = largest.into_iter().map(part).collect();
+        let parts: Vec<HoistedPart> = values.into_iter().map(part).collect();
         let images = parts.iter().map(|part| (part.value, part.symbol)).collect();
         Hoisted {
             roots: self.substitute(roots, &images),

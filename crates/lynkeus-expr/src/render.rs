@@ -98,12 +98,11 @@ impl Renderer<'_> {
                     self.write(part, 1, depth, text);
                 }
             }),
-            Op::Solve(_) => self.system(node, depth, text),
-            Op::Implicit(_) => self.implicit(node, text),
+            Op::System(_) => self.system(node, depth, text),
             Op::Entry(system, entry) => {
                 self.write(system, 0, depth + 1, text);
-                let calls = self.graph.implicit_call(system);
-                if calls.is_none_or(|call| call.function.size() > 1) {
+                let call = self.graph.system(system);
+                if call.is_none_or(|call| call.function().is_none() || call.size() > 1) {
                     text.push_str(&format!("[{}]", entry + 1));
                 }
             }
@@ -118,12 +117,19 @@ impl Renderer<'_> {
         }
     }
 
-    /// `solve([a, b; c, d], {e, f})`; a large system, and one within another, by what it reads.
+    /// `root(a: a + exp(a) - x = 0)`, or `solve([a, b; c, d], {e, f})`; a large linear system, and
+    /// one within another, by what it reads.
     fn system(&self, node: Node, depth: usize, text: &mut String) {
-        let Some(system) = self.graph.system(node) else {
+        let Some(call) = self.graph.system(node) else {
             return;
         };
-        let n = system.right().len();
+        if let Some(function) = call.function() {
+            text.push_str(&format!("root({})", function.text()));
+        }
+        let Some((matrix, right)) = call.linear() else {
+            return;
+        };
+        let n = right.len();
         if self.in_system || n > SPELLED {
             let symbols = self.graph.symbols_of(&[node]);
             let names: Vec<String> = symbols
@@ -141,20 +147,13 @@ impl Renderer<'_> {
             ..*self
         };
         text.push_str("solve([");
-        for (i, row) in system.matrix().chunks(n).enumerate() {
+        for (i, row) in matrix.chunks(n).enumerate() {
             text.push_str(if i > 0 { "; " } else { "" });
             inner.list(row, depth, text);
         }
         text.push_str("], {");
-        inner.list(system.right(), depth, text);
+        inner.list(right, depth, text);
         text.push_str("})");
-    }
-
-    /// `root(a: a + exp(a) - x = 0)`
-    fn implicit(&self, node: Node, text: &mut String) {
-        if let Some(call) = self.graph.implicit_call(node) {
-            text.push_str(&format!("root({})", call.function.text()));
-        }
     }
 
     fn grouped(&self, parentheses: bool, text: &mut String, body: impl FnOnce(&mut String)) {

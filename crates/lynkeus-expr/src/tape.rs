@@ -35,7 +35,8 @@ impl Tape {
     /// An evaluator over any algebra, for many evaluations: it keeps its registers.
     pub fn evaluator_in<A: Algebra>(&self, algebra: A) -> Evaluator<A> {
         Evaluator {
-            machine: Machine::new(&self.code, algebra),
+            registers: self.code.memory(&algebra),
+            algebra,
             tape: self.clone(),
         }
     }
@@ -45,26 +46,23 @@ impl Tape {
     /// # Panics
     /// If `inputs` has not [`Tape::inputs`] entries.
     pub fn eval_in<A: Algebra>(&self, algebra: &A, inputs: &[A::Value]) -> Vec<A::Value> {
-        let mut machine = Machine::new(&self.code, algebra);
-        machine.run(&self.code, inputs);
-        machine.outputs(&self.code).cloned().collect()
+        let mut registers = self.code.memory(algebra);
+        self.code.run(algebra, &mut registers, inputs);
+        let outputs = self.code.outputs.iter();
+        outputs.map(|&r| registers[r as usize].clone()).collect()
     }
 
     /// Names the first operation that makes a NaN or an infinity out of finite
     /// arguments at these inputs; of an algebraic loop also how the search ended.
     pub fn first_nonfinite(&self, graph: &Graph, inputs: &[f64]) -> Option<String> {
         let code = &*self.code;
-        let mut machine = Machine::new(code, Reals);
-        machine.enter(code, inputs);
+        let mut registers = code.memory(&Reals);
+        registers[..code.inputs].copy_from_slice(inputs);
         for (instruction, &source) in code.instructions.iter().zip(&code.sources) {
-            machine.step(code, instruction);
-            let mut written = code.written(instruction);
-            let bad = written.find_map(|r| {
-                let value = machine.registers[r as usize];
-                (!value.is_finite()).then_some(value)
-            });
-            if let Some(value) = bad {
-                let failure = machine.failure(code, instruction);
+            code.step(&Reals, &mut registers, instruction);
+            let mut written = code.written(instruction).map(|r| registers[r as usize]);
+            if let Some(value) = written.find(|value| !value.is_finite()) {
+                let failure = code.failure(instruction, &registers);
                 let failure = failure.map_or_else(String::new, |how| format!(": {how}"));
                 return Some(format!("{} is {value}{failure}", graph.render(source, 160)));
             }
@@ -93,7 +91,8 @@ impl Tape {
 #[derive(Clone)]
 pub struct Evaluator<A: Algebra = Reals> {
     tape: Tape,
-    machine: Machine<A>,
+    algebra: A,
+    registers: Vec<A::Value>,
 }
 
 impl<A: Algebra> fmt::Debug for Evaluator<A> {
@@ -113,15 +112,12 @@ impl<A: Algebra> Evaluator<A> {
     /// # Panics
     /// If the slices have not the tape's numbers of inputs and outputs.
     pub fn eval(&mut self, inputs: &[A::Value], outputs: &mut [A::Value]) {
-        let Self { tape, machine } = self;
-        machine.run(&tape.code, inputs);
-        assert_eq!(
-            outputs.len(),
-            tape.outputs(),
-            "one place per output of the tape"
-        );
-        for (output, value) in outputs.iter_mut().zip(machine.outputs(&tape.code)) {
-            output.clone_from(value);
+        let code = &*self.tape.code;
+        let places = code.outputs.len();
+        assert_eq!(outputs.len(), places, "one place per output of the tape");
+        code.run(&self.algebra, &mut self.registers, inputs);
+        for (output, &register) in outputs.iter_mut().zip(&code.outputs) {
+            output.clone_from(&self.registers[register as usize]);
         }
     }
 }
@@ -212,10 +208,12 @@ impl<'g> Compiler<'g> {
         let arguments = self.graph.arguments(node);
         let from: Vec<Register> = arguments.iter().map(|a| self.register[a]).collect();
         let instruction = match op {
-            Op::Solve(_) | Op::Implicit(_) => {
+            Op::System(_) => {
                 // results must not land on arguments: arguments are released after
+                self.code.room = self.code.room.max(from.len());
+                let system = self.graph.system(node).map(|call| call.system);
                 self.code.systems.push(SystemSlots {
-                    system: self.system(node),
+                    system: system.unwrap_or(System::Linear(0)),
                     arguments: from,
                     results: vec![],
                 });
@@ -235,13 +233,6 @@ impl<'g> Compiler<'g> {
         }
         self.code.instructions.push(instruction);
         self.code.sources.push(node);
-    }
-
-    fn system(&self, node: Node) -> System {
-        match self.graph.implicit_call(node) {
-            Some(call) => System::Implicit(call.function),
-            None => System::Linear(self.graph.system(node).map_or(0, |system| system.size())),
-        }
     }
 
     /// Results of a system are written when it is solved, so each takes a fresh
@@ -281,51 +272,28 @@ impl<'g> Compiler<'g> {
     }
 }
 
-/// Registers over one algebra, for one [`Code`].
-#[derive(Clone)]
-struct Machine<A: Algebra> {
-    algebra: A,
-    pub registers: Vec<A::Value>,
-    /// the arguments of the system that is being solved
-    system: Vec<A::Value>,
-}
-
-impl<A: Algebra> Machine<A> {
-    /// With the code's constants in their places.
-    pub fn new(code: &Code, algebra: A) -> Self {
-        let mut registers = vec![algebra.constant(0.0); code.registers];
-        let places = registers.iter_mut().skip(code.inputs);
-        for (place, &constant) in places.zip(&code.constants) {
+/// Evaluation over registers that hold the values of one algebra.
+impl Code {
+    /// Registers with the constants in their places.
+    fn memory<A: Algebra>(&self, algebra: &A) -> Vec<A::Value> {
+        let mut registers = vec![algebra.constant(0.0); self.registers + self.room];
+        let places = registers.iter_mut().skip(self.inputs);
+        for (place, &constant) in places.zip(&self.constants) {
             *place = algebra.constant(constant);
         }
-        Self {
-            algebra,
-            registers,
-            system: vec![],
+        registers
+    }
+
+    fn run<A: Algebra>(&self, algebra: &A, r: &mut [A::Value], inputs: &[A::Value]) {
+        assert_eq!(inputs.len(), self.inputs, "one value per input of the tape");
+        r[..inputs.len()].clone_from_slice(inputs);
+        for instruction in &self.instructions {
+            self.step(algebra, r, instruction);
         }
-    }
-
-    pub fn run(&mut self, code: &Code, inputs: &[A::Value]) {
-        self.enter(code, inputs);
-        for instruction in &code.instructions {
-            self.step(code, instruction);
-        }
-    }
-
-    pub fn enter(&mut self, code: &Code, inputs: &[A::Value]) {
-        assert_eq!(inputs.len(), code.inputs, "one value per input of the tape");
-        self.registers[..inputs.len()].clone_from_slice(inputs);
-    }
-
-    /// What the outputs' registers hold.
-    pub fn outputs<'a>(&'a self, code: &'a Code) -> impl Iterator<Item = &'a A::Value> {
-        let outputs = code.outputs.iter();
-        outputs.map(|&register| &self.registers[register as usize])
     }
 
     #[inline(always)]
-    pub fn step(&mut self, code: &Code, instruction: &Instruction) {
-        let (algebra, r) = (&self.algebra, &mut self.registers[..]);
+    fn step<A: Algebra>(&self, algebra: &A, r: &mut [A::Value], instruction: &Instruction) {
         match *instruction {
             Instruction::Add(to, x, y) => {
                 r[to as usize] = algebra.binary(Binary::Add, &r[x as usize], &r[y as usize]);
@@ -347,44 +315,47 @@ impl<A: Algebra> Machine<A> {
             Instruction::Select(to, c, x, y) => {
                 r[to as usize] = algebra.select(&r[c as usize], &r[x as usize], &r[y as usize]);
             }
-            Instruction::Solve(index) => self.solve(code, index),
+            Instruction::Solve(index) => self.solve(algebra, r, index),
         }
     }
 
-    fn solve(&mut self, code: &Code, index: u32) {
-        let slots = &code.systems[index as usize];
-        let r = &mut self.registers;
-        self.system.clear();
-        let arguments = slots.arguments.iter();
-        self.system
-            .extend(arguments.map(|&a| r[a as usize].clone()));
+    /// The arguments are copied to the room behind the registers.
+    fn solve<A: Algebra>(&self, algebra: &A, r: &mut [A::Value], index: u32) {
+        let slots = &self.systems[index as usize];
+        let (r, room) = r.split_at_mut(self.registers);
+        let room = &mut room[..slots.arguments.len()];
+        for (place, &argument) in room.iter_mut().zip(&slots.arguments) {
+            place.clone_from(&r[argument as usize]);
+        }
         match &slots.system {
             System::Linear(n) => {
-                let (a, x) = self.system.split_at_mut(n * n);
-                let rcond = self.algebra.solve_in_place(a, x);
+                let (a, x) = room.split_at_mut(n * n);
+                let rcond = algebra.solve_in_place(a, x);
                 for &(entry, to) in &slots.results {
                     r[to as usize].clone_from(x.get(entry).unwrap_or(&rcond));
                 }
             }
             System::Implicit(function) => {
-                let z = self.algebra.implicit(function, &self.system);
+                let z = algebra.implicit(function, room);
                 for &(entry, to) in &slots.results {
                     r[to as usize].clone_from(&z[entry]);
                 }
             }
         }
     }
-}
 
-impl Machine<Reals> {
     /// Why the instruction that was just run found no root, where it looked for one.
-    pub fn failure(&self, code: &Code, instruction: &Instruction) -> Option<String> {
+    fn failure(&self, instruction: &Instruction, r: &[f64]) -> Option<String> {
         let Instruction::Solve(index) = *instruction else {
             return None;
         };
-        match &code.systems[index as usize].system {
+        let slots = &self.systems[index as usize];
+        match &slots.system {
             System::Linear(_) => None,
-            System::Implicit(function) => function.root(&self.system).err(),
+            System::Implicit(function) => {
+                let p = &r[self.registers..][..slots.arguments.len()];
+                function.root(p).err()
+            }
         }
     }
 }

@@ -22,22 +22,10 @@ use lynkeus_proof::metzler::spectral_radius;
 use lynkeus_proof::spectrum;
 use nalgebra::DMatrix;
 
-/// K(λ) with the eigenvalues of A_n − K C_n at `poles`: the coefficients of
-/// ∏(s − λ_i) after the leading one.
-///
-/// ```
-/// // (s + 1)(s + 2) = s² + 3s + 2
-/// assert_eq!(lynkeus_gain::integrators::place(&[-1.0, -2.0]), [3.0, 2.0]);
-/// ```
-pub fn place(poles: &[f64]) -> Vec<f64> {
-    let mut polynomial = vec![1.0];
-    for λ in poles {
-        polynomial.push(0.0);
-        for k in (1..polynomial.len()).rev() {
-            polynomial[k] -= λ * polynomial[k - 1];
-        }
-    }
-    polynomial.split_off(1)
+/// [`place_all`] for real poles.
+pub(crate) fn place(poles: &[f64]) -> Vec<f64> {
+    let poles: Vec<Pole> = poles.iter().map(|&λ| Pole::Real(λ)).collect();
+    place_all(&poles)
 }
 
 /// Eigenvalues of a real matrix: a real one, or two conjugate ones.
@@ -92,8 +80,8 @@ impl std::fmt::Display for Pole {
     }
 }
 
-/// K with the eigenvalues of A_n − K C_n at `poles`, n of them in all: [`place`] for poles that
-/// may be complex.
+/// K(λ) with the eigenvalues of A_n − K C_n at `poles`, n of them in all: the coefficients of
+/// ∏(s − λ_i) after the leading one.
 ///
 /// ```
 /// use lynkeus_gain::integrators::{Pole, place_all};
@@ -107,12 +95,12 @@ pub fn place_all(poles: &[Pole]) -> Vec<f64> {
     for pole in poles {
         // s − λ, or s² + p s + q
         let (p, q) = match *pole {
-            Pole::Real(λ) => (-λ, 0.0),
-            Pole::Pair { re, im } => (-2.0 * re, re * re + im * im),
+            Pole::Real(λ) => (-λ, None),
+            Pole::Pair { re, im } => (-2.0 * re, Some(re * re + im * im)),
         };
         polynomial.resize(polynomial.len() + pole.count(), 0.0);
         for k in (1..polynomial.len()).rev() {
-            let second = if k > 1 { q * polynomial[k - 2] } else { 0.0 };
+            let second = q.filter(|_| k > 1).map_or(0.0, |q| q * polynomial[k - 2]);
             polynomial[k] += p * polynomial[k - 1] + second;
         }
     }

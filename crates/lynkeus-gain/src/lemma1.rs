@@ -110,7 +110,7 @@ pub fn construct(bounds: &[Bounds]) -> Result<Lemma1, Error> {
         // s² alone may leave the range of numbers
         diagonal.push(MARGIN_DIAGONAL * s * (s / pivot));
         pivot = (MARGIN_DIAGONAL - 1.0) * s * (s / pivot);
-        let sound = pivot.is_finite() && pivot > 0.0 && growth.positive();
+        let sound = pivot.is_finite() && pivot > 0.0 && growth.tails.positive();
         if !sound {
             return Err(Error::Lost { row: k + 2 });
         }
@@ -160,7 +160,7 @@ fn unscaled(diagonal: Vec<f64>, off: Vec<f64>, w: f64) -> Result<Tridiagonal, Fa
 /// The elimination while S grows, each state in a unit in which its column is about one:
 /// the numbers of long chains spread over hundreds of decades.
 struct Growth {
-    tails: Option<Tails>,
+    tails: Tails,
     /// 1/unit of the last two states
     units: [f64; 2],
 }
@@ -168,18 +168,15 @@ struct Growth {
 impl Growth {
     fn new() -> Self {
         Self {
-            tails: None,
+            tails: Tails::start(Interval::point(RHO)),
             units: [0.0, 1.0],
         }
     }
 
     /// max of cᵀ(−P)⁻¹c over the bounds, c being zero but in its last two entries.
     fn cross(&self, c: [f64; 2]) -> f64 {
-        let c = [0, 1].map(|i| Interval::point(c[i]) * Interval::point(self.units[i]));
-        match &self.tails {
-            Some(tails) => tails.cross(c),
-            None => (c[1].powi(2) / Interval::point(RHO)).hi(),
-        }
+        let scaled = |i: usize| Interval::point(c[i]) * Interval::point(self.units[i]);
+        self.tails.cross([0, 1].map(scaled))
     }
 
     /// The column with a·(s_{k−2,k−1}, s_{k−1,k−1}, 2s_{k−1,k}).
@@ -193,15 +190,8 @@ impl Growth {
             near: scaled(near, self.units[1], unit),
             own: scaled(-2.0 * s, unit, unit),
         };
-        self.tails = Some(match &self.tails {
-            Some(tails) => tails.grown(&column, bounds, 0.0),
-            None => Tails::new(Interval::point(RHO), &column, bounds, 0.0),
-        });
+        self.tails = self.tails.grown(&column, bounds, 0.0);
         self.units = [self.units[1], unit];
-    }
-
-    fn positive(&self) -> bool {
-        self.tails.as_ref().is_none_or(Tails::positive)
     }
 }
 

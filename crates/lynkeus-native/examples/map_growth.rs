@@ -101,12 +101,9 @@ fn growth(n: usize) -> Result<Growth, Box<dyn Error>> {
     let mut interpreter = tape.evaluator();
     let interpreted = timed(|| interpreter.eval(point.as_flattened(), values.as_flattened_mut()));
     let start = Instant::now();
-    let native = Function::<1>::compile(&tape).map(|function| Native {
+    let native = Function::<1>::compile(&tape).map(|mut function| Native {
         compiled: start.elapsed(),
-        evaluated: {
-            let mut machine = function.evaluator();
-            timed(|| machine.eval(&point, &mut values))
-        },
+        evaluated: timed(|| function.eval(&point, &mut values)),
     });
     Ok(Growth {
         map,

@@ -42,19 +42,9 @@ pub(crate) enum Operand {
     Memory(Address),
 }
 
-/// One number or four in a register.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Width {
-    Scalar,
-    Lanes,
-}
-
 /// The opcode maps of the VEX prefix.
-#[derive(Clone, Copy)]
-enum Map {
-    Of = 1,
-    Of3a = 3,
-}
+const OF: u8 = 1;
+const OF_3A: u8 = 3;
 
 /// Relations of `vcmp`; a NaN makes all false but [`Relation::NotEqual`] and
 /// [`Relation::Unordered`].
@@ -68,18 +58,13 @@ pub(crate) enum Relation {
     Greater = 0x1e,
 }
 
-/// Three-operand arithmetic, by its opcode.
-#[derive(Clone, Copy)]
-pub(crate) enum Arithmetic {
+/// Three-operand arithmetic and logic, by the opcode.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Opcode {
     Add = 0x58,
     Mul = 0x59,
     Sub = 0x5c,
     Div = 0x5e,
-}
-
-/// Three-operand logic, by its opcode.
-#[derive(Clone, Copy)]
-pub(crate) enum Logic {
     And = 0x54,
     /// not the first, and the second
     AndNot = 0x55,
@@ -93,32 +78,32 @@ const SCALAR: u8 = 3;
 /// Machine code that grows.
 pub(crate) struct Assembler {
     pub bytes: Vec<u8>,
-    width: Width,
+    /// four numbers in a register, not one
+    is_wide: bool,
 }
 
 impl Assembler {
-    pub fn new(width: Width) -> Self {
-        Self {
-            bytes: vec![],
-            width,
-        }
+    pub fn new(is_wide: bool) -> Self {
+        let bytes = vec![];
+        Self { bytes, is_wide }
     }
 
     /// pp and L of arithmetic.
     fn numbers(&self) -> (u8, u8) {
-        match self.width {
-            Width::Scalar => (SCALAR, 0),
-            Width::Lanes => (PACKED, 1),
+        if self.is_wide {
+            (PACKED, 1)
+        } else {
+            (SCALAR, 0)
         }
     }
 
-    /// L of what is done bit by bit.
-    fn length(&self) -> u8 {
-        u8::from(self.width == Width::Lanes)
+    /// pp and L of what is done bit by bit.
+    fn bits(&self) -> (u8, u8) {
+        (PACKED, u8::from(self.is_wide))
     }
 
     /// `vvvv` is 0 where the instruction has no second operand.
-    fn vex(&mut self, (pp, l): (u8, u8), map: Map, opcode: u8, reg: u8, vvvv: u8, rm: Operand) {
+    fn vex(&mut self, (pp, l): (u8, u8), map: u8, opcode: u8, reg: u8, vvvv: u8, rm: Operand) {
         let base = match rm {
             Operand::Register(r) => r,
             Operand::Memory(address) => address.base.number(),
@@ -126,7 +111,7 @@ impl Assembler {
         let inverted = |number: u8, bit: u8| (!number >> 3 & 1) << bit;
         self.bytes.extend([
             0xc4,
-            inverted(reg, 7) | 1 << 6 | inverted(base, 5) | map as u8,
+            inverted(reg, 7) | 1 << 6 | inverted(base, 5) | map,
             (!vvvv & 15) << 3 | l << 2 | pp,
             opcode,
         ]);
@@ -141,68 +126,51 @@ impl Assembler {
     }
 
     pub fn load(&mut self, to: Register, from: Address) {
-        let numbers = self.numbers();
-        self.vex(numbers, Map::Of, 0x10, to, 0, Operand::Memory(from));
+        self.vex(self.numbers(), OF, 0x10, to, 0, Operand::Memory(from));
     }
 
     pub fn store(&mut self, from: Register, to: Address) {
-        let numbers = self.numbers();
-        self.vex(numbers, Map::Of, 0x11, from, 0, Operand::Memory(to));
+        self.vex(self.numbers(), OF, 0x11, from, 0, Operand::Memory(to));
     }
 
     /// From one register to another.
     pub fn copy(&mut self, to: Register, from: Register) {
         if to != from {
-            let l = self.length();
-            self.vex((PACKED, l), Map::Of, 0x28, to, 0, Operand::Register(from));
+            self.vex(self.bits(), OF, 0x28, to, 0, Operand::Register(from));
         }
     }
 
-    pub fn arithmetic(&mut self, op: Arithmetic, to: Register, x: Register, y: Operand) {
-        let numbers = self.numbers();
-        self.vex(numbers, Map::Of, op as u8, to, x, y);
-    }
-
-    pub fn logic(&mut self, op: Logic, to: Register, x: Register, y: Operand) {
-        let l = self.length();
-        self.vex((PACKED, l), Map::Of, op as u8, to, x, y);
+    pub fn apply(&mut self, op: Opcode, to: Register, x: Register, y: Operand) {
+        use Opcode::{Add, Div, Mul, Sub};
+        let prefix = match matches!(op, Add | Mul | Sub | Div) {
+            true => self.numbers(),
+            false => self.bits(),
+        };
+        self.vex(prefix, OF, op as u8, to, x, y);
     }
 
     /// All bits where the relation holds, else none.
     pub fn compare(&mut self, relation: Relation, to: Register, x: Register, y: Operand) {
-        let numbers = self.numbers();
-        self.vex(numbers, Map::Of, 0xc2, to, x, y);
+        self.vex(self.numbers(), OF, 0xc2, to, x, y);
         self.bytes.push(relation as u8);
     }
 
     /// `y` where the mask's sign is set, else `x`.
     pub fn blend(&mut self, to: Register, x: Register, y: Operand, mask: Register) {
-        let l = self.length();
-        self.vex((PACKED, l), Map::Of3a, 0x4b, to, x, y);
+        self.vex(self.bits(), OF_3A, 0x4b, to, x, y);
         self.bytes.push(mask << 4);
     }
 
     pub fn sqrt(&mut self, to: Register, x: Register) {
-        let numbers = self.numbers();
         // the scalar form takes its upper half from a second operand
-        let upper = if self.width == Width::Scalar { x } else { 0 };
-        self.vex(numbers, Map::Of, 0x51, to, upper, Operand::Register(x));
+        let upper = if self.is_wide { 0 } else { x };
+        self.vex(self.numbers(), OF, 0x51, to, upper, Operand::Register(x));
     }
 
     pub fn floor(&mut self, to: Register, x: Register) {
-        let l = self.length();
-        let (opcode, upper) = match self.width {
-            Width::Scalar => (0x0b, x),
-            Width::Lanes => (0x09, 0),
-        };
-        self.vex(
-            (PACKED, l),
-            Map::Of3a,
-            opcode,
-            to,
-            upper,
-            Operand::Register(x),
-        );
+        let (opcode, upper) = if self.is_wide { (0x09, 0) } else { (0x0b, x) };
+        let from = Operand::Register(x);
+        self.vex(self.bits(), OF_3A, opcode, to, upper, from);
         // toward −∞, without the inexact flag
         self.bytes.push(9);
     }

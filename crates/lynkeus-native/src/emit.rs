@@ -3,7 +3,7 @@
 
 use lynkeus_expr::{Binary, Unary};
 
-use crate::assemble::{Arithmetic, Logic, Operand, Register, Relation};
+use crate::assemble::{Opcode, Operand, Register, Relation};
 use crate::library;
 use crate::record::{Id, Program, Value};
 use crate::registers::{Emitter, TEMPORARY};
@@ -17,22 +17,13 @@ const CONSTANTS: [f64; 6] = [-0.0, MAGNITUDE, 0.0, 1.0, -1.0, f64::NAN];
 const MASK: Register = TEMPORARY[0];
 const OTHER: Register = TEMPORARY[1];
 
-/// What was compiled.
-#[derive(Debug)]
-pub(crate) struct Emitted {
-    pub code: Vec<u8>,
-    pub constants: Vec<f64>,
-    /// length of the frame, in values
-    pub frame: usize,
-}
-
 /// Code for a program, of whose inputs the first `shared` stand apart. With `spacing`, the distance in
 /// values of the outputs of one group of lanes from those of the next, it goes over many groups.
 pub(crate) fn emit<const LANES: usize>(
     program: &Program,
     shared: usize,
     spacing: Option<usize>,
-) -> Emitted {
+) -> Emitter<'_, LANES> {
     let mut emitter = Emitter::<LANES>::new(program, shared, &CONSTANTS);
     emitter.assembler.enter();
     let first = emitter.assembler.bytes.len();
@@ -45,11 +36,7 @@ pub(crate) fn emit<const LANES: usize>(
         emitter.assembler.repeat(first, inputs, outputs);
     }
     emitter.assembler.leave();
-    Emitted {
-        code: emitter.assembler.bytes,
-        frame: emitter.frame.len(),
-        constants: emitter.frame.constants,
-    }
+    emitter
 }
 
 impl<const LANES: usize> Emitter<'_, LANES> {
@@ -92,7 +79,7 @@ impl<const LANES: usize> Emitter<'_, LANES> {
             Unary::Not => {
                 self.assembler.compare(Relation::Equal, MASK, from, zero);
                 let to = self.result(id, &[x]);
-                self.assembler.logic(Logic::And, to, MASK, one);
+                self.assembler.apply(Opcode::And, to, MASK, one);
             }
             Unary::Sqrt => {
                 let to = self.result(id, &[x]);
@@ -105,12 +92,12 @@ impl<const LANES: usize> Emitter<'_, LANES> {
             Unary::Abs => {
                 let magnitude = self.constant(MAGNITUDE);
                 let to = self.result(id, &[x]);
-                self.assembler.logic(Logic::And, to, from, magnitude);
+                self.assembler.apply(Opcode::And, to, from, magnitude);
             }
             Unary::Neg => {
                 let sign = self.constant(-0.0);
                 let to = self.result(id, &[x]);
-                self.assembler.logic(Logic::Xor, to, from, sign);
+                self.assembler.apply(Opcode::Xor, to, from, sign);
             }
             // called, as `library` has them; named, so that a new operation does not compile before it has a place
             Unary::Exp
@@ -129,25 +116,25 @@ impl<const LANES: usize> Emitter<'_, LANES> {
 
     fn binary(&mut self, id: Id, op: Binary, x: Id, y: Id) {
         match op {
-            Binary::Add => self.arithmetic(id, Arithmetic::Add, x, y),
-            Binary::Sub => self.arithmetic(id, Arithmetic::Sub, x, y),
-            Binary::Mul => self.arithmetic(id, Arithmetic::Mul, x, y),
-            Binary::Div => self.arithmetic(id, Arithmetic::Div, x, y),
+            Binary::Add => self.arithmetic(id, Opcode::Add, x, y),
+            Binary::Sub => self.arithmetic(id, Opcode::Sub, x, y),
+            Binary::Mul => self.arithmetic(id, Opcode::Mul, x, y),
+            Binary::Div => self.arithmetic(id, Opcode::Div, x, y),
             Binary::Less => self.relation(id, Relation::Less, x, y),
             Binary::LessEq => self.relation(id, Relation::LessEqual, x, y),
             Binary::Equal => self.relation(id, Relation::Equal, x, y),
-            Binary::And => self.truth(id, Logic::And, x, y),
-            Binary::Or => self.truth(id, Logic::Or, x, y),
-            Binary::Min => self.extreme(id, Relation::Less, Logic::And, x, y),
-            Binary::Max => self.extreme(id, Relation::Greater, Logic::AndNot, x, y),
+            Binary::And => self.truth(id, Opcode::And, x, y),
+            Binary::Or => self.truth(id, Opcode::Or, x, y),
+            Binary::Min => self.extreme(id, Relation::Less, Opcode::And, x, y),
+            Binary::Max => self.extreme(id, Relation::Greater, Opcode::AndNot, x, y),
             // called
             Binary::Pow | Binary::Atan2 => {}
         }
     }
 
-    fn arithmetic(&mut self, id: Id, op: Arithmetic, x: Id, y: Id) {
+    fn arithmetic(&mut self, id: Id, op: Opcode, x: Id, y: Id) {
         // a value that is in a register already comes first where the order is free
-        let commutes = matches!(op, Arithmetic::Add | Arithmetic::Mul);
+        let commutes = matches!(op, Opcode::Add | Opcode::Mul);
         let (x, y) = if commutes && self.is_elsewhere(x) && !self.is_elsewhere(y) {
             (y, x)
         } else {
@@ -156,7 +143,7 @@ impl<const LANES: usize> Emitter<'_, LANES> {
         let first = self.register(x);
         let second = self.operand(y);
         let to = self.result(id, &[x, y]);
-        self.assembler.arithmetic(op, to, first, second);
+        self.assembler.apply(op, to, first, second);
     }
 
     fn relation(&mut self, id: Id, relation: Relation, x: Id, y: Id) {
@@ -165,11 +152,11 @@ impl<const LANES: usize> Emitter<'_, LANES> {
         let one = self.constant(1.0);
         self.assembler.compare(relation, MASK, first, second);
         let to = self.result(id, &[x, y]);
-        self.assembler.logic(Logic::And, to, MASK, one);
+        self.assembler.apply(Opcode::And, to, MASK, one);
     }
 
     /// Anything but zero is true, NaN too.
-    fn truth(&mut self, id: Id, op: Logic, x: Id, y: Id) {
+    fn truth(&mut self, id: Id, op: Opcode, x: Id, y: Id) {
         let (first, second) = (self.register(x), self.register(y));
         let [zero, one] = [0.0, 1.0].map(|c| self.constant(c));
         self.assembler
@@ -177,14 +164,14 @@ impl<const LANES: usize> Emitter<'_, LANES> {
         self.assembler
             .compare(Relation::NotEqual, OTHER, second, zero);
         self.assembler
-            .logic(op, MASK, MASK, Operand::Register(OTHER));
+            .apply(op, MASK, MASK, Operand::Register(OTHER));
         let to = self.result(id, &[x, y]);
-        self.assembler.logic(Logic::And, to, MASK, one);
+        self.assembler.apply(Opcode::And, to, MASK, one);
     }
 
     /// The smaller or the larger one, NaN if either is. Of two zeros the one whose sign is the
     /// extreme: `pick` takes x's sign where both are equal.
-    fn extreme(&mut self, id: Id, relation: Relation, pick: Logic, x: Id, y: Id) {
+    fn extreme(&mut self, id: Id, relation: Relation, pick: Opcode, x: Id, y: Id) {
         let (first, second) = (self.register(x), self.register(y));
         let nan = self.constant(f64::NAN);
         let y_value = Operand::Register(second);
@@ -192,9 +179,9 @@ impl<const LANES: usize> Emitter<'_, LANES> {
         self.assembler
             .compare(Relation::Equal, OTHER, first, y_value);
         self.assembler
-            .logic(pick, OTHER, first, Operand::Register(OTHER));
+            .apply(pick, OTHER, first, Operand::Register(OTHER));
         self.assembler
-            .logic(Logic::Or, MASK, MASK, Operand::Register(OTHER));
+            .apply(Opcode::Or, MASK, MASK, Operand::Register(OTHER));
         self.assembler
             .compare(Relation::Unordered, OTHER, first, y_value);
         let to = self.result(id, &[x, y]);

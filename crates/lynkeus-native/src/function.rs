@@ -3,26 +3,31 @@
 use std::sync::Arc;
 
 use lynkeus_expr::Tape;
+#[cfg(target_arch = "x86_64")]
+use memmap2::Mmap;
 
 use crate::record::Program;
 
 #[cfg(target_arch = "x86_64")]
 use crate::emit::emit;
 #[cfg(target_arch = "x86_64")]
-use crate::memory::Executable;
+use crate::memory;
 
 /// Most instructions of a tape that is compiled.
 const LARGEST: usize = 1_000_000;
 
 /// Most bytes of inputs, of outputs and of a frame: addresses are offsets of 31 bits, and every
-/// evaluator has a frame of its own.
+/// clone has a frame of its own.
 const LARGEST_PLACE: usize = 1 << 28;
 
-/// A tape as machine code, for one group of lanes or for many one after the other. A clone shares the
-/// code.
+/// A tape as machine code, for one group of lanes or for many one after the other, evaluated again and
+/// again without allocating. A clone shares the code and has a working memory of its own.
 #[derive(Clone, Debug)]
 pub struct Function<const LANES: usize> {
     compiled: Arc<Compiled>,
+    /// constants, then what registers do not hold; one place more than is used, since logic reads
+    /// beyond a single number
+    frame: Buffer<LANES>,
 }
 
 #[derive(Debug)]
@@ -33,11 +38,8 @@ struct Compiled {
     shared: usize,
     /// from the outputs of one group to those of the next; none of code for one group
     spacing: Option<usize>,
-    constants: Vec<f64>,
-    /// length of the frame, in values
-    frame: usize,
     #[cfg(target_arch = "x86_64")]
-    code: Executable,
+    code: Mmap,
 }
 
 impl<const LANES: usize> Function<LANES> {
@@ -63,81 +65,37 @@ impl<const LANES: usize> Function<LANES> {
         if !is_compiled_for || tape.len() > LARGEST {
             return None;
         }
-        let program = Program::record(tape)?;
-        let compiled = Arc::new(Compiled::new::<LANES>(&program, shared, spacing)?);
-        Some(Self { compiled })
+        Self::compiled(&Program::record(tape)?, shared, spacing)
     }
 
-    /// An evaluator with its own working memory.
-    pub fn evaluator(&self) -> Evaluator<LANES> {
-        Evaluator {
-            frame: self.compiled.frame(),
-            compiled: self.compiled.clone(),
-        }
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-fn is_supported() -> bool {
-    std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
-}
-
-#[cfg(not(target_arch = "x86_64"))]
-fn is_supported() -> bool {
-    false
-}
-
-impl Compiled {
     #[cfg(target_arch = "x86_64")]
-    fn new<const LANES: usize>(
-        program: &Program,
-        shared: usize,
-        spacing: Option<usize>,
-    ) -> Option<Self> {
-        let emitted = emit::<LANES>(program, shared, spacing);
+    fn compiled(program: &Program, shared: usize, spacing: Option<usize>) -> Option<Self> {
+        let emitter = emit::<LANES>(program, shared, spacing);
         let outputs = spacing.unwrap_or(program.outputs.len());
-        let places = [program.inputs, outputs, emitted.frame + 1];
-        if places
-            .iter()
-            .any(|count| *count > LARGEST_PLACE / (8 * LANES))
-        {
+        let places = [program.inputs, outputs, emitter.frame.len() + 1];
+        let is_large = |&count: &usize| count > LARGEST_PLACE / (8 * LANES);
+        if places.iter().any(is_large) {
             return None;
         }
-        Some(Self {
+        let mut frame = Buffer::new(emitter.frame.len() + 1);
+        for (place, &constant) in frame.values_mut().iter_mut().zip(&emitter.frame.constants) {
+            *place = [constant; LANES];
+        }
+        let compiled = Arc::new(Compiled {
             inputs: program.inputs,
             outputs: program.outputs.len(),
             shared,
             spacing,
-            code: Executable::new(&emitted.code)?,
-            constants: emitted.constants,
-            frame: emitted.frame,
-        })
+            code: memory::executable(&emitter.assembler.bytes)?,
+        });
+        Some(Self { compiled, frame })
     }
 
     #[cfg(not(target_arch = "x86_64"))]
-    fn new<const LANES: usize>(_: &Program, _: usize, _: Option<usize>) -> Option<Self> {
+    fn compiled(_: &Program, _: usize, _: Option<usize>) -> Option<Self> {
         None
     }
 
-    /// Constants, then what registers do not hold; one place more than is used, since logic
-    /// reads beyond a single number.
-    fn frame<const LANES: usize>(&self) -> Buffer<LANES> {
-        let mut frame = Buffer::new(self.frame + 1);
-        for (place, &constant) in frame.values_mut().iter_mut().zip(&self.constants) {
-            *place = [constant; LANES];
-        }
-        frame
-    }
-}
-
-/// Evaluates a [`Function`] again and again, without allocating.
-#[derive(Clone, Debug)]
-pub struct Evaluator<const LANES: usize> {
-    compiled: Arc<Compiled>,
-    frame: Buffer<LANES>,
-}
-
-impl<const LANES: usize> Evaluator<LANES> {
     /// Writes the outputs at `inputs`.
     ///
     /// # Panics
@@ -181,9 +139,19 @@ impl<const LANES: usize> Evaluator<LANES> {
         // without spacing has one
         unsafe {
             let frame = self.frame.values_mut();
-            compiled.code.run(inputs, outputs, frame, shared, groups);
+            memory::run(&compiled.code, inputs, outputs, frame, shared, groups);
         }
     }
+}
+
+#[cfg(target_arch = "x86_64")]
+fn is_supported() -> bool {
+    std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn is_supported() -> bool {
+    false
 }
 
 /// Bytes of a cache line.

@@ -5,7 +5,7 @@
 //! emitter: one number per value ([`Function<1>`]), which is the tape over
 //! [`Reals`](lynkeus_expr::Reals), and four numbers side by side in vector registers
 //! ([`Function<4>`]), the tape over [`Lanes`](lynkeus_expr::lanes::Lanes), whose elementary
-//! functions are written for lanes. [`Evaluator::sweep`] does many groups of four with one call.
+//! functions are written for lanes. [`Function::sweep`] does many groups of four with one call.
 //!
 //! Compiling is one more evaluation of the tape, over the algebra of instructions (`record`);
 //! values are then placed in registers (`registers`), operation by operation (`emit`), in one
@@ -22,9 +22,9 @@
 //! let g = Graph::new();
 //! let x = g.symbol("x");
 //! let tape = Tape::new(&g, &[x.node()], &[(x.sin() * x + 1.0).node()])?;
-//! if let Some(function) = Function::<1>::compile(&tape) {
+//! if let Some(mut function) = Function::<1>::compile(&tape) {
 //!     let mut y = [[0.0]];
-//!     function.evaluator().eval(&[[0.3]], &mut y);
+//!     function.eval(&[[0.3]], &mut y);
 //!     assert_eq!(y, [[0.3_f64.sin() * 0.3 + 1.0]]);
 //! }
 //! # Ok::<(), lynkeus_expr::MissingInput>(())
@@ -44,4 +44,4 @@ mod memory;
 #[cfg(target_arch = "x86_64")]
 mod registers;
 
-pub use function::{Buffer, Evaluator, Function};
+pub use function::{Buffer, Function};

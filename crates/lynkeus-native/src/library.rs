@@ -7,68 +7,53 @@ use std::ops::{Add, Div, Mul, Sub};
 use lynkeus_expr::lanes::Vector;
 use lynkeus_expr::{Algebra, Binary, Reals, Unary, lanes};
 
-/// The library's functions and those of lanes, by a macro because each has to be a function of
-/// its own. Arguments and result go by vector registers, one number or four in each.
-macro_rules! unary {
-    ($($op:ident $function:ident),*) => {
-        /// The address of a function of one value; none where code is emitted for it.
-        pub(crate) fn unary<const LANES: usize>(op: Unary) -> Option<usize> {
-            Some(match op {
-                $(Unary::$op => {
-                    extern "sysv64" fn scalar(x: f64) -> f64 {
-                        Reals.unary(Unary::$op, &x)
-                    }
-                    // with AVX the System V ABI passes it in a register
-                    #[allow(improper_ctypes_definitions)]
-                    #[target_feature(enable = "avx2,fma")]
-                    extern "sysv64" fn side_by_side(x: __m256d) -> __m256d {
-                        lanes::$function(Avx(x)).0
-                    }
-                    if LANES == 1 {
-                        scalar as extern "sysv64" fn(f64) -> f64 as usize
-                    } else {
-                        side_by_side as unsafe extern "sysv64" fn(__m256d) -> __m256d as usize
-                    }
-                })*
-                _ => return None,
-            })
+/// The address of the library's function for one lane, of that of lanes for four; by a macro because
+/// each has to be a function of its own. Arguments and result go by vector registers, one number or
+/// four in each.
+macro_rules! address {
+    ($method:ident($op:expr), $function:ident($($x:ident),+)) => {{
+        extern "sysv64" fn scalar($($x: f64),+) -> f64 {
+            Reals.$method($op, $(&$x),+)
         }
-    };
+        // with AVX the System V ABI passes it in a register
+        #[allow(improper_ctypes_definitions)]
+        #[target_feature(enable = "avx2,fma")]
+        extern "sysv64" fn side_by_side($($x: __m256d),+) -> __m256d {
+            lanes::$function($(Avx($x)),+).0
+        }
+        Some(match LANES {
+            1 => scalar as *const () as usize,
+            _ => side_by_side as *const () as usize,
+        })
+    }};
 }
 
-macro_rules! binary {
-    ($($op:ident $function:ident),*) => {
-        /// The address of a function of two values; none where code is emitted for it.
-        pub(crate) fn binary<const LANES: usize>(op: Binary) -> Option<usize> {
-            Some(match op {
-                $(Binary::$op => {
-                    extern "sysv64" fn scalar(x: f64, y: f64) -> f64 {
-                        Reals.binary(Binary::$op, &x, &y)
-                    }
-                    // with AVX the System V ABI passes it in a register
-                    #[allow(improper_ctypes_definitions)]
-                    #[target_feature(enable = "avx2,fma")]
-                    extern "sysv64" fn side_by_side(x: __m256d, y: __m256d) -> __m256d {
-                        lanes::$function(Avx(x), Avx(y)).0
-                    }
-                    if LANES == 1 {
-                        scalar as extern "sysv64" fn(f64, f64) -> f64 as usize
-                    } else {
-                        side_by_side
-                            as unsafe extern "sysv64" fn(__m256d, __m256d) -> __m256d as usize
-                    }
-                })*
-                _ => return None,
-            })
-        }
-    };
+/// The address of a function of one value; none where code is emitted for it.
+pub(crate) fn unary<const LANES: usize>(op: Unary) -> Option<usize> {
+    match op {
+        Unary::Exp => address!(unary(Unary::Exp), exp(x)),
+        Unary::Ln => address!(unary(Unary::Ln), ln(x)),
+        Unary::Sin => address!(unary(Unary::Sin), sin(x)),
+        Unary::Cos => address!(unary(Unary::Cos), cos(x)),
+        Unary::Tan => address!(unary(Unary::Tan), tan(x)),
+        Unary::Asin => address!(unary(Unary::Asin), asin(x)),
+        Unary::Acos => address!(unary(Unary::Acos), acos(x)),
+        Unary::Atan => address!(unary(Unary::Atan), atan(x)),
+        Unary::Sinh => address!(unary(Unary::Sinh), sinh(x)),
+        Unary::Cosh => address!(unary(Unary::Cosh), cosh(x)),
+        Unary::Tanh => address!(unary(Unary::Tanh), tanh(x)),
+        Unary::Neg | Unary::Abs | Unary::Sign | Unary::Floor | Unary::Sqrt | Unary::Not => None,
+    }
 }
 
-unary!(
-    Exp exp, Ln ln, Sin sin, Cos cos, Tan tan, Asin asin, Acos acos, Atan atan, Sinh sinh,
-    Cosh cosh, Tanh tanh
-);
-binary!(Pow pow, Atan2 atan2);
+/// The address of a function of two values; none where code is emitted for it.
+pub(crate) fn binary<const LANES: usize>(op: Binary) -> Option<usize> {
+    match op {
+        Binary::Pow => address!(binary(Binary::Pow), pow(x, y)),
+        Binary::Atan2 => address!(binary(Binary::Atan2), atan2(x, y)),
+        _ => None,
+    }
+}
 
 /// Solves a system of `n` equations whose values have `LANES` lanes. At `system` stand A row by
 /// row and b, with one more place behind; b becomes x, the last place the condition.
@@ -142,12 +127,6 @@ impl Vector for Avx {
     fn mul_add(self, factor: Self, term: Self) -> Self {
         // SAFETY: the processor has FMA
         Self(unsafe { _mm256_fmadd_pd(self.0, factor.0, term.0) })
-    }
-
-    #[inline(always)]
-    fn mul_sub(self, factor: Self, term: Self) -> Self {
-        // SAFETY: the processor has FMA
-        Self(unsafe { _mm256_fmsub_pd(self.0, factor.0, term.0) })
     }
 
     #[inline(always)]

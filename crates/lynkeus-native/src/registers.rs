@@ -1,7 +1,7 @@
 //! Where values are while code is emitted: each goes into a register when it is made, and to the
 //! frame when its register is needed more urgently by another.
 
-use crate::assemble::{Address, Assembler, Base, Operand, Register, Width};
+use crate::assemble::{Address, Assembler, Base, Operand, Register};
 use crate::record::{Id, Program, Value};
 
 /// Registers that values live in; the two above are for the operations' own use.
@@ -111,14 +111,9 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
             }
             program.each_argument(value, |argument| uses[argument as usize].push(i as u32));
         }
-        let width = if LANES == 1 {
-            Width::Scalar
-        } else {
-            Width::Lanes
-        };
         let mut emitter = Self {
             program,
-            assembler: Assembler::new(width),
+            assembler: Assembler::new(LANES > 1),
             frame: Frame::default(),
             homes: vec![Home::default(); count],
             holds: [None; REGISTERS],

@@ -77,14 +77,12 @@ fn agrees(draws: &[Draw], rows: &[[f64; 5]; 4]) -> Result<(), TestCaseError> {
     let inputs: Vec<Node> = (0..5).map(|i| g.symbol(&format!("x{i}")).node()).collect();
     let outputs = build(&g, &inputs, draws);
     let tape = Tape::new(&g, &inputs, &outputs).expect("all inputs are there");
-    let Some(single) = Function::<1>::compile(&tape) else {
+    let Some(mut single) = Function::<1>::compile(&tape) else {
         eprintln!("skipped: machine code is not made here");
         return Ok(());
     };
-    let (mut single, mut interpreter) = (single.evaluator(), tape.evaluator());
-    let mut lanes = Function::<4>::compile(&tape)
-        .expect("as for one lane")
-        .evaluator();
+    let mut interpreter = tape.evaluator();
+    let mut lanes = Function::<4>::compile(&tape).expect("as for one lane");
     let columns: Vec<[f64; 4]> = (0..5).map(|i| rows.map(|row| row[i])).collect();
     let mut side_by_side = vec![[0.0; 4]; outputs.len()];
     lanes.eval(&columns, &mut side_by_side);
@@ -114,13 +112,12 @@ fn sweeps_agree(draws: &[Draw], rows: &[[f64; 5]; 4]) -> Result<(), TestCaseErro
     let outputs = build(&g, &inputs, draws);
     let tape = Tape::new(&g, &inputs, &outputs).expect("all inputs are there");
     let spacing = outputs.len() + SPARE;
-    let Some(sweep) = Function::<4>::sweeping(&tape, 2, spacing) else {
+    let Some(mut sweeper) = Function::<4>::sweeping(&tape, 2, spacing) else {
         return Ok(());
     };
     let [u, v, a, b, c] = std::array::from_fn(|i| rows.map(|row| row[i]));
     let own = [[a, b, c], [b, c, a], [c, c, b]];
     let mut found = vec![[7.0; 4]; 3 * spacing];
-    let mut sweeper = sweep.evaluator();
     sweeper.sweep(3, &[u, v], own.as_flattened(), &mut found);
     for (group, [a, b, c]) in own.into_iter().enumerate() {
         let expected = tape.eval_in(&Lanes::<4>, &[u, v, a, b, c]);
@@ -148,7 +145,7 @@ fn linear_systems_of_every_size_agree() {
         let second = g.solve(&a, &first.x);
         let outputs = [&first.x[..], &second.x, &[first.rcond, second.rcond]].concat();
         let tape = Tape::new(&g, &[x.node(), y.node()], &outputs).expect("all inputs are there");
-        let Some(lanes) = Function::<4>::compile(&tape) else {
+        let Some(mut lanes) = Function::<4>::compile(&tape) else {
             assert!(
                 n == 65 || Function::<4>::compile(&smallest()).is_none(),
                 "{n}"
@@ -158,9 +155,8 @@ fn linear_systems_of_every_size_agree() {
         assert!(n < 65);
         let inputs = [[0.3, -1.5, f64::NAN, 0.0], [2.0, 0.25, 1.0, 0.0]];
         let mut found = vec![[0.0; 4]; outputs.len()];
-        let mut evaluator = lanes.evaluator();
         for _ in 0..2 {
-            evaluator.eval(&inputs, &mut found);
+            lanes.eval(&inputs, &mut found);
             let expected = tape.eval_in(&Lanes::<4>, &inputs);
             let pairs = found.as_flattened().iter().zip(expected.as_flattened());
             assert!(pairs.clone().all(|(f, e)| same(*f, *e)), "{n}");

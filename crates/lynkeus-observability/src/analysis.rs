@@ -1,23 +1,23 @@
 //! The analysis.
 
-use lynkeus_expr::{Budget, Node};
+use lynkeus_expr::Node;
 use lynkeus_model::Plant;
 
-use crate::branches::{Branches, Choices, Reference};
+use crate::branches::{Branch, Choices, Reference};
 use crate::expansion::{Affine, Columns, Start};
 use crate::hidden::{Hidden, beside, joined, steady_from, symmetries};
-use crate::model::{Model, Refused, measured};
+use crate::model::{Model, check_names, expressions, measured};
 use crate::search::Search;
 use crate::series::Stop;
-use crate::{Answer, Asked, Partial, Quantity, Question, QuestionError, Verdict, hull, lie};
+use crate::{Answer, Asked, Note, Partial, Quantity, Question, QuestionError, Verdict, hull, lie};
 use lynkeus_expr::modular::Modular;
 
 /// Seed of the first point.
 const FIRST: u64 = 1;
 /// Seed of the second point, which confirms symmetries that the first suggests.
 const SECOND: u64 = 4711;
-const CHOICES: &str = "the model makes choices (if, abs, min, max, sign, floor …)";
-const SINGULAR: &str = "its series is not defined at any of the random points tried: a division by zero, or roots of negative numbers";
+/// Branches that are analysed beside the model's own.
+const BRANCHES: usize = 5;
 /// Products of coefficients, with a sensitivity each, that a search from a special start may
 /// cost; and the most orders it may have.
 const WORK: usize = 100_000_000;
@@ -29,46 +29,44 @@ const ORDERS: usize = 1000;
 /// [`QuestionError`].
 pub fn analyse(plant: &Plant, question: &Question) -> Result<Answer, QuestionError> {
     let outputs = measured(plant, question)?;
+    let about = expressions(plant, question)?;
+    check_names(plant, question)?;
     let choices = Choices::of(plant, &outputs);
-    let own = in_branch(plant, question, None, &[])?;
-    if choices.is_empty() {
-        return Ok(own);
-    }
-    match choices.branches(plant) {
-        Some(branches) => combined(plant, question, own, &choices, &branches),
-        None => Ok(own),
-    }
+    let in_branch = |branch: Option<&Branch>, guards: &[Node]| {
+        let outputs = [&outputs[..], guards].concat();
+        let reference = branch.map(|branch| &branch.reference);
+        in_branch(plant, question, (&outputs, &about), reference)
+    };
+    let own = in_branch(None, &[]);
+    let branches = (!choices.is_empty()).then(|| choices.branches(plant));
+    Ok(match branches.flatten() {
+        Some(branches) => combined(plant, own, &choices, branches, &in_branch),
+        None => own,
+    })
 }
 
-/// The answers of all branches in one.
+/// The answers of all branches in one; `in_branch` gives that of one, with some guards measured beside the outputs.
 fn combined(
     plant: &Plant,
-    question: &Question,
     own: Answer,
     choices: &Choices,
-    branches: &Branches,
-) -> Result<Answer, QuestionError> {
+    mut branches: Vec<Branch>,
+    in_branch: &dyn Fn(Option<&Branch>, &[Node]) -> Answer,
+) -> Answer {
+    let left_out = branches.split_off(branches.len().min(BRANCHES + 1));
     let is_hidden = |answer: &Answer| {
-        let mut all = answer
-            .quantities
-            .iter()
-            .map(|(asked, _)| asked)
-            .chain(&answer.about);
+        let quantities = answer.quantities.iter().map(|(asked, _)| asked);
+        let mut all = quantities.chain(&answer.about);
         all.any(|asked| asked.verdict == Verdict::Unobservable)
     };
     let mut answers = vec![];
     let mut guarded = vec![];
-    for (k, branch) in branches.found.iter().enumerate() {
-        let reference = Some(&branch.reference).filter(|_| k > 0);
-        let answer = match k {
-            0 => own.clone(),
-            _ => in_branch(plant, question, reference, &[])?,
-        };
+    for (k, branch) in branches.iter().enumerate() {
+        // the first is the model's own
+        let other = Some(branch).filter(|_| k > 0);
+        let answer = other.map_or_else(|| own.clone(), |_| in_branch(other, &[]));
         // what is seen without the guards is seen with them
-        guarded.push(match is_hidden(&answer) {
-            true => Some(in_branch(plant, question, reference, &choices.guards)?),
-            false => None,
-        });
+        guarded.push(is_hidden(&answer).then(|| in_branch(other, &choices.guards)));
         answers.push(answer);
     }
     let mut found = own;
@@ -93,7 +91,7 @@ fn combined(
         let verdict = match seen.contains(&true) {
             true => Verdict::Observable,
             // in branches that were left out it may be seen, unless no path leads to it
-            false if is_hidden() && (branches.left_out == 0.0 || !choices.feel(&own.name)) => {
+            false if is_hidden() && (left_out.is_empty() || !choices.feel(&own.name)) => {
                 Verdict::Unobservable
             }
             false => Verdict::Undecided,
@@ -108,11 +106,11 @@ fn combined(
         if let Some(first) = seen.iter().position(|seen| !seen)
             && verdict == Verdict::Observable
         {
-            let hides = seen.iter().zip(&branches.found).filter(|(seen, _)| !**seen);
+            let hides = seen.iter().zip(&branches).filter(|(seen, _)| !**seen);
             found.partial.push(Partial {
                 name: own.name,
                 share: hides.map(|(_, branch)| branch.share).sum(),
-                at: named(plant, choices, &branches.found[first].reference),
+                at: named(plant, choices, &branches[first].reference),
             });
         }
     }
@@ -125,25 +123,13 @@ fn combined(
     {
         found.symmetries = answer.map_or(vec![], |answer| answer.symmetries);
     }
-    found.notes.retain(|note| !note.starts_with(CHOICES));
-    found.notes.push(format!(
-        "{CHOICES}: {} found at points of the box, each analysed{}",
-        match branches.found.len() {
-            1 => "one branch was".to_owned(),
-            count => format!("{count} branches were"),
-        },
-        match branches.left_out > 0.0 {
-            true => ", and further ones were not",
-            false => "",
-        }
-    ));
+    found.notes.retain(|note| *note != Note::OwnBranch);
+    let all = left_out.is_empty();
+    found.notes.push(Note::Branches(branches.len(), all));
     if !doubted.is_empty() {
-        found.notes.push(format!(
-            "within each branch the outputs do not tell {}; the moments at which the branch changes may",
-            doubted.join(", ")
-        ));
+        found.notes.push(Note::WithinBranches(doubted));
     }
-    Ok(found)
+    found
 }
 
 /// The values of what the choices read, by name.
@@ -156,60 +142,41 @@ fn named(plant: &Plant, choices: &Choices, reference: &Reference) -> Vec<(String
 
 /// Decides what can be known in one branch.
 ///
-/// `reference` is a point in it, the model's own values where there is none; what `guards` choices is
-/// measured beside the outputs.
+/// `reference` is a point in it, the model's own values where there is none.
 fn in_branch(
     plant: &Plant,
     question: &Question,
+    roots: (&[Node], &[Node]),
     reference: Option<&Reference>,
-    guards: &[Node],
-) -> Result<Answer, QuestionError> {
-    let model = match Model::new(plant, question, reference, guards)? {
+) -> Answer {
+    let model = match Model::new(plant, question, roots, reference) {
         Ok(model) => model,
-        Err(Refused { named, reason }) => return Ok(undecided(&named, question, &reason)),
+        Err((named, note)) => return undecided(&named, question, note),
     };
-    let analysis = Analysis {
-        model: &model,
-        budget: &question.budget,
+    let note = match Analysis::new(&model) {
+        Ok(analysis) => return analysis.answer(question),
+        Err(Stop::Point(_)) => Note::Singular,
+        Err(stop) => Note::StruckAtOnce(stop.word()),
     };
-    let reason = |stop: Stop| match stop {
-        Stop::Point(_) => SINGULAR.to_owned(),
-        stop => format!("the limit of {} struck at once", stop.word()),
-    };
-    Ok(match analysis.ground() {
-        Ok(ground) => analysis.answer(&ground, question),
-        Err(stop) => undecided(&model.named, question, &reason(stop)),
-    })
+    undecided(&model.named, question, note)
 }
 
-fn undecided(named: &[(String, Quantity)], question: &Question, reason: &str) -> Answer {
+fn undecided(named: &[(String, Quantity)], question: &Question, note: Note) -> Answer {
     let asked = |name: &String| Asked {
         name: name.clone(),
         verdict: Verdict::Undecided,
     };
+    let quantities = named.iter().map(|(name, kind)| (asked(name), *kind));
     Answer {
-        quantities: named
-            .iter()
-            .map(|(name, kind)| (asked(name), *kind))
-            .collect(),
+        quantities: quantities.collect(),
         about: question.about.iter().map(asked).collect(),
         partial: vec![],
         symmetries: vec![],
         order: 0,
         rank: 0,
         unknowns: named.len(),
-        notes: vec![format!("undecided: {reason}")],
+        notes: vec![note],
     }
-}
-
-/// A start, and what it is worth.
-struct Ground {
-    start: Start,
-    /// around known starts an invariant set in which other points may show more; none where the start is as good
-    /// as any other: a rank that does not grow once never grows
-    set: Option<Affine>,
-    /// time starts at zero
-    at_zero: bool,
 }
 
 /// What the search has found.
@@ -229,65 +196,45 @@ impl Found<'_> {
     }
 }
 
+/// A model with a start, and what that is worth.
 struct Analysis<'a> {
     model: &'a Model,
-    budget: &'a Budget,
+    start: Start,
+    /// around known starts an invariant set in which other points may show more; none where the start is as good
+    /// as any other: a rank that does not grow once never grows
+    set: Option<Affine>,
 }
 
 impl<'a> Analysis<'a> {
-    fn find(&self, start: Start) -> Result<Start, Stop> {
-        hull::find(self.model, start, self.budget)
-    }
-
-    fn search<'s>(&self, start: &'s Start, columns: Columns) -> Search<'s>
-    where
-        'a: 's,
-    {
-        Search::new(self.model, start, columns, self.budget)
-    }
-
-    /// A start, with the invariant set around it.
-    fn ground(&self) -> Result<Ground, Stop> {
-        let start = Start::new(self.model, FIRST);
-        let around = |at_zero| hull::invariant(self.model, at_zero, self.budget);
-        if self.model.known_starts().next().is_none() {
-            return Ok(Ground {
-                start: self.find(start)?,
-                set: None,
-                at_zero: false,
-            });
+    fn new(model: &'a Model) -> Result<Self, Stop> {
+        let start = Start::new(model, FIRST);
+        let at = |start: Start, set: Option<Affine>| {
+            let start = hull::find(model, start)?;
+            Ok(Self { model, start, set })
+        };
+        if model.known_starts().next().is_none() {
+            return at(start, None);
         }
-        let set = around(false)?;
-        if set.directions.is_empty() {
-            return Ok(Ground {
-                start: self.find(start)?,
-                set: None,
-                at_zero: false,
-            });
+        let set = hull::invariant(model, false)?;
+        if set.is_empty() {
+            return at(start, None);
         }
-        if self.model.time().is_some() {
+        if model.time().is_some() {
             // known starts are those at time zero
-            match self.find(start.clone().at_zero(true)) {
-                Ok(start) => {
-                    return Ok(Ground {
-                        start,
-                        set: Some(around(true)?),
-                        at_zero: true,
-                    });
+            match at(start.clone().at_zero(true), None) {
+                Ok(found) => {
+                    let set = Some(hull::invariant(model, true)?);
+                    return Ok(Self { set, ..found });
                 }
                 Err(Stop::Point(_)) => {}
                 Err(stop) => return Err(stop),
             }
         }
-        Ok(Ground {
-            start: self.find(start)?,
-            set: Some(set),
-            at_zero: false,
-        })
+        at(start, Some(set))
     }
 
-    fn answer(&self, ground: &Ground, question: &Question) -> Answer {
-        let found = self.found(ground);
+    fn answer(&self, question: &Question) -> Answer {
+        let found = self.found();
         let quantities = self.model.named.iter().enumerate();
         let quantities = quantities.map(|(column, (name, kind))| {
             let verdict = found.verdict(&found.search.columns().unit(column));
@@ -307,7 +254,7 @@ impl<'a> Analysis<'a> {
             quantities: quantities.collect(),
             about: about.collect(),
             partial: vec![],
-            symmetries: self.symmetries(ground, &found),
+            symmetries: self.symmetries(&found),
             order: order + found.search.succession().order,
             rank: found.search.rank(),
             unknowns: named + self.model.unknown_inputs * order,
@@ -315,16 +262,13 @@ impl<'a> Analysis<'a> {
         }
     }
 
-    fn found<'s>(&self, ground: &'s Ground) -> Found<'s>
-    where
-        'a: 's,
-    {
-        let columns = Columns::new(self.model, self.last_order(ground));
-        let mut search = self.search(&ground.start, columns);
-        let ended = match &ground.set {
+    fn found(&self) -> Found<'_> {
+        let columns = Columns::new(self.model, self.last_order());
+        let mut search = Search::new(self.model, &self.start, columns);
+        let ended = match &self.set {
             None => search.run_out().map(|()| vec![Hidden::all(&search)]),
-            Some(set) if self.model.unknown_inputs == 0 => self.beside(ground, set, &mut search),
-            Some(set) => self.steady(ground, set, &mut search),
+            Some(set) if self.model.unknown_inputs == 0 => self.beside(set, &mut search),
+            Some(set) => self.steady(set, &mut search),
         };
         let (stop, hidden) = match ended {
             Ok(hidden) => (None, hidden),
@@ -338,9 +282,9 @@ impl<'a> Analysis<'a> {
     }
 
     /// Orders after which nothing more is looked for.
-    fn last_order(&self, ground: &Ground) -> usize {
+    fn last_order(&self) -> usize {
         let depth = self.model.depth;
-        match (&ground.set, self.model.unknown_inputs) {
+        match (&self.set, self.model.unknown_inputs) {
             (None, _) => depth,
             (Some(_), 0) => {
                 let width = self.model.named.len() + 1;
@@ -352,29 +296,24 @@ impl<'a> Analysis<'a> {
     }
 
     /// A generic point of the set around the known starts.
-    fn elsewhere(&self, ground: &Ground, set: &Affine) -> Result<Option<Start>, Stop> {
-        let start = Start::new(self.model, FIRST).at_zero(ground.at_zero);
-        match self.find(start.within(self.model, set)) {
+    fn elsewhere(&self, set: &Affine) -> Result<Option<Start>, Stop> {
+        let start = Start::new(self.model, FIRST).at_zero(self.start.at_zero);
+        match hull::find(self.model, start.within(self.model, set)) {
             Ok(start) => Ok(Some(start)),
             Err(Stop::Point(_)) => Ok(None),
             Err(stop) => Err(stop),
         }
     }
 
-    fn beside(
-        &self,
-        ground: &Ground,
-        set: &Affine,
-        search: &mut Search<'_>,
-    ) -> Result<Vec<Hidden>, Stop> {
-        let last = self.last_order(ground);
+    fn beside(&self, set: &Affine, search: &mut Search<'_>) -> Result<Vec<Hidden>, Stop> {
+        let last = self.last_order();
         let depth = self.model.depth;
-        let elsewhere = self.elsewhere(ground, set);
+        let elsewhere = self.elsewhere(set);
         let Ok(Some(elsewhere)) = elsewhere else {
             search.until(None, last)?;
             return elsewhere.map(|_| vec![]);
         };
-        let mut generic = self.search(&elsewhere, Columns::new(self.model, depth));
+        let mut generic = Search::new(self.model, &elsewhere, Columns::new(self.model, depth));
         let bounded = generic.until(None, depth);
         let most = bounded.is_ok().then(|| generic.rank());
         // what usually is enough, then the symmetries, then as far as it is worth
@@ -383,7 +322,7 @@ impl<'a> Analysis<'a> {
         if search.rank() >= generic.rank() {
             return Ok(vec![Hidden::all(search)]);
         }
-        let fields = self.fields(ground, set)?;
+        let fields = self.fields(set)?;
         let proved = joined(search, beside(search, &generic), &fields);
         if search.is_complete() || proved.iter().any(|hidden| hidden.among.is_none()) {
             return Ok(proved);
@@ -396,51 +335,37 @@ impl<'a> Analysis<'a> {
     }
 
     /// Directions along which verified symmetries move the unknowns at the start.
-    fn fields(&self, ground: &Ground, set: &Affine) -> Result<Vec<Vec<Modular>>, Stop> {
-        let setting = lie::Setting {
-            model: self.model,
-            set,
-            at_zero: ground.at_zero,
-            budget: self.budget,
-        };
-        lie::directions(&setting, &ground.start)
+    fn fields(&self, set: &Affine) -> Result<Vec<Vec<Modular>>, Stop> {
+        lie::directions(self.model, set, &self.start)
     }
 
-    fn steady(
-        &self,
-        ground: &Ground,
-        set: &Affine,
-        search: &mut Search<'_>,
-    ) -> Result<Vec<Hidden>, Stop> {
-        let last = self.last_order(ground);
+    fn steady(&self, set: &Affine, search: &mut Search<'_>) -> Result<Vec<Hidden>, Stop> {
+        let last = self.last_order();
         search.until(None, last)?;
-        let elsewhere = self.elsewhere(ground, set)?;
+        let elsewhere = self.elsewhere(set)?;
         let Some(elsewhere) = elsewhere.filter(|_| !search.is_complete()) else {
             return Ok(vec![]);
         };
-        let starts = (&ground.start, &elsewhere);
-        let steady = steady_from(self.model, starts, set, last, self.budget)?;
+        let starts = (&self.start, &elsewhere);
+        let steady = steady_from(self.model, starts, set, last)?;
         Ok(match steady {
             Some(_) => vec![Hidden::all(search)],
-            None => joined(search, vec![], &self.fields(ground, set)?),
+            None => joined(search, vec![], &self.fields(set)?),
         })
     }
 
     /// What hides the unobservable, confirmed at a second start.
-    fn symmetries(&self, ground: &Ground, found: &Found<'_>) -> Vec<crate::Symmetry> {
+    fn symmetries(&self, found: &Found<'_>) -> Vec<crate::Symmetry> {
         let search = &found.search;
-        if found
-            .hidden
-            .iter()
-            .all(|hidden| hidden.directions.is_empty())
-        {
+        let mut hidden = found.hidden.iter();
+        if hidden.all(|hidden| hidden.directions.is_empty()) {
             return vec![];
         }
-        let start = Start::new(self.model, SECOND).at_zero(ground.at_zero);
-        let start = self.find(start);
+        let start = Start::new(self.model, SECOND).at_zero(self.start.at_zero);
+        let start = hull::find(self.model, start);
         let mut second = start.as_ref().ok().map(|start| {
             let columns = Columns::new(self.model, search.order());
-            self.search(start, columns)
+            Search::new(self.model, start, columns)
         });
         let reached = second.as_mut().is_some_and(|second| {
             let ended = second.until(None, search.order());
@@ -453,33 +378,24 @@ impl<'a> Analysis<'a> {
             .collect()
     }
 
-    fn notes(&self, found: &Found<'_>) -> Vec<String> {
-        let mut notes = vec![self.method()];
-        let choices = self.model.program.choices;
-        if choices > 0 {
-            notes.push(format!("{CHOICES}: the branch at its own values is analysed, and what another branch or the moment of the change would show is not"));
+    fn notes(&self, found: &Found<'_>) -> Vec<Note> {
+        let program = &self.model.program;
+        let mut notes = vec![match program.functions.is_empty() {
+            true => Note::Exact,
+            false => Note::Generic(program.functions.clone()),
+        }];
+        if program.choices > 0 {
+            notes.push(Note::OwnBranch);
         }
         let (order, named) = (found.search.order(), self.model.named.len());
         let open = |column: usize| {
             found.verdict(&found.search.columns().unit(column)) == Verdict::Undecided
         };
         if let Some(stop) = found.stop {
-            let what = stop.word();
-            notes.push(format!("the limit of {what} struck after {order} derivatives of the outputs: what is called observable is so, the rest is undecided"));
+            notes.push(Note::Struck(stop.word(), order));
         } else if (0..named).any(open) {
-            notes.push(format!("start values are given: {order} derivatives of the outputs were taken, and what is undecided may show in a later one, or never"));
+            notes.push(Note::Derivatives(order));
         }
         notes
-    }
-
-    fn method(&self) -> String {
-        let functions = &self.model.program.functions;
-        match functions.is_empty() {
-            true => "exact arithmetic in a prime field at a random point: \"observable\" is certain, \"unobservable\" is wrong with a probability below 1e-12".to_owned(),
-            false => format!(
-                "exact arithmetic in a prime field at a random point; {} enter through their differential equations, with values drawn at random that keep the usual identities; beyond these, composed functions are taken as generic, and \"observable\" rests on that",
-                functions.join(", ")
-            ),
-        }
     }
 }

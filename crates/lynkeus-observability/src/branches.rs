@@ -15,8 +15,6 @@ use lynkeus_expr::modular::Random;
 
 /// Points at which branches are looked for.
 const POINTS: usize = 256;
-/// Branches that are analysed beside the model's own.
-const BRANCHES: usize = 5;
 /// Seed of the points.
 const SEED: u64 = 77;
 
@@ -39,14 +37,6 @@ pub(crate) struct Branch {
     pub reference: Reference,
     /// how many of the points looked at
     pub share: f64,
-}
-
-/// The branches of a box.
-pub(crate) struct Branches {
-    /// the model's own first
-    pub found: Vec<Branch>,
-    /// the share of points in further ones
-    pub left_out: f64,
 }
 
 impl Choices {
@@ -111,8 +101,9 @@ impl Choices {
         self.marks.is_empty()
     }
 
-    /// The branches at the model's own values and at points of the box; none where the choices have no value.
-    pub fn branches(&self, plant: &Plant) -> Option<Branches> {
+    /// The branches at the model's own values, which comes first, and at points of the box, those with the most points
+    /// before the others; none where the choices have no value.
+    pub fn branches(&self, plant: &Plant) -> Option<Vec<Branch>> {
         let mut random = Random::new(SEED);
         let own = reference(plant, &mut Random::new(1));
         let mut seen: Vec<(Vec<u64>, Branch)> = vec![];
@@ -149,11 +140,7 @@ impl Choices {
         let mut found: Vec<Branch> = seen.into_iter().map(|(_, branch)| branch).collect();
         let others = found.get_mut(1..)?;
         others.sort_by(|a, b| b.share.total_cmp(&a.share));
-        let left_out = found.split_off(found.len().min(BRANCHES + 1));
-        Some(Branches {
-            found,
-            left_out: left_out.iter().map(|branch| branch.share).sum(),
-        })
+        Some(found)
     }
 }
 

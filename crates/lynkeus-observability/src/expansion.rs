@@ -3,8 +3,6 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use lynkeus_expr::Budget;
-
 use crate::model::{First, Model, Role};
 use crate::series::{Functions, Run, Stop};
 use lynkeus_expr::modular::{Modular, Random};
@@ -30,7 +28,7 @@ impl Columns {
             named: model.named.len(),
             unknown_inputs: model.unknown_inputs,
             orders: if model.unknown_inputs > 0 { orders } else { 0 },
-            moving: Affine::default(),
+            moving: vec![],
         }
     }
 
@@ -41,7 +39,7 @@ impl Columns {
     }
 
     pub fn width(&self) -> usize {
-        self.named + self.unknown_inputs * self.orders + self.moving.directions.len()
+        self.named + self.unknown_inputs * self.orders + self.moving.len()
     }
 
     /// The columns of the unknown inputs' k-th derivatives.
@@ -66,7 +64,7 @@ impl Columns {
     }
 
     fn first_of_moving(&self) -> usize {
-        self.width() - self.moving.directions.len()
+        self.width() - self.moving.len()
     }
 }
 
@@ -85,11 +83,11 @@ pub(crate) struct Expansion<'a> {
     /// values of the named quantities at the start
     pub point: Vec<Modular>,
     next: usize,
-    budget: Budget,
 }
 
 impl<'a> Expansion<'a> {
-    pub fn new(model: &'a Model, start: &'a Start, columns: Columns, budget: &Budget) -> Self {
+    pub fn new(model: &'a Model, start: &'a Start, columns: Columns) -> Self {
+        let budget = &model.budget;
         let room = budget.room().unwrap_or(ROOM) / size_of::<Modular>();
         let functions = Functions::new(start.seed, &start.turned);
         let width = columns.width();
@@ -104,7 +102,6 @@ impl<'a> Expansion<'a> {
             columns,
             start,
             model,
-            budget: budget.clone(),
         }
     }
 
@@ -132,11 +129,6 @@ impl<'a> Expansion<'a> {
     /// How far a first value is from the known start.
     pub fn moved_by(&self, place: usize) -> Modular {
         self.start.moved_by(self.model, place)
-    }
-
-    /// The latest coefficient of a state's derivative.
-    pub fn velocity(&self, state: usize) -> Modular {
-        self.run.root(state).0
     }
 
     /// Sensitivities of the latest coefficient of a root.
@@ -170,9 +162,9 @@ impl<'a> Expansion<'a> {
                 .columns
                 .width()
                 .saturating_mul(self.model.symbols.len());
-            self.budget
-                .affords(numbers.saturating_mul(size_of::<Modular>()));
-            Stop::where_spent(&self.budget)?;
+            let budget = &self.model.budget;
+            budget.affords(numbers.saturating_mul(size_of::<Modular>()));
+            Stop::where_spent(budget)?;
             return self.first_coefficients();
         }
         let mut unknown_input = 0;
@@ -235,7 +227,7 @@ impl<'a> Expansion<'a> {
     /// A row of sensitivities with those to the directions in which known starts move.
     fn moved(&self, place: usize, mut row: Vec<Modular>) -> Vec<Modular> {
         let first = self.columns.first_of_moving();
-        for (i, direction) in self.columns.moving.directions.iter().enumerate() {
+        for (i, direction) in self.columns.moving.iter().enumerate() {
             if !direction[place].is_zero() {
                 row.resize(self.columns.width(), Modular::ZERO);
                 row[first + i] = direction[place];
@@ -245,13 +237,9 @@ impl<'a> Expansion<'a> {
     }
 }
 
-/// An affine set c + span(d₁, d₂, …) in the coordinates of the model's symbols, c being the known
+/// An affine set c + span(d₁, d₂, …) in the coordinates of the model's symbols, by its directions: c are the known
 /// starts; what is free is free in it as well.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Affine {
-    /// per direction one number for each symbol
-    pub directions: Vec<Vec<Modular>>,
-}
+pub(crate) type Affine = Vec<Vec<Modular>>;
 
 /// Where a series starts: random numbers, redrawn one by one where they do not suit.
 #[derive(Clone, Debug)]
@@ -264,7 +252,7 @@ pub(crate) struct Start {
     /// the known starts are those of a random point of this set
     set: Affine,
     /// time starts at zero, and not at any moment
-    at_zero: bool,
+    pub at_zero: bool,
 }
 
 impl Start {
@@ -274,7 +262,7 @@ impl Start {
             seed,
             draws: vec![0; model.symbols.len()],
             turned: BTreeSet::new(),
-            set: Affine::default(),
+            set: vec![],
             at_zero: false,
         }
     }
@@ -287,7 +275,7 @@ impl Start {
     /// The known starts anywhere in a set.
     pub fn within(self, model: &Model, set: &Affine) -> Self {
         Self {
-            draws: vec![0; model.symbols.len() + set.directions.len()],
+            draws: vec![0; model.symbols.len() + set.len()],
             set: set.clone(),
             ..self
         }
@@ -326,7 +314,7 @@ impl Start {
 
     /// How far the point of the set is from the known start.
     pub fn moved_by(&self, model: &Model, place: usize) -> Modular {
-        let directions = self.set.directions.iter().enumerate();
+        let directions = self.set.iter().enumerate();
         directions.fold(Modular::ZERO, |sum, (i, direction)| {
             match direction[place].is_zero() {
                 true => sum,
@@ -343,7 +331,7 @@ impl Start {
             Role::Time => !self.at_zero,
             _ => matches!(symbol.first, First::Free),
         };
-        let directions = self.set.directions.iter().enumerate();
+        let directions = self.set.iter().enumerate();
         let moving = directions.filter(|(_, direction)| !direction[place].is_zero());
         let moving = moving.map(|(i, _)| model.symbols.len() + i);
         free.then_some(place).into_iter().chain(moving).collect()

@@ -3,13 +3,11 @@
 
 use std::collections::BTreeSet;
 
-use lynkeus_expr::Budget;
-
-use crate::Symmetry;
 use crate::expansion::{Affine, Columns, Start};
 use crate::model::Model;
 use crate::search::Search;
 use crate::series::Stop;
+use crate::{Kind, Symmetry};
 use lynkeus_expr::modular::{Echelon, Modular};
 
 /// A direction of the named quantities, with the column that moves in no other one.
@@ -172,10 +170,9 @@ pub(crate) fn steady_from(
     (special, generic): (&Start, &Start),
     set: &Affine,
     last: usize,
-    budget: &Budget,
 ) -> Result<Option<usize>, Stop> {
     let columns = Columns::new(model, last).moving(set);
-    let begin = |start| Search::new(model, start, columns.clone(), budget);
+    let begin = |start| Search::new(model, start, columns.clone());
     let (mut here, mut there) = (begin(special), begin(generic));
     let mut before: Option<(Ranks, Ranks)> = None;
     for k in 0..=last {
@@ -208,18 +205,9 @@ pub(crate) fn kernel_among(rows: &Echelon, among: &[usize], named: usize) -> Vec
 
 /// Weights of a scaling, and steps of a shift, are fractions with parts up to this.
 const SMALL: i64 = 24;
-/// Names in words before the rest becomes a count.
-const LISTED: usize = 8;
 
 /// n/d by column, relative to the own column of the direction.
 type Weights = Vec<(usize, i64, i64)>;
-
-/// How a group acts on its quantities.
-#[derive(Clone, Copy, PartialEq)]
-enum Kind {
-    Scaling,
-    Shift,
-}
 
 /// What is hidden at another start among the same quantities.
 fn hidden_at(search: &Search<'_>, hidden: &Hidden) -> Vec<Direction> {
@@ -232,7 +220,7 @@ fn hidden_at(search: &Search<'_>, hidden: &Hidden) -> Vec<Direction> {
     }
 }
 
-/// The groups of quantities that the hidden directions move, in words; `twin` is a second start, which confirms what
+/// The groups of quantities that the hidden directions move; `twin` is a second start, which confirms what
 /// the first suggests.
 pub(crate) fn symmetries(
     model: &Model,
@@ -256,7 +244,12 @@ pub(crate) fn symmetries(
         let kinds = [Kind::Scaling, Kind::Shift];
         match kinds.into_iter().find_map(|kind| Some((kind, of(kind)?))) {
             Some((kind, weights)) => named(kind, &group, &weights, &names),
-            None => unnamed(&group, &names),
+            None => Symmetry {
+                moves: moved(&group, &names),
+                directions: group.len(),
+                kind: None,
+                invariants: vec![],
+            },
         }
     };
     let groups = groups(&hidden.directions);
@@ -294,26 +287,10 @@ fn moved(group: &[&Direction], names: &[&str]) -> Vec<String> {
         .collect()
 }
 
-fn unnamed(group: &[&Direction], names: &[&str]) -> Symmetry {
-    let moves = moved(group, names);
-    let known = moves.len() - group.len().min(moves.len());
-    Symmetry {
-        words: format!(
-            "{} can change together without a trace in the outputs: {known} combinations of these {} can be known",
-            listed(&moves),
-            moves.len()
-        ),
-        invariants: vec![],
-        directions: group.len(),
-        moves,
-    }
-}
-
 /// A scaling x_i → s^{w_i}·x_i leaves products of powers with Σ m_i w_i = 0 alone, a shift
 /// x_i → x_i + s·w_i sums. Own columns move in one direction each, so that every other
 /// column c gives one: x_c with what its weights take back from the own columns.
 fn named(kind: Kind, group: &[&Direction], weights: &[Weights], names: &[&str]) -> Symmetry {
-    let moves = moved(group, names);
     let own: BTreeSet<usize> = group.iter().map(|d| d.0).collect();
     let all: BTreeSet<usize> = weights.iter().flatten().map(|w| w.0).collect();
     let invariants: Vec<String> = all
@@ -335,34 +312,11 @@ fn named(kind: Kind, group: &[&Direction], weights: &[Weights], names: &[&str]) 
             written(kind, &factors)
         })
         .collect();
-    let how = match kind {
-        Kind::Scaling => "scaled",
-        Kind::Shift => "shifted",
-    };
     Symmetry {
-        words: match (invariants.is_empty(), &moves[..]) {
-            (true, [only]) => format!("{only} can have any value: the outputs do not feel it"),
-            (true, _) => format!(
-                "{} can have any values: the outputs do not feel them",
-                listed(&moves)
-            ),
-            (false, _) => format!(
-                "of {}, which can be {how} together, only {} can be known",
-                listed(&moves),
-                listed(&invariants)
-            ),
-        },
-        invariants,
+        moves: moved(group, names),
         directions: group.len(),
-        moves,
-    }
-}
-
-/// The first few, and how many there are.
-fn listed(names: &[String]) -> String {
-    match names.len() > LISTED {
-        true => format!("{}, … ({} in all)", names[..LISTED].join(", "), names.len()),
-        false => names.join(", "),
+        kind: Some(kind),
+        invariants,
     }
 }
 

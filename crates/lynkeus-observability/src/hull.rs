@@ -10,8 +10,6 @@
 
 use std::collections::BTreeMap;
 
-use lynkeus_expr::Budget;
-
 use crate::expansion::{Affine, Columns, Expansion, Start};
 use crate::model::{Model, Role};
 use crate::series::Stop;
@@ -23,23 +21,23 @@ const FIRST: u64 = 9001;
 const CONFIRMED: usize = 2;
 
 /// The set, grown from the known starts by the flow at random points of it.
-pub(crate) fn invariant(model: &Model, at_zero: bool, budget: &Budget) -> Result<Affine, Stop> {
+pub(crate) fn invariant(model: &Model, at_zero: bool) -> Result<Affine, Stop> {
     let mut moving: Vec<usize> = model.known_starts().collect();
     moving.extend(model.time().filter(|_| at_zero));
-    let mut set = Affine::default();
+    let mut set: Affine = vec![];
     let mut span = Echelon::new(model.symbols.len());
     let (mut confirmed, mut seed) = (0, FIRST);
     while confirmed < CONFIRMED {
         seed += 1;
         let start = Start::new(model, seed).at_zero(at_zero);
         let start = start.within(model, &set);
-        let velocity = match velocity(model, start, &moving, budget) {
+        let velocity = match velocity(model, start, &moving) {
             Ok(velocity) => velocity,
             Err(Stop::Point(_)) => return Ok(everywhere(model, &moving)),
             Err(stop) => return Err(stop),
         };
         if span.add(&velocity) {
-            set.directions.push(velocity);
+            set.push(velocity);
             confirmed = 0;
         } else {
             confirmed += 1;
@@ -49,20 +47,15 @@ pub(crate) fn invariant(model: &Model, at_zero: bool, budget: &Budget) -> Result
 }
 
 /// The derivatives of these symbols at a start.
-fn velocity(
-    model: &Model,
-    start: Start,
-    moving: &[usize],
-    budget: &Budget,
-) -> Result<Vec<Modular>, Stop> {
-    let start = find(model, start, budget)?;
+fn velocity(model: &Model, start: Start, moving: &[usize]) -> Result<Vec<Modular>, Stop> {
+    let start = find(model, start)?;
     let columns = Columns::new(model, 0);
-    let mut expansion = Expansion::new(model, &start, columns, budget);
+    let mut expansion = Expansion::new(model, &start, columns);
     expansion.first()?;
     let mut velocity = vec![Modular::ZERO; model.symbols.len()];
     for &place in moving {
         velocity[place] = match model.symbols[place].role {
-            Role::State(i) => expansion.velocity(i),
+            Role::State(i) => expansion.derivative(i).0,
             _ => Modular::ONE,
         };
     }
@@ -76,9 +69,7 @@ pub(crate) fn everywhere(model: &Model, moving: &[usize]) -> Affine {
         unit[place] = Modular::ONE;
         unit
     };
-    Affine {
-        directions: moving.iter().map(unit).collect(),
-    }
+    moving.iter().map(unit).collect()
 }
 
 /// Points tried before the model counts as singular everywhere.
@@ -90,12 +81,12 @@ const STUBBORN: usize = 40;
 /// A start at which the first coefficients exist, beginning with the one given. Where an
 /// operation does not, one of the numbers that it depends on is drawn anew, if possible one
 /// that no earlier root depends on: so a hundred roots cost some hundred draws.
-pub(crate) fn find(model: &Model, mut start: Start, budget: &Budget) -> Result<Start, Stop> {
+pub(crate) fn find(model: &Model, mut start: Start) -> Result<Start, Stop> {
     let mut random = Random::new(start.seed ^ 0x5eed);
     let mut failures: BTreeMap<usize, usize> = BTreeMap::new();
     for _ in 0..POINTS {
         let columns = Columns::new(model, 0);
-        let failed = match Expansion::new(model, &start, columns, budget).first() {
+        let failed = match Expansion::new(model, &start, columns).first() {
             Ok(()) => return Ok(start),
             Err(Stop::Point(slot)) => slot,
             Err(stop) => return Err(stop),

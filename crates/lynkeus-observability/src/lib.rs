@@ -43,4 +43,6 @@ mod search;
 mod series;
 
 pub use analysis::analyse;
-pub use question::{Answer, Asked, Partial, Quantity, Question, QuestionError, Symmetry, Verdict};
+pub use question::{
+    Answer, Asked, Kind, Note, Partial, Quantity, Question, QuestionError, Symmetry, Verdict,
+};

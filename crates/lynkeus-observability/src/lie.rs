@@ -6,8 +6,6 @@
 //! coefficients of v at every point; they are written down at random points of the invariant
 //! set until they determine what is left. Unknown inputs may answer in any affine way.
 
-use lynkeus_expr::Budget;
-
 use crate::expansion::{Affine, Columns, Expansion, Start};
 use crate::hull;
 use crate::model::{Model, Role};
@@ -40,17 +38,13 @@ struct Place {
     outputs: Vec<Vec<Modular>>,
 }
 
-/// What is needed to visit points of the set.
-pub(crate) struct Setting<'a> {
-    pub model: &'a Model,
-    pub set: &'a Affine,
-    pub at_zero: bool,
-    pub budget: &'a Budget,
-}
-
-/// Directions of the named quantities at a start along which the fields found move them.
-pub(crate) fn directions(setting: &Setting<'_>, start: &Start) -> Result<Vec<Vec<Modular>>, Stop> {
-    let terms = setting.terms();
+/// Directions of the named quantities at a start along which the fields found at points of the set move them.
+pub(crate) fn directions(
+    model: &Model,
+    set: &Affine,
+    start: &Start,
+) -> Result<Vec<Vec<Modular>>, Stop> {
+    let terms = terms(model);
     if terms.is_empty() {
         return Ok(vec![]);
     }
@@ -58,10 +52,9 @@ pub(crate) fn directions(setting: &Setting<'_>, start: &Start) -> Result<Vec<Vec
     let (mut confirmed, mut seed) = (0, FIRST);
     while confirmed < CONFIRMED && equations.rank() < terms.len() {
         seed += 1;
-        let anywhere = Start::new(setting.model, seed).at_zero(setting.at_zero);
-        let anywhere = anywhere.within(setting.model, setting.set);
-        let found = hull::find(setting.model, anywhere, setting.budget);
-        let place = match found.and_then(|start| setting.visit(&start)) {
+        let anywhere = Start::new(model, seed).at_zero(start.at_zero);
+        let found = hull::find(model, anywhere.within(model, set));
+        let place = match found.and_then(|start| Place::new(model, &start)) {
             Ok(place) => place,
             Err(Stop::Point(_)) => return Ok(vec![]),
             Err(stop) => return Err(stop),
@@ -74,69 +67,59 @@ pub(crate) fn directions(setting: &Setting<'_>, start: &Start) -> Result<Vec<Vec
             0
         };
     }
-    let here = setting.visit(start)?;
-    let named = setting.model.named.len();
+    let here = Place::new(model, start)?;
     let fields = equations.kernel();
-    Ok(fields
+    let fields = fields
         .iter()
-        .map(|field| here.field(&terms, field, named))
-        .collect())
+        .map(|field| here.field(&terms, field, model.named.len()));
+    Ok(fields.collect())
 }
 
-impl Setting<'_> {
-    /// Every known start as a coordinate of its own.
-    fn known(&self) -> (Vec<usize>, Affine) {
-        let known: Vec<usize> = self.model.known_starts().collect();
-        let directions = hull::everywhere(self.model, &known);
-        (known, directions)
+/// The coefficients of a field: known starts, each a coordinate of its own, move with their distance from the start
+/// alone; what has no column is known.
+fn terms(model: &Model) -> Vec<Term> {
+    let named = model.named.len();
+    let count = named + model.known_starts().count();
+    let inputs = named - model.unknown_inputs..named;
+    let affine = |row: usize| {
+        let linear = (0..count).filter(|&column| {
+            let held = row < named || column >= named;
+            held && (inputs.contains(&row) || !inputs.contains(&column))
+        });
+        let constant = (row < named).then_some(Term { row, column: None });
+        let linear = linear.map(move |column| Term {
+            row,
+            column: Some(column),
+        });
+        linear.chain(constant).collect::<Vec<Term>>()
+    };
+    let mut terms: Vec<Term> = (0..count).flat_map(affine).collect();
+    if terms.len() > COEFFICIENTS {
+        terms.retain(|term| term.column.is_none_or(|column| column == term.row));
     }
-
-    /// The coefficients of a field: known starts move with their distance from the start alone;
-    /// what has no column is known.
-    fn terms(&self) -> Vec<Term> {
-        let named = self.model.named.len();
-        let count = named + self.known().0.len();
-        let inputs = named - self.model.unknown_inputs..named;
-        let affine = |row: usize| {
-            let linear = (0..count).filter(|&column| {
-                let held = row < named || column >= named;
-                held && (inputs.contains(&row) || !inputs.contains(&column))
-            });
-            let constant = (row < named).then_some(Term { row, column: None });
-            let linear = linear.map(move |column| Term {
-                row,
-                column: Some(column),
-            });
-            linear.chain(constant).collect::<Vec<Term>>()
-        };
-        let mut terms: Vec<Term> = (0..count).flat_map(affine).collect();
-        if terms.len() > COEFFICIENTS {
-            terms.retain(|term| term.column.is_none_or(|column| column == term.row));
-        }
-        match terms.len() > COEFFICIENTS {
-            true => vec![],
-            false => terms,
-        }
+    match terms.len() > COEFFICIENTS {
+        true => vec![],
+        false => terms,
     }
+}
 
-    fn visit(&self, start: &Start) -> Result<Place, Stop> {
-        let (known, directions) = self.known();
-        let columns = Columns::new(self.model, 0).moving(&directions);
-        let mut expansion = Expansion::new(self.model, start, columns, self.budget);
+impl Place {
+    fn new(model: &Model, start: &Start) -> Result<Self, Stop> {
+        let known: Vec<usize> = model.known_starts().collect();
+        let columns = Columns::new(model, 0).moving(&hull::everywhere(model, &known));
+        let mut expansion = Expansion::new(model, start, columns);
         expansion.advance()?;
         let mut values = expansion.point.clone();
         values.extend(known.iter().map(|&place| expansion.moved_by(place)));
         let mut flow = vec![Modular::ZERO; values.len()];
         let mut gradients = vec![None; values.len()];
-        let places = self.model.symbols.iter().enumerate();
+        let places = model.symbols.iter().enumerate();
         for (place, symbol) in places {
             let Role::State(state) = symbol.role else {
                 continue;
             };
             let unnamed = known.iter().position(|&k| k == place);
-            let coordinate = symbol
-                .column
-                .or(unnamed.map(|i| self.model.named.len() + i));
+            let coordinate = symbol.column.or(unnamed.map(|i| model.named.len() + i));
             if let Some(coordinate) = coordinate {
                 let (value, gradient) = expansion.derivative(state);
                 flow[coordinate] = value;
@@ -144,24 +127,22 @@ impl Setting<'_> {
             }
         }
         // parameters do not move; unknown inputs move as they like
-        let inputs = self.model.named.len() - self.model.unknown_inputs;
+        let inputs = model.named.len() - model.unknown_inputs;
         for (coordinate, gradient) in gradients.iter_mut().enumerate() {
-            let is_input = (inputs..self.model.named.len()).contains(&coordinate);
+            let is_input = (inputs..model.named.len()).contains(&coordinate);
             if gradient.is_none() && !is_input {
                 *gradient = Some(vec![]);
             }
         }
-        let outputs = 0..self.model.outputs;
-        Ok(Place {
+        let outputs = 0..model.outputs;
+        Ok(Self {
             values,
             flow,
             gradients,
             outputs: outputs.map(|i| expansion.output(i)).collect(),
         })
     }
-}
 
-impl Place {
     fn at(&self, term: &Term) -> Modular {
         term.column
             .map_or(Modular::ONE, |column| self.values[column])

@@ -1,11 +1,11 @@
 //! A plant with a question, ready to be expanded.
 
-use lynkeus_expr::Node;
+use lynkeus_expr::{Budget, Node};
 use lynkeus_model::{Plant, Variable, parse_expression};
 
 use crate::branches::Reference;
 use crate::series::Program;
-use crate::{Quantity, Question, QuestionError, branches};
+use crate::{Note, Quantity, Question, QuestionError, branches};
 use lynkeus_expr::modular::{Modular, Random};
 
 /// What role a symbol plays in the series.
@@ -59,39 +59,27 @@ pub(crate) struct Model {
     pub unknown_inputs: usize,
     /// orders that are enough at a generic point
     pub depth: usize,
-}
-
-/// Why a plant cannot be expanded, with the quantities that stay undecided.
-pub(crate) struct Refused {
-    pub named: Vec<(String, Quantity)>,
-    pub reason: String,
+    /// when to stop
+    pub budget: Budget,
 }
 
 impl Model {
-    /// The model in one branch, or why it has no series.
+    /// The model in one branch, `outputs` and the expressions `about` being over the plant's graph.
+    ///
+    /// # Errors
+    /// Why it has no series.
     pub fn new(
         plant: &Plant,
         question: &Question,
+        (outputs, about): (&[Node], &[Node]),
         reference: Option<&Reference>,
-        guards: &[Node],
-    ) -> Result<Result<Self, Refused>, QuestionError> {
-        let about = expressions(plant, question)?;
-        let mut outputs = measured(plant, question)?;
-        outputs.extend(guards);
-        for name in question.unknown.iter().chain(&question.disturbances) {
-            find("input", &plant.inputs, name)?;
-        }
-        for name in &question.known_starts {
-            find("state", &plant.states, name)?;
-        }
+    ) -> Result<Self, (Vec<(String, Quantity)>, Note)> {
         let Symbols {
             mut symbols,
             named,
             starts,
         } = Symbols::new(plant, question);
-        let mut roots = plant.derivatives.clone();
-        roots.extend(&outputs);
-        roots.extend(&about);
+        let roots = [&plant.derivatives[..], outputs, about].concat();
         let nodes: Vec<Node> = symbols.iter().map(|s| s.node).collect();
         let own = || branches::reference(plant, &mut Random::new(1));
         let reference = reference.cloned().unwrap_or_else(own);
@@ -103,23 +91,21 @@ impl Model {
         let programs = compiled(&roots).and_then(|program| Ok((program, compiled(&starts)?)));
         let (program, starts) = match programs {
             Ok(programs) => programs,
-            Err(reason) => {
-                let reason = format!("the model contains {reason}");
-                return Ok(Err(Refused { named, reason }));
-            }
+            Err(note) => return Err((named, note)),
         };
         let of_kind = |kind: Quantity| named.iter().filter(|(_, k)| *k == kind).count();
-        Ok(Ok(Self {
+        Ok(Self {
             unknown_inputs: of_kind(Quantity::UnknownInput),
             depth: plant.states.len() + of_kind(Quantity::Parameter) + 1,
             states: plant.states.len(),
             outputs: outputs.len(),
             about: about.len(),
+            budget: question.budget.clone(),
             symbols,
             named,
             program,
             starts,
-        }))
+        })
     }
 
     /// Places of the states whose start is known.
@@ -139,7 +125,7 @@ impl Model {
 }
 
 /// The expressions asked about, over the plant's graph.
-fn expressions(plant: &Plant, question: &Question) -> Result<Vec<Node>, QuestionError> {
+pub(crate) fn expressions(plant: &Plant, question: &Question) -> Result<Vec<Node>, QuestionError> {
     let parameters = plant.parameters.iter().map(|p| &p.variable);
     let variables: Vec<&Variable> = plant
         .states
@@ -158,6 +144,17 @@ fn expressions(plant: &Plant, question: &Question) -> Result<Vec<Node>, Question
             .map_err(|error| QuestionError::Expression(error.one_line()))
     };
     question.about.iter().map(parse).collect()
+}
+
+/// Refuses inputs and states that the plant does not have.
+pub(crate) fn check_names(plant: &Plant, question: &Question) -> Result<(), QuestionError> {
+    for name in question.unknown.iter().chain(&question.disturbances) {
+        find("input", &plant.inputs, name)?;
+    }
+    for name in &question.known_starts {
+        find("state", &plant.states, name)?;
+    }
+    Ok(())
 }
 
 fn find<'v>(

@@ -85,10 +85,56 @@ pub struct Symmetry {
     pub moves: Vec<String>,
     /// in how many independent ways they can change
     pub directions: usize,
-    /// in words: what it does, and which combinations it leaves alone
-    pub words: String,
+    /// how, where that is simple
+    pub kind: Option<Kind>,
     /// combinations that are known nevertheless, as Modelica expressions
     pub invariants: Vec<String>,
+}
+
+/// How quantities change together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// each is multiplied by a power of one number
+    Scaling,
+    /// to each a multiple of one number is added
+    Shift,
+}
+
+/// How it was decided, or what limits it: `lynkeus-words` has the sentences.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Note {
+    /// in exact arithmetic at a random point
+    Exact,
+    /// the same, functions of these names being taken as generic
+    Generic(Vec<&'static str>),
+    /// the model makes choices: in the branch at its own values
+    OwnBranch,
+    /// the model makes choices: in so many branches, which are all that were found or not
+    Branches(usize, bool),
+    /// what is told in no branch may show when the branch changes
+    WithinBranches(Vec<String>),
+    /// start values are given, and so many derivatives do not decide everything
+    Derivatives(usize),
+    /// the limit of that name struck after so many derivatives
+    Struck(&'static str, usize),
+    /// the limit of that name struck at once
+    StruckAtOnce(&'static str),
+    /// the series is not defined at any point tried
+    Singular,
+    /// the model contains an algebraic loop, this one
+    Loop(String),
+    /// the model reads the condition estimate of a linear system
+    ConditionEstimate,
+    /// the model reads a symbol of this name without a value
+    NoValue(String),
+    /// the model contains an expression that is not defined at the reference point
+    NotDefined(String),
+    /// the model contains a linear system that is singular
+    SingularSystem,
+    /// the model takes a linear system as a value
+    System,
+    /// the model contains a number that has no image in the field
+    Number(f64),
 }
 
 /// A quantity that the outputs tell in some branches of the model only.
@@ -129,7 +175,7 @@ pub struct Answer {
     /// number of unknowns, derivatives of unknown inputs included
     pub unknowns: usize,
     /// how it was decided, and what limits it
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
 }
 
 impl Answer {

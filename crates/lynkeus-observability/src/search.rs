@@ -2,8 +2,6 @@
 
 use std::collections::{BTreeSet, VecDeque};
 
-use lynkeus_expr::Budget;
-
 use crate::expansion::{Columns, Expansion, Start};
 use crate::model::{Model, Role};
 use crate::series::Stop;
@@ -28,10 +26,10 @@ pub(crate) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    pub fn new(model: &'a Model, start: &'a Start, columns: Columns, budget: &Budget) -> Self {
+    pub fn new(model: &'a Model, start: &'a Start, columns: Columns) -> Self {
         let width = columns.width();
         Self {
-            expansion: Expansion::new(model, start, columns, budget),
+            expansion: Expansion::new(model, start, columns),
             rows: Echelon::new(width),
             signals: Echelon::new(width),
             about: vec![],
@@ -297,6 +295,7 @@ mod tests {
 
     use super::*;
     use crate::Question;
+    use crate::model::measured;
 
     /// Names of what follows, in order, with the derivatives used. The ranks, which
     /// know nothing of it, say the same.
@@ -306,14 +305,13 @@ mod tests {
             ..LoadOptions::default()
         };
         let plant = Plant::from_modelica(text, "p.mo", &options).unwrap();
-        let model = Model::new(&plant, question, None, &[])
-            .unwrap()
+        let outputs = measured(&plant, question).unwrap();
+        let model = Model::new(&plant, question, (&outputs, &[]), None)
             .ok()
             .unwrap();
-        let budget = Budget::default();
-        let start = crate::hull::find(&model, Start::new(&model, 1), &budget).unwrap();
+        let start = crate::hull::find(&model, Start::new(&model, 1)).unwrap();
         let columns = Columns::new(&model, model.depth);
-        let mut search = Search::new(&model, &start, columns, &budget);
+        let mut search = Search::new(&model, &start, columns);
         search.advance().unwrap();
         let found = search.follow();
         search.until(None, model.depth).unwrap();

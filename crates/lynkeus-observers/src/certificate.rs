@@ -1,9 +1,7 @@
 //! What can be guaranteed about an observer, and why.
 
 use lynkeus_expr::{Interval, MissingInput, Node, Spent};
-use lynkeus_structure::{
-    AugmentedPlant, Dimension, Measurement, Region, Side, Standing, range, short,
-};
+use lynkeus_structure::{AugmentedPlant, Dimension, Measurement, Region, Standing, range, short};
 use nalgebra::DMatrix;
 
 use crate::statement::{proved, standing, sufficient, undecided};
@@ -271,7 +269,7 @@ pub struct Certificate {
     /// else has a bound
     pub mean_square: Option<Bounds>,
     /// the box
-    pub region: Vec<Side>,
+    pub region: Vec<Dimension>,
     /// what has to hold, with verdicts and witnesses
     pub hypotheses: Vec<Check>,
     /// the numbers of the proof
@@ -302,11 +300,6 @@ impl Certificate {
     ) -> Self {
         let bounded = |d: &&Dimension| d.symbol != assumptions.time || d.max.is_finite();
         let sides = assumptions.region.dimensions.iter().filter(bounded);
-        let side = |d: &Dimension| Side {
-            name: d.name.clone(),
-            min: d.min,
-            max: d.max,
-        };
         let first = std::iter::once(assumptions.regularity.clone()).chain(assumptions.what_acts());
         let first = first.chain(assumptions.within_limits.clone());
         let hypotheses: Vec<Check> = first.chain(hypotheses).collect();
@@ -317,7 +310,7 @@ impl Certificate {
             ultimate_bound: None,
             ultimate: vec![],
             mean_square: None,
-            region: sides.map(side).collect(),
+            region: sides.cloned().collect(),
             hypotheses,
             constants: vec![],
             lyapunov: None,

@@ -10,7 +10,7 @@ use lynkeus_proof::hurwitz;
 use lynkeus_proof::hurwitz::Stability;
 use lynkeus_structure::sign::Sign;
 use lynkeus_structure::{
-    AugmentedPlant, ChainRequest, Finding, Point, Region, Regularity, Verdict, has_value_at, short,
+    AugmentedPlant, ChainRequest, Finding, Point, Region, Verdict, has_value_at, regularity, short,
     sign,
 };
 
@@ -35,8 +35,12 @@ fn partial(
         && !has_value_at(graph, augmented.derivatives[row], witness, region)?
     {
         let f = &augmented.states[row].name;
-        found.finding.detail = format!("{}, but where f({f}) has no value", found.finding.detail);
-        let place = region.restricted(&graph.symbols_of(&[node])).place();
+        found.finding.reason = format!(
+            "{}, but where f({f}) has no value",
+            found.finding.reason.text()
+        )
+        .into();
+        let place = region.restricted(&graph.symbols_of(&[node])).dimensions;
         found.finding.verdict = Verdict::Undecided(place);
     }
     Ok((node, found))
@@ -156,9 +160,9 @@ pub(crate) fn lipschitz(
     let graph = augmented.graph();
     let symbols = augmented.symbols();
     let jacobian = lynkeus_expr::jacobian::forward(graph, &augmented.derivatives, &symbols);
-    let regularity = Regularity::of(graph, &augmented.derivatives, &symbols, region)?;
-    if !regularity.holds() {
-        return Ok(Statement::Lipschitz.with(regularity.finding()));
+    let regular = regularity(graph, &augmented.derivatives, &symbols, region)?;
+    if !regular.is_proved() {
+        return Ok(Statement::Lipschitz.with(regular));
     }
     let entries: Vec<_> = jacobian.entries.iter().map(|entry| entry.2).collect();
     let at_once = sign::bounded_at_once(graph, &entries, region)?;
@@ -174,8 +178,11 @@ pub(crate) fn lipschitz(
             graph.render(node, 60)
         );
         let used = region.restricted(&graph.symbols_of(&[node]));
-        let verdict = Verdict::Undecided(used.place());
-        return Ok(Statement::Lipschitz.with(Finding { verdict, detail }));
+        let verdict = Verdict::Undecided(used.dimensions);
+        return Ok(Statement::Lipschitz.with(Finding {
+            verdict,
+            reason: detail.into(),
+        }));
     }
     let detail = format!("{} entries enclosed", jacobian.entries.len());
     Ok(proved(Statement::Lipschitz, detail))

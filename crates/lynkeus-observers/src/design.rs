@@ -163,7 +163,7 @@ pub struct Design {
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum DesignError {
     /// the family does not fit
-    #[error("{}", refusal(.0))]
+    #[error("the family '{}' does not fit", .0.family)]
     Refused(Box<Examination>),
     /// a key of the study
     #[error(transparent)]
@@ -182,18 +182,6 @@ pub enum DesignError {
     /// a limit ended the work
     #[error("undecided: {0}")]
     Spent(#[from] Spent),
-}
-
-fn refusal(examination: &Examination) -> String {
-    let (family, summary) = (examination.family, &examination.summary);
-    let mut text = match examination.spent() {
-        Some(_) => format!("whether the family '{family}' fits is {summary}"),
-        None => format!("the family '{family}' does not fit: {summary}"),
-    };
-    if let Some(check) = examination.refuted() {
-        text += &format!("\n  {check}");
-    }
-    text
 }
 
 /// A form with what is known of its conditions.

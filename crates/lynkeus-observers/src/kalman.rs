@@ -14,7 +14,7 @@
 //! Nothing is required of the plant, and nothing is proved of the error.
 
 use lynkeus_model::Variable;
-use lynkeus_run::filter::{Bounds, FilterKind, SigmaPoints};
+use lynkeus_run::filter::{FilterKind, SigmaPoints};
 use lynkeus_structure::{AugmentedPlant, Region, Standing};
 
 use crate::design::{Found, Searched};
@@ -50,7 +50,7 @@ trait Kalman: Sync {
     const WORDS: &'static str;
     const KEYS: &'static [&'static [KeySpec]];
 
-    fn kind(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError>;
+    fn kind(tuning: &Tuning) -> Result<FilterKind, TuningError>;
 }
 
 impl Kalman for Ekf {
@@ -59,7 +59,7 @@ impl Kalman for Ekf {
     const WORDS: &'static str = "extended Kalman filter";
     const KEYS: &'static [&'static [KeySpec]] = &[&KEYS, &BOUNDS];
 
-    fn kind(_: &AugmentedPlant<'_>, _: &Tuning) -> Result<FilterKind, TuningError> {
+    fn kind(_: &Tuning) -> Result<FilterKind, TuningError> {
         Ok(FilterKind::Extended)
     }
 }
@@ -70,7 +70,7 @@ impl Kalman for Ukf {
     const WORDS: &'static str = "unscented Kalman filter";
     const KEYS: &'static [&'static [KeySpec]] = &[&KEYS, &BOUNDS, &POINTS];
 
-    fn kind(_: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError> {
+    fn kind(tuning: &Tuning) -> Result<FilterKind, TuningError> {
         let SigmaPoints { alpha, beta, kappa } = SigmaPoints::default();
         let [own_alpha, own_beta, own_kappa] = &POINTS;
         Ok(FilterKind::Unscented(SigmaPoints {
@@ -87,24 +87,15 @@ impl Kalman for Mhe {
     const WORDS: &'static str = "moving-horizon estimator";
     const KEYS: &'static [&'static [KeySpec]] = &[&KEYS, &WINDOW];
 
-    fn kind(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError> {
+    fn kind(tuning: &Tuning) -> Result<FilterKind, TuningError> {
         let [horizon] = &WINDOW;
         let length = match number(tuning, horizon)? {
             None => HORIZON,
             Some(x) if x >= 1.0 && x.fract() == 0.0 && x <= 1e4 => x as usize,
             Some(x) => return Err(horizon.wrong(x)),
         };
-        Ok(FilterKind::MovingHorizon(length, ranges(augmented)))
+        Ok(FilterKind::MovingHorizon(length))
     }
-}
-
-/// The declared range of each state.
-fn ranges(augmented: &AugmentedPlant<'_>) -> Vec<Bounds> {
-    let bounds = augmented.states.iter().map(|state| Bounds {
-        low: state.min,
-        high: state.max,
-    });
-    bounds.collect()
 }
 
 impl<K: Kalman> Stages for K {
@@ -117,7 +108,7 @@ impl<K: Kalman> Stages for K {
     const KEYS: &'static [&'static [KeySpec]] = K::KEYS;
 
     fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
-        Settings::read(augmented, tuning, K::kind(augmented, tuning)?)
+        Settings::read(augmented, tuning, K::kind(tuning)?)
     }
 
     fn form(augmented: &AugmentedPlant<'_>, _: &Settings, region: &Region) -> Searched<()> {
@@ -125,7 +116,7 @@ impl<K: Kalman> Stages for K {
         let jumps = match regularity.standing() {
             Standing::Refuted => format!(
                 "; {}: the filter linearises beside such places",
-                regularity.detail
+                regularity.reason.text()
             ),
             _ => String::new(),
         };
@@ -161,7 +152,7 @@ impl<K: Kalman> Stages for K {
         observer.filter = Some(FilterTuning {
             kind: settings.kind.clone(),
             gate: settings.gate,
-            bounds: settings.projects.then(|| ranges(augmented)),
+            projects: settings.projects,
             outputs: copy.at_estimate(&outputs),
             confined,
             initial_variance: variance.clone(),

@@ -40,7 +40,9 @@ pub use lynkeus_gain::integrators::Pole;
 pub use observer::{
     Estimate, FilterTuning, InputDerivative, Monitor, Observer, Sampled, Signal, Tunable, Tunables,
 };
-pub use statement::{Check, Farza, Germani, Hammouri, Inequality, Lee, Ltaief, Statement, Weight};
+pub use statement::{
+    Check, Farza, Germani, Hammouri, Inequality, Lee, Ltaief, Reason, Statement, Weight,
+};
 pub use tuning::{Initial, KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 
 use block_triangular::BlockTriangular;

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use lynkeus_expr::flow::Flow;
 use lynkeus_expr::{Graph, MissingInput, Node, flow};
 use lynkeus_model::Variable;
-use lynkeus_run::filter::{Bounds, FilterKind};
+use lynkeus_run::filter::FilterKind;
 use lynkeus_structure::AugmentedPlant;
 
 /// A named symbol.
@@ -99,8 +99,8 @@ pub struct FilterTuning {
     pub kind: FilterKind,
     /// a reading further from what is expected, in standard deviations, is rejected
     pub gate: Option<f64>,
-    /// where the estimate is kept, one pair per state; none where it may go anywhere
-    pub bounds: Option<Vec<Bounds>>,
+    /// the estimate is kept in the declared ranges
+    pub projects: bool,
     /// h(t, x̂, u), one per measured output
     pub outputs: Vec<Node>,
     /// variance of the first estimate, one per state
@@ -151,7 +151,7 @@ impl Signal {
 }
 
 /// An observer whose measurements w are states, to be set to each reading: see
-/// [`lynkeus_run::SampledObserver`].
+/// [`lynkeus_run::Updates::Jumps`].
 #[derive(Clone, Debug)]
 pub struct Sampled {
     /// states z, then w; known inputs, then one switch s per sensor; nothing measured

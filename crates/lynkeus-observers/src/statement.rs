@@ -53,6 +53,43 @@ pub enum Statement {
     Germani(Germani),
 }
 
+/// What decides a verdict, as data: `lynkeus-words` has the sentences.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reason {
+    /// a sentence that is not data yet
+    Text(String),
+    /// found in the structure of the plant
+    Structure(lynkeus_structure::Reason),
+}
+
+impl Reason {
+    /// The sentence.
+    pub fn text(self) -> String {
+        match self {
+            Self::Text(text) => text,
+            Self::Structure(reason) => reason.text(),
+        }
+    }
+}
+
+impl From<String> for Reason {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl From<&str> for Reason {
+    fn from(text: &str) -> Self {
+        Self::Text(text.to_owned())
+    }
+}
+
+impl From<lynkeus_structure::Reason> for Reason {
+    fn from(reason: lynkeus_structure::Reason) -> Self {
+        Self::Structure(reason)
+    }
+}
+
 /// A statement with its verdict.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Check {
@@ -60,8 +97,8 @@ pub struct Check {
     pub statement: Statement,
     /// the verdict
     pub verdict: Verdict,
-    /// what was found, in words
-    pub detail: String,
+    /// what decides it
+    pub reason: Reason,
     /// what it weighs
     pub weight: Weight,
 }
@@ -105,39 +142,50 @@ pub(crate) fn standing<'a>(checks: impl IntoIterator<Item = &'a Check>) -> Stand
 impl Statement {
     /// What was found of it.
     pub(crate) fn with(self, found: Finding) -> Check {
+        self.found(found.verdict, found.reason)
+    }
+
+    /// The statement with its verdict.
+    pub(crate) fn found(self, verdict: Verdict, reason: impl Into<Reason>) -> Check {
         Check {
             statement: self,
-            verdict: found.verdict,
-            detail: found.detail,
+            verdict,
+            reason: reason.into(),
             weight: Weight::Required,
         }
     }
 }
 
-pub(crate) fn proved(statement: impl Into<Statement>, detail: impl Into<String>) -> Check {
-    statement.into().with(Finding::proved(detail))
+pub(crate) fn proved(statement: impl Into<Statement>, reason: impl Into<Reason>) -> Check {
+    statement.into().found(Verdict::Proved, reason)
 }
 
 /// A hypothesis that could not be established, or that a sufficient condition misses.
-pub(crate) fn undecided(statement: impl Into<Statement>, detail: impl Into<String>) -> Check {
-    statement.into().with(Finding::undecided(detail))
+pub(crate) fn undecided(statement: impl Into<Statement>, reason: impl Into<Reason>) -> Check {
+    statement.into().found(Verdict::open(), reason)
 }
 
 pub(crate) fn refuted(
     statement: impl Into<Statement>,
     witness: impl Into<Witness>,
-    detail: impl Into<String>,
+    reason: impl Into<Reason>,
 ) -> Check {
-    statement.into().with(Finding::refuted(witness, detail))
+    statement
+        .into()
+        .found(Verdict::Refuted(witness.into()), reason)
 }
 
 /// By a condition that is sufficient: that it fails refutes nothing.
 pub(crate) fn sufficient(
     statement: impl Into<Statement>,
     holds: bool,
-    detail: impl Into<String>,
+    reason: impl Into<Reason>,
 ) -> Check {
-    statement.into().with(Finding::sufficient(holds, detail))
+    let verdict = match holds {
+        true => Verdict::Proved,
+        false => Verdict::open(),
+    };
+    statement.into().found(verdict, reason)
 }
 
 impl fmt::Display for Statement {
@@ -165,12 +213,6 @@ impl fmt::Display for Statement {
             Self::Farza(part) => part.fmt(f),
             Self::Germani(part) => part.fmt(f),
         }
-    }
-}
-
-impl fmt::Display for Check {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {} ({})", self.statement, self.verdict, self.detail)
     }
 }
 

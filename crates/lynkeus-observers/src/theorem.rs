@@ -4,7 +4,7 @@
 use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
 
-use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Unary, jacobian};
+use lynkeus_expr::{Binary, Call, Graph, Interval, MissingInput, Node, Op, Unary, jacobian};
 use lynkeus_proof::chain::{Slope, Ultimate};
 use lynkeus_proof::inverse::Inverse;
 use lynkeus_proof::magnitude::{norm, plus, product, size, times};
@@ -127,8 +127,8 @@ fn check(augmented: &AugmentedPlant<'_>, region: &Region, found: &[Slope], open:
     };
     let used = region.restricted(&graph.symbols_of(&nodes));
     Statement::SlopesOfTheProof.with(Finding {
-        verdict: Verdict::Undecided(used.place()),
-        detail,
+        verdict: Verdict::Undecided(used.dimensions),
+        reason: detail.into(),
     })
 }
 
@@ -339,10 +339,11 @@ impl<'g> Enclosure<'g> {
 
     /// |x_i| ≤ Σ_j |(A⁻¹)_ij| |b_j| for an entry of the solution of A x = b.
     fn of_solution(&self, node: Node, system: Node, i: usize) -> Result<f64, MissingInput> {
-        let Some(system) = self.graph.system(system) else {
+        let call = self.graph.system(system);
+        let Some((A, b)) = call.as_ref().and_then(Call::linear) else {
             return Ok(f64::INFINITY);
         };
-        let (n, A, b) = (system.size(), system.matrix(), system.right());
+        let n = b.len();
         let number = |one: bool| self.graph.constant(f64::from(u8::from(one))).node();
         let mut sum = 0.0;
         for (j, &b) in b.iter().enumerate() {

@@ -24,7 +24,7 @@ use lynkeus_expr::Interval;
 use crate::definite::{is_positive_definite, least_eigenvalue};
 use crate::elimination::{columns, positive};
 use crate::magnitude::Magnitudes;
-use crate::matrix::{IntervalMatrix, dot, square, sum, upper};
+use crate::matrix::{IntervalMatrix, dot, product, square, sum, upper};
 use crate::search::largest;
 use crate::vertices::{Bounds, varying, vertices};
 use crate::{inverse, metzler};
@@ -151,7 +151,7 @@ impl Comparison {
             _ => Interval::ZERO,
         });
         let G = couplings(chains, &places, slopes);
-        let H = square(n, |p, q| sum((0..n).map(|r| S̄[p][r] * G[r][q])));
+        let H = product(&S̄, &G);
         let N = square(n, |p, q| {
             let (i, _) = places[p];
             let own = match p == q {

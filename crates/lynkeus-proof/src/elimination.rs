@@ -25,7 +25,7 @@ const SHRUNK: f64 = 1.0 - 1e-9;
 /// The column of a state in −P(a), per unit of its partial.
 #[derive(Clone, Copy, Debug)]
 pub struct Column {
-    /// two rows above the diagonal; not read for the first two states
+    /// two rows above the diagonal
     pub far: Interval,
     /// one row above
     pub near: Interval,
@@ -149,24 +149,14 @@ fn smaller(A: [f64; 3], B: [f64; 3]) -> Tail {
 pub struct Tails(Vec<Tail>);
 
 impl Tails {
-    /// After the second state: [first, −a·near; ·, a·own − shift].
-    pub fn new(first: Interval, column: &Column, bounds: Bounds, shift: f64) -> Self {
-        let tail = |a: f64| {
-            let a = Interval::point(a);
-            let own = a * column.own - Interval::point(shift);
-            Tail::below([first, -(a * column.near), own])
-        };
-        Self(ends(bounds).map(tail).collect()).pruned()
+    /// The first state, of which nothing else is read.
+    pub fn start(first: Interval) -> Self {
+        Self(vec![Tail([1.0, 0.0, first.lo()])])
     }
 
     /// With one more state.
     pub fn grown(&self, column: &Column, bounds: Bounds, shift: f64) -> Self {
-        let next = |tail: &Tail| {
-            let tail = *tail;
-            ends(bounds)
-                .map(move |a| tail.next(column, a, shift))
-                .collect::<Vec<_>>()
-        };
+        let next = |&tail: &Tail| ends(bounds).map(move |a| tail.next(column, a, shift));
         Self(self.0.iter().flat_map(next).collect()).pruned()
     }
 
@@ -215,17 +205,14 @@ fn ends(bounds: Bounds) -> impl Iterator<Item = f64> {
 /// second state, is positive definite by more than `shift` times the identity, for all
 /// partials within their bounds. False may also mean: not proved.
 pub fn positive(first: Interval, columns: &[Column], bounds: &[Bounds], shift: f64) -> bool {
-    let first = first - Interval::point(shift);
-    let mut pairs = columns.iter().zip(bounds);
-    let Some((column, b)) = pairs.next() else {
-        return first.is_positive();
-    };
-    let mut tails = Tails::new(first, column, *b, shift);
-    for (column, b) in pairs {
+    let mut tails = Tails::start(first - Interval::point(shift));
+    for (k, (column, b)) in columns.iter().zip(bounds).enumerate() {
         if !tails.positive() {
             return false;
         }
-        tails = tails.grown(column, *b, shift);
+        // nothing stands two rows above the second state
+        let far = if k == 0 { Interval::ZERO } else { column.far };
+        tails = tails.grown(&Column { far, ..*column }, *b, shift);
     }
     tails.positive()
 }

@@ -8,8 +8,8 @@
 use lynkeus_expr::{Interval, interval};
 use nalgebra::DMatrix;
 
-use crate::magnitude::{Magnitudes, plus, product, size, times, total};
-use crate::matrix::{IntervalMatrix, square, sum};
+use crate::magnitude::{self, Magnitudes, plus, size, times, total};
+use crate::matrix::{IntervalMatrix, points, product, square};
 
 /// Share by which a guessed bound is raised before it is checked.
 const RESERVE: f64 = 1e-9;
@@ -43,13 +43,13 @@ impl Inverse {
         if A.iter().any(|row| row.len() != n) {
             return None;
         }
-        let middle = |i: usize, j: usize| Interval::point(A[i][j].midpoint());
+        let middle = square(n, |i, j| Interval::point(A[i][j].midpoint()));
         let R = guessed(n, |i, j| A[i][j].midpoint())?;
-        let radius = square(n, |i, j| (A[i][j] - middle(i, j)).magnitude());
-        let spread = product(&radius, &square(n, |i, j| R[(i, j)].abs()));
+        let radius = square(n, |i, j| (A[i][j] - middle[i][j]).magnitude());
+        let spread = magnitude::product(&radius, &square(n, |i, j| R[(i, j)].abs()));
+        let near = product(&middle, &points(&R));
         let E = square(n, |i, j| {
-            let terms = (0..n).map(|k| middle(i, k) * Interval::point(R[(k, j)]));
-            let rest = sum(terms) - Interval::point(one(i, j));
+            let rest = near[i][j] - Interval::point(one(i, j));
             plus(rest.magnitude(), spread[i][j])
         });
         let N = raised(&E)?;
@@ -59,7 +59,7 @@ impl Inverse {
     /// Bounds of the entries of A⁻¹ = R(I + E)⁻¹.
     pub fn bounds(&self) -> Magnitudes {
         let sizes = square(self.R.nrows(), |i, j| self.R[(i, j)].abs());
-        product(&sizes, &self.N)
+        magnitude::product(&sizes, &self.N)
     }
 }
 
@@ -95,14 +95,7 @@ pub fn diagonal(matrix: &IntervalMatrix) -> Option<Vec<f64>> {
     let n = matrix.len();
     let flat: Vec<Interval> = matrix.iter().flatten().copied().collect();
     let entry = |j: usize| {
-        let unit = |i: usize| {
-            if i == j {
-                Interval::ONE
-            } else {
-                Interval::ZERO
-            }
-        };
-        let right: Vec<Interval> = (0..n).map(unit).collect();
+        let right: Vec<Interval> = (0..n).map(|i| Interval::point(one(i, j))).collect();
         let (column, regular) = interval::solve(&flat, &right);
         let bound = column[j].hi();
         (regular && bound.is_finite() && bound > 0.0).then_some(bound)

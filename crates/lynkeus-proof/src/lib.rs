@@ -8,7 +8,7 @@
 //! | question | proposed by | decided by |
 //! |---|---|---|
 //! | is a symmetric interval matrix definite? | | [`definite`]: interval Cholesky |
-//! | does e' = A(θ)e decay for every θ(t) in a box? | [`lmi`], [`decay::fastest`], [`decay::design`] | [`decay::holds`] |
+//! | does e' = A(θ)e decay for every θ(t) in a box? | [`decay::prove`], [`decay::fastest`], [`decay::design`] | [`decay::holds`] |
 //! | has every A of an interval matrix an unstable eigenvalue? | [`lyapunov`], a Schur form | [`decay::is_unstable`] |
 //! | does a chain with bounded partials decay? | [`lyapunov::of_chain`] | [`chain::Chain::decay`], [`elimination`] |
 //! | do coupled chains decay, and to where? | | [`chain::Comparison`], [`chain::ultimate`], by [`metzler`] matrices |
@@ -46,7 +46,7 @@ pub mod definite;
 pub mod elimination;
 pub mod hurwitz;
 pub mod inverse;
-pub mod lmi;
+mod lmi;
 pub mod lyapunov;
 pub mod magnitude;
 pub mod matrix;

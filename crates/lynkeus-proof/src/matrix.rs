@@ -18,6 +18,14 @@ pub fn dot(a: &[Interval], b: &[Interval]) -> Interval {
     sum(a.iter().zip(b).map(|(a, b)| *a * *b))
 }
 
+/// A·B
+pub fn product(A: &IntervalMatrix, B: &IntervalMatrix) -> IntervalMatrix {
+    let columns = B.first().map_or(0, Vec::len);
+    let entry = |row: &[Interval], j: usize| sum(row.iter().zip(B).map(|(a, b)| *a * b[j]));
+    let row = |row: &Vec<Interval>| (0..columns).map(|j| entry(row, j)).collect();
+    A.iter().map(row).collect()
+}
+
 /// The n×n table of the entries.
 pub fn square<T>(n: usize, entry: impl Fn(usize, usize) -> T) -> Vec<Vec<T>> {
     let row = |i| (0..n).map(|j| entry(i, j)).collect();

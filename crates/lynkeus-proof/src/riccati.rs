@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::definite::{is_below, is_positive_definite};
 use crate::lyapunov;
 use crate::magnitude::{length, size};
-use crate::matrix::{square, sum};
+use crate::matrix::{dot, points, square};
 use crate::spectrum;
 
 /// Newton steps; convergence is quadratic.
@@ -24,14 +24,11 @@ const HALVINGS: usize = 40;
 const SLACK: f64 = 1e-12;
 const SHARE: f64 = 1e-10;
 
-/// A matrix row by row.
-type Rows = [Vec<f64>];
-
 /// A solution P with bounds of what proofs need of it.
 #[derive(Clone, Debug)]
 pub struct Riccati {
     /// P
-    pub P: Vec<Vec<f64>>,
+    pub P: DMatrix<f64>,
     /// α
     pub α: f64,
     /// an upper bound of ‖P‖
@@ -50,23 +47,22 @@ impl Riccati {
     /// use lynkeus_proof::riccati::Riccati;
     ///
     /// // −2·3 P + 1 + 2·0.5 P + 4 P² ≤ 0 has solutions, with 3 in place of 0.5 none
-    /// let one = |x: f64| vec![vec![x]];
+    /// let one = |x: f64| nalgebra::DMatrix::from_element(1, 1, x);
     /// let found = Riccati::solve(&one(-3.0), &one(1.0), 0.5, 2.0).unwrap();
-    /// let P = found.P[0][0];
+    /// let P = found.P[0];
     /// assert!(-6.0 * P + 1.0 + P + 4.0 * P * P <= 0.0);
     /// assert!(Riccati::solve(&one(-3.0), &one(1.0), 3.0, 2.0).is_none());
     /// ```
-    pub fn solve(A: &Rows, E: &Rows, α: f64, γ: f64) -> Option<Self> {
+    pub fn solve(A: &DMatrix<f64>, E: &DMatrix<f64>, α: f64, γ: f64) -> Option<Self> {
         // e = D e', D of powers of two, so that fast poles leave nothing of very
         // different size; scaling back is exact
-        let mut A = matrix(A);
+        let mut A = A.clone();
         // squares that overflow would keep the balancing going for ever
         if !A.iter().all(|a| a.abs() < LARGEST) {
             return None;
         }
         let D = balance_parlett_reinsch(&mut A);
         let n = A.nrows();
-        let E = matrix(E);
         let E = DMatrix::from_fn(n, E.ncols(), |i, j| E[(i, j)] / D[i]);
         let M = DMatrix::from_diagonal(&D.map(|d| (d * γ) * (d * γ)));
         let shifted = &A + DMatrix::identity(n, n) * α;
@@ -87,12 +83,12 @@ impl Riccati {
             α,
             largest,
             smallest,
-            P: (0..n).map(|i| P.row(i).iter().copied().collect()).collect(),
+            P,
         })
     }
 
     /// A solution with the largest α below `limit`.
-    pub fn fastest(A: &Rows, E: &Rows, γ: f64, limit: f64) -> Option<Self> {
+    pub fn fastest(A: &DMatrix<f64>, E: &DMatrix<f64>, γ: f64, limit: f64) -> Option<Self> {
         let mut best = Self::solve(A, E, 1e-6 * limit, γ)?;
         let (mut low, mut high) = (best.α, limit);
         for _ in 0..HALVINGS {
@@ -122,8 +118,7 @@ impl Riccati {
     /// An upper bound of √(fᵀP⁻¹f): P − ffᵀ/t > 0 says fᵀP⁻¹f < t.
     pub fn weight(&self, f: &[f64]) -> f64 {
         let coarse = self.weight_of_length(length(f));
-        let P = matrix(&self.P);
-        let Some(inverse) = P.cholesky().map(|c| c.inverse()) else {
+        let Some(inverse) = self.P.clone().cholesky().map(|c| c.inverse()) else {
             return coarse;
         };
         let column = DVector::from_column_slice(f);
@@ -131,18 +126,13 @@ impl Riccati {
         let t = Interval::point(guess * (1.0 + 1e-6) + f64::MIN_POSITIVE);
         let rest = |i: usize, j: usize| {
             let product = Interval::point(f[i]) * Interval::point(f[j]);
-            Interval::point(self.P[i][j]) - product / t
+            Interval::point(self.P[(i, j)]) - product / t
         };
         match is_positive_definite(&square(f.len(), rest)) {
             true => t.sqrt().hi(),
             false => coarse,
         }
     }
-}
-
-fn matrix(rows: &Rows) -> DMatrix<f64> {
-    let columns = rows.first().map_or(0, Vec::len);
-    DMatrix::from_fn(rows.len(), columns, |i, j| rows[i][j])
 }
 
 /// E Eᵀ with a little more in each direction, on the scale that P has there.
@@ -185,17 +175,13 @@ fn holds(
     P: &DMatrix<f64>,
 ) -> bool {
     let n = P.nrows();
-    let product = |a: &DMatrix<f64>, i: usize, b: &DMatrix<f64>, j: usize| {
-        // row i of a times column j of bᵀ
-        let terms = (0..a.ncols()).map(|k| Interval::point(a[(i, k)]) * Interval::point(b[(j, k)]));
-        sum(terms)
-    };
     let scaled = DMatrix::from_fn(n, n, |i, j| P[(i, j)] * D[j]);
+    let [A, E, P, scaled] = [A, E, P, &scaled].map(points);
     let entry = |i: usize, j: usize| {
-        let linear = product(A, i, P, j) + product(P, i, A, j);
-        let square = product(&scaled, i, &scaled, j) * Interval::point(γ).powi(2);
-        let rate = Interval::point(2.0 * α) * Interval::point(P[(i, j)]);
-        Interval::point(0.0) - (linear + product(E, i, E, j) + rate + square)
+        let linear = dot(&A[i], &P[j]) + dot(&P[i], &A[j]);
+        let square = dot(&scaled[i], &scaled[j]) * Interval::point(γ).powi(2);
+        let rate = Interval::point(2.0 * α) * P[i][j];
+        Interval::point(0.0) - (linear + dot(&E[i], &E[j]) + rate + square)
     };
     is_positive_definite(&square(n, entry))
 }
@@ -208,17 +194,20 @@ mod tests {
     #[test]
     fn poles_beyond_reason_have_no_solution() {
         for pole in [-1e308, -1e200, f64::NAN] {
-            let A = vec![vec![pole, 1.0], vec![pole, 0.0]];
-            let E = vec![vec![0.0], vec![1.0]];
+            let A = DMatrix::from_row_slice(2, 2, &[pole, 1.0, pole, 0.0]);
+            let E = second();
             assert!(Riccati::solve(&A, &E, 0.5, 1.0).is_none());
         }
     }
 
-    fn companion(K: &[f64]) -> Vec<Vec<f64>> {
+    fn second() -> DMatrix<f64> {
+        DMatrix::from_row_slice(2, 1, &[0.0, 1.0])
+    }
+
+    fn companion(K: &[f64]) -> DMatrix<f64> {
         let entry =
             |i: usize, j: usize| f64::from(u8::from(j == i + 1)) - if j == 0 { K[i] } else { 0.0 };
-        let row = |i| (0..K.len()).map(|j| entry(i, j)).collect();
-        (0..K.len()).map(row).collect()
+        DMatrix::from_fn(K.len(), K.len(), entry)
     }
 
     /// For A − KC with the poles −1, −2 and B = (0, 1)ᵀ the transfer function from v to e
@@ -226,7 +215,7 @@ mod tests {
     #[test]
     fn the_limit_is_the_bounded_real_lemmas() {
         let A = companion(&[3.0, 2.0]);
-        let E = [vec![0.0], vec![1.0]];
+        let E = second();
         let limit = 2.0 / 10f64.sqrt();
         assert!(Riccati::solve(&A, &E, 1e-9, limit * 0.999).is_some());
         assert!(Riccati::solve(&A, &E, 1e-9, limit * 1.001).is_none());
@@ -235,12 +224,11 @@ mod tests {
     /// Without perturbation the rate is that of the slowest pole.
     #[test]
     fn the_rate_without_perturbation() {
-        let found = Riccati::fastest(&companion(&[3.0, 2.0]), &[vec![0.0], vec![1.0]], 1e-6, 1.0);
+        let found = Riccati::fastest(&companion(&[3.0, 2.0]), &second(), 1e-6, 1.0);
         let found = found.unwrap();
         assert!(found.α > 0.99 && found.smallest <= found.largest);
         // eᵢ'P⁻¹e against the definition
-        let P = matrix(&found.P);
-        let exact = P.cholesky().unwrap().inverse()[(1, 1)].sqrt();
+        let exact = found.P.clone().cholesky().unwrap().inverse()[(1, 1)].sqrt();
         let weight = found.weight(&[0.0, 1.0]);
         assert!(weight >= exact && weight < exact * (1.0 + 1e-5));
     }

@@ -3,7 +3,7 @@
 use divan::{Bencher, black_box};
 use lynkeus_expr::Graph;
 use lynkeus_run::filter::{
-    Bounds, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor, SigmaPoints,
+    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
 };
 use lynkeus_run::{Error, Estimator, EstimatorSettings, Level, Method, Tolerances};
 
@@ -14,14 +14,14 @@ fn main() {
 const STEP: f64 = 0.1;
 
 /// x_i' = φ(x_{i−1}) − φ(x_i), φ(x) = 2.5 x/(1 + 1.5 x), fed by a signal.
-fn chain(n: usize) -> Result<FilterModel, Error> {
+fn chain(n: usize) -> Result<NoisyModel, Error> {
     let g = Graph::new();
     let (time, u) = (g.symbol("time"), g.symbol("u"));
     let x: Vec<_> = (0..n).map(|i| g.symbol(&format!("x[{i}]"))).collect();
     let flow: Vec<_> = x.iter().map(|&x| x * 2.5 / (1.0 + x * 1.5)).collect();
     let dx = (0..n).map(|i| (if i == 0 { u } else { flow[i - 1] } - flow[i]).node());
     let states = x.iter().map(|x| (format!("{x:?}"), x.node(), 0.5));
-    FilterModel::new(&FilterPlant {
+    NoisyModel::new(&NoisyPlant {
         graph: &g,
         time: time.node(),
         states: states.collect(),
@@ -35,6 +35,13 @@ fn chain(n: usize) -> Result<FilterModel, Error> {
         }],
         process_noise: vec![1e-6; n],
         initial_variance: vec![1e-4; n],
+        ranges: vec![
+            Limits {
+                low: 0.0,
+                high: 10.0,
+            };
+            n
+        ],
         confined: None,
     })
 }
@@ -82,9 +89,5 @@ fn ukf(bencher: Bencher, n: usize) {
 /// A window of ten samples.
 #[divan::bench(args = [2, 8, 25, 61, 200], sample_count = 20)]
 fn mhe(bencher: Bencher, n: usize) {
-    let bounds = Bounds {
-        low: 0.0,
-        high: 10.0,
-    };
-    measure(bencher, n, FilterKind::MovingHorizon(10, vec![bounds; n]));
+    measure(bencher, n, FilterKind::MovingHorizon(10));
 }

@@ -2,135 +2,179 @@
 
 use std::fmt::Write;
 
-use crate::filter::{FilterModel, FilterSettings};
+use crate::filter::{FilterSettings, NoisyModel};
 use crate::integrator::AUTO_PRODUCT;
 use crate::jacobian::fastest;
 use crate::snapshot::Digest;
 use crate::system::Evaluation;
-use crate::{EstimatorSettings, Events, Method, SampledObserver, System, Tuned};
+use crate::{EstimatorSettings, Events, Method, System};
 
 /// An observer with all that says how it is run: every [`Estimator`](crate::Estimator) is made of
 /// one, and what runs elsewhere (another language, a device) is printed from one.
+///
+/// The signals of its flow are known inputs, then what its [updates](Updates) need. It reports
+/// [`System::estimates`], monitors last.
 #[derive(Clone, Debug)]
-pub enum Blueprint {
-    /// an observer whose sensors, if it has any, report when they do
-    Sampled {
-        /// its equations
-        observer: Box<SampledObserver>,
-        /// how it is integrated
-        method: Method,
+pub struct Blueprint {
+    /// what runs between samples
+    pub flow: System,
+    /// names of the measured outputs, whose readings may be missing
+    pub sensors: Vec<String>,
+    /// how it goes from sample to sample
+    pub run: EstimatorSettings,
+    /// what readings do
+    pub updates: Updates,
+    /// readings are judged by what is expected of them, where errors are followed
+    pub judges: bool,
+}
+
+/// What the readings of sensors do.
+#[derive(Clone, Debug)]
+pub enum Updates {
+    /// Measurements are states of their own: w jumps to a reading when the sensor reports, and in
+    /// between stays (`hold`) or follows the model, w' = L_f h(x̂) (the inter-sample predictor of
+    /// Karafyllis and Kravaris, *From continuous-time design to sampled-data design of observers*, 2009).
+    ///
+    /// The flow is z' = F(t, z, u, w). With one for each of the sensors, its last states are w; its
+    /// signals are known inputs, then whether w follows the model (1) or stays (0), then what `tuned`
+    /// makes; its last outputs are h(x̂).
+    Jumps {
+        /// w follows the model also after a reading, not only where one is missing
+        predict: bool,
+        /// how errors spread, where standard deviations are asked for
+        errors: Option<Box<NoisyModel>>,
+        /// numbers of the equations that may be changed while it runs elsewhere; here they stay
+        tuned: Option<Tuned>,
     },
-    /// a Kalman filter
+    /// A Kalman filter corrects its estimate.
     Filter {
         /// the plant with its noises
-        model: Box<FilterModel>,
+        model: Box<NoisyModel>,
         /// which filter
         settings: FilterSettings,
-        /// how it goes from sample to sample
-        run: EstimatorSettings,
     },
+}
+
+/// Numbers of an observer's equations, and what the equations make of them.
+#[derive(Clone, Debug)]
+pub struct Tuned {
+    /// without states: its signals are the numbers, its outputs the last signals of the observer
+    pub system: System,
+    /// the numbers
+    pub values: Vec<f64>,
+}
+
+impl Tuned {
+    /// The last signals of the observer.
+    pub fn signals(&self) -> Vec<f64> {
+        let mut evaluation = self.system.evaluation();
+        for (signal, value) in evaluation.signals_mut().iter_mut().zip(&self.values) {
+            *signal = *value;
+        }
+        let mut signals = vec![0.0; self.system.outputs().len()];
+        evaluation.outputs(0.0, &[], &mut signals);
+        signals
+    }
 }
 
 impl Blueprint {
     /// Of an observer whose signals are all there at every sample.
     #[must_use]
-    pub fn new(system: &System, settings: EstimatorSettings) -> Self {
-        let observer = SampledObserver::of_inputs(system.clone(), settings.between);
-        Self::Sampled {
-            observer: Box::new(observer),
-            method: settings.method,
+    pub fn new(system: &System, run: EstimatorSettings) -> Self {
+        Self {
+            flow: system.clone(),
+            sensors: vec![],
+            run,
+            updates: Updates::Jumps {
+                predict: false,
+                errors: None,
+                tuned: None,
+            },
+            judges: false,
         }
     }
 
-    /// Names of the sensors, whose readings may be missing.
-    pub(crate) fn sensors(&self) -> Vec<String> {
-        match self {
-            Self::Sampled { observer, .. } => observer.sensors.clone(),
-            Self::Filter { model, .. } => model.sensors().iter().map(|s| s.name.clone()).collect(),
+    /// A Kalman filter.
+    #[must_use]
+    pub fn filter(model: NoisyModel, settings: FilterSettings, run: EstimatorSettings) -> Self {
+        Self {
+            flow: model.flow.system().clone(),
+            sensors: model.sensors.iter().map(|s| s.name.clone()).collect(),
+            run,
+            updates: Updates::Filter {
+                model: Box::new(model),
+                settings,
+            },
+            judges: true,
+        }
+    }
+
+    /// The same, integrated by another method.
+    #[must_use]
+    pub fn with_method(mut self, method: Method) -> Self {
+        self.run.method = method;
+        self
+    }
+
+    /// What is made of the numbers that may be changed.
+    pub(crate) fn tuned(&self) -> Option<&Tuned> {
+        match &self.updates {
+            Updates::Jumps { tuned, .. } => tuned.as_ref(),
+            Updates::Filter { .. } => None,
         }
     }
 
     /// Names of the known inputs.
     pub(crate) fn inputs(&self) -> &[String] {
-        match self {
-            Self::Sampled { observer, .. } => observer.known_inputs(),
-            Self::Filter { model, .. } => model.inputs(),
-        }
+        let follow = match self.updates {
+            Updates::Jumps { .. } => self.sensors.len(),
+            Updates::Filter { .. } => 0,
+        };
+        let tuned = self.tuned().map_or(0, |t| t.system.outputs().len());
+        let signals = self.flow.signals();
+        &signals[..signals.len().saturating_sub(follow + tuned)]
     }
 
     /// Names of what is estimated, monitors last.
     pub(crate) fn estimates(&self) -> &[String] {
-        match self {
-            Self::Sampled { observer, .. } => observer.estimates(),
-            Self::Filter { model, .. } => model.states(),
+        match self.updates {
+            Updates::Jumps { .. } => {
+                let names = self.flow.estimates();
+                &names[..names.len().saturating_sub(self.sensors.len())]
+            }
+            Updates::Filter { .. } => self.flow.states(),
         }
     }
 
     /// A number that differs for observers with other equations, settings, noises or starts.
     pub(crate) fn fingerprint(&self) -> u64 {
         let mut digest = Digest::default();
-        let signals = [&self.sensors()[..], self.inputs()].concat();
+        let inputs = self.inputs();
         // a digest takes any text
-        let _ = write!(digest, "{signals:?} ");
-        let _ = match self {
-            Self::Sampled { observer, method } => {
-                let SampledObserver {
-                    system,
-                    predict,
-                    inputs,
-                    errors,
-                    tuned,
-                    ..
-                } = &**observer;
-                system.tell(&mut digest);
-                if let Some(errors) = errors {
-                    errors.flow().system().tell(&mut digest);
-                }
+        let _ = write!(digest, "{:?} {inputs:?} {:?}", self.sensors, self.run);
+        self.flow.tell(&mut digest);
+        let model = match &self.updates {
+            Updates::Jumps {
+                predict,
+                errors,
+                tuned,
+            } => {
+                let _ = write!(digest, "{predict}");
                 if let Some(tuned) = tuned {
                     tuned.system.tell(&mut digest);
                     digest.numbers(&tuned.values);
                 }
-                let noises = errors.as_ref().map(|errors| errors.noises());
-                write!(digest, "{method:?} {predict} {inputs:?} {noises:?}")
+                errors.as_ref()
             }
-            Self::Filter {
-                model,
-                settings,
-                run,
-            } => {
-                model.systems().for_each(|system| system.tell(&mut digest));
-                write!(digest, "{settings:?} {run:?} {}", model.numbers())
+            Updates::Filter { model, settings } => {
+                let _ = write!(digest, "{settings:?}");
+                Some(model)
             }
         };
+        if let Some(model) = model {
+            model.tell(&mut digest);
+        }
         digest.value()
-    }
-
-    /// What runs between samples.
-    #[must_use]
-    pub fn flow(&self) -> &System {
-        match self {
-            Self::Sampled { observer, .. } => &observer.system,
-            Self::Filter { model, .. } => model.flow().system(),
-        }
-    }
-
-    /// How it is integrated.
-    #[must_use]
-    pub fn method(&self) -> Method {
-        match self {
-            Self::Sampled { method, .. } => *method,
-            Self::Filter { run, .. } => run.method,
-        }
-    }
-
-    /// The same, integrated by another method.
-    #[must_use]
-    pub fn with_method(mut self, by: Method) -> Self {
-        match &mut self {
-            Self::Sampled { method, .. } => *method = by,
-            Self::Filter { run, .. } => run.method = by,
-        }
-        self
     }
 }
 
@@ -153,17 +197,13 @@ pub fn needed_step(
     inputs: &[(&str, f64)],
     sizes: &[f64],
 ) -> Option<NeededStep> {
-    let system = blueprint.flow();
-    let tuned = match blueprint {
-        Blueprint::Sampled { observer, .. } => observer.tuned.as_ref(),
-        Blueprint::Filter { .. } => None,
-    };
+    let system = &blueprint.flow;
     let mut evaluation = system.evaluation();
     for (name, signal) in system.signals().iter().zip(evaluation.signals_mut()) {
         let given = inputs.iter().find(|(input, _)| input == name);
         *signal = given.map_or(0.0, |(_, value)| *value);
     }
-    let tuned = tuned.map(Tuned::signals).unwrap_or_default();
+    let tuned = blueprint.tuned().map(Tuned::signals).unwrap_or_default();
     let signals = evaluation.signals_mut().iter_mut();
     for (signal, value) in signals.rev().zip(tuned.into_iter().rev()) {
         *signal = value;

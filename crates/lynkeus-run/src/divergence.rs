@@ -55,13 +55,24 @@ impl Bound {
     }
 }
 
-/// A covariance that has grown beyond every number.
-pub(crate) fn deviation_diverged(time: f64, name: &str, value: f64) -> Error {
-    Error::Diverged {
-        time,
-        name: format!("standard deviation of {name}"),
-        value,
-        hint: "; give smaller values in initial_variance or [process_noise]".to_owned(),
+/// # Errors
+/// [`Error::Diverged`] of a covariance that has grown beyond every number.
+pub(crate) fn check_deviations(
+    time: f64,
+    names: &[String],
+    deviations: &[f64],
+) -> Result<(), Error> {
+    match deviations.iter().position(|d| !d.is_finite()) {
+        None => Ok(()),
+        Some(i) => Err(Error::Diverged {
+            time,
+            name: format!(
+                "standard deviation of {}",
+                names.get(i).map_or("", String::as_str)
+            ),
+            value: deviations[i],
+            hint: "; give smaller values in initial_variance or [process_noise]".to_owned(),
+        }),
     }
 }
 

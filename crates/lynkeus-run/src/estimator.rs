@@ -2,13 +2,11 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::filter::{Filter, FilterModel, FilterSettings, Health, Innovation, Smoothed};
+use crate::filter::{Filter, FilterSettings, Health, Innovation, NoisyModel, Smoothed};
 use crate::runner::{Runner, Sample};
 use crate::sampled::Sampled;
-use crate::snapshot::{self, Damaged, Persist, Walk};
-use crate::{
-    Blueprint, Error, EstimatorSettings, Method, SampledObserver, SnapshotFault, StepAdvice, System,
-};
+use crate::snapshot::{self, Damaged, Walk};
+use crate::{Blueprint, Error, EstimatorSettings, SnapshotFault, StepAdvice, System, Updates};
 
 /// Any observer, one sample after the other, live or from a log.
 ///
@@ -52,8 +50,15 @@ use crate::{
 pub struct Estimator {
     blueprint: Arc<Blueprint>,
     fingerprint: OnceLock<u64>,
-    intake: Intake,
-    core: Core,
+    /// of the sensors, then of the known inputs
+    names: Vec<String>,
+    sensors: usize,
+    time: Option<f64>,
+    /// of the last sample; an input that was missing has the value before
+    signals: Vec<f64>,
+    /// inputs of which the last value holds
+    held: usize,
+    runner: Box<dyn Runner>,
     /// the state before the call under way
     image: Vec<u8>,
 }
@@ -71,23 +76,25 @@ impl Blueprint {
 
 impl Estimator {
     fn of(blueprint: Blueprint) -> Result<Self, Error> {
-        let core = match &blueprint {
-            Blueprint::Sampled { observer, method } => {
-                Core::Sampled(Box::new(Sampled::new(observer, *method)?))
+        let runner: Box<dyn Runner> = match &blueprint.updates {
+            Updates::Jumps {
+                predict, errors, ..
+            } => Box::new(Sampled::new(&blueprint, *predict, errors.as_deref())?),
+            Updates::Filter { model, settings } => {
+                Box::new(Filter::new(model, settings, blueprint.run)?)
             }
-            Blueprint::Filter {
-                model,
-                settings,
-                run,
-            } => Core::Filter(Box::new(Filter::new(model, settings.clone(), *run)?)),
         };
-        let sensors = blueprint.sensors();
+        let names = [&blueprint.sensors, blueprint.inputs()].concat();
         Ok(Self {
-            intake: Intake::new([&sensors[..], blueprint.inputs()].concat(), sensors.len()),
-            blueprint: Arc::new(blueprint),
             fingerprint: OnceLock::new(),
-            core,
+            signals: vec![0.0; names.len()],
+            names,
+            sensors: blueprint.sensors.len(),
+            time: None,
+            held: 0,
+            runner,
             image: vec![],
+            blueprint: Arc::new(blueprint),
         })
     }
 
@@ -99,30 +106,16 @@ impl Estimator {
         Self::of(Blueprint::new(observer, settings))
     }
 
-    /// Of an observer whose sensors report when they do, at its start values.
-    ///
-    /// # Errors
-    /// As [`Blueprint::estimator`].
-    pub fn sampled(observer: &SampledObserver, method: Method) -> Result<Self, Error> {
-        let observer = Box::new(observer.clone());
-        Self::of(Blueprint::Sampled { observer, method })
-    }
-
     /// A Kalman filter, at the plant's first estimate.
     ///
     /// # Errors
     /// As [`Blueprint::estimator`].
     pub fn filter(
-        model: &FilterModel,
+        model: &NoisyModel,
         settings: FilterSettings,
         run: EstimatorSettings,
     ) -> Result<Self, Error> {
-        let model = Box::new(model.clone());
-        Self::of(Blueprint::Filter {
-            model,
-            settings,
-            run,
-        })
+        Self::of(Blueprint::filter(model.clone(), settings, run))
     }
 
     /// Goes to `t`, at which nothing is read: inputs stay as they were, and the estimate is
@@ -132,9 +125,12 @@ impl Estimator {
     /// [`Error::Setting`] before the first sample, [`Error::TimeBefore`], [`Error::NoNumber`];
     /// [`Error::Diverged`], [`Error::NotFinite`] and the errors of the integration.
     pub fn predict(&mut self, t: f64) -> Result<&[f64], Error> {
+        self.started()?;
+        self.check_time(t)?;
         self.save();
-        let before = self.intake.time();
-        self.intake.wait(t)?;
+        let before = self.time.replace(t);
+        self.signals[..self.sensors].fill(f64::NAN);
+        self.held = 0;
         self.settle(before, false)
     }
 
@@ -143,7 +139,7 @@ impl Estimator {
     /// # Errors
     /// As [`Estimator::push`], and [`Error::Setting`] before the first sample.
     pub fn update(&mut self, signals: &[f64]) -> Result<&[f64], Error> {
-        let t = self.intake.started()?;
+        let t = self.started()?;
         self.push(t, signals)
     }
 
@@ -157,22 +153,52 @@ impl Estimator {
     /// [`Error::NoNumber`] for a time or the first value of an input; [`Error::Diverged`],
     /// [`Error::NotFinite`] and the errors of the integration.
     pub fn push(&mut self, t: f64, signals: &[f64]) -> Result<&[f64], Error> {
+        if signals.len() != self.names.len() {
+            let expected = format!("{}: {}", self.names.len(), self.names.join(", "));
+            return Err(Error::setting("number of signals", expected, signals.len()));
+        }
+        self.check_time(t)?;
+        let inputs = self.sensors..self.names.len();
+        let missing = |i: &usize| !signals[*i].is_finite();
+        if let (None, Some(i)) = (self.time, inputs.clone().find(missing)) {
+            return Err(no_number(&self.names[i], signals[i]));
+        }
         self.save();
-        let before = self.intake.time();
-        self.intake.take(t, signals)?;
+        let before = self.time.replace(t);
+        self.signals[..self.sensors].copy_from_slice(&signals[..self.sensors]);
+        self.held = inputs.clone().filter(missing).count();
+        for i in inputs.filter(|i| signals[*i].is_finite()) {
+            self.signals[i] = signals[i];
+        }
         self.settle(before, true)
+    }
+
+    /// The time of the last sample.
+    fn started(&self) -> Result<f64, Error> {
+        let none = || Error::setting("samples so far", "one, which sets the time", 0);
+        self.time.ok_or_else(none)
+    }
+
+    fn check_time(&self, t: f64) -> Result<(), Error> {
+        if !t.is_finite() {
+            return Err(no_number("t", t));
+        }
+        match self.time {
+            Some(reached) if t < reached => Err(Error::TimeBefore { reached, time: t }),
+            _ => Ok(()),
+        }
     }
 
     /// Names of the signals: sensors, then known inputs.
     #[must_use]
     pub fn signals(&self) -> &[String] {
-        self.intake.names()
+        &self.names
     }
 
     /// How many of the signals are readings of sensors, which may be missing.
     #[must_use]
     pub fn sensors(&self) -> usize {
-        self.intake.sensors()
+        self.sensors
     }
 
     /// Names of what is estimated, monitors last.
@@ -184,41 +210,41 @@ impl Estimator {
     /// The estimate after the last call that succeeded, in the order of [`Estimator::names`].
     #[must_use]
     pub fn estimate(&self) -> &[f64] {
-        self.core.runner().estimate()
+        self.runner.estimate()
     }
 
     /// Its standard deviations, monitors left out; none for an observer without a model of its
     /// errors.
     #[must_use]
     pub fn deviations(&self) -> Option<&[f64]> {
-        self.core.runner().deviations()
+        self.runner.deviations()
     }
 
     /// What became of the last readings, one per sensor; empty where no covariance says what to
     /// expect of them.
     #[must_use]
     pub fn innovations(&self) -> &[Innovation] {
-        self.core.runner().innovations()
+        self.runner.innovations()
     }
 
     /// How readings and estimate went together so far.
     #[must_use]
     pub fn health(&self) -> &Health {
-        self.core.runner().health()
+        self.runner.health()
     }
 
     /// Time of the last sample or prediction.
     #[must_use]
     pub fn time(&self) -> Option<f64> {
-        self.intake.time()
+        self.time
     }
 
     /// For a [`System`] with fixed steps: the step in use beside the one that it needs, as of
     /// [`Integrator::advice`](crate::Integrator::advice); none before the second sample.
     #[must_use]
     pub fn advice(&self) -> Option<StepAdvice> {
-        match &self.core {
-            Core::Sampled(sampled) if self.sensors() == 0 => sampled.advice(),
+        match self.sensors {
+            0 => self.runner.advice(),
             _ => None,
         }
     }
@@ -226,10 +252,7 @@ impl Estimator {
     /// The state of the observer itself, by [`System::states`] for a system.
     #[must_use]
     pub fn state(&self) -> &[f64] {
-        match &self.core {
-            Core::Sampled(sampled) => sampled.state(),
-            Core::Filter(filter) => filter.estimate(),
-        }
+        self.runner.state()
     }
 
     /// The estimate at each update given all of them, or those up to `lag` updates later, with
@@ -237,10 +260,7 @@ impl Estimator {
     /// moving horizon that reaches back by fewer than `lag` samples.
     #[must_use]
     pub fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Option<Vec<Smoothed>> {
-        match &self.core {
-            Core::Filter(filter) => filter.smoothed(lag, deviations),
-            Core::Sampled(_) => None,
-        }
+        self.runner.smoothed(lag, deviations)
     }
 
     /// A number that differs for observers with other equations, settings, noises or starts.
@@ -255,7 +275,8 @@ impl Estimator {
     /// and a checksum. What a smoother keeps is in it, too.
     #[must_use]
     pub fn snapshot(&self) -> Vec<u8> {
-        snapshot::seal(self.fingerprint(), &mut Whole(&mut self.clone()))
+        let mut own = self.clone();
+        snapshot::seal(self.fingerprint(), |walk| own.walk(walk, true))
     }
 
     /// Goes to where another estimator of the same observer was: from there on both give the
@@ -267,7 +288,7 @@ impl Estimator {
         let refused = |fault| Error::Snapshot { fault };
         let state = snapshot::opened(snapshot, self.fingerprint()).map_err(refused)?;
         let mut restored = self.clone();
-        snapshot::load(&mut Whole(&mut restored), state)
+        snapshot::load(state, |walk| restored.walk(walk, true))
             .map_err(|_| refused(SnapshotFault::Damaged))?;
         *self = restored;
         Ok(())
@@ -278,7 +299,7 @@ impl Estimator {
         let mut image = std::mem::take(&mut self.image);
         image.clear();
         // a state that is there can be walked over
-        let _ = self.walk(&mut Walk::Save(&mut image));
+        let _ = self.walk(&mut Walk::Save(&mut image), false);
         self.image = image;
     }
 
@@ -287,21 +308,25 @@ impl Estimator {
         if let Err(error) = self.go(before, has_signals) {
             let image = std::mem::take(&mut self.image);
             // the same walk over what it made
-            let _ = snapshot::load(self, &image);
+            let _ = snapshot::load(&image, |walk| self.walk(walk, false));
             self.image = image;
             return Err(error);
         }
-        if let Core::Filter(filter) = &mut self.core
-            && has_signals
-        {
-            filter.remember();
+        if has_signals {
+            self.runner.remember();
         }
         Ok(self.estimate())
     }
 
     fn go(&mut self, before: Option<f64>, has_signals: bool) -> Result<(), Error> {
-        let sample = self.intake.sample();
-        let runner = self.core.runner_mut();
+        let (readings, inputs) = self.signals.split_at(self.sensors);
+        let sample = Sample {
+            t: self.time.unwrap_or_default(),
+            readings,
+            inputs,
+            held: self.held,
+        };
+        let runner = &mut self.runner;
         match before {
             None => runner.begin(&sample)?,
             Some(before) if sample.t > before => runner.advance(before, &sample)?,
@@ -312,127 +337,16 @@ impl Estimator {
         }
         runner.report(sample.t)
     }
-}
 
-impl Persist for Estimator {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        self.intake.walk(walk)?;
-        self.core.runner_mut().walk(walk)
-    }
-}
-
-/// An estimator with what its smoother keeps.
-struct Whole<'e>(&'e mut Estimator);
-
-impl Persist for Whole<'_> {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        self.0.walk(walk)?;
-        match &mut self.0.core {
-            Core::Filter(filter) => filter.walk_history(walk),
-            Core::Sampled(_) => Ok(()),
-        }
-    }
-}
-
-/// The samples so far, and whether the next one may follow them.
-#[derive(Clone, Debug)]
-pub(crate) struct Intake {
-    /// of the sensors, then of the known inputs
-    names: Vec<String>,
-    sensors: usize,
-    time: Option<f64>,
-    values: Vec<f64>,
-    held: usize,
-}
-
-impl Intake {
-    pub fn new(names: Vec<String>, sensors: usize) -> Self {
-        Self {
-            values: vec![0.0; names.len()],
-            names,
-            sensors,
-            time: None,
-            held: 0,
-        }
-    }
-
-    pub fn names(&self) -> &[String] {
-        &self.names
-    }
-
-    pub fn sensors(&self) -> usize {
-        self.sensors
-    }
-
-    pub fn time(&self) -> Option<f64> {
-        self.time
-    }
-
-    /// The sample taken last.
-    pub fn sample(&self) -> Sample<'_> {
-        let (readings, inputs) = self.values.split_at(self.sensors);
-        Sample {
-            t: self.time.unwrap_or_default(),
-            readings,
-            inputs,
-            held: self.held,
-        }
-    }
-
-    /// Takes a sample, or nothing where one is refused.
-    ///
-    /// # Errors
-    /// [`Error::Setting`] for a wrong number of signals, [`Error::NoNumber`] for a time or the
-    /// first value of an input, [`Error::TimeBefore`].
-    pub fn take(&mut self, t: f64, signals: &[f64]) -> Result<(), Error> {
-        if signals.len() != self.names.len() {
-            let expected = format!("{}: {}", self.names.len(), self.names.join(", "));
-            return Err(Error::setting("number of signals", expected, signals.len()));
-        }
-        self.check_time(t)?;
-        let inputs = self.sensors..self.names.len();
-        let missing = |i: &usize| !signals[*i].is_finite();
-        if let (None, Some(i)) = (self.time, inputs.clone().find(missing)) {
-            return Err(no_number(&self.names[i], signals[i]));
-        }
-        self.values[..self.sensors].copy_from_slice(&signals[..self.sensors]);
-        self.held = inputs.clone().filter(missing).count();
-        for i in inputs.filter(|i| signals[*i].is_finite()) {
-            self.values[i] = signals[i];
-        }
-        self.time = Some(t);
-        Ok(())
-    }
-
-    /// Goes to a time at which nothing reports.
-    ///
-    /// # Errors
-    /// As [`Intake::take`], and before the first sample.
-    pub fn wait(&mut self, t: f64) -> Result<(), Error> {
-        self.started()?;
-        self.check_time(t)?;
-        self.values[..self.sensors].fill(f64::NAN);
-        self.held = 0;
-        self.time = Some(t);
-        Ok(())
-    }
-
-    /// The time of the last sample.
-    ///
-    /// # Errors
-    /// [`Error::Setting`] where there is none.
-    pub fn started(&self) -> Result<f64, Error> {
-        let none = || Error::setting("samples so far", "one, which sets the time", 0);
-        self.time.ok_or_else(none)
-    }
-
-    fn check_time(&self, t: f64) -> Result<(), Error> {
-        if !t.is_finite() {
-            return Err(no_number("t", t));
-        }
-        match self.time {
-            Some(reached) if t < reached => Err(Error::TimeBefore { reached, time: t }),
-            _ => Ok(()),
+    /// Over all that the future depends on, and what a smoother keeps where that is asked for.
+    fn walk(&mut self, walk: &mut Walk<'_>, with_history: bool) -> Result<(), Damaged> {
+        walk.optional(&mut self.time, Walk::number)?;
+        walk.numbers(&mut self.signals)?;
+        walk.count(&mut self.held)?;
+        self.runner.walk(walk)?;
+        match with_history {
+            true => self.runner.walk_history(walk),
+            false => Ok(()),
         }
     }
 }
@@ -441,36 +355,5 @@ fn no_number(signal: &str, value: f64) -> Error {
     Error::NoNumber {
         signal: signal.to_owned(),
         value,
-    }
-}
-
-impl Persist for Intake {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        walk.optional(&mut self.time, Walk::number)?;
-        walk.numbers(&mut self.values)?;
-        walk.count(&mut self.held)
-    }
-}
-
-/// An observer of any kind.
-#[derive(Clone, Debug)]
-pub(crate) enum Core {
-    Sampled(Box<Sampled>),
-    Filter(Box<Filter>),
-}
-
-impl Core {
-    pub fn runner(&self) -> &dyn Runner {
-        match self {
-            Self::Sampled(sampled) => &**sampled,
-            Self::Filter(filter) => &**filter,
-        }
-    }
-
-    pub fn runner_mut(&mut self) -> &mut dyn Runner {
-        match self {
-            Self::Sampled(sampled) => &mut **sampled,
-            Self::Filter(filter) => &mut **filter,
-        }
     }
 }

@@ -22,8 +22,7 @@ impl Slopes {
     /// differences. Not finite where f is not.
     pub(crate) fn look(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) {
         if !(f.slopes(t, x, self) && self.are_finite()) {
-            let size = |k: usize| f64::EPSILON.sqrt() * x[k].abs().max(1e-3);
-            self.differences(f, t, x, size);
+            self.differences(f, t, x, |k| rounding(x[k]));
         }
     }
 
@@ -72,6 +71,11 @@ impl Slopes {
     }
 }
 
+/// The size of a difference where rounding is the limit.
+fn rounding(x: f64) -> f64 {
+    f64::EPSILON.sqrt() * x.abs().max(1e-3)
+}
+
 /// Estimates the spectral radius of ∂f/∂x at (t, x), in 1/(unit of time).
 ///
 /// The Jacobian is the system's own ([`Dynamics::slopes`]) or taken by finite
@@ -79,15 +83,7 @@ impl Slopes {
 /// no eigenvalue iteration and takes strongly non-normal matrices (high gain) as well
 /// as complex pairs. Not finite where the derivative is not.
 pub fn spectral_radius(f: &mut impl Dynamics, t: f64, x: &[f64]) -> f64 {
-    if x.is_empty() {
-        0.0
-    } else if x.len() <= SMALL {
-        let mut slopes = Slopes::default();
-        slopes.look(f, t, x);
-        gelfand(slopes.dense(x.len()))
-    } else {
-        power(f, t, x)
-    }
+    seen(f, t, x, None).radius
 }
 
 /// The fastest mode at (t, x), and how it was seen.
@@ -100,17 +96,28 @@ pub(crate) struct Fastest {
 /// As [`spectral_radius`], but where f knows its slopes and one is not finite, as that of a root at 0,
 /// by secants over a hundredth of each state's size (1 where none is given).
 pub(crate) fn fastest(f: &mut impl Dynamics, t: f64, x: &[f64], sizes: &[f64]) -> Fastest {
-    let mut slopes = Slopes::default();
-    let is_steep = !x.is_empty() && f.slopes(t, x, &mut slopes) && !slopes.are_finite();
-    if !is_steep {
-        let radius = spectral_radius(f, t, x);
-        return Fastest { radius, is_steep };
+    seen(f, t, x, Some(sizes))
+}
+
+fn seen(f: &mut impl Dynamics, t: f64, x: &[f64], sizes: Option<&[f64]>) -> Fastest {
+    let (n, mut slopes) = (x.len(), Slopes::default());
+    let is_known = n > 0 && f.slopes(t, x, &mut slopes);
+    let is_steep = is_known && !slopes.are_finite();
+    match sizes {
+        Some(sizes) if is_steep => {
+            let size = |k: usize| SECANT * sizes.get(k).copied().unwrap_or(1.0);
+            slopes.differences(f, t, x, size);
+        }
+        _ if n == 0 || (is_known && !is_steep) => {}
+        _ if n <= SMALL => slopes.differences(f, t, x, |k| rounding(x[k])),
+        _ => {
+            let radius = power(f, t, x);
+            return Fastest { radius, is_steep };
+        }
     }
-    let size = |k: usize| SECANT * sizes.get(k).copied().unwrap_or(1.0);
-    slopes.differences(f, t, x, size);
-    let radius = match x.len() <= SMALL {
-        true => gelfand(slopes.dense(x.len())),
-        false => growth(x.len(), |v, image| slopes.times(v, image)),
+    let radius = match n <= SMALL {
+        true => gelfand(slopes.dense(n)),
+        false => growth(n, |v, image| slopes.times(v, image)),
     };
     Fastest { radius, is_steep }
 }
@@ -131,14 +138,9 @@ fn gelfand(mut power: DMatrix<f64>) -> f64 {
     ((log + power.norm().ln()) / exponent).exp()
 }
 
-/// The power method: products with the Jacobian where it is known, else differences in the
-/// direction of v.
+/// The power method by differences in the direction of v.
 fn power(f: &mut impl Dynamics, t: f64, x: &[f64]) -> f64 {
     let n = x.len();
-    let mut slopes = Slopes::default();
-    if f.slopes(t, x, &mut slopes) && slopes.are_finite() {
-        return growth(n, |v, image| slopes.times(v, image));
-    }
     let (mut base, mut moved) = (vec![0.0; n], vec![0.0; n]);
     f.derivatives(t, x, &mut base);
     let step = f64::EPSILON.sqrt() * (1.0 + norm(x));

@@ -39,7 +39,7 @@ pub struct Jacobian {
 }
 
 /// Entries (row, column, value) of a matrix.
-type Entries = Vec<(usize, usize, Node)>;
+pub(crate) type Entries = Vec<(usize, usize, Node)>;
 
 impl Linearised {
     /// Compiles a system, as [`System::new`], with Jacobians that are derived already.
@@ -124,15 +124,6 @@ impl Linearised {
     pub fn jacobians(&self) -> &Jacobians<Jacobian> {
         &self.jacobians
     }
-
-    /// The same from other start values.
-    ///
-    /// # Errors
-    /// As [`System::with_start`].
-    pub fn with_start(mut self, start: Vec<f64>) -> Result<Self, Error> {
-        self.system = self.system.with_start(start)?;
-        Ok(self)
-    }
 }
 
 impl Jacobian {
@@ -192,13 +183,27 @@ impl OutputMap {
         }
     }
 
-    /// Evaluates h and C; values may not be finite.
-    pub fn evaluate(&mut self, t: f64, x: &[f64], u: &[f64]) {
+    /// h(t, x, u), whether or not C has values there.
+    pub fn predict(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64], Error> {
+        self.evaluate(t, x, u, self.jacobian.first)
+    }
+
+    /// h(t, x, u), and C there.
+    pub fn linearise(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64], Error> {
+        self.evaluate(t, x, u, self.values.len())
+    }
+
+    /// Evaluates h and C, of which the first `needed` values are to be finite.
+    fn evaluate(&mut self, t: f64, x: &[f64], u: &[f64], needed: usize) -> Result<&[f64], Error> {
         let (own, known) = self.evaluation.signals_mut().split_at_mut(x.len());
         own.copy_from_slice(x);
         known.copy_from_slice(u);
         self.evaluation.enter(t);
         self.evaluation.outputs(t, &[], &mut self.values);
+        match self.values[..needed].iter().all(|v| v.is_finite()) {
+            true => Ok(self.outputs()),
+            false => Err(self.evaluation.not_finite(t, &[])),
+        }
     }
 
     /// h.
@@ -206,19 +211,9 @@ impl OutputMap {
         &self.values[..self.jacobian.first]
     }
 
-    /// Whether C has finite entries, too.
-    pub fn is_finite(&self) -> bool {
-        self.values.iter().all(|v| v.is_finite())
-    }
-
     /// Writes row i of C.
     pub fn write_slopes(&self, i: usize, row: &mut [f64]) {
         self.jacobian.write_row(&self.values, i, row);
-    }
-
-    /// Names the operation that has no value.
-    pub fn not_finite(&mut self, t: f64) -> Error {
-        self.evaluation.not_finite(t, &[])
     }
 }
 

@@ -314,7 +314,7 @@ fn check_name(what: &str, name: &str, kind: &str, known: &[String]) -> Result<()
 
 /// # Errors
 /// [`Error::Setting`] for what is no size of a noise.
-fn check_size(what: &str, name: &str, size: f64) -> Result<(), Error> {
+pub(crate) fn check_size(what: &str, name: &str, size: f64) -> Result<(), Error> {
     if size >= 0.0 && size.is_finite() {
         return Ok(());
     }

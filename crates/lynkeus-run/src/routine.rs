@@ -176,7 +176,7 @@ fn classical_step(g: &Graph, inputs: &[Node], slopes: &[Node]) -> (Vec<Node>, Ve
 #[derive(Clone, Debug)]
 enum Engine {
     Waiting(u32),
-    Running(lynkeus_native::Evaluator<1>),
+    Running(Function<1>),
 }
 
 impl Default for Engine {
@@ -190,14 +190,14 @@ impl Engine {
     fn ready<'f>(
         &mut self,
         make: impl FnOnce() -> Option<&'f Function<1>>,
-    ) -> Option<&mut lynkeus_native::Evaluator<1>> {
+    ) -> Option<&mut Function<1>> {
         if let Self::Waiting(count) = self {
             if Backend::patience(PATIENCE).is_none_or(|patience| *count < patience) {
                 *count = count.saturating_add(1);
                 return None;
             }
             // what cannot be compiled is not tried again: the routine remembers
-            *self = Self::Running(make()?.evaluator());
+            *self = Self::Running(make()?.clone());
         }
         match self {
             Self::Running(evaluator) => Some(evaluator),

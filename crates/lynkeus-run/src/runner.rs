@@ -1,8 +1,11 @@
 //! What an estimator asks of an observer under way.
 
-use crate::Error;
+use std::fmt::Debug;
+
+use crate::filter::Smoothed;
 use crate::filter::health::{Health, Innovation};
-use crate::snapshot::Persist;
+use crate::snapshot::{Damaged, Persist, Walk};
+use crate::{Error, StepAdvice};
 
 /// A sample as an observer takes it.
 #[derive(Clone, Copy, Debug)]
@@ -18,9 +21,11 @@ pub(crate) struct Sample<'a> {
 
 /// What the kinds of observers differ in. Any of the steps may fail half-way: the estimator
 /// then goes back to where it was.
-pub(crate) trait Runner: Persist {
+pub(crate) trait Runner: Persist + Debug + Send + Sync {
     /// The first sample, before its readings count.
-    fn begin(&mut self, sample: &Sample<'_>) -> Result<(), Error>;
+    fn begin(&mut self, _: &Sample<'_>) -> Result<(), Error> {
+        Ok(())
+    }
 
     /// From the sample before to the time of this one; only its inputs count.
     fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error>;
@@ -33,13 +38,39 @@ pub(crate) trait Runner: Persist {
 
     fn estimate(&self) -> &[f64];
 
-    fn deviations(&self) -> Option<&[f64]> {
+    fn deviations(&self) -> Option<&[f64]>;
+
+    fn innovations(&self) -> &[Innovation];
+
+    fn health(&self) -> &Health;
+
+    /// The state of the observer itself.
+    fn state(&self) -> &[f64] {
+        self.estimate()
+    }
+
+    fn advice(&self) -> Option<StepAdvice> {
         None
     }
 
-    fn innovations(&self) -> &[Innovation] {
-        &[]
+    /// Keeps the last update for a smoother.
+    fn remember(&mut self) {}
+
+    /// The estimate at each update given later ones, up to `lag` of them; none without history.
+    fn smoothed(&self, _lag: Option<usize>, _deviations: bool) -> Option<Vec<Smoothed>> {
+        None
     }
 
-    fn health(&self) -> &Health;
+    /// What the smoother keeps.
+    fn walk_history(&mut self, _: &mut Walk<'_>) -> Result<(), Damaged> {
+        Ok(())
+    }
+
+    fn copied(&self) -> Box<dyn Runner>;
+}
+
+impl Clone for Box<dyn Runner> {
+    fn clone(&self) -> Self {
+        (**self).copied()
+    }
 }

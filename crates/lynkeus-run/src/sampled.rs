@@ -1,92 +1,15 @@
 //! Observers whose sensors report when they do.
 
-use crate::divergence::{Bound, deviation_diverged};
-use crate::filter::{Health, Innovation, Reading};
+use crate::blueprint::Tuned;
+use crate::divergence::{Bound, check_deviations};
+use crate::filter::{Health, Innovation, NoisyModel};
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::spread::{ErrorModel, Spread};
+use crate::spread::Spread;
 use crate::system::Driven;
-use crate::{BetweenSamples, Dynamics, Error, Events, Integrator, Method, StepAdvice, System};
+use crate::{Blueprint, Dynamics, Error, Events, Integrator, StepAdvice};
 
-/// An observer z' = F(t, z, u, w) whose measurements are states of their own: w jumps to a
-/// reading when the sensor reports, and in between stays (`hold`) or follows the model,
-/// w' = L_f h(x̂) (the inter-sample predictor of Karafyllis and Kravaris, *From
-/// continuous-time design to sampled-data design of observers*, 2009).
-///
-/// With one for each of the `sensors`, the system's last states are w; its signals are known inputs,
-/// then whether w follows the model (1) or stays (0), then what `tuned` makes; its last outputs are h(x̂).
-/// Without sensors the system's signals are known inputs and it reports [`System::estimates`].
-#[derive(Clone, Debug)]
-pub struct SampledObserver {
-    /// the system
-    pub system: System,
-    /// names of the measured outputs
-    pub sensors: Vec<String>,
-    /// w follows the model also after a reading, not only where one is missing
-    pub predict: bool,
-    /// what known inputs do between samples
-    pub inputs: BetweenSamples,
-    /// how errors spread, where standard deviations are asked for
-    pub errors: Option<ErrorModel>,
-    /// numbers of the equations that may be changed while it runs elsewhere; here they stay
-    pub tuned: Option<Tuned>,
-}
-
-impl SampledObserver {
-    /// An observer without sensors of its own: all signals of the system are known at every
-    /// sample.
-    #[must_use]
-    pub fn of_inputs(system: System, inputs: BetweenSamples) -> Self {
-        Self {
-            system,
-            sensors: vec![],
-            predict: false,
-            inputs,
-            errors: None,
-            tuned: None,
-        }
-    }
-
-    /// Names of the known inputs.
-    #[must_use]
-    pub fn known_inputs(&self) -> &[String] {
-        let tuned = self.tuned.as_ref();
-        let tuned = tuned.map_or(0, |tuned| tuned.system.outputs().len());
-        let signals = self.system.signals();
-        &signals[..signals.len().saturating_sub(self.sensors.len() + tuned)]
-    }
-
-    /// Names of what is estimated, monitors last.
-    #[must_use]
-    pub fn estimates(&self) -> &[String] {
-        let names = self.system.estimates();
-        &names[..names.len().saturating_sub(self.sensors.len())]
-    }
-}
-
-/// Numbers of an observer's equations, and what the equations make of them.
-#[derive(Clone, Debug)]
-pub struct Tuned {
-    /// without states: its signals are the numbers, its outputs the last signals of the observer
-    pub system: System,
-    /// the numbers
-    pub values: Vec<f64>,
-}
-
-impl Tuned {
-    /// The last signals of the observer.
-    pub fn signals(&self) -> Vec<f64> {
-        let mut evaluation = self.system.evaluation();
-        for (signal, value) in evaluation.signals_mut().iter_mut().zip(&self.values) {
-            *signal = *value;
-        }
-        let mut signals = vec![0.0; self.system.outputs().len()];
-        evaluation.outputs(0.0, &[], &mut signals);
-        signals
-    }
-}
-
-/// A [`SampledObserver`] under way.
+/// An observer whose readings [jump](crate::Updates::Jumps), under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Sampled {
     driven: Driven,
@@ -99,23 +22,25 @@ pub(crate) struct Sampled {
     predict: bool,
     bound: Bound,
     spread: Option<Spread>,
-    /// of the last readings; empty where they are not judged
-    innovations: Vec<Innovation>,
     health: Health,
 }
 
 impl Sampled {
-    pub fn new(observer: &SampledObserver, method: Method) -> Result<Self, Error> {
-        let SampledObserver {
-            system,
+    /// Of a blueprint whose readings jump, with these parts.
+    pub fn new(
+        blueprint: &Blueprint,
+        predict: bool,
+        errors: Option<&NoisyModel>,
+    ) -> Result<Self, Error> {
+        let Blueprint {
+            flow: system,
             sensors,
-            predict,
-            inputs,
-            errors,
-            tuned,
-        } = observer;
+            run,
+            judges,
+            ..
+        } = blueprint;
         let count = sensors.len();
-        let tuned = tuned.as_ref().map(Tuned::signals).unwrap_or_default();
+        let tuned = blueprint.tuned().map(Tuned::signals).unwrap_or_default();
         for (what, found) in [
             ("states", system.states().len()),
             (
@@ -131,34 +56,19 @@ impl Sampled {
         }
         let mut signals = vec![0.0; system.signals().len().saturating_sub(tuned.len())];
         signals.extend(tuned);
-        let spread = errors
-            .as_ref()
-            .map(|model| Spread::new(model, *inputs, method));
-        let judged = errors.as_ref().filter(|model| model.expects());
+        let spread = errors.map(|model| Spread::new(model, *judges, *run));
         Ok(Self {
-            driven: Driven::new(system, *inputs),
-            integrator: Integrator::new(method, system.states().len())?,
+            driven: Driven::new(system, run.between),
+            integrator: Integrator::new(run.method, system.states().len())?,
             x: system.start().to_vec(),
             outputs: vec![0.0; system.estimates().len()],
             signals,
             sensors: count,
-            predict: *predict,
+            predict,
             bound: Bound::new(system.start()),
             spread: spread.transpose()?,
-            innovations: match judged.is_some() {
-                true => vec![Innovation::default(); count],
-                false => vec![],
-            },
             health: Health::of(count),
         })
-    }
-
-    pub fn state(&self) -> &[f64] {
-        &self.x
-    }
-
-    pub fn advice(&self) -> Option<StepAdvice> {
-        self.integrator.advice()
     }
 
     /// The signals from a sample on: a sensor's w follows the model where it did not report.
@@ -170,7 +80,7 @@ impl Sampled {
         }
         self.driven.start(&self.signals);
         if let Some(spread) = &mut self.spread {
-            spread.start(&self.signals);
+            spread.propagation.driven.start(&self.signals);
         }
     }
 
@@ -181,27 +91,6 @@ impl Sampled {
         match self.outputs.iter().all(|v| v.is_finite()) {
             true => Ok(()),
             false => Err(evaluation.not_finite(t, &self.x)),
-        }
-    }
-
-    /// What is said of readings before they count.
-    fn expect(&mut self, sample: &Sample<'_>) {
-        let Some(spread) = &mut self.spread else {
-            return;
-        };
-        let expected = spread.expected(sample.t, &self.x, &self.signals);
-        for (i, innovation) in self.innovations.iter_mut().enumerate() {
-            let reading = sample.readings.get(i).copied().unwrap_or(f64::NAN);
-            *innovation = match expected.get(i) {
-                Some(&[predicted, deviation, settled]) if reading.is_finite() => Innovation {
-                    value: reading - predicted,
-                    deviation,
-                    settled,
-                    predicted,
-                    reading: Reading::Taken,
-                },
-                _ => Innovation::default(),
-            };
         }
     }
 
@@ -222,11 +111,8 @@ impl Runner for Sampled {
 
     fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
         self.driven.aim(from, sample.t, sample.inputs);
-        if let Some(spread) = &mut self.spread {
-            spread.aim(from, sample.t, sample.inputs);
-        }
         let done = match &mut self.spread {
-            Some(spread) => spread.advance(from, sample.t, &mut self.x),
+            Some(spread) => spread.advance(from, sample, &mut self.x),
             None => self
                 .integrator
                 .advance(&mut self.driven, from, sample.t, &mut self.x),
@@ -241,15 +127,18 @@ impl Runner for Sampled {
     fn update(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
         self.health.inputs_held += sample.held;
         self.start(sample);
-        self.expect(sample);
+        if let Some(spread) = &mut self.spread {
+            spread.judge(sample, &self.x, &self.signals);
+        }
         let first = self.x.len() - self.sensors;
+        let innovations = self.spread.as_ref().map_or(&[][..], |s| &s.innovations);
         for (i, reading) in sample.readings.iter().enumerate() {
             let sensor = &mut self.health.sensors[i];
             if !reading.is_finite() {
                 sensor.missing += 1;
                 continue;
             }
-            match self.innovations.get(i) {
+            match innovations.get(i) {
                 Some(innovation) if innovation.deviation > 0.0 => sensor.count(innovation),
                 _ => sensor.taken += 1,
             }
@@ -278,14 +167,7 @@ impl Runner for Sampled {
         };
         spread.measure(t, &self.x);
         let told = self.driven.evaluation.system().outputs();
-        match spread.deviations.iter().position(|d| !d.is_finite()) {
-            None => Ok(()),
-            Some(i) => Err(deviation_diverged(
-                t,
-                told.get(i).map_or("", String::as_str),
-                spread.deviations[i],
-            )),
-        }
+        check_deviations(t, told, &spread.deviations)
     }
 
     fn estimate(&self) -> &[f64] {
@@ -297,11 +179,23 @@ impl Runner for Sampled {
     }
 
     fn innovations(&self) -> &[Innovation] {
-        &self.innovations
+        self.spread.as_ref().map_or(&[], |s| &s.innovations)
     }
 
     fn health(&self) -> &Health {
         &self.health
+    }
+
+    fn state(&self) -> &[f64] {
+        &self.x
+    }
+
+    fn advice(&self) -> Option<StepAdvice> {
+        self.integrator.advice()
+    }
+
+    fn copied(&self) -> Box<dyn Runner> {
+        Box::new(self.clone())
     }
 }
 
@@ -315,9 +209,6 @@ impl Persist for Sampled {
         if let Some(spread) = &mut self.spread {
             spread.walk(walk)?;
         }
-        for innovation in &mut self.innovations {
-            innovation.walk(walk)?;
-        }
         self.health.walk(walk)
     }
 }
@@ -325,11 +216,11 @@ impl Persist for Sampled {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Estimator, Step, Tolerances};
+    use crate::{EstimatorSettings, Method, Step, System, Tolerances, Updates};
     use lynkeus_expr::Graph;
 
     /// x' = −x, x̂' = −x̂ + 2(w − x̂), w' = s·(−x̂).
-    fn observer(predict: bool) -> SampledObserver {
+    fn observer(predict: bool) -> Blueprint {
         let g = Graph::new();
         let [time, x, w, s] = ["time", "x", "w", "s"].map(|name| g.symbol(name));
         let states = [
@@ -341,18 +232,19 @@ mod tests {
         let signals = [("s".to_string(), s.node())];
         let system =
             System::new(&g, time.node(), &states, &signals, &derivatives, &outputs).unwrap();
-        SampledObserver {
-            system,
+        Blueprint {
             sensors: vec!["y".to_string()],
-            predict,
-            inputs: BetweenSamples::Hold,
-            errors: None,
-            tuned: None,
+            updates: Updates::Jumps {
+                predict,
+                errors: None,
+                tuned: None,
+            },
+            ..Blueprint::new(&system, run())
         }
     }
 
     /// The gain 2 as the square of a number.
-    fn tuned(value: f64) -> SampledObserver {
+    fn tuned(value: f64) -> Blueprint {
         let g = Graph::new();
         let [time, x, w, s, k, root] = ["time", "x", "w", "s", "k", "root"].map(|n| g.symbol(n));
         let plain = observer(true);
@@ -365,12 +257,16 @@ mod tests {
         let made = [("k".to_string(), root.powi(2).node())];
         let number = [("root".to_string(), root.node())];
         let gains = System::new(&g, time.node(), &[], &number, &[], &made).unwrap();
-        SampledObserver {
-            system: system.unwrap(),
-            tuned: Some(Tuned {
-                system: gains,
-                values: vec![value],
-            }),
+        Blueprint {
+            flow: system.unwrap(),
+            updates: Updates::Jumps {
+                predict: true,
+                errors: None,
+                tuned: Some(Tuned {
+                    system: gains,
+                    values: vec![value],
+                }),
+            },
             ..plain
         }
     }
@@ -379,7 +275,7 @@ mod tests {
     fn numbers_stand_where_constants_stood() {
         let fixed = observer(true);
         let tuned = tuned(2.0_f64.sqrt());
-        let mut pair = [&fixed, &tuned].map(|o| Estimator::sampled(o, method()).unwrap());
+        let mut pair = [&fixed, &tuned].map(|o| o.estimator().unwrap());
         assert_eq!(pair[0].signals(), pair[1].signals());
         for k in 0..10 {
             let [a, b] = &mut pair;
@@ -388,32 +284,28 @@ mod tests {
             assert!((a - b).abs() < 1e-14, "{a} {b}");
         }
         // a snapshot is of these numbers
-        let other = self::tuned(3.0);
-        let mut other = Estimator::sampled(&other, method()).unwrap();
+        let mut other = self::tuned(3.0).estimator().unwrap();
         assert!(other.restore(&pair[1].snapshot()).is_err());
-        let step = |observer: &SampledObserver| {
-            let blueprint = crate::Blueprint::Sampled {
-                observer: Box::new(observer.clone()),
-                method: method(),
-            };
-            crate::needed_step(&blueprint, &[], &[]).unwrap().length
-        };
+        let step = |of: &Blueprint| crate::needed_step(of, &[], &[]).unwrap().length;
         assert!((step(&fixed) - step(&tuned)).abs() < 1e-12 * step(&fixed));
     }
 
-    fn method() -> Method {
-        Method::Explicit(Tolerances {
-            relative: 1e-11,
-            absolute: 1e-13,
-            ..Tolerances::default()
-        })
+    fn run() -> EstimatorSettings {
+        EstimatorSettings {
+            method: Method::Explicit(Tolerances {
+                relative: 1e-11,
+                absolute: 1e-13,
+                ..Tolerances::default()
+            }),
+            ..EstimatorSettings::default()
+        }
     }
 
     /// Right from the start the predictor stays right between samples, and holding does not.
     #[test]
     fn the_predictor_leaves_a_right_estimate_alone() {
         let error = |predict: bool| {
-            let mut estimator = Estimator::sampled(&observer(predict), method()).unwrap();
+            let mut estimator = observer(predict).estimator().unwrap();
             let mut worst = 0.0_f64;
             for k in 0..20 {
                 let t = 0.5 * f64::from(k);
@@ -434,8 +326,9 @@ mod tests {
 
     #[test]
     fn before_the_first_reading_the_model_runs_alone() {
-        let mut estimator =
-            Estimator::sampled(&observer(false), Method::Rk4(Step::Substeps(50))).unwrap();
+        let mut observer = observer(false);
+        observer.run.method = Method::Rk4(Step::Substeps(50));
+        let mut estimator = observer.estimator().unwrap();
         for k in 0..4 {
             let x = estimator.push(f64::from(k), &[f64::NAN]).unwrap()[0];
             assert!((x - 3.0 * (-f64::from(k)).exp()).abs() < 1e-6);

@@ -7,7 +7,7 @@ use std::fmt;
 /// What a snapshot starts with.
 const MAGIC: &[u8; 8] = b"LYNKSNAP";
 /// Raised whenever what is saved changes.
-const VERSION: u64 = 3;
+const VERSION: u64 = 4;
 /// Magic, version, fingerprint, length; the checksum comes last.
 const HEAD: usize = 32;
 const TAIL: usize = 8;
@@ -194,9 +194,12 @@ impl Walk<'_> {
 }
 
 /// Loads everything from bytes, and nothing is left.
-pub(crate) fn load(state: &mut impl Persist, bytes: &[u8]) -> Result<(), Damaged> {
+pub(crate) fn load(
+    bytes: &[u8],
+    state: impl FnOnce(&mut Walk<'_>) -> Result<(), Damaged>,
+) -> Result<(), Damaged> {
     let mut walk = Walk::Load(bytes);
-    state.walk(&mut walk)?;
+    state(&mut walk)?;
     match walk {
         Walk::Load([]) => Ok(()),
         _ => Err(Damaged),
@@ -204,13 +207,16 @@ pub(crate) fn load(state: &mut impl Persist, bytes: &[u8]) -> Result<(), Damaged
 }
 
 /// A state with what it takes to know it again.
-pub(crate) fn seal(fingerprint: u64, state: &mut impl Persist) -> Vec<u8> {
+pub(crate) fn seal(
+    fingerprint: u64,
+    state: impl FnOnce(&mut Walk<'_>) -> Result<(), Damaged>,
+) -> Vec<u8> {
     let mut bytes = MAGIC.to_vec();
     for word in [VERSION, fingerprint, 0] {
         bytes.extend_from_slice(&word.to_le_bytes());
     }
     // a state that is there can be walked over
-    let _ = state.walk(&mut Walk::Save(&mut bytes));
+    let _ = state(&mut Walk::Save(&mut bytes));
     let length = (bytes.len() - HEAD) as u64;
     bytes[HEAD - 8..HEAD].copy_from_slice(&length.to_le_bytes());
     let sum = checksum(&bytes);
@@ -288,16 +294,16 @@ mod tests {
 
     #[test]
     fn what_is_saved_is_loaded() {
-        let bytes = seal(42, &mut state());
+        let bytes = seal(42, |walk| state().walk(walk));
         let mut found = State::default();
-        load(&mut found, opened(&bytes, 42).unwrap()).unwrap();
+        load(opened(&bytes, 42).unwrap(), |walk| found.walk(walk)).unwrap();
         assert_eq!(found, state());
         assert!(found.x.is_sign_negative());
     }
 
     #[test]
     fn every_change_and_every_cut_is_found() {
-        let bytes = seal(42, &mut state());
+        let bytes = seal(42, |walk| state().walk(walk));
         let fault = |bytes: &[u8], fingerprint| opened(bytes, fingerprint).unwrap_err();
         for place in 0..bytes.len() {
             let mut changed = bytes.clone();
@@ -316,7 +322,7 @@ mod tests {
         let mut bytes = vec![];
         state().walk(&mut Walk::Save(&mut bytes)).unwrap();
         bytes[24..32].copy_from_slice(&u64::MAX.to_le_bytes());
-        assert!(load(&mut State::default(), &bytes).is_err());
-        assert!(load(&mut State::default(), &bytes[..20]).is_err());
+        assert!(load(&bytes, |walk| State::default().walk(walk)).is_err());
+        assert!(load(&bytes[..20], |walk| State::default().walk(walk)).is_err());
     }
 }

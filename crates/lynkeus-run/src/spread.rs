@@ -1,74 +1,16 @@
 //! How an observer's error spreads, for standard deviations.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
-use lynkeus_expr::{Graph, Node, jacobian};
+use lynkeus_expr::{Node, jacobian};
 
-use crate::filter::Belief;
-use crate::filter::ekf::Ekf;
-use crate::filter::kalman::Kalman;
 use crate::filter::root::Root;
-use crate::linearised::OutputMap;
+use crate::filter::transition::Propagation;
+use crate::filter::{Belief, Innovation, NoisyModel, NoisyPlant, Reading, Sensor, check_counts};
+use crate::linearised::{Entries, OutputMap};
+use crate::runner::Sample;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{
-    BetweenSamples, Error, EstimatorSettings, Events, Jacobian, Jacobians, Level, Linearised,
-    Method,
-};
-
-/// The linearised error of a [sampled observer](crate::SampledObserver) z' = F(t, z, u, w), x̂ = g(z),
-/// driven by the declared noises of plant and sensors.
-///
-/// The error of a measurement w is counted from what the estimate expects, as the innovation ν = w − h(x̂):
-/// process noise moves the plant and its output alike, so that in (z, ν) it acts on the estimated
-/// states alone, between samples as well. A reading with noise v leaves ν = v − C e, C = ∂h/∂x̂.
-///
-/// A measurement that is held falls behind the plant by ẏ = L_f h(x), x = x̂ − e. Its part L_f h(x̂) is
-/// no noise; it is known along the estimate, and counts as the share of one more quantity, the lag, whose
-/// size is 1: deviations are then roots of the mean square error, as if e were independent of x̂, as that
-/// of a filter is.
-#[derive(Clone, Debug)]
-pub struct ErrorModel {
-    /// the observer with its Jacobian in (z, ν), ∂g/∂z and ∂h/∂z
-    flow: Linearised,
-    noise: ErrorNoise,
-    /// place of the lag
-    lag: Option<usize>,
-    estimates: usize,
-    /// what each sensor should read, h(x̂) by z; none where readings are not judged
-    expected: Option<Linearised>,
-}
-
-/// What acts on an observer's error.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ErrorNoise {
-    /// spectral density on each state
-    pub process: Vec<f64>,
-    /// variance of each state at the start
-    pub initial: Vec<f64>,
-    /// of each sensor
-    pub sensors: Vec<Level>,
-}
-
-/// The equations of a [sampled observer](crate::SampledObserver).
-#[derive(Clone, Copy, Debug)]
-pub struct ErrorEquations<'a> {
-    /// of all nodes
-    pub graph: &'a Graph,
-    /// the symbol of time
-    pub time: Node,
-    /// names, symbols and starts of the states z, then of the measurements w
-    pub states: &'a [(String, Node, f64)],
-    /// names and symbols
-    pub signals: &'a [(String, Node)],
-    /// z', then w'
-    pub derivatives: &'a [Node],
-    /// g(z)
-    pub estimates: &'a [Node],
-    /// h(x̂), one for each w
-    pub outputs: &'a [Node],
-    /// where measurements are held
-    pub lag: Option<Lag<'a>>,
-}
+use crate::{Error, EstimatorSettings, Events, Jacobian, Jacobians, Linearised};
 
 /// How measurements that are held fall behind.
 #[derive(Clone, Copy, Debug)]
@@ -79,259 +21,201 @@ pub struct Lag<'a> {
     pub rates: &'a [Node],
 }
 
-/// A matrix by its places.
-type Entries = BTreeMap<(usize, usize), Node>;
+impl NoisyModel {
+    /// Compiles the linearised error of a [observer](crate::Updates::Jumps) z' = F(t, z, u, w),
+    /// x̂ = g(z), driven by the declared noises of plant and sensors. The states are z, then the
+    /// measurements w; the sensors' outputs are h(x̂), one for each w; `estimates` are g(z).
+    ///
+    /// The error of a measurement w is counted from what the estimate expects, as the innovation ν = w − h(x̂):
+    /// process noise moves the plant and its output alike, so that in (z, ν) it acts on the estimated
+    /// states alone, between samples as well. A reading with noise v leaves ν = v − C e, C = ∂h/∂x̂. The
+    /// flow has its Jacobian in (z, ν), ∂g/∂z and ∂h/∂z.
+    ///
+    /// A measurement that is held falls behind the plant by ẏ = L_f h(x), x = x̂ − e. Its part L_f h(x̂) is
+    /// no noise; it is known along the estimate, and counts as the share of one more quantity, the lag, whose
+    /// size is 1: deviations are then roots of the mean square error, as if e were independent of x̂, as that
+    /// of a filter is.
+    ///
+    /// # Errors
+    /// [`Error::MissingInput`], and [`Error::Setting`] for wrong numbers of noises.
+    pub fn of_observer(
+        observer: &NoisyPlant<'_>,
+        estimates: &[Node],
+        lag: Option<Lag<'_>>,
+    ) -> Result<Self, Error> {
+        check_counts(observer)?;
+        // C first: nodes are made in this order
+        let mut output = observer.views();
+        let mut state = observer.error_flow(lag);
+        let mut estimate = observer.error_slopes(estimates);
+        for entries in [&mut output, &mut state, &mut estimate] {
+            entries.sort_by_key(|&(i, j, _)| (i, j));
+        }
+        let flow = Linearised::new(
+            observer.graph,
+            observer.time,
+            &observer.states,
+            &observer.inputs,
+            &observer.derivatives,
+            &[],
+            &Jacobians {
+                state,
+                estimate,
+                output,
+            },
+        )?;
+        Ok(Self {
+            lag: lag.map(|lag| lag.state),
+            estimates: estimates.len(),
+            ..Self::of(observer, flow, None)?
+        })
+    }
 
-impl ErrorEquations<'_> {
+    /// The covariance from an exact start: of the lag alone.
+    fn settled(&self) -> Root {
+        let starts = self.initial_variance.iter().enumerate();
+        let starts = starts.map(|(i, v)| if Some(i) == self.lag { *v } else { 0.0 });
+        Root::diagonal(&starts.collect::<Vec<f64>>())
+    }
+}
+
+/// Of an observer.
+impl NoisyPlant<'_> {
+    /// How many of the states are z.
     fn own(&self) -> usize {
-        self.states.len().saturating_sub(self.outputs.len())
+        self.states.len().saturating_sub(self.sensors.len())
     }
 
     fn symbols(&self) -> Vec<Node> {
         self.states.iter().map(|s| s.1).collect()
     }
 
+    fn outputs(&self) -> Vec<Node> {
+        self.sensors.iter().map(|s| s.output).collect()
+    }
+
     /// C = ∂h/∂z.
     fn views(&self) -> Entries {
-        let symbols = self.symbols();
-        let views = jacobian::forward(self.graph, self.outputs, &symbols[..self.own()]);
-        let places = views.entries.into_iter();
-        places.map(|(i, j, c)| ((i, j), c)).collect()
+        let own = &self.symbols()[..self.own()];
+        jacobian::forward(self.graph, &self.outputs(), own).entries
     }
 
     /// The Jacobian of nodes by (z, ν). w = ν + h(x̂) is put in its place first, so that what a
     /// correction has of x̂ goes out before a gain multiplies it.
-    fn slopes(&self, nodes: &[Node]) -> Entries {
+    fn error_slopes(&self, nodes: &[Node]) -> Entries {
         let graph = self.graph;
         let mut symbols = self.symbols();
         let (mut there, mut back) = (HashMap::new(), HashMap::new());
-        for (w, output) in symbols.iter_mut().skip(self.own()).zip(self.outputs) {
+        for (w, sensor) in symbols.iter_mut().skip(self.own()).zip(&self.sensors) {
             let innovation = graph.fresh("innovation");
-            let expected = graph.expr(*output);
+            let expected = graph.expr(sensor.output);
             there.insert(*w, (innovation + expected).node());
             back.insert(innovation.node(), (graph.expr(*w) - expected).node());
             *w = innovation.node();
         }
         let nodes = graph.substitute(nodes, &there);
-        let slopes = jacobian::forward(graph, &nodes, &symbols).entries;
+        let mut slopes = jacobian::forward(graph, &nodes, &symbols).entries;
         let values: Vec<Node> = slopes.iter().map(|entry| entry.2).collect();
         let values = graph.substitute(&values, &back);
-        let places = slopes.iter().map(|&(i, j, _)| (i, j));
-        places.zip(values).collect()
-    }
-
-    fn add(&self, entries: &mut Entries, place: (usize, usize), node: Node) {
-        let graph = self.graph;
-        let sum = entries.get(&place).map_or(node, |before| {
-            (graph.expr(*before) + graph.expr(node)).node()
-        });
-        entries.insert(place, sum);
+        let entries = slopes.iter_mut().zip(values);
+        entries.for_each(|(entry, value)| entry.2 = value);
+        slopes
     }
 
     /// z' and ν' = L_f h(x̂) − (h(x̂))', to which a measurement that is held adds its lag.
-    fn rates(&self) -> Vec<Node> {
-        let (graph, own) = (self.graph, self.own());
-        let moving = std::iter::once(self.time).chain(self.symbols().into_iter().take(own));
-        let one = graph.constant(1.0).node();
-        let motion = std::iter::once(one).chain(self.derivatives.iter().copied().take(own));
-        let (moving, motion): (Vec<_>, Vec<_>) = (moving.collect(), motion.collect());
-        let expected = jacobian::along(graph, self.outputs, &moving, &motion);
-        let following = self.derivatives.get(own..).unwrap_or_default();
-        let following = self.lag.map_or(following, |lag| lag.rates);
+    fn error_rates(&self, lag: Option<Lag<'_>>) -> Vec<Node> {
+        let graph = self.graph;
+        let all = &self.derivatives;
+        let (own, following) = all.split_at(self.own().min(all.len()));
+        let mut moving = vec![self.time];
+        moving.extend(self.symbols().into_iter().take(own.len()));
+        let motion = [&[graph.constant(1.0).node()], own].concat();
+        let expected = jacobian::along(graph, &self.outputs(), &moving, &motion);
+        let following = lag.map_or(following, |lag| lag.rates);
         let both = following.iter().zip(expected);
         let innovations = both.map(|(w, y)| (graph.expr(*w) - graph.expr(y)).node());
-        let own = self.derivatives.iter().copied().take(own);
-        own.chain(innovations).collect()
+        own.iter().copied().chain(innovations).collect()
     }
 
     /// The Jacobian of the flow in (z, ν), with what holding leaves behind.
-    fn flow(&self) -> Entries {
+    fn error_flow(&self, lag: Option<Lag<'_>>) -> Entries {
         let (graph, own) = (self.graph, self.own());
-        let mut flow = self.slopes(&self.rates());
-        if let Some(lag) = &self.lag {
-            let held = self.derivatives.iter().skip(own).zip(lag.rates).enumerate();
-            for (sensor, (w, rate)) in held {
-                let behind = graph.expr(*w) - graph.expr(*rate);
-                self.add(&mut flow, (own + sensor, lag.state), behind.node());
+        let mut flow = self.error_slopes(&self.error_rates(lag));
+        let Some(lag) = lag else {
+            return flow;
+        };
+        let held = self.derivatives.iter().skip(own).zip(lag.rates);
+        for (sensor, (w, rate)) in held.enumerate() {
+            let behind = graph.expr(*w) - graph.expr(*rate);
+            let at = (own + sensor, lag.state);
+            match flow.iter_mut().find(|entry| (entry.0, entry.1) == at) {
+                Some(entry) => entry.2 = (graph.expr(entry.2) + behind).node(),
+                None => flow.push((at.0, at.1, behind.node())),
             }
         }
         flow
     }
 }
 
-/// Entries in the order of their places.
-fn listed(entries: Entries) -> Vec<(usize, usize, Node)> {
-    let entries = entries.into_iter();
-    entries.map(|((i, j), node)| (i, j, node)).collect()
-}
-
-impl ErrorModel {
-    /// Compiles the linearisation of an observer.
-    ///
-    /// # Errors
-    /// [`Error::MissingInput`], and [`Error::Setting`] for wrong numbers of noises.
-    pub fn new(equations: ErrorEquations<'_>, noise: ErrorNoise) -> Result<Self, Error> {
-        let ErrorEquations {
-            graph,
-            time,
-            states,
-            signals,
-            derivatives,
-            estimates,
-            ..
-        } = equations;
-        for (what, count) in [
-            ("process noise", noise.process.len()),
-            ("initial variance", noise.initial.len()),
-        ] {
-            if count != states.len() {
-                let expected = format!("{} numbers, one per state", states.len());
-                return Err(Error::setting(what, expected, count));
-            }
-        }
-        // C first: nodes are made in this order
-        let output = listed(equations.views());
-        let jacobians = Jacobians {
-            state: listed(equations.flow()),
-            estimate: listed(equations.slopes(estimates)),
-            output,
-        };
-        Ok(Self {
-            flow: Linearised::new(graph, time, states, signals, derivatives, &[], &jacobians)?,
-            noise,
-            lag: equations.lag.map(|lag| lag.state),
-            estimates: estimates.len(),
-            expected: None,
-        })
-    }
-
-    /// Readings are judged by what the observer makes of them, h(x̂): one node per sensor. States
-    /// and signals are those of [`new`](Self::new).
-    ///
-    /// # Errors
-    /// [`Error::MissingInput`].
-    pub fn expecting(
-        self,
-        graph: &Graph,
-        time: Node,
-        states: &[(String, Node, f64)],
-        signals: &[(String, Node)],
-        outputs: &[Node],
-    ) -> Result<Self, Error> {
-        let outputs = outputs.iter().enumerate();
-        let outputs: Vec<_> = outputs.map(|(i, node)| (format!("{i}"), *node)).collect();
-        let expected = Linearised::output_map(graph, time, states, signals, &outputs)?;
-        Ok(Self {
-            expected: Some(expected),
-            ..self
-        })
-    }
-
-    /// The observer with its Jacobian in states and innovations, ∂g/∂z and ∂h/∂z.
-    pub fn flow(&self) -> &Linearised {
-        &self.flow
-    }
-
-    /// The same that judges no reading.
-    #[must_use]
-    pub fn without_readings(self) -> Self {
-        Self {
-            expected: None,
-            ..self
-        }
-    }
-
-    /// The covariance from an exact start: of the lag alone.
-    fn settled(&self) -> Root {
-        let starts = self.noise.initial.iter().enumerate();
-        let starts = starts.map(|(i, v)| if Some(i) == self.lag { *v } else { 0.0 });
-        Root::diagonal(&starts.collect::<Vec<f64>>())
-    }
-
-    /// Whether readings are judged.
-    pub(crate) fn expects(&self) -> bool {
-        self.expected.is_some()
-    }
-
-    /// What acts on the error.
-    pub fn noise(&self) -> &ErrorNoise {
-        &self.noise
-    }
-
-    /// The same as text.
-    pub(crate) fn noises(&self) -> String {
-        let ErrorNoise {
-            process,
-            initial,
-            sensors,
-        } = &self.noise;
-        format!("{process:?} {initial:?} {sensors:?}")
-    }
-}
-
 /// The covariance of an observer's states, and of its innovations, along its run.
 #[derive(Clone, Debug)]
 pub(crate) struct Spread {
-    engine: Ekf,
+    pub propagation: Propagation,
     belief: Belief,
     /// the covariance from an exact start, where readings are judged
     settled: Option<Root>,
     jacobians: Jacobians<Jacobian>,
     /// of the flow's outputs
     values: Vec<f64>,
-    noise: Vec<Level>,
-    expected: Option<OutputMap>,
+    sensors: Vec<Sensor>,
+    expected: OutputMap,
+    /// of the last readings; empty where they are not judged
+    pub innovations: Vec<Innovation>,
     pub deviations: Vec<f64>,
 }
 
 impl Persist for Spread {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        self.engine.walk(walk)?;
+        self.propagation.walk(walk)?;
         self.belief.walk(walk)?;
         if let Some(settled) = &mut self.settled {
             settled.walk(walk)?;
+        }
+        for innovation in &mut self.innovations {
+            innovation.walk(walk)?;
         }
         walk.numbers(&mut self.deviations)
     }
 }
 
 impl Spread {
-    pub fn new(model: &ErrorModel, between: BetweenSamples, method: Method) -> Result<Self, Error> {
-        let run = EstimatorSettings { between, method };
+    /// Whether readings are judged.
+    pub fn new(model: &NoisyModel, judges: bool, run: EstimatorSettings) -> Result<Self, Error> {
+        let flow = model.flow.system();
+        let judged = if judges { model.sensors.len() } else { 0 };
         Ok(Self {
-            engine: Ekf::new(&model.flow, &model.noise.process, run)?,
-            belief: Belief {
-                x: model.flow.system().start().to_vec(),
-                root: Root::diagonal(&model.noise.initial),
-            },
-            settled: model.expects().then(|| model.settled()),
+            propagation: Propagation::new(&model.flow, &model.process_noise, run)?,
+            belief: Belief::new(flow.start(), &model.initial_variance),
+            settled: judges.then(|| model.settled()),
             jacobians: model.flow.jacobians().clone(),
-            values: vec![0.0; model.flow.system().outputs().len()],
-            noise: model.noise.sensors.clone(),
-            expected: model.expected.as_ref().map(OutputMap::new),
+            values: vec![0.0; flow.outputs().len()],
+            sensors: model.sensors.clone(),
+            expected: OutputMap::new(&model.output_map),
+            innovations: vec![Innovation::default(); judged],
             deviations: vec![0.0; model.estimates],
         })
     }
 
-    /// The signals from here on.
-    pub fn start(&mut self, signals: &[f64]) {
-        self.engine.driven.start(signals);
-    }
-
-    /// The known inputs at the end of the interval to come.
-    pub fn aim(&mut self, from: f64, to: f64, inputs: &[f64]) {
-        self.engine.driven.aim(from, to, inputs);
-    }
-
-    /// State and covariance to a time.
-    pub fn advance(&mut self, from: f64, to: f64, x: &mut [f64]) -> Result<(), Error> {
+    /// State and covariance to the time of a sample.
+    pub fn advance(&mut self, from: f64, to: &Sample<'_>, x: &mut [f64]) -> Result<(), Error> {
         self.belief.x.copy_from_slice(x);
-        let done = self.engine.predict(&mut self.belief, from, to, false);
+        self.propagation.driven.aim(from, to.t, to.inputs);
+        let done = self.propagation.predict(&mut self.belief, from, to.t);
         // where an error ends it early, as far as it came
         x.copy_from_slice(&self.belief.x);
         done?;
         if let Some(settled) = &mut self.settled {
-            self.engine.carry(settled);
+            self.propagation.carry(settled);
         }
         Ok(())
     }
@@ -339,7 +223,7 @@ impl Spread {
     /// The measurements of the sensors that report are new readings, with errors of their own; z is
     /// after them.
     pub fn reset(&mut self, t: f64, z: &[f64], readings: &[f64]) {
-        let evaluation = &mut self.engine.driven.evaluation;
+        let evaluation = &mut self.propagation.driven.evaluation;
         evaluation.enter(t);
         evaluation.outputs(t, z, &mut self.values);
         for (sensor, reading) in readings.iter().enumerate() {
@@ -348,43 +232,52 @@ impl Spread {
             }
             let views = self.jacobians.output.row(&self.values, sensor);
             let own: Vec<(usize, f64)> = views.collect();
-            let state = self.belief.root.n - self.noise.len() + sensor;
-            let deviation = self.noise[sensor].variance(*reading).sqrt();
+            let state = self.belief.root.n - self.sensors.len() + sensor;
+            let deviation = self.sensors[sensor].noise.variance(*reading).sqrt();
             for root in std::iter::once(&mut self.belief.root).chain(&mut self.settled) {
                 read(root, state, &own, deviation);
             }
         }
     }
 
-    /// What is expected of the sensors at (t, z) under the signals, before they are read there: h(x̂)
-    /// with the standard deviation of a reading around it, √(HPHᵀ + R), and the same once the start is
-    /// forgotten. Nothing where readings are not judged, or the model has no value.
-    pub fn expected(&mut self, t: f64, z: &[f64], signals: &[f64]) -> Vec<[f64; 3]> {
-        let (Some(expected), Some(settled)) = (&mut self.expected, &self.settled) else {
-            return vec![];
+    /// What is said of readings before they count, at z under the signals: h(x̂) is expected with the
+    /// standard deviation of a reading around it, √(HPHᵀ + R), and the same once the start is forgotten.
+    /// Nothing where readings are not judged, or the model has no value.
+    pub fn judge(&mut self, sample: &Sample<'_>, z: &[f64], signals: &[f64]) {
+        let Some(settled) = &self.settled else {
+            return;
         };
-        expected.evaluate(t, z, signals);
-        if !expected.is_finite() {
-            return vec![];
-        }
+        let expected = &mut self.expected;
+        let is_known = expected.linearise(sample.t, z, signals).is_ok();
         let n = self.belief.root.n;
         let (mut row, mut projected) = (vec![0.0; n], vec![0.0; n]);
-        let each = |(i, (value, noise)): (usize, (&f64, &Level))| {
+        for (i, innovation) in self.innovations.iter_mut().enumerate() {
+            let reading = sample.readings.get(i).copied().unwrap_or(f64::NAN);
+            if !(is_known && reading.is_finite()) {
+                *innovation = Innovation::default();
+                continue;
+            }
+            let predicted = expected.outputs()[i];
+            let noise = self.sensors[i].noise.variance(predicted);
             expected.write_slopes(i, &mut row);
             let mut deviation = |root: &Root| {
                 root.transposed_times(&row, &mut projected);
                 let own: f64 = projected.iter().map(|p| p * p).sum();
-                (own + noise.variance(*value)).sqrt()
+                (own + noise).sqrt()
             };
-            [*value, deviation(&self.belief.root), deviation(settled)]
-        };
-        let values = expected.outputs().iter().zip(&self.noise);
-        values.enumerate().map(each).collect()
+            *innovation = Innovation {
+                value: reading - predicted,
+                deviation: deviation(&self.belief.root),
+                settled: deviation(settled),
+                predicted,
+                reading: Reading::Taken,
+            };
+        }
     }
 
     /// The standard deviations of the estimates at (t, z).
     pub fn measure(&mut self, t: f64, z: &[f64]) {
-        let evaluation = &mut self.engine.driven.evaluation;
+        let evaluation = &mut self.propagation.driven.evaluation;
         evaluation.enter(t);
         evaluation.outputs(t, z, &mut self.values);
         let n = self.belief.root.n;
@@ -413,7 +306,7 @@ fn read(root: &mut Root, state: usize, views: &[(usize, f64)], deviation: f64) {
         .map(|(i, k)| root.entries[i * n + k])
         .collect();
     rows.extend((0..n).map(|i| if i == state { deviation } else { 0.0 }));
-    root.of_rows(&mut rows);
+    root.of_rows(&mut rows, &mut vec![0.0; n]);
 }
 
 #[cfg(test)]

@@ -6,9 +6,9 @@
 
 use cap::Cap;
 use lynkeus_expr::Graph;
-use lynkeus_run::filter::{FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor};
+use lynkeus_run::filter::{FilterKind, FilterSettings, NoisyModel, NoisyPlant, Sensor};
 use lynkeus_run::{
-    BetweenSamples, Estimator, EstimatorSettings, Level, Method, SampledObserver, Step, System,
+    BetweenSamples, Blueprint, Estimator, EstimatorSettings, Level, Method, Step, System, Updates,
 };
 
 #[global_allocator]
@@ -45,22 +45,24 @@ fn sampled() -> Estimator {
     let derivatives = [(u + (w - x) * 2.0).node(), (s * (u - x)).node()];
     let signals = [("u".to_string(), u.node()), ("s".to_string(), s.node())];
     let outputs = [("x".to_string(), x.node()), ("y".to_string(), x.node())];
-    let observer = SampledObserver {
-        system: System::new(&g, time.node(), &states, &signals, &derivatives, &outputs).unwrap(),
+    let system = System::new(&g, time.node(), &states, &signals, &derivatives, &outputs).unwrap();
+    let observer = Blueprint {
         sensors: vec!["y".to_string()],
-        predict: true,
-        inputs: BetweenSamples::Hold,
-        errors: None,
-        tuned: None,
+        updates: Updates::Jumps {
+            predict: true,
+            errors: None,
+            tuned: None,
+        },
+        ..Blueprint::new(&system, settings())
     };
-    Estimator::sampled(&observer, METHOD).unwrap()
+    observer.estimator().unwrap()
 }
 
 /// x1' = x2 + u, x2' = −sin x1, y = x1.
 fn filter() -> Estimator {
     let g = Graph::new();
     let [time, a, b, u] = ["time", "a", "b", "u"].map(|name| g.symbol(name));
-    let plant = FilterPlant {
+    let plant = NoisyPlant {
         graph: &g,
         time: time.node(),
         states: vec![("a".into(), a.node(), 0.1), ("b".into(), b.node(), 0.0)],
@@ -74,9 +76,10 @@ fn filter() -> Estimator {
         }],
         process_noise: vec![0.0, 0.1],
         initial_variance: vec![1.0; 2],
+        ranges: vec![],
         confined: None,
     };
-    let model = FilterModel::new(&plant).unwrap();
+    let model = NoisyModel::new(&plant).unwrap();
     let kind = FilterSettings::of(FilterKind::Extended);
     Estimator::filter(&model, kind, settings()).unwrap()
 }

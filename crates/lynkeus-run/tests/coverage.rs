@@ -8,7 +8,7 @@
 
 use lynkeus_expr::Graph;
 use lynkeus_run::filter::{
-    Bounds, FilterKind, FilterModel, FilterPlant, FilterSettings, Limits, Sensor, SigmaPoints,
+    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
 };
 use lynkeus_run::{Estimator, EstimatorSettings, Level, Method, Step};
 
@@ -65,7 +65,7 @@ impl Case {
     fn filter(&self, kind: FilterKind) -> Estimator {
         let g = Graph::new();
         let [time, x, v] = ["time", "x", "v"].map(|name| g.symbol(name));
-        let model = FilterModel::new(&FilterPlant {
+        let model = NoisyModel::new(&NoisyPlant {
             graph: &g,
             time: time.node(),
             states: vec![
@@ -82,6 +82,13 @@ impl Case {
             }],
             process_noise: vec![0.0, DENSITY],
             initial_variance: vec![SPREAD; 2],
+            ranges: vec![
+                Limits {
+                    low: -50.0,
+                    high: 50.0,
+                };
+                2
+            ],
             confined: None,
         });
         let settings = FilterSettings {
@@ -166,14 +173,10 @@ impl Normal {
 }
 
 fn kinds() -> [(&'static str, FilterKind); 3] {
-    let wide = Bounds {
-        low: -50.0,
-        high: 50.0,
-    };
     [
         ("ekf", FilterKind::Extended),
         ("ukf", FilterKind::Unscented(SigmaPoints::default())),
-        ("mhe", FilterKind::MovingHorizon(5, vec![wide; 2])),
+        ("mhe", FilterKind::MovingHorizon(5)),
     ]
 }
 

@@ -5,7 +5,7 @@
 
 use lynkeus_expr::Graph;
 use lynkeus_run::filter::{
-    Bounds, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor, SigmaPoints,
+    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
 };
 use lynkeus_run::{Estimator, EstimatorSettings, Level, Method, Tolerances};
 use nalgebra::{DMatrix, DVector};
@@ -106,7 +106,7 @@ impl Linear {
             rows.collect()
         };
         let sensors = rows(&self.C).into_iter().enumerate();
-        let model = FilterModel::new(&FilterPlant {
+        let model = NoisyModel::new(&NoisyPlant {
             graph: &g,
             time: g.symbol("time").node(),
             states: x
@@ -126,6 +126,13 @@ impl Linear {
                 .collect(),
             process_noise: self.densities.clone(),
             initial_variance: vec![VARIANCE; n],
+            ranges: vec![
+                Limits {
+                    low: -1e9,
+                    high: 1e9,
+                };
+                n
+            ],
             confined: None,
         });
         let settings = FilterSettings {
@@ -218,15 +225,10 @@ fn filters_and_smoothers_are_exact_on_linear_plants_at_any_interval() {
             let reading = |_| DVector::from_fn(m, |_, _| random.next());
             let readings: Vec<DVector<f64>> = (0..ROWS).map(reading).collect();
             let [filtered, smoothed] = exact(&plant, interval, &readings);
-            let wide = Bounds {
-                low: -1e9,
-                high: 1e9,
-            };
-            let window = FilterKind::MovingHorizon(4, vec![wide; plant.F.nrows()]);
             for kind in [
                 FilterKind::Extended,
                 FilterKind::Unscented(SigmaPoints::default()),
-                window,
+                FilterKind::MovingHorizon(4),
             ] {
                 let what = format!("{} {kind:?} every {interval}", plant.name);
                 let mut ours = plant.filter(kind);

@@ -5,7 +5,7 @@
 
 use lynkeus_expr::{Expr, Graph};
 use lynkeus_run::filter::{
-    Bounds, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor, SigmaPoints, Smoothed,
+    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints, Smoothed,
 };
 use lynkeus_run::{Estimator, EstimatorSettings, Level, Method, Tolerances};
 use numeris::estimate::{Ckf, Ekf, EkfStep, Ukf, rts_smooth};
@@ -98,7 +98,7 @@ impl Plant {
         let [time, x, v] = ["time", "x", "v"].map(|name| g.symbol(name));
         let (derivatives, outputs) = (self.symbols)([x, v]);
         let sensors = outputs.iter().zip(NOISES).enumerate();
-        let model = FilterModel::new(&FilterPlant {
+        let model = NoisyModel::new(&NoisyPlant {
             graph: &g,
             time: time.node(),
             states: vec![
@@ -117,6 +117,13 @@ impl Plant {
                 .collect(),
             process_noise: DENSITIES.to_vec(),
             initial_variance: VARIANCES.to_vec(),
+            ranges: vec![
+                Limits {
+                    low: -100.0,
+                    high: 100.0,
+                };
+                2
+            ],
             confined: None,
         });
         let settings = FilterSettings {
@@ -321,18 +328,9 @@ impl Plant {
 /// one comes close to it.
 #[test]
 fn mhe_smoother() {
-    let wide = || {
-        vec![
-            Bounds {
-                low: -100.0,
-                high: 100.0,
-            };
-            2
-        ]
-    };
     for plant in [LINEAR, PENDULUM] {
         let [all, few] = [100, 6].map(|length| {
-            let mut ours = plant.filter(FilterKind::MovingHorizon(length, wide()));
+            let mut ours = plant.filter(FilterKind::MovingHorizon(length));
             let mut filtered = vec![];
             for (k, y) in readings().into_iter().enumerate() {
                 let x = ours.push(STEP * k as f64, &y).unwrap();

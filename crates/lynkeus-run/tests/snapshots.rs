@@ -3,7 +3,7 @@
 
 use lynkeus_expr::{Expr, Graph};
 use lynkeus_run::filter::{
-    Bounds, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor, SigmaPoints,
+    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
 };
 use lynkeus_run::{
     BetweenSamples, Estimator, EstimatorSettings, Level, Method, Step, System, Tolerances,
@@ -54,7 +54,7 @@ fn chain(n: usize, kind: FilterKind, method: Method) -> Estimator {
     let x: Vec<Expr<'_>> = (0..n).map(|i| g.symbol(&format!("x{i}"))).collect();
     let left = |i: usize| if i == 0 { u } else { x[i - 1] };
     let f = (0..n).map(|i| (left(i) - x[i] + (x[i] - 0.45).abs() * 0.5).node());
-    let plant = FilterPlant {
+    let plant = NoisyPlant {
         graph: &g,
         time: time.node(),
         states: (0..n)
@@ -70,13 +70,20 @@ fn chain(n: usize, kind: FilterKind, method: Method) -> Estimator {
         }],
         process_noise: (0..n).map(|i| 0.01 * (i % 2) as f64).collect(),
         initial_variance: vec![0.04; n],
+        ranges: vec![
+            Limits {
+                low: 0.0,
+                high: 3.0,
+            };
+            n
+        ],
         confined: None,
     };
     let of_filter = FilterSettings {
         keep_history: true,
         ..FilterSettings::of(kind)
     };
-    let model = FilterModel::new(&plant).unwrap();
+    let model = NoisyModel::new(&plant).unwrap();
     Estimator::filter(&model, of_filter, settings(method)).unwrap()
 }
 
@@ -170,20 +177,11 @@ fn filters_of_every_size_go_on() {
             )
         })
         .collect();
-    let bounds = |n| {
-        vec![
-            Bounds {
-                low: 0.0,
-                high: 3.0
-            };
-            n
-        ]
-    };
     for n in [3, 11] {
         for kind in [
             FilterKind::Extended,
             FilterKind::Unscented(SigmaPoints::default()),
-            FilterKind::MovingHorizon(4, bounds(n)),
+            FilterKind::MovingHorizon(4),
         ] {
             for method in [
                 Method::Explicit(tolerances()),

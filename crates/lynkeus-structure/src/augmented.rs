@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use lynkeus_expr::{Graph, MissingInput, Node, jacobian};
 use lynkeus_model::{Plant, Variable};
 
-use crate::{Dimension, Finding, Region, Regularity, steps};
+use crate::{Dimension, Finding, Region, regularity, steps};
 
 /// Who measures what.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -18,7 +18,7 @@ pub struct Sensors {
     pub disturbances: Vec<String>,
 }
 
-/// A name that does not fit the plant.
+/// A name or a range that does not fit the plant.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SensorsError {
     /// no such output or input
@@ -56,23 +56,18 @@ pub enum SensorsError {
         /// name of the plant
         plant: String,
     },
-}
-
-/// A side of a smaller box that cannot be used.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum NarrowError {
-    /// no such state or input
+    /// a smaller box is asked for in no state or input
     #[error(
         "the box has no side '{name}': expected a state, an input or time ({})",
         list(found)
     )]
-    NoSuchName {
+    NoSuchSide {
         /// the name in question
         name: String,
         /// the names there are
         found: Vec<String>,
     },
-    /// nothing in common with the declared range
+    /// a smaller box has nothing in common with the declared range
     #[error("'{name}' is declared in [{min}, {max}]: expected a part of that range")]
     Outside {
         /// the variable
@@ -177,38 +172,26 @@ impl<'p> AugmentedPlant<'p> {
     ///
     /// # Errors
     /// No such variable, or nothing in common with its declared range.
-    pub fn narrow(&mut self, side: &str, low: f64, high: f64) -> Result<(), NarrowError> {
+    pub fn narrow(&mut self, side: &str, low: f64, high: f64) -> Result<(), SensorsError> {
         if side == "time" {
             // no state or input can have that name
-            let time = &mut self.time;
-            let (min, max) = (time.min.max(low), time.max.min(high));
-            (time.min, time.max) = limited(side, (time.min, time.max), (min, max))?;
-            return Ok(());
+            let Dimension { min, max, .. } = &mut self.time;
+            return limit(side, min, max, (low, high));
         }
         let is_meant = |name: &str| {
             let element = name.strip_prefix(side);
             element.is_some_and(|rest| rest.is_empty() || rest.starts_with('['))
         };
         let variables = self.states.iter_mut().chain(&mut self.inputs);
-        let mut found = false;
-        for variable in variables.filter(|v| is_meant(&v.name)) {
-            found = true;
-            let (min, max) = (variable.min.max(low), variable.max.min(high));
-            let declared = (variable.min, variable.max);
-            (variable.min, variable.max) = limited(&variable.name, declared, (min, max))?;
+        let mut meant = variables.filter(|v| is_meant(&v.name)).peekable();
+        if meant.peek().is_some() {
+            return meant.try_for_each(|v| limit(&v.name, &mut v.min, &mut v.max, (low, high)));
         }
-        match found {
-            true => Ok(()),
-            false => Err(NarrowError::NoSuchName {
-                name: side.to_owned(),
-                found: self
-                    .states
-                    .iter()
-                    .chain(&self.inputs)
-                    .map(|v| v.name.clone())
-                    .collect(),
-            }),
-        }
+        let variables = self.states.iter().chain(&self.inputs);
+        Err(SensorsError::NoSuchSide {
+            name: side.to_owned(),
+            found: variables.map(|v| v.name.clone()).collect(),
+        })
     }
 
     /// The bound of the derivative of that order, from 1, of a known input; infinite where none is known.
@@ -233,6 +216,11 @@ impl<'p> AugmentedPlant<'p> {
         self.states.iter().map(|s| s.node).collect()
     }
 
+    /// h(t, x, u), one expression per measured output.
+    pub fn output_nodes(&self) -> Vec<Node> {
+        self.outputs.iter().map(|o| o.variable.node).collect()
+    }
+
     /// Index of the augmented state of that name.
     pub fn state_index(&self, name: &str) -> Option<usize> {
         self.states.iter().position(|s| s.name == name)
@@ -254,10 +242,8 @@ impl<'p> AugmentedPlant<'p> {
     /// # Errors
     /// [`MissingInput`] where the plant has parameters without value.
     pub fn regularity(&self, region: &Region) -> Result<Finding, MissingInput> {
-        let outputs = self.outputs.iter().map(|o| o.variable.node);
-        let all: Vec<Node> = self.derivatives.iter().copied().chain(outputs).collect();
-        let found = Regularity::of(self.graph(), &all, &self.symbols(), region)?;
-        Ok(found.finding())
+        let all = [self.derivatives.clone(), self.output_nodes()].concat();
+        regularity(self.graph(), &all, &self.symbols(), region)
     }
 
     /// The box: declared ranges of the states, unknown and known inputs, time.
@@ -276,49 +262,48 @@ impl<'p> AugmentedPlant<'p> {
     }
 }
 
-/// The part of a declared range, where it is one.
-fn limited(
+/// Makes a declared range smaller.
+fn limit(
     name: &str,
-    (min, max): (f64, f64),
-    part: (f64, f64),
-) -> Result<(f64, f64), NarrowError> {
-    match part.0 <= part.1 {
-        true => Ok(part),
-        false => Err(NarrowError::Outside {
-            name: name.to_owned(),
-            min,
-            max,
-        }),
+    min: &mut f64,
+    max: &mut f64,
+    (low, high): (f64, f64),
+) -> Result<(), SensorsError> {
+    let part = (min.max(low), max.min(high));
+    if part.0 <= part.1 {
+        (*min, *max) = part;
+        return Ok(());
     }
+    Err(SensorsError::Outside {
+        name: name.to_owned(),
+        min: *min,
+        max: *max,
+    })
 }
 
 fn refuse_doubles(sensors: &Sensors) -> Result<(), SensorsError> {
-    let mut seen: HashMap<&str, &'static str> = HashMap::new();
-    let groups = [
+    let inputs = [
         ("unknown", &sensors.unknown),
         ("disturbances", &sensors.disturbances),
     ];
-    let inputs = groups
-        .into_iter()
-        .flat_map(|(key, names)| names.iter().map(move |n| (key, n)));
-    for (second, name) in inputs {
-        if let Some(first) = seen.insert(name, second) {
-            return Err(SensorsError::Twice {
-                name: name.clone(),
-                first,
-                second,
-            });
+    // an output may be called like an input
+    for group in [&inputs[..], &[("measured", &sensors.measured)]] {
+        let mut seen = HashMap::new();
+        let all = group
+            .iter()
+            .flat_map(|(key, names)| names.iter().map(|name| (name, *key)));
+        for (name, second) in all {
+            if let Some(first) = seen.insert(name, second) {
+                let name = name.clone();
+                return Err(SensorsError::Twice {
+                    name,
+                    first,
+                    second,
+                });
+            }
         }
     }
-    let mut outputs = std::collections::HashSet::new();
-    match sensors.measured.iter().find(|name| !outputs.insert(*name)) {
-        Some(name) => Err(SensorsError::Twice {
-            name: name.clone(),
-            first: "measured",
-            second: "measured",
-        }),
-        None => Ok(()),
-    }
+    Ok(())
 }
 
 fn measured(plant: &Plant, sensors: &Sensors) -> Result<Vec<Variable>, SensorsError> {

@@ -123,7 +123,7 @@ pub fn lie_gradients(
     form: &AffineForm,
     order: usize,
 ) -> Result<Vec<Rows>, MissingInput> {
-    let outputs: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
+    let outputs = augmented.output_nodes();
     let flow = Flow {
         time: augmented.plant.time,
         states: &augmented.symbols(),
@@ -139,7 +139,7 @@ fn along(
     inputs: &[InputJet],
     order: usize,
 ) -> Result<Vec<Vec<Node>>, MissingInput> {
-    let outputs: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
+    let outputs = augmented.output_nodes();
     let flow = Flow {
         time: augmented.plant.time,
         states: &augmented.symbols(),
@@ -198,7 +198,7 @@ pub fn relative_degree(
                 let order = k + 1;
                 let detail = format!(
                     "{input} appears in y^({order}): ∂y^({order})/∂{input} is {}",
-                    witness.told()
+                    crate::words::told(&witness)
                 );
                 return Ok(Degree {
                     r: k + 1,

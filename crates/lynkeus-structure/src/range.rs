@@ -7,7 +7,7 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape};
 
 use crate::region::{Cell, Question, highest_corner, lowest_corner};
-use crate::{Place, Point, Region, Regularity};
+use crate::{Place, Point, Region, regularity};
 
 /// Cells examined per end of the range.
 const BUDGET: usize = 4000;
@@ -45,13 +45,12 @@ pub fn range_within(
     region: &Region,
     budget: usize,
 ) -> Result<Range, MissingInput> {
-    let region = region.restricted(&graph.symbols_of(&[node]));
-    let question = Question::new(node, &region, budget);
+    let question = asked(graph, node, region, budget);
     if let Some(known) = graph.noted(&question) {
         return Ok(known);
     }
-    let mut search = Search::new(graph, node, &region, budget)?;
-    let valued = has_values(graph, node, &region, &search)?;
+    let mut search = Search::new(graph, &question)?;
+    let valued = search.has_values()?;
     let found = both_ends(&mut search, valued);
     graph.note(question, found.clone());
     Ok(found)
@@ -68,17 +67,9 @@ pub fn enclosure_within(
     region: &Region,
     budget: usize,
 ) -> Result<Interval, MissingInput> {
-    let region = region.restricted(&graph.symbols_of(&[node]));
-    let question = Question::new(node, &region, budget);
-    if let Some(known) = graph.noted::<_, Range>(&question) {
-        return Ok(known.enclosure);
-    }
-    let Some(mut search) = valued(graph, node, &region, budget)? else {
-        return Ok(Interval::UNKNOWN);
-    };
-    let found = both_ends(&mut search, true);
-    graph.note(question, found.clone());
-    Ok(found.enclosure)
+    let question = asked(graph, node, region, budget);
+    let found = answered(graph, question, Range::clone, |s| both_ends(s, true))?;
+    Ok(found.map_or(Interval::UNKNOWN, |range| range.enclosure))
 }
 
 /// The magnitude of the [`enclosure_within`], at up to half its cost: the end of the range that
@@ -92,20 +83,10 @@ pub fn magnitude_within(
     region: &Region,
     budget: usize,
 ) -> Result<f64, MissingInput> {
-    let region = region.restricted(&graph.symbols_of(&[node]));
-    let question = Question::new(node, &region, budget);
-    if let Some(known) = graph.noted::<_, Range>(&question) {
-        return Ok(known.enclosure.magnitude());
-    }
-    if let Some(known) = graph.noted(&question) {
-        return Ok(known);
-    }
-    let Some(mut search) = valued(graph, node, &region, budget)? else {
-        return Ok(f64::INFINITY);
-    };
-    let size = search.magnitude();
-    graph.note(question, size);
-    Ok(size)
+    let question = asked(graph, node, region, budget);
+    let told = |range: &Range| range.enclosure.magnitude();
+    let found = answered(graph, question, told, |s| s.magnitude())?;
+    Ok(found.unwrap_or(f64::INFINITY))
 }
 
 /// Whether an expression has a value everywhere on the region, and none is zero. What
@@ -114,55 +95,44 @@ pub fn magnitude_within(
 /// # Errors
 /// [`MissingInput`] where the node depends on a symbol outside the region.
 pub fn excludes_zero(graph: &Graph, node: Node, region: &Region) -> Result<bool, MissingInput> {
-    let region = region.restricted(&graph.symbols_of(&[node]));
-    let question = Question::new(node, &region, BUDGET);
-    if let Some(known) = graph.noted::<_, Range>(&question) {
-        return Ok(!known.enclosure.contains_zero() && known.enclosure.is_defined());
-    }
-    if let Some(known) = graph.noted(&question) {
-        return Ok(known);
-    }
-    let found = match valued(graph, node, &region, BUDGET)? {
-        Some(mut search) => search.excludes_zero(),
-        None => false,
-    };
-    graph.note(question, found);
-    Ok(found)
+    let question = asked(graph, node, region, BUDGET);
+    let told = |range: &Range| !range.enclosure.contains_zero() && range.enclosure.is_defined();
+    let found = answered(graph, question, told, |s| s.excludes_zero())?;
+    Ok(found.unwrap_or(false))
 }
 
-/// The search of an expression that has a value everywhere on the region; none of another.
-fn valued<'a>(
-    graph: &'a Graph,
-    node: Node,
-    region: &'a Region,
-    budget: usize,
-) -> Result<Option<Search<'a>>, MissingInput> {
-    if graph.noted(&Question::new(node, region, 0)) == Some(false) {
+/// The question, in what the node reads.
+fn asked(graph: &Graph, node: Node, region: &Region, budget: usize) -> Question {
+    let region = region.restricted(&graph.symbols_of(&[node]));
+    Question {
+        node,
+        region,
+        budget,
+    }
+}
+
+/// The answer to a question, `told` by the range where that is known; none where the expression
+/// may lack a value.
+fn answered<T: Clone + Send + Sync + 'static>(
+    graph: &Graph,
+    question: Question,
+    told: impl Fn(&Range) -> T,
+    find: impl Fn(&mut Search<'_>) -> T,
+) -> Result<Option<T>, MissingInput> {
+    let range = graph.noted::<_, Range>(&question);
+    if let Some(known) = range.as_ref().map(told).or_else(|| graph.noted(&question)) {
+        return Ok(Some(known));
+    }
+    if graph.noted(&question.whether_valued()) == Some(false) {
         return Ok(None);
     }
-    let search = Search::new(graph, node, region, budget)?;
-    let valued = has_values(graph, node, region, &search)?;
-    Ok(valued.then_some(search))
-}
-
-/// Whether an expression is seen to have a value everywhere on the region.
-fn has_values(
-    graph: &Graph,
-    node: Node,
-    region: &Region,
-    search: &Search<'_>,
-) -> Result<bool, MissingInput> {
-    if search.is_defined() {
-        return Ok(true);
+    let mut search = Search::new(graph, &question)?;
+    if !search.has_values()? {
+        return Ok(None);
     }
-    // of no budget: that of no search
-    let question = Question::new(node, region, 0);
-    if let Some(known) = graph.noted(&question) {
-        return Ok(known);
-    }
-    let regular = Regularity::of(graph, &[node], &[], region)?.holds();
-    graph.note(question, regular);
-    Ok(regular)
+    let found = find(&mut search);
+    graph.note(question, found.clone());
+    Ok(Some(found))
 }
 
 fn both_ends(search: &mut Search<'_>, valued: bool) -> Range {
@@ -173,7 +143,7 @@ fn both_ends(search: &mut Search<'_>, valued: bool) -> Range {
         enclosure: values.filter(|_| valued).unwrap_or(Interval::UNKNOWN),
         lowest: search.lowest.take(),
         highest: search.highest.take(),
-        weakest: search.region.named(&search.tree[lower.place].cell),
+        weakest: search.asked.region.named(&search.tree[lower.place].cell),
     }
 }
 
@@ -249,8 +219,7 @@ struct Search<'a> {
     graph: &'a Graph,
     bounds: Evaluator<Intervals>,
     evaluator: Evaluator,
-    region: &'a Region,
-    budget: usize,
+    asked: &'a Question,
     tree: Vec<Branch>,
     /// the smallest and the largest value attained
     lowest: Option<Point>,
@@ -258,34 +227,36 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// With at most `budget` cells halved for each end.
-    ///
     /// # Errors
     /// [`MissingInput`] where the node depends on a symbol outside the region.
-    fn new(
-        graph: &'a Graph,
-        node: Node,
-        region: &'a Region,
-        budget: usize,
-    ) -> Result<Self, MissingInput> {
-        let tape = Tape::new(graph, &region.symbols(), &[node])?;
+    fn new(graph: &'a Graph, asked: &'a Question) -> Result<Self, MissingInput> {
+        let tape = Tape::new(graph, &asked.region.symbols(), &[asked.node])?;
         let mut search = Self {
             graph,
             evaluator: tape.evaluator(),
             bounds: tape.evaluator_in(Intervals),
-            region,
-            budget,
+            asked,
             tree: vec![],
             lowest: None,
             highest: None,
         };
-        search.add(region.cell(), None);
+        search.add(asked.region.cell(), None);
         Ok(search)
     }
 
-    /// The node has a value everywhere, as the whole region taken at once shows.
-    fn is_defined(&self) -> bool {
-        self.tree[0].values.is_defined()
+    /// Whether the node is seen to have a value everywhere: the whole region taken at once may show it.
+    fn has_values(&self) -> Result<bool, MissingInput> {
+        if self.tree[0].values.is_defined() {
+            return Ok(true);
+        }
+        let question = self.asked.whether_valued();
+        if let Some(known) = self.graph.noted(&question) {
+            return Ok(known);
+        }
+        let (node, region) = (self.asked.node, &self.asked.region);
+        let regular = regularity(self.graph, &[node], &[], region)?.is_proved();
+        self.graph.note(question, regular);
+        Ok(regular)
     }
 
     /// The end of the range, as well as the budget allows.
@@ -324,7 +295,7 @@ impl<'a> Search<'a> {
             bound: end.bound(self.tree[0].values),
             place: 0,
         }]);
-        for step in 0..self.budget {
+        for step in 0..self.asked.budget {
             let Some(weakest) = open.peek() else { break };
             let looks = step % OFTEN == 0;
             let is_hopeless = self.attained(end).is_some_and(|best| best <= hopeless);
@@ -340,7 +311,7 @@ impl<'a> Search<'a> {
                 let bound = end.bound(self.tree[place].values);
                 // where no value can be further out than one attained, none is tried
                 if self.attained(end).is_none_or(|best| bound < best) {
-                    self.sample(place, self.region.dimensions.len() <= FACES);
+                    self.sample(place, self.asked.region.dimensions.len() <= FACES);
                 }
                 open.push(Open { bound, place });
             }
@@ -369,7 +340,7 @@ impl<'a> Search<'a> {
         if let Some(first) = self.tree[place].halves {
             return Some(first);
         }
-        let (one, other) = self.region.split(&self.tree[place].cell)?;
+        let [one, other] = self.asked.region.split(&self.tree[place].cell)?;
         let first = self.tree.len();
         self.add(one, Some(End::Lower));
         self.add(other, Some(End::Upper));
@@ -401,7 +372,7 @@ impl<'a> Search<'a> {
             return;
         }
         let Branch { cell, shared, .. } = &self.tree[place];
-        let mut points = vec![self.region.middle_point(cell)];
+        let mut points = vec![self.asked.region.middle_point(cell)];
         if *shared != Some(End::Lower) {
             points.push(lowest_corner(cell));
         }
@@ -409,7 +380,7 @@ impl<'a> Search<'a> {
             points.push(highest_corner(cell));
         }
         if faces {
-            points.extend(self.region.faces(cell));
+            points.extend(self.asked.region.faces(cell));
         }
         for point in points {
             self.look(&point);
@@ -417,7 +388,7 @@ impl<'a> Search<'a> {
     }
 
     fn look(&mut self, at: &[f64]) {
-        if !(at.iter().all(|x| x.is_finite()) && self.region.reaches(at)) {
+        if !(at.iter().all(|x| x.is_finite()) && self.asked.region.reaches(at)) {
             return;
         }
         let mut out = [0.0];
@@ -427,7 +398,7 @@ impl<'a> Search<'a> {
             return;
         }
         let attained = || Point {
-            coordinates: self.region.coordinates(at),
+            coordinates: self.asked.region.coordinates(at),
             value,
         };
         if self.lowest.as_ref().is_none_or(|best| value < best.value) {
@@ -504,7 +475,8 @@ mod tests {
             dimensions: vec![side("x", x.node()), side("y", y.node())],
         };
         let of = |ends: &[End]| {
-            let mut search = Search::new(&g, f, &region, 400).unwrap();
+            let asked = asked(&g, f, &region, 400);
+            let mut search = Search::new(&g, &asked).unwrap();
             let found: Vec<f64> = ends.iter().map(|&end| search.end(end).bound).collect();
             (found, search.tree.len())
         };

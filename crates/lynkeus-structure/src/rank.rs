@@ -13,8 +13,9 @@ use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Tape, jacobian};
 
 use crate::matrix::{blocks, determinant};
 use crate::region::Cell;
-use crate::words::short;
-use crate::{Dimension, Finding, Matrix, Point, Region, Regularity, Verdict, Witness, sign, steps};
+use crate::{
+    Dimension, Finding, Matrix, Point, Reason, Region, Verdict, Witness, regularity, sign, steps,
+};
 
 /// Larger minors are not expanded.
 const MAX_COLUMNS: usize = 5;
@@ -36,22 +37,12 @@ pub fn full_column_rank(matrix: &Matrix<'_>, region: &Region) -> Result<Finding,
         return regular(matrix, region);
     }
     let Some(mut minors) = minors(matrix) else {
-        let detail = format!(
-            "a {}×{} matrix has too many minors to decide",
-            matrix.rows, matrix.columns
-        );
-        return Ok(Finding::undecided(detail));
+        let reason = Reason::ManyMinors(matrix.rows, matrix.columns);
+        return Ok(Finding::undecided(reason));
     };
     if minors.is_empty() {
-        let zero = Point {
-            coordinates: vec![],
-            value: 0.0,
-        };
-        let detail = format!(
-            "every {0}×{0} minor of the {1}×{0} matrix is zero",
-            matrix.columns, matrix.rows
-        );
-        return Ok(Finding::refuted(zero, detail));
+        let reason = Reason::ZeroMinors(matrix.rows, matrix.columns);
+        return Ok(Finding::refuted(everywhere_zero(), reason));
     }
     if matrix.rows == matrix.columns {
         return Ok(sign::keeps_sign(graph, minors[0], region)?.finding);
@@ -66,10 +57,36 @@ pub fn full_column_rank(matrix: &Matrix<'_>, region: &Region) -> Result<Finding,
             return Ok(found);
         }
     }
-    let squares = minors.iter().map(|&minor| graph.powi(minor, 2));
-    let gram = squares.reduce(|a, b| graph.binary(Binary::Add, a, b));
-    let gram = gram.unwrap_or_else(|| graph.constant(0.0).node());
+    let gram = sum_of_squares(graph, &minors);
     Ok(sign::keeps_sign(graph, gram, region)?.finding)
+}
+
+/// A determinant that vanishes whatever its variables are.
+fn everywhere_zero() -> Point {
+    Point {
+        coordinates: vec![],
+        value: 0.0,
+    }
+}
+
+/// det AᵀA as the sum of the squared minors (Cauchy and Binet), of the A with these entries; none where A is wider than
+/// tall or the minors are too many.
+pub(crate) fn gram(
+    graph: &Graph,
+    (rows, columns): (usize, usize),
+    entry: impl Fn(usize, usize) -> Option<Node>,
+) -> Option<Node> {
+    if columns > rows || columns > MAX_COLUMNS {
+        return None;
+    }
+    let minors = minors(&Matrix::from_fn(graph, (rows, columns), entry))?;
+    Some(sum_of_squares(graph, &minors))
+}
+
+fn sum_of_squares(graph: &Graph, nodes: &[Node]) -> Node {
+    let squares = nodes.iter().map(|&node| graph.powi(node, 2));
+    let sum = squares.reduce(|a, b| graph.binary(Binary::Add, a, b));
+    sum.unwrap_or_else(|| graph.constant(0.0).node())
 }
 
 /// Decides whether `functions` are one-to-one in `variables` on the box, for any
@@ -94,12 +111,10 @@ pub fn one_to_one(
         .iter()
         .all(Vec::is_empty)
         && !functions.iter().any(|&f| steps(graph, f, variables));
-    let regularity = Regularity::of(graph, functions, variables, region)?;
-    if let Some(trouble) = regularity.trouble() {
-        return Ok(Finding {
-            verdict: regularity.verdict(),
-            detail: format!("the mean value theorem does not apply: {trouble}"),
-        });
+    let Finding { verdict, reason } = regularity(graph, functions, variables, region)?;
+    if verdict != Verdict::Proved {
+        let reason = Reason::NoMeanValue(Box::new(reason));
+        return Ok(Finding { verdict, reason });
     }
     if affine {
         return full_column_rank(&local, region);
@@ -119,9 +134,7 @@ pub fn one_to_one(
     let mean = Matrix::from_fn(graph, size, |i, j| rows[i][j]);
     let found = full_column_rank(&mean, &wider)?;
     Ok(match found.verdict {
-        Verdict::Refuted(_) => Finding::undecided(
-            "the mean value theorem does not decide it: rows taken at different points can be dependent",
-        ),
+        Verdict::Refuted(_) => Finding::undecided(Reason::RowsApart),
         _ => found,
     })
 }
@@ -207,57 +220,44 @@ const CELLS: usize = 2000;
 /// [`MissingInput`] where an entry depends on a symbol outside the region.
 pub fn regular(matrix: &Matrix<'_>, region: &Region) -> Result<Finding, MissingInput> {
     let Some(blocks) = blocks(matrix) else {
-        let zero = Point {
-            coordinates: vec![],
-            value: 0.0,
-        };
-        let detail = "det is zero everywhere, by the zeros of the matrix";
-        return Ok(Finding::refuted(zero, detail));
+        return Ok(Finding::refuted(everywhere_zero(), Reason::ZeroDeterminant));
     };
     let mut product = Some((1.0, 1.0));
     let mut parts = 0;
-    let mut open: Option<Block> = None;
+    let mut open: Option<Finding> = None;
     for block in blocks {
         let found = decide(&block, region)?;
-        match found.verdict {
-            Verdict::Refuted(witness) => {
-                let detail = "det vanishes or changes its sign";
-                return Ok(Finding::refuted(witness, detail));
+        match (&found.verdict, &found.reason) {
+            (Verdict::Refuted(_), _) => {
+                let reason = Reason::DeterminantVanishes;
+                return Ok(Finding { reason, ..found });
             }
-            Verdict::Undecided(_) => open = open.or(Some(found)),
-            Verdict::Proved => {
-                let pairs = product.zip(found.bounds);
-                product = pairs.map(|(all, one)| (all.0 * one.0, all.1 * one.1));
-                parts += found.parts;
+            (Verdict::Undecided(_), _) => open = open.or(Some(found)),
+            (Verdict::Proved, Reason::Determinant { low, high, .. }) => {
+                product = product.map(|all| (all.0 * low, all.1 * high));
+            }
+            (Verdict::Proved, reason) => {
+                product = None;
+                parts += match reason {
+                    Reason::RegularParts(parts) => *parts,
+                    _ => 0,
+                };
             }
         }
     }
-    if let Some(open) = open {
-        return Ok(Finding {
-            verdict: open.verdict,
-            detail: open.detail,
-        });
-    }
-    let detail = match product {
-        Some((low, high)) => format!("|det| lies in [{}, {}]", short(low), short(high)),
-        None => format!(
-            "the ranges of its entries keep it regular, on each of {parts} parts of the box"
-        ),
-    };
-    Ok(Finding::proved(detail))
+    Ok(open.unwrap_or(Finding::proved(match product {
+        Some((low, high)) => determinant_in((low, high), false),
+        None => Reason::RegularParts(parts),
+    })))
 }
 
-/// What is known of an irreducible block.
-struct Block {
-    verdict: Verdict,
-    detail: String,
-    /// of |det|, where it was expanded
-    bounds: Option<(f64, f64)>,
-    /// parts of the box of the proof, where it was not
-    parts: usize,
+fn determinant_in((low, high): (f64, f64), open: bool) -> Reason {
+    Reason::Determinant { low, high, open }
 }
 
-fn decide(block: &Matrix<'_>, region: &Region) -> Result<Block, MissingInput> {
+/// Of an irreducible block: proved by [`Reason::Determinant`] where that was expanded, else by
+/// [`Reason::RegularParts`].
+fn decide(block: &Matrix<'_>, region: &Region) -> Result<Finding, MissingInput> {
     if block.rows > EXPANDED {
         return by_parts(block, region);
     }
@@ -267,29 +267,20 @@ fn decide(block: &Matrix<'_>, region: &Region) -> Result<Block, MissingInput> {
         .collect();
     let det = determinant(graph, &rows).unwrap_or_else(|| graph.constant(0.0).node());
     let found = sign::keeps_sign(graph, det, region)?;
-    let (low, high) = found.bounds;
-    if let Verdict::Undecided(_) = found.finding.verdict
-        && block.rows > 1
-    {
+    let verdict = found.finding.verdict;
+    let open = matches!(verdict, Verdict::Undecided(_));
+    if open && block.rows > 1 {
         let second = by_parts(block, region)?;
-        if second.verdict == Verdict::Proved {
+        if second.is_proved() {
             return Ok(second);
         }
     }
-    Ok(Block {
-        verdict: found.finding.verdict,
-        detail: format!(
-            "|det| lies in [{}, {}] as far as can be proved",
-            short(low),
-            short(high)
-        ),
-        bounds: Some((low, high)),
-        parts: 0,
-    })
+    let reason = determinant_in(found.bounds, open);
+    Ok(Finding { verdict, reason })
 }
 
 /// Cuts the box until the ranges of the entries decide.
-fn by_parts(block: &Matrix<'_>, region: &Region) -> Result<Block, MissingInput> {
+fn by_parts(block: &Matrix<'_>, region: &Region) -> Result<Finding, MissingInput> {
     let graph = block.graph();
     let entries = block.dense();
     let region = region.restricted(&graph.symbols_of(&entries));
@@ -328,29 +319,19 @@ fn by_parts(block: &Matrix<'_>, region: &Region) -> Result<Block, MissingInput> 
         let halves = region
             .split(&cell)
             .filter(|_| looked < CELLS && graph.spent().is_none());
-        let Some((first, second)) = halves.filter(|_| witness.is_none()) else {
-            let verdict = match witness {
-                Some(points) => Verdict::Refuted(Witness { points }),
-                None => Verdict::Undecided(region.named(&cell)),
-            };
-            return Ok(Block {
-                verdict,
-                detail: format!(
-                    "{CELLS} parts of the box do not decide for a block of {} rows; the column rcond shows it along the estimate",
-                    block.rows
-                ),
-                bounds: None,
-                parts,
+        let Some(halves) = halves.filter(|_| witness.is_none()) else {
+            let reason = Reason::OpenParts(CELLS, block.rows);
+            return Ok(match witness {
+                Some(points) => Finding::refuted(Witness { points }, reason),
+                None => Finding {
+                    verdict: Verdict::Undecided(region.named(&cell)),
+                    reason,
+                },
             });
         };
-        open.extend([first, second]);
+        open.extend(halves);
     }
-    Ok(Block {
-        verdict: Verdict::Proved,
-        detail: String::new(),
-        bounds: None,
-        parts,
-    })
+    Ok(Finding::proved(Reason::RegularParts(parts)))
 }
 
 /// The determinant by elimination, where its sign is beyond rounding errors.
@@ -400,7 +381,7 @@ mod tests {
         let g = Graph::new();
         let x = g.symbol("x");
         let check = rank(&[&[-x], &[1.0 - x]], &[x]);
-        assert_eq!(check.verdict, Verdict::Proved, "{}", check.detail);
+        assert_eq!(check.verdict, Verdict::Proved, "{}", check.reason.text());
     }
 
     #[test]
@@ -409,7 +390,7 @@ mod tests {
         let (x, y) = (g.symbol("x"), g.symbol("y"));
         let check = rank(&[&[x], &[y.sin()]], &[x, y]);
         let Verdict::Refuted(witness) = check.verdict else {
-            panic!("{}", check.detail)
+            panic!("{}", check.reason.text())
         };
         let values: Vec<f64> = witness.points[0]
             .coordinates
@@ -425,7 +406,7 @@ mod tests {
         let (x, y) = (g.symbol("x"), g.symbol("y"));
         let check = rank(&[&[x, x * y], &[y, y * y], &[x + 1.0, y * x + y]], &[x, y]);
         assert!(matches!(check.verdict, Verdict::Refuted(_)));
-        assert!(rank(&[&[x, y]], &[x, y]).detail.contains("minor"));
+        assert!(rank(&[&[x, y]], &[x, y]).reason.text().contains("minor"));
     }
 
     #[test]
@@ -451,7 +432,7 @@ mod tests {
         };
         let box_ = region(&[a, b], 2.0);
         let tame = decide([a + 0.2 * b.sin(), b - 0.1 * a * a], &box_);
-        assert_eq!(tame.verdict, Verdict::Proved, "{}", tame.detail);
+        assert_eq!(tame.verdict, Verdict::Proved, "{}", tame.reason.text());
         let folded = decide([a * a - b * b, 2.0 * a * b], &box_);
         assert!(matches!(folded.verdict, Verdict::Undecided(_)));
         let flat = decide([a + b, 2.0 * a + 2.0 * b], &box_);
@@ -492,7 +473,7 @@ mod tests {
             regular(&matrix, &region(&[x, y], size)).unwrap()
         };
         let found = decide(0.9);
-        assert_eq!(found.verdict, Verdict::Proved, "{}", found.detail);
+        assert_eq!(found.verdict, Verdict::Proved, "{}", found.reason.text());
         let Verdict::Refuted(witness) = decide(1.5).verdict else {
             panic!()
         };
@@ -523,9 +504,9 @@ mod tests {
         let found = regular(&matrix, &region(&[x], 3.0)).unwrap();
         assert_eq!(found.verdict, Verdict::Proved);
         assert!(
-            found.detail.starts_with("|det| lies in"),
+            found.reason.text().starts_with("|det| lies in"),
             "{}",
-            found.detail
+            found.reason.text()
         );
     }
 
@@ -551,7 +532,11 @@ mod tests {
         let matrix = Matrix::from_fn(&g, (1, 1), |_, _| Some((1e-20 * (x + 2.0)).node()));
         let found = regular(&matrix, &region(&[x], 1.0)).unwrap();
         assert_eq!(found.verdict, Verdict::Proved);
-        assert!(!found.detail.contains("[0,"), "{}", found.detail);
+        assert!(
+            !found.reason.text().contains("[0,"),
+            "{}",
+            found.reason.text()
+        );
     }
 
     proptest! {

@@ -1,8 +1,10 @@
 //! Boxes of variables.
 
+use std::hash::{Hash, Hasher};
+
 use lynkeus_expr::{Interval, Node};
 
-use crate::{Coordinate, Place, Side};
+use crate::{Coordinate, Place};
 
 /// One side of the box.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,17 +19,6 @@ pub struct Dimension {
     pub max: f64,
     /// only whole numbers count
     pub integer: bool,
-}
-
-impl Dimension {
-    /// Name and ends.
-    pub fn side(&self) -> Side {
-        Side {
-            name: self.name.clone(),
-            min: self.min,
-            max: self.max,
-        }
-    }
 }
 
 /// The box on which conditions are decided: the product of its dimensions.
@@ -56,11 +47,6 @@ impl Region {
         }
     }
 
-    /// The sides by name.
-    pub fn place(&self) -> Place {
-        self.dimensions.iter().map(Dimension::side).collect()
-    }
-
     /// The symbols, in order.
     pub fn symbols(&self) -> Vec<Node> {
         self.dimensions.iter().map(|d| d.symbol).collect()
@@ -84,10 +70,10 @@ impl Region {
             if d.max == f64::INFINITY && high > d.min.max(0.0) + REACH {
                 (low, high) = (low.min(d.min.max(0.0) + REACH), d.max);
             }
-            Side {
-                name: d.name.clone(),
+            Dimension {
                 min: low,
                 max: high,
+                ..d.clone()
             }
         };
         sides.map(ends).collect()
@@ -117,7 +103,7 @@ impl Region {
     }
 
     /// Halves the relatively widest side; none if every side is a point.
-    pub(crate) fn split(&self, cell: &Cell) -> Option<(Cell, Cell)> {
+    pub(crate) fn split(&self, cell: &Cell) -> Option<[Cell; 2]> {
         self.split_one_of(cell, (0..cell.len()).collect())
     }
 
@@ -128,7 +114,7 @@ impl Region {
         cell: &Cell,
         symbols: &[Node],
         finest: f64,
-    ) -> Option<(Cell, Cell)> {
+    ) -> Option<[Cell; 2]> {
         let meant = |&i: &usize| {
             let side = &self.dimensions[i];
             symbols.contains(&side.symbol) && self.relative_width(i, &cell[i]) > finest
@@ -136,7 +122,7 @@ impl Region {
         self.split_one_of(cell, (0..cell.len()).filter(meant).collect())
     }
 
-    fn split_one_of(&self, cell: &Cell, sides: Vec<usize>) -> Option<(Cell, Cell)> {
+    fn split_one_of(&self, cell: &Cell, sides: Vec<usize>) -> Option<[Cell; 2]> {
         let width = |i: usize| self.relative_width(i, &cell[i]);
         let widest = sides
             .into_iter()
@@ -145,7 +131,7 @@ impl Region {
     }
 
     /// The cell cut along one side; none where that has nothing between its ends.
-    pub(crate) fn halves(&self, cell: &Cell, side: usize) -> Option<(Cell, Cell)> {
+    pub(crate) fn halves(&self, cell: &Cell, side: usize) -> Option<[Cell; 2]> {
         let (low, high) = (cell[side].lo(), cell[side].hi());
         let (left, right) = if self.dimensions[side].integer {
             let middle = self.middle(side, &cell[side]);
@@ -164,7 +150,7 @@ impl Region {
         let (mut first, mut second) = (cell.clone(), cell.clone());
         first[side] = Interval::new(low, left).ok()?;
         second[side] = Interval::new(right, high).ok()?;
-        Some((first, second))
+        Some([first, second])
     }
 
     /// The width of a side as a share of the region's.
@@ -268,34 +254,33 @@ pub(crate) fn inside(min: f64, max: f64, share: f64) -> f64 {
 }
 
 /// What a search on a region depends on; the graph keeps the answers.
-#[derive(Clone, PartialEq, Eq, Hash)]
+#[derive(Clone, PartialEq)]
 pub(crate) struct Question {
-    node: Node,
-    sides: Vec<Declared>,
-    budget: usize,
-}
-
-#[derive(Clone, PartialEq, Eq, Hash)]
-struct Declared {
-    name: String,
-    symbol: Node,
-    /// bits of min and max
-    ends: [u64; 2],
-    integer: bool,
+    pub node: Node,
+    pub region: Region,
+    pub budget: usize,
 }
 
 impl Question {
-    pub fn new(node: Node, region: &Region, budget: usize) -> Self {
-        let side = |side: &Dimension| Declared {
-            name: side.name.clone(),
-            symbol: side.symbol,
-            ends: [side.min, side.max].map(f64::to_bits),
-            integer: side.integer,
-        };
+    /// The question whether there is a value everywhere: of no budget, as that of no search.
+    pub fn whether_valued(&self) -> Self {
         Self {
-            node,
-            sides: region.dimensions.iter().map(side).collect(),
-            budget,
+            budget: 0,
+            ..self.clone()
+        }
+    }
+}
+
+// no end of a side is NaN
+impl Eq for Question {}
+
+impl Hash for Question {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        (self.node, self.budget).hash(state);
+        for side in &self.region.dimensions {
+            // 0 and −0 are equal
+            let ends = [side.min, side.max].map(|x| (x + 0.0).to_bits());
+            (side.symbol, ends).hash(state);
         }
     }
 }

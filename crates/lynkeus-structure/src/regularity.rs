@@ -10,12 +10,11 @@
 use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::interval::Intervals;
-use lynkeus_expr::{Algebra, Binary, Graph, Interval, MissingInput, Node, Op, Tape, Unary};
+use lynkeus_expr::{Algebra, Binary, Call, Graph, Interval, MissingInput, Node, Op, Tape, Unary};
 
 use crate::jumps::{meets, without_removable_jumps};
 use crate::region::{Cell, Question};
-use crate::words::short;
-use crate::{Finding, Place, Region, Side, Verdict, Witness};
+use crate::{Finding, Reason, Region, Verdict, Witness};
 
 /// Cells looked at.
 const BUDGET: usize = 3000;
@@ -24,139 +23,32 @@ const PARTS: usize = 16;
 /// A side halved so many times says where it is.
 const FINEST: f64 = 1e-4;
 
-/// What was found of some expressions on a box.
-#[derive(Clone, Debug)]
-pub struct Regularity {
-    trouble: Option<Trouble>,
-}
-
-/// Why an expression is not known to be regular.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Trouble {
-    /// the operation has no value there, or may have none
-    Undefined {
-        /// the operation as a person would write it
-        operation: String,
-        /// the part of the box
-        place: Place,
-        /// it certainly has none on that part
-        certain: bool,
-    },
-    /// the operation jumps there, or may jump
-    Jumps {
-        /// the operation as a person would write it
-        operation: String,
-        /// the part of the box
-        place: Place,
-    },
-}
-
-impl Regularity {
-    /// Examines `nodes` on the region; a jump counts where one of the `moving` symbols
-    /// causes it, what time or inputs switch does not.
-    ///
-    /// # Errors
-    /// [`MissingInput`] where an expression reads a symbol outside the region.
-    pub fn of(
-        graph: &Graph,
-        nodes: &[Node],
-        moving: &[Node],
-        region: &Region,
-    ) -> Result<Self, MissingInput> {
-        if is_regular_at_once(graph, nodes, moving, region)? {
-            return Ok(Self { trouble: None });
-        }
-        for &node in nodes {
-            let node = without_removable_jumps(graph, &[node])[0];
-            if let Some(trouble) = search(graph, node, moving, region)? {
-                return Ok(Self {
-                    trouble: Some(trouble),
-                });
-            }
-        }
-        Ok(Self { trouble: None })
+/// Decides whether `nodes` have values everywhere on the region and jump nowhere: a jump counts
+/// where one of the `moving` symbols causes it, what time or inputs switch does not.
+///
+/// Proved, or undecided with the place. Never refuted: a jump or a missing value in a
+/// part of an expression need not be one of the whole, and the plant need not go there.
+///
+/// # Errors
+/// [`MissingInput`] where an expression reads a symbol outside the region.
+pub fn regularity(
+    graph: &Graph,
+    nodes: &[Node],
+    moving: &[Node],
+    region: &Region,
+) -> Result<Finding, MissingInput> {
+    // the whole box decides most plants: one walk through what the expressions share
+    let mut walk = Walk::new(graph, nodes, moving, region)?;
+    if walk.trouble(&region.cell()).is_none() {
+        return Ok(Finding::proved(Reason::Regular));
     }
-
-    /// Every expression has a value everywhere on the box and jumps nowhere.
-    pub fn holds(&self) -> bool {
-        self.trouble.is_none()
-    }
-
-    /// What stands against it.
-    pub fn trouble(&self) -> Option<&Trouble> {
-        self.trouble.as_ref()
-    }
-
-    /// The verdict with what was found.
-    pub fn finding(&self) -> Finding {
-        let examined = || "every operation examined".to_owned();
-        Finding {
-            verdict: self.verdict(),
-            detail: self
-                .trouble
-                .as_ref()
-                .map_or_else(examined, Trouble::to_string),
+    for &node in nodes {
+        let node = without_removable_jumps(graph, &[node])[0];
+        if let Some(trouble) = search(graph, node, moving, region)? {
+            return Ok(trouble);
         }
     }
-
-    /// Proved, or undecided with the place. Never refuted: a jump or a missing value in a
-    /// part of an expression need not be one of the whole, and the plant need not go there.
-    pub fn verdict(&self) -> Verdict {
-        match &self.trouble {
-            None => Verdict::Proved,
-            Some(trouble) => Verdict::Undecided(trouble.place().to_vec()),
-        }
-    }
-}
-
-impl Trouble {
-    /// The part of the box in question.
-    pub fn place(&self) -> &[Side] {
-        match self {
-            Trouble::Undefined { place, .. } | Trouble::Jumps { place, .. } => place,
-        }
-    }
-
-    fn is_undefined(&self) -> bool {
-        matches!(self, Trouble::Undefined { .. })
-    }
-}
-
-impl std::fmt::Display for Trouble {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (operation, word) = match self {
-            Trouble::Undefined {
-                operation,
-                certain: true,
-                ..
-            } => (operation, "has no value"),
-            Trouble::Undefined { operation, .. } => (operation, "may have no value"),
-            Trouble::Jumps { operation, .. } => (operation, "jumps"),
-        };
-        write!(f, "{operation} {word}")?;
-        for (i, side) in self.place().iter().enumerate() {
-            let (name, low, high) = (&side.name, side.min, side.max);
-            let joint = if i == 0 { " at" } else { "," };
-            let narrow = (high - low).abs() <= 1e-3 * low.abs().max(high.abs()).max(1.0);
-            match narrow {
-                true => write!(f, "{joint} {name} = {}", short(nearest(low, high)))?,
-                false => write!(f, "{joint} {name} in [{}, {}]", short(low), short(high))?,
-            }
-        }
-        Ok(())
-    }
-}
-
-/// The roundest number of a narrow range: zero or one of its ends.
-fn nearest(low: f64, high: f64) -> f64 {
-    if low <= 0.0 && high >= 0.0 {
-        return 0.0;
-    }
-    let length = |x: f64| format!("{x}").len();
-    match length(low) <= length(high) {
-        true => low,
-        false => high,
-    }
+    Ok(Finding::proved(Reason::Regular))
 }
 
 /// Whether an expression has a value where a witness of another one lies; what the witness
@@ -198,18 +90,6 @@ pub(crate) fn is_regular(
     Ok(walk.trouble(cell).is_none())
 }
 
-/// Whether the whole box decides all of them, without halving it: so it is with most plants,
-/// and one walk through what the expressions share is enough.
-fn is_regular_at_once(
-    graph: &Graph,
-    nodes: &[Node],
-    moving: &[Node],
-    region: &Region,
-) -> Result<bool, MissingInput> {
-    let mut walk = Walk::new(graph, nodes, moving, region)?;
-    Ok(walk.trouble(&region.cell()).is_none())
-}
-
 /// The first place where it is not decided, depth first: a true jump is found after a few
 /// dozen cells, an overestimated range goes on until every cell is decided.
 ///
@@ -221,7 +101,7 @@ fn search(
     node: Node,
     moving: &[Node],
     region: &Region,
-) -> Result<Option<Trouble>, MissingInput> {
+) -> Result<Option<Finding>, MissingInput> {
     let region = region.restricted(&graph.symbols_of(&[node]));
     let mut walk = Walk::new(graph, &[node], moving, &region)?;
     let mut asked = vec![node];
@@ -235,7 +115,7 @@ fn search(
         let spoils = walk.needs_all() && !known.values.is_defined();
         if spoils && asked.len() <= PARTS && !asked.contains(&culprit) {
             let found = part(graph, culprit, moving, &region)?;
-            if found.as_ref().is_some_and(Trouble::is_undefined) {
+            if let Some(Reason::NoValue { .. }) = found.as_ref().map(|found| &found.reason) {
                 return Ok(found);
             }
             asked.push(culprit);
@@ -247,7 +127,7 @@ fn search(
             .then(|| region.split_among(&cell, &used, FINEST))
             .flatten();
         match halves {
-            Some((first, second)) => open.extend([second, first]),
+            Some([first, second]) => open.extend([second, first]),
             None => return Ok(Some(told(graph, &region, &cell, culprit, known.values))),
         }
     }
@@ -260,36 +140,39 @@ fn part(
     node: Node,
     moving: &[Node],
     region: &Region,
-) -> Result<Option<Trouble>, MissingInput> {
+) -> Result<Option<Finding>, MissingInput> {
     let symbols = graph.symbols_of(&[node]);
-    let region = region.restricted(&symbols);
     let moving = moving.iter().copied().filter(|m| symbols.contains(m));
     let moving: Vec<Node> = moving.collect();
-    let question = (Question::new(node, &region, BUDGET), moving);
+    let asked = Question {
+        node,
+        region: region.restricted(&symbols),
+        budget: BUDGET,
+    };
+    let question = (asked, moving);
     if let Some(known) = graph.noted(&question) {
         return Ok(known);
     }
-    let found = search(graph, node, &question.1, &region)?;
+    let found = search(graph, node, &question.1, &question.0.region)?;
     graph.note(question, found.clone());
     Ok(found)
 }
 
-fn told(graph: &Graph, region: &Region, cell: &Cell, culprit: Node, values: Interval) -> Trouble {
+fn told(graph: &Graph, region: &Region, cell: &Cell, culprit: Node, values: Interval) -> Finding {
     let used = graph.symbols_of(&[culprit]);
-    let named = region.named(cell).into_iter().zip(&region.dimensions);
-    let place = named
-        .filter(|(_, d)| used.contains(&d.symbol))
-        .map(|(side, _)| side)
-        .collect();
+    let mut place = region.named(cell);
+    place.retain(|side| used.contains(&side.symbol));
+    let verdict = Verdict::Undecided(place.clone());
     let operation = graph.render(culprit, 60);
-    match values.is_defined() {
-        true => Trouble::Jumps { operation, place },
-        false => Trouble::Undefined {
+    let reason = match values.is_defined() {
+        true => Reason::Jumps { operation, place },
+        false => Reason::NoValue {
             operation,
             place,
             certain: values.is_empty(),
         },
-    }
+    };
+    Finding { verdict, reason }
 }
 
 /// Whether an operation that steps stands between a node and one of the symbols, wherever
@@ -306,9 +189,7 @@ pub fn steps(graph: &Graph, node: Node, symbols: &[Node]) -> bool {
                 ..,
             ) => depends(n),
             Op::Select(condition, ..) => depends(condition),
-            Op::Implicit(_) => graph
-                .implicit_call(n)
-                .is_some_and(|call| call.function.steps() && depends(n)),
+            Op::System(_) => graph.jumps(n) && depends(n),
             _ => false,
         })
 }
@@ -472,7 +353,7 @@ impl<'g> Walk<'g> {
             Op::Binary(op, ..) => Intervals.binary(op, &of(0), &of(1)),
             Op::Select(..) => Intervals.select(&of(0), &of(1), &of(2)),
             // a system has no value of its own, and must not pass for a constant
-            Op::Solve(_) | Op::Implicit(_) => Interval::ENTIRE,
+            Op::System(_) => Interval::ENTIRE,
             Op::Entry(_, i) => {
                 let entry = self.solved[step.arguments[0]].get(i as usize);
                 entry.copied().unwrap_or(Interval::UNKNOWN)
@@ -484,19 +365,15 @@ impl<'g> Walk<'g> {
         let step = &self.steps[i];
         let arguments = step.arguments.iter();
         let values: Vec<Interval> = arguments.map(|&a| self.known[a].values).collect();
-        if let Some(call) = self.graph.implicit_call(step.node) {
-            return Intervals.implicit(&call.function, &values);
+        let call = self.graph.system(step.node);
+        if let Some(function) = call.as_ref().and_then(Call::function) {
+            return Intervals.implicit(function, &values);
         }
-        let n = self.unknowns(step.node);
+        let n = call.map_or(0, |call| call.size());
         let (A, b) = values.split_at(n * n);
         let (mut x, condition) = Intervals.solve(A, b);
         x.push(condition);
         x
-    }
-
-    /// Number of unknowns of a linear system.
-    fn unknowns(&self, system: Node) -> usize {
-        self.graph.system(system).map_or(0, |system| system.size())
     }
 
     fn continuous(&self, step: &Step, values: Interval) -> bool {
@@ -529,11 +406,12 @@ impl<'g> Walk<'g> {
             // the condition estimate steps with the pivots; a root that is the only one of
             // equations that do not jump moves with them
             Op::Entry(system, i) => {
-                let linear = matches!(self.steps[step.arguments[0]].op, Op::Solve(_));
-                let last = linear && i as usize == self.unknowns(system);
+                // an implicit function has none
+                let call = self.graph.system(system);
+                let last = call.is_some_and(|call| i as usize == call.size());
                 of(0).continuous && values.is_defined() && !last
             }
-            Op::Unary(..) | Op::Powi(..) | Op::Binary(..) | Op::Solve(_) | Op::Implicit(_) => {
+            Op::Unary(..) | Op::Powi(..) | Op::Binary(..) | Op::System(_) => {
                 let mut arguments = step.arguments.iter();
                 arguments.all(|&a| self.known[a].continuous)
             }

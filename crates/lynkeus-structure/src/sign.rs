@@ -6,10 +6,9 @@ use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 use crate::jumps::without_removable_jumps;
 use crate::region::Cell;
 use crate::regularity::is_regular;
-use crate::words::short;
 use crate::{
-    Coordinate, Finding, Point, Range, Region, Regularity, Side, Verdict, Witness, range,
-    range_within,
+    Coordinate, Dimension, Finding, Point, Range, Reason, Region, Verdict, Witness, range,
+    range_within, regularity,
 };
 
 /// Cells examined per end to see whether there is a bound.
@@ -37,25 +36,26 @@ pub fn keeps_sign(graph: &Graph, node: Node, region: &Region) -> Result<Sign, Mi
     let found = range(graph, node, region)?;
     let (low, high) = (found.enclosure.lo(), found.enclosure.hi());
     let expression = graph.render(node, 80);
-    let (verdict, detail) = if low > 0.0 || high < 0.0 {
-        let detail = format!("{expression} lies in [{}, {}]", short(low), short(high));
-        (Verdict::Proved, detail)
+    let lies = |open: bool, undeclared: Vec<String>| Reason::Lies {
+        expression: expression.clone(),
+        low,
+        high,
+        open,
+        undeclared,
+    };
+    let finding = if low > 0.0 || high < 0.0 {
+        Finding::proved(lies(false, vec![]))
     } else if let Some(witness) = witness(graph, node, region, &found)? {
-        (
-            Verdict::Refuted(witness),
-            format!("{expression} can vanish or change its sign"),
-        )
-    } else if let Some(trouble) = Regularity::of(graph, &[node], &[], region)?.trouble() {
-        let place = trouble.place().to_vec();
-        (Verdict::Undecided(place), trouble.to_string())
+        Finding::refuted(witness, Reason::Vanishes(expression))
     } else {
-        let detail = format!(
-            "{expression} lies in [{}, {}] as far as can be proved{}",
-            short(low),
-            short(high),
-            undeclared(&found)
-        );
-        (Verdict::Undecided(found.weakest.clone()), detail)
+        let regular = regularity(graph, &[node], &[], region)?;
+        match regular.is_proved() {
+            false => regular,
+            true => Finding {
+                verdict: Verdict::Undecided(found.weakest.clone()),
+                reason: lies(true, undeclared(&found)),
+            },
+        }
     };
     let sample = found.highest.as_ref().map_or(1.0, |p| p.value);
     let sign = if high < 0.0 || (low <= 0.0 && sample < 0.0) {
@@ -71,7 +71,7 @@ pub fn keeps_sign(graph: &Graph, node: Node, region: &Region) -> Result<Sign, Mi
         (0.0, high.max(-low))
     };
     Ok(Sign {
-        finding: Finding { verdict, detail },
+        finding,
         sign,
         bounds,
     })
@@ -103,19 +103,11 @@ pub fn bounded_at_once(
     Ok(values.iter().map(is_bounded).collect())
 }
 
-/// A hint where the box has no declared end.
-fn undeclared(found: &Range) -> String {
-    let open = |side: &&Side| side.min.is_infinite() || side.max.is_infinite();
-    let names: Vec<&str> = found
-        .weakest
-        .iter()
-        .filter(open)
-        .map(|side| side.name.as_str())
-        .collect();
-    match names.is_empty() {
-        true => String::new(),
-        false => format!("; declare min and max of {}", names.join(", ")),
-    }
+/// Names of the sides of the weakest cell that have no declared end.
+fn undeclared(found: &Range) -> Vec<String> {
+    let open = |side: &&Dimension| side.min.is_infinite() || side.max.is_infinite();
+    let open = found.weakest.iter().filter(open);
+    open.map(|side| side.name.clone()).collect()
 }
 
 fn witness(
@@ -230,7 +222,7 @@ fn told(tape: &Tape, like: &Point, place: &[f64]) -> Point {
 /// A small cell of the region around a point.
 fn around(point: &Point, region: &Region) -> Cell {
     let sides = point.coordinates.iter().zip(&region.dimensions);
-    let side = |(Coordinate { value: x, .. }, d): (&Coordinate, &crate::Dimension)| {
+    let side = |(Coordinate { value: x, .. }, d): (&Coordinate, &Dimension)| {
         let (low, high) = (x.next_down().max(d.min), x.next_up().min(d.max));
         Interval::new(low, high).unwrap_or(Interval::point(*x))
     };
@@ -289,7 +281,6 @@ mod tests {
     use lynkeus_expr::{Expr, jacobian};
 
     use super::*;
-    use crate::{Dimension, Point, Verdict};
 
     fn side(x: Expr<'_>, min: f64, max: f64, integer: bool) -> Dimension {
         let name = x.graph().symbol_name(x.node()).unwrap();
@@ -389,7 +380,7 @@ mod tests {
         // of one sign as far as anyone looks
         let sign = decide(x + 1e30, vec![side(x, all.0, all.1, false)]);
         assert!(matches!(sign.finding.verdict, Verdict::Undecided(_)));
-        let text = format!("{} {}", sign.finding.verdict, sign.finding.detail);
+        let text = format!("{} {}", sign.finding.verdict, sign.finding.reason.text());
         assert!(
             !text.contains("e30") || text.contains("declare min and max of x"),
             "{text}"
@@ -405,9 +396,12 @@ mod tests {
         let sign = decide(x.exp(), vec![side(x, all.0, all.1, false)]);
         assert!(matches!(sign.finding.verdict, Verdict::Undecided(_)));
         assert!(
-            sign.finding.detail.contains("declare min and max of x"),
+            sign.finding
+                .reason
+                .text()
+                .contains("declare min and max of x"),
             "{}",
-            sign.finding.detail
+            sign.finding.reason.text()
         );
     }
 

@@ -25,7 +25,7 @@ use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Tape, Unary,
 use lynkeus_proof::decay::{ErrorModel, Sector};
 
 use crate::jumps::without_removable_jumps;
-use crate::{Place, Region, Regularity, range_within};
+use crate::{Place, Region, range_within, regularity};
 
 /// Inputs whose ranges become vertices: 2⁴ models at most.
 const VERTEX_INPUTS: usize = 4;
@@ -184,7 +184,7 @@ fn moves_slopes_affinely(
         return Ok(false);
     }
     // a step has no derivative, and what it does between the ends they do not tell
-    Ok(Regularity::of(graph, derivatives, &[symbol], region)?.holds())
+    Ok(regularity(graph, derivatives, &[symbol], region)?.is_proved())
 }
 
 /// The region with each of the inputs at one end of its range.
@@ -201,10 +201,8 @@ fn at_vertex(region: &Region, inputs: &[usize], vertex: usize) -> Region {
 }
 
 fn named(region: &Region, inputs: &[usize]) -> Place {
-    inputs
-        .iter()
-        .map(|&i| region.dimensions[i].side())
-        .collect()
+    let sides = inputs.iter().map(|&i| region.dimensions[i].clone());
+    sides.collect()
 }
 
 /// Cells examined per end of a slope's range.
@@ -336,7 +334,7 @@ impl Part {
         let moving: Vec<Node> = columns.iter().map(|c| c.0).collect();
         for group in groups(weights) {
             let terms: Vec<Node> = group.terms.iter().map(|t| t.0).collect();
-            let regular = Regularity::of(graph, &terms, &moving, region)?.holds();
+            let regular = regularity(graph, &terms, &moving, region)?.is_proved();
             for &column in columns {
                 let found = sector(graph, &group, column, regular, region)?;
                 part.sectors.extend(found);

@@ -14,9 +14,9 @@ use lynkeus_proof::matrix::{IntervalMatrix, points, sum};
 use nalgebra::DMatrix;
 
 use crate::chains::names;
-use crate::rank::subsets;
+use crate::rank::gram;
 use crate::region::{inside, spread};
-use crate::{AugmentedPlant, Finding, Matrix, Point, Region, Verdict, sign};
+use crate::{AugmentedPlant, Finding, Point, Reason, Region, Shown, Verdict, sign};
 
 /// One rectangular block: F_k.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,7 +63,7 @@ impl Superdiagonal {
 /// # Errors
 /// The first output or equation that breaks the form; the states that no block reaches.
 pub fn find(augmented: &AugmentedPlant<'_>) -> Result<Superdiagonal, String> {
-    let outputs: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
+    let outputs = augmented.output_nodes();
     let output = |i: usize| format!("the output {}", augmented.outputs[i].variable.name);
     let all: Vec<usize> = (0..augmented.states.len()).collect();
     let rows: Vec<usize> = (0..outputs.len()).collect();
@@ -202,11 +202,6 @@ impl Factor {
     }
 }
 
-/// Larger minors are not expanded.
-const MAX_COLUMNS: usize = 5;
-/// More minors than this are left undecided.
-const MAX_MINORS: usize = 250;
-
 impl Factor {
     /// Has F_k full column rank everywhere on the box? Then x^{k+1} shows in x^k
     /// whatever the input. Refuted, with the direction ξ that F_k ξ = 0 hides,
@@ -222,33 +217,35 @@ impl Factor {
         region: &Region,
     ) -> Result<Finding, MissingInput> {
         let graph = augmented.graph();
-        let shape = format!("F_{k} is {}×{}", self.rows.len(), self.columns.len());
+        let size = (self.rows.len(), self.columns.len());
+        let because = |shows: Shown| Reason::Factor { k, size, shows };
         if let Some(F) = self.constant(graph) {
-            return Ok(self.constant_rank(augmented, &F, &shape));
+            return Ok(self.constant_rank(augmented, &F, because));
         }
-        let entries: Vec<Node> = self.entries.iter().map(|&(.., node)| node).collect();
-        let used = region.restricted(&graph.symbols_of(&entries));
-        let sides = used.named(&used.cell());
-        let Some(minors) = self.minors(graph) else {
-            let detail = format!(
-                "{shape}: it shows these states only while its entries move, so convergence rests on the excitation (A4)"
-            );
+        let entry = |i: usize, j: usize| {
+            let found = self.entries.iter().find(|&&(k, l, _)| (k, l) == (i, j));
+            found.map(|&(.., node)| node)
+        };
+        let open = || {
+            let entries: Vec<Node> = self.entries.iter().map(|&(.., node)| node).collect();
+            let used = region.restricted(&graph.symbols_of(&entries));
+            Verdict::Undecided(used.named(&used.cell()))
+        };
+        let Some(gram) = gram(graph, size, entry) else {
             return Ok(Finding {
-                verdict: Verdict::Undecided(sides),
-                detail,
+                verdict: open(),
+                reason: because(Shown::WhileMoving),
             });
         };
-        let found = sign::keeps_sign(graph, minors, region)?.finding;
-        Ok(match found.verdict {
+        let Finding { verdict, reason } = sign::keeps_sign(graph, gram, region)?.finding;
+        Ok(match verdict {
             Verdict::Refuted(witness) => Finding {
-                detail: format!(
-                    "{shape} and loses rank (det F_{k}ᵀF_{k}: {witness}); convergence rests on inputs that do not stay there (A4)"
-                ),
-                verdict: Verdict::Undecided(sides),
+                verdict: open(),
+                reason: because(Shown::NotAt(witness)),
             },
             verdict => Finding {
-                detail: format!("{shape}; det F_{k}ᵀF_{k} = {}", found.detail),
                 verdict,
+                reason: because(Shown::Gram(Box::new(reason))),
             },
         })
     }
@@ -268,55 +265,21 @@ impl Factor {
         &self,
         augmented: &AugmentedPlant<'_>,
         F: &DMatrix<f64>,
-        shape: &str,
+        because: impl Fn(Shown) -> Reason,
     ) -> Finding {
-        let kernel = kernel(F);
-        let Kernel::Direction(ξ) = kernel else {
-            let (verdict, detail) = match kernel {
-                Kernel::Zero => (
-                    Verdict::Proved,
-                    format!(
-                        "{shape} and constant, its columns independent by elimination in interval arithmetic"
-                    ),
-                ),
-                _ => (
-                    Verdict::open(),
-                    format!(
-                        "{shape} and constant, so near to one that hides a direction that rounding errors keep from telling whether it does"
-                    ),
-                ),
-            };
-            return Finding { verdict, detail };
-        };
-        let component = |(&i, x): (&usize, f64)| (augmented.states[i].name.clone(), x).into();
-        let direction = Point {
-            coordinates: self.columns.iter().zip(ξ).map(component).collect(),
-            value: 0.0,
-        };
-        let detail = format!(
-            "{shape} and constant: whatever the input, the layer before does not show this direction, so that this arrangement of the states does not fit; measure another output"
-        );
-        Finding::refuted(direction, detail)
-    }
-
-    /// det FᵀF as the sum of the squared minors (Cauchy and Binet); none where F
-    /// is wider than tall or the minors are too many.
-    fn minors(&self, graph: &Graph) -> Option<Node> {
-        let (rows, columns) = (self.rows.len(), self.columns.len());
-        if columns > rows || columns > MAX_COLUMNS {
-            return None;
+        match kernel(F) {
+            (Shown::Always, _) => Finding::proved(because(Shown::Always)),
+            (shows, None) => Finding::undecided(because(shows)),
+            (shows, Some(ξ)) => {
+                let component =
+                    |(&i, x): (&usize, f64)| (augmented.states[i].name.clone(), x).into();
+                let direction = Point {
+                    coordinates: self.columns.iter().zip(ξ).map(component).collect(),
+                    value: 0.0,
+                };
+                Finding::refuted(direction, because(shows))
+            }
         }
-        let entry = |i: usize, j: usize| {
-            let found = self.entries.iter().find(|&&(k, l, _)| (k, l) == (i, j));
-            found.map(|&(.., node)| node)
-        };
-        let matrix = Matrix::from_fn(graph, (rows, columns), entry);
-        let squares = subsets(rows, columns, MAX_MINORS)?
-            .into_iter()
-            .filter_map(|rows| matrix.select_rows(&rows).determinant())
-            .map(|minor| graph.expr(minor).powi(2));
-        let zero = || graph.constant(0.0);
-        Some(squares.reduce(|a, b| a + b).unwrap_or_else(zero).node())
     }
 }
 
@@ -325,19 +288,9 @@ const GRID: f64 = 1_048_576.0;
 /// Components below this share of the largest are not taken for the unit of a direction.
 const SIGNIFICANT: f64 = 1e-6;
 
-/// What F ξ = 0 leaves of ξ.
-#[derive(Clone, Debug, PartialEq)]
-enum Kernel {
-    /// nothing but zero
-    Zero,
-    /// this direction, exactly; or near to this one where F is wider than tall
-    Direction(Vec<f64>),
-    /// rounding errors hide it
-    Unknown,
-}
-
-/// The kernel of F.
-fn kernel(F: &DMatrix<f64>) -> Kernel {
+/// What a matrix of numbers shows of ξ in F ξ, and where it hides a direction that one, exactly; or one near to it
+/// where F is wider than tall.
+fn kernel(F: &DMatrix<f64>) -> (Shown, Option<Vec<f64>>) {
     let mut rows = points(F);
     // per column the row of the one that is left there
     let mut pivots: Vec<Option<usize>> = vec![];
@@ -352,7 +305,7 @@ fn kernel(F: &DMatrix<f64>) -> Kernel {
         pivots.push(pivot);
     }
     if pivots.iter().all(Option::is_some) {
-        return Kernel::Zero;
+        return (Shown::Always, None);
     }
     let free = (0..F.ncols()).filter(|&column| pivots[column].is_none());
     let directions = free.map(|column| {
@@ -372,7 +325,10 @@ fn kernel(F: &DMatrix<f64>) -> Kernel {
         .into_iter()
         .next()
         .filter(|ξ| F.ncols() > F.nrows() && ξ.iter().all(|x| x.is_finite()));
-    exact.or(near).map_or(Kernel::Unknown, Kernel::Direction)
+    match exact.or(near) {
+        Some(ξ) => (Shown::Never, Some(ξ)),
+        None => (Shown::Unknown, None),
+    }
 }
 
 /// Divides a row by its pivot and takes it from all others.
@@ -520,33 +476,36 @@ mod tests {
         assert!(matches!(verdicts(wide)[1], Verdict::Undecided(_)));
     }
 
-    fn of(rows: usize, columns: usize, entries: &[f64]) -> Kernel {
+    fn of(rows: usize, columns: usize, entries: &[f64]) -> (Shown, Option<Vec<f64>>) {
         kernel(&DMatrix::from_row_slice(rows, columns, entries))
     }
 
     #[test]
     fn small_numbers_are_no_zeros() {
-        assert_eq!(of(2, 2, &[1.0, 0.0, 0.0, 1e-14]), Kernel::Zero);
-        assert_eq!(of(2, 2, &[1.0, 0.0, 1e10, 1e-300]), Kernel::Zero);
-        assert_eq!(of(3, 1, &[0.0, 0.0, 5e-324]), Kernel::Zero);
+        assert_eq!(of(2, 2, &[1.0, 0.0, 0.0, 1e-14]), (Shown::Always, None));
+        assert_eq!(of(2, 2, &[1.0, 0.0, 1e10, 1e-300]), (Shown::Always, None));
+        assert_eq!(of(3, 1, &[0.0, 0.0, 5e-324]), (Shown::Always, None));
     }
 
     #[test]
     fn directions_are_exact() {
         assert_eq!(
             of(2, 2, &[3.0, 1.0, 6.0, 2.0]),
-            Kernel::Direction(vec![1.0, -3.0])
+            (Shown::Never, Some(vec![1.0, -3.0]))
         );
-        assert_eq!(of(2, 1, &[0.0, 0.0]), Kernel::Direction(vec![1.0]));
+        assert_eq!(of(2, 1, &[0.0, 0.0]), (Shown::Never, Some(vec![1.0])));
         // a kernel of two directions
-        assert_eq!(of(3, 3, &[1.0; 9]), Kernel::Direction(vec![1.0, -1.0, 0.0]));
+        assert_eq!(
+            of(3, 3, &[1.0; 9]),
+            (Shown::Never, Some(vec![1.0, -1.0, 0.0]))
+        );
         // 0.3 is not three times 0.1, and no number of few digits
-        assert_eq!(of(2, 2, &[0.1, 0.3, 0.2, 0.6]), Kernel::Unknown);
+        assert_eq!(of(2, 2, &[0.1, 0.3, 0.2, 0.6]), (Shown::Unknown, None));
     }
 
     #[test]
     fn what_is_wider_than_tall_has_a_direction() {
-        let Kernel::Direction(ξ) = of(1, 2, &[0.1, 0.3]) else {
+        let (Shown::Never, Some(ξ)) = of(1, 2, &[0.1, 0.3]) else {
             panic!()
         };
         assert!((0.1 * ξ[0] + 0.3 * ξ[1]).abs() < 1e-15 && ξ[1] == 1.0);

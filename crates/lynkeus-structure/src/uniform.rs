@@ -13,14 +13,15 @@
 use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::interval::Intervals;
-use lynkeus_expr::{Graph, MissingInput, Node, Tape, jacobian};
+use lynkeus_expr::jacobian::{self, Jacobian};
+use lynkeus_expr::{Graph, MissingInput, Node, Tape};
 
 use crate::matrix::{Rows, determinant, jacobian_rows};
 use crate::output_map::{Codistribution, output_derivatives};
 use crate::region::{Cell, inside};
 use crate::{
-    AugmentedPlant, Finding, OneToOne, Place, Region, Regularity, Side, Verdict, magnitude_within,
-    one_to_one, sign, vanishes,
+    AugmentedPlant, Coordinate, Finding, OneToOne, Place, Reason, Region, Verdict,
+    magnitude_within, one_to_one, regularity, sign, vanishes,
 };
 
 /// A determinant of more states has too many terms.
@@ -66,7 +67,7 @@ pub fn uniformity(
     let graph = augmented.graph();
     let region = augmented.region();
     let derivatives = Derivatives::new(augmented)?;
-    let Some(Map { node, regular }) = map(augmented, &derivatives, &region)? else {
+    let Some((node, regular)) = map(augmented, &derivatives, &region)? else {
         return Ok(None);
     };
     if vanishes(graph, node, &region)? == Verdict::Proved {
@@ -93,15 +94,7 @@ pub fn uniformity(
             .into_iter()
             .map(str::to_owned)
             .collect(),
-        sides: augmented
-            .states
-            .iter()
-            .map(|s| Side {
-                name: s.name.clone(),
-                min: s.min,
-                max: s.max,
-            })
-            .collect(),
+        sides: region.dimensions[..n].to_vec(),
     }))
 }
 
@@ -135,25 +128,19 @@ fn without_jumps(found: Finding, region: &Region) -> Finding {
     match &found.verdict {
         Verdict::Refuted(witness) if witness.zero().is_none() => Finding {
             verdict: Verdict::Undecided(region.named(&region.cell())),
-            detail: format!("{}, but only by a jump", found.detail),
+            reason: Reason::ByJump(Box::new(found.reason)),
         },
         _ => found,
     }
 }
 
-/// A determinant of n rows of ∂(y, y', …)/∂x for constant inputs.
-struct Map {
-    node: Node,
-    regular: Finding,
-}
-
-/// The first choice of rows whose determinant is proved to keep its sign, else the
-/// first that is independent at generic points.
+/// A determinant of n rows of ∂(y, y', …)/∂x for constant inputs, and whether it keeps away from zero: of the
+/// first choice of rows for which that is proved, else of the first that is independent at generic points.
 fn map(
     augmented: &AugmentedPlant<'_>,
     derivatives: &Derivatives,
     region: &Region,
-) -> Result<Option<Map>, MissingInput> {
+) -> Result<Option<(Node, Finding)>, MissingInput> {
     let mut codistribution = Codistribution::new(augmented, &derivatives.gradients)?;
     let first = codistribution.krener_respondek();
     if first.iter().sum::<usize>() < augmented.states.len() {
@@ -162,7 +149,7 @@ fn map(
     let Some(found) = examined(augmented, derivatives, &first, region)? else {
         return Ok(None);
     };
-    if found.regular.verdict == Verdict::Proved {
+    if found.1.is_proved() {
         return Ok(Some(found));
     }
     let mut others = codistribution.alternatives(&first);
@@ -172,8 +159,7 @@ fn map(
             continue;
         }
         let other = examined(augmented, derivatives, &indices, region)?;
-        let other = other.filter(|map| map.regular.verdict == Verdict::Proved);
-        if other.is_some() {
+        if other.as_ref().is_some_and(|other| other.1.is_proved()) {
             return Ok(other);
         }
     }
@@ -185,7 +171,7 @@ fn examined(
     derivatives: &Derivatives,
     indices: &[usize],
     region: &Region,
-) -> Result<Option<Map>, MissingInput> {
+) -> Result<Option<(Node, Finding)>, MissingInput> {
     let graph = augmented.graph();
     let pairs = derivatives.gradients.iter().zip(indices);
     let chosen: Rows = pairs
@@ -201,12 +187,11 @@ fn examined(
     // where the map itself jumps, its derivative tells nothing
     let mut moving = augmented.symbols();
     moving.push(augmented.plant.time);
-    let regularity = Regularity::of(graph, &map, &moving, region)?;
-    let regular = match regularity.holds() {
-        true => without_jumps(sign::keeps_sign(graph, node, region)?.finding, region),
-        false => regularity.finding(),
-    };
-    Ok(Some(Map { node, regular }))
+    let mut regular = regularity(graph, &map, &moving, region)?;
+    if regular.is_proved() {
+        regular = without_jumps(sign::keeps_sign(graph, node, region)?.finding, region);
+    }
+    Ok(Some((node, regular)))
 }
 
 /// The outputs' derivatives along the flow for constant inputs.
@@ -276,11 +261,11 @@ fn cells(graph: &Graph, node: Node, region: &Region) -> Result<(Vec<Place>, f64)
             break;
         };
         let (cell, share) = open.swap_remove(place);
-        let Some((first, second)) = region.split(&cell) else {
+        let Some(halves) = region.split(&cell) else {
             open.push((cell, share));
             break;
         };
-        for half in [first, second] {
+        for half in halves {
             if may_vanish(&half) {
                 open.push((half, 0.5 * share));
             }
@@ -307,7 +292,7 @@ pub struct Blind {
     /// plant that differ only in these cannot be told apart
     pub hidden: Vec<String>,
     /// two such states, where there is a hidden one: by name, in the box
-    pub alike: Option<[Vec<(String, f64)>; 2]>,
+    pub alike: Option<[Vec<Coordinate>; 2]>,
 }
 
 /// Constant inputs, of zero and the ends and middles of their ranges, for which the
@@ -357,11 +342,11 @@ fn blind(
 
 /// Two states that differ in the hidden ones only: a quarter and three quarters up
 /// their ranges, the others in the middle.
-fn alike(augmented: &AugmentedPlant<'_>, hidden: &[String]) -> [Vec<(String, f64)>; 2] {
+fn alike(augmented: &AugmentedPlant<'_>, hidden: &[String]) -> [Vec<Coordinate>; 2] {
     [0.25, 0.75].map(|share| {
         let value = |v: &lynkeus_model::Variable| {
             let share = if hidden.contains(&v.name) { share } else { 0.5 };
-            (v.name.clone(), inside(v.min, v.max, share))
+            (v.name.clone(), inside(v.min, v.max, share)).into()
         };
         augmented.states.iter().map(value).collect()
     })
@@ -375,10 +360,7 @@ fn hidden(
 ) -> Result<Vec<String>, MissingInput> {
     let graph = augmented.graph();
     let symbols = augmented.symbols();
-    let outputs = augmented.outputs.iter().map(|o| o.variable.node);
-    let functions: Vec<Node> = outputs
-        .chain(augmented.derivatives.iter().copied())
-        .collect();
+    let functions = [augmented.output_nodes(), augmented.derivatives.clone()].concat();
     let partials = jacobian_rows(graph, &functions, &symbols);
     let first = augmented.outputs.len();
     let mut seen = vec![false; symbols.len()];
@@ -430,37 +412,54 @@ const SLOPE_CELLS: usize = 400;
 pub fn determined(augmented: &AugmentedPlant<'_>) -> Result<Vec<bool>, MissingInput> {
     let (graph, region) = (augmented.graph(), augmented.region());
     let mut known = vec![false; augmented.states.len()];
-    if known.len() > KNOWN_STATES {
+    let Some(slopes) = slopes(augmented, &region)? else {
         return Ok(known);
-    }
-    // a function that jumps may take a value twice though its slope has one sign
-    if augmented.regularity(&region)?.verdict != Verdict::Proved {
-        return Ok(known);
-    }
-    let outputs = augmented.outputs.iter().map(|o| o.variable.node);
-    let functions: Vec<Node> = outputs
-        .chain(augmented.derivatives.iter().copied())
-        .collect();
-    let slopes = jacobian::forward(graph, &functions, &augmented.symbols());
+    };
     let first = augmented.outputs.len();
     // the derivative of an unknown input is no equation
     let mut open: Vec<usize> = (0..first + augmented.plant_states()).collect();
-    loop {
-        let mut next = None;
-        for (place, &row) in open.iter().enumerate() {
-            let is_told = row < first || known[row - first];
-            let mut entries = slopes.row(row).filter(|(j, _)| !known[*j]);
-            if let (true, Some((j, slope)), None) = (is_told, entries.next(), entries.next()) {
-                next = Some((place, j, slope));
-                break;
-            }
-        }
-        let Some((place, j, slope)) = next.filter(|_| graph.spent().is_none()) else {
-            return Ok(known);
-        };
-        open.remove(place);
-        known[j] = sign::keeps_sign(graph, slope, &region)?.finding.verdict == Verdict::Proved;
+    while graph.spent().is_none() {
+        let is_told = |row: usize| row < first || known[row - first];
+        let next = one_unknown(&mut open, &slopes, is_told, |j| known[j]);
+        let Some((_, j, slope)) = next else { break };
+        known[j] = sign::keeps_sign(graph, slope, &region)?.finding.is_proved();
     }
+    Ok(known)
+}
+
+/// Those of the outputs, then of the derivatives, by the augmented states; none where there are too many states, or
+/// where a function jumps: it may take a value twice though its slope has one sign.
+fn slopes(
+    augmented: &AugmentedPlant<'_>,
+    region: &Region,
+) -> Result<Option<Jacobian>, MissingInput> {
+    if augmented.states.len() > KNOWN_STATES || !augmented.regularity(region)?.is_proved() {
+        return Ok(None);
+    }
+    let functions = [augmented.output_nodes(), augmented.derivatives.clone()].concat();
+    let symbols = augmented.symbols();
+    Ok(Some(jacobian::forward(
+        augmented.graph(),
+        &functions,
+        &symbols,
+    )))
+}
+
+/// The first of the open rows that counts and reads one unknown alone, taken out: with the place of that unknown and
+/// its slope.
+fn one_unknown(
+    open: &mut Vec<usize>,
+    slopes: &Jacobian,
+    counts: impl Fn(usize) -> bool,
+    is_known: impl Fn(usize) -> bool,
+) -> Option<(usize, usize, Node)> {
+    let (place, row, (j, slope)) = open.iter().enumerate().find_map(|(place, &row)| {
+        let mut entries = slopes.row(row).filter(|(j, _)| !is_known(*j));
+        let only = entries.next().filter(|_| counts(row))?;
+        entries.next().is_none().then_some((place, row, only))
+    })?;
+    open.remove(place);
+    Some((row, j, slope))
 }
 
 /// Per augmented state how far two of its values can be apart that the same outputs go with, where that is
@@ -479,29 +478,16 @@ pub fn uncertain(
     for &(place, size) in given {
         sizes[place] = sizes[place].or(Some(size).filter(|size| size.is_finite()));
     }
-    if sizes.len() > KNOWN_STATES || augmented.regularity(&region)?.verdict != Verdict::Proved {
+    let Some(slopes) = slopes(augmented, &region)? else {
         return Ok(sizes);
-    }
-    let outputs = augmented.outputs.iter().map(|o| o.variable.node);
-    let functions: Vec<Node> = outputs
-        .chain(augmented.derivatives.iter().copied())
-        .collect();
-    let slopes = jacobian::forward(graph, &functions, &augmented.symbols());
+    };
     let first = augmented.outputs.len();
     let mut open: Vec<usize> = (0..first + augmented.plant_states())
         .filter(|&row| row < first || known[row - first])
         .collect();
-    loop {
-        let one = |row: usize| {
-            let mut entries = slopes.row(row).filter(|(j, _)| sizes[*j].is_none());
-            entries.next().filter(|_| entries.next().is_none())
-        };
-        let mut next = open.iter().enumerate();
-        let next = next.find_map(|(place, &row)| Some((place, row, one(row)?)));
-        let Some((place, row, (j, slope))) = next.filter(|_| graph.spent().is_none()) else {
-            return Ok(sizes);
-        };
-        open.remove(place);
+    while graph.spent().is_none() {
+        let next = one_unknown(&mut open, &slopes, |_| true, |j| sizes[j].is_some());
+        let Some((row, j, slope)) = next else { break };
         let (least, _) = sign::keeps_sign(graph, slope, &region)?.bounds;
         let mut sum = 0.0;
         for (k, slope) in slopes.row(row).filter(|(k, _)| *k != j) {
@@ -512,6 +498,7 @@ pub fn uncertain(
         }
         sizes[j] = Some(sum / least).filter(|size| size.is_finite());
     }
+    Ok(sizes)
 }
 
 #[cfg(test)]
@@ -552,7 +539,7 @@ mod tests {
         };
         assert_eq!((blind.input.as_str(), blind.value), ("u", 0.0));
         assert_eq!(blind.hidden, ["b"]);
-        let at = |a: f64, b: f64| vec![("a".to_owned(), a), ("b".to_owned(), b)];
+        let at = |a: f64, b: f64| vec![("a".to_owned(), a).into(), ("b".to_owned(), b).into()];
         assert_eq!(blind.alike, Some([at(0.0, -0.25), at(0.0, 1.25)]));
     }
 

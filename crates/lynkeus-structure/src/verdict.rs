@@ -1,8 +1,6 @@
 //! Verdicts.
 
-use std::fmt;
-
-use crate::words::short;
+use crate::Dimension;
 
 /// Where a variable is.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,12 +43,6 @@ impl Witness {
             _ => self.points.first(),
         }
     }
-
-    /// The points in words.
-    pub(crate) fn told(&self) -> String {
-        let points: Vec<String> = self.points.iter().map(Point::to_string).collect();
-        points.join(" and ")
-    }
 }
 
 impl From<Point> for Witness {
@@ -61,19 +53,8 @@ impl From<Point> for Witness {
     }
 }
 
-/// A variable between two ends.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Side {
-    /// name of the variable
-    pub name: String,
-    /// smallest value
-    pub min: f64,
-    /// largest value
-    pub max: f64,
-}
-
-/// A part of the box, by its sides; without sides where none says more than the whole box.
-pub type Place = Vec<Side>;
+/// A part of the box; without sides where none says more than the whole box.
+pub type Place = Vec<Dimension>;
 
 /// The verdict on a statement about the whole box.
 #[derive(Clone, Debug, PartialEq)]
@@ -134,89 +115,152 @@ impl Standing {
     }
 }
 
+/// What decides a verdict, as data: `lynkeus-words` has the sentences.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reason {
+    /// a sentence that is not data yet
+    Text(String),
+    /// every operation has a value everywhere on the box, and none jumps
+    Regular,
+    /// an operation has no value on a part of the box, or may have none
+    NoValue {
+        /// as a person would write it
+        operation: String,
+        /// the part
+        place: Place,
+        /// it certainly has none there
+        certain: bool,
+    },
+    /// an operation jumps on a part of the box, or may jump
+    Jumps {
+        /// as a person would write it
+        operation: String,
+        /// the part
+        place: Place,
+    },
+    /// the values of an expression lie in a range
+    Lies {
+        /// as a person would write it
+        expression: String,
+        /// its least value
+        low: f64,
+        /// its greatest value
+        high: f64,
+        /// the range does not decide, and is the best there is
+        open: bool,
+        /// variables without a declared end that keep it wide
+        undeclared: Vec<String>,
+    },
+    /// this expression can vanish or change its sign
+    Vanishes(String),
+    /// the sign changes as said, but no zero is between
+    ByJump(Box<Reason>),
+    /// this keeps the mean value theorem from applying
+    NoMeanValue(Box<Reason>),
+    /// rows of a Jacobian, taken at different points, can be dependent
+    RowsApart,
+    /// a matrix of so many rows and columns has too many minors
+    ManyMinors(usize, usize),
+    /// every minor of full size of a matrix of so many rows and columns is zero
+    ZeroMinors(usize, usize),
+    /// a determinant is zero by the zeros of the matrix
+    ZeroDeterminant,
+    /// a determinant vanishes or changes its sign
+    DeterminantVanishes,
+    /// the size of a determinant lies in a range
+    Determinant {
+        /// its least value
+        low: f64,
+        /// its greatest value
+        high: f64,
+        /// the range does not decide, and is the best there is
+        open: bool,
+    },
+    /// the ranges of its entries keep a matrix regular on each of so many parts of the box
+    RegularParts(usize),
+    /// so many parts of the box do not decide for a matrix of so many rows
+    OpenParts(usize, usize),
+    /// F_k of the form that is affine block by block
+    Factor {
+        /// k
+        k: usize,
+        /// of so many rows and columns
+        size: (usize, usize),
+        /// what it shows of the states behind it
+        shows: Shown,
+    },
+    /// state by state, along slopes that keep their sign
+    StateByState,
+    /// the ranges of a map and its Jacobian tell all points apart, on so many pairs of parts of the box
+    PairsApart(usize),
+    /// two points have the same values: exactly, or to twelve digits
+    Alike(bool),
+    /// whether points far apart are told apart is not decided
+    FarApart,
+}
+
+/// What a factor of the form that is affine block by block shows of the states behind it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shown {
+    /// constant, with independent columns
+    Always,
+    /// constant, and hides a direction
+    Never,
+    /// constant, and rounding keeps from telling
+    Unknown,
+    /// it has less rank than columns, and its entries move
+    WhileMoving,
+    /// the determinant of FᵀF vanishes or changes its sign there
+    NotAt(Witness),
+    /// what decides it of the determinant of FᵀF
+    Gram(Box<Reason>),
+}
+
 /// What was found of a statement. Which statement, whoever asked knows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
     /// the verdict
     pub verdict: Verdict,
-    /// what was found, in words
-    pub detail: String,
+    /// what decides it
+    pub reason: Reason,
 }
 
 impl Finding {
     /// It holds.
-    pub fn proved(detail: impl Into<String>) -> Self {
+    pub fn proved(reason: impl Into<Reason>) -> Self {
         Self {
             verdict: Verdict::Proved,
-            detail: detail.into(),
+            reason: reason.into(),
         }
     }
 
     /// It is not known to hold; nor where it might fail.
-    pub fn undecided(detail: impl Into<String>) -> Self {
+    pub fn undecided(reason: impl Into<Reason>) -> Self {
         Self {
             verdict: Verdict::open(),
-            detail: detail.into(),
+            reason: reason.into(),
         }
     }
 
     /// It fails.
-    pub fn refuted(witness: impl Into<Witness>, detail: impl Into<String>) -> Self {
+    pub fn refuted(witness: impl Into<Witness>, reason: impl Into<Reason>) -> Self {
         Self {
             verdict: Verdict::Refuted(witness.into()),
-            detail: detail.into(),
+            reason: reason.into(),
         }
     }
 
     /// By a condition that is sufficient, not necessary: that it fails refutes nothing.
-    pub fn sufficient(holds: bool, detail: impl Into<String>) -> Self {
+    pub fn sufficient(holds: bool, reason: impl Into<Reason>) -> Self {
         if holds {
-            Self::proved(detail)
+            Self::proved(reason)
         } else {
-            Self::undecided(detail)
+            Self::undecided(reason)
         }
     }
 
     /// Whether the statement is proved.
     pub fn is_proved(&self) -> bool {
         self.verdict == Verdict::Proved
-    }
-}
-
-impl fmt::Display for Point {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", short(self.value))?;
-        for (i, Coordinate { name, value }) in self.coordinates.iter().enumerate() {
-            let word = if i == 0 { " at" } else { "," };
-            write!(f, "{word} {name} = {}", short(*value))?;
-        }
-        Ok(())
-    }
-}
-
-impl fmt::Display for Witness {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "it is {}", self.told())
-    }
-}
-
-impl fmt::Display for Side {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Side { name, min, max } = self;
-        write!(f, "{name} in [{}, {}]", short(*min), short(*max))
-    }
-}
-
-impl fmt::Display for Verdict {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Verdict::Proved => write!(f, "proved"),
-            Verdict::Refuted(witness) => write!(f, "refuted: {witness}"),
-            Verdict::Undecided(place) if place.is_empty() => write!(f, "undecided"),
-            Verdict::Undecided(place) => {
-                let sides: Vec<String> = place.iter().map(Side::to_string).collect();
-                write!(f, "undecided on {}", sides.join(", "))
-            }
-        }
     }
 }

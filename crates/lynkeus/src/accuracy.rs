@@ -1,6 +1,7 @@
 //! How far estimates are from what is known to be true.
 
-use lynkeus_structure::{Side, figures};
+use lynkeus_structure::Dimension;
+use lynkeus_words::figures;
 use serde_json::{Value, json};
 
 use crate::words::instant;
@@ -80,14 +81,18 @@ const CONTRADICTED: f64 = 4.0;
 const TELLING: usize = 10;
 
 /// Of all quantities whose true values are known, unknown inputs first.
-pub(crate) fn accuracies(time: &Series, quantities: &[Quantity], sides: &[Side]) -> Vec<Accuracy> {
+pub(crate) fn accuracies(
+    time: &Series,
+    quantities: &[Quantity],
+    sides: &[Dimension],
+) -> Vec<Accuracy> {
     let mut known: Vec<&Quantity> = quantities.iter().collect();
     known.sort_by_key(|q| (!q.unknown_input, q.measured.is_some()));
     let of = |q: &&Quantity| accuracy(time, q, sides.iter().find(|s| s.name == q.name));
     known.iter().filter_map(of).collect()
 }
 
-fn accuracy(time: &Series, quantity: &Quantity, side: Option<&Side>) -> Option<Accuracy> {
+fn accuracy(time: &Series, quantity: &Quantity, side: Option<&Dimension>) -> Option<Accuracy> {
     let (truth, estimate) = (quantity.truth.as_ref()?, quantity.estimate.as_ref()?);
     let errors = || {
         let pairs = truth.iter().zip(estimate);
@@ -224,10 +229,13 @@ mod tests {
             estimate: Some(vec![9.0, -4.0, 1.0, 0.3, 1.4, 1.3].into()),
             ..Quantity::default()
         };
-        let side = |max| Side {
+        let graph = lynkeus_expr::Graph::new();
+        let side = |max| Dimension {
             name: "x".to_owned(),
+            symbol: graph.symbol("x").node(),
             min: 0.0,
             max,
+            integer: false,
         };
         let time = Series::from(vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
         let of = |max| accuracy(&time, &quantity, Some(&side(max))).unwrap();

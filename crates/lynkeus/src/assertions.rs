@@ -2,7 +2,7 @@
 
 use lynkeus_expr::{Node, Tape};
 use lynkeus_model::{Assertion, Diagnostic, Plant, Variable};
-use lynkeus_structure::short;
+use lynkeus_words::short;
 
 use crate::outside::{ESTIMATE, Of, PLANT};
 use crate::series::Iter;

@@ -16,7 +16,8 @@ use lynkeus_expr::{Budget, Spent};
 use lynkeus_model::Plant;
 use lynkeus_observability::{Answer, Verdict};
 use lynkeus_observers::{Examination, fit_word};
-use lynkeus_structure::{Sensors, counted, determined, uniformity};
+use lynkeus_structure::{Sensors, determined, uniformity};
+use lynkeus_words::counted;
 
 use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;

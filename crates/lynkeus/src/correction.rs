@@ -7,7 +7,8 @@ use lynkeus_expr::{Node, Tape};
 use lynkeus_model::Plant;
 use lynkeus_observers as observers;
 use lynkeus_observers::Observer;
-use lynkeus_structure::{AugmentedPlant, short};
+use lynkeus_structure::AugmentedPlant;
+use lynkeus_words::short;
 use serde_json::{Map, Value, json};
 
 use crate::{Error, Study, systems};

@@ -3,7 +3,8 @@
 use std::fmt;
 
 use lynkeus_observers::{Design, fit_word};
-use lynkeus_structure::{Standing, counted};
+use lynkeus_structure::Standing;
+use lynkeus_words::counted;
 use serde_json::{Map, Value, json};
 
 use crate::certify::{self, certificate_json};

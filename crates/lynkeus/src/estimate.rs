@@ -235,7 +235,7 @@ pub(crate) fn start_at_readings(prepared: &Prepared<'_>, samples: &Samples, desi
             design.notes.push(format!(
                 "{} starts at its first reading, {}: neither `initial` nor the model's `start` says where",
                 prepared.augmented().states[at.state].name,
-                lynkeus_structure::short(start)
+                lynkeus_words::short(start)
             ));
         }
     }

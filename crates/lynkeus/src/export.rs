@@ -87,7 +87,7 @@ fn written(
     notes.extend(choice.map(Choice::notes).into_iter().flatten());
     let made = blueprint(&prepared, &design)?;
     let made = stepped(&prepared, made, options.step, &mut notes)?;
-    notes.extend(bends(made.flow()));
+    notes.extend(bends(&made.flow));
     if is_tunable {
         notes.push(tunable::note(&design, &made));
     }

@@ -3,10 +3,11 @@
 use lynkeus_model::Variable;
 use lynkeus_observers::{Design, FilterTuning, Signal};
 use lynkeus_run::filter::{
-    Bounds, Confined, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor, Smoothed,
+    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, Smoothed,
 };
 use lynkeus_run::{Blueprint, EstimatorSettings};
-use lynkeus_structure::{AugmentedPlant, short};
+use lynkeus_structure::AugmentedPlant;
+use lynkeus_words::short;
 
 use crate::course::{Course, Samples};
 use crate::prepare::Prepared;
@@ -99,21 +100,18 @@ pub(crate) fn blueprint(
     refuse_longer_lag(study, &tuning.kind)?;
     refuse_smoothed_bounds(study, tuning)?;
     let model = model(prepared, design, tuning, samples, notes)?;
-    Ok(Blueprint::Filter {
-        model: Box::new(model),
-        settings: FilterSettings {
-            gate: tuning.gate,
-            bounds: tuning.bounds.clone(),
-            keep_history: study.estimate.smoothing.is_some(),
-            ..FilterSettings::of(tuning.kind.clone())
-        },
-        run: settings,
-    })
+    let kept = FilterSettings {
+        gate: tuning.gate,
+        projects: tuning.projects,
+        keep_history: study.estimate.smoothing.is_some(),
+        ..FilterSettings::of(tuning.kind.clone())
+    };
+    Ok(Blueprint::filter(model, kept, settings))
 }
 
 fn is_window(design: &Design) -> bool {
     let filter = design.observer.filter.as_ref();
-    filter.is_some_and(|filter| matches!(filter.kind, FilterKind::MovingHorizon(..)))
+    filter.is_some_and(|filter| matches!(filter.kind, FilterKind::MovingHorizon(_)))
 }
 
 /// A share of the rows in which an estimate at an end of its range is worth a word.
@@ -141,7 +139,7 @@ fn held_at_an_end(augmented: &AugmentedPlant<'_>, estimates: &[Series]) -> Optio
 
 /// What is projected is no Kalman filter's estimate, and its smoother would not keep to the bounds.
 fn refuse_smoothed_bounds(study: &Study, tuning: &FilterTuning) -> Result<(), Error> {
-    if study.estimate.smoothing.is_none() || tuning.bounds.is_none() {
+    if study.estimate.smoothing.is_none() || !tuning.projects {
         return Ok(());
     }
     let message = "`bounds = \"project\"` of [observer] has no smoother, and `smooth` or `lag` of [estimate] asks for one";
@@ -152,7 +150,7 @@ fn refuse_smoothed_bounds(study: &Study, tuning: &FilterTuning) -> Result<(), Er
 
 /// A window has no row older than its horizon.
 pub(crate) fn refuse_longer_lag(study: &Study, kind: &FilterKind) -> Result<(), Error> {
-    let (Some(Smoothing::Lag(lag)), FilterKind::MovingHorizon(horizon, _)) =
+    let (Some(Smoothing::Lag(lag)), FilterKind::MovingHorizon(horizon)) =
         (study.estimate.smoothing, kind)
     else {
         return Ok(());
@@ -187,7 +185,7 @@ fn model(
     tuning: &FilterTuning,
     samples: &Samples,
     notes: &mut Vec<String>,
-) -> Result<FilterModel, Error> {
+) -> Result<NoisyModel, Error> {
     let (augmented, observer) = (prepared.augmented(), &design.observer);
     let declared = prepared.declared();
     let states = observer
@@ -198,7 +196,11 @@ fn model(
     let span = samples.span();
     let levels = noise::levels(declared, augmented, samples, notes);
     let sensors = observer.measured.iter().zip(&tuning.outputs).zip(levels);
-    let plant = FilterPlant {
+    let range = |state: &Variable| Limits {
+        low: state.min,
+        high: state.max,
+    };
+    let plant = NoisyPlant {
         graph: augmented.graph(),
         time: observer.time,
         states: states.collect(),
@@ -214,17 +216,8 @@ fn model(
             .collect(),
         process_noise: noise::densities(prepared, span, notes),
         initial_variance: tuning.initial_variance.clone(),
-        confined: Some(Confined {
-            flow: tuning.confined.clone(),
-            bounds: augmented.states.iter().map(bounds).collect(),
-        }),
+        ranges: augmented.states.iter().map(range).collect(),
+        confined: Some(tuning.confined.clone()),
     };
-    FilterModel::new(&plant).map_err(Error::from_source)
-}
-
-fn bounds(state: &Variable) -> Bounds {
-    Bounds {
-        low: state.min,
-        high: state.max,
-    }
+    NoisyModel::new(&plant).map_err(Error::from_source)
 }

@@ -3,7 +3,7 @@
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_run::{Blueprint, Method, NeededStep, Step, System, first_jump, needed_step};
-use lynkeus_structure::short;
+use lynkeus_words::short;
 
 use crate::prepare::Prepared;
 use crate::{Error, Study, systems};
@@ -67,7 +67,7 @@ pub(crate) fn stepped(
     if let Some(step) = sound(step)? {
         return Ok(made.with_method(Method::Rk4(Step::AtMost(step))));
     }
-    if let Method::Rk4(Step::AtMost(_) | Step::Substeps(_)) = made.method() {
+    if let Method::Rk4(Step::AtMost(_) | Step::Substeps(_)) = made.run.method {
         return Ok(made);
     }
     let unsaid = Unsaid {
@@ -165,7 +165,7 @@ pub(crate) fn size(variable: &Variable) -> f64 {
 
 /// Where fixed steps are so long that the method itself grows, if it is seen to.
 pub(crate) fn hasty(prepared: &Prepared<'_>, made: &Blueprint) -> Option<String> {
-    let Method::Rk4(Step::AtMost(step)) = made.method() else {
+    let Method::Rk4(Step::AtMost(step)) = made.run.method else {
         return None;
     };
     let longest = LONGEST * needed(prepared, made)?.length;
@@ -183,7 +183,7 @@ fn needed(prepared: &Prepared<'_>, made: &Blueprint) -> Option<NeededStep> {
     let plant = prepared.plant();
     let known = plant.inputs.iter();
     let known: Vec<(&str, f64)> = known.map(|i| (i.name.as_str(), typical(i))).collect();
-    let sizes = made.flow().states().iter().map(|state| {
+    let sizes = made.flow.states().iter().map(|state| {
         let mut all = plant
             .states
             .iter()

@@ -1,6 +1,6 @@
 //! Sensors that hang: readings that repeat although their noise would not let them.
 
-use lynkeus_structure::figures;
+use lynkeus_words::figures;
 use serde_json::{Value, json};
 
 use crate::Series;

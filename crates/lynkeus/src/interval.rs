@@ -3,7 +3,8 @@
 use lynkeus_expr::{Node, Tape, jacobian};
 use lynkeus_gain::sampling;
 use lynkeus_observers::{Design, Observer};
-use lynkeus_structure::{AugmentedPlant, figures};
+use lynkeus_structure::AugmentedPlant;
+use lynkeus_words::figures;
 use serde_json::{Value, json};
 
 use crate::course::{Course, Samples};

@@ -1,7 +1,7 @@
 //! A study's estimator for samples that come one by one.
 
 use lynkeus_observers::Design;
-use lynkeus_run::{Blueprint, ErrorModel, Estimator};
+use lynkeus_run::{Blueprint, Estimator};
 
 use crate::course::Samples;
 use crate::estimate::run_settings;
@@ -74,11 +74,9 @@ pub(crate) fn blueprint(prepared: &Prepared<'_>, design: &Design) -> Result<Blue
     let follows = study.estimate.deviations;
     let mut observer = sampled::observer(prepared, design, &none, follows, notes)?;
     // nobody judges a run that has no end
-    observer.errors = observer.errors.map(ErrorModel::without_readings);
-    Ok(Blueprint::Sampled {
-        observer: Box::new(observer),
-        method: run.method,
-    })
+    observer.judges = false;
+    observer.run.method = run.method;
+    Ok(observer)
 }
 
 fn refuse_looking_ahead(study: &Study, settings: &EstimateSettings) -> Result<(), Error> {

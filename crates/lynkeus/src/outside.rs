@@ -2,7 +2,8 @@
 
 use std::ops::RangeInclusive;
 
-use lynkeus_structure::{AugmentedPlant, Side, figures};
+use lynkeus_structure::{AugmentedPlant, Dimension};
+use lynkeus_words::figures;
 use serde_json::{Map, Value, json};
 
 use crate::series::Iter;
@@ -49,17 +50,19 @@ pub struct Outside {
 }
 
 /// The box, side by side: what the observer knows of, time included, then the disturbances.
-pub(crate) fn sides(augmented: &AugmentedPlant<'_>) -> Vec<Side> {
+pub(crate) fn sides(augmented: &AugmentedPlant<'_>) -> Vec<Dimension> {
     let region = augmented.region();
     let symbols = region.symbols();
     let inputs = augmented.plant.inputs.iter();
     let disturbances = inputs.filter(|i| !symbols.contains(&i.node));
-    let disturbances = disturbances.map(|i| Side {
+    let disturbances = disturbances.map(|i| Dimension {
         name: i.name.clone(),
+        symbol: i.node,
         min: i.min,
         max: i.max,
+        integer: i.integer,
     });
-    region.place().into_iter().chain(disturbances).collect()
+    region.dimensions.into_iter().chain(disturbances).collect()
 }
 
 /// Time as a quantity: a side of the box, too.
@@ -84,7 +87,7 @@ pub(crate) fn outside<'q>(
     time: &Series,
     quantities: impl IntoIterator<Item = &'q Quantity>,
     of: Of,
-    sides: &[Side],
+    sides: &[Dimension],
 ) -> Option<Outside> {
     let followed = quantities.into_iter().filter_map(|quantity| {
         let side = sides.iter().find(|side| side.name == quantity.name)?;
@@ -112,7 +115,7 @@ pub(crate) fn outside<'q>(
 
 /// A quantity beside its side of the box, row by row.
 struct Followed<'q> {
-    side: &'q Side,
+    side: &'q Dimension,
     values: Iter<'q>,
     slack: f64,
     /// rows at which it is outside
@@ -124,7 +127,7 @@ struct Followed<'q> {
 }
 
 impl<'q> Followed<'q> {
-    fn new(side: &'q Side, values: &'q Series) -> Self {
+    fn new(side: &'q Dimension, values: &'q Series) -> Self {
         Self {
             side,
             values: values.iter(),
@@ -175,7 +178,7 @@ impl<'q> Followed<'q> {
 
 /// What counts as rounding beside a side: a share of its width, or where that is none of the
 /// numbers around it. NaN, in a log's column of truth, is not outside.
-fn slack(side: &Side, values: &Series) -> f64 {
+fn slack(side: &Dimension, values: &Series) -> f64 {
     let width = side.max - side.min;
     if width.is_finite() && width > 0.0 {
         return ROUNDING * width;
@@ -252,7 +255,7 @@ mod tests {
 
     use super::*;
 
-    fn side_of(declared: &str) -> Side {
+    fn side_of(declared: &str) -> Dimension {
         let text =
             format!("model M Real x{declared}; output Real y = x; equation der(x) = -x; end M;");
         let plant = Plant::from_modelica(&text, "m.mo", &LoadOptions::default()).unwrap();

@@ -9,6 +9,7 @@ use lynkeus_model::{LoadError, LoadOptions, Plant, Variable};
 pub(crate) use lynkeus_observers::is_certified_gain;
 use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning};
 use lynkeus_structure::{AugmentedPlant, Dimension, Region, Sensors, SensorsError, range};
+use lynkeus_words::Words;
 
 use crate::choice::Choice;
 use crate::declared::Declared;
@@ -359,7 +360,7 @@ impl<'a> Prepared<'a> {
         let study = self.study;
         match &error {
             DesignError::Tuning(tuning) => study.observer.blame(tuning, &study.file),
-            DesignError::Refused(_) => Error::refused(error.to_string())
+            DesignError::Refused(_) => Error::refused(error.words())
                 .caused_by(error)
                 .at(&study.file),
             DesignError::NoGain { key, .. } => study.observer.place(key, &study.file, &error),
@@ -403,7 +404,7 @@ fn tube(study: &Study, augmented: &mut AugmentedPlant<'_>) -> Result<(), Error> 
 fn blame(study: &Study, error: SensorsError) -> Error {
     let name = match &error {
         SensorsError::NoSuchName { name, .. } | SensorsError::Twice { name, .. } => name,
-        SensorsError::NothingMeasured { .. } => {
+        _ => {
             return Error::from_source(error).at(&study.file);
         }
     };
@@ -435,7 +436,7 @@ fn none_fits(study: &Study, examinations: &[Examination]) -> Error {
     }
     let reasons: Vec<String> = examinations
         .iter()
-        .map(|e| DesignError::Refused(Box::new(e.clone())).to_string())
+        .map(|e| DesignError::Refused(Box::new(e.clone())).words())
         .collect();
     Error::refused(reasons.join("\n"))
         .at(&study.file)

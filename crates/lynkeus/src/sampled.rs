@@ -2,9 +2,10 @@
 
 use lynkeus_expr::{Graph, Node};
 use lynkeus_observers::{Design, Sampled, Signal, Tunable, kalman::prior_variance};
+use lynkeus_run::filter::{NoisyModel, NoisyPlant, Sensor};
 use lynkeus_run::{
-    BetweenSamples as Between, Error as RunError, ErrorEquations, ErrorModel, ErrorNoise,
-    Estimator, EstimatorSettings, Lag, Method, SampledObserver, System, Tuned,
+    BetweenSamples as Between, Blueprint, Error as RunError, EstimatorSettings, Lag, Method,
+    System, Tuned, Updates,
 };
 
 use crate::Error;
@@ -34,11 +35,10 @@ pub(crate) fn run(
     };
     let follows = prepared.study().estimate.follows_errors();
     let mut observer = observer(prepared, design, samples, follows, &mut course.notes)?;
-    if prepared.study().sensors.noise.is_empty() && !course.keeps_innovations {
-        // what the log's scatter gives judges nobody
-        observer.errors = observer.errors.map(ErrorModel::without_readings);
-    }
-    let mut estimator = Estimator::sampled(&observer, method).map_err(Error::from_source)?;
+    // what the log's scatter gives judges nobody
+    observer.judges = !prepared.study().sensors.noise.is_empty() || course.keeps_innovations;
+    observer.run.method = method;
+    let mut estimator = observer.estimator().map_err(Error::from_source)?;
     let count = design.observer.estimates.len();
     replay(&mut estimator, samples, count, &mut course, watch)?;
     let sensors = estimator.health().sensors.iter();
@@ -117,8 +117,8 @@ fn followed(
 ) -> Result<Course, Error> {
     let mut course = Course::default();
     let mut observer = observer(prepared, design, samples, true, &mut course.notes)?;
-    observer.inputs = run.between;
-    let mut estimator = Estimator::sampled(&observer, run.method).map_err(Error::from_source)?;
+    observer.run = run;
+    let mut estimator = observer.estimator().map_err(Error::from_source)?;
     let count = design.observer.estimates.len();
     replay(&mut estimator, samples, count, &mut course, watch)?;
     Ok(course)
@@ -134,7 +134,7 @@ pub(crate) fn observer(
     samples: &Samples,
     follows: bool,
     notes: &mut Vec<String>,
-) -> Result<SampledObserver, Error> {
+) -> Result<Blueprint, Error> {
     let (study, augmented) = (prepared.study(), prepared.augmented());
     let sampled = design.observer.sampled(augmented);
     let mut sampled = sampled.map_err(Error::from_source)?;
@@ -177,37 +177,48 @@ pub(crate) fn observer(
     let errors = match follows {
         false => None,
         true => {
-            let mut noise = error_noise(prepared, &states, samples, notes);
+            let (process_noise, mut initial_variance) =
+                error_noise(prepared, &states, samples, notes);
             let lag = lag.map(|state| Lag {
                 state,
                 rates: &rates,
             });
             if let Some(lag) = &lag {
-                noise.initial[lag.state] = 1.0;
+                initial_variance[lag.state] = 1.0;
             }
-            let equations = ErrorEquations {
+            let levels = noise::levels(prepared.declared(), augmented, samples, notes);
+            let each = sensors.iter().zip(&expected).zip(levels);
+            let sensors = each.map(|((name, output), noise)| Sensor {
+                name: name.clone(),
+                output: *output,
+                noise,
+                limits: None,
+            });
+            let observer = NoisyPlant {
                 graph,
                 time: observer.time,
-                states: &states,
-                signals: &signals,
-                derivatives: &observer.derivatives,
-                estimates: &estimates,
-                outputs: &expected,
-                lag,
+                states,
+                derivatives: observer.derivatives.clone(),
+                inputs: signals,
+                sensors: sensors.collect(),
+                process_noise,
+                initial_variance,
+                ranges: vec![],
+                confined: None,
             };
-            let model = ErrorModel::new(equations, noise);
-            let model = model.map_err(Error::from_source)?;
-            let judged = model.expecting(graph, observer.time, &states, &signals, &expected);
-            Some(judged.map_err(Error::from_source)?)
+            let errors = NoisyModel::of_observer(&observer, &estimates, lag);
+            Some(Box::new(errors.map_err(Error::from_source)?))
         }
     };
-    Ok(SampledObserver {
-        system,
-        sensors,
-        predict,
-        inputs: Between::Hold,
-        errors,
-        tuned,
+    Ok(Blueprint {
+        sensors: measured(design),
+        updates: Updates::Jumps {
+            predict,
+            errors,
+            tuned,
+        },
+        judges: true,
+        ..Blueprint::new(&system, EstimatorSettings::default())
     })
 }
 
@@ -256,15 +267,15 @@ fn measured(design: &Design) -> Vec<String> {
     measured.map(|signal| signal.name.clone()).collect()
 }
 
-/// The noises on the observer's states: those of the plant on its estimate, which comes first,
-/// and none on what the gain needs.
+/// Densities and variances of the observer's states: those of the plant's estimate, which comes first,
+/// and none of what the gain needs.
 fn error_noise(
     prepared: &Prepared<'_>,
     states: &[(String, Node, f64)],
     samples: &Samples,
     notes: &mut Vec<String>,
-) -> ErrorNoise {
-    let (augmented, declared) = (prepared.augmented(), prepared.declared());
+) -> (Vec<f64>, Vec<f64>) {
+    let augmented = prepared.augmented();
     let mut process = noise::of_families(prepared, samples.span(), notes);
     let starts = augmented.states.iter().zip(states);
     let mut initial: Vec<f64> = starts
@@ -272,9 +283,5 @@ fn error_noise(
         .collect();
     process.resize(states.len(), 0.0);
     initial.resize(states.len(), 0.0);
-    ErrorNoise {
-        process,
-        initial,
-        sensors: noise::levels(declared, augmented, samples, notes),
-    }
+    (process, initial)
 }

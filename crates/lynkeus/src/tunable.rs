@@ -2,7 +2,7 @@
 
 use lynkeus_export::curly::{self, Entry};
 use lynkeus_observers::{Design, Tunable, Tuning};
-use lynkeus_run::Blueprint;
+use lynkeus_run::{Blueprint, Updates};
 
 use crate::Error;
 use crate::prepare::Prepared;
@@ -19,12 +19,10 @@ pub(crate) fn design(prepared: &Prepared<'_>) -> Result<Design, Error> {
 /// The numbers of an estimator that may be changed.
 fn tunables<'d>(design: &'d Design, made: &Blueprint) -> &'d [Tunable] {
     let numbers = &design.observer.tunables.numbers;
-    match made {
-        Blueprint::Sampled { observer, .. } if observer.tuned.is_some() => numbers,
-        Blueprint::Filter { model, .. } if model.process_noise().iter().any(|q| *q > 0.0) => {
-            numbers
-        }
-        Blueprint::Sampled { .. } | Blueprint::Filter { .. } => &[],
+    match &made.updates {
+        Updates::Jumps { tuned: Some(_), .. } => numbers,
+        Updates::Filter { model, .. } if model.process_noise.iter().any(|q| *q > 0.0) => numbers,
+        Updates::Jumps { .. } | Updates::Filter { .. } => &[],
     }
 }
 
@@ -38,10 +36,10 @@ pub(crate) fn note(design: &Design, made: &Blueprint) -> String {
             names.join(", ")
         );
     }
-    let reason = match (design.observer.tunables.refused, made) {
+    let reason = match (design.observer.tunables.refused, &made.updates) {
         (Some(reason), _) => reason,
-        (None, Blueprint::Filter { .. }) => "without process noise there is none to scale",
-        (None, Blueprint::Sampled { .. }) => "its equations read no gain",
+        (None, Updates::Filter { .. }) => "without process noise there is none to scale",
+        (None, Updates::Jumps { .. }) => "its equations read no gain",
     };
     format!("nothing may be changed while it runs: {reason}")
 }

@@ -4,7 +4,8 @@ use std::fmt;
 
 use lynkeus_expr::real::rounded;
 use lynkeus_observers::Check;
-use lynkeus_structure::{Verdict, figures};
+use lynkeus_structure::Verdict;
+use lynkeus_words::{Words, figures};
 
 /// Four significant digits.
 pub(crate) fn number(value: f64) -> String {
@@ -46,7 +47,12 @@ pub(crate) fn conditions<'a>(
     }
     for check in checks.iter().filter(|c| !(brief && proved(c))) {
         let word = check.verdict.word();
-        writeln!(f, "  {word:<10} {}: {}", check.statement, check.detail)?;
+        writeln!(
+            f,
+            "  {word:<10} {}: {}",
+            check.statement.words(),
+            check.reason.words()
+        )?;
         if let Verdict::Refuted(_) = check.verdict {
             writeln!(f, "             {}", check.verdict)?;
         }

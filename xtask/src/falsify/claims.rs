@@ -5,7 +5,7 @@ use lynkeus::observers::{
     Certificate, Check, Design, Examination, FAMILIES, Statement, Tuning, UltimateBound,
 };
 use lynkeus::prepare::Prepared;
-use lynkeus::structure::{AugmentedPlant, Side, Standing, Verdict};
+use lynkeus::structure::{AugmentedPlant, Dimension, Standing, Verdict};
 use nalgebra::DMatrix;
 
 use super::tally::Counts;
@@ -25,7 +25,7 @@ pub struct Claim {
     /// V = eᵀPe falls at 2·rate without disturbance and noise
     pub lyapunov: Option<DMatrix<f64>>,
     /// the box by names
-    pub sides: Vec<Side>,
+    pub sides: Vec<Dimension>,
 }
 
 /// A condition that is said to fail, with the points that are to show it.

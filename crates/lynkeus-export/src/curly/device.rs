@@ -20,7 +20,7 @@ pub struct Device<'a> {
     /// whether a filter's standard deviations are reported
     pub deviations: bool,
     /// numbers that may be changed while it runs: those of a sampled observer's
-    /// [`tuned`](lynkeus_run::SampledObserver::tuned), in its order; of a filter none, or a factor on
+    /// [`tuned`](lynkeus_run::Updates::Jumps), in its order; of a filter none, or a factor on
     /// its process noise
     pub tunables: &'a [Tunable],
     /// of each measured output the noise that is declared, by which an observer that is no filter is
@@ -76,10 +76,7 @@ pub struct FirstReading {
 impl Device<'_> {
     /// Number of measured outputs.
     pub(super) fn sensors(&self) -> usize {
-        match self.blueprint {
-            Blueprint::Sampled { observer, .. } => observer.sensors.len(),
-            Blueprint::Filter { model, .. } => model.sensors().len(),
-        }
+        self.blueprint.sensors.len()
     }
 }
 

@@ -1,10 +1,8 @@
 //! Estimators as drafts: observers and Kalman filters whose sensors report when they do.
 
 use lynkeus_run::credible::{By, CHANCE, CLIP, ENOUGH, FEW};
-use lynkeus_run::filter::{FilterKind, FilterModel, FilterSettings, Limits, Sensor, SigmaPoints};
-use lynkeus_run::{
-    BetweenSamples, Blueprint, ErrorModel, Jacobians, Level, SampledObserver, Tuned,
-};
+use lynkeus_run::filter::{FilterKind, FilterSettings, Limits, NoisyModel, Sensor, SigmaPoints};
+use lynkeus_run::{BetweenSamples, Jacobians, Level, Tuned, Updates};
 
 use super::device::{Device, Entry, FirstReading};
 use super::draft::{Arguments, Target, draft, number, table};
@@ -40,14 +38,14 @@ pub(super) fn drafted(device: &Device<'_>) -> Result<Machine, Refusal> {
     );
     let about = "samples in a row for which the equations had no value or an estimate ran away";
     machine.single("refused", Type::Int, about, 0.0);
-    machine.steps(device.blueprint.method())?;
+    machine.steps(device.blueprint.run.method)?;
     let mut holds = vec![];
-    match device.blueprint {
-        Blueprint::Sampled { observer, .. } => {
+    match &device.blueprint.updates {
+        Updates::Jumps { .. } => {
             holds.push("sampled");
-            machine.sampled(device, observer)?;
+            machine.sampled(device)?;
         }
-        Blueprint::Filter { .. } => machine.filter(device)?,
+        Updates::Filter { .. } => machine.filter(device)?,
     }
     if !device.first_readings.is_empty() {
         holds.push("first");
@@ -84,10 +82,19 @@ fn arguments(states: &[String], signals: &[String], device: &Device<'_>) -> Argu
 }
 
 impl Machine {
-    fn sampled(&mut self, device: &Device<'_>, observer: &SampledObserver) -> Result<(), Refusal> {
-        let system = &observer.system;
+    /// Nothing for a filter.
+    fn sampled(&mut self, device: &Device<'_>) -> Result<(), Refusal> {
+        let Updates::Jumps {
+            predict,
+            errors,
+            tuned: made,
+        } = &device.blueprint.updates
+        else {
+            return Ok(());
+        };
+        let system = &device.blueprint.flow;
         refuse_jumps(system)?;
-        let (n, m) = (system.states().len(), observer.sensors.len());
+        let (n, m) = (system.states().len(), device.sensors());
         let told = system.outputs().len().saturating_sub(m);
         self.size("STATES", n);
         self.size("OWN", n - m);
@@ -96,7 +103,7 @@ impl Machine {
         self.size("ESTIMATED", told.saturating_sub(device.monitors));
         let about = system.states().join(", ");
         self.field("x", Type::Real, &about, system.start().to_vec());
-        let (tuned, behind) = match &observer.tuned {
+        let (tuned, behind) = match made {
             Some(tuned) => (
                 tuned.system.outputs().len(),
                 ", then what follows from tuning",
@@ -125,7 +132,7 @@ impl Machine {
         )?;
         self.add(&outputs);
         let mut holds = vec![];
-        let field = match &observer.errors {
+        let field = match errors {
             None => {
                 self.flow(system, &arguments)?;
                 self.integrate(n);
@@ -138,7 +145,7 @@ impl Machine {
             }
         };
         let is_declared = device.noises.iter().any(Option::is_some);
-        match &observer.errors {
+        match errors {
             _ if !is_declared => {}
             Some(_) => {
                 self.credible(m, By::ErrorSystem, false);
@@ -149,8 +156,8 @@ impl Machine {
                 holds.push("judged");
             }
         }
-        self.tuned(device, observer.tuned.as_ref())?;
-        let follows = if observer.predict { "R(1.0)" } else { "R(0.0)" };
+        self.tuned(device, made.as_ref())?;
+        let follows = if *predict { "R(1.0)" } else { "R(0.0)" };
         let text = chosen(SAMPLED, &holds).replace("FIELD", field);
         self.add(&text.replace("FOLLOWS", follows));
         Ok(())
@@ -167,16 +174,15 @@ impl Machine {
     }
 
     /// The covariance of an observer's error.
-    fn spread(&mut self, errors: &ErrorModel, arguments: &Arguments) -> Result<(), Refusal> {
-        let noise = errors.noise();
-        let flow = errors.flow();
+    fn spread(&mut self, model: &NoisyModel, arguments: &Arguments) -> Result<(), Refusal> {
+        let flow = &model.flow;
         let n = flow.system().states().len();
-        self.root(&noise.initial);
-        self.noises(noise.sensors.iter().copied());
+        self.root(&model.initial_variance);
+        self.noises(model.sensors.iter().map(|s| s.noise));
         self.size("LARGER", n);
         let linear = Linear {
             flow,
-            noise: &noise.process,
+            noise: &model.process_noise,
             is_tuned: false,
         };
         self.linear(Which::Free, &linear, arguments)?;
@@ -219,41 +225,31 @@ const FILTER: &str = include_str!("runtime/filter.c");
 impl Machine {
     /// Nothing for an observer that is no filter.
     fn filter(&mut self, device: &Device<'_>) -> Result<(), Refusal> {
-        let Blueprint::Filter {
-            model,
-            settings,
-            run,
-        } = device.blueprint
-        else {
+        let Updates::Filter { model, settings } = &device.blueprint.updates else {
             return Ok(());
         };
-        if run.between == BetweenSamples::Linear {
+        if device.blueprint.run.between == BetweenSamples::Linear {
             return Err(Refusal::LooksAhead);
         }
-        if settings.bounds.is_some() {
+        if settings.projects {
             return Err(Refusal::Projection);
         }
-        let (states, inputs) = (model.states(), model.inputs());
+        let flow = model.flow.system();
+        let (states, inputs) = (flow.states(), flow.signals());
         let arguments = arguments(states, inputs, device);
         let room = inputs.len() + device.tunables.len();
         let room = vec![0.0; room.max(1)];
         self.size("STATES", states.len());
-        self.field(
-            "x",
-            Type::Real,
-            &states.join(", "),
-            model.flow().system().start().to_vec(),
-        );
+        self.field("x", Type::Real, &states.join(", "), flow.start().to_vec());
         self.field("inputs", Type::Real, &inputs.join(", "), room);
-        self.root(model.initial_variance());
+        self.root(&model.initial_variance);
         // also a polynomial has no value once it has run away
-        let confined = model.confined().filter(|confined| {
-            let mut bounds = confined.bounds.iter();
-            bounds.any(|b| b.low.is_finite() || b.high.is_finite())
-        });
-        let has_limits = model.sensors().iter().any(|sensor| sensor.limits.is_some());
+        let mut ranges = model.ranges.iter();
+        let is_bounded = ranges.any(|b| b.low.is_finite() || b.high.is_finite());
+        let confined = model.confined.as_ref().filter(|_| is_bounded);
+        let has_limits = model.sensors.iter().any(|sensor| sensor.limits.is_some());
         let is_share = |sensor: &Sensor| matches!(sensor.noise, Level::Relative(_));
-        let is_relative = model.sensors().iter().any(is_share);
+        let is_relative = model.sensors.iter().any(is_share);
         let facts = [
             (confined.is_some(), "confined"),
             (device.deviations, "deviations"),
@@ -267,12 +263,12 @@ impl Machine {
         ];
         let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
         self.measure(model, &arguments, &settings.kind)?;
-        let sensors = model.sensors().len();
+        let sensors = model.sensors.len();
         self.credible(sensors, By::Filter, settings.gate.is_some());
         self.judge(model, settings, &holds);
         let free = Linear {
-            flow: model.flow(),
-            noise: model.process_noise(),
+            flow: &model.flow,
+            noise: &model.process_noise,
             is_tuned: !device.tunables.is_empty(),
         };
         self.tuned(device, None)?;
@@ -284,15 +280,14 @@ impl Machine {
         };
         if let Some(confined) = confined {
             let inside = Linear {
-                flow: &confined.flow,
-                noise: model.process_noise(),
+                flow: confined,
+                noise: &model.process_noise,
                 is_tuned: free.is_tuned,
             };
             self.linear(which_inside, &inside, &arguments)?;
             self.carried(which_inside, &inside);
-            let ends = |end: fn(&lynkeus_run::filter::Bounds) -> f64| -> Vec<f64> {
-                confined.bounds.iter().map(end).collect()
-            };
+            let ends =
+                |end: fn(&Limits) -> f64| -> Vec<f64> { model.ranges.iter().map(end).collect() };
             self.tables += &table("range_from", &ends(|b| b.low));
             self.tables += &table("range_to", &ends(|b| b.high));
         }
@@ -331,12 +326,12 @@ impl Machine {
     /// h, and for the extended filter the entries of C.
     fn measure(
         &mut self,
-        model: &FilterModel,
+        model: &NoisyModel,
         arguments: &Arguments,
         kind: &FilterKind,
     ) -> Result<(), Refusal> {
-        let (n, m) = (model.dimension(), model.sensors().len());
-        let output_map = model.output_map();
+        let (n, m) = (model.process_noise.len(), model.sensors.len());
+        let output_map = &model.output_map;
         refuse_jumps(output_map.system())?;
         let tape = output_map.system().output_tape();
         let mut targets = vec![Target::all("h", m)];
@@ -361,8 +356,8 @@ impl Machine {
         Ok(())
     }
 
-    fn judge(&mut self, model: &FilterModel, settings: &FilterSettings, holds: &[&str]) {
-        let m = model.sensors().len();
+    fn judge(&mut self, model: &NoisyModel, settings: &FilterSettings, holds: &[&str]) {
+        let m = model.sensors.len();
         let mut kept = |name, kind, about: &str| self.field(name, kind, about, vec![0.0; m]);
         kept("readings", Type::Real, "of the last sample");
         kept("became", Type::Int, "what became of each reading");
@@ -373,10 +368,10 @@ impl Machine {
             "of these, how many differ from the one before",
         );
         kept("last", Type::Real, "the reading before");
-        self.noises(model.sensors().iter().map(|s| s.noise));
+        self.noises(model.sensors.iter().map(|s| s.noise));
         if holds.contains(&"limits") {
             let ends = |end: f64, pick: fn(Limits) -> f64| -> Vec<f64> {
-                let sensors = model.sensors().iter();
+                let sensors = model.sensors.iter();
                 sensors.map(|s| s.limits.map_or(end, pick)).collect()
             };
             self.tables += &table("lowest", &ends(f64::NEG_INFINITY, |l| l.low));

@@ -2,39 +2,98 @@
 
 use std::collections::HashSet;
 
-use super::{Graph, ImplicitCall, Inner, Key, LinearSystem, Solution};
+use super::{Call, Graph, Key, Solution};
+use crate::code::System;
 use crate::{Implicit, Node, Nodes, Op};
 
-impl ImplicitCall {
-    /// (z, p): the results of the node and its arguments.
+impl Call {
+    /// Number of unknowns.
+    pub fn size(&self) -> usize {
+        match &self.system {
+            System::Linear(n) => *n,
+            System::Implicit(function) => function.size(),
+        }
+    }
+
+    /// A row by row and b, where it is the linear system A x = b.
+    pub fn linear(&self) -> Option<(&[Node], &[Node])> {
+        match self.system {
+            System::Linear(n) => Some(self.arguments.split_at(n * n)),
+            System::Implicit(_) => None,
+        }
+    }
+
+    /// z as a function of p, where it is that.
+    pub fn function(&self) -> Option<&Implicit> {
+        match &self.system {
+            System::Linear(_) => None,
+            System::Implicit(function) => Some(function),
+        }
+    }
+
+    /// (z, p): the unknowns, results of the node, and its arguments.
     pub fn at(&self, graph: &Graph, node: Node) -> Vec<Node> {
-        let z = (0..self.function.size() as u32).map(|i| graph.entry(node, i));
+        let z = (0..self.size() as u32).map(|i| graph.entry(node, i));
         z.chain(self.arguments.iter().copied()).collect()
     }
-}
 
-impl Inner {
-    /// The node of a system, made by `make` where it is new; none where the budget is spent.
-    fn system_node(
-        &mut self,
-        known: Option<Node>,
-        make: impl FnOnce(&mut Self) -> Op,
-    ) -> Option<Node> {
-        if known.is_some() || self.is_spent() {
-            return known;
+    /// The slopes of the equations by the unknowns, n×n, row by row.
+    pub fn matrix(&self, graph: &Graph, node: Node) -> Vec<Node> {
+        match &self.system {
+            System::Linear(n) => self.arguments[..n * n].to_vec(),
+            System::Implicit(function) => function.matrix(&Nodes(graph), &self.at(graph, node)),
         }
-        let op = make(self);
-        Some(self.push(op))
+    }
+
+    /// The slopes of the equations by the arguments where they are not zero everywhere: (row,
+    /// argument, slope); none stands for −1.
+    pub(crate) fn slopes(&self, graph: &Graph, node: Node) -> Vec<(usize, Node, Option<Node>)> {
+        match &self.system {
+            System::Linear(n) => {
+                let (a, b) = self.arguments.split_at(n * n);
+                let row = |(i, &b): (usize, &Node)| {
+                    let factors = a[i * n..][..*n].iter().zip(0..);
+                    let factors = factors.map(move |(&a, j)| (i, a, Some(graph.entry(node, j))));
+                    [(i, b, None)].into_iter().chain(factors)
+                };
+                b.iter().enumerate().flat_map(row).collect()
+            }
+            System::Implicit(function) => {
+                let slopes = function.sensitivities(graph, &self.at(graph, node));
+                let slopes = slopes.into_iter();
+                slopes
+                    .map(|(row, p, slope)| (row, self.arguments[p], Some(slope)))
+                    .collect()
+            }
+        }
     }
 }
 
 impl Graph {
-    /// The linear system, where the node is an [`Op::Solve`].
-    pub fn system(&self, node: Node) -> Option<LinearSystem> {
-        let Op::Solve(index) = self.op(node) else {
+    /// The system and its arguments, where the node is an [`Op::System`].
+    pub fn system(&self, node: Node) -> Option<Call> {
+        let Op::System(index) = self.op(node) else {
             return None;
         };
         self.inner.borrow().systems.get(index as usize).cloned()
+    }
+
+    /// The results of a system: its unknowns, of a linear one also the condition estimate.
+    pub(crate) fn results(&self, call: Call) -> Vec<Node> {
+        let count = call.size() + usize::from(call.function().is_none());
+        let inner = &mut *self.inner.borrow_mut();
+        let node = match inner.known_systems.get(&call).copied() {
+            Some(node) => node,
+            None if inner.is_spent() => return vec![inner.nothing(); count],
+            None => {
+                inner.systems.push(call.clone());
+                let node = inner.push(Op::System(inner.systems.len() as u32 - 1));
+                inner.known_systems.insert(call, node);
+                node
+            }
+        };
+        let entry = |i| inner.intern(Key::Entry(node, i), Op::Entry(node, i));
+        (0..count as u32).map(entry).collect()
     }
 
     /// The solution of A x = b; `a` is n×n row by row, `b` has n entries.
@@ -44,40 +103,13 @@ impl Graph {
     pub fn solve(&self, a: &[Node], b: &[Node]) -> Solution {
         let n = b.len();
         assert_eq!(a.len(), n * n, "A must be n×n for the n entries of b");
-        let system = LinearSystem {
-            arguments: a.iter().chain(b).copied().collect(),
-            n,
+        let call = Call {
+            system: System::Linear(n),
+            arguments: [a, b].concat(),
         };
-        let mut inner = self.inner.borrow_mut();
-        let known = inner.known_systems.get(&system).copied();
-        let node = inner.system_node(known, |inner| {
-            inner.systems.push(system.clone());
-            Op::Solve(inner.systems.len() as u32 - 1)
-        });
-        let Some(node) = node else {
-            let nothing = inner.nothing();
-            return Solution {
-                x: vec![nothing; n],
-                rcond: nothing,
-            };
-        };
-        inner.known_systems.insert(system, node);
-        let mut entry = |i: usize| {
-            let i = i as u32;
-            inner.intern(Key::Entry(node, i), Op::Entry(node, i))
-        };
-        Solution {
-            x: (0..n).map(&mut entry).collect(),
-            rcond: entry(n),
-        }
-    }
-
-    /// The implicit function and its arguments, where the node is an [`Op::Implicit`].
-    pub fn implicit_call(&self, node: Node) -> Option<ImplicitCall> {
-        let Op::Implicit(index) = self.op(node) else {
-            return None;
-        };
-        self.inner.borrow().implicits.get(index as usize).cloned()
+        let mut x = self.results(call);
+        let rcond = x.remove(n);
+        Solution { x, rcond }
     }
 
     /// The entries of z with g(z, p) = 0.
@@ -86,23 +118,11 @@ impl Graph {
     /// If `p` has not the function's number of entries.
     pub fn implicit(&self, function: &Implicit, p: &[Node]) -> Vec<Node> {
         assert_eq!(p.len(), function.parameters(), "one node per entry of p");
-        let call = ImplicitCall {
-            function: function.clone(),
+        let call = Call {
+            system: System::Implicit(function.clone()),
             arguments: p.to_vec(),
         };
-        let mut inner = self.inner.borrow_mut();
-        let known = inner.known_implicits.get(&call).copied();
-        let node = inner.system_node(known, |inner| {
-            inner.implicits.push(call.clone());
-            Op::Implicit(inner.implicits.len() as u32 - 1)
-        });
-        let Some(node) = node else {
-            return vec![inner.nothing(); function.size()];
-        };
-        inner.known_implicits.insert(call, node);
-        let entries = (0..function.size() as u32)
-            .map(|i| inner.intern(Key::Entry(node, i), Op::Entry(node, i)));
-        entries.collect()
+        self.results(call)
     }
 
     /// Whether the value of a node may jump where its arguments do not.
@@ -110,9 +130,10 @@ impl Graph {
         match self.op(node) {
             Op::Unary(op, _) => op.jumps(),
             Op::Binary(op, ..) => op.jumps(),
-            Op::Implicit(_) => self
-                .implicit_call(node)
-                .is_some_and(|call| call.function.steps()),
+            Op::System(_) => {
+                let call = self.system(node);
+                call.is_some_and(|call| call.function().is_some_and(Implicit::steps))
+            }
             _ => false,
         }
     }
@@ -124,20 +145,22 @@ impl Graph {
         loop {
             let nodes = self.reachable(&all).into_iter();
             // a loop within a loop may be a node that was made before those seen so far
-            let calls = nodes.filter_map(|node| Some((node, self.implicit_call(node)?)));
-            let calls: Vec<(Node, ImplicitCall)> =
-                calls.filter(|(node, _)| seen.insert(*node)).collect();
+            let calls = nodes.filter_map(|node| Some((node, self.system(node)?)));
+            let is_new =
+                |(node, call): &(Node, Call)| call.function().is_some() && seen.insert(*node);
+            let calls: Vec<(Node, Call)> = calls.filter(is_new).collect();
             if calls.is_empty() {
                 return all;
             }
-            for (node, call) in calls {
-                let at = call.at(self, node);
-                all.extend(call.function.residual(&Nodes(self), &at));
+            for (node, call) in &calls {
+                let residual =
+                    |function: &Implicit| function.residual(&Nodes(self), &call.at(self, *node));
+                all.extend(call.function().into_iter().flat_map(residual));
             }
         }
     }
 
-    /// One result of a `Solve` or an `Implicit` node built before.
+    /// One result of a system built before.
     pub(crate) fn entry(&self, solve: Node, i: u32) -> Node {
         self.inner
             .borrow_mut()
@@ -158,8 +181,8 @@ mod tests {
             panic!()
         };
         let system = g.system(solve).unwrap();
-        assert_eq!((system.size(), system.right()), (2, &[b, c][..]));
-        assert_eq!(system.matrix(), [a, b, c, a]);
+        assert_eq!(system.size(), 2);
+        assert_eq!(system.linear(), Some((&[a, b, c, a][..], &[b, c][..])));
         assert_eq!(g.system(x), None);
     }
 }

@@ -5,18 +5,14 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::Interval;
-use super::rounding::{
-    add_down, add_up, div_down, div_up, mul_down, mul_outward, mul_up, sqrt_down, sqrt_up,
-};
+use super::rounding::{Rounded, product, quotient, root, sum};
+use crate::real;
 
 impl Neg for Interval {
     type Output = Self;
 
     fn neg(self) -> Self {
-        if self.is_empty() {
-            return Self::EMPTY;
-        }
-        Self::raw(-self.hi, -self.lo, self.defined)
+        self.image(|x| (-x.hi, -x.lo))
     }
 }
 
@@ -24,7 +20,7 @@ impl Add for Interval {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
-        self.combine(other, |a, b| (add_down(a.lo, b.lo), add_up(a.hi, b.hi)))
+        self.combine(other, |a, b| (sum(a.lo, b.lo).down(), sum(a.hi, b.hi).up()))
     }
 }
 
@@ -42,14 +38,12 @@ impl Mul for Interval {
     fn mul(self, other: Self) -> Self {
         self.combine(other, |a, b| {
             if a.lo >= 0.0 && b.lo >= 0.0 {
-                return (mul_down(a.lo, b.lo), mul_up(a.hi, b.hi));
+                return (product(a.lo, b.lo).down(), product(a.hi, b.hi).up());
             }
             let corners = [(a.lo, b.lo), (a.lo, b.hi), (a.hi, b.lo), (a.hi, b.hi)];
-            let products = corners.map(|(x, y)| mul_outward(x, y));
-            (
-                smallest(products.map(|(down, _)| down)),
-                largest(products.map(|(_, up)| up)),
-            )
+            let products = corners.map(|(x, y)| product(x, y));
+            let (lo, hi) = (products.map(Rounded::down), products.map(Rounded::up));
+            (smallest(lo), largest(hi))
         })
     }
 }
@@ -85,71 +79,59 @@ impl Interval {
         if divisor.hi == 0.0 {
             return Self::EMPTY;
         }
-        let quotient = self.combine(divisor, |a, b| {
+        let found = self.combine(divisor, |a, b| {
             let lo = match a.lo {
-                lo if lo >= 0.0 => div_down(lo, b.hi),
+                lo if lo >= 0.0 => quotient(lo, b.hi).down(),
                 _ if b.lo == 0.0 => f64::NEG_INFINITY,
-                lo => div_down(lo, b.lo),
+                lo => quotient(lo, b.lo).down(),
             };
             let hi = match a.hi {
-                hi if hi <= 0.0 => div_up(hi, b.hi),
+                hi if hi <= 0.0 => quotient(hi, b.hi).up(),
                 _ if b.lo == 0.0 => f64::INFINITY,
-                hi => div_up(hi, b.lo),
+                hi => quotient(hi, b.lo).up(),
             };
             (lo, hi)
         });
-        quotient.and_defined(divisor.lo > 0.0)
+        found.and_defined(divisor.lo > 0.0)
+    }
+
+    /// The bounds that `f` gives for an interval that is not empty.
+    pub(super) fn image(self, f: impl FnOnce(Self) -> (f64, f64)) -> Self {
+        self.combine(self, |x, _| f(x))
     }
 
     /// The absolute values.
-    #[must_use]
     pub fn abs(self) -> Self {
-        if self.is_empty() {
-            return Self::EMPTY;
-        }
-        Self::raw(self.mignitude(), self.magnitude(), self.defined)
+        self.image(|x| (x.mignitude(), x.magnitude()))
     }
 
     /// The signs: −1, 0 or 1.
-    #[must_use]
     pub fn sign(self) -> Self {
-        self.increasing(|x| if x == 0.0 { 0.0 } else { x.signum() })
+        self.image(|x| (real::sign(x.lo), real::sign(x.hi)))
     }
 
     /// The largest integers not above the members.
-    #[must_use]
     pub fn floor(self) -> Self {
-        self.increasing(f64::floor)
+        self.image(|x| (x.lo.floor(), x.hi.floor()))
     }
 
     /// The square roots of the members that are not negative.
-    #[must_use]
     pub fn sqrt(self) -> Self {
         if self.is_empty() || self.hi < 0.0 {
             return Self::EMPTY;
         }
-        let lo = sqrt_down(self.lo.max(0.0)).max(0.0);
-        Self::raw(lo, sqrt_up(self.hi), self.defined && self.lo >= 0.0)
+        let lo = root(self.lo.max(0.0)).down().max(0.0);
+        Self::raw(lo, root(self.hi).up(), self.defined && self.lo >= 0.0)
     }
 
     /// The smaller ones of two members.
-    #[must_use]
     pub fn min(self, other: Self) -> Self {
         self.combine(other, |a, b| (a.lo.min(b.lo), a.hi.min(b.hi)))
     }
 
     /// The larger ones of two members.
-    #[must_use]
     pub fn max(self, other: Self) -> Self {
         self.combine(other, |a, b| (a.lo.max(b.lo), a.hi.max(b.hi)))
-    }
-
-    /// The image under an increasing function that is exact in floating point.
-    fn increasing(self, f: impl Fn(f64) -> f64) -> Self {
-        if self.is_empty() {
-            return Self::EMPTY;
-        }
-        Self::raw(f(self.lo), f(self.hi), self.defined)
     }
 }
 
@@ -167,53 +149,42 @@ impl Interval {
     const UNDECIDED: Self = Self::raw(0.0, 1.0, true);
 
     /// Whether members of `self` are below members of `other`.
-    #[must_use]
-    pub fn less(self, other: Self) -> Self {
+    pub(super) fn less(self, other: Self) -> Self {
         self.relation(other, self.hi < other.lo, self.lo >= other.hi)
     }
 
     /// Whether members of `self` are at most members of `other`.
-    #[must_use]
-    pub fn less_eq(self, other: Self) -> Self {
+    pub(super) fn less_eq(self, other: Self) -> Self {
         self.relation(other, self.hi <= other.lo, self.lo > other.hi)
     }
 
     /// Whether members are equal: certain only for two points.
-    #[must_use]
-    pub fn equal(self, other: Self) -> Self {
+    pub(super) fn equal(self, other: Self) -> Self {
         let same = self.is_point() && other.is_point() && self.lo == other.lo;
         self.relation(other, same, self.hi < other.lo || other.hi < self.lo)
     }
 
     /// Whether both are true.
-    #[must_use]
-    pub fn and(self, other: Self) -> Self {
+    pub(super) fn and(self, other: Self) -> Self {
         let always = self.is_true() && other.is_true();
         self.relation(other, always, self.is_zero() || other.is_zero())
     }
 
     /// Whether one is true.
-    #[must_use]
-    pub fn or(self, other: Self) -> Self {
+    pub(super) fn or(self, other: Self) -> Self {
         let never = self.is_zero() && other.is_zero();
         self.relation(other, self.is_true() || other.is_true(), never)
     }
 
     /// The opposite truth values.
-    #[must_use]
-    #[expect(
-        clippy::should_implement_trait,
-        reason = "`!x` would read as a negation of the set"
-    )]
-    pub fn not(self) -> Self {
+    pub(super) fn not(self) -> Self {
         self.relation(self, self.is_zero(), self.is_true())
     }
 
     /// `chosen` where `self` is true, `other` where it is false, the hull of both when it may be either.
     ///
     /// A branch that cannot be taken has no influence, be it defined or not.
-    #[must_use]
-    pub fn select(self, chosen: Self, other: Self) -> Self {
+    pub(super) fn select(self, chosen: Self, other: Self) -> Self {
         if self.is_empty() {
             return Self::EMPTY;
         }

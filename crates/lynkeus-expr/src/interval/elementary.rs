@@ -8,17 +8,15 @@ use std::f64::consts::FRAC_PI_2;
 
 use super::Interval;
 use super::arithmetic::{largest, smallest};
-use super::rounding::{library_down, library_up, mul_down, mul_up};
+use super::rounding::{Rounded, library_down, library_up, product};
 
 impl Interval {
     /// The exponentials.
-    #[must_use]
     pub fn exp(self) -> Self {
-        self.monotone(|x| (exp_down(x.lo), exp_up(x.hi)))
+        self.image(|x| (exp_down(x.lo), exp_up(x.hi)))
     }
 
     /// The natural logarithms of the members above zero.
-    #[must_use]
     pub fn ln(self) -> Self {
         if self.is_empty() || self.hi <= 0.0 {
             return Self::EMPTY;
@@ -32,13 +30,11 @@ impl Interval {
     }
 
     /// The angles in [−π/2, π/2] whose sine is a member.
-    #[must_use]
     pub fn asin(self) -> Self {
         self.within_one().odd(libm::asin, FRAC_PI_2.next_up())
     }
 
     /// The angles in [0, π] whose cosine is a member.
-    #[must_use]
     pub fn acos(self) -> Self {
         let down = |x: f64| library_down(libm::acos(x)).max(0.0);
         let up = |x: f64| {
@@ -48,23 +44,20 @@ impl Interval {
                 library_up(libm::acos(x)).min(Self::PI.hi)
             }
         };
-        self.within_one().monotone(|x| (down(x.hi), up(x.lo)))
+        self.within_one().image(|x| (down(x.hi), up(x.lo)))
     }
 
     /// The angles in [−π/2, π/2] whose tangent is a member.
-    #[must_use]
     pub fn atan(self) -> Self {
         self.odd(libm::atan, FRAC_PI_2.next_up())
     }
 
     /// The hyperbolic sines.
-    #[must_use]
     pub fn sinh(self) -> Self {
         self.odd(libm::sinh, f64::INFINITY)
     }
 
     /// The hyperbolic cosines.
-    #[must_use]
     pub fn cosh(self) -> Self {
         let up = |x: f64| {
             if x == 0.0 {
@@ -73,7 +66,7 @@ impl Interval {
                 library_up(libm::cosh(x))
             }
         };
-        self.monotone(|x| {
+        self.image(|x| {
             (
                 library_down(libm::cosh(x.mignitude())).max(1.0),
                 up(x.magnitude()),
@@ -82,7 +75,6 @@ impl Interval {
     }
 
     /// The hyperbolic tangents.
-    #[must_use]
     pub fn tanh(self) -> Self {
         self.odd(libm::tanh, 1.0)
     }
@@ -100,16 +92,7 @@ impl Interval {
             x if x < 0.0 => library_up(f(x)).min(0.0),
             x => library_up(f(x)).min(limit),
         };
-        self.monotone(|x| (-up(-x.lo), up(x.hi)))
-    }
-
-    /// The interval between the bounds `f` finds; the empty set stays empty.
-    fn monotone(self, f: impl FnOnce(Self) -> (f64, f64)) -> Self {
-        if self.is_empty() {
-            return Self::EMPTY;
-        }
-        let (lo, hi) = f(self);
-        Self::raw(lo, hi, self.defined)
+        self.image(|x| (-up(-x.lo), up(x.hi)))
     }
 }
 
@@ -133,7 +116,6 @@ impl Interval {
     /// The `n`-th powers, of members of any sign; x⁰ is 1 for every x.
     ///
     /// The bounds come from at most 2·log₂|n| rounded multiplications.
-    #[must_use]
     pub fn powi(self, n: i32) -> Self {
         if self.is_empty() {
             return Self::EMPTY;
@@ -160,22 +142,19 @@ impl Interval {
             self
         };
         // Odd powers keep the sign, so both bounds follow from powers of absolute values.
-        let lo = if base.lo >= 0.0 {
-            repeated(base.lo, n, mul_down)
-        } else {
-            -repeated(-base.lo, n, mul_up)
+        let lo = match base.lo >= 0.0 {
+            true => repeated(base.lo, n, Rounded::down),
+            false => -repeated(-base.lo, n, Rounded::up),
         };
-        let hi = if base.hi >= 0.0 {
-            repeated(base.hi, n, mul_up)
-        } else {
-            -repeated(-base.hi, n, mul_down)
+        let hi = match base.hi >= 0.0 {
+            true => repeated(base.hi, n, Rounded::up),
+            false => -repeated(-base.hi, n, Rounded::down),
         };
         Self::raw(lo, hi, self.defined)
     }
 
     /// The powers with real exponents, as `f64::powf` defines them: for bases that are not negative (0⁰ = 1, and zero
     /// has no negative powers), and for negative bases with exponents that are integers.
-    #[must_use]
     pub fn pow(self, exponent: Self) -> Self {
         if self.is_empty() || exponent.is_empty() {
             return Self::EMPTY;
@@ -223,8 +202,9 @@ impl Interval {
     }
 }
 
-/// x^n by squaring for x ≥ 0 and n ≥ 1, all products rounded by `mul`.
-fn repeated(x: f64, n: u32, mul: impl Fn(f64, f64) -> f64) -> f64 {
+/// x^n by squaring for x ≥ 0 and n ≥ 1, all products rounded the same way.
+fn repeated(x: f64, n: u32, rounded: impl Fn(Rounded) -> f64) -> f64 {
+    let mul = |x: f64, y: f64| rounded(product(x, y));
     let mut result = x;
     for bit in (0..n.ilog2()).rev() {
         result = mul(result, result).max(0.0);
@@ -260,7 +240,6 @@ fn pow_up(x: f64, y: f64) -> f64 {
 
 impl Interval {
     /// The sines.
-    #[must_use]
     pub fn sin(self) -> Self {
         let quarter = Self::PI / Self::point(2.0);
         if self.is_zero() {
@@ -270,14 +249,12 @@ impl Interval {
     }
 
     /// The cosines.
-    #[must_use]
     pub fn cos(self) -> Self {
         self.wave(libm::cos, Self::ZERO, Self::PI)
     }
 
     /// The tangents; not defined when an odd multiple of π/2 is a member, or may be one as far as the reduction by the
     /// enclosure of π tells.
-    #[must_use]
     pub fn tan(self) -> Self {
         if self.is_empty() || self.is_zero() {
             return self;
@@ -325,7 +302,6 @@ impl Interval {
     ///
     /// Boxes that touch the negative x axis from either side give [−π, π]: floating-point arithmetic has two zeros, and
     /// −0 lies on the other side of the cut.
-    #[must_use]
     pub fn atan2(self, x: Self) -> Self {
         let y = self;
         if y.is_empty() || x.is_empty() {

@@ -21,7 +21,7 @@
 
 use std::fmt;
 
-use rounding::{add_down, add_up};
+use rounding::sum;
 
 pub use solve::solve;
 
@@ -37,6 +37,7 @@ mod solve;
 ///
 /// Two intervals are equal when their bounds and their marks are.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Interval {
     lo: f64,
     hi: f64,
@@ -90,7 +91,6 @@ impl Interval {
     ///
     /// Infinity is no real number: it becomes the numbers beyond the largest finite one, not defined. NaN becomes the
     /// empty interval.
-    #[must_use]
     pub const fn point(value: f64) -> Self {
         if value.is_nan() {
             Self::EMPTY
@@ -121,31 +121,26 @@ impl Interval {
     }
 
     /// The lower bound; +∞ for the empty interval.
-    #[must_use]
     pub const fn lo(self) -> f64 {
         self.lo
     }
 
     /// The upper bound; −∞ for the empty interval.
-    #[must_use]
     pub const fn hi(self) -> f64 {
         self.hi
     }
 
     /// Whether every operation that led here was defined at every point of its arguments.
-    #[must_use]
     pub const fn is_defined(self) -> bool {
         self.defined
     }
 
     /// Whether no number is a member.
-    #[must_use]
     pub const fn is_empty(self) -> bool {
         self.lo > self.hi
     }
 
     /// Whether exactly one number is a member.
-    #[must_use]
     pub const fn is_point(self) -> bool {
         self.lo == self.hi
     }
@@ -182,31 +177,26 @@ impl fmt::Display for Interval {
 
 impl Interval {
     /// Whether `value` is a member; infinities and NaN never are.
-    #[must_use]
     pub fn contains(self, value: f64) -> bool {
         value.is_finite() && self.lo <= value && value <= self.hi
     }
 
     /// Whether zero is a member.
-    #[must_use]
     pub fn contains_zero(self) -> bool {
         self.contains(0.0)
     }
 
     /// Whether there are members and all are above zero.
-    #[must_use]
     pub fn is_positive(self) -> bool {
         !self.is_empty() && self.lo > 0.0
     }
 
     /// Whether there are members and all are below zero.
-    #[must_use]
     pub fn is_negative(self) -> bool {
         !self.is_empty() && self.hi < 0.0
     }
 
     /// Whether every member is a member of `other`; the empty interval is a subset of all.
-    #[must_use]
     pub fn is_subset(self, other: Self) -> bool {
         self.is_empty() || (other.lo <= self.lo && self.hi <= other.hi)
     }
@@ -214,7 +204,6 @@ impl Interval {
     /// The smallest interval that holds the members of both; defined when both are.
     ///
     /// The empty interval adds no member, but it is not defined, and neither is the hull then.
-    #[must_use]
     pub fn hull(self, other: Self) -> Self {
         Self {
             lo: self.lo.min(other.lo),
@@ -224,7 +213,6 @@ impl Interval {
     }
 
     /// The members of both; empty when there are none.
-    #[must_use]
     pub fn intersection(self, other: Self) -> Self {
         let lo = self.lo.max(other.lo);
         let hi = self.hi.min(other.hi);
@@ -235,17 +223,15 @@ impl Interval {
     }
 
     /// The distance of the bounds, rounded up; zero for the empty interval.
-    #[must_use]
     pub fn width(self) -> f64 {
         if self.is_empty() {
             return 0.0;
         }
-        add_up(self.hi, -self.lo)
+        sum(self.hi, -self.lo).up()
     }
 
     /// A finite number in the middle: 0 for all real numbers (and for the empty interval), the largest finite number
     /// for an interval without an upper bound.
-    #[must_use]
     pub fn midpoint(self) -> f64 {
         match (self.lo.is_finite(), self.hi.is_finite()) {
             (true, true) => (0.5 * self.lo + 0.5 * self.hi).clamp(self.lo, self.hi),
@@ -256,7 +242,6 @@ impl Interval {
     }
 
     /// The largest absolute value of a member; zero for the empty interval.
-    #[must_use]
     pub fn magnitude(self) -> f64 {
         if self.is_empty() {
             return 0.0;
@@ -265,7 +250,6 @@ impl Interval {
     }
 
     /// The smallest absolute value of a member; zero for the empty interval.
-    #[must_use]
     pub fn mignitude(self) -> f64 {
         if self.is_empty() || self.contains_zero() {
             return 0.0;
@@ -274,7 +258,6 @@ impl Interval {
     }
 
     /// The part up to the [midpoint](Self::midpoint) and the part from there on; they share that point.
-    #[must_use]
     pub fn bisect(self) -> (Self, Self) {
         if self.is_empty() {
             return (self, self);
@@ -287,15 +270,14 @@ impl Interval {
     }
 
     /// The interval wider by `distance` on either side.
-    #[must_use]
     pub fn inflate(self, distance: f64) -> Self {
         let distance = distance.abs();
         if self.is_empty() || distance.is_nan() {
             return self;
         }
         Self::raw(
-            add_down(self.lo, -distance),
-            add_up(self.hi, distance),
+            sum(self.lo, -distance).down(),
+            sum(self.hi, distance).up(),
             self.defined,
         )
     }

@@ -15,138 +15,94 @@ const TINY: f64 = f64::MIN_POSITIVE * (1_u64 << 60) as f64 * (1_u64 << 60) as f6
 /// point value of the function at any point of an interval then lies in the result as well as the exact one.
 const LIBRARY_ULPS: u32 = 4;
 
-/// What the rounding to nearest did to a result.
-enum Residual {
-    Exact,
-    /// The exact value is below the rounded one.
-    Below,
-    /// The exact value is above the rounded one.
-    Above,
-    Unknown,
+/// A result to nearest, and what rounding took from it.
+#[derive(Clone, Copy)]
+pub struct Rounded {
+    nearest: f64,
+    /// the sign of the exact value less the nearest; not finite where it is not known
+    rest: f64,
 }
 
-impl Residual {
-    fn from_sign(exact_minus_rounded: f64) -> Self {
-        if exact_minus_rounded == 0.0 {
-            Self::Exact
-        } else if !exact_minus_rounded.is_finite() {
-            Self::Unknown
-        } else if exact_minus_rounded < 0.0 {
-            Self::Below
-        } else {
-            Self::Above
+impl Rounded {
+    fn exact(nearest: f64) -> Self {
+        Self { nearest, rest: 0.0 }
+    }
+
+    fn unknown(nearest: f64) -> Self {
+        let rest = f64::NAN;
+        Self { nearest, rest }
+    }
+
+    /// A lower bound of the exact value.
+    pub fn down(self) -> f64 {
+        match self.rest < 0.0 || !self.rest.is_finite() {
+            true => self.nearest.next_down(),
+            false => self.nearest,
         }
     }
 
-    fn down(&self, rounded: f64) -> f64 {
-        match self {
-            Self::Below | Self::Unknown => rounded.next_down(),
-            Self::Exact | Self::Above => rounded,
-        }
-    }
-
-    fn up(&self, rounded: f64) -> f64 {
-        match self {
-            Self::Above | Self::Unknown => rounded.next_up(),
-            Self::Exact | Self::Below => rounded,
+    /// An upper bound of the exact value.
+    pub fn up(self) -> f64 {
+        match self.rest > 0.0 || !self.rest.is_finite() {
+            true => self.nearest.next_up(),
+            false => self.nearest,
         }
     }
 }
 
-fn sum(a: f64, b: f64) -> (f64, Residual) {
-    let s = a + b;
+/// a + b
+pub fn sum(a: f64, b: f64) -> Rounded {
+    let nearest = a + b;
     if a.is_infinite() || b.is_infinite() {
-        return (s, Residual::Exact);
+        return Rounded::exact(nearest);
     }
-    let b_part = s - a;
-    let a_part = s - b_part;
-    (s, Residual::from_sign((a - a_part) + (b - b_part)))
+    let b_part = nearest - a;
+    let a_part = nearest - b_part;
+    let rest = (a - a_part) + (b - b_part);
+    Rounded { nearest, rest }
 }
 
-fn product(a: f64, b: f64) -> (f64, Residual) {
+/// a·b; an infinite bound is a limit of numbers, so its product with zero is zero.
+pub fn product(a: f64, b: f64) -> Rounded {
     if a == 0.0 || b == 0.0 {
-        // An infinite bound is a limit of numbers, so its product with zero is zero.
-        return (0.0, Residual::Exact);
+        return Rounded::exact(0.0);
     }
-    let p = a * b;
+    let nearest = a * b;
     if a.is_infinite() || b.is_infinite() {
-        return (p, Residual::Exact);
+        return Rounded::exact(nearest);
     }
-    if p.is_infinite() || p.abs() < TINY {
-        return (p, Residual::Unknown);
+    if nearest.is_infinite() || nearest.abs() < TINY {
+        return Rounded::unknown(nearest);
     }
-    (p, Residual::from_sign(a.mul_add(b, -p)))
+    let rest = a.mul_add(b, -nearest);
+    Rounded { nearest, rest }
 }
 
-fn quotient(a: f64, b: f64) -> (f64, Residual) {
-    let q = a / b;
+/// a/b for b ≠ 0, not both infinite.
+pub fn quotient(a: f64, b: f64) -> Rounded {
+    let nearest = a / b;
     if a == 0.0 || a.is_infinite() || b.is_infinite() {
-        return (q, Residual::Exact);
+        return Rounded::exact(nearest);
     }
-    if q.is_infinite() || q.abs() < TINY || a.abs() < TINY {
-        return (q, Residual::Unknown);
+    if nearest.is_infinite() || nearest.abs() < TINY || a.abs() < TINY {
+        return Rounded::unknown(nearest);
     }
-    let remainder = (-q).mul_add(b, a);
-    (q, Residual::from_sign(remainder * b.signum()))
+    let remainder = (-nearest).mul_add(b, a);
+    let rest = remainder * b.signum();
+    Rounded { nearest, rest }
 }
 
-fn root(a: f64) -> (f64, Residual) {
-    let r = a.sqrt();
+/// √a
+pub fn root(a: f64) -> Rounded {
+    let nearest = a.sqrt();
     if a == 0.0 || a.is_infinite() {
-        return (r, Residual::Exact);
+        return Rounded::exact(nearest);
     }
     if a < TINY {
-        return (r, Residual::Unknown);
+        return Rounded::unknown(nearest);
     }
-    (r, Residual::from_sign((-r).mul_add(r, a)))
-}
-
-pub fn add_down(a: f64, b: f64) -> f64 {
-    let (s, residual) = sum(a, b);
-    residual.down(s)
-}
-
-pub fn add_up(a: f64, b: f64) -> f64 {
-    let (s, residual) = sum(a, b);
-    residual.up(s)
-}
-
-pub fn mul_down(a: f64, b: f64) -> f64 {
-    let (p, residual) = product(a, b);
-    residual.down(p)
-}
-
-pub fn mul_up(a: f64, b: f64) -> f64 {
-    let (p, residual) = product(a, b);
-    residual.up(p)
-}
-
-/// Lower and upper bound of a product.
-pub fn mul_outward(a: f64, b: f64) -> (f64, f64) {
-    let (p, residual) = product(a, b);
-    (residual.down(p), residual.up(p))
-}
-
-/// `a / b` for `b ≠ 0`, not both infinite.
-pub fn div_down(a: f64, b: f64) -> f64 {
-    let (q, residual) = quotient(a, b);
-    residual.down(q)
-}
-
-/// `a / b` for `b ≠ 0`, not both infinite.
-pub fn div_up(a: f64, b: f64) -> f64 {
-    let (q, residual) = quotient(a, b);
-    residual.up(q)
-}
-
-pub fn sqrt_down(a: f64) -> f64 {
-    let (r, residual) = root(a);
-    residual.down(r)
-}
-
-pub fn sqrt_up(a: f64) -> f64 {
-    let (r, residual) = root(a);
-    residual.up(r)
+    let rest = (-nearest).mul_add(nearest, a);
+    Rounded { nearest, rest }
 }
 
 /// A lower bound of the exact value of which a library function returned `value`.
@@ -165,20 +121,26 @@ mod tests {
 
     #[test]
     fn exact_results_are_not_moved() {
-        assert_eq!((add_down(0.5, 0.25), add_up(0.5, 0.25)), (0.75, 0.75));
-        assert_eq!((mul_down(3.0, -7.0), mul_up(3.0, -7.0)), (-21.0, -21.0));
-        assert_eq!((div_down(1.0, -8.0), div_up(1.0, -8.0)), (-0.125, -0.125));
-        assert_eq!((sqrt_down(2.25), sqrt_up(2.25)), (1.5, 1.5));
+        assert_eq!((sum(0.5, 0.25).down(), sum(0.5, 0.25).up()), (0.75, 0.75));
+        assert_eq!(
+            (product(3.0, -7.0).down(), product(3.0, -7.0).up()),
+            (-21.0, -21.0)
+        );
+        assert_eq!(
+            (quotient(1.0, -8.0).down(), quotient(1.0, -8.0).up()),
+            (-0.125, -0.125)
+        );
+        assert_eq!((root(2.25).down(), root(2.25).up()), (1.5, 1.5));
     }
 
     #[test]
     fn inexact_results_are_one_step_apart() {
         for (down, up) in [
-            (add_down(0.1, 0.2), add_up(0.1, 0.2)),
-            (add_down(1.0, 1e-300), add_up(1.0, 1e-300)),
-            (mul_down(0.1, 0.1), mul_up(0.1, 0.1)),
-            (div_down(1.0, -3.0), div_up(1.0, -3.0)),
-            (sqrt_down(2.0), sqrt_up(2.0)),
+            (sum(0.1, 0.2).down(), sum(0.1, 0.2).up()),
+            (sum(1.0, 1e-300).down(), sum(1.0, 1e-300).up()),
+            (product(0.1, 0.1).down(), product(0.1, 0.1).up()),
+            (quotient(1.0, -3.0).down(), quotient(1.0, -3.0).up()),
+            (root(2.0).down(), root(2.0).up()),
         ] {
             assert_eq!(down.next_up(), up);
         }
@@ -186,23 +148,23 @@ mod tests {
 
     #[test]
     fn overflow_stays_finite_on_the_inner_side() {
-        assert_eq!(add_down(f64::MAX, f64::MAX), f64::MAX);
-        assert_eq!(add_up(f64::MAX, f64::MAX), f64::INFINITY);
-        assert_eq!(mul_up(-1e200, 1e200), f64::MIN);
-        assert_eq!(div_down(1e200, 1e-200), f64::MAX);
+        assert_eq!(sum(f64::MAX, f64::MAX).down(), f64::MAX);
+        assert_eq!(sum(f64::MAX, f64::MAX).up(), f64::INFINITY);
+        assert_eq!(product(-1e200, 1e200).up(), f64::MIN);
+        assert_eq!(quotient(1e200, 1e-200).down(), f64::MAX);
     }
 
     #[test]
     fn underflow_is_outward() {
         let tiny = f64::from_bits(1);
-        assert!(mul_down(tiny, tiny) <= 0.0 && mul_up(tiny, tiny) >= tiny);
-        assert!(div_down(-tiny, 3.0) <= -tiny && div_up(-tiny, 3.0) >= 0.0);
-        assert!(sqrt_down(tiny) < sqrt_up(tiny));
+        assert!(product(tiny, tiny).down() <= 0.0 && product(tiny, tiny).up() >= tiny);
+        assert!(quotient(-tiny, 3.0).down() <= -tiny && quotient(-tiny, 3.0).up() >= 0.0);
+        assert!(root(tiny).down() < root(tiny).up());
     }
 
     #[test]
     fn zero_times_infinity_is_zero() {
-        assert_eq!(mul_up(0.0, f64::INFINITY), 0.0);
-        assert_eq!(mul_down(f64::NEG_INFINITY, 0.0), 0.0);
+        assert_eq!(product(0.0, f64::INFINITY).up(), 0.0);
+        assert_eq!(product(f64::NEG_INFINITY, 0.0).down(), 0.0);
     }
 }

@@ -7,14 +7,13 @@
 //!    when |E|u < u for some positive vector u, and then Krawczyk's iteration x ← (Rb + Ex) ∩ x.
 
 use super::Interval;
-use super::rounding::{add_up, div_up, mul_up};
+use super::rounding::{product, quotient, sum};
 
 /// Encloses all solutions x of A x = b; `a` is n×n row by row, `b` has n entries.
 ///
 /// Returns the n enclosures, and whether every matrix in A was proved regular. Where that fails the enclosures hold all
 /// real numbers and are not [defined](Interval::is_defined); they are empty when an entry of A or b is. A number of
 /// entries other than n² in `a` is answered like a matrix that cannot be proved regular.
-#[must_use]
 pub fn solve(a: &[Interval], b: &[Interval]) -> (Vec<Interval>, bool) {
     let n = b.len();
     if a.iter().chain(b).any(|entry| entry.is_empty()) {
@@ -163,17 +162,17 @@ fn first_enclosure(e: &[Interval], z: &[Interval], n: usize) -> Option<Vec<Inter
         let image = row
             .iter()
             .zip(&u)
-            .fold(0.0, |sum, (&e, &u)| add_up(sum, mul_up(e, u)));
-        contraction = contraction.max(div_up(image, u[i]));
-        reach = reach.max(div_up(z[i].magnitude(), u[i]));
+            .fold(0.0, |known, (&e, &u)| sum(known, product(e, u).up()).up());
+        contraction = contraction.max(quotient(image, u[i]).up());
+        reach = reach.max(quotient(z[i].magnitude(), u[i]).up());
     }
-    let slack = -add_up(contraction, -1.0);
+    let slack = -sum(contraction, -1.0).up();
     if !(slack > 0.0 && reach.is_finite()) {
         return None;
     }
-    let radius = div_up(reach, slack);
+    let radius = quotient(reach, slack).up();
     let bounds = u.iter().map(|&u| {
-        let bound = mul_up(radius, u);
+        let bound = product(radius, u).up();
         Interval::raw(-bound, bound, true)
     });
     Some(bounds.collect())

@@ -14,8 +14,6 @@ pub trait Vector:
     fn splat(x: f64) -> Self;
     /// self·factor + term, rounded once.
     fn mul_add(self, factor: Self, term: Self) -> Self;
-    /// self·factor − term, rounded once.
-    fn mul_sub(self, factor: Self, term: Self) -> Self;
     /// Bits that both have.
     fn and(self, other: Self) -> Self;
     /// Bits that either has.
@@ -45,6 +43,12 @@ pub trait Vector:
     #[inline(always)]
     fn abs(self) -> Self {
         self.and(Self::splat(f64::from_bits(!(1 << 63))))
+    }
+
+    /// self·factor − term, rounded once.
+    #[inline(always)]
+    fn mul_sub(self, factor: Self, term: Self) -> Self {
+        self.mul_add(factor, term.xor(Self::splat(-0.0)))
     }
 
     /// The signs alone.
@@ -129,11 +133,6 @@ impl<const N: usize> Vector for Portable<N> {
     }
 
     #[inline(always)]
-    fn mul_sub(self, factor: Self, term: Self) -> Self {
-        Self(from_fn(|i| self.0[i].mul_add(factor.0[i], -term.0[i])))
-    }
-
-    #[inline(always)]
     fn and(self, other: Self) -> Self {
         self.bits(other, |x, y| x & y)
     }
@@ -181,12 +180,12 @@ impl<const N: usize> Vector for Portable<N> {
 
     #[inline(always)]
     fn up<const BITS: i32>(self) -> Self {
-        Self(self.0.map(|x| f64::from_bits(x.to_bits() << BITS)))
+        self.bits(self, |x, _| x << BITS)
     }
 
     #[inline(always)]
     fn down<const BITS: i32>(self) -> Self {
-        Self(self.0.map(|x| f64::from_bits(x.to_bits() >> BITS)))
+        self.bits(self, |x, _| x >> BITS)
     }
 
     #[inline(always)]

@@ -35,19 +35,17 @@ fn naive<A: Algebra>(
             Op::Binary(op, a, b) => algebra.binary(op, at(a), at(b)),
             Op::Select(c, a, b) => algebra.select(at(c), at(a), at(b)),
             Op::Entry(solve, entry) => solutions[&solve][entry as usize].clone(),
-            Op::Solve(_) => {
-                let arguments = graph.arguments(node);
-                let values: Vec<A::Value> = arguments.iter().map(|&a| at(a).clone()).collect();
+            Op::System(_) => {
+                let call = graph.system(node).expect("it is one");
+                let values: Vec<A::Value> = call.arguments.iter().map(|&a| at(a).clone()).collect();
+                if let Some(function) = call.function() {
+                    solutions.insert(node, algebra.implicit(function, &values));
+                    continue;
+                }
                 // Systems of a recipe are 2×2.
                 let (mut x, rcond) = algebra.solve(&values[..4], &values[4..]);
                 x.push(rcond);
                 solutions.insert(node, x);
-                continue;
-            }
-            Op::Implicit(_) => {
-                let call = graph.implicit_call(node).expect("it is one");
-                let p: Vec<A::Value> = call.arguments.iter().map(|&a| at(a).clone()).collect();
-                solutions.insert(node, algebra.implicit(&call.function, &p));
                 continue;
             }
         };

@@ -100,7 +100,7 @@ fn two_hundred_random_loops() {
 fn examine(known: &Loop, at: f64) {
     let plant = plant(&known.text());
     let roots: Vec<Node> = plant.algebraics.iter().map(|z| z.node).collect();
-    let is_system = |&node: &Node| matches!(plant.graph.op(node), Op::Solve(_));
+    let is_system = |&node: &Node| matches!(plant.graph.op(node), Op::System(_));
     let nodes = plant.graph.reachable(&roots);
     assert!(nodes.iter().any(is_system), "no linear system");
     let tape = Tape::new(&plant.graph, &[plant.states[0].node], &roots).unwrap();

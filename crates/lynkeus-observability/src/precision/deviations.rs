@@ -58,15 +58,6 @@ impl Deviations {
     }
 }
 
-/// The factor with columns of length one, and what made them so.
-struct Balanced {
-    factor: DMatrix<f64>,
-    /// lengths of the columns; 1 for a column that is only rounding
-    lengths: Vec<f64>,
-    /// accuracy of the balanced columns
-    accuracy: f64,
-}
-
 /// Standard errors, and which of them rest on parts of unseen directions that were taken as rounding.
 pub(super) struct Judged {
     pub deviations: Deviations,
@@ -86,13 +77,11 @@ pub(super) fn of(
     budget: &Budget,
 ) -> Option<Judged> {
     let count = scales.len();
-    let balanced = balance(information, accuracy);
-    let Singular { values, directions } = singular(balanced.factor, budget)?;
-    let rank = decide(&values, balanced.accuracy);
+    let (factor, lengths, accuracy) = balance(information, accuracy);
+    let Singular { values, directions } = singular(factor, budget)?;
+    let rank = decide(&values, accuracy);
     // errors in units of the scales, one column per direction
-    let start = DMatrix::from_fn(count, count, |i, j| {
-        directions[(i, j)] / balanced.lengths[i]
-    });
+    let start = DMatrix::from_fn(count, count, |i, j| directions[(i, j)] / lengths[i]);
     let present = transition * &start;
     let blur = (MARGIN * rank.threshold / rank.weakest_seen).clamp(1e-9, 1e-2);
     let split = Split {
@@ -101,13 +90,13 @@ pub(super) fn of(
         reach: start.column_iter().map(|c| c.amax()).collect(),
     };
     let at_start = |i: usize| {
-        let noise = blur / balanced.lengths[i];
+        let noise = blur / lengths[i];
         let (σ, is_doubted) = split.error(&|j| start[(i, j)], noise, 1.0);
         (scales[i] * σ, is_doubted)
     };
     let at_present = |i: usize| {
         let row = transition.row(i);
-        let terms = row.iter().zip(&balanced.lengths);
+        let terms = row.iter().zip(&lengths);
         let noise = blur * terms.map(|(phi, e)| (phi / e).abs()).fold(0.0, f64::max);
         split.error(&|j| present[(i, j)], noise, scales[i])
     };
@@ -160,8 +149,9 @@ impl Split<'_> {
     }
 }
 
-/// Scales the columns; one whose terms cancel down to their rounding becomes zero.
-fn balance(information: &Information, accuracy: f64) -> Balanced {
+/// The factor with columns of length one, the lengths that they had, and their accuracy. A column whose terms cancel
+/// down to their rounding becomes zero, its length 1.
+fn balance(information: &Information, accuracy: f64) -> (DMatrix<f64>, Vec<f64>, f64) {
     let mut factor = information.triangle().clone();
     let mut lengths = vec![1.0; factor.ncols()];
     let mut worst: f64 = 1.0;
@@ -175,11 +165,7 @@ fn balance(information: &Information, accuracy: f64) -> Balanced {
             factor.column_mut(j).fill(0.0);
         }
     }
-    Balanced {
-        factor,
-        lengths,
-        accuracy: accuracy * worst,
-    }
+    (factor, lengths, accuracy * worst)
 }
 
 fn decide(values: &[f64], accuracy: f64) -> Rank {

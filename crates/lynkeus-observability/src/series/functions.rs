@@ -15,17 +15,20 @@ const LARGEST: u64 = 24;
 /// Powers looked for under a logarithm.
 const POWERS: u64 = 6;
 
-/// Inverse functions of angles.
+/// Inverse functions: with a given derivative, and any value at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Arc {
+pub(super) enum Inverse {
+    Logarithm,
+    /// of the sine
     Sine,
+    /// of the tangent
     Tangent,
 }
 
 /// A value of an inverse function, with its sine and cosine.
 #[derive(Clone, Copy, Debug)]
 struct Known {
-    of: Arc,
+    of: Inverse,
     argument: Modular,
     value: Modular,
     angle: Option<Angle>,
@@ -187,13 +190,13 @@ impl Functions {
     }
 
     /// The inverse sine or tangent of a, `cosine` being that of the value where it is known.
-    pub(super) fn arc(&mut self, of: Arc, a: Modular, cosine: Option<Modular>) -> Modular {
+    pub(super) fn arc(&mut self, of: Inverse, a: Modular, cosine: Option<Modular>) -> Modular {
         if a.is_zero() {
             return a;
         }
         let angle = cosine.map(|cosine| match of {
-            Arc::Sine => Angle(a, cosine),
-            Arc::Tangent => Angle(a * cosine, cosine),
+            Inverse::Tangent => Angle(a * cosine, cosine),
+            _ => Angle(a, cosine),
         });
         if let Some(value) = self.known_arc(of, a, angle) {
             return value;
@@ -212,7 +215,7 @@ impl Functions {
     }
 
     /// An arc met before, be it of the other function, its negative or its complement.
-    fn known_arc(&self, of: Arc, a: Modular, angle: Option<Angle>) -> Option<Modular> {
+    fn known_arc(&self, of: Inverse, a: Modular, angle: Option<Angle>) -> Option<Modular> {
         let right = Modular::from_f64(std::f64::consts::PI).unwrap_or_default() * Modular::half();
         self.arcs.iter().find_map(|known| {
             let same = |x: Modular| known.of == of && known.argument == x;
@@ -223,7 +226,7 @@ impl Functions {
             };
             let one = Modular::ONE;
             // atan(1/a) is the complement of atan a on the same side of zero
-            let inverse = of == Arc::Tangent && known.of == of && known.argument * a == one;
+            let inverse = of == Inverse::Tangent && known.of == of && known.argument * a == one;
             match () {
                 () if same(a) || alike(one, one) => Some(known.value),
                 () if same(-a) || alike(-one, one) => Some(-known.value),
@@ -415,13 +418,16 @@ mod tests {
         assert_eq!(s * s + c * c, Modular::ONE);
         assert_eq!(f.angle(&[x + x]), (s * c + s * c, c * c - s * s));
         assert_eq!(f.angle(&[-x]), (-s, c));
-        let arc = f.arc(Arc::Tangent, x, None);
-        assert_eq!(f.arc(Arc::Tangent, -x, None), -arc);
+        let arc = f.arc(Inverse::Tangent, x, None);
+        assert_eq!(f.arc(Inverse::Tangent, -x, None), -arc);
         let third = f.exponential(&[x * Modular::new(3).inverse().unwrap()]);
         assert_eq!(third * third * third, ex);
         let cosine = Modular::ONE - s * s;
-        let (_, back) = (f.arc(Arc::Sine, s, cosine.root()), cosine.root().unwrap());
-        let value = f.arc(Arc::Sine, s, Some(back));
+        let (_, back) = (
+            f.arc(Inverse::Sine, s, cosine.root()),
+            cosine.root().unwrap(),
+        );
+        let value = f.arc(Inverse::Sine, s, Some(back));
         assert_eq!(f.angle(&[value]), (s, back));
         assert_eq!(f.angle(&[Modular::ZERO]), (Modular::ZERO, Modular::ONE));
     }

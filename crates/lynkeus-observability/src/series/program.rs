@@ -3,9 +3,10 @@
 use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{E, LN_2, LN_10, PI};
 
-use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
+use lynkeus_expr::{Binary, Call, Graph, Node, Op, Unary};
 
-use crate::series::functions::Arc;
+use crate::Note;
+use crate::series::functions::Inverse;
 use lynkeus_expr::modular::Modular;
 
 /// One operation; slots are numbered in order.
@@ -32,13 +33,6 @@ pub(super) enum Step {
     },
 }
 
-/// Which function an integral is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Inverse {
-    Logarithm,
-    Arc(crate::series::functions::Arc),
-}
-
 /// Operations that compute some roots from symbols.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Program {
@@ -55,13 +49,13 @@ impl Program {
     /// of several branches the one there is analysed.
     ///
     /// # Errors
-    /// What has no power series here, in words.
+    /// What has no power series here.
     pub fn new(
         graph: &Graph,
         symbols: &[Node],
         roots: &[Node],
         branch: &dyn Fn(Node) -> Option<f64>,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Note> {
         let mut builder = Builder {
             graph,
             symbols,
@@ -77,7 +71,7 @@ impl Program {
         }
         let slot = |root: &Node| builder.slots.get(root).copied();
         let roots: Option<Vec<usize>> = roots.iter().map(slot).collect();
-        builder.program.roots = roots.ok_or_else(|| "a linear system as a value".to_owned())?;
+        builder.program.roots = roots.ok_or(Note::System)?;
         Ok(builder.program)
     }
 }
@@ -176,54 +170,47 @@ impl Builder<'_> {
     }
 
     /// Slots of the arguments; a linear system has none of its own.
-    fn node(&mut self, node: Node) -> Result<(), String> {
+    fn node(&mut self, node: Node) -> Result<(), Note> {
         let of = |builder: &Self, a: Node| builder.slots.get(&a).copied().unwrap_or(usize::MAX);
         let slot = match self.graph.op(node) {
             Op::Constant(x) => self.number(x)?,
             Op::Symbol(_) => self.symbol(node)?,
             Op::Powi(a, n) => self.power(of(self, a), n)?,
             Op::Unary(op, a) => self.unary(op, of(self, a), node, a)?,
-            Op::Binary(op, a, b) => self.binary(op, of(self, a), of(self, b), node)?,
+            Op::Binary(op, a, b) => {
+                let slots = [of(self, a), of(self, b)];
+                self.binary(op, slots, [a, b], node)?
+            }
             Op::Select(condition, a, b) => match self.value_at_reference(condition)? != 0.0 {
                 true => of(self, a),
                 false => of(self, b),
             },
-            Op::Solve(_) => return self.solve(node),
-            Op::Implicit(_) => {
-                let text = self.graph.render(node, 60);
-                return Err(format!("an algebraic loop, {text}"));
+            Op::System(_) => return self.solve(node),
+            Op::Entry(solve, i) => {
+                let solution = self.solutions.get(&solve);
+                let slot = solution.and_then(|x| x.get(i as usize));
+                *slot.ok_or(Note::ConditionEstimate)?
             }
-            Op::Entry(solve, i) => match self.solutions.get(&solve).and_then(|x| x.get(i as usize))
-            {
-                Some(&slot) => slot,
-                None => {
-                    return Err("the condition estimate of a linear system".to_owned());
-                }
-            },
         };
         self.slots.insert(node, slot);
         Ok(())
     }
 
-    fn symbol(&mut self, node: Node) -> Result<usize, String> {
+    fn symbol(&mut self, node: Node) -> Result<usize, Note> {
         match self.symbols.iter().position(|&s| s == node) {
             Some(place) => Ok(self.push(Step::Symbol(place))),
-            None => {
-                let name = self.graph.symbol_name(node).unwrap_or_default();
-                Err(format!("'{name}', which has no value"))
-            }
+            None => Err(Note::NoValue(
+                self.graph.symbol_name(node).unwrap_or_default(),
+            )),
         }
     }
 
-    fn value_at_reference(&mut self, node: Node) -> Result<f64, String> {
+    fn value_at_reference(&mut self, node: Node) -> Result<f64, Note> {
         self.program.choices += usize::from(!self.graph.symbols_of(&[node]).is_empty());
-        (self.branch)(node).ok_or_else(|| {
-            let text = self.graph.render(node, 60);
-            format!("{text}, which is not defined at the reference point")
-        })
+        (self.branch)(node).ok_or_else(|| Note::NotDefined(self.graph.render(node, 60)))
     }
 
-    fn power(&mut self, a: usize, n: i32) -> Result<usize, String> {
+    fn power(&mut self, a: usize, n: i32) -> Result<usize, Note> {
         if n == 0 {
             return self.number(1.0);
         }
@@ -250,7 +237,13 @@ impl Builder<'_> {
         Ok(self.push(Step::Div(one, result)))
     }
 
-    fn binary(&mut self, op: Binary, a: usize, b: usize, node: Node) -> Result<usize, String> {
+    fn binary(
+        &mut self,
+        op: Binary,
+        [a, b]: [usize; 2],
+        [x, y]: [Node; 2],
+        node: Node,
+    ) -> Result<usize, Note> {
         Ok(match op {
             Binary::Add => self.push(Step::Add(a, b)),
             Binary::Sub => self.push(Step::Sub(a, b)),
@@ -258,7 +251,7 @@ impl Builder<'_> {
             Binary::Div => self.push(Step::Div(a, b)),
             // e^(b·ln a)
             Binary::Pow => {
-                if let Some(halves) = self.halves(node) {
+                if let Some(halves) = self.halves(y) {
                     self.function("sqrt");
                     let root = self.push(Step::Sqrt(a));
                     return self.power(root, halves);
@@ -270,9 +263,6 @@ impl Builder<'_> {
             }
             Binary::Atan2 => self.angle_of(a, b, node)?,
             Binary::Min | Binary::Max => {
-                let [x, y] = self.graph.arguments(node)[..] else {
-                    return Err("a choice without arguments".to_owned());
-                };
                 let first = self.value_at_reference(x)? < self.value_at_reference(y)?;
                 if first == (op == Binary::Min) { a } else { b }
             }
@@ -284,8 +274,7 @@ impl Builder<'_> {
     }
 
     /// n of an exponent n/2 that is a number.
-    fn halves(&self, power: Node) -> Option<i32> {
-        let exponent = self.graph.arguments(power).get(1).copied()?;
+    fn halves(&self, exponent: Node) -> Option<i32> {
         match self.graph.op(exponent) {
             Op::Constant(x) if (2.0 * x).fract() == 0.0 && x.abs() < 100.0 => {
                 Some((2.0 * x) as i32)
@@ -295,22 +284,22 @@ impl Builder<'_> {
     }
 
     /// Gaussian elimination; pivots are generic, so that only structural zeros matter.
-    fn solve(&mut self, node: Node) -> Result<(), String> {
-        let Some(system) = self.graph.system(node) else {
-            return Ok(());
+    fn solve(&mut self, node: Node) -> Result<(), Note> {
+        let call = self.graph.system(node);
+        let Some((a, b)) = call.as_ref().and_then(Call::linear) else {
+            return Err(Note::Loop(self.graph.render(node, 60)));
         };
-        let n = system.size();
+        let n = b.len();
         let zero = |builder: &Self, slot: usize| matches!(builder.program.steps[slot], Step::Constant(c) if c.is_zero());
         let mut rows: Vec<Vec<usize>> = (0..n)
             .map(|i| {
-                let row = &system.matrix()[i * n..(i + 1) * n];
-                let row = row.iter().chain(&system.right()[i..=i]);
+                let row = a[i * n..(i + 1) * n].iter().chain(&b[i..=i]);
                 row.map(|node| self.slots[node]).collect()
             })
             .collect();
         for k in 0..n {
             let Some(pivot) = (k..n).find(|&i| !zero(self, rows[i][k])) else {
-                return Err("a singular linear system".to_owned());
+                return Err(Note::SingularSystem);
             };
             rows.swap(k, pivot);
             let chosen = rows[k].clone();
@@ -338,7 +327,7 @@ const PARTS: [f64; 7] = [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 180.0];
 
 impl Builder<'_> {
     /// A number: e and the logarithms of 2 and 10 by what they are, fractions of π as such.
-    pub(super) fn number(&mut self, x: f64) -> Result<usize, String> {
+    pub(super) fn number(&mut self, x: f64) -> Result<usize, Note> {
         let natural = [(LN_2, 2.0), (LN_10, 10.0)];
         if let Some((_, of)) = natural.into_iter().find(|(logarithm, _)| *logarithm == x) {
             let of = self.number(of)?;
@@ -349,7 +338,7 @@ impl Builder<'_> {
             return Ok(self.push(Step::Exp(one)));
         }
         let value = fraction_of_pi(x).or_else(|| Modular::from_f64(x));
-        let value = value.ok_or_else(|| format!("the number {x}"))?;
+        let value = value.ok_or(Note::Number(x))?;
         Ok(self.push(Step::Constant(value)))
     }
 }
@@ -393,7 +382,7 @@ impl Builder<'_> {
             let Step::Integral { h, of, .. } = self.program.steps[slot] else {
                 continue;
             };
-            if let (Inverse::Arc(Arc::Tangent), Step::Div(_, sum)) = (of, self.program.steps[h])
+            if let (Inverse::Tangent, Step::Div(_, sum)) = (of, self.program.steps[h])
                 && self.rooted.insert(sum)
             {
                 self.push(Step::Sqrt(sum));
@@ -402,7 +391,7 @@ impl Builder<'_> {
     }
 
     /// The angle of a point (a above b): what b/a's inverse tangent leaves out is a half turn.
-    pub(super) fn angle_of(&mut self, a: usize, b: usize, node: Node) -> Result<usize, String> {
+    pub(super) fn angle_of(&mut self, a: usize, b: usize, node: Node) -> Result<usize, Note> {
         self.function(ARCS);
         let ratio = self.push(Step::Div(a, b));
         let arc = self.arc_tangent(ratio)?;
@@ -415,7 +404,7 @@ impl Builder<'_> {
     }
 
     /// f⁻¹(f(z)) and √z², which are z up to sign and shift: as they are at the reference point.
-    fn undone(&mut self, op: Unary, node: Node, argument: Node) -> Result<Option<usize>, String> {
+    fn undone(&mut self, op: Unary, node: Node, argument: Node) -> Result<Option<usize>, Note> {
         let inner = match (op, self.graph.op(argument)) {
             (Unary::Asin, Op::Unary(Unary::Sin, z))
             | (Unary::Acos, Op::Unary(Unary::Cos, z))
@@ -452,7 +441,7 @@ impl Builder<'_> {
     }
 
     /// e^a + e^−a and e^a − e^−a
-    fn hyperbolic(&mut self, a: usize) -> Result<(usize, usize), String> {
+    fn hyperbolic(&mut self, a: usize) -> Result<(usize, usize), Note> {
         let one = self.number(1.0)?;
         let up = self.push(Step::Exp(a));
         let down = self.push(Step::Div(one, up));
@@ -462,26 +451,28 @@ impl Builder<'_> {
         ))
     }
 
-    fn half(&mut self, a: usize) -> Result<usize, String> {
+    fn half(&mut self, a: usize) -> Result<usize, Note> {
         let half = self.number(0.5)?;
         Ok(self.push(Step::Mul(half, a)))
     }
 
-    pub(super) fn logarithm(&mut self, a: usize) -> Result<usize, String> {
+    pub(super) fn logarithm(&mut self, a: usize) -> Result<usize, Note> {
         let one = self.number(1.0)?;
-        let h = self.push(Step::Div(one, a));
-        let of = Inverse::Logarithm;
-        Ok(self.push(Step::Integral { a, h, of }))
+        Ok(self.integral(a, (one, a), Inverse::Logarithm))
     }
 
-    fn arc_sine(&mut self, a: usize) -> Result<usize, String> {
+    fn arc_sine(&mut self, a: usize) -> Result<usize, Note> {
         let one = self.number(1.0)?;
         let square = self.push(Step::Mul(a, a));
         let rest = self.push(Step::Sub(one, square));
         let root = self.push(Step::Sqrt(rest));
-        let h = self.push(Step::Div(one, root));
-        let of = Inverse::Arc(Arc::Sine);
-        Ok(self.push(Step::Integral { a, h, of }))
+        Ok(self.integral(a, (one, root), Inverse::Sine))
+    }
+
+    /// y with y' = h·a' for h = above/below
+    fn integral(&mut self, a: usize, (above, below): (usize, usize), of: Inverse) -> usize {
+        let h = self.push(Step::Div(above, below));
+        self.push(Step::Integral { a, h, of })
     }
 
     pub(super) fn unary(
@@ -490,7 +481,7 @@ impl Builder<'_> {
         a: usize,
         node: Node,
         argument: Node,
-    ) -> Result<usize, String> {
+    ) -> Result<usize, Note> {
         let name = match op {
             Unary::Exp => "exp",
             Unary::Ln => "log",
@@ -544,12 +535,10 @@ impl Builder<'_> {
         })
     }
 
-    pub(super) fn arc_tangent(&mut self, a: usize) -> Result<usize, String> {
+    pub(super) fn arc_tangent(&mut self, a: usize) -> Result<usize, Note> {
         let one = self.number(1.0)?;
         let square = self.push(Step::Mul(a, a));
         let sum = self.push(Step::Add(one, square));
-        let h = self.push(Step::Div(one, sum));
-        let of = Inverse::Arc(Arc::Tangent);
-        Ok(self.push(Step::Integral { a, h, of }))
+        Ok(self.integral(a, (one, sum), Inverse::Tangent))
     }
 }

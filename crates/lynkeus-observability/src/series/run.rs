@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use lynkeus_expr::{Budget, Spent};
 
-use crate::series::functions::Arc;
-use crate::series::program::{Inverse, Step};
+use crate::series::functions::Inverse;
+use crate::series::program::Step;
 use crate::series::{Functions, Program};
 use lynkeus_expr::modular::{Modular, Wide};
 
@@ -324,15 +324,15 @@ impl<'a> Run<'a> {
             }
             Inverse::Logarithm => Ok(self.functions.logarithm(argument)),
             // 1/√(1 − a²) has the cosine below, 1/(1 + a²) is its square
-            Inverse::Arc(Arc::Sine) => {
+            Inverse::Sine => {
                 let cosine = derivative.inverse();
                 let root = cosine.is_some_and(|c| c * c + argument * argument == Modular::ONE);
                 let cosine = cosine.filter(|_| root);
-                Ok(self.functions.arc(Arc::Sine, argument, cosine))
+                Ok(self.functions.arc(Inverse::Sine, argument, cosine))
             }
-            Inverse::Arc(Arc::Tangent) => {
+            Inverse::Tangent => {
                 let cosine = derivative.root();
-                Ok(self.functions.arc(Arc::Tangent, argument, cosine))
+                Ok(self.functions.arc(Inverse::Tangent, argument, cosine))
             }
         }
     }

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use lynkeus_expr::{Binary, Graph, Node, Op, Spent};
 use lynkeus_structure::output_map::{AffineForm, Degree, Rows};
 use lynkeus_structure::{
-    AugmentedPlant, Dimension, Matrix, Region, Regularity, Verdict, output_map, short,
+    AugmentedPlant, Dimension, Matrix, Region, Verdict, output_map, regularity, short,
 };
 
 use super::settings::{Settings, Variant};
@@ -159,7 +159,7 @@ impl Form {
         // the map is followed along the plant: as states, inputs and time move
         let slopes = map.settings.known_slopes(augmented, &U);
         let moving = with_slopes(augmented, &U, &slopes, region);
-        let continuous = Regularity::of(augmented.graph(), &Φ, &moving.symbols(), &moving)?;
+        let continuous = regularity(augmented.graph(), &Φ, &moving.symbols(), &moving)?;
         let reads = U.iter().any(|jet| !jet.is_empty());
         let inputs = Inputs {
             augmented,
@@ -173,7 +173,7 @@ impl Form {
             regular,
             one_to_one,
             lipschitz: map.lipschitz.clone(),
-            continuous: Statement::from(Germani::Continuous).with(continuous.finding()),
+            continuous: Statement::from(Germani::Continuous).with(continuous),
             inputs: match reads {
                 true => Some(inputs.check(variant)?.advisory()),
                 false => None,
@@ -480,11 +480,15 @@ impl Inputs<'_, '_> {
             };
             check = regular(self.augmented, statement, self.Q̄, &wider)?;
             if !declared.is_empty() {
-                check.detail += &format!("; for {declared}, as `input_derivatives` bounds them");
+                check.reason = format!(
+                    "{}; for {declared}, as `input_derivatives` bounds them",
+                    check.reason.text()
+                )
+                .into();
             }
         }
         if !check.is_proved() {
-            check.detail += "; small and slow inputs keep it regular (Theorem 2.4), the column rcond and its flag tell";
+            check.reason = (check.reason.text() + "; small and slow inputs keep it regular (Theorem 2.4), the column rcond and its flag tell").into();
         }
         Ok(check)
     }

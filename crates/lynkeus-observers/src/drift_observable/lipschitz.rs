@@ -18,7 +18,7 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{MissingInput, Node};
 use lynkeus_proof::magnitude::{length, norm, plus, product, times};
-use lynkeus_structure::{AugmentedPlant, Matrix, Region, Regularity, output_map};
+use lynkeus_structure::{AugmentedPlant, Matrix, Region, output_map, regularity};
 
 use super::form::{Form, derivative_name, regular};
 use super::settings::Variant;
@@ -90,7 +90,7 @@ pub(super) fn bounds(
     } = remainders(augmented, form, &U)?;
     let rows: Vec<Node> = input.iter().flatten().chain(&drift).copied().collect();
     let sides = box_.region();
-    let continuous = Regularity::of(graph, &rows, &sides.symbols(), sides)?;
+    let continuous = regularity(graph, &rows, &sides.symbols(), sides)?;
     let found = box_.inverse(&Q)?;
     let unknown = || vec![vec![f64::INFINITY; n]; n];
     let size = found.as_ref().map_or_else(unknown, |found| found.bounds());
@@ -135,7 +135,7 @@ pub(super) fn bounds(
             .collect(),
         Q: Q_size,
         regular: regular(augmented, Germani::RegularWithin, &form.Q, box_.region())?,
-        continuous: Statement::from(Germani::ContinuousRows).with(continuous.finding()),
+        continuous: Statement::from(Germani::ContinuousRows).with(continuous),
         open: box_.open(),
     })
 }

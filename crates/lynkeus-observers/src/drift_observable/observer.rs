@@ -398,15 +398,15 @@ pub(super) fn slowest(λ: &[Vec<Pole>]) -> f64 {
 }
 
 /// A − KC, a block per chain.
-pub(super) fn closed_loop(K: &[Vec<f64>]) -> Vec<Vec<f64>> {
+pub(super) fn closed_loop(K: &[Vec<f64>]) -> DMatrix<f64> {
     let n = K.iter().map(Vec::len).sum();
-    let mut A = vec![vec![0.0; n]; n];
+    let mut A = DMatrix::zeros(n, n);
     let mut start = 0;
     for K in K {
         for (k, gain) in K.iter().enumerate() {
-            A[start + k][start] = -gain;
+            A[(start + k, start)] = -gain;
             if k + 1 < K.len() {
-                A[start + k][start + k + 1] += 1.0;
+                A[(start + k, start + k + 1)] += 1.0;
             }
         }
         start += K.len();
@@ -415,14 +415,13 @@ pub(super) fn closed_loop(K: &[Vec<f64>]) -> Vec<Vec<f64>> {
 }
 
 /// Columns √m s_k e_k for the m numbers s_k > 0.
-pub(super) fn spread(s: &[f64]) -> Vec<Vec<f64>> {
+pub(super) fn spread(s: &[f64]) -> DMatrix<f64> {
     let rows: Vec<usize> = (0..s.len()).filter(|&k| s[k] > 0.0).collect();
     let root = root(rows.len() as f64);
-    let row = |k: usize| {
-        let entry = |&column: &usize| if column == k { times(root, s[k]) } else { 0.0 };
-        rows.iter().map(entry).collect()
-    };
-    (0..s.len()).map(row).collect()
+    DMatrix::from_fn(s.len(), rows.len(), |k, j| match rows[j] == k {
+        true => times(root, s[k]),
+        false => 0.0,
+    })
 }
 
 /// Characters of an entry of a matrix.

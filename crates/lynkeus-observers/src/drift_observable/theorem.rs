@@ -30,6 +30,7 @@ use lynkeus_gain::integrators::{self, Pole};
 use lynkeus_proof::magnitude::{length, plus, size, times, total};
 use lynkeus_proof::riccati::Riccati;
 use lynkeus_structure::{AugmentedPlant, Verdict, short};
+use nalgebra::DMatrix;
 
 use super::form::{Form, Inputs};
 use super::lipschitz;
@@ -221,7 +222,7 @@ fn of_the_map(
         let mut regular = found.regular.clone();
         if let Verdict::Refuted(_) = regular.verdict {
             // the observer passes such a place, only the proof does not
-            regular.detail = format!("{} ({})", regular.detail, regular.verdict);
+            regular.reason = format!("{} ({})", regular.reason.text(), regular.verdict).into();
             regular.verdict = Verdict::open();
         }
         checks.push(regular);
@@ -347,8 +348,8 @@ fn left(proof: &Proof<'_, '_>, P: &Riccati, a: f64, assumptions: &Assumptions) -
     let twice = Interval::point(2.0) * Interval::point(P.α);
     let root_ν = (f + (f.powi(2) + twice * size(a).powi(2)).sqrt()) / twice;
     let e_z = Interval::point(P.largest).sqrt() * root_ν;
-    let part = |j: usize| (Interval::point(P.P[j][j]).sqrt() * root_ν).min(e_z).hi();
-    let parts: Vec<f64> = (0..P.P.len()).map(part).collect();
+    let part = |j: usize| (Interval::point(P.P[(j, j)]).sqrt() * root_ν).min(e_z).hi();
+    let parts: Vec<f64> = (0..P.P.nrows()).map(part).collect();
     let e_z = e_z.hi();
     let of_state = |share: &Share| {
         let one_by_one = total(share.z.iter().zip(&parts).map(|(z, e)| times(*z, *e)));
@@ -399,7 +400,7 @@ fn of_rows(P: &Riccati, size: &[f64]) -> f64 {
 
 /// √(fᵀP⁻¹f) for the disturbances, as the map sees them, and the noise.
 fn forces(proof: &Proof<'_, '_>, P: &Riccati, assumptions: &Assumptions) -> f64 {
-    let n = proof.A.len();
+    let n = proof.A.nrows();
     let pushed = |row: &Vec<f64>| {
         let terms = row.iter().zip(&assumptions.drift);
         total(terms.map(|(q, d)| times(*q, *d)))
@@ -499,7 +500,7 @@ pub(super) struct Proof<'a, 'p> {
     pub gains: &'a Gains,
     pub lipschitz: &'a Lipschitz,
     /// A − KC
-    pub A: Vec<Vec<f64>>,
+    pub A: DMatrix<f64>,
     /// the slowest pole's absolute value
     pub slowest: f64,
     /// per input: the bound of the derivative that drives the filter
@@ -589,7 +590,7 @@ impl Proof<'_, '_> {
         )
     }
 
-    fn bears(&self, A: &[Vec<f64>], g: &[f64], slowest: f64) -> bool {
+    fn bears(&self, A: &DMatrix<f64>, g: &[f64], slowest: f64) -> bool {
         g.iter().all(|g| g.is_finite())
             && Riccati::solve(A, &spread(g), SLOW * slowest, 1.0).is_some()
     }

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{
-    Binary, Evaluator, Graph, Interval, MissingInput, Node, Nodes, Op, Tape, Unary, jacobian,
+    Binary, Evaluator, Graph, Interval, MissingInput, Node, Op, Tape, Unary, jacobian,
 };
 use lynkeus_proof::decay;
 use lynkeus_proof::decay::ErrorModel;
@@ -124,12 +124,10 @@ impl ErrorSystem {
             false => format!("declare min and max of {}", open.join(", ")),
         };
         let sides = self.region.dimensions.iter();
-        let left = sides
-            .filter(|d| slope.variables.contains(&d.name))
-            .map(Dimension::side);
+        let left = sides.filter(|d| slope.variables.contains(&d.name)).cloned();
         Statement::from(Inequality::SlopesAreBounded).with(Finding {
             verdict: Verdict::Undecided(left.collect()),
-            detail: format!("the slope of {} has no bound; {cure}", slope.term),
+            reason: format!("the slope of {} has no bound; {cure}", slope.term).into(),
         })
     }
 
@@ -413,14 +411,15 @@ fn edge(graph: &Graph, node: Node) -> Option<Node> {
             _ => None,
         },
         // where the equations of a loop do not determine it
-        Op::Implicit(_) => {
-            let call = graph.implicit_call(node)?;
-            let matrix = call.function.matrix(&Nodes(graph), &call.at(graph, node));
+        Op::System(_) => {
+            let call = graph.system(node)?;
+            call.function()?;
+            let matrix = call.matrix(graph, node);
             match matrix[..] {
                 [slope] => Some(slope),
                 _ => {
                     let zero = graph.constant(0.0).node();
-                    let right = vec![zero; call.function.size()];
+                    let right = vec![zero; call.size()];
                     Some(graph.solve(&matrix, &right).rcond)
                 }
             }

@@ -238,7 +238,7 @@ fn fastest(system: &ErrorSystem, mut request: Request) -> Result<Gain, DesignErr
     let pace = system
         .models
         .iter()
-        .map(|m| m.scaled(&system.scale, 1.0).at(&middles(m)).amax());
+        .map(|m| m.scaled(&system.scale, 1.0).at(&m.middles()).amax());
     let mut high = pace.fold(0.0, f64::max).max(1e-9);
     let mut best = None;
     let mut low = 0.0;
@@ -260,13 +260,9 @@ fn fastest(system: &ErrorSystem, mut request: Request) -> Result<Gain, DesignErr
         request.rate = high;
         let error = decay::design(&system.models, &request)
             .err()
-            .unwrap_or(NoGain::Rejected);
+            .unwrap_or(NoGain::Unproved);
         refusal(system, &request, error)
     })
-}
-
-fn middles(model: &lynkeus_proof::decay::ErrorModel) -> Vec<f64> {
-    model.sectors.iter().map(|s| s.middle()).collect()
 }
 
 fn assemble(

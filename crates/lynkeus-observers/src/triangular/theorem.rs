@@ -604,9 +604,9 @@ mod tests {
         assert!(!found.broken && found.μ.is_none());
         assert!(matches!(found.check.verdict, Verdict::Undecided(_)));
         assert!(
-            found.check.detail.contains("no value"),
+            found.check.reason.clone().text().contains("no value"),
             "{}",
-            found.check.detail
+            found.check.reason.clone().text()
         );
     }
 
@@ -622,7 +622,7 @@ mod tests {
             };
             let (check, is_refuted) = breaks(title(), &S, &found, &["x".into(), "z".into()]);
             assert!(!is_refuted && matches!(check.verdict, Verdict::Undecided(_)));
-            let said = &check.detail;
+            let said = &check.reason.clone().text();
             assert!(!said.contains("for no ρ") && !said.contains("+-"), "{said}");
         }
     }

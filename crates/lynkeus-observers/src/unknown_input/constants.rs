@@ -22,7 +22,7 @@ use lynkeus_expr::{Interval, MissingInput, Node, jacobian};
 use lynkeus_gain::integrators::Chain;
 use lynkeus_proof::magnitude::{length, norm, plus, product, size, times, total};
 use lynkeus_proof::matrix::sum;
-use lynkeus_structure::{AugmentedPlant, Layers, Matrix, Regularity, rank, sign};
+use lynkeus_structure::{AugmentedPlant, Layers, Matrix, rank, regularity, sign};
 
 use super::form;
 use super::form::{Form, Shape};
@@ -251,8 +251,8 @@ impl<'e, 'p> Signals<'e, 'p> {
         let nodes: Vec<Node> = all.flat_map(Matrix::nonzero).collect();
         let region = self.box_.region();
         let graph = self.form.augmented.graph();
-        let found = Regularity::of(graph, &nodes, &region.symbols(), region)?;
-        Ok(Statement::from(Farza::Continuous).with(found.finding()))
+        let found = regularity(graph, &nodes, &region.symbols(), region)?;
+        Ok(Statement::from(Farza::Continuous).with(found))
     }
 
     /// (11) asks for Λ₂ at one x; the proof needs it where x̃ has left the measured
@@ -270,7 +270,12 @@ impl<'e, 'p> Signals<'e, 'p> {
                 false => rank::full_column_rank(P, region)?,
             };
             if !found.is_proved() {
-                let detail = format!("block {}: {} ({})", k + 1, found.detail, found.verdict);
+                let detail = format!(
+                    "block {}: {} ({})",
+                    k + 1,
+                    found.reason.text(),
+                    found.verdict
+                );
                 return Ok(undecided(Farza::Regular, detail));
             }
         }

@@ -8,6 +8,7 @@ use lynkeus_observers::{
     Certificate, Family, Tuning, Value, block_triangular::BlockTriangular, triangular::Triangular,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
+use lynkeus_words::Words;
 
 fn numbers(x: &[f64]) -> Value {
     Value::List(x.iter().map(|&x| Value::Number(x)).collect())
@@ -230,7 +231,7 @@ fn the_classical_gain_of_a_negative_partial_is_refuted() {
     };
     assert!((witness.points[0].value - (3f64.sqrt() - 1.0)).abs() < 1e-12);
     assert!(
-        check.detail.contains("0.732051") && check.detail.contains("k = [2, -0.5]"),
+        check.reason.words().contains("0.732051") && check.reason.words().contains("k = [2, -0.5]"),
         "{check:?}"
     );
 }
@@ -285,7 +286,7 @@ fn an_unstable_k_is_refused_with_its_eigenvalues() {
         let mut all = vec![("k", Value::List(vec![numbers(&[-2.0, 2.0])]))];
         all.extend(keys);
         let found = refused(&BlockTriangular, &plant, &with(&[1.0], &all));
-        let detail = &found.refuted().unwrap().detail;
+        let detail = &found.refuted().unwrap().reason.words();
         assert!(
             detail.contains("1 ± 1i") && detail.contains("k_poles"),
             "{detail}"
@@ -321,9 +322,12 @@ fn an_s_that_rests_on_damping_is_told() {
     let check = wrong.checks.last().unwrap();
     // s² + 4s/3 − 2/3
     assert!(
-        check.detail.contains("eigenvalues 0.387426, -1.72076"),
+        check
+            .reason
+            .words()
+            .contains("eigenvalues 0.387426, -1.72076"),
         "{}",
-        check.detail
+        check.reason.words()
     );
 }
 
@@ -349,7 +353,7 @@ fn a_long_chain_is_not_called_damped() {
             .unwrap()
             .examination;
         assert_eq!(examination.fit(), Standing::Undecided);
-        examination.checks.last().unwrap().detail.clone()
+        examination.checks.last().unwrap().reason.words().clone()
     };
     let short = told(20);
     assert!(short.contains("→ x[20]), eigenvalues 0"), "{short}");

@@ -14,6 +14,7 @@ use lynkeus_observers::{
     Design, DesignError, Initial, Tuning, Value, drift_observable::DriftObservable,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
+use lynkeus_words::Words;
 
 const PLANT: &str = include_str!("../../../../examples/germani-manes/germani_manes.mo");
 const INPUT: &[(&str, &str)] = &[("u", "5 + 2*sin(2*pi*time)")];
@@ -311,9 +312,9 @@ fn the_examination_tells_the_degree_and_the_singular_surface() {
         ["proved", "proved", "proved", "proved", "proved", "refuted"]
     );
     assert!(
-        found.checks[0].detail.contains("r = 1"),
+        found.checks[0].reason.words().contains("r = 1"),
         "{}",
-        found.checks[0].detail
+        found.checks[0].reason.words()
     );
     let Verdict::Refuted(witness) = &found.checks[5].verdict else {
         panic!()

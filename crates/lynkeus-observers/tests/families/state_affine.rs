@@ -11,6 +11,7 @@ use lynkeus_observers::{
     triangular::Triangular,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
+use lynkeus_words::Words;
 
 /// System (29).
 const EXAMPLE: &str = "model Ltaief
@@ -455,9 +456,9 @@ fn what_the_input_must_excite_is_undecided_and_says_so() {
         examination.summary
     );
     assert!(
-        examination.checks[1].detail.contains("F_1 is 1×2"),
+        examination.checks[1].reason.words().contains("F_1 is 1×2"),
         "{}",
-        examination.checks[1].detail
+        examination.checks[1].reason.words()
     );
     assert!(
         design.notes.is_empty(),

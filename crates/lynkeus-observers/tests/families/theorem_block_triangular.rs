@@ -6,6 +6,7 @@ use crate::common::{
 use lynkeus_model::{LoadOptions, Plant};
 use lynkeus_observers::{Tuning, Value, block_triangular::BlockTriangular};
 use lynkeus_structure::Standing;
+use lynkeus_words::Words;
 
 fn study<'a>(plant: &'a Plant, tuning: Tuning) -> Guaranteed<'a> {
     Guaranteed {
@@ -112,7 +113,7 @@ fn an_input_in_m_needs_a_bound_of_its_derivative() {
     let found = study(&plant, tuning(&[50.0], "lee")).certificate();
     assert_eq!(found.verdict(), Standing::Undecided);
     assert!(
-        hypothesis(&found, "Ṁ M⁻¹").detail.contains(
+        hypothesis(&found, "Ṁ M⁻¹").reason.words().contains(
             "where M depends on an input, bound its derivative under `input_derivatives`"
         )
     );
@@ -136,7 +137,8 @@ fn without_a_box() {
     let found = study(&cubic, tuning(&[20.0], "classical")).certificate();
     assert!(
         hypothesis(&found, "every ∂f/∂x")
-            .detail
+            .reason
+            .words()
             .contains("declare min and max of b")
     );
 }
@@ -151,7 +153,12 @@ fn a_transformation_that_moves_too_fast() {
     );
     let found = study(&plant, tuning(&[50.0], "lee")).certificate();
     assert_eq!(found.verdict(), Standing::Undecided);
-    assert!(hypothesis(&found, "large enough").detail.contains("no θ0"));
+    assert!(
+        hypothesis(&found, "large enough")
+            .reason
+            .words()
+            .contains("no θ0")
+    );
     assert!(found.constants.iter().all(|c| c.name != "θ0"));
 }
 

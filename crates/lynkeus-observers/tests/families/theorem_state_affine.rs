@@ -6,6 +6,7 @@ use crate::common::{
 use lynkeus_model::{LoadOptions, Plant};
 use lynkeus_observers::{Initial, Ltaief, Tuning, state_affine::StateAffine};
 use lynkeus_structure::Standing;
+use lynkeus_words::Words;
 
 fn study<'a>(plant: &'a Plant, tuning: Tuning) -> Guaranteed<'a> {
     Guaranteed {
@@ -74,11 +75,12 @@ fn the_example_of_the_paper() {
         assert!(!found.constants.iter().any(|c| c.name == "θ0"));
         let needed = 544.5004595584355 * (2.0 * 28.463402635597934_f64 / 10.0).powi(2);
         close(constant(&found, "λ_m needed"), needed);
-        assert!(hypothesis(&found, "A4").detail.contains("(12)"));
+        assert!(hypothesis(&found, "A4").reason.words().contains("(12)"));
         assert!(constant(&found, "μ_θ") < 0.0);
         assert!(
             hypothesis(&found, "A4")
-                .detail
+                .reason
+                .words()
                 .contains("monitor 'excitation'")
         );
         let tuning = Tuning::from([("theta", 1.01 * θ0), ("alarm", alarm)]);
@@ -98,7 +100,8 @@ fn what_is_missing_is_said() {
     assert_eq!(found.verdict(), Standing::Undecided);
     assert!(
         hypothesis(&found, "A1")
-            .detail
+            .reason
+            .words()
             .contains("declare min and max of u")
     );
 }
@@ -176,12 +179,17 @@ fn an_unknown_input_is_said_to_be_constant() {
     assert_eq!(still.verdict(), Standing::Proved);
     let bounded = hypothesis(&still, "(A3)");
     assert!(
-        bounded.detail.contains("takes force as constant"),
+        bounded.reason.words().contains("takes force as constant"),
         "{}",
-        bounded.detail
+        bounded.reason.words()
     );
     assert_eq!(still.ultimate_bound, Some(0.0));
     let moving = of(0.5);
-    assert!(!hypothesis(&moving, "(A3)").detail.contains("constant"));
+    assert!(
+        !hypothesis(&moving, "(A3)")
+            .reason
+            .words()
+            .contains("constant")
+    );
     assert!(moving.ultimate_bound.unwrap() > 0.0);
 }

@@ -8,6 +8,7 @@ use crate::common::{
 use lynkeus_model::{LoadOptions, Plant};
 use lynkeus_observers::{Certificate, Initial, Tuning, Value, triangular::Triangular};
 use lynkeus_structure::{Standing, Verdict};
+use lynkeus_words::Words;
 
 fn study<'a>(plant: &'a Plant, tuning: Tuning) -> Guaranteed<'a> {
     Guaranteed {
@@ -118,7 +119,11 @@ fn below_θ0_the_theorem_is_silent() {
     let found = study(&plant, Tuning::from([("theta", 1.3)])).certificate();
     assert_eq!((found.verdict(), found.rate), (Standing::Undecided, None));
     let check = hypothesis(&found, "at least θ0");
-    assert!(check.detail.contains("θ0 = 1.39924"), "{}", check.detail);
+    assert!(
+        check.reason.words().contains("θ0 = 1.39924"),
+        "{}",
+        check.reason.words()
+    );
     let above = study(&plant, Tuning::from([("theta", 1.3993)])).certificate();
     assert_eq!(above.verdict(), Standing::Proved);
 }
@@ -163,9 +168,9 @@ fn the_printed_matrix_is_refuted_with_its_direction() {
             .all(|c| c.name.starts_with('a') && c.value == 1.0)
     );
     assert!(
-        check.detail.contains("for no ρ") && check.detail.contains("·x"),
+        check.reason.words().contains("for no ρ") && check.reason.words().contains("·x"),
         "{}",
-        check.detail
+        check.reason.words()
     );
 }
 
@@ -191,7 +196,8 @@ fn other_gains_are_not_covered() {
     assert_eq!((found.verdict(), found.rate), (Standing::Undecided, None));
     assert!(
         hypothesis(&found, "constant gain")
-            .detail
+            .reason
+            .words()
             .contains("'gain'")
     );
 }
@@ -207,15 +213,15 @@ fn a_missing_box_is_named() {
     assert_eq!(found.verdict(), Standing::Undecided, "{found:?}");
     let lemma = hypothesis(&found, "Lemma 1");
     assert!(
-        lemma.detail.contains("declare min and max of b"),
+        lemma.reason.words().contains("declare min and max of b"),
         "{}",
-        lemma.detail
+        lemma.reason.words()
     );
     let slopes = hypothesis(&found, "every ∂f/∂x");
     assert!(
-        slopes.detail.contains("declare min and max of"),
+        slopes.reason.words().contains("declare min and max of"),
         "{}",
-        slopes.detail
+        slopes.reason.words()
     );
     assert!(
         found.notes[0].contains("1 of 2 partials"),
@@ -239,7 +245,8 @@ fn a_varying_gain_is_not_covered_a_scaled_one_is() {
     assert_eq!(found.verdict(), Standing::Undecided, "{found:?}");
     assert!(
         hypothesis(&found, "gain is constant")
-            .detail
+            .reason
+            .words()
             .contains("vary on the box")
     );
     let scaled = plant(&text("-3*b"));

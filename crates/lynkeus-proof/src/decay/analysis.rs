@@ -47,16 +47,13 @@ fn prove_in(
     rate: f64,
     budget: &Budget,
 ) -> Option<Proof> {
-    let scale = &frame.scale;
-    let scaled: Vec<ErrorModel> = models.iter().map(|m| scale.model(m)).collect();
+    let scaled: Vec<ErrorModel> = models.iter().map(|m| frame.scaled(m)).collect();
     let seen: Vec<Seen> = scaled.iter().map(|m| frame.seen(m)).collect();
-    let mut problem = Problem::new();
-    problem.set_budget(budget);
+    let mut problem = Problem::new(budget);
     let P = extent.lyapunov(&mut problem, &scaled);
-    let mut proof = candidate(problem, &P, &seen, rate * scale.unit)?;
-    proof.P = symmetric(&frame.restored(&proof.P));
-    let proof = scale.restored(models, &proof);
-    let proof = Proof { rate, ..proof };
+    let found = candidate(problem, &P, &seen, rate * frame.unit)?;
+    let found = frame.restored(models, found);
+    let proof = Proof { rate, ..found };
     holds(models, &proof).then_some(proof)
 }
 
@@ -73,14 +70,14 @@ fn candidate(mut problem: Problem, P: &Affine, models: &[Seen], rate: f64) -> Op
         let PA = P.times(&model.A);
         multipliers.push(inequality(&mut problem, P, &PA, (&model.B, &model.C), rate));
     }
-    let solution = problem.inside().ok()?;
+    let point = problem.inside().ok()?;
     let restored = |(T, model): (&Affine, &Seen)| {
-        let diagonal = solution.value(T).diagonal();
+        let diagonal = T.at(&point).diagonal();
         diagonal.component_div(&model.weights)
     };
     Some(Proof {
         rate,
-        P: symmetric(&solution.value(P)),
+        P: symmetric(&P.at(&point)),
         multipliers: multipliers.iter().zip(models).map(restored).collect(),
     })
 }
@@ -233,9 +230,9 @@ mod tests {
         }
         let around = distances(&coupled(&corrected, n));
         assert_eq!((around[1][9], around[0][9], around[9][0]), (8, 1, 1));
-        let mut problem = Problem::new();
+        let mut problem = Problem::new(&Budget::default());
         let P = Extent::Near.lyapunov(&mut problem, &models);
-        let kept = |i: usize, j: usize| P.at_entry(i, j) != Affine::constant(&DMatrix::zeros(1, 1));
+        let kept = |i: usize, j: usize| P.terms(i, j).next().is_some();
         assert!(kept(0, 8) && !kept(0, 9) && kept(9, 11) && !kept(10, 11));
     }
 }

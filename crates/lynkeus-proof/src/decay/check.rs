@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{ErrorModel, Proof};
 use crate::definite::is_positive_definite;
-use crate::matrix::{IntervalMatrix, dot, points};
+use crate::matrix::{IntervalMatrix, dot, points, product};
 
 /// Whether the proof holds for every model: P > 0, every multiplier positive, and
 /// He(P A(θ)) + 2·rate·P < 0 for every θ in the ranges.
@@ -29,10 +29,6 @@ fn is_symmetric(P: &DMatrix<f64>) -> bool {
     P.is_square() && *P == P.transpose()
 }
 
-fn product(P: &IntervalMatrix, column: &[Interval]) -> Vec<Interval> {
-    P.iter().map(|row| dot(row, column)).collect()
-}
-
 /// One inequality: the negative of the block matrix is positive definite.
 fn model_holds(model: &ErrorModel, proof: &Proof, t: &DVector<f64>) -> bool {
     let (n, q) = (model.size(), model.sectors.len());
@@ -41,10 +37,10 @@ fn model_holds(model: &ErrorModel, proof: &Proof, t: &DVector<f64>) -> bool {
     }
     let P = points(&proof.P);
     let twice_rate = Interval::point(2.0) * Interval::point(proof.rate);
-    let PA = columns_times(&P, &nominal(model));
+    let PA = product(&P, &model.fixed(&model.middles()).constant);
     let mut matrix: IntervalMatrix = vec![];
     for i in 0..n {
-        let entry = |j: usize| -(PA[j][i] + PA[i][j] + twice_rate * P[i][j]);
+        let entry = |j: usize| -(PA[i][j] + PA[j][i] + twice_rate * P[i][j]);
         matrix.push((0..=i).map(entry).collect());
     }
     for (sector, &t) in model.sectors.iter().zip(t) {
@@ -54,29 +50,10 @@ fn model_holds(model: &ErrorModel, proof: &Proof, t: &DVector<f64>) -> bool {
     for (k, sector) in model.sectors.iter().enumerate() {
         let h = Interval::point(sector.half());
         let spread: Vec<Interval> = sector.direction.iter().map(|b| h * *b).collect();
-        let mut row: Vec<Interval> = product(&P, &spread).into_iter().map(|x| -x).collect();
+        let mut row: Vec<Interval> = P.iter().map(|row| -dot(row, &spread)).collect();
         row.extend(vec![Interval::ZERO; k]);
         row.push(Interval::point(t[k]));
         matrix.push(row);
     }
     is_positive_definite(&matrix)
-}
-
-/// A_m = A₀ + Σ m_k b_k e_{s_k}ᵀ, column by column.
-fn nominal(model: &ErrorModel) -> IntervalMatrix {
-    let n = model.size();
-    let column = |j: usize| (0..n).map(|i| model.constant[i][j]).collect();
-    let mut columns: IntervalMatrix = (0..n).map(column).collect();
-    for sector in &model.sectors {
-        let m = Interval::point(sector.middle());
-        for (entry, b) in columns[sector.column].iter_mut().zip(&sector.direction) {
-            *entry = *entry + m * *b;
-        }
-    }
-    columns
-}
-
-/// The columns of PA from those of A: (PA)[j][i] is row i, column j.
-fn columns_times(P: &IntervalMatrix, columns: &IntervalMatrix) -> IntervalMatrix {
-    columns.iter().map(|column| product(P, column)).collect()
 }

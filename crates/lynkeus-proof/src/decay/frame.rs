@@ -9,7 +9,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{ErrorModel, Proof};
-use crate::lyapunov;
+use crate::lyapunov::{self, symmetric};
 
 /// Sweeps of the balancing.
 const SWEEPS: usize = 20;
@@ -19,8 +19,10 @@ const STATES: usize = 10;
 /// e = D T e′, time in units.
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
-    /// D and the unit of time
-    pub scale: Scale,
+    /// D
+    pub sizes: Vec<f64>,
+    /// of time, in which the largest entry of the middle matrices is one
+    pub unit: f64,
     /// T
     axes: DMatrix<f64>,
     inverse: DMatrix<f64>,
@@ -30,8 +32,12 @@ impl Frame {
     /// The given sizes, and no more.
     pub fn plain(models: &[ErrorModel], sizes: &[f64]) -> Self {
         let n = sizes.len();
+        let largest = |m: &ErrorModel| m.scaled(sizes, 1.0).nominal().amax();
+        let largest = models.iter().map(largest).fold(0.0, f64::max);
+        let is_number = largest > 0.0 && largest.is_finite();
         Self {
-            scale: Scale::of(models, sizes),
+            sizes: sizes.to_vec(),
+            unit: if is_number { 1.0 / largest } else { 1.0 },
             axes: DMatrix::identity(n, n),
             inverse: DMatrix::identity(n, n),
         }
@@ -41,19 +47,20 @@ impl Frame {
     /// that matrix is not stable.
     pub fn natural(models: &[ErrorModel], sizes: &[f64]) -> Option<Self> {
         let sizes = balanced(&middle(models, sizes), sizes);
+        let mut frame = Self::plain(models, &sizes);
         // other axes fill the matrices, which takes longer than it helps where they are large
-        if sizes.len() > STATES {
-            return Some(Self::plain(models, &sizes));
+        if sizes.len() <= STATES {
+            let A = middle(models, &sizes) * frame.unit;
+            let P = lyapunov::solve(&A, &DMatrix::identity(A.nrows(), A.nrows()))?;
+            frame.inverse = P.cholesky()?.l().transpose();
+            frame.axes = frame.inverse.clone().try_inverse()?;
         }
-        let scale = Scale::of(models, &sizes);
-        let A = middle(models, &sizes) * scale.unit;
-        let P = lyapunov::solve(&A, &DMatrix::identity(A.nrows(), A.nrows()))?;
-        let upper = P.cholesky()?.l().transpose();
-        Some(Self {
-            axes: upper.clone().try_inverse()?,
-            inverse: upper,
-            scale,
-        })
+        Some(frame)
+    }
+
+    /// The model in these sizes and units, along the old axes.
+    pub fn scaled(&self, model: &ErrorModel) -> ErrorModel {
+        model.scaled(&self.sizes, self.unit)
     }
 
     /// A, B and C of a scaled model e' = (A + B δ C) e in these axes.
@@ -79,9 +86,19 @@ impl Frame {
         }
     }
 
-    /// P in the scaled units from P in these axes.
-    pub fn restored(&self, P: &DMatrix<f64>) -> DMatrix<f64> {
-        self.inverse.transpose() * P * &self.inverse
+    /// A proof found in this frame, in the user's units. With e = D e′ and time in
+    /// `unit`s, P = D⁻¹P′D⁻¹ and t = t′/(unit·s²) for a sector in a state of size s.
+    pub fn restored(&self, models: &[ErrorModel], mut proof: Proof) -> Proof {
+        let s = &self.sizes;
+        let P = symmetric(&(self.inverse.transpose() * &proof.P * &self.inverse));
+        proof.P = DMatrix::from_fn(P.nrows(), P.ncols(), |i, j| P[(i, j)] / (s[i] * s[j]));
+        proof.rate /= self.unit;
+        for (t, model) in proof.multipliers.iter_mut().zip(models) {
+            for (t, sector) in t.iter_mut().zip(&model.sectors) {
+                *t /= self.unit * s[sector.column].powi(2);
+            }
+        }
+        proof
     }
 }
 
@@ -125,53 +142,6 @@ pub(super) fn balanced(A: &DMatrix<f64>, sizes: &[f64]) -> Vec<f64> {
     }
     let pairs = sizes.iter().zip(&d);
     pairs.map(|(size, d)| size * d).collect()
-}
-
-/// Sizes of the states and a unit of time.
-#[derive(Clone, Debug)]
-pub(super) struct Scale {
-    pub states: Vec<f64>,
-    pub unit: f64,
-}
-
-impl Scale {
-    /// The unit of time in which the largest entry of the middle matrices is one.
-    pub fn of(models: &[ErrorModel], states: &[f64]) -> Self {
-        let largest = |m: &ErrorModel| m.scaled(states, 1.0).nominal().amax();
-        let largest = models.iter().map(largest).fold(0.0, f64::max);
-        let unit = if largest > 0.0 && largest.is_finite() {
-            1.0 / largest
-        } else {
-            1.0
-        };
-        Self {
-            states: states.to_vec(),
-            unit,
-        }
-    }
-
-    pub fn model(&self, model: &ErrorModel) -> ErrorModel {
-        model.scaled(&self.states, self.unit)
-    }
-
-    /// A proof for scaled models in the user's units. With e = D e′ and time in
-    /// `unit`s, P = D⁻¹P′D⁻¹ and t = t′/(unit·s²) for a sector in a state of size s.
-    pub fn restored(&self, models: &[ErrorModel], proof: &Proof) -> Proof {
-        let s = &self.states;
-        let P = &proof.P;
-        let multipliers = models.iter().zip(&proof.multipliers).map(|(model, t)| {
-            let mut t = t.clone();
-            for (t, sector) in t.iter_mut().zip(&model.sectors) {
-                *t /= self.unit * s[sector.column].powi(2);
-            }
-            t
-        });
-        Proof {
-            rate: proof.rate / self.unit,
-            P: DMatrix::from_fn(P.nrows(), P.ncols(), |i, j| P[(i, j)] / (s[i] * s[j])),
-            multipliers: multipliers.collect(),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -9,12 +9,12 @@
 
 use crate::spectrum;
 use lynkeus_expr::Interval;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::frame::balanced;
 use crate::definite::is_positive_definite;
 use crate::lyapunov;
-use crate::matrix::{IntervalMatrix, square, sum};
+use crate::matrix::{IntervalMatrix, dot, points, product, square};
 
 /// States up to which H is sought: its equation has n² unknowns.
 const STATES: usize = 32;
@@ -89,9 +89,8 @@ fn grows(A: &IntervalMatrix, σ: f64, H: &DMatrix<f64>) -> bool {
         true => A[k][j] - Interval::point(σ),
         false => A[k][j],
     };
-    let product =
-        |i: usize, j: usize| sum((0..n).map(|k| Interval::point(H[(i, k)]) * shifted(k, j)));
-    let He = square(n, |i, j| product(i, j) + product(j, i));
+    let HA = product(&points(H), &square(n, shifted));
+    let He = square(n, |i, j| HA[i][j] + HA[j][i]);
     is_positive_definite(&He) && is_positive_somewhere(H)
 }
 
@@ -99,13 +98,10 @@ fn is_positive_somewhere(H: &DMatrix<f64>) -> bool {
     let Some(eigen) = spectrum::symmetric(H.clone()) else {
         return false;
     };
-    let e: DVector<f64> = eigen
-        .eigenvectors
-        .column(eigen.eigenvalues.imax())
-        .into_owned();
-    let point = Interval::point;
-    let row = |i: usize| sum((0..e.len()).map(|j| point(H[(i, j)]) * point(e[j])));
-    sum((0..e.len()).map(|i| point(e[i]) * row(i))).is_positive()
+    let e = eigen.eigenvectors.column(eigen.eigenvalues.imax());
+    let e: Vec<Interval> = e.iter().map(|&e| Interval::point(e)).collect();
+    let He: Vec<Interval> = points(H).iter().map(|row| dot(row, &e)).collect();
+    dot(&e, &He).is_positive()
 }
 
 #[cfg(test)]

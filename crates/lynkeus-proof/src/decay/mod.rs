@@ -114,9 +114,14 @@ impl ErrorModel {
         scaled
     }
 
+    /// The middles of the ranges.
+    pub fn middles(&self) -> Vec<f64> {
+        self.sectors.iter().map(Sector::middle).collect()
+    }
+
     /// A₀ + Σ m_k b_k e_{s_k}ᵀ, in numbers.
     fn nominal(&self) -> DMatrix<f64> {
-        self.at(&self.sectors.iter().map(Sector::middle).collect::<Vec<_>>())
+        self.at(&self.middles())
     }
 
     /// A(θ), in numbers.

@@ -4,9 +4,9 @@ use lynkeus_expr::{Budget, Spent};
 use nalgebra::{DMatrix, DVector};
 
 use super::analysis::{Extent, inequality, is_large, prove};
-use super::frame::Scale;
+use super::frame::Frame;
 use super::{ErrorModel, Proof};
-use crate::lmi::{Affine, Failure, Problem, Solution};
+use crate::lmi::{Affine, Failure, Problem};
 use crate::lyapunov::symmetric;
 use crate::spectrum;
 
@@ -76,18 +76,12 @@ pub struct Gain {
 /// Why there is no gain.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoGain {
-    /// an uncertain term without bound
-    #[error("a slope is unbounded")]
-    Unbounded,
-    /// no gain reaches the rate by a proof of this form
-    #[error("no gain is proved to reach the rate: {0}")]
-    Rate(Failure),
+    /// no gain is proved to reach the rate
+    #[error("no gain is proved to reach the rate")]
+    Unproved,
     /// gains reach the rate, but with larger entries on the outputs' errors than allowed
     #[error("the smallest largest entry found is {0:.4}")]
     Limit(f64),
-    /// the interval check rejected the solver's answer
-    #[error("the solver's answer does not stand the interval check")]
-    Rejected,
     /// a limit ended the search
     #[error("undecided: {0}")]
     Spent(Spent),
@@ -99,12 +93,12 @@ pub enum NoGain {
 /// [`NoGain`].
 pub fn design(models: &[ErrorModel], request: &Request) -> Result<Gain, NoGain> {
     if models.is_empty() || !models.iter().all(ErrorModel::is_bounded) {
-        return Err(NoGain::Unbounded);
+        return Err(NoGain::Unproved);
     }
     let scaled = Scaled::new(models, request);
     let mut K = scaled.direct().map_err(|failure| match failure {
         Failure::Spent(spent) => NoGain::Spent(spent),
-        other => NoGain::Rate(other),
+        _ => NoGain::Unproved,
     })?;
     let over = |K: &DMatrix<f64>| {
         let limit = request.limit;
@@ -122,7 +116,7 @@ pub fn design(models: &[ErrorModel], request: &Request) -> Result<Gain, NoGain> 
         .collect();
     let proof = prove(&corrected, &request.scale, request.rate, &request.budget);
     let spent = request.budget.marked();
-    let proof = proof.ok_or(spent.map_or(NoGain::Rejected, NoGain::Spent))?;
+    let proof = proof.ok_or(spent.map_or(NoGain::Unproved, NoGain::Spent))?;
     Ok(Gain { K, proof })
 }
 
@@ -148,22 +142,22 @@ struct Scaled<'a> {
     models: Vec<ErrorModel>,
     rate: f64,
     request: &'a Request,
-    scale: Scale,
+    frame: Frame,
 }
 
 impl<'a> Scaled<'a> {
     fn new(models: &[ErrorModel], request: &'a Request) -> Self {
-        let scale = Scale::of(models, &request.scale);
+        let frame = Frame::plain(models, &request.scale);
         Self {
-            models: models.iter().map(|m| scale.model(m)).collect(),
-            rate: request.rate * scale.unit * (1.0 + RESERVE),
+            models: models.iter().map(|m| frame.scaled(m)).collect(),
+            rate: request.rate * frame.unit * (1.0 + RESERVE),
             request,
-            scale,
+            frame,
         }
     }
 
     fn size(&self) -> usize {
-        self.scale.states.len()
+        self.frame.sizes.len()
     }
 
     /// C, one row per output.
@@ -177,18 +171,12 @@ impl<'a> Scaled<'a> {
 
     /// One factor per entry of K: from scaled to the user's units.
     fn unit(&self, i: usize, j: usize) -> f64 {
-        let s = &self.scale.states;
-        s[i] / (s[self.request.measured[j]] * self.scale.unit)
+        let s = &self.frame.sizes;
+        s[i] / (s[self.request.measured[j]] * self.frame.unit)
     }
 
     fn in_units(&self, K: &DMatrix<f64>) -> DMatrix<f64> {
         DMatrix::from_fn(K.nrows(), K.ncols(), |i, j| K[(i, j)] * self.unit(i, j))
-    }
-
-    fn problem(&self) -> Problem {
-        let mut problem = Problem::new();
-        problem.set_budget(&self.request.budget);
-        problem
     }
 
     /// The inequality of every model, where its middle matrix makes PA; its multipliers.
@@ -207,7 +195,7 @@ impl<'a> Scaled<'a> {
 
     /// P > 0 and the inequality of every model in P and Y = PK.
     fn inequalities(&self, extent: Extent) -> Inequalities {
-        let mut problem = self.problem();
+        let mut problem = Problem::new(&self.request.budget);
         let P = extent.lyapunov(&mut problem, &self.models);
         let Y = problem.matrix(self.size(), self.request.measured.len());
         problem.positive(P.clone());
@@ -218,7 +206,7 @@ impl<'a> Scaled<'a> {
 
     /// A point inside `all`, P being of full extent. In large systems one with few unknowns
     /// is looked for first, and then whether there is one at all.
-    fn first(&self, all: &Inequalities) -> Result<Solution, Failure> {
+    fn first(&self, all: &Inequalities) -> Result<DVector<f64>, Failure> {
         if is_large(self.size()) {
             let near = self.inequalities(Extent::Near);
             if near.bounded(WIDEST).has_inside().is_ok()
@@ -253,14 +241,14 @@ impl<'a> Scaled<'a> {
             Aim::Peak => β.plus(&noise.scaled(SHARE)),
         });
         let solution = problem.solve_from(&start)?;
-        let factor = symmetric(&solution.value(&P)).cholesky();
+        let factor = symmetric(&P.at(&solution)).cholesky();
         let P = factor.ok_or(Failure::Numerical)?;
-        Ok(self.in_units(&P.solve(&solution.value(&Y))))
+        Ok(self.in_units(&P.solve(&Y.at(&solution))))
     }
 
     /// Squares of the outputs' errors in scaled units, the largest as one.
     fn weights(&self) -> DMatrix<f64> {
-        let states = &self.scale.states;
+        let states = &self.frame.sizes;
         let Request {
             measured, slopes, ..
         } = self.request;
@@ -303,19 +291,19 @@ impl<'a> Scaled<'a> {
         let n = self.size();
         let K = DMatrix::from_fn(n, K.ncols(), |i, j| K[(i, j)] / self.unit(i, j));
         let KC = K * self.selector();
-        let mut problem = self.problem();
+        let mut problem = Problem::new(&self.request.budget);
         let P = problem.symmetric(n);
         problem.positive(P.clone());
         problem.positive(Affine::identity(n).minus(&P));
         self.constrain(&mut problem, &P, |A| P.times(&(A - &KC)));
         let solution = problem.inside().ok()?;
-        Some(symmetric(&solution.value(&P)))
+        Some(symmetric(&P.at(&solution)))
     }
 
     /// K with the smallest largest entry for a given P.
     fn smallest(&self, P: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let (n, p) = (self.size(), self.request.measured.len());
-        let mut problem = self.problem();
+        let mut problem = Problem::new(&self.request.budget);
         let K = problem.matrix(n, p);
         let g = problem.matrix(1, 1);
         for i in 0..n {
@@ -331,7 +319,7 @@ impl<'a> Scaled<'a> {
         self.constrain(&mut problem, &constant, |A| constant.times(A).minus(&PKC));
         problem.minimise(&g);
         let solution = problem.solve().ok()?;
-        Some(self.in_units(&solution.value(&K)))
+        Some(self.in_units(&K.at(&solution)))
     }
 }
 
@@ -371,42 +359,42 @@ impl Inequalities {
 
     /// A point inside, from the same problem with P and Y bounded above, scaled so that
     /// P > I: the inequalities are homogeneous.
-    pub fn normalised(&self) -> Result<Solution, Failure> {
+    pub fn normalised(&self) -> Result<DVector<f64>, Failure> {
         let inside = |large: f64| self.bounded(large).inside();
         let inside = inside(WIDE).or_else(|_| inside(WIDEST))?;
-        let eigen = spectrum::symmetric(symmetric(&inside.value(&self.P)));
+        let eigen = spectrum::symmetric(symmetric(&self.P.at(&inside)));
         let smallest = eigen.ok_or(Failure::Numerical)?.eigenvalues.min();
         if smallest <= 0.0 {
             return Err(Failure::Numerical);
         }
-        Ok(inside.scaled(1.1 / smallest))
+        Ok(inside * (1.1 / smallest))
     }
 
     /// The point of the same problem with fewer unknowns.
-    pub fn like(&self, other: &Inequalities, point: &Solution) -> Solution {
+    pub fn like(&self, other: &Inequalities, point: &DVector<f64>) -> DVector<f64> {
         let mut pairs = vec![(&self.P, &other.P), (&self.Y, &other.Y)];
         pairs.extend(self.T.iter().zip(&other.T));
-        let parts = pairs.into_iter().map(|(own, its)| (own, point.value(its)));
+        let parts = pairs.into_iter().map(|(own, its)| (own, its.at(point)));
         self.problem.point(&parts.collect::<Vec<_>>())
     }
 }
 
 /// Values for Z and β with room to spare, and |P|.
-fn roomy(first: &Solution, P: &Affine, Y: &Affine) -> Result<(Solution, f64), Failure> {
-    let (P, Y) = (symmetric(&first.value(P)), first.value(Y));
+fn roomy(first: &DVector<f64>, P: &Affine, Y: &Affine) -> Result<(DVector<f64>, f64), Failure> {
+    let (P, Y) = (symmetric(&P.at(first)), Y.at(first));
     let eigen = spectrum::symmetric(P.clone()).ok_or(Failure::Numerical)?;
     let largest = eigen.eigenvalues.max();
     let factor = P.cholesky().ok_or(Failure::Numerical)?;
     let Z = symmetric(&(Y.transpose() * factor.solve(&Y))) * 2.0;
     let room = 1.0 + Z.trace() * 1e-3;
-    let mut newer = vec![];
+    let mut start = first.clone();
     for j in 0..Z.ncols() {
         for i in 0..=j {
-            newer.push(Z[(i, j)] + if i == j { room } else { 0.0 });
+            start.extend([Z[(i, j)] + if i == j { room } else { 0.0 }]);
         }
     }
-    newer.push(2.0 * largest);
-    Ok((first.with(&newer), largest))
+    start.extend([2.0 * largest]);
+    Ok((start, largest))
 }
 
 #[cfg(test)]

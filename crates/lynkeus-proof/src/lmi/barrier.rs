@@ -1,5 +1,7 @@
 //! Newton's method on t·cᵀx − Σ log det F_j(x) − log(R² − |x|²).
 
+use std::collections::BTreeMap;
+
 use lynkeus_expr::Budget;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -16,6 +18,9 @@ const NEAR: f64 = 1.0;
 const PANEL: usize = 64;
 /// Newton steps altogether.
 const STEPS: usize = 400;
+/// Unknowns larger than this do not occur in a well scaled problem; the bound keeps
+/// the feasible set compact.
+const RADIUS: f64 = 1e12;
 
 /// Where the search for a minimum ended, and why.
 pub(super) struct Ended {
@@ -27,9 +32,8 @@ pub(super) struct Ended {
 
 /// A barrier problem.
 pub(super) struct Barrier<'a> {
-    pub blocks: &'a [Block],
+    pub blocks: Vec<Block>,
     pub cost: DVector<f64>,
-    pub radius: f64,
     pub budget: &'a Budget,
 }
 
@@ -83,7 +87,7 @@ impl Barrier<'_> {
     }
 
     fn factors(&self, x: &DVector<f64>) -> Option<Vec<Cholesky<f64, Dyn>>> {
-        if x.norm_squared() >= self.radius * self.radius {
+        if x.norm_squared() >= RADIUS * RADIUS {
             return None;
         }
         self.blocks
@@ -98,7 +102,7 @@ impl Barrier<'_> {
         factors: &[Cholesky<f64, Dyn>],
         t: f64,
     ) -> (DVector<f64>, DMatrix<f64>) {
-        let slack = self.radius * self.radius - x.norm_squared();
+        let slack = RADIUS * RADIUS - x.norm_squared();
         let mut g = &self.cost * t + x * (2.0 / slack);
         let m = x.len();
         let mut H = DMatrix::identity(m, m) * (2.0 / slack);
@@ -118,7 +122,7 @@ impl Barrier<'_> {
                 .map(|d| d.ln())
                 .sum::<f64>()
         };
-        let slack = self.radius * self.radius - x.norm_squared();
+        let slack = RADIUS * RADIUS - x.norm_squared();
         t * self.cost.dot(x) - slack.ln() - factors.iter().map(log_det).sum::<f64>()
     }
 
@@ -329,8 +333,7 @@ const LOOK: usize = 16;
 impl Block {
     pub fn new(F: &Affine) -> Self {
         let n = F.rows();
-        let mut terms: std::collections::BTreeMap<usize, Vec<Entry>> =
-            std::collections::BTreeMap::new();
+        let mut terms: BTreeMap<usize, Vec<Entry>> = BTreeMap::new();
         for i in 0..n {
             for j in i..n {
                 for (unknown, value) in F.terms(i, j).filter(|(_, value)| *value != 0.0) {
@@ -339,10 +342,10 @@ impl Block {
                 }
             }
         }
-        let terms = terms.into_iter();
+        let (terms, constants) = (terms.into_iter(), F.constants());
         Self {
             size: n,
-            constant: DMatrix::from_fn(n, n, |i, j| F.constant_at(i.min(j), i.max(j))),
+            constant: DMatrix::from_fn(n, n, |i, j| constants[(i.min(j), i.max(j))]),
             terms: terms.map(|(k, entries)| Term::new(k, entries, n)).collect(),
         }
     }
@@ -412,15 +415,14 @@ mod tests {
     fn an_end_for_want_of_digits_decides_nothing() {
         let x = Affine::unknown(1, 1, |_, _| Some(0));
         let half = Affine::identity(1).scaled(0.5);
-        let blocks = [
+        let blocks = vec![
             Block::new(&Affine::symmetric_blocks(&half, &x, &half)),
             Block::new(&x),
         ];
         let budget = Budget::default();
         let barrier = Barrier {
-            blocks: &blocks,
+            blocks,
             cost: DVector::from_element(1, 1.0),
-            radius: 1e3,
             budget: &budget,
         };
         let start = || DVector::from_element(1, 0.3);

@@ -1,23 +1,6 @@
 //! Linear matrix inequalities: minimise a linear function of unknowns over
 //! symmetric matrices that are affine in them and have to be positive definite.
 //!
-//! ```
-//! use lynkeus_proof::lmi::{Affine, Problem};
-//! use nalgebra::DMatrix;
-//!
-//! // the smallest P ≥ I with AᵀP + PA ≤ −I
-//! let A = DMatrix::from_row_slice(2, 2, &[-1.0, 4.0, 0.0, -2.0]);
-//! let mut problem = Problem::new();
-//! let P = problem.symmetric(2);
-//! let identity = Affine::identity(2);
-//! problem.positive(P.minus(&identity));
-//! problem.positive(P.times(&A).he().scaled(-1.0).minus(&identity));
-//! problem.minimise(&P.trace());
-//! let solution = problem.solve().unwrap();
-//! let P = solution.value(&P);
-//! assert!((A.transpose() * &P + &P * A).symmetric_eigenvalues().max() < -0.99);
-//! ```
-//!
 //! Problems here are small and dense (tens of states, hundreds of unknowns), and a
 //! point well inside the inequalities is worth more than the last digit of the
 //! objective, because the answer is checked afterwards by interval arithmetic
@@ -36,9 +19,6 @@ use barrier::{Barrier, Block, Ended};
 use lynkeus_expr::{Budget, Spent};
 use nalgebra::{DMatrix, DVector};
 
-/// Unknowns larger than this do not occur in a well scaled problem; the bound keeps
-/// the feasible set compact.
-const RADIUS: f64 = 1e12;
 /// A point is inside if every inequality holds with this margin.
 const MARGIN: f64 = 1e-8;
 /// A point inside is sought until its margin is this close to the largest, relatively.
@@ -46,19 +26,15 @@ const INSIDE: f64 = 0.3;
 /// Gap at which the objective is as good as its minimum, relative to its size.
 const GAP: f64 = 1e-4;
 
-/// A minimisation under linear matrix inequalities.
-#[derive(Clone, Debug, Default)]
+/// A minimisation under linear matrix inequalities. Its points are the values of the unknowns in the
+/// order of their introduction.
+#[derive(Clone, Debug)]
 pub struct Problem {
     unknowns: usize,
     inequalities: Vec<Affine>,
-    objective: Option<Affine>,
+    /// coefficients of the objective, by unknown
+    objective: Vec<(usize, f64)>,
     budget: Budget,
-}
-
-/// Values of the unknowns strictly inside every inequality.
-#[derive(Clone, Debug)]
-pub struct Solution {
-    values: DVector<f64>,
 }
 
 /// Why there is no solution.
@@ -76,14 +52,14 @@ pub enum Failure {
 }
 
 impl Problem {
-    /// No unknowns, no inequalities.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Under a budget: it may end the search.
-    pub fn set_budget(&mut self, budget: &Budget) {
-        self.budget = budget.clone();
+    /// No unknowns, no inequalities; the budget may end the search.
+    pub fn new(budget: &Budget) -> Self {
+        Self {
+            unknowns: 0,
+            inequalities: vec![],
+            objective: vec![],
+            budget: budget.clone(),
+        }
     }
 
     /// Whether its budget has ended.
@@ -150,27 +126,19 @@ impl Problem {
 
     /// The objective, a 1×1 matrix.
     pub fn minimise(&mut self, objective: &Affine) {
-        self.objective = Some(objective.clone());
-    }
-
-    fn cost(&self) -> DVector<f64> {
-        let mut cost = DVector::zeros(self.unknowns);
-        for (unknown, coefficient) in self.objective.iter().flat_map(|o| o.terms(0, 0)) {
-            cost[unknown] += coefficient;
-        }
-        cost
+        self.objective = objective.terms(0, 0).collect();
     }
 
     /// A point inside, near the minimum of the objective where there is one.
     ///
     /// # Errors
     /// [`Failure`].
-    pub fn solve(&self) -> Result<Solution, Failure> {
+    pub fn solve(&self) -> Result<DVector<f64>, Failure> {
         self.solve_from(&self.inside()?)
     }
 
     /// The point at which unknown matrices of this problem have these values.
-    pub fn point(&self, parts: &[(&Affine, DMatrix<f64>)]) -> Solution {
+    pub fn point(&self, parts: &[(&Affine, DMatrix<f64>)]) -> DVector<f64> {
         let mut values = DVector::zeros(self.unknowns);
         for (matrix, value) in parts {
             for j in 0..matrix.columns() {
@@ -181,30 +149,33 @@ impl Problem {
                 }
             }
         }
-        Solution { values }
+        values
     }
 
     /// The same from a known point inside.
     ///
     /// # Errors
     /// [`Failure::Infeasible`] where the point is not inside.
-    pub fn solve_from(&self, start: &Solution) -> Result<Solution, Failure> {
+    pub fn solve_from(&self, start: &DVector<f64>) -> Result<DVector<f64>, Failure> {
         self.affords()?;
-        let blocks: Vec<Block> = self.inequalities.iter().map(Block::new).collect();
+        let mut cost = DVector::zeros(self.unknowns);
+        for &(unknown, coefficient) in &self.objective {
+            cost[unknown] = coefficient;
+        }
+        let blocks = self.inequalities.iter().map(Block::new).collect();
+        let budget = &self.budget;
         let barrier = Barrier {
-            blocks: &blocks,
-            cost: self.cost(),
-            radius: RADIUS,
-            budget: &self.budget,
+            blocks,
+            cost,
+            budget,
         };
-        if !barrier.is_inside(&start.values) {
+        if !barrier.is_inside(start) {
             return Err(Failure::Infeasible);
         }
         let good = |x: &DVector<f64>, gap: f64| gap < GAP * (1e-3 + barrier.cost.dot(x).abs());
         // a point short of the minimum is a solution all the same
-        let found = barrier.minimise(start.values.clone(), good);
-        let values = found.ok_or_else(|| self.failure())?.x;
-        Ok(Solution { values })
+        let found = barrier.minimise(start.clone(), good);
+        Ok(found.ok_or_else(|| self.failure())?.x)
     }
 
     /// A point inside every inequality, by about the largest margin that there is.
@@ -213,7 +184,7 @@ impl Problem {
     ///
     /// # Errors
     /// [`Failure`].
-    pub fn inside(&self) -> Result<Solution, Failure> {
+    pub fn inside(&self) -> Result<DVector<f64>, Failure> {
         self.relaxed(|s, gap| gap < INSIDE * s.abs() || gap < 1e-2 * MARGIN)
     }
 
@@ -228,12 +199,12 @@ impl Problem {
 
     /// Minimises the s by which inequalities are relaxed until it is known to stay above the
     /// margin, or is `enough` for its value and the gap to its minimum.
-    fn relaxed(&self, enough: impl Fn(f64, f64) -> bool) -> Result<Solution, Failure> {
+    fn relaxed(&self, enough: impl Fn(f64, f64) -> bool) -> Result<DVector<f64>, Failure> {
         self.affords()?;
         let s = self.unknowns;
         let relaxed = |f: &Affine| {
             let slack = Affine::unknown(f.rows(), f.rows(), |i, j| (i == j).then_some(s));
-            match f.holds_at_zero() {
+            match f.constants().cholesky().is_some() {
                 true => Block::new(f),
                 false => Block::new(&f.plus(&slack)),
             }
@@ -242,50 +213,51 @@ impl Problem {
         // s > −1: an inequality without bound has no need to hold by more
         let floor = Affine::unknown(1, 1, |_, _| Some(s)).plus(&Affine::identity(1));
         blocks.push(Block::new(&floor));
-        let norms = self.inequalities.iter().map(Affine::constant_norm);
+        // a bound of the eigenvalues of the constant part
+        let norm = |f: &Affine| {
+            let constants = f.constants();
+            let rows = constants
+                .row_iter()
+                .map(|row| row.iter().map(|c| c.abs()).sum());
+            rows.fold(0.0, f64::max)
+        };
+        let norms = self.inequalities.iter().map(norm);
         let mut start = DVector::zeros(s + 1);
         start[s] = 1.0 + norms.fold(0.0, f64::max);
         let mut cost = DVector::zeros(s + 1);
         cost[s] = 1.0;
+        let budget = &self.budget;
         let barrier = Barrier {
-            blocks: &blocks,
+            blocks,
             cost,
-            radius: RADIUS,
-            budget: &self.budget,
+            budget,
         };
         let decided = |x: &DVector<f64>, gap: f64| x[s] - gap > -MARGIN || enough(x[s], gap);
         let ended = barrier.minimise(start, decided);
         let Ended { x, decided } = ended.ok_or_else(|| self.failure())?;
         match x[s] < -MARGIN {
-            true => Ok(Solution {
-                values: x.rows(0, s).into_owned(),
-            }),
+            true => Ok(x.rows(0, s).into_owned()),
             false if decided => Err(Failure::Infeasible),
             false => Err(self.failure()),
         }
     }
 }
 
-impl Solution {
-    /// The matrix at the solution.
-    pub fn value(&self, matrix: &Affine) -> DMatrix<f64> {
-        matrix.at(&self.values)
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-    /// The point with values for unknowns that were introduced since, in the order of
-    /// their introduction.
-    pub fn with(&self, newer: &[f64]) -> Self {
-        let values = self.values.iter().chain(newer).copied();
-        Self {
-            values: DVector::from_iterator(self.values.len() + newer.len(), values),
-        }
-    }
-
-    /// Every unknown multiplied by a factor: inside again where the inequalities are
-    /// homogeneous.
-    pub fn scaled(&self, factor: f64) -> Self {
-        Self {
-            values: &self.values * factor,
-        }
+    #[test]
+    fn the_smallest_lyapunov_matrix_is_found() {
+        // P ≥ I with AᵀP + PA ≤ −I
+        let A = DMatrix::from_row_slice(2, 2, &[-1.0, 4.0, 0.0, -2.0]);
+        let mut problem = Problem::new(&Budget::default());
+        let P = problem.symmetric(2);
+        let identity = Affine::identity(2);
+        problem.positive(P.minus(&identity));
+        problem.positive(P.times(&A).he().scaled(-1.0).minus(&identity));
+        problem.minimise(&P.trace());
+        let P = P.at(&problem.solve().unwrap());
+        assert!((A.transpose() * &P + &P * A).symmetric_eigenvalues().max() < -0.99);
     }
 }

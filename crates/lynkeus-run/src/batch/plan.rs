@@ -236,7 +236,7 @@ impl Code {
 
     pub fn runner(&self) -> Runner {
         let engine = |tape: &Tape, compiled: &Option<Function<LANES>>| match compiled {
-            Some(function) => Engine::Native(function.evaluator()),
+            Some(function) => Engine::Native(function.clone()),
             None => Engine::Interpreted(Box::new(tape.evaluator_in(Lanes))),
         };
         Runner {
@@ -264,7 +264,7 @@ pub(crate) struct Runner {
 /// Machine code, or a tape.
 #[derive(Debug)]
 enum Engine {
-    Native(lynkeus_native::Evaluator<LANES>),
+    Native(Function<LANES>),
     Interpreted(Box<Evaluator<Lanes<LANES>>>),
 }
 

@@ -1,13 +1,40 @@
 //! What is believed of the state, and the ranges in which it is kept.
 
 use super::root::{Factor, Root, dot, substitute};
+use crate::noise::Limits;
 use crate::snapshot::{Damaged, Persist, Walk};
 
 /// What is believed of the state: its mean and a root of its covariance.
 #[derive(Clone, Debug)]
 pub(crate) struct Belief {
-    pub(crate) x: Vec<f64>,
-    pub(crate) root: Root,
+    pub x: Vec<f64>,
+    pub root: Root,
+}
+
+impl Belief {
+    /// Of independent states.
+    pub fn new(x: &[f64], variances: &[f64]) -> Self {
+        Self {
+            x: x.to_vec(),
+            root: Root::diagonal(variances),
+        }
+    }
+
+    /// Corrects by a reading, as [`Root::update`], that is `innovation` off.
+    pub fn take(
+        &mut self,
+        projected: &[f64],
+        innovation: f64,
+        noise: f64,
+        gain: &mut Vec<f64>,
+    ) -> bool {
+        let has_gain = self.root.update(projected, noise, gain);
+        if has_gain {
+            let places = self.x.iter_mut().zip(gain);
+            places.for_each(|(x, k)| *x += *k * innovation);
+        }
+        has_gain
+    }
 }
 
 impl Persist for Belief {
@@ -17,17 +44,8 @@ impl Persist for Belief {
     }
 }
 
-/// Where a state can be.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// smallest value
-    pub low: f64,
-    /// largest value
-    pub high: f64,
-}
-
 /// The nearest place inside, state by state.
-pub(crate) fn confine(x: &mut [f64], bounds: &[Bounds]) {
+pub(crate) fn confine(x: &mut [f64], bounds: &[Limits]) {
     for (x, bounds) in x.iter_mut().zip(bounds) {
         *x = x.max(bounds.low).min(bounds.high);
     }
@@ -45,7 +63,7 @@ const SLACK: f64 = 1e-12;
 /// 1974, chapter 23), on the multipliers: one at a time, those that would pull inward let go.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Projection {
-    bounds: Vec<Bounds>,
+    bounds: Vec<Limits>,
     /// P, row by row
     covariance: Vec<f64>,
     before: Vec<f64>,
@@ -60,7 +78,7 @@ pub(crate) struct Projection {
 }
 
 impl Projection {
-    pub fn new(bounds: Vec<Bounds>) -> Self {
+    pub fn new(bounds: Vec<Limits>) -> Self {
         Self {
             bounds,
             ..Self::default()
@@ -70,7 +88,7 @@ impl Projection {
     /// The estimate in its ranges, where it is not; whether it was moved. A state without variance that
     /// is outside is put to its bound alone.
     pub fn project(&mut self, x: &mut [f64], root: &Root) -> bool {
-        let outside = |(x, b): (&f64, &Bounds)| *x < b.low || *x > b.high;
+        let outside = |(x, b): (&f64, &Limits)| *x < b.low || *x > b.high;
         if !x.iter().zip(&self.bounds).any(outside) {
             return false;
         }
@@ -84,9 +102,7 @@ impl Projection {
             self.meet();
             self.place(x);
         }
-        for (x, bounds) in x.iter_mut().zip(&self.bounds) {
-            *x = x.max(bounds.low).min(bounds.high);
-        }
+        confine(x, &self.bounds);
         true
     }
 
@@ -142,7 +158,7 @@ impl Projection {
             for &i in &self.met {
                 let row = self.met.iter().map(|j| self.covariance[i * n + j]);
                 self.matrix.extend(row);
-                let Bounds { low, high } = self.bounds[i];
+                let Limits { low, high } = self.bounds[i];
                 let bound = if self.sides[i] > 0 { high } else { low };
                 self.wanted.push(bound - self.before[i]);
             }
@@ -182,7 +198,7 @@ impl Projection {
         let n = x.len();
         for (i, x) in x.iter_mut().enumerate() {
             let row = &self.covariance[i * n..(i + 1) * n];
-            let Bounds { low, high } = self.bounds[i];
+            let Limits { low, high } = self.bounds[i];
             *x = match self.sides[i] {
                 0 => self.before[i] + dot(row, &self.multipliers),
                 1 => high,
@@ -221,10 +237,10 @@ mod tests {
             // every third covariance is singular
             let count = if trial % 3 == 0 { n.div_ceil(2) } else { n + 2 };
             let mut rows: Vec<f64> = (0..count * n).map(|_| random.next()).collect();
-            root.of_rows(&mut rows);
+            root.of_rows(&mut rows, &mut vec![0.0; root.n]);
             let before: Vec<f64> = (0..n).map(|_| 2.0 * random.next()).collect();
-            let bounds: Vec<Bounds> = (0..n)
-                .map(|_| Bounds {
+            let bounds: Vec<Limits> = (0..n)
+                .map(|_| Limits {
                     low: -1.0 - random.next().abs(),
                     high: 0.5 * random.next().abs(),
                 })
@@ -232,7 +248,7 @@ mod tests {
             let mut x = before.clone();
             let mut projection = Projection::new(bounds.clone());
             let moved = projection.project(&mut x, &root);
-            let inside = |(x, b): (&f64, &Bounds)| b.low <= *x && *x <= b.high;
+            let inside = |(x, b): (&f64, &Limits)| b.low <= *x && *x <= b.high;
             assert!(x.iter().zip(&bounds).all(inside), "{x:?}");
             assert_eq!(moved, x != before);
             if trial % 3 == 0 || !moved {
@@ -245,7 +261,7 @@ mod tests {
                     .sum();
                 let μ = projection.multipliers[i];
                 assert!((x[i] - before[i] - push).abs() < 1e-9, "{trial}: {x:?}");
-                let Bounds { low, high } = bounds[i];
+                let Limits { low, high } = bounds[i];
                 let allowed = (μ <= 0.0 || x[i] == low) && (μ >= 0.0 || x[i] == high);
                 assert!(allowed, "{trial}: {μ} at {}", x[i]);
             }
@@ -257,12 +273,12 @@ mod tests {
     #[test]
     fn what_is_correlated_moves_along() {
         let mut root = Root::diagonal(&[0.0; 2]);
-        root.of_rows(&mut [1.0, 0.8, 0.0, 0.6]);
-        let wide = Bounds {
+        root.of_rows(&mut [1.0, 0.8, 0.0, 0.6], &mut [0.0; 2]);
+        let wide = Limits {
             low: -9.0,
             high: 9.0,
         };
-        let mut projection = Projection::new(vec![Bounds { high: 1.0, ..wide }, wide]);
+        let mut projection = Projection::new(vec![Limits { high: 1.0, ..wide }, wide]);
         let mut x = [2.0, 0.0];
         assert!(projection.project(&mut x, &root));
         assert!(

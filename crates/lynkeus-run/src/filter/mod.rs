@@ -7,13 +7,13 @@
 //!
 //! ```
 //! use lynkeus_expr::Graph;
-//! use lynkeus_run::filter::{FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor};
+//! use lynkeus_run::filter::{FilterKind, FilterSettings, NoisyModel, NoisyPlant, Sensor};
 //! use lynkeus_run::{Estimator, EstimatorSettings, Level};
 //!
 //! // a level that nobody moves, measured with noise of standard deviation 1
 //! let g = Graph::new();
 //! let [time, x] = ["time", "x"].map(|name| g.symbol(name));
-//! let model = FilterModel::new(&FilterPlant {
+//! let model = NoisyModel::new(&NoisyPlant {
 //!     graph: &g,
 //!     time: time.node(),
 //!     states: vec![("x".into(), x.node(), 0.0)],
@@ -22,6 +22,7 @@
 //!     sensors: vec![Sensor { name: "y".into(), output: x.node(), noise: Level::Absolute(1.0), limits: None }],
 //!     process_noise: vec![0.0],
 //!     initial_variance: vec![1.0],
+//!     ranges: vec![],
 //!     confined: None,
 //! })?;
 //! let settings = FilterSettings::of(FilterKind::Extended);
@@ -38,38 +39,36 @@
 //! ```
 
 mod belief;
-pub(crate) mod ekf;
+mod ekf;
 pub(crate) mod health;
-pub(crate) mod kalman;
 mod mhe;
 mod model;
 mod profile;
 pub(crate) mod root;
 mod sensing;
 mod smoother;
-mod transition;
+pub(crate) mod transition;
 mod ukf;
 
 pub use crate::noise::Limits;
 pub(crate) use belief::Belief;
-pub use belief::Bounds;
 pub use health::{Health, Innovation, Reading, SensorHealth};
-pub use model::{Confined, FilterModel, FilterPlant, Sensor};
+pub(crate) use model::check_counts;
+pub use model::{NoisyModel, NoisyPlant, Sensor};
 pub use smoother::Smoothed;
 pub use ukf::{SigmaPoints, Weights};
 
-use crate::divergence::{Bound, deviation_diverged};
+use crate::divergence::{Bound, check_deviations};
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings};
 use belief::{Projection, confine};
 use ekf::Ekf;
-use kalman::Kalman;
 use mhe::Mhe;
-use profile::Skyline;
-use root::{Packed, Root};
+use profile::Profile;
 use sensing::Sensing;
 use smoother::{History, Step};
+use transition::Propagation;
 use ukf::Ukf;
 
 /// Which filter.
@@ -80,9 +79,8 @@ pub enum FilterKind {
     Extended,
     /// the unscented Kalman filter: sigma points follow the plant
     Unscented(SigmaPoints),
-    /// moving-horizon estimation over so many samples, the states within bounds (one pair per
-    /// state)
-    MovingHorizon(usize, Vec<Bounds>),
+    /// moving-horizon estimation over so many samples, the states within the model's ranges
+    MovingHorizon(usize),
 }
 
 /// How a filter works.
@@ -94,10 +92,10 @@ pub struct FilterSettings {
     pub gate: Option<f64>,
     /// keep what a smoother needs
     pub keep_history: bool,
-    /// where the estimate is kept, one pair per state: after each prediction and correction it is
-    /// put to the nearest such place by the covariance's metric. The covariance stays: a bound says where
+    /// the estimate is kept in the model's ranges: after each prediction and correction it is put to the
+    /// nearest place inside by the covariance's metric. The covariance stays: a bound says where
     /// the estimate is, and not how sure it is
-    pub bounds: Option<Vec<Bounds>>,
+    pub projects: bool,
     /// readings are what the model shows, and only covariances are asked for: a sensor with limits
     /// counts as its readings do on average (Fisher's information of a clipped normal number)
     pub foresees: bool,
@@ -111,133 +109,109 @@ impl FilterSettings {
             kind,
             gate: None,
             keep_history: false,
-            bounds: None,
+            projects: false,
             foresees: false,
         }
     }
 }
 
+/// What the filters differ in.
 #[derive(Clone, Debug)]
 enum Engine {
-    Extended(Box<Ekf>),
+    Extended(Ekf),
     Unscented(Box<Ukf>),
     MovingHorizon(Box<Mhe>),
-}
-
-impl Engine {
-    fn kalman(&mut self) -> &mut dyn Kalman {
-        match self {
-            Self::Extended(ekf) => &mut **ekf,
-            Self::Unscented(ukf) => &mut **ukf,
-            Self::MovingHorizon(mhe) => &mut **mhe,
-        }
-    }
 }
 
 /// A filter under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Filter {
+    /// the plant between samples
+    propagation: Propagation,
     engine: Engine,
-    /// inside the declared ranges, for intervals on which the plant has no value where the estimate is
-    spare: Option<Confined<Ekf>>,
+    /// the same inside the declared ranges, for intervals on which the plant has no value where the
+    /// estimate is
+    spare: Option<Propagation>,
+    ranges: Vec<Limits>,
     belief: Belief,
     projection: Option<Projection>,
     sensing: Sensing,
-    inputs: Vec<f64>,
     deviations: Vec<f64>,
     bound: Bound,
     history: Option<History>,
     /// the transition since the last update, for the smoother
-    pending: Option<Skyline>,
+    pending: Option<Profile>,
 }
 
 impl Filter {
     /// At the plant's first estimate.
     pub fn new(
-        model: &FilterModel,
-        settings: FilterSettings,
+        model: &NoisyModel,
+        settings: &FilterSettings,
         run: EstimatorSettings,
     ) -> Result<Self, Error> {
-        if let Some(gate) = settings.gate
-            && !(gate > 0.0 && gate.is_finite())
-        {
-            return Err(Error::setting(
-                "gate",
-                "a number of standard deviations above 0",
-                gate,
-            ));
-        }
-        if let Some(bounds) = &settings.bounds {
-            if bounds.len() != model.dimension() {
-                let expected = format!("{}, one pair per state", model.dimension());
-                return Err(Error::setting("bounds", expected, bounds.len()));
-            }
-            if settings.keep_history {
-                let found = "a smoother beside them";
-                return Err(Error::setting("bounds", "no smoother", found));
-            }
-        }
-        let is_window = matches!(settings.kind, FilterKind::MovingHorizon(..));
-        let keep_corrections = settings.keep_history && !is_window;
-        let engine = match settings.kind {
-            FilterKind::Extended => {
-                Engine::Extended(Box::new(Ekf::new(&model.flow, &model.process_noise, run)?))
-            }
-            FilterKind::Unscented(points) => {
-                Engine::Unscented(Box::new(Ukf::new(model, points, run)?))
-            }
-            FilterKind::MovingHorizon(length, bounds) => {
-                let keep = settings.keep_history;
-                let horizon = Mhe::new(model, length, bounds, run, keep)?;
-                Engine::MovingHorizon(Box::new(horizon))
-            }
-        };
-        let x = model.flow.system().start().to_vec();
-        let spare = match &model.confined {
-            None => None,
-            Some(Confined { flow, bounds }) => Some(Confined {
-                flow: Ekf::new(flow, &model.process_noise, run)?,
-                bounds: bounds.clone(),
-            }),
-        };
+        let flow = model.flow.system();
+        let n = flow.states().len();
+        check(settings, n, model.ranges.len())?;
+        let propagation = |flow| Propagation::new(flow, &model.process_noise, run);
         Ok(Self {
-            engine,
-            spare,
-            deviations: model.initial_variance.iter().map(|v| v.sqrt()).collect(),
-            belief: Belief {
-                root: Root::diagonal(&model.initial_variance),
-                x: x.clone(),
+            propagation: propagation(&model.flow)?,
+            engine: match settings.kind {
+                FilterKind::Extended => Engine::Extended(Ekf::default()),
+                FilterKind::Unscented(points) => {
+                    Engine::Unscented(Box::new(Ukf::new(n, points, run.method)?))
+                }
+                FilterKind::MovingHorizon(length) => {
+                    let horizon = Mhe::new(model, length, settings.keep_history)?;
+                    Engine::MovingHorizon(Box::new(horizon))
+                }
             },
-            projection: settings.bounds.map(Projection::new),
-            sensing: Sensing::new(model, settings.gate, keep_corrections, settings.foresees),
-            inputs: vec![0.0; model.inputs().len()],
-            bound: Bound::new(&x),
+            spare: model.confined.as_ref().map(propagation).transpose()?,
+            ranges: model.ranges.clone(),
+            deviations: model.initial_variance.iter().map(|v| v.sqrt()).collect(),
+            belief: Belief::new(flow.start(), &model.initial_variance),
+            projection: settings
+                .projects
+                .then(|| Projection::new(model.ranges.clone())),
+            sensing: Sensing::new(model, settings),
+            bound: Bound::new(flow.start()),
             history: settings.keep_history.then(History::default),
             pending: None,
         })
     }
 
-    /// The estimate after the last sample.
-    pub fn estimate(&self) -> &[f64] {
-        &self.belief.x
+    /// Whether the smoother needs the transition between two updates; a window finds its own.
+    fn keeps_transitions(&self) -> bool {
+        self.history.is_some() && !matches!(self.engine, Engine::MovingHorizon(_))
     }
 
     /// To the next sample; the transition is what the smoother needs of it. Where the plant has no
     /// value on the way, inside the declared ranges.
-    fn predict(&mut self, from: f64, to: f64, inputs: &[f64]) -> Result<Skyline, Error> {
+    fn predict(&mut self, from: f64, sample: &Sample<'_>) -> Result<Option<Profile>, Error> {
         let keep = self.keeps_transitions();
-        let engine = self.engine.kalman();
-        engine.driven().aim(from, to, inputs);
-        let result = engine.predict(&mut self.belief, from, to, keep);
+        let (propagation, belief) = (&mut self.propagation, &mut self.belief);
+        if let Some(spare) = &mut self.spare {
+            spare.driven.start(propagation.driven.evaluation.signals());
+        }
+        propagation.driven.aim(from, sample.t, sample.inputs);
+        let result = match &mut self.engine {
+            Engine::Unscented(ukf) => ukf.predict(propagation, belief, from, sample.t, keep),
+            engine => {
+                let done = propagation.predict(belief, from, sample.t);
+                if let Engine::MovingHorizon(_) = engine {
+                    confine(&mut belief.x, &self.ranges);
+                }
+                done.map(|()| keep.then(|| propagation.transition().clone()))
+            }
+        };
         match (result, &mut self.spare) {
             (Err(error), Some(spare)) if is_undefined(&error) => {
                 // a flow that failed has left the belief as it was
                 self.sensing.health.confined += 1;
-                confine(&mut self.belief.x, &spare.bounds);
-                let driven = &mut spare.flow.driven;
-                driven.start(&self.inputs);
-                driven.aim(from, to, inputs);
-                spare.flow.predict(&mut self.belief, from, to, keep)
+                confine(&mut belief.x, &self.ranges);
+                spare.driven.aim(from, sample.t, sample.inputs);
+                spare.predict(belief, from, sample.t)?;
+                Ok(keep.then(|| spare.transition().clone()))
             }
             (result, _) => result,
         }
@@ -251,42 +225,42 @@ impl Filter {
         }
     }
 
-    fn correct(&mut self, t: f64, readings: &[f64]) -> Result<(), Error> {
-        match self.correct_here(t, readings) {
+    fn correct(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
+        match self.correct_here(sample) {
             // the outputs are evaluated before a reading is counted; a window keeps its states
             // inside anyway
             Err(error)
-                if is_undefined(&error) && !matches!(self.engine, Engine::MovingHorizon(_)) =>
+                if is_undefined(&error)
+                    && self.spare.is_some()
+                    && !matches!(self.engine, Engine::MovingHorizon(_)) =>
             {
-                let Some(spare) = &self.spare else {
-                    return Err(error);
-                };
                 self.sensing.health.confined += 1;
-                confine(&mut self.belief.x, &spare.bounds);
-                self.correct_here(t, readings)
+                confine(&mut self.belief.x, &self.ranges);
+                self.correct_here(sample)
             }
             result => result,
         }
     }
 
-    fn correct_here(&mut self, t: f64, readings: &[f64]) -> Result<(), Error> {
+    fn correct_here(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
         let (sensing, belief) = (&mut self.sensing, &mut self.belief);
-        let engine = self.engine.kalman();
-        engine.correct(sensing, belief, t, readings, &self.inputs)
+        match &mut self.engine {
+            Engine::Extended(ekf) => ekf.correct(sensing, belief, sample),
+            Engine::Unscented(ukf) => ukf.correct(sensing, belief, sample),
+            Engine::MovingHorizon(mhe) => {
+                mhe.correct(&mut self.propagation, sensing, belief, sample)
+            }
+        }
     }
 }
 
 impl Runner for Filter {
-    fn begin(&mut self, _: &Sample<'_>) -> Result<(), Error> {
-        Ok(())
-    }
-
     fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
-        self.bound.see(&self.inputs);
-        let transition = self.predict(from, sample.t, sample.inputs)?;
-        self.engine.kalman().driven().arrive();
+        self.bound.see(self.propagation.driven.evaluation.signals());
+        let transition = self.predict(from, sample)?;
+        self.propagation.driven.arrive();
         self.keep_inside();
-        if self.keeps_transitions() {
+        if let Some(transition) = transition {
             self.pending = Some(match self.pending.take() {
                 None => transition,
                 Some(earlier) => transition.after(&earlier),
@@ -299,23 +273,19 @@ impl Runner for Filter {
         self.sensing.health.inputs_held += sample.held;
         // those of an update that failed
         self.sensing.take_corrections();
-        self.inputs.copy_from_slice(sample.inputs);
-        self.engine.kalman().driven().start(sample.inputs);
-        self.correct(sample.t, sample.readings)?;
+        self.propagation.driven.start(sample.inputs);
+        self.correct(sample)?;
         self.keep_inside();
         Ok(())
     }
 
     fn report(&mut self, t: f64) -> Result<(), Error> {
-        let names = self.sensing.states();
+        let names = self.propagation.driven.evaluation.system().states();
         self.bound.check(t, names, &self.belief.x, String::new)?;
         for (i, deviation) in self.deviations.iter_mut().enumerate() {
             *deviation = self.belief.root.deviation(i);
         }
-        match self.deviations.iter().position(|d| !d.is_finite()) {
-            None => Ok(()),
-            Some(i) => Err(deviation_diverged(t, &names[i], self.deviations[i])),
-        }
+        check_deviations(t, names, &self.deviations)
     }
 
     fn estimate(&self) -> &[f64] {
@@ -333,6 +303,81 @@ impl Runner for Filter {
     fn health(&self) -> &Health {
         &self.sensing.health
     }
+
+    fn remember(&mut self) {
+        let corrections = self.sensing.take_corrections();
+        let transition = self.pending.take();
+        let Some(history) = &mut self.history else {
+            return;
+        };
+        if let Engine::MovingHorizon(horizon) = &mut self.engine {
+            horizon.leave(history);
+            return;
+        }
+        history.steps.push(Step {
+            transition,
+            belief: self.belief.clone(),
+            corrections,
+        });
+    }
+
+    /// None where a window reaches back less far than `lag`, either.
+    fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Option<Vec<Smoothed>> {
+        let history = self.history.as_ref()?;
+        let Engine::MovingHorizon(horizon) = &self.engine else {
+            return Some(history.smoothed(&[], lag, deviations));
+        };
+        if lag.is_some_and(|lag| lag > horizon.length()) {
+            return None;
+        }
+        let newest = horizon.steps(&self.propagation, &self.sensing)?;
+        let mut rows = history.smoothed(&newest, lag, deviations);
+        if let Some(lag) = lag {
+            // as it was known then: the rows kept are linearised about what was known later
+            for (row, x) in rows
+                .iter_mut()
+                .zip(history.in_windows(self.belief.x.len(), lag))
+            {
+                row.estimate.copy_from_slice(x);
+            }
+        }
+        for row in &mut rows {
+            confine(&mut row.estimate, &self.ranges);
+        }
+        Some(rows)
+    }
+
+    fn walk_history(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        let n = self.belief.x.len();
+        match &mut self.history {
+            Some(history) => history.walk(walk, n),
+            None => Ok(()),
+        }
+    }
+
+    fn copied(&self) -> Box<dyn Runner> {
+        Box::new(self.clone())
+    }
+}
+
+/// That the settings can be, for n states with so many ranges.
+fn check(settings: &FilterSettings, n: usize, ranges: usize) -> Result<(), Error> {
+    if let Some(gate) = settings.gate
+        && !(gate > 0.0 && gate.is_finite())
+    {
+        let expected = "a number of standard deviations above 0";
+        return Err(Error::setting("gate", expected, gate));
+    }
+    let is_bounded = settings.projects || matches!(settings.kind, FilterKind::MovingHorizon(_));
+    if is_bounded && ranges != n {
+        let expected = format!("{n}, one pair per state");
+        return Err(Error::setting("bounds", expected, ranges));
+    }
+    if settings.projects && settings.keep_history {
+        let found = "a smoother beside them";
+        return Err(Error::setting("bounds", "no smoother", found));
+    }
+    Ok(())
 }
 
 /// Whether the plant has no value where it was asked for.
@@ -345,81 +390,21 @@ fn is_undefined(error: &Error) -> bool {
 
 impl Persist for Filter {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        self.engine.kalman().walk(walk)?;
+        self.propagation.walk(walk)?;
+        match &mut self.engine {
+            Engine::Extended(_) => {}
+            Engine::Unscented(ukf) => ukf.walk(walk)?,
+            Engine::MovingHorizon(mhe) => mhe.walk(walk)?,
+        }
         if let Some(spare) = &mut self.spare {
-            spare.flow.walk(walk)?;
+            spare.walk(walk)?;
         }
         self.belief.walk(walk)?;
         self.sensing.walk(walk)?;
-        walk.numbers(&mut self.inputs)?;
         walk.numbers(&mut self.deviations)?;
         self.bound.walk(walk)?;
         let n = self.belief.x.len();
         walk.optional(&mut self.pending, |walk, pending| pending.walk(walk, n))
-    }
-}
-
-impl Filter {
-    /// What the smoother keeps.
-    pub fn walk_history(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        let n = self.belief.x.len();
-        match &mut self.history {
-            Some(history) => history.walk(walk, n),
-            None => Ok(()),
-        }
-    }
-}
-
-impl Filter {
-    /// The estimate at each update given later ones, up to `lag` of them; none without history,
-    /// and where a window reaches back less far than `lag`.
-    pub fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Option<Vec<Smoothed>> {
-        let history = self.history.as_ref()?;
-        let Engine::MovingHorizon(horizon) = &self.engine else {
-            return Some(history.smoothed(&[], lag, deviations));
-        };
-        if lag.is_some_and(|lag| lag > horizon.length()) {
-            return None;
-        }
-        let newest = horizon.steps(&self.sensing)?;
-        let mut rows = history.smoothed(&newest, lag, deviations);
-        if let Some(lag) = lag {
-            // as it was known then: the rows kept are linearised about what was known later
-            for (row, x) in rows
-                .iter_mut()
-                .zip(history.in_windows(self.belief.x.len(), lag))
-            {
-                row.estimate.copy_from_slice(x);
-            }
-        }
-        for row in &mut rows {
-            confine(&mut row.estimate, horizon.bounds());
-        }
-        Some(rows)
-    }
-
-    /// Keeps the last update for the smoother.
-    pub fn remember(&mut self) {
-        let corrections = self.sensing.take_corrections();
-        let transition = self.pending.take();
-        let Some(history) = &mut self.history else {
-            return;
-        };
-        if let Engine::MovingHorizon(horizon) = &mut self.engine {
-            horizon.leave(history);
-            return;
-        }
-        history.push(Step {
-            transition,
-            x: self.belief.x.clone(),
-            root: Packed::of(&self.belief.root),
-            corrections,
-        });
-    }
-
-    /// Whether the smoother needs the transition between two updates; a window finds its own.
-    pub(super) fn keeps_transitions(&self) -> bool {
-        self.history.is_some() && !matches!(self.engine, Engine::MovingHorizon(_))
     }
 }
 

@@ -3,19 +3,12 @@
 use std::ops::Range;
 
 use super::root::dot;
+use crate::Place;
 use crate::snapshot::{Damaged, Walk};
-
-/// An entry of a sparse matrix.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Entry {
-    pub row: usize,
-    pub column: usize,
-    pub value: f64,
-}
 
 /// n × n, row by row; what is outside the span of a row is 0 and never touched. The powers of a
 /// banded matrix are of this kind, and grow with their exponent only.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Profile {
     n: usize,
     entries: Vec<f64>,
@@ -100,9 +93,9 @@ impl Profile {
     }
 
     /// Adds factor · A · other for a sparse A.
-    pub fn add_product(&mut self, factor: f64, sparse: &[Entry], other: &Self) {
-        for entry in sparse {
-            self.add_row(entry.row, factor * entry.value, other, entry.column);
+    pub fn add_product(&mut self, factor: f64, sparse: &[(Place, f64)], other: &Self) {
+        for (at, value) in sparse {
+            self.add_row(at.row, factor * value, other, at.column);
         }
     }
 
@@ -159,76 +152,16 @@ impl Profile {
             span.start.min(columns.start)..span.end.max(columns.end)
         };
     }
-}
-
-/// A matrix of which only the spans are stored.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Skyline {
-    /// first column of each row, and where its entries begin
-    begins: Vec<(usize, usize)>,
-    entries: Vec<f64>,
-}
-
-impl Skyline {
-    pub(super) fn of(matrix: &Profile) -> Self {
-        let count = matrix.rows().map(|(_, row)| row.len()).sum();
-        let mut rows = Self {
-            begins: Vec::with_capacity(matrix.n),
-            entries: Vec::with_capacity(count),
-        };
-        for (first, row) in matrix.rows() {
-            rows.begins.push((first, rows.entries.len()));
-            rows.entries.extend_from_slice(row);
-        }
-        rows
-    }
-
-    pub fn identity(n: usize) -> Self {
-        Self {
-            begins: (0..n).map(|i| (i, i)).collect(),
-            entries: vec![1.0; n],
-        }
-    }
-
-    /// Each row: its first column, and its entries from there.
-    pub fn rows(&self) -> impl Iterator<Item = (usize, &[f64])> {
-        self.begins.iter().enumerate().map(|(i, &(first, begin))| {
-            let end = self.begins.get(i + 1).map_or(self.entries.len(), |b| b.1);
-            (first, &self.entries[begin..end])
-        })
-    }
 
     /// What `earlier` and then this one do: their product.
     pub fn after(&self, earlier: &Self) -> Self {
-        let n = self.begins.len();
-        let mut product = Profile::zero(n);
-        let mut dense = Profile::zero(n);
-        for (i, (first, row)) in earlier.rows().enumerate() {
-            let entries = row.iter().enumerate();
-            entries.for_each(|(k, entry)| dense.add_at(i, first + k, *entry));
-        }
+        let mut product = Self::zero(self.n);
         for (i, (first, row)) in self.rows().enumerate() {
-            let entries = row.iter().enumerate();
-            entries.for_each(|(k, entry)| product.add_row(i, *entry, &dense, first + k));
+            for (j, entry) in (first..).zip(row) {
+                product.add_row(i, *entry, earlier, j);
+            }
         }
-        Self::of(&product)
-    }
-
-    /// Of n rows and columns.
-    pub fn walk(&mut self, walk: &mut Walk<'_>, n: usize) -> Result<(), Damaged> {
-        let spans = self.rows().map(|(first, row)| first..first + row.len());
-        let mut spans: Vec<Range<usize>> = spans.collect();
-        spans.resize(n, 0..0);
-        self.begins.resize(n, (0, 0));
-        let mut count = 0;
-        for (begin, span) in self.begins.iter_mut().zip(&mut spans) {
-            walk.below(&mut span.start, n + 1)?;
-            walk.below(&mut span.end, n + 1)?;
-            *begin = (span.start, count);
-            count += span.end.checked_sub(span.start).ok_or(Damaged)?;
-        }
-        self.entries.resize(count, 0.0);
-        walk.numbers(&mut self.entries)
+        product
     }
 
     /// Mᵀv.
@@ -241,14 +174,28 @@ impl Skyline {
         }
         result
     }
+
+    /// Of n rows and columns.
+    pub fn walk(&mut self, walk: &mut Walk<'_>, n: usize) -> Result<(), Damaged> {
+        if let Walk::Load(_) = walk {
+            *self = Self::zero(n);
+        }
+        let rows = self.entries.chunks_exact_mut(n.max(1));
+        for (span, row) in self.spans.iter_mut().zip(rows) {
+            walk.below(&mut span.start, n + 1)?;
+            walk.below(&mut span.end, n + 1)?;
+            walk.numbers(row.get_mut(span.clone()).ok_or(Damaged)?)?;
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn entry(row: usize, column: usize, value: f64) -> Entry {
-        Entry { row, column, value }
+    fn entry(row: usize, column: usize, value: f64) -> (Place, f64) {
+        (Place { row, column }, value)
     }
 
     #[test]
@@ -270,10 +217,7 @@ mod tests {
             [0.0, -1.0, 0.0, -1.0, 1.0, 3.0, 0.0, 3.0, 0.0]
         );
         assert!((twice.norm() - 21.0_f64.sqrt()).abs() < 1e-15);
-        assert_eq!(
-            Skyline::of(&twice).transposed_times(&[1.0, 2.0, 3.0]),
-            [-2.0, 10.0, 6.0]
-        );
+        assert_eq!(twice.transposed_times(&[1.0, 2.0, 3.0]), [-2.0, 10.0, 6.0]);
         twice.clear();
         assert_eq!(twice.norm(), 0.0);
     }
@@ -281,12 +225,12 @@ mod tests {
     /// [[0, 2, 0], [0, −1, 0], [3, 0, 0]] after [[1, 0, 0], [4, 0, 5], [0, 0, 6]].
     #[test]
     fn one_after_the_other_is_the_product() {
-        let rows = |entries: &[Entry]| {
+        let rows = |entries: &[(Place, f64)]| {
             let mut matrix = Profile::zero(3);
             entries
                 .iter()
-                .for_each(|e| matrix.add_at(e.row, e.column, e.value));
-            Skyline::of(&matrix)
+                .for_each(|(at, value)| matrix.add_at(at.row, at.column, *value));
+            matrix
         };
         let later = rows(&[entry(0, 1, 2.0), entry(1, 1, -1.0), entry(2, 0, 3.0)]);
         let earlier = rows(&[
@@ -304,7 +248,7 @@ mod tests {
         assert_eq!(column(0), [8.0, 0.0, 10.0]);
         assert_eq!(column(1), [-4.0, 0.0, -5.0]);
         assert_eq!(column(2), [3.0, 0.0, 0.0]);
-        let identity = Skyline::of(&Profile::identity(3));
-        assert_eq!(identity.after(&identity), identity);
+        let identity = Profile::identity(3);
+        assert!(identity.after(&identity).rows().eq(identity.rows()));
     }
 }

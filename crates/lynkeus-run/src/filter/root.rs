@@ -9,13 +9,6 @@ pub(crate) struct Root {
     pub entries: Vec<f64>,
 }
 
-/// A gain, with room for finding it.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Gain {
-    pub values: Vec<f64>,
-    factors: Vec<(f64, f64)>,
-}
-
 impl Root {
     /// Of a diagonal covariance.
     pub fn diagonal(variances: &[f64]) -> Self {
@@ -49,7 +42,11 @@ impl Root {
 
     /// P v.
     pub fn covariance_times(&self, v: &[f64]) -> Vec<f64> {
-        covariance_times(v, |i| &self.row(i)[..=i])
+        let mut half = vec![0.0; self.n];
+        self.transposed_times(v, &mut half);
+        (0..self.n)
+            .map(|i| dot(&self.row(i)[..=i], &half[..=i]))
+            .collect()
     }
 
     /// φ with φS = b; components along which P has no variance are 0.
@@ -69,63 +66,49 @@ impl Root {
     }
 
     /// Carlson's update by one reading y = cᵀx + noise of variance `r`: S becomes the lower root
-    /// of (I − k cᵀ) P (I − k cᵀ)ᵀ + r k kᵀ, and the gain k is returned. `projected` is Sᵀc. No
-    /// gain where neither the reading nor the estimate has any variance.
+    /// of (I − k cᵀ) P (I − k cᵀ)ᵀ + r k kᵀ, and k is written to `gain`. `projected` is Sᵀc. False
+    /// where neither the reading nor the estimate has any variance: there is no gain then.
     ///
     /// N. A. Carlson, "Fast triangular formulation of the square root filter", *AIAA Journal* 11
     /// (1973) 1259–1265, for a lower root: from the last column to the first.
-    pub fn update(&mut self, projected: &[f64], r: f64) -> Option<Vec<f64>> {
-        let mut gain = Gain::default();
-        self.update_into(projected, r, &mut gain)
-            .then_some(gain.values)
-    }
-
-    /// The same with room for the gain; false where there is none.
-    pub fn update_into(&mut self, projected: &[f64], r: f64, gain: &mut Gain) -> bool {
+    pub fn update(&mut self, projected: &[f64], r: f64, gain: &mut Vec<f64>) -> bool {
         let n = self.n;
-        let Gain { values, factors } = gain;
         let variance = dot(projected, projected) + r;
         if variance.is_nan() || variance <= 0.0 {
             return false;
         }
-        // of each column: what is left of it, and what the later ones take
-        factors.clear();
-        factors.resize(n, (1.0, 0.0));
+        gain.clear();
+        gain.resize(n, 0.0);
         let mut alpha = r;
-        for (factor, v) in factors.iter_mut().zip(projected).rev() {
+        for (j, v) in projected.iter().enumerate().rev() {
             let before = alpha;
             alpha += v * v;
-            if alpha > 0.0 {
-                let taken = if before > 0.0 {
-                    v / (before.sqrt() * alpha.sqrt())
-                } else {
-                    0.0
-                };
-                *factor = ((before / alpha).sqrt(), taken);
-            }
-        }
-        values.resize(n, 0.0);
-        for (i, k) in values.iter_mut().enumerate() {
-            let row = &mut self.entries[i * n..=i * n + i];
-            let mut sum = 0.0;
-            for ((s, (left, taken)), v) in row.iter_mut().zip(&*factors).zip(projected).rev() {
+            // what is left of the column, and what the later ones take
+            let left = if alpha > 0.0 {
+                (before / alpha).sqrt()
+            } else {
+                1.0
+            };
+            let taken = if before > 0.0 {
+                v / (before.sqrt() * alpha.sqrt())
+            } else {
+                0.0
+            };
+            let column = self.entries[j * (n + 1)..].iter_mut().step_by(n);
+            for (s, sum) in column.zip(&mut gain[j..]) {
                 let own = *s;
-                *s = own * left - sum * taken;
-                sum += own * v;
+                *s = own * left - *sum * taken;
+                *sum += own * v;
             }
-            *k = sum / variance;
         }
+        gain.iter_mut().for_each(|k| *k /= variance);
         true
     }
 
     /// The lower triangular root of AᵀA, for the rows A (each of n entries): what is left of A
     /// after Householder's reflections. The diagonal is not negative.
-    pub fn of_rows(&mut self, rows: &mut [f64]) {
-        self.of_rows_with(rows, &mut vec![0.0; self.n]);
-    }
-
-    /// The same with room for n numbers.
-    pub fn of_rows_with(&mut self, rows: &mut [f64], room: &mut [f64]) {
+    /// `room` is for n numbers.
+    pub fn of_rows(&mut self, rows: &mut [f64], room: &mut [f64]) {
         let n = self.n;
         triangularise(rows, n, room);
         self.entries.fill(0.0);
@@ -139,50 +122,6 @@ impl Root {
 }
 
 impl Persist for Root {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        walk.numbers(&mut self.entries)
-    }
-}
-
-/// A lower root, its triangle alone, for keeping.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Packed {
-    n: usize,
-    entries: Vec<f64>,
-}
-
-impl Packed {
-    pub fn of(root: &Root) -> Self {
-        let rows = (0..root.n).flat_map(|i| &root.row(i)[..=i]);
-        Self {
-            n: root.n,
-            entries: rows.copied().collect(),
-        }
-    }
-
-    /// Row i of S up to its diagonal.
-    fn row(&self, i: usize) -> &[f64] {
-        &self.entries[i * (i + 1) / 2..(i + 1) * (i + 2) / 2]
-    }
-
-    /// P v.
-    pub fn covariance_times(&self, v: &[f64]) -> Vec<f64> {
-        covariance_times(v, |i| self.row(i))
-    }
-}
-
-/// S (Sᵀ v) for the rows of S, each up to its diagonal.
-fn covariance_times<'s>(v: &[f64], row: impl Fn(usize) -> &'s [f64]) -> Vec<f64> {
-    let mut half = vec![0.0; v.len()];
-    for (i, v) in v.iter().enumerate().filter(|(_, v)| **v != 0.0) {
-        for (half, s) in half.iter_mut().zip(row(i)) {
-            *half += v * s;
-        }
-    }
-    (0..v.len()).map(|i| dot(row(i), &half[..=i])).collect()
-}
-
-impl Persist for Packed {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         walk.numbers(&mut self.entries)
     }
@@ -352,14 +291,14 @@ mod tests {
             })
             .collect();
         let mut root = Root::diagonal(&[0.0; 3]);
-        root.of_rows(&mut rows.clone());
+        root.of_rows(&mut rows.clone(), &mut [0.0; 3]);
         close(&covariance(&root), &expected, 1e-13);
         assert!(
             (0..3).all(|i| root.row(i)[i] >= 0.0 && root.row(i)[i + 1..].iter().all(|s| *s == 0.0))
         );
         // fewer rows than columns: rank one
         let mut flat = Root::diagonal(&[0.0; 3]);
-        flat.of_rows(&mut [1.0, 2.0, 3.0]);
+        flat.of_rows(&mut [1.0, 2.0, 3.0], &mut [0.0; 3]);
         close(
             &covariance(&flat),
             &[1.0, 2.0, 3.0, 2.0, 4.0, 6.0, 3.0, 6.0, 9.0],
@@ -373,7 +312,7 @@ mod tests {
         for exponent in -1080..=1000 {
             let tiny = 1.3 * 2.0_f64.powi(exponent);
             let mut root = Root::diagonal(&[0.0; 2]);
-            root.of_rows(&mut [tiny, 0.6, 0.5 * tiny, 1.2, 0.0, 0.7]);
+            root.of_rows(&mut [tiny, 0.6, 0.5 * tiny, 1.2, 0.0, 0.7], &mut [0.0; 2]);
             let found = root.deviation(1).powi(2);
             assert!((found - 2.29).abs() < 1e-14, "{found} beside {tiny:e}");
         }
@@ -386,12 +325,13 @@ mod tests {
         root.entries = factor(&[2.0, 1.0, 1.0, 3.0], 2);
         let mut projected = [0.0; 2];
         root.transposed_times(&[1.0, 0.0], &mut projected);
-        let gain = root.update(&projected, 2.0).unwrap();
+        let mut gain = vec![];
+        assert!(root.update(&projected, 2.0, &mut gain));
         close(&gain, &[0.5, 0.25], 1e-15);
         close(&covariance(&root), &[1.0, 0.5, 0.5, 2.75], 1e-15);
         // a perfect reading leaves no variance, and a second one has nothing to say
         root.transposed_times(&[1.0, 0.0], &mut projected);
-        root.update(&projected, 0.0).unwrap();
+        assert!(root.update(&projected, 0.0, &mut gain));
         assert!(root.deviation(0) < 1e-15);
     }
 
@@ -407,7 +347,7 @@ mod tests {
     #[test]
     fn what_has_no_variance_gives_no_gain() {
         let mut root = Root::diagonal(&[0.0, 1.0]);
-        assert_eq!(root.update(&[0.0, 0.0], 0.0), None);
+        assert!(!root.update(&[0.0, 0.0], 0.0, &mut vec![]));
         assert_eq!(root.deviation(1), 1.0);
     }
 

@@ -12,12 +12,14 @@
 
 use super::belief::Belief;
 use super::health::{Health, Innovation, Reading};
-use super::model::{FilterModel, Sensor};
+use super::model::{NoisyModel, Sensor};
 use super::root::dot;
 use super::smoother::Correction;
+use super::{FilterKind, FilterSettings};
 use crate::Error;
 use crate::linearised::OutputMap;
 use crate::noise::Limits;
+use crate::runner::Sample;
 use crate::snapshot::{Damaged, Persist, Walk};
 
 /// After so many rejections in a row the next reading is believed: a gate must not lock the
@@ -91,8 +93,7 @@ struct Lockout {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Sensing {
-    output_map: OutputMap,
-    states: Vec<String>,
+    pub output_map: OutputMap,
     sensors: Vec<Sensor>,
     gate: Option<f64>,
     /// of readings that only stand for others ([`super::FilterSettings::foresees`])
@@ -109,30 +110,23 @@ pub(crate) struct Sensing {
 }
 
 impl Sensing {
-    pub fn new(
-        model: &FilterModel,
-        gate: Option<f64>,
-        keep_corrections: bool,
-        foresees: bool,
-    ) -> Self {
-        let count = model.sensors.len();
+    pub fn new(model: &NoisyModel, settings: &FilterSettings) -> Self {
+        let (n, count) = (model.process_noise.len(), model.sensors.len());
+        // a window finds its own
+        let is_window = matches!(settings.kind, FilterKind::MovingHorizon(_));
+        let keeps_corrections = settings.keep_history && !is_window;
         Self {
             output_map: OutputMap::new(&model.output_map),
-            states: model.states().to_vec(),
             sensors: model.sensors.clone(),
-            gate,
-            foresees,
+            gate: settings.gate,
+            foresees: settings.foresees,
             lockouts: vec![Lockout::default(); count],
             innovations: vec![Innovation::default(); count],
             health: Health::of(count),
-            corrections: keep_corrections.then(Vec::new),
-            slopes: vec![0.0; model.dimension()],
-            projected: vec![0.0; model.dimension()],
+            corrections: keeps_corrections.then(Vec::new),
+            slopes: vec![0.0; n],
+            projected: vec![0.0; n],
         }
-    }
-
-    pub fn states(&self) -> &[String] {
-        &self.states
     }
 
     pub fn take_corrections(&mut self) -> Vec<Correction> {
@@ -142,49 +136,18 @@ impl Sensing {
             .unwrap_or_default()
     }
 
-    /// h(t, x, u), and C there.
-    pub fn evaluate(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64], Error> {
-        self.output_map.evaluate(t, x, u);
-        match self.output_map.is_finite() {
-            true => Ok(self.output_map.outputs()),
-            false => Err(self.output_map.not_finite(t)),
-        }
-    }
-
-    /// h(t, x, u), whether or not C has values there.
-    pub fn predict(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64], Error> {
-        self.output_map.evaluate(t, x, u);
-        match self.output_map.outputs().iter().all(|v| v.is_finite()) {
-            true => Ok(self.output_map.outputs()),
-            false => Err(self.output_map.not_finite(t)),
-        }
-    }
-
-    /// Row i of C where it was evaluated last.
-    pub fn slopes(&self, i: usize) -> Vec<f64> {
-        let mut row = vec![0.0; self.states.len()];
-        self.write_slopes(i, &mut row);
-        row
-    }
-
-    /// The same with room for it.
-    pub fn write_slopes(&self, i: usize, row: &mut [f64]) {
-        self.output_map.write_slopes(i, row);
-    }
-
     /// Decides what becomes of all readings of a sample before the first of them corrects, by h and C at the
     /// belief's mean, and gathers those that correct.
     pub fn judge_all(
         &mut self,
         belief: &Belief,
-        t: f64,
-        readings: &[f64],
-        inputs: &[f64],
+        sample: &Sample<'_>,
         taken: &mut Vec<Believed>,
     ) -> Result<(), Error> {
-        self.evaluate(t, &belief.x, inputs)?;
+        self.output_map
+            .linearise(sample.t, &belief.x, sample.inputs)?;
         taken.clear();
-        for (i, reading) in readings.iter().enumerate() {
+        for (i, reading) in sample.readings.iter().enumerate() {
             self.output_map.write_slopes(i, &mut self.slopes);
             let projected = &mut self.projected;
             belief.root.transposed_times(&self.slopes, projected);
@@ -317,34 +280,30 @@ impl Tail {
         const DENSITY: f64 = 0.398_942_280_401_432_7;
         let size = a.abs();
         let density = DENSITY * (-0.5 * a * a).exp();
-        if size < 2.25 {
+        let weight = if size < 2.25 {
             // Φ(a) − ½ = φ(a)(a + a³/3 + a⁵/(3·5) + …)
             let (mut term, mut sum) = (a, a);
             for k in 1..40 {
                 term *= a * a / f64::from(2 * k + 1);
                 sum += term;
             }
-            let weight = 0.5 - density * sum;
-            let mean = density / weight;
-            return Self {
-                weight,
-                mean,
-                excess: mean - a,
-            };
-        }
-        // Laplace's continued fraction: φ/Φ(−a) = a + 1/(a + 2/(a + 3/…))
-        let excess = (1..80)
-            .rev()
-            .fold(0.0, |rest, k| f64::from(k) / (size + rest));
-        let weight = density / (size + excess);
-        if a > 0.0 {
-            return Self {
-                weight,
-                mean: a + excess,
-                excess,
-            };
-        }
-        let weight = 1.0 - weight;
+            0.5 - density * sum
+        } else {
+            // Laplace's continued fraction: φ/Φ(−a) = a + 1/(a + 2/(a + 3/…))
+            let excess = (1..80)
+                .rev()
+                .fold(0.0, |rest, k| f64::from(k) / (size + rest));
+            let weight = density / (size + excess);
+            if a > 0.0 {
+                let mean = a + excess;
+                return Self {
+                    weight,
+                    mean,
+                    excess,
+                };
+            }
+            1.0 - weight
+        };
         let mean = density / weight;
         Self {
             weight,

@@ -1,7 +1,8 @@
 //! Smoothers: the estimate at a sample given later ones.
 
-use super::profile::Skyline;
-use super::root::{Packed, Root, dot};
+use super::belief::Belief;
+use super::profile::Profile;
+use super::root::dot;
 use crate::snapshot::{Damaged, Persist, Walk};
 
 /// What readings did that were taken together.
@@ -33,10 +34,9 @@ impl Correction {
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
     /// Φ from the sample before; none at the first and at repeated times
-    pub transition: Option<Skyline>,
-    /// x̂⁺ and a root of P⁺
-    pub x: Vec<f64>,
-    pub root: Packed,
+    pub transition: Option<Profile>,
+    /// x̂⁺, P⁺
+    pub belief: Belief,
     pub corrections: Vec<Correction>,
 }
 
@@ -60,18 +60,19 @@ impl Correction {
 }
 
 impl Step {
+    /// Of n states, to be walked over.
     fn nothing(n: usize) -> Self {
+        let none = vec![0.0; n];
         Self {
             transition: None,
-            x: vec![0.0; n],
-            root: Packed::of(&Root::diagonal(&vec![0.0; n])),
+            belief: Belief::new(&none, &none),
             corrections: vec![],
         }
     }
 
     /// Given what later samples say.
     fn given(&self, adjoint: &Adjoint) -> Smoothed {
-        let Self { x, root, .. } = self;
+        let Belief { x, root } = &self.belief;
         let n = x.len();
         let shift = root.covariance_times(&adjoint.vector);
         let estimate = x.iter().zip(&shift).map(|(x, s)| x - s).collect();
@@ -103,13 +104,10 @@ impl Step {
     }
 
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        let n = self.x.len();
-        walk.numbers(&mut self.x)?;
-        self.root.walk(walk)?;
+        let n = self.belief.x.len();
+        self.belief.walk(walk)?;
         let transition = &mut self.transition;
-        walk.optional(transition, |walk, transition: &mut Skyline| {
-            transition.walk(walk, n)
-        })?;
+        walk.optional(transition, |walk, transition| transition.walk(walk, n))?;
         let count = walk.length(self.corrections.len())?;
         self.corrections.resize_with(count, Correction::default);
         self.corrections
@@ -129,9 +127,9 @@ pub struct Smoothed {
 
 #[derive(Clone, Debug, Default)]
 pub(crate) struct History {
-    steps: Vec<Step>,
+    pub steps: Vec<Step>,
     /// of a moving horizon: the states of the window at each sample, row after row
-    windows: Vec<Vec<f64>>,
+    pub windows: Vec<Vec<f64>>,
 }
 
 /// What later samples say: x̂ˢ = x̂⁺ − P⁺λ, Pˢ = P⁺ − P⁺ΛP⁺.
@@ -159,15 +157,6 @@ impl History {
         })
     }
 
-    pub fn push(&mut self, step: Step) {
-        self.steps.push(step);
-    }
-
-    /// Of a moving horizon.
-    pub fn push_window(&mut self, window: Vec<f64>) {
-        self.windows.push(window);
-    }
-
     /// By the recursion of Bryson and Frazier, backward from the last sample or from `lag`
     /// samples later: λ = 0, Λ = 0 there, and over readings y = Cx + v with gain K
     /// λ ← (I − KC)ᵀλ − CᵀA⁻¹ν, Λ ← (I − KC)ᵀΛ(I − KC) + CᵀA⁻¹C, then over the flow
@@ -178,10 +167,11 @@ impl History {
     pub fn smoothed(&self, newest: &[Step], lag: Option<usize>, deviations: bool) -> Vec<Smoothed> {
         let steps: Vec<&Step> = self.steps.iter().chain(newest).collect();
         let count = steps.len();
+        let n = steps.first().map_or(0, |step| step.belief.x.len());
         let mut result = vec![];
         match lag {
             None => {
-                let mut adjoint = nothing(&steps, deviations);
+                let mut adjoint = Adjoint::nothing(n, deviations);
                 for step in steps.iter().rev() {
                     result.push(step.given(&adjoint));
                     step.back(&mut adjoint);
@@ -190,7 +180,7 @@ impl History {
             }
             Some(lag) => {
                 for (k, step) in steps.iter().enumerate() {
-                    let mut adjoint = nothing(&steps, deviations);
+                    let mut adjoint = Adjoint::nothing(n, deviations);
                     let last = k.saturating_add(lag).min(count - 1);
                     for later in steps[k + 1..=last].iter().rev() {
                         later.back(&mut adjoint);
@@ -214,31 +204,17 @@ impl History {
     }
 }
 
-fn nothing(steps: &[&Step], deviations: bool) -> Adjoint {
-    let n = steps.first().map_or(0, |s| s.x.len());
-    match deviations {
-        true => Adjoint::with_matrix(n),
-        false => Adjoint::nothing(n),
-    }
-}
-
 fn quadratic(matrix: &[f64], v: &[f64]) -> f64 {
     let rows = matrix.chunks_exact(v.len().max(1));
     rows.zip(v).map(|(row, x)| x * dot(row, v)).sum()
 }
 
 impl Adjoint {
-    pub fn nothing(n: usize) -> Self {
+    /// That they say nothing; whether deviations are asked for.
+    pub fn nothing(n: usize, deviations: bool) -> Self {
         Self {
             vector: vec![0.0; n],
-            matrix: vec![],
-        }
-    }
-
-    fn with_matrix(n: usize) -> Self {
-        Self {
-            matrix: vec![0.0; n * n],
-            ..Self::nothing(n)
+            matrix: vec![0.0; if deviations { n * n } else { 0 }],
         }
     }
 
@@ -255,7 +231,7 @@ impl Adjoint {
     }
 
     /// Φᵀλ.
-    pub fn vector_through(&mut self, transition: &Skyline) {
+    pub fn vector_through(&mut self, transition: &Profile) {
         self.vector = transition.transposed_times(&self.vector);
     }
 
@@ -301,7 +277,7 @@ impl Adjoint {
         }
     }
 
-    fn through(&mut self, transition: &Skyline) {
+    fn through(&mut self, transition: &Profile) {
         let n = self.vector.len();
         self.vector_through(transition);
         if self.matrix.is_empty() {

@@ -5,10 +5,10 @@ use crate::{Estimator, Level, Method, Tolerances};
 use lynkeus_expr::Graph;
 
 /// x' = a x + w, y = x + v.
-pub(super) fn scalar(a: f64, q: f64, r: f64) -> FilterModel {
+pub(super) fn scalar(a: f64, q: f64, r: f64) -> NoisyModel {
     let g = Graph::new();
     let [time, x] = ["time", "x"].map(|name| g.symbol(name));
-    FilterModel::new(&FilterPlant {
+    NoisyModel::new(&NoisyPlant {
         graph: &g,
         time: time.node(),
         states: vec![("x".into(), x.node(), 1.0)],
@@ -22,6 +22,10 @@ pub(super) fn scalar(a: f64, q: f64, r: f64) -> FilterModel {
         }],
         process_noise: vec![q],
         initial_variance: vec![0.5],
+        ranges: vec![Limits {
+            low: -1e301,
+            high: 1e301,
+        }],
         confined: None,
     })
     .unwrap()
@@ -126,7 +130,7 @@ fn a_gate_keeps_outliers_out_and_gives_way_in_the_end() {
 fn a_reading_that_sigma_points_cannot_weigh_is_not_taken() {
     let g = Graph::new();
     let [time, x] = ["time", "x"].map(|name| g.symbol(name));
-    let model = FilterModel::new(&FilterPlant {
+    let model = NoisyModel::new(&NoisyPlant {
         graph: &g,
         time: time.node(),
         states: vec![("x".into(), x.node(), 0.0)],
@@ -140,6 +144,7 @@ fn a_reading_that_sigma_points_cannot_weigh_is_not_taken() {
         }],
         process_noise: vec![0.0],
         initial_variance: vec![2.0],
+        ranges: vec![],
         confined: None,
     });
     let points = SigmaPoints {
@@ -170,7 +175,7 @@ fn what_cannot_be_is_refused() {
     let unscented = FilterSettings::of(FilterKind::Unscented(points));
     assert!(new(unscented).unwrap_err().to_string().contains("kappa"));
     let g = Graph::new();
-    let nothing = FilterModel::new(&FilterPlant {
+    let nothing = NoisyModel::new(&NoisyPlant {
         graph: &g,
         time: g.symbol("time").node(),
         states: vec![],
@@ -179,6 +184,7 @@ fn what_cannot_be_is_refused() {
         sensors: vec![],
         process_noise: vec![],
         initial_variance: vec![],
+        ranges: vec![],
         confined: None,
     });
     assert!(nothing.unwrap_err().to_string().contains("states"));
@@ -207,7 +213,7 @@ fn what_cannot_be_is_refused() {
 fn an_estimate_without_a_value_of_the_plant_is_put_back() {
     let g = Graph::new();
     let [time, x] = ["time", "x"].map(|name| g.symbol(name));
-    let plant = |confined| FilterPlant {
+    let plant = |confined: Option<Vec<_>>| NoisyPlant {
         graph: &g,
         time: time.node(),
         states: vec![("x".into(), x.node(), 1.0)],
@@ -221,17 +227,15 @@ fn an_estimate_without_a_value_of_the_plant_is_put_back() {
         }],
         process_noise: vec![0.01],
         initial_variance: vec![1.0],
-        confined,
-    };
-    let inside = Confined {
-        flow: vec![(-x.max(g.constant(0.01)).sqrt()).node()],
-        bounds: vec![Bounds {
+        ranges: vec![Limits {
             low: 0.01,
             high: 2.0,
         }],
+        confined,
     };
+    let inside = vec![(-x.max(g.constant(0.01)).sqrt()).node()];
     let run = |confined| {
-        let model = FilterModel::new(&plant(confined)).unwrap();
+        let model = NoisyModel::new(&plant(confined)).unwrap();
         let settings = FilterSettings::of(FilterKind::Extended);
         let mut filter = Estimator::filter(&model, settings, exact()).unwrap();
         let result = (0..20).try_for_each(|k| filter.push(0.1 * f64::from(k), &[-0.5]).map(drop));
@@ -251,7 +255,7 @@ fn smoothing_goes_on_after_a_restore_and_over_predictions() {
     for kind in [
         FilterKind::Extended,
         FilterKind::Unscented(SigmaPoints::default()),
-        window(4, 100.0),
+        FilterKind::MovingHorizon(4),
     ] {
         let settings = FilterSettings {
             keep_history: true,
@@ -292,7 +296,7 @@ fn smoothing_knows_nothing_of_updates_that_failed() {
     for kind in [
         FilterKind::Extended,
         FilterKind::Unscented(SigmaPoints::default()),
-        window(3, 1e301),
+        FilterKind::MovingHorizon(3),
     ] {
         let settings = FilterSettings {
             keep_history: true,
@@ -312,13 +316,4 @@ fn smoothing_knows_nothing_of_updates_that_failed() {
         let smoothed = |estimator: &Estimator| estimator.smoothed(None, true).unwrap();
         assert_eq!(smoothed(&troubled), smoothed(&whole));
     }
-}
-
-/// Of one state that reaches as far as `bound`.
-pub(super) fn window(length: usize, bound: f64) -> FilterKind {
-    let bounds = Bounds {
-        low: -bound,
-        high: bound,
-    };
-    FilterKind::MovingHorizon(length, vec![bounds])
 }

@@ -1,16 +1,14 @@
 //! The unscented Kalman filter.
 
 use super::belief::Belief;
-use super::kalman::Kalman;
-use super::model::FilterModel;
-use super::profile::{Profile, Skyline};
+use super::profile::Profile;
 use super::root::{Factor, Root, dot, factor, substitute};
 use super::sensing::{Believed, Sensing};
 use super::smoother::Correction;
 use super::transition::Propagation;
+use crate::runner::Sample;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::system::Driven;
-use crate::{Error, EstimatorSettings, Integrator};
+use crate::{Error, Integrator, Method};
 
 /// Images of two points that differ by no more than this share of their size do not differ.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -77,16 +75,11 @@ impl SigmaPoints {
     }
 }
 
-/// The filter between its samples.
+/// Sigma points under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Ukf {
-    pub driven: Driven,
     integrator: Integrator,
     weights: Weights,
-    /// what the process noise comes to; none without noise
-    propagation: Option<Propagation>,
-    /// x̂ at the end of the way
-    centre: Vec<f64>,
     points: Vec<f64>,
     mean: Vec<f64>,
     /// what the sensors show of each point
@@ -99,22 +92,11 @@ pub(crate) struct Ukf {
 }
 
 impl Ukf {
-    pub fn new(
-        model: &FilterModel,
-        points: SigmaPoints,
-        run: EstimatorSettings,
-    ) -> Result<Self, Error> {
-        let (n, noise) = (model.dimension(), &model.process_noise);
-        let propagation = match noise.iter().any(|q| *q > 0.0) {
-            true => Some(Propagation::new(&model.flow, noise, run.method)?),
-            false => None,
-        };
+    /// Of n states.
+    pub fn new(n: usize, points: SigmaPoints, method: Method) -> Result<Self, Error> {
         Ok(Self {
-            driven: Driven::new(model.flow.system(), run.between),
-            integrator: Integrator::new(run.method, n)?,
+            integrator: Integrator::new(method, n)?,
             weights: points.weights(n)?,
-            propagation,
-            centre: vec![],
             points: vec![],
             mean: vec![],
             shown: vec![],
@@ -131,8 +113,7 @@ impl Ukf {
         &mut self,
         sensing: &mut Sensing,
         belief: &Belief,
-        t: f64,
-        inputs: &[f64],
+        sample: &Sample<'_>,
     ) -> Result<(), Error> {
         let weights = self.weights;
         let n = belief.x.len();
@@ -140,7 +121,7 @@ impl Ukf {
         self.shown.clear();
         let mut m = 0;
         for point in self.points.chunks_exact(n) {
-            let shown = sensing.predict(t, point, inputs)?;
+            let shown = sensing.output_map.predict(sample.t, point, sample.inputs)?;
             m = shown.len();
             self.shown.extend_from_slice(shown);
         }
@@ -211,9 +192,7 @@ impl Ukf {
         }
         self.spread(&mut belief.root);
     }
-}
 
-impl Ukf {
     /// The lower root of Σ W d dᵀ + Σ e eᵀ over points and extra rows. Where the first weight is
     /// negative the sum is formed, and what it lacks of being definite taken as nothing.
     fn spread(&mut self, root: &mut Root) {
@@ -236,7 +215,7 @@ impl Ukf {
             }));
             rows.extend_from_slice(extra);
             sums.resize(n, 0.0);
-            root.of_rows_with(rows, sums);
+            root.of_rows(rows, sums);
             return;
         }
         rows.resize(n * n, 0.0);
@@ -249,72 +228,57 @@ impl Ukf {
         }
         root.entries.copy_from_slice(factor.of(rows, n));
     }
-}
-
-impl Kalman for Ukf {
-    fn driven(&mut self) -> &mut Driven {
-        &mut self.driven
-    }
 
     /// Each point through the flow; P⁻ = Σ W(…)(…)ᵀ + W, W what the process noise comes to along
     /// the estimate ([`Propagation`]), which is exact on linear plants. Where it is to be kept, the transition
     /// of the linear flow that carries the points best is returned: Φ = DᵀP⁻¹ with the covariance D
     /// of the points before and after (S. Särkkä, "Unscented Rauch–Tung–Striebel smoother", *IEEE
     /// Transactions on Automatic Control* 53 (2008) 845–849).
-    fn predict(
+    pub fn predict(
         &mut self,
+        propagation: &mut Propagation,
         belief: &mut Belief,
         from: f64,
         to: f64,
         keep: bool,
-    ) -> Result<Skyline, Error> {
+    ) -> Result<Option<Profile>, Error> {
         let weights = self.weights;
         let n = belief.x.len();
         draw(belief, weights.spread, &mut self.points);
-        let (centre, others) = self.points.split_at_mut(n);
-        match &mut self.propagation {
-            None => self
-                .integrator
-                .advance(&mut self.driven, from, to, centre)?,
-            Some(propagation) => {
-                self.centre.clone_from(&belief.x);
-                propagation.advance(&mut self.driven, belief, from, to, &mut self.centre)?;
-                centre.copy_from_slice(&self.centre);
-            }
+        let mut points = self.points.chunks_exact_mut(n);
+        if propagation.is_noisy()
+            && let Some(centre) = points.next()
+        {
+            propagation.advance(belief, from, to)?;
+            centre.copy_from_slice(&propagation.end);
         }
-        for point in others.chunks_exact_mut(n) {
-            self.integrator.advance(&mut self.driven, from, to, point)?;
+        for point in points {
+            self.integrator
+                .advance(&mut propagation.driven, from, to, point)?;
         }
-        let transition = match keep {
-            true => {
-                let rows = (0..n).flat_map(|i| weights.row(&belief.root, &self.points, n, i));
-                Skyline::of(&Profile::dense(n, rows.collect()))
-            }
-            false => Skyline::default(),
-        };
+        let transition = keep.then(|| {
+            let rows = (0..n).flat_map(|i| weights.row(&belief.root, &self.points, n, i));
+            Profile::dense(n, rows.collect())
+        });
         weights.centre(&mut self.points, n, &mut belief.x);
         self.extra.clear();
-        if let Some(propagation) = &mut self.propagation {
-            propagation.push_root(&mut self.extra);
-        }
+        propagation.push_root(&mut self.extra);
         self.spread(&mut belief.root);
         Ok(transition)
     }
 
     /// The points drawn again from x̂⁻, P⁻; K = P_xz P_zz⁻¹ over the readings that are believed. For
     /// each of those at an end of their sensor's range they are drawn once more.
-    fn correct(
+    pub fn correct(
         &mut self,
         sensing: &mut Sensing,
         belief: &mut Belief,
-        t: f64,
-        readings: &[f64],
-        inputs: &[f64],
+        sample: &Sample<'_>,
     ) -> Result<(), Error> {
-        self.show(sensing, belief, t, inputs)?;
-        let m = readings.len();
+        self.show(sensing, belief, sample)?;
+        let m = sample.readings.len();
         let (mut inside, mut at_ends) = (vec![], vec![]);
-        for (i, reading) in readings.iter().enumerate() {
+        for (i, reading) in sample.readings.iter().enumerate() {
             let spread = self.weights.moment(&self.shown, m, i, i);
             let believed = sensing.judge(i, *reading, self.expected[i], spread);
             if let Some(believed) = believed.filter(|b| spread + b.variance > 0.0) {
@@ -330,7 +294,7 @@ impl Kalman for Ukf {
             is_moved = true;
         }
         for (mut believed, before) in at_ends {
-            if is_moved && self.show(sensing, belief, t, inputs).is_err() {
+            if is_moved && self.show(sensing, belief, sample).is_err() {
                 // the sensors' model has no value about the estimate as it is now: the others count
                 break;
             }
@@ -419,12 +383,7 @@ impl Weights {
 
 impl Persist for Ukf {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        self.driven.walk(walk)?;
-        self.integrator.walk(walk)?;
-        match &mut self.propagation {
-            Some(propagation) => propagation.walk(walk),
-            None => Ok(()),
-        }
+        self.integrator.walk(walk)
     }
 }
 

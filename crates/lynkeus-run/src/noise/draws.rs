@@ -57,13 +57,9 @@ pub fn process_draws(simulation: &Simulation) -> ProcessDraws {
     let states = simulation.plant.states();
     let density = |name: &String| simulation.noise.process.get(name).copied().unwrap_or(0.0);
     let densities: Vec<f64> = states.iter().map(density).collect();
-    let mut needed = 0;
     if densities.iter().any(|q| *q > 0.0) && samples.is_finite() && sample > 0.0 {
         let most = (MOST / samples).max(1.0).log2().floor() as usize;
-        for place in linearised(simulation, &densities) {
-            let found = place.halvings(&densities, sample, samples, most + 1);
-            needed = needed.max(found);
-        }
+        let needed = halvings(simulation, &densities, [sample, samples], most + 1);
         let halvings = needed.min(most);
         let per_sample = 1 << halvings;
         return ProcessDraws {
@@ -79,20 +75,20 @@ pub fn process_draws(simulation: &Simulation) -> ProcessDraws {
     }
 }
 
-/// The plant about one point.
-enum Linearisation {
-    Small(DMatrix<f64>),
-    /// its fastest mode
-    Large(f64),
-}
-
-/// The plant along its run without noise, as far as that goes, and about it.
-fn linearised(simulation: &Simulation, densities: &[f64]) -> Vec<Linearisation> {
+/// How often a sampling interval, of which the run has so many, has to be halved along the plant's run
+/// without noise, as far as that goes, and about it; `most` where that is too often.
+fn halvings(
+    simulation: &Simulation,
+    densities: &[f64],
+    [sample, samples]: [f64; 2],
+    most: usize,
+) -> usize {
+    let time = simulation.until - simulation.start;
     let quiet = Simulation {
         observer: None,
         record_outputs: false,
         noise: Noise::default(),
-        output_step: (simulation.until - simulation.start) / PLACES as f64,
+        output_step: time / PLACES as f64,
         ..simulation.clone()
     };
     let watch = &mut |_| ControlFlow::Continue(());
@@ -103,7 +99,7 @@ fn linearised(simulation: &Simulation, densities: &[f64]) -> Vec<Linearisation> 
     let mut plant = simulation.plant.evaluation();
     let (n, inputs) = (plant.dimension(), plant.signals().len());
     let mut slopes = Slopes::default();
-    let mut places = vec![];
+    let mut needed = 0;
     for (row, &t) in run.times().iter().enumerate() {
         let value = |role: Role, i: usize| run.column(role.at(i)).map_or(f64::NAN, |c| c[row]);
         let x: Vec<f64> = (0..n).map(|i| value(Role::State, i)).collect();
@@ -111,26 +107,42 @@ fn linearised(simulation: &Simulation, densities: &[f64]) -> Vec<Linearisation> 
             plant.signals_mut()[i] = value(Role::Input, i);
         }
         plant.enter(t);
-        places.push(match n <= SMALL {
-            true => {
-                slopes.look(&mut plant, t, &x);
-                Linearisation::Small(slopes.dense(n))
+        if n > SMALL {
+            let rate = fastest(&mut plant, t, &x, &[]).radius;
+            let fits = |j: &usize| rate * sample / 2.0_f64.powi(*j as i32) <= TURN;
+            if rate.is_finite() {
+                needed = needed.max((0..most).find(fits).unwrap_or(most));
             }
-            false => Linearisation::Large(fastest(&mut plant, t, &x, &[]).radius),
-        });
-        if n <= SMALL {
-            let mut slope = |x: &[f64]| {
-                slopes.look(&mut plant, t, x);
-                slopes.dense(n)
-            };
-            let noisy = densities.iter().enumerate().filter(|(_, q)| **q > 0.0);
-            for (i, q) in noisy.take(AXES) {
-                let time = simulation.until - simulation.start;
-                places.extend(about(&x, i, *q, time, &mut slope));
-            }
+            continue;
+        }
+        let mut slope = |x: &[f64]| {
+            slopes.look(&mut plant, t, x);
+            slopes.dense(n)
+        };
+        let mut places = vec![slope(&x)];
+        let noisy = densities.iter().enumerate().filter(|(_, q)| **q > 0.0);
+        for (i, q) in noisy.take(AXES) {
+            places.extend(about(&x, i, *q, time, &mut slope));
+        }
+        for F in places {
+            needed = needed.max(halvings_at(&F, densities, [sample, samples], most));
         }
     }
-    places
+    needed
+}
+
+/// As [`halvings`], of a linear plant; a plant without slopes tells nothing.
+fn halvings_at(
+    F: &DMatrix<f64>,
+    densities: &[f64],
+    [sample, samples]: [f64; 2],
+    most: usize,
+) -> usize {
+    if !F.iter().all(|f| f.is_finite()) {
+        return 0;
+    }
+    let flow = LinearPlant::new(F, densities, sample, samples);
+    (0..most).find(|j| flow.fits(*j)).unwrap_or(most)
 }
 
 /// Where noise of density q on state i takes a plant within some time, as far as its own slope there lets it: s² = q/2|F|.
@@ -140,14 +152,13 @@ fn about(
     q: f64,
     time: f64,
     slope: &mut dyn FnMut(&[f64]) -> DMatrix<f64>,
-) -> Vec<Linearisation> {
+) -> [DMatrix<f64>; 2] {
     let mut at = |s: f64| {
         let mut x = x.to_vec();
         x[i] += s;
         slope(&x)
     };
-    let mut found = vec![];
-    for sign in [-1.0, 1.0] {
+    [-1.0, 1.0].map(|sign| {
         let mut s = (q * time).sqrt();
         for _ in 0..SHRINKS {
             let rate = at(sign * s)[(i, i)].abs();
@@ -156,33 +167,8 @@ fn about(
             }
             s *= 0.7;
         }
-        let F = at(sign * AWAY * s);
-        if F.iter().all(|x| x.is_finite()) {
-            found.push(Linearisation::Small(F));
-        }
-    }
-    found
-}
-
-impl Linearisation {
-    /// How often a sampling interval has to be halved; `most` where that is too often, 0 where the
-    /// plant has no slopes.
-    fn halvings(&self, densities: &[f64], sample: f64, samples: f64, most: usize) -> usize {
-        match self {
-            Self::Large(rate) => {
-                let fits = |j: &usize| rate * sample / 2.0_f64.powi(*j as i32) <= TURN;
-                match rate.is_finite() {
-                    true => (0..most).find(fits).unwrap_or(most),
-                    false => 0,
-                }
-            }
-            Self::Small(F) if F.iter().all(|f| f.is_finite()) => {
-                let flow = LinearPlant::new(F, densities, sample, samples);
-                (0..most).find(|j| flow.fits(*j)).unwrap_or(most)
-            }
-            Self::Small(_) => 0,
-        }
-    }
+        at(sign * AWAY * s)
+    })
 }
 
 /// Φ = exp(Fh), ∫ exp(Fs) ds and W = ∫ exp(Fs) Q exp(Fᵀs) ds over h.
@@ -298,7 +284,12 @@ mod tests {
 
     fn needed(F: &[f64], densities: &[f64], samples: f64) -> usize {
         let n = densities.len();
-        Linearisation::Small(DMatrix::from_row_slice(n, n, F)).halvings(densities, 1.0, samples, 30)
+        halvings_at(
+            &DMatrix::from_row_slice(n, n, F),
+            densities,
+            [1.0, samples],
+            30,
+        )
     }
 
     /// x' = −ax + w: tanh(aδ/2)/(aδ/2) is within 2 % of 1 where aδ is below 0.496.

@@ -1,7 +1,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::*;
-use crate::{Estimator, SampledObserver, System, Tolerances};
+use crate::{Blueprint, Level, Method, System, Tolerances, Updates};
+use lynkeus_expr::Graph;
 
 /// x' = A x + b + ξ, y = C x + v with two states and one output, and x̂' = A x̂ + b + K (w − C x̂).
 #[derive(Clone, Copy)]
@@ -42,7 +43,7 @@ const DRIFT: Plant = Plant {
 };
 
 impl Plant {
-    fn observer(&self) -> SampledObserver {
+    fn observer(&self, method: Method) -> Blueprint {
         let g = Graph::new();
         let [time, x1, x2, w, s, lag] = ["t", "x1", "x2", "w", "s", "lag"].map(|n| g.symbol(n));
         let Self { A, b, C, K, .. } = *self;
@@ -58,32 +59,42 @@ impl Plant {
         let signals = [("s".to_owned(), s.node())];
         let outputs = [("x1", x1), ("x2", x2), ("y", h)];
         let outputs = outputs.map(|(name, value)| (name.to_owned(), value.node()));
-        let equations = ErrorEquations {
+        let observer = NoisyPlant {
             graph: &g,
             time: time.node(),
-            states: &states,
-            signals: &signals,
-            derivatives: &derivatives,
-            estimates: &[x1.node(), x2.node()],
-            outputs: &[h.node()],
-            lag: Some(Lag {
-                state: 2,
-                rates: &[rate.node()],
-            }),
+            states: states.to_vec(),
+            derivatives: derivatives.to_vec(),
+            inputs: signals.to_vec(),
+            sensors: vec![Sensor {
+                name: "y".to_owned(),
+                output: h.node(),
+                noise: Level::Absolute(self.noise),
+                limits: None,
+            }],
+            process_noise: vec![self.q[0], self.q[1], 0.0, 0.0],
+            initial_variance: vec![self.p[0], self.p[1], 1.0, 0.0],
+            ranges: vec![],
+            confined: None,
         };
-        let noise = ErrorNoise {
-            process: vec![self.q[0], self.q[1], 0.0, 0.0],
-            initial: vec![self.p[0], self.p[1], 1.0, 0.0],
-            sensors: vec![Level::Absolute(self.noise)],
+        let lag = Lag {
+            state: 2,
+            rates: &[rate.node()],
         };
+        let errors =
+            NoisyModel::of_observer(&observer, &[x1.node(), x2.node()], Some(lag)).unwrap();
         let system = System::new(&g, time.node(), &states, &signals, &derivatives, &outputs);
-        SampledObserver {
-            system: system.unwrap(),
+        let run = EstimatorSettings {
+            method,
+            ..EstimatorSettings::default()
+        };
+        Blueprint {
             sensors: vec!["y".to_owned()],
-            predict: self.predict,
-            inputs: BetweenSamples::Hold,
-            errors: Some(ErrorModel::new(equations, noise).unwrap()),
-            tuned: None,
+            updates: Updates::Jumps {
+                predict: self.predict,
+                errors: Some(Box::new(errors)),
+                tuned: None,
+            },
+            ..Blueprint::new(&system.unwrap(), run)
         }
     }
 
@@ -156,7 +167,7 @@ impl Plant {
             absolute: 1e-13,
             ..Tolerances::default()
         });
-        let mut estimator = Estimator::sampled(&self.observer(), method).unwrap();
+        let mut estimator = self.observer(method).estimator().unwrap();
         let exact = self.exact(step, ROWS, &reports);
         for (row, exact) in exact.iter().enumerate() {
             let t = step * row as f64;
@@ -197,7 +208,7 @@ fn what_the_plant_did_since_the_reading_counts() {
         noise: 0.001,
         ..DRIFT
     };
-    let mut estimator = Estimator::sampled(&walk.observer(), Method::default()).unwrap();
+    let mut estimator = walk.observer(Method::default()).estimator().unwrap();
     for k in 0..60 {
         estimator.push(f64::from(k), &[0.0]).unwrap();
     }

@@ -46,7 +46,7 @@ fn time_is_a_side_of_the_box() {
     let time = region.dimensions.iter().find(|d| d.symbol == plant.time);
     assert_eq!(time.map(|d| (d.min, d.max)), Some((0.0, 10.0)));
     let outside = augmented.narrow("time", 11.0, 12.0);
-    assert!(matches!(outside, Err(NarrowError::Outside { .. })));
+    assert!(matches!(outside, Err(SensorsError::Outside { .. })));
 }
 
 #[test]

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::detectability::exact::{self, Shows};
 use crate::detectability::hidden::{Detectability, Hidden, HiddenErrors, Observability};
 use crate::detectability::modes::{Modes, image, null_space, reached};
-use crate::{AugmentedPlant, Dimension, Region};
+use crate::{AugmentedPlant, Region};
 
 /// States beyond which no modes are looked for.
 const STATES: usize = 60;
@@ -29,14 +29,8 @@ pub(super) fn hidden_errors(hidden: &Hidden<'_, '_>) -> Result<Option<HiddenErro
         return Ok(None);
     }
     let region = augmented.region();
-    let symbols: Vec<Node> = augmented.states.iter().map(|s| s.node).collect();
-    let outputs = augmented.outputs.iter().map(|o| o.variable.node);
-    let functions: Vec<Node> = augmented
-        .derivatives
-        .iter()
-        .copied()
-        .chain(outputs)
-        .collect();
+    let symbols = augmented.symbols();
+    let functions = [augmented.derivatives.clone(), augmented.output_nodes()].concat();
     let slopes = jacobian::forward(augmented.graph(), &functions, &symbols);
     let nodes: Vec<Node> = slopes.entries.iter().map(|e| e.2).collect();
     let tape = Tape::new(augmented.graph(), &region.symbols(), &nodes)?;
@@ -57,47 +51,40 @@ pub(super) fn hidden_errors(hidden: &Hidden<'_, '_>) -> Result<Option<HiddenErro
         for (entry, value) in slopes.entries.iter().zip(&values) {
             J[(entry.0, entry.1)] = *value;
         }
-        let found = J
-            .iter()
-            .all(|x| x.is_finite())
-            .then(|| Linear::new(hidden, &J).hidden_errors(hidden));
-        if let Some(found) = found.flatten() {
-            let states = (0..symbols.len()).filter(|&i| !hidden.is_signal(i)).count();
-            let exact = exact::shows(&J, states);
-            let sure = exact.map_or(vec![false; symbols.len()], |exact| {
-                found
-                    .iter()
-                    .zip(exact)
-                    .map(|((_, shown), exact)| *shown == exact)
-                    .collect()
-            });
-            let mut of: Vec<Detectability> = found
-                .into_iter()
-                .map(|(detectability, _)| detectability)
-                .collect();
-            for (detectability, _) in of.iter_mut().zip(&timed).filter(|(_, timed)| **timed) {
+        if !J.iter().all(|x| x.is_finite()) {
+            continue;
+        }
+        let Some(found) = Linear::new(hidden, &J).hidden_errors(hidden) else {
+            continue;
+        };
+        let (mut of, shown): (Vec<Detectability>, Vec<Shows>) = found.into_iter().unzip();
+        for (detectability, _) in of.iter_mut().zip(&timed).filter(|(_, timed)| **timed) {
+            *detectability = Detectability::Undecided;
+        }
+        let states = (0..symbols.len()).filter(|&i| !hidden.is_signal(i)).count();
+        let sure = exact::shows(&J, states).map_or(vec![false; symbols.len()], |exact| {
+            shown.iter().zip(exact).map(|(a, b)| *a == b).collect()
+        });
+        weaken(hidden, &slopes, &sure, &mut of);
+        let moved = moved(hidden, &slopes, &rest.moving(&point));
+        for (detectability, _) in of.iter_mut().zip(moved).filter(|(_, moved)| *moved) {
+            if let Detectability::Decays { .. } | Detectability::Grows { .. } = detectability {
                 *detectability = Detectability::Undecided;
             }
-            weaken(hidden, &slopes, &sure, &mut of);
-            let moved = moved(hidden, &slopes, &rest.moving(&point));
-            for (detectability, _) in of.iter_mut().zip(moved).filter(|(_, moved)| *moved) {
-                if matches!(
-                    detectability,
-                    Detectability::Decays { .. } | Detectability::Grows { .. }
-                ) {
-                    *detectability = Detectability::Undecided;
-                }
-            }
-            let sides = || region.dimensions.iter().zip(&point);
-            let is_time = |d: &Dimension| d.symbol == augmented.plant.time;
-            let is_read = is_read(augmented, &nodes);
-            // first, as long points are shown in part
-            let time = sides().filter(|(d, _)| is_read && is_time(d));
-            let named = time.chain(sides().filter(|(d, _)| !is_time(d)));
-            let point = named.map(|(d, &x)| (d.name.clone(), x).into()).collect();
-            let of = of.into_iter().map(Some).collect();
-            return Ok(Some(HiddenErrors { of, point }));
         }
+        let (mut named, time): (Vec<_>, Vec<_>) = region
+            .coordinates(&point)
+            .into_iter()
+            .zip(&region.dimensions)
+            .partition(|(_, side)| side.symbol != augmented.plant.time);
+        if is_read(augmented, &nodes) {
+            // first, as long points are shown in part
+            named.splice(0..0, time);
+        }
+        return Ok(Some(HiddenErrors {
+            of: of.into_iter().map(Some).collect(),
+            point: named.into_iter().map(|(at, _)| at).collect(),
+        }));
     }
     Ok(None)
 }
@@ -139,14 +126,6 @@ struct Linear {
     outputs: DMatrix<f64>,
 }
 
-/// What can move without a trace.
-struct Traceless {
-    /// pairs (x, v), one per column
-    pairs: DMatrix<f64>,
-    /// an orthonormal basis of V
-    V: DMatrix<f64>,
-}
-
 impl Linear {
     fn new(hidden: &Hidden<'_, '_>, J: &DMatrix<f64>) -> Self {
         let states = &hidden.augmented.states;
@@ -157,13 +136,8 @@ impl Linear {
             let size = states[i].start.unwrap_or(0.0).abs();
             match width.is_finite() && width > 0.0 {
                 true => width,
-                false => {
-                    if size > 0.0 {
-                        size
-                    } else {
-                        1.0
-                    }
-                }
+                false if size > 0.0 => size,
+                false => 1.0,
             }
         };
         let of_state = |i: usize, j: usize| J[(i, j)] * scale(j) / scale(i);
@@ -177,8 +151,9 @@ impl Linear {
         }
     }
 
-    /// None where no decomposition is found.
-    fn traceless(&self) -> Option<Traceless> {
+    /// What can move without a trace: pairs (x, v), one per column, and an orthonormal basis of V. None where no
+    /// decomposition is found.
+    fn traceless(&self) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         let (n, m) = (self.F.nrows(), self.G.ncols());
         let flow = DMatrix::from_fn(n, n + m, |i, j| match j < n {
             true => self.F[(i, j)],
@@ -196,7 +171,7 @@ impl Linear {
             let next = image(&pairs.rows(0, n).into_owned(), ZERO)?;
             // it never grows, but by rounding
             if next.ncols() >= V.ncols() {
-                return Some(Traceless { pairs, V });
+                return Some((pairs, V));
             }
             V = next;
         }
@@ -204,7 +179,7 @@ impl Linear {
 
     /// What becomes of hidden errors, with what that rests on, where the linearisation hides what is hidden and nothing else.
     fn hidden_errors(&self, hidden: &Hidden<'_, '_>) -> Option<Vec<(Detectability, Shows)>> {
-        let Traceless { pairs, V } = self.traceless()?;
+        let (pairs, V) = self.traceless()?;
         let n = self.F.nrows();
         if pairs.ncols() == 0 {
             // frozen at the point, everything is seen
@@ -282,7 +257,7 @@ const STILL: f64 = 1e-10;
 const SMALL: f64 = 1e-9;
 
 /// The states that the slopes of the hidden read, and those that these read.
-pub(super) struct Rest {
+struct Rest {
     /// their symbols
     states: Vec<Node>,
     /// places in the region of the states, then of the unknown inputs: these may be what keeps the states at rest
@@ -299,7 +274,7 @@ pub(super) struct Rest {
 
 impl Rest {
     /// `slopes` are those of the equations, then the outputs, by the augmented states.
-    pub fn new(
+    fn new(
         hidden: &Hidden<'_, '_>,
         slopes: &jacobian::Jacobian,
         region: &Region,
@@ -361,7 +336,7 @@ impl Rest {
     }
 
     /// Time, and the states that move at this point, unknown inputs being constant, or are driven by some that do.
-    pub fn moving(&mut self, point: &[f64]) -> HashSet<Node> {
+    fn moving(&mut self, point: &[f64]) -> HashSet<Node> {
         let (f, J) = self.at(point);
         let width = |k: usize| {
             let (min, max) = self.sides[k];
@@ -382,13 +357,13 @@ impl Rest {
     }
 
     /// Whether nothing moves at this point but what time drives.
-    pub fn holds(&mut self, point: &[f64]) -> bool {
+    fn holds(&mut self, point: &[f64]) -> bool {
         self.moving(point) == self.driven
     }
 
     /// This point or the nearest in the box where that holds, by unknown inputs alone where they can keep the states at
     /// rest, else by moving both; none where Newton's method finds none.
-    pub fn near(&mut self, point: &[f64]) -> Option<Vec<f64>> {
+    fn near(&mut self, point: &[f64]) -> Option<Vec<f64>> {
         if self.holds(point) {
             return Some(point.to_vec());
         }
@@ -437,14 +412,14 @@ fn behind(states: &[Node], reads: &[Vec<Node>], mut found: HashSet<Node>) -> Has
 }
 
 /// Whether one of these expressions reads the time.
-pub(super) fn is_read(augmented: &AugmentedPlant<'_>, nodes: &[Node]) -> bool {
+fn is_read(augmented: &AugmentedPlant<'_>, nodes: &[Node]) -> bool {
     let symbols = augmented.graph().symbols_of(nodes);
     symbols.contains(&augmented.plant.time)
 }
 
 /// Per augmented state whether the error in it, if it is hidden, obeys an equation that reads one of these
 /// symbols. `slopes` are those of the equations, then the outputs, by the augmented states.
-pub(super) fn moved(
+fn moved(
     hidden: &Hidden<'_, '_>,
     slopes: &jacobian::Jacobian,
     moving: &HashSet<Node>,
@@ -481,7 +456,7 @@ pub(super) fn moved(
 
 /// Undecides what decays or stays, but reads what does not. `slopes` are those of the equations by the
 /// augmented states; that the outputs may cancel what is read is not looked for. What is `sure` rests on no threshold.
-pub(super) fn weaken(
+fn weaken(
     hidden: &Hidden<'_, '_>,
     slopes: &jacobian::Jacobian,
     sure: &[bool],

@@ -26,15 +26,6 @@ pub struct Hidden<'e, 'p> {
     pub directions: usize,
 }
 
-/// What the claim on an error rests on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ground {
-    /// proved for every solution in the box
-    Box,
-    /// the linearisation at one point
-    Point,
-}
-
 /// What becomes of the error of a hidden quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Detectability {
@@ -42,8 +33,8 @@ pub enum Detectability {
     Decays {
         /// in 1/(unit of time)
         rate: f64,
-        /// proved, or linearised
-        ground: Ground,
+        /// proved for every solution in the box; else linearised at one point
+        is_proved: bool,
     },
     /// in the end it is below this bound, in its unit; proved on the box, unknown inputs staying in
     /// their ranges

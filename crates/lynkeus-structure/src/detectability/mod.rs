@@ -20,7 +20,7 @@ mod on_the_box;
 
 use lynkeus_expr::MissingInput;
 
-pub use hidden::{Detectability, Ground, Hidden, HiddenErrors, Observability};
+pub use hidden::{Detectability, Hidden, HiddenErrors, Observability};
 
 impl Hidden<'_, '_> {
     /// Decides what becomes of the errors.

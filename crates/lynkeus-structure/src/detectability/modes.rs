@@ -3,7 +3,7 @@
 use lynkeus_proof::spectrum;
 use nalgebra::{Complex, DMatrix, DVector};
 
-use crate::detectability::hidden::{Detectability, Ground};
+use crate::detectability::hidden::Detectability;
 
 /// What counts as zero beside one.
 const ZERO: f64 = 1e-8;
@@ -82,7 +82,7 @@ impl Modes {
         if slow.peek().is_none() {
             return Some(Detectability::Decays {
                 rate: -slowest,
-                ground: Ground::Point,
+                is_proved: false,
             });
         }
         Some(match slow.all(|(_, doubt)| doubt.is_simple) {

@@ -5,8 +5,8 @@ use lynkeus_proof::decay::{ErrorModel, Sector, fastest};
 use lynkeus_proof::spectrum;
 use nalgebra::DMatrix;
 
-use crate::detectability::hidden::{Detectability, Ground, Hidden, Observability};
-use crate::{Region, Verdict, range_within};
+use crate::detectability::hidden::{Detectability, Hidden, Observability};
+use crate::{Verdict, range_within};
 
 /// States that are hidden together, beyond which no proof is tried.
 const STATES: usize = 24;
@@ -29,56 +29,36 @@ pub(super) fn hidden_errors(
     {
         return Ok(found);
     }
-    let width = |i: &usize| augmented.states[*i].max - augmented.states[*i].min;
-    let cascade = Cascade {
-        system: enclosed(hidden)?.reduced(),
-        scales: states.iter().map(width).collect(),
-        reach: inputs.iter().map(width).collect(),
-        budget: augmented.graph().budget(),
+    let system = enclosed(hidden)?.reduced();
+    let rates = system.rates();
+    let decays = |rate: f64| Detectability::Decays {
+        rate,
+        is_proved: true,
     };
-    let rates = cascade.rates();
     let of_row = |row: &Row| {
-        let finite = row
-            .a
-            .iter()
-            .all(|x| x.is_defined() && x.lo().is_finite() && x.hi().is_finite());
+        let finite = row.a.iter().all(is_bounded);
         let read = (0..row.a.len()).filter(|&s| !is_zero(&row.a[s]));
         let rate = read.map(|s| rates[s]).collect::<Option<Vec<f64>>>()?;
         let rate = rate.into_iter().fold(f64::INFINITY, f64::min);
-        (finite && rate.is_finite() && row.is_free_of_inputs()).then_some(Detectability::Decays {
-            rate,
-            ground: Ground::Box,
-        })
+        (finite && rate.is_finite() && row.is_free_of_inputs()).then(|| decays(rate))
     };
     for (s, &place) in states.iter().enumerate() {
-        let own = rates[s].map(|rate| Detectability::Decays {
-            rate,
-            ground: Ground::Box,
-        });
-        found[place] = own.or_else(|| cascade.bounded(s, &rates));
+        let own = rates[s].map(decays);
+        found[place] = own.or_else(|| system.bounded(s, &rates));
     }
-    for (s, row) in &cascade.system.followers {
+    for (s, row) in &system.followers {
         found[states[*s]] = of_row(row);
     }
-    for (row, &place) in cascade.system.inputs.iter().zip(&inputs) {
+    for (row, &place) in system.inputs.iter().zip(&inputs) {
         found[place] = row.as_ref().and_then(of_row);
     }
     Ok(found)
 }
 
 /// What is left of the differences: blocks of coupled states, one driving the next.
-struct Cascade {
-    system: System,
-    /// widths of the states' ranges
-    scales: Vec<f64>,
-    /// widths of the unknown inputs' ranges
-    reach: Vec<f64>,
-    budget: Budget,
-}
-
-impl Cascade {
+impl System {
     fn row(&self, s: usize) -> Option<&Row> {
-        self.system.flow[s].as_ref()
+        self.flow[s].as_ref()
     }
 
     fn reads(&self, s: usize, q: usize) -> bool {
@@ -87,7 +67,7 @@ impl Cascade {
 
     /// The rate at which each state's difference is proved to decay.
     fn rates(&self) -> Vec<Option<f64>> {
-        let n = self.system.flow.len();
+        let n = self.flow.len();
         let reads = |s: usize| (0..n).filter(|&q| self.reads(s, q)).collect();
         let reads: Vec<Vec<usize>> = (0..n).map(reads).collect();
         let mut rates = vec![None; n];
@@ -120,13 +100,12 @@ impl Cascade {
     fn decay(&self, states: &[usize], rows: &[&Row]) -> Option<f64> {
         let entry = |i: usize, j: usize| rows[i].a[states[j]];
         let n = states.len();
-        let bounded = |x: Interval| x.is_defined() && x.lo().is_finite() && x.hi().is_finite();
         let mut entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
         // what comes from outside of the block has to be bounded as well
         let mut outside = rows.iter().flat_map(|row| &row.a);
         if n > COUPLED
-            || !entries.all(|(i, j)| bounded(entry(i, j)))
-            || !outside.all(|x| bounded(*x))
+            || !entries.all(|(i, j)| is_bounded(&entry(i, j)))
+            || !outside.all(is_bounded)
         {
             return None;
         }
@@ -198,21 +177,16 @@ const CELLS: usize = 400;
 
 /// Encloses the differences of any two solutions in the box: slopes averaged along the line
 /// between two points lie in the range of the slopes.
-pub(super) fn enclosed(hidden: &Hidden<'_, '_>) -> Result<System, MissingInput> {
+fn enclosed(hidden: &Hidden<'_, '_>) -> Result<System, MissingInput> {
     let augmented = hidden.augmented;
     let region = augmented.region();
     let (states, inputs) = hidden.free();
     let equation = |&i: &usize| augmented.derivatives[i];
-    let observability = (0..hidden.observability.len())
+    let determined = (0..hidden.observability.len())
         .filter(|&i| hidden.observability[i] == Observability::Determined && !hidden.is_signal(i));
-    let observability: Vec<usize> = observability.collect();
-    let outputs = augmented.outputs.iter().map(|o| o.variable.node);
-    let functions: Vec<Node> = states
-        .iter()
-        .map(equation)
-        .chain(observability.iter().map(equation))
-        .chain(outputs)
-        .collect();
+    let determined: Vec<usize> = determined.collect();
+    let equations = states.iter().chain(&determined).map(equation);
+    let functions: Vec<Node> = equations.chain(augmented.output_nodes()).collect();
     let symbol = |&i: &usize| augmented.states[i].node;
     let symbols: Vec<Node> = states.iter().chain(&inputs).map(symbol).collect();
     let slopes = jacobian::forward(augmented.graph(), &functions, &symbols);
@@ -220,14 +194,18 @@ pub(super) fn enclosed(hidden: &Hidden<'_, '_>) -> Result<System, MissingInput> 
     for i in 0..functions.len() {
         let mut all = vec![Interval::ZERO; symbols.len()];
         for (j, slope) in slopes.row(i) {
-            all[j] = enclosure(hidden, slope, &region)?;
+            all[j] = range_within(augmented.graph(), slope, &region, CELLS)?.enclosure;
         }
         let b = all.split_off(states.len());
         rows.push(Row { a: all, b });
     }
     let constraints = rows.split_off(states.len());
     let is_said = |row: &Row| !row.a.iter().chain(&row.b).all(is_zero);
+    let width = |i: &usize| augmented.states[*i].max - augmented.states[*i].min;
     Ok(System {
+        scales: states.iter().map(width).collect(),
+        reach: inputs.iter().map(width).collect(),
+        budget: augmented.graph().budget(),
         flow: rows.into_iter().map(Some).collect(),
         constraints: constraints.into_iter().filter(is_said).collect(),
         followers: vec![],
@@ -235,26 +213,22 @@ pub(super) fn enclosed(hidden: &Hidden<'_, '_>) -> Result<System, MissingInput> 
     })
 }
 
-fn enclosure(
-    hidden: &Hidden<'_, '_>,
-    node: Node,
-    region: &Region,
-) -> Result<Interval, MissingInput> {
-    Ok(range_within(hidden.augmented.graph(), node, region, CELLS)?.enclosure)
-}
-
 /// a·δη + b·δv with coefficients that enclose those between any two points of the box.
 #[derive(Clone, Debug)]
-pub(super) struct Row {
+struct Row {
     /// of states
-    pub a: Vec<Interval>,
+    a: Vec<Interval>,
     /// of unknown inputs
-    pub b: Vec<Interval>,
+    b: Vec<Interval>,
 }
 
 /// Whether a coefficient is nothing at all.
-pub(super) fn is_zero(x: &Interval) -> bool {
+fn is_zero(x: &Interval) -> bool {
     x.lo() == 0.0 && x.hi() == 0.0
+}
+
+fn is_bounded(x: &Interval) -> bool {
+    x.is_defined() && x.lo().is_finite() && x.hi().is_finite()
 }
 
 /// Whether it never vanishes.
@@ -292,27 +266,32 @@ impl Row {
         add(&mut self.a, factor, &others);
     }
 
-    pub fn is_free_of_inputs(&self) -> bool {
+    fn is_free_of_inputs(&self) -> bool {
         self.b.iter().all(is_zero)
     }
 }
 
 /// The differences of two solutions.
 #[derive(Clone, Debug)]
-pub(super) struct System {
+struct System {
     /// δη' by state; none where the state follows from others
-    pub flow: Vec<Option<Row>>,
+    flow: Vec<Option<Row>>,
     /// 0 = row
-    pub constraints: Vec<Row>,
+    constraints: Vec<Row>,
     /// δη of a state that was eliminated, by the others
-    pub followers: Vec<(usize, Row)>,
+    followers: Vec<(usize, Row)>,
     /// δv by states
-    pub inputs: Vec<Option<Row>>,
+    inputs: Vec<Option<Row>>,
+    /// widths of the states' ranges
+    scales: Vec<f64>,
+    /// widths of the unknown inputs' ranges
+    reach: Vec<f64>,
+    budget: Budget,
 }
 
 impl System {
     /// Eliminates unknown inputs, then states, by the constraints.
-    pub fn reduced(mut self) -> Self {
+    fn reduced(mut self) -> Self {
         for u in 0..self.inputs.len() {
             self.solve_for_input(u);
         }

@@ -9,7 +9,7 @@
 //! *Several together.* Between two points x and x' the map differs by J̃(x − x'), where J̃ averages the Jacobian over the
 //! segment between them and lies in its range over the hull of the boxes that hold x and x' (`pairs.rs`). Where all such
 //! matrices have full column rank, no two points of these boxes are confused; nor are any where the values of the map are disjoint.
-//! Pairs of boxes are cut until each is decided, or two points with equal values are found (`alike.rs`).
+//! Pairs of boxes are cut until each is decided, or two points with equal values are found.
 
 mod pairs;
 
@@ -17,15 +17,14 @@ use std::collections::HashSet;
 
 use lynkeus_expr::{MissingInput, Node};
 
-use crate::{Finding, Matrix, Regularity, Verdict, Witness, range};
+use crate::{Finding, Matrix, Reason, Verdict, Witness, range, regularity};
+use pairs::Part;
 pub use pairs::{Alike, Map};
-use pairs::{Pairs, Twins};
 
 /// States among which every set is looked at for one that its functions determine.
 const SETS: usize = 10;
 /// Sets of states whose pairs of boxes are cut.
 const TRIED: usize = 3;
-const ALONE: &str = "state by state, along slopes that keep their sign";
 
 /// What was found of a map.
 #[derive(Clone, Debug)]
@@ -49,7 +48,7 @@ impl Map<'_> {
         if known.iter().all(|known| *known) {
             return Ok(OneToOne {
                 known: known.to_vec(),
-                finding: Finding::proved(ALONE),
+                finding: Finding::proved(Reason::StateByState),
                 alike: None,
             });
         }
@@ -74,14 +73,17 @@ impl Map<'_> {
             let next = steps.smallest().filter(|_| together && left > 0);
             let Some((states, rows)) = next else { break };
             left -= 1;
-            let pairs = Pairs::new(&map, &jacobian, &states, &rows)?;
-            let seeker = Twins::new(&map, &jacobian, &steps.known)?;
-            let found = pairs.decide(&mut |points| {
-                twins = twins.take().or_else(|| seeker.find(points));
+            let shown: Vec<Node> = states.iter().map(|&j| map.states[j]).collect();
+            let part = Part::new(&map, &jacobian, &states, &rows, &shown)?;
+            let unknown: Vec<usize> = (0..known.len()).filter(|&j| !steps.known[j]).collect();
+            let all: Vec<usize> = (0..map.functions.len()).collect();
+            let whole = Part::new(&map, &jacobian, &unknown, &all, map.states)?;
+            let (decided, left_open) = part.decide(&mut |points| {
+                twins = twins.take().or_else(|| whole.twins(points));
                 twins.is_some()
             });
-            parts += found.parts;
-            match found.open {
+            parts += decided;
+            match left_open {
                 None => states.iter().for_each(|&j| steps.known[j] = true),
                 Some(place) => open = open.or(Some(place)),
             }
@@ -92,23 +94,18 @@ impl Map<'_> {
         }
         let known = steps.known;
         let finding = match (known.iter().all(|known| *known), &twins) {
-            (true, _) if parts == 0 => Finding::proved(ALONE),
-            (true, _) => Finding::proved(format!(
-                "the ranges of the Jacobian and of the map tell all points apart, on {parts} pairs of parts of the box"
-            )),
-            (false, Some(alike)) if alike.is_proved => {
-                let points = alike.points.to_vec();
-                Finding::refuted(
-                    Witness { points },
-                    "two points of the box have the same values",
-                )
-            }
-            (false, Some(_)) => {
-                Finding::undecided("two points of the box have the same values to twelve digits")
+            (true, _) if parts == 0 => Finding::proved(Reason::StateByState),
+            (true, _) => Finding::proved(Reason::PairsApart(parts)),
+            (false, Some(Alike { points, is_proved })) => {
+                let points = points.to_vec();
+                match is_proved {
+                    true => Finding::refuted(Witness { points }, Reason::Alike(true)),
+                    false => Finding::undecided(Reason::Alike(false)),
+                }
             }
             (false, None) => Finding {
                 verdict: Verdict::Undecided(open.unwrap_or_default()),
-                detail: "whether points far apart are told apart is not decided".to_owned(),
+                reason: Reason::FarApart,
             },
         };
         Ok(OneToOne {
@@ -120,14 +117,13 @@ impl Map<'_> {
 
     /// The functions with values on the whole box that do not jump as the states move.
     fn regular_functions(&self) -> Result<Vec<Node>, MissingInput> {
-        let of =
-            |functions: &[Node]| Regularity::of(self.graph, functions, self.states, self.region);
-        if of(self.functions)?.holds() {
+        let of = |functions: &[Node]| regularity(self.graph, functions, self.states, self.region);
+        if of(self.functions)?.is_proved() {
             return Ok(self.functions.to_vec());
         }
         let mut kept = vec![];
         for &function in self.functions {
-            if of(&[function])?.holds() {
+            if of(&[function])?.is_proved() {
                 kept.push(function);
             }
         }

@@ -4,11 +4,12 @@ use std::collections::VecDeque;
 
 use lynkeus_expr::interval::{Intervals, solve};
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape};
+use lynkeus_proof::matrix::{dot, sum};
 use lynkeus_proof::spectrum;
 use nalgebra::{DMatrix, DVector};
 
 use crate::region::Cell;
-use crate::{Matrix, Place, Point, Region};
+use crate::{Coordinate, Matrix, Place, Point, Region};
 
 /// Pairs of a box with itself that are looked at.
 const NEAR: usize = 400;
@@ -44,23 +45,14 @@ pub struct Alike {
 }
 
 /// Two boxes, of which only the sides of the states in question may differ.
-#[derive(Clone)]
-struct Pair {
-    left: Cell,
-    right: Cell,
-}
+type Pair = [Cell; 2];
 
-/// What cutting has shown.
-pub(super) struct Found {
-    /// pairs that were decided
-    pub parts: usize,
-    /// a part of the box with a pair that is not; none where all are
-    pub open: Option<Place>,
-}
+/// A first guess: two points by names.
+pub(super) type Guess = [Vec<Coordinate>; 2];
 
-/// Functions of some states, and of what is the same at both points.
-pub(super) struct Pairs<'a> {
-    map: &'a Map<'a>,
+/// Functions of some states, and of what is the same at two points.
+pub(super) struct Part<'a> {
+    graph: &'a Graph,
     /// of all that the functions read
     region: Region,
     /// places of the states in the region
@@ -68,145 +60,127 @@ pub(super) struct Pairs<'a> {
     /// places of what the slopes read
     bent: Vec<usize>,
     rows: usize,
-    values: Evaluator<Intervals>,
-    slopes: Evaluator<Intervals>,
+    values: Tape,
+    slopes: Tape,
 }
 
-impl<'a> Pairs<'a> {
+impl<'a> Part<'a> {
+    /// Some rows of a map by some of its states; its points tell of what is `shown` at least.
     pub fn new(
-        map: &'a Map<'a>,
+        map: &Map<'a>,
         jacobian: &Matrix<'_>,
         states: &[usize],
         rows: &[usize],
+        shown: &[Node],
     ) -> Result<Self, MissingInput> {
+        let graph = map.graph;
         let functions: Vec<_> = rows.iter().map(|&row| map.functions[row]).collect();
         let slopes: Vec<_> = rows
             .iter()
             .flat_map(|&row| states.iter().map(move |&j| jacobian.node(row, j)))
             .collect();
-        let mut read = map.graph.symbols_of(&functions);
-        read.extend(map.graph.symbols_of(&slopes));
-        read.extend(states.iter().map(|&j| map.states[j]));
+        let bends = graph.symbols_of(&slopes);
+        let read = [&graph.symbols_of(&functions), &bends[..], shown].concat();
         let region = map.region.restricted(&read);
         let symbols = region.symbols();
         let place = |&j: &usize| symbols.iter().position(|s| *s == map.states[j]);
-        let reads = map.graph.symbols_of(&slopes);
         Ok(Self {
-            map,
+            graph,
             bent: (0..symbols.len())
-                .filter(|&i| reads.contains(&symbols[i]))
+                .filter(|&i| bends.contains(&symbols[i]))
                 .collect(),
             places: states.iter().filter_map(place).collect(),
             rows: rows.len(),
-            values: Tape::new(map.graph, &symbols, &functions)?.evaluator_in(Intervals),
-            slopes: Tape::new(map.graph, &symbols, &slopes)?.evaluator_in(Intervals),
+            values: Tape::new(graph, &symbols, &functions)?,
+            slopes: Tape::new(graph, &symbols, &slopes)?,
             region,
         })
     }
 
     /// Cuts pairs until all are decided. `seek` has the middles of pairs that are not, and ends the search
-    /// by true.
-    pub fn decide(mut self, seek: &mut dyn FnMut(&[Guess]) -> bool) -> Found {
-        let whole = self.region.cell();
-        let first = Pair {
-            left: whole.clone(),
-            right: whole,
+    /// by true. The number of pairs that were decided, and a part of the box with one that is not.
+    pub fn decide(&self, seek: &mut dyn FnMut(&[Guess]) -> bool) -> (usize, Option<Place>) {
+        let mut values = self.values.evaluator_in(Intervals);
+        let mut slopes = self.slopes.evaluator_in(Intervals);
+        // no point of one box has the values of another point of the other
+        let mut is_decided = |pair: &Pair| {
+            self.is_apart_by_values(&mut values, pair) || self.is_apart_by_slopes(&mut slopes, pair)
         };
-        let mut near = vec![first];
+        let whole = self.region.cell();
+        let mut near = vec![[whole.clone(), whole]];
         let mut far = VecDeque::new();
         let (mut parts, mut looked) = (0, 0);
+        let ended = |parts: usize, pair: &Pair| (parts, Some(self.region.named(&hull(pair))));
         // neighbours first: where these are not told apart nothing is
         while let Some(pair) = near.pop() {
             looked += 1;
-            if self.is_decided(&pair) {
+            if is_decided(&pair) {
                 parts += 1;
                 continue;
             }
-            if looked > NEAR || self.map.graph.spent().is_some() {
-                return self.ended(parts, &pair);
-            }
-            let Some(halves) = self.halves(&pair) else {
-                return self.ended(parts, &pair);
+            let lasts = looked <= NEAR && self.graph.spent().is_none();
+            let Some(halves) = self.halves(&pair).filter(|_| lasts) else {
+                return ended(parts, &pair);
             };
-            for half in halves {
-                match half.left == half.right {
-                    true => near.push(half),
-                    false => far.push_back(half),
-                }
-            }
+            let (same, other): (Vec<Pair>, _) = halves.into_iter().partition(|[l, r]| l == r);
+            near.extend(same);
+            far.extend(other);
         }
         looked = 0;
         while let Some(pair) = far.pop_front() {
             looked += 1;
-            if self.is_decided(&pair) {
+            if is_decided(&pair) {
                 parts += 1;
                 continue;
             }
-            let ends = looked > FAR || self.map.graph.spent().is_some();
-            let Some(halves) = self.halves(&pair).filter(|_| !ends) else {
-                let found = self.ended(parts, &pair);
+            let lasts = looked <= FAR && self.graph.spent().is_none();
+            let Some(halves) = self.halves(&pair).filter(|_| lasts) else {
+                let found = ended(parts, &pair);
                 far.push_front(pair);
                 seek(&self.guesses(&far));
                 return found;
             };
             far.extend(halves);
             if looked == SEEK && seek(&self.guesses(&far)) {
-                return self.ended(parts, &pair);
+                return ended(parts, &pair);
             }
         }
-        Found { parts, open: None }
-    }
-
-    fn ended(&self, parts: usize, pair: &Pair) -> Found {
-        let hull = hull(pair);
-        Found {
-            parts,
-            open: Some(self.region.named(&hull)),
-        }
+        (parts, None)
     }
 
     /// Middles of pairs, evenly among those that are open.
     fn guesses(&self, open: &VecDeque<Pair>) -> Vec<Guess> {
-        let named = |cell: &Cell| -> Vec<(String, f64)> {
-            let middle = self.region.middle_point(cell);
-            let names = self.region.dimensions.iter().map(|d| d.name.clone());
-            names.zip(middle).collect()
-        };
-        let apart = |pair: &&Pair| {
-            let mut sides = self.places.iter().map(|&i| (pair.left[i], pair.right[i]));
+        let apart = |[left, right]: &&Pair| {
+            let mut sides = self.places.iter().map(|&i| (left[i], right[i]));
             sides.any(|(l, r)| l.intersection(r).is_empty())
         };
         let open: Vec<&Pair> = open.iter().filter(apart).collect();
         let step = open.len().div_ceil(GUESSES).max(1);
+        let named = |cell: &Cell| self.region.coordinates(&self.region.middle_point(cell));
         let chosen = open.iter().step_by(step);
-        chosen
-            .map(|pair| [named(&pair.left), named(&pair.right)])
-            .collect()
+        chosen.map(|pair| pair.each_ref().map(named)).collect()
     }
 
-    /// Whether no point of one box has the values of another point of the other.
-    fn is_decided(&mut self, pair: &Pair) -> bool {
-        self.is_apart_by_values(pair) || self.is_apart_by_slopes(pair)
-    }
-
-    fn is_apart_by_values(&mut self, pair: &Pair) -> bool {
-        if pair.left == pair.right {
+    fn is_apart_by_values(&self, values: &mut Evaluator<Intervals>, pair: &Pair) -> bool {
+        if pair[0] == pair[1] {
             return false;
         }
-        let mut left = vec![Interval::ENTIRE; self.rows];
-        let mut right = left.clone();
-        self.values.eval(&pair.left, &mut left);
-        self.values.eval(&pair.right, &mut right);
-        left.iter()
-            .zip(&right)
-            .any(|(l, r)| l.is_defined() && r.is_defined() && l.intersection(*r).is_empty())
+        let [left, right] = pair.each_ref().map(|cell| {
+            let mut out = vec![Interval::ENTIRE; self.rows];
+            values.eval(cell, &mut out);
+            out
+        });
+        let apart = |(l, r): (&Interval, &Interval)| {
+            l.is_defined() && r.is_defined() && l.intersection(*r).is_empty()
+        };
+        left.iter().zip(&right).any(apart)
     }
 
     /// By the mean value: J̃(x − x') = 0 for no x ≠ x'.
-    fn is_apart_by_slopes(&mut self, pair: &Pair) -> bool {
+    fn is_apart_by_slopes(&self, slopes: &mut Evaluator<Intervals>, pair: &Pair) -> bool {
         let n = self.places.len();
         let mut J = vec![Interval::ENTIRE; self.rows * n];
-        self.slopes.eval(&hull(pair), &mut J);
+        slopes.eval(&hull(pair), &mut J);
         let is_bounded =
             |x: &Interval| x.is_defined() && !x.is_empty() && x.magnitude().is_finite();
         if !J.iter().all(is_bounded) {
@@ -216,16 +190,10 @@ impl<'a> Pairs<'a> {
         if self.rows == n && solve(&J, &zeros).1 {
             return true;
         }
-        let distance: Vec<Interval> = self
-            .places
-            .iter()
-            .map(|&i| pair.left[i] - pair.right[i])
-            .collect();
-        let differs = |row: &[Interval]| {
-            let terms = row.iter().zip(&distance).map(|(a, d)| *a * *d);
-            let sum = terms.fold(Interval::ZERO, |sum, term| sum + term);
-            !sum.contains_zero()
-        };
+        let [left, right] = pair;
+        let distance = self.places.iter().map(|&i| left[i] - right[i]);
+        let distance: Vec<Interval> = distance.collect();
+        let differs = |row: &[Interval]| !dot(row, &distance).contains_zero();
         if J.chunks(n).any(differs) {
             return true;
         }
@@ -238,13 +206,12 @@ impl<'a> Pairs<'a> {
     /// The pair cut along its relatively widest side; of a box with itself, both halves at once, along a side that the
     /// slopes read: the others do not matter there.
     fn halves(&self, pair: &Pair) -> Option<Vec<Pair>> {
-        let width = |i: usize| {
-            let of = |cell: &Cell| self.region.relative_width(i, &cell[i]);
-            of(&pair.left).max(of(&pair.right))
-        };
-        let sides = match pair.left == pair.right {
+        let [left, right] = pair;
+        let of = |cell: &Cell, i: usize| self.region.relative_width(i, &cell[i]);
+        let width = |i: usize| of(left, i).max(of(right, i));
+        let sides = match left == right {
             true => self.bent.clone(),
-            false => (0..pair.left.len()).collect(),
+            false => (0..left.len()).collect(),
         };
         let widest = sides
             .into_iter()
@@ -252,46 +219,24 @@ impl<'a> Pairs<'a> {
         let cut = |cell: &Cell| self.region.halves(cell, widest);
         if !self.places.contains(&widest) {
             // the same at both points
-            let (left, right) = (cut(&pair.left)?, cut(&pair.right)?);
-            let pairs = [(left.0, right.0), (left.1, right.1)];
-            return Some(pairs.map(|(left, right)| Pair { left, right }).into());
+            let ([a, b], [c, d]) = (cut(left)?, cut(right)?);
+            return Some(vec![[a, c], [b, d]]);
         }
-        if pair.left == pair.right {
-            let (low, high) = cut(&pair.left)?;
-            let pairs = [
-                (low.clone(), low.clone()),
-                (low, high.clone()),
-                (high.clone(), high),
-            ];
-            return Some(pairs.map(|(left, right)| Pair { left, right }).into());
+        if left == right {
+            let [low, high] = cut(left)?;
+            let apart = [low.clone(), high.clone()];
+            return Some(vec![[low.clone(), low], apart, [high.clone(), high]]);
         }
-        let of = |cell: &Cell| self.region.relative_width(widest, &cell[widest]);
-        Some(match of(&pair.left) >= of(&pair.right) {
-            true => {
-                let (low, high) = cut(&pair.left)?;
-                [low, high]
-                    .map(|left| Pair {
-                        left,
-                        right: pair.right.clone(),
-                    })
-                    .into()
-            }
-            false => {
-                let (low, high) = cut(&pair.right)?;
-                [low, high]
-                    .map(|right| Pair {
-                        left: pair.left.clone(),
-                        right,
-                    })
-                    .into()
-            }
+        Some(match of(left, widest) >= of(right, widest) {
+            true => cut(left)?.map(|left| [left, right.clone()]).into(),
+            false => cut(right)?.map(|right| [left.clone(), right]).into(),
         })
     }
 }
 
 /// The smallest box around both.
 fn hull(pair: &Pair) -> Cell {
-    let sides = pair.left.iter().zip(&pair.right);
+    let sides = pair[0].iter().zip(&pair[1]);
     sides.map(|(l, r)| l.hull(*r)).collect()
 }
 
@@ -304,8 +249,7 @@ fn preconditioned(J: &[Interval], rows: usize, n: usize) -> Option<Vec<Interval>
         .ok()?;
     let entry = |place: usize| {
         let (i, j) = (place / n, place % n);
-        let terms = (0..rows).map(|k| Interval::point(C[(i, k)]) * J[k * n + j]);
-        terms.fold(Interval::ZERO, |sum, term| sum + term)
+        sum((0..rows).map(|k| Interval::point(C[(i, k)]) * J[k * n + j]))
     };
     Some((0..n * n).map(entry).collect())
 }
@@ -319,42 +263,9 @@ const EQUAL: f64 = 1e-12;
 /// The half width, as a share of the side, of the box in which the second point is proved to be.
 const AROUND: f64 = 1e-7;
 
-/// A first guess: two points by names.
-pub(super) type Guess = [Vec<(String, f64)>; 2];
-
-/// The whole map, by the states that are not known.
-pub(super) struct Twins {
-    region: Region,
-    /// places of the states that are not known
-    places: Vec<usize>,
-    rows: usize,
-    values: Tape,
-    slopes: Tape,
-}
-
-impl Twins {
-    pub fn new(map: &Map<'_>, jacobian: &Matrix<'_>, known: &[bool]) -> Result<Self, MissingInput> {
-        let states: Vec<usize> = (0..known.len()).filter(|&j| !known[j]).collect();
-        let slopes: Vec<_> = (0..map.functions.len())
-            .flat_map(|row| states.iter().map(move |&j| jacobian.node(row, j)))
-            .collect();
-        let mut read = map.graph.symbols_of(map.functions);
-        read.extend(map.graph.symbols_of(&slopes));
-        read.extend(map.states);
-        let region = map.region.restricted(&read);
-        let symbols = region.symbols();
-        let place = |&j: &usize| symbols.iter().position(|s| *s == map.states[j]);
-        Ok(Self {
-            places: states.iter().filter_map(place).collect(),
-            rows: map.functions.len(),
-            values: Tape::new(map.graph, &symbols, map.functions)?,
-            slopes: Tape::new(map.graph, &symbols, &slopes)?,
-            region,
-        })
-    }
-
+impl Part<'_> {
     /// Two points with equal values, from the first of the guesses that leads to a proof, else to some.
-    pub fn find(&self, guesses: &[Guess]) -> Option<Alike> {
+    pub fn twins(&self, guesses: &[Guess]) -> Option<Alike> {
         let mut found = guesses.iter().filter_map(|guess| self.from(guess));
         let first = found.next()?;
         match first.is_proved {
@@ -364,24 +275,14 @@ impl Twins {
     }
 
     fn from(&self, guess: &Guess) -> Option<Alike> {
-        let [first, second] = guess.each_ref().map(|point| self.full(point));
+        let [first, mut second] = guess.each_ref().map(|point| self.full(point));
         // what is the same at both points
-        let second: Vec<f64> = (0..first.len())
-            .map(|i| {
-                if self.places.contains(&i) {
-                    second[i]
-                } else {
-                    first[i]
-                }
-            })
-            .collect();
+        for i in (0..first.len()).filter(|i| !self.places.contains(i)) {
+            second[i] = first[i];
+        }
         let (first, second) = self.solved(first, second)?;
-        let differs = |&i: &usize| {
-            let side = &self.region.dimensions[i];
-            let width = side.max - side.min;
-            let width = if width.is_finite() { width } else { 1.0 };
-            (first[i] - second[i]).abs() > ONE * width
-        };
+        let differs =
+            |&i: &usize| (first[i] - second[i]).abs() > ONE * self.width(i).unwrap_or(1.0);
         if !self.places.iter().any(differs) || !self.agree(&first, &second) {
             return None;
         }
@@ -397,15 +298,16 @@ impl Twins {
         })
     }
 
+    /// The width of a side, where it has one.
+    fn width(&self, i: usize) -> Option<f64> {
+        let side = &self.region.dimensions[i];
+        Some(side.max - side.min).filter(|width| width.is_finite())
+    }
+
     /// The guess, and the middle of the box for what it does not name.
-    fn full(&self, guess: &[(String, f64)]) -> Vec<f64> {
+    fn full(&self, guess: &[Coordinate]) -> Vec<f64> {
+        let given = |name: &str| guess.iter().find(|c| c.name == name).map(|c| c.value);
         let sides = self.region.dimensions.iter().zip(self.region.centre());
-        let given = |name: &str| {
-            guess
-                .iter()
-                .find(|(n, _)| n.as_str() == name)
-                .map(|(_, x)| *x)
-        };
         sides
             .map(|(d, middle)| given(&d.name).unwrap_or(middle))
             .collect()
@@ -453,12 +355,7 @@ impl Twins {
     /// The nearest value in the range that leaves room for a proof.
     fn inside(&self, i: usize, value: f64) -> f64 {
         let side = &self.region.dimensions[i];
-        let width = side.max - side.min;
-        let room = if width.is_finite() {
-            2.0 * AROUND * width
-        } else {
-            0.0
-        };
+        let room = self.width(i).map_or(0.0, |width| 2.0 * AROUND * width);
         value.clamp(side.min + room, side.max - room)
     }
 
@@ -483,10 +380,7 @@ impl Twins {
         let mut around = points(second);
         for &i in &self.places {
             let side = &self.region.dimensions[i];
-            let width = Some(side.max - side.min)
-                .filter(|w| w.is_finite())
-                .unwrap_or(1.0);
-            around[i] = around[i].inflate(AROUND * width);
+            around[i] = around[i].inflate(AROUND * self.width(i).unwrap_or(1.0));
             let whole = Interval::new(side.min, side.max).ok()?;
             if !around[i].is_subset(whole) {
                 return None;

@@ -2,6 +2,7 @@
 
 use lynkeus_observers::{Certificate, Check, UltimateBound};
 use lynkeus_structure::Verdict;
+use lynkeus_words::Words;
 use serde_json::{Map, Value, json};
 
 use super::{CertifyReport, Excited};
@@ -90,7 +91,7 @@ fn hypothesis(check: &Check) -> Value {
     let mut entry = json!({
         "name": check.statement.to_string(),
         "verdict": check.verdict.word(),
-        "detail": check.detail,
+        "detail": check.reason.words(),
     });
     if let Verdict::Refuted(witness) = &check.verdict {
         entry["witness"] = witness.points.iter().map(point).collect();

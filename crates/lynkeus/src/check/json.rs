@@ -4,6 +4,7 @@ use lynkeus_model::Diagnostic;
 use lynkeus_observability::Verdict;
 use lynkeus_observers::{Check, Examination, fit_word};
 use lynkeus_structure as structure;
+use lynkeus_words::Words;
 use serde_json::{Value, json};
 
 use super::{Knowledge, Next, Report, Uniform, observability, point, uniform};
@@ -49,7 +50,7 @@ fn family(examination: &Examination) -> Value {
         let mut entry = json!({
             "name": check.statement.to_string(),
             "verdict": check.verdict.word(),
-            "detail": check.detail,
+            "detail": check.reason.words(),
         });
         match &check.verdict {
             structure::Verdict::Proved => {}

@@ -4,9 +4,7 @@
 use std::fmt;
 
 use lynkeus_observability::{Answer, Verdict};
-use lynkeus_structure::detectability::{
-    Detectability, Ground, Hidden, HiddenErrors, Observability,
-};
+use lynkeus_structure::detectability::{Detectability, Hidden, HiddenErrors, Observability};
 use lynkeus_structure::{self as structure, AugmentedPlant, Coordinate, Uniformity};
 use serde_json::{Map, Value, json};
 
@@ -351,9 +349,9 @@ impl Known {
                     }
                 }
             }
-            Known::Hidden(Detectability::Decays { rate, ground }) => {
+            Known::Hidden(Detectability::Decays { rate, is_proved }) => {
                 entry["rate"] = json!(rate);
-                entry["proved"] = json!(*ground == Ground::Box);
+                entry["proved"] = json!(is_proved);
             }
             Known::Hidden(Detectability::Bounded { bound, is_kept }) => {
                 entry["bound"] = json!(bound);
@@ -459,14 +457,14 @@ fn told(detectability: Detectability, unit: &str) -> String {
     match detectability {
         Detectability::Decays {
             rate,
-            ground: Ground::Box,
+            is_proved: true,
         } => format!(
             "not observable, but its error decays by itself, at {} per {unit} or faster (proved on the box)",
             number(rate)
         ),
         Detectability::Decays {
             rate,
-            ground: Ground::Point,
+            is_proved: false,
         } => format!(
             "not observable, but its error decays by itself, at {} per {unit} (linearised at one point only, see below)",
             number(rate)

@@ -7,7 +7,7 @@ use std::path::Path;
 use lynkeus_expr::real::rounded;
 use lynkeus_model::Variable;
 use lynkeus_observers::{Initial, Tuning, Value as Tuned};
-use lynkeus_structure::figures;
+use lynkeus_words::figures;
 use serde_json::{Value, json};
 
 use crate::Study;

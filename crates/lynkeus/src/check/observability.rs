@@ -6,6 +6,7 @@ use lynkeus_expr::Budget;
 use lynkeus_model::Plant;
 use lynkeus_observability::{Answer, Quantity, Question, QuestionError, Verdict, analyse};
 use lynkeus_structure::Sensors;
+use lynkeus_words::Words;
 use serde_json::{Map, Value, json};
 
 use super::{CheckOptions, Report};
@@ -65,7 +66,7 @@ pub(super) fn add_json(answer: &Answer, report: &mut Value) {
         json!({
             "moves": symmetry.moves,
             "directions": symmetry.directions,
-            "words": symmetry.words,
+            "words": symmetry.words(),
             "invariants": symmetry.invariants,
         })
     });
@@ -73,7 +74,7 @@ pub(super) fn add_json(answer: &Answer, report: &mut Value) {
     report["derivatives"] = json!(answer.order);
     report["rank"] = json!(answer.rank);
     report["unknowns"] = json!(answer.unknowns);
-    report["observability_notes"] = json!(answer.notes);
+    report["observability_notes"] = answer.notes.iter().map(Words::words).collect();
 }
 
 pub(super) fn print(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result {
@@ -105,7 +106,7 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result 
         }
     }
     for symmetry in answer.symmetries.iter().take(TOLD) {
-        writeln!(f, "  {}", symmetry.words)?;
+        writeln!(f, "  {}", symmetry.words())?;
     }
     if answer.symmetries.len() > TOLD {
         writeln!(
@@ -126,7 +127,7 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result 
     answer
         .notes
         .iter()
-        .try_for_each(|note| writeln!(f, "  ({note})"))
+        .try_for_each(|note| writeln!(f, "  ({})", note.words()))
 }
 
 /// What to do about it.

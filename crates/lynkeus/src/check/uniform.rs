@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use lynkeus_structure::{self as structure, Blind, Place, Point, Uniformity, counted};
+use lynkeus_structure::{self as structure, Blind, Place, Point, Uniformity};
+use lynkeus_words::{Words, counted};
 use serde_json::{Map, Value, json};
 
 use crate::words::{number, side};
@@ -10,7 +11,7 @@ use crate::words::{number, side};
 use crate::{Error, plot::Plane};
 use lynkeus_observability::{Answer, Quantity, Verdict};
 #[cfg(feature = "plot")]
-use lynkeus_structure::Side;
+use lynkeus_structure::Dimension;
 
 /// Parts of the singular set listed for machines.
 const LISTED: usize = 256;
@@ -152,7 +153,7 @@ fn told(blind: &Blind) -> String {
         );
     };
     let [one, other] = states.each_ref().map(|state| {
-        let sides = state.iter().map(|(name, x)| side(name, *x, *x));
+        let sides = state.iter().map(|c| side(&c.name, c.value, c.value));
         sides.collect::<Vec<_>>().join(", ")
     });
     format!(
@@ -201,10 +202,10 @@ pub(super) fn json(uniformity: &Uniformity) -> Value {
         .map(|blind| json!({ "input": blind.input, "value": blind.value, "hidden": blind.hidden }));
     json!({
         "verdict": uniformity.regular.verdict.word(),
-        "detail": uniformity.regular.detail,
+        "detail": uniformity.regular.reason.words(),
         "one_to_one": {
             "verdict": uniformity.one_to_one.finding.verdict.word(),
-            "detail": uniformity.one_to_one.finding.detail,
+            "detail": uniformity.one_to_one.finding.reason.words(),
             "alike": uniformity.one_to_one.alike.as_ref().map(|alike| {
                 alike.points.iter().map(point).collect::<Vec<_>>()
             }),
@@ -225,9 +226,9 @@ pub(super) fn picture(plant: &str, uniformity: &Uniformity) -> Result<Plane, Err
         );
         return Err(Error::refused(message));
     };
-    let along = |part: &Place, whole: &Side| {
+    let along = |part: &Place, whole: &Dimension| {
         let side = part.iter().find(|side| side.name == whole.name);
-        let Side { min, max, .. } = side.unwrap_or(whole);
+        let Dimension { min, max, .. } = side.unwrap_or(whole);
         *min..*max
     };
     let parts = uniformity.singular.iter();

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use lynkeus_model::Plant;
 use lynkeus_observers::Family;
-use lynkeus_structure::short;
+use lynkeus_words::short;
 use serde_json::{Value, json};
 
 use super::run::{Compared, Watch, run_all};

@@ -4,7 +4,7 @@ use lynkeus_export::Refusal;
 use lynkeus_export::curly::{Device, Entry, FirstReading, Tunable};
 use lynkeus_model::Variable;
 use lynkeus_observers::Design;
-use lynkeus_run::{Blueprint, Level};
+use lynkeus_run::{Blueprint, Level, Updates};
 
 use crate::estimate::at_readings;
 use crate::headers::Headers;
@@ -121,9 +121,9 @@ impl Told {
                 });
             }
         }
-        let monitors: Vec<Entry> = match made {
-            Blueprint::Filter { .. } => vec![],
-            Blueprint::Sampled { .. } => observer
+        let monitors: Vec<Entry> = match made.updates {
+            Updates::Filter { .. } => vec![],
+            Updates::Jumps { .. } => observer
                 .monitors
                 .iter()
                 .map(|monitor| Entry {

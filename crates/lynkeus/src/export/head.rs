@@ -23,7 +23,7 @@ pub(super) fn beyond_float(lost: &[String]) -> Option<String> {
 /// What stands at the head of the files: where they come from, what is guaranteed, and `hasty`,
 /// for which steps it is not.
 pub(super) fn about(study: &Study, made: &Blueprint, hasty: Option<String>) -> Vec<String> {
-    let step = steps(made.method()).unwrap_or_default();
+    let step = steps(made.run.method).unwrap_or_default();
     let mut lines = vec![
         origin(study),
         format!("Classical Runge-Kutta method, {step}; signals are held between samples."),

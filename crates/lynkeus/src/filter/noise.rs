@@ -2,7 +2,8 @@
 
 use lynkeus_model::Variable;
 use lynkeus_run::Level;
-use lynkeus_structure::{AugmentedPlant, short};
+use lynkeus_structure::AugmentedPlant;
+use lynkeus_words::short;
 
 use crate::Series;
 use crate::course::Samples;

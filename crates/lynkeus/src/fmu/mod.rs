@@ -15,7 +15,7 @@ use lynkeus_export::curly::{Device, Entry};
 use lynkeus_expr::Budget;
 use lynkeus_model::{BaseUnit, Variable};
 use lynkeus_observers::Design;
-use lynkeus_run::Blueprint;
+use lynkeus_run::{Blueprint, Updates};
 
 use crate::Study;
 use crate::export::Artifact;
@@ -215,20 +215,19 @@ struct Start {
 
 /// Where the states start; what is held of the measurements is none.
 fn starts(made: &Made<'_>) -> Vec<Start> {
-    let (names, values, own) = match made.device.blueprint {
-        Blueprint::Sampled { observer, .. } => {
-            let states = observer.system.states();
-            let own = states.len().saturating_sub(observer.sensors.len());
-            (states, observer.system.start(), own)
-        }
-        Blueprint::Filter { model, .. } => (
-            model.states(),
-            model.flow().system().start(),
-            model.states().len(),
-        ),
+    let Blueprint {
+        flow,
+        sensors,
+        updates,
+        ..
+    } = made.device.blueprint;
+    let held = match updates {
+        Updates::Jumps { .. } => sensors.len(),
+        Updates::Filter { .. } => 0,
     };
+    let own = flow.states().len().saturating_sub(held);
     let first = made.device.first_readings;
-    let pairs = names.iter().zip(values).take(own).enumerate();
+    let pairs = flow.states().iter().zip(flow.start()).take(own).enumerate();
     let start = |(place, (state, value)): (usize, (&String, &f64))| Start {
         state: state.clone(),
         value: *value,

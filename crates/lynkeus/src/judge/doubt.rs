@@ -1,6 +1,6 @@
 //! What speaks against an estimate.
 
-use lynkeus_structure::figures;
+use lynkeus_words::figures;
 use serde_json::{Value, json};
 
 /// How much a doubt weighs.

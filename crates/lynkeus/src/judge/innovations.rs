@@ -2,7 +2,7 @@
 
 use lynkeus_observers::Design;
 use lynkeus_run::filter::SensorHealth;
-use lynkeus_structure::figures;
+use lynkeus_words::figures;
 use serde_json::{Value, json};
 
 use super::Trace;

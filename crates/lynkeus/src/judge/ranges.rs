@@ -1,7 +1,7 @@
 //! Estimates outside of what the model declares.
 
 use lynkeus_model::Variable;
-use lynkeus_structure::figures;
+use lynkeus_words::figures;
 
 use super::{Doubt, Evidence, Kind, Level};
 use crate::outside::percent;

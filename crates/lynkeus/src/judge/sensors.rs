@@ -173,7 +173,7 @@ fn jump(sensor: &Judged<'_>) -> Option<Doubt> {
     let text = format!(
         "a reading of {} is {} of its deviations from what was expected, and moves the estimate (t = {}); `gate` of [observer] keeps such readings out",
         sensor.name,
-        lynkeus_structure::figures(size, 2),
+        lynkeus_words::figures(size, 2),
         instant(whole.largest_at)
     );
     doubt(sensor, Kind::Jump, Level::Note, text)
@@ -210,7 +210,7 @@ fn coloured(sensor: &Judged<'_>) -> Option<Doubt> {
     let text = format!(
         "the innovations of {} follow from the ones before (correlation {}): the model leaves something out",
         sensor.name,
-        lynkeus_structure::figures(correlation, 2)
+        lynkeus_words::figures(correlation, 2)
     );
     let level = match correlation > COLOURED[1] {
         true => Level::Warning,

@@ -3,7 +3,7 @@
 use lynkeus_model::Plant;
 use lynkeus_run::filter::Limits;
 use lynkeus_run::{Column, Role};
-use lynkeus_structure::figures;
+use lynkeus_words::figures;
 
 use super::Rig;
 use super::runs::Whole;

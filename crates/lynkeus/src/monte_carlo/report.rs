@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lynkeus_structure::figures;
+use lynkeus_words::figures;
 use serde_json::{Map, Value, json};
 
 use super::statistics::{HIGH, mean, quantile};

@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use lynkeus_model::Variable;
 use lynkeus_observability::precision::Deviation;
 use lynkeus_observers::{Design, Initial, Tuning, Value};
-use lynkeus_run::{Blueprint, Role, Simulation};
+use lynkeus_run::{Role, Simulation, Updates};
 
 use super::experiment::Setup;
 use crate::course::{Course, Samples};
@@ -91,7 +91,7 @@ fn foreseen(
     let run = estimate::run_settings(&own.study().estimate);
     let notes = &mut vec![];
     let mut blueprint = filter::blueprint(own, design, samples, run, notes)?;
-    if let Blueprint::Filter { settings, .. } = &mut blueprint {
+    if let Updates::Filter { settings, .. } = &mut blueprint.updates {
         settings.foresees = true;
     }
     let mut filter = blueprint.estimator().map_err(Error::from_source)?;

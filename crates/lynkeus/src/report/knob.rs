@@ -63,10 +63,10 @@ impl Fixed {
         study.estimate.deviations |= is_filter;
         let asked = prepared.run_by(&study)?;
         let plain = blueprint(&asked, design)?;
-        let is_chosen = step.is_none() && fixed(plain.method()).is_none();
+        let is_chosen = step.is_none() && fixed(plain.run.method).is_none();
         let made = stepped(&asked, plain, step, &mut vec![])?;
         let made = shortened(made, is_chosen, shorter);
-        let method = made.method();
+        let method = made.run.method;
         let own = Variant {
             factor: 1.0,
             steps: steps(method).unwrap_or_default(),
@@ -86,7 +86,7 @@ impl Fixed {
 }
 
 fn shortened(made: Blueprint, is_chosen: bool, shorter: f64) -> Blueprint {
-    match made.method() {
+    match made.run.method {
         Method::Rk4(Step::AtMost(h)) if is_chosen => {
             made.with_method(Method::Rk4(Step::AtMost(h / shorter)))
         }
@@ -127,7 +127,7 @@ fn variant(prepared: &Prepared<'_>, fixed: &Fixed, position: &Position) -> Resul
     let made = shortened(made, fixed.is_chosen, fixed.shorter);
     Ok(Variant {
         factor: position.factor,
-        steps: steps(made.method()).unwrap_or_default(),
+        steps: steps(made.run.method).unwrap_or_default(),
         text: printed(&prepared, &design, &made, &[], |device, _| {
             javascript::expression(device)
         })?,

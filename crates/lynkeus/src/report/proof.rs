@@ -2,6 +2,7 @@
 
 use lynkeus_observers::{Certificate, Check, UltimateBound};
 use lynkeus_structure::Verdict;
+use lynkeus_words::Words;
 
 use super::html::{Cell, Html, badge, escaped};
 use crate::words::number;
@@ -113,7 +114,7 @@ pub(super) fn correction(html: &mut Html, correction: &Correction) {
 /// Conditions with their verdicts.
 pub(super) fn conditions<'a>(html: &mut Html, checks: impl IntoIterator<Item = &'a Check>) {
     let row = |check: &Check| {
-        let mut detail = check.detail.clone();
+        let mut detail = check.reason.words();
         if let Verdict::Refuted(_) = check.verdict {
             detail = format!("{detail}; {}", check.verdict);
         }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use lynkeus_model::Plant;
 use lynkeus_observers::Design;
-use lynkeus_structure::short;
+use lynkeus_words::short;
 
 use super::data::ROWS;
 use super::knob::Fixed;

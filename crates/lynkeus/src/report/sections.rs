@@ -1,7 +1,7 @@
 //! What a page says, section by section.
 
 use lynkeus_observers::{Examination, fit_word};
-use lynkeus_structure::{counted, figures};
+use lynkeus_words::{counted, figures};
 
 use super::data::ROWS;
 use super::html::{Cell, Html, badge, words};

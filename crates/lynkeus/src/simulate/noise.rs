@@ -2,7 +2,7 @@
 
 use lynkeus_model::Plant;
 use lynkeus_run::{Level, Simulation, process_draws};
-use lynkeus_structure::figures;
+use lynkeus_words::figures;
 
 use crate::declared::Declared;
 use crate::study::SimulateSettings;

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use lynkeus_expr::real::rounded;
-use lynkeus_structure::counted;
+use lynkeus_words::counted;
 use serde_json::{Map, Value, json};
 
 use super::axis::shown;

@@ -8,6 +8,7 @@ use lynkeus_observers::{
     DesignError, Examination, Family, Tuning, Value, drift_observable::DriftObservable,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
+use lynkeus_words::Words;
 
 use super::{assert_near, list, parameter};
 
@@ -190,10 +191,11 @@ fn an_input_that_another_brings_along_is_seen() {
     );
     assert!(
         found.checks[0]
-            .detail
+            .reason
+            .words()
             .contains("y: r = 2, v appears in y^(2)"),
         "{}",
-        found.checks[0].detail
+        found.checks[0].reason.words()
     );
 }
 
@@ -213,8 +215,11 @@ fn long_chains_are_proved_regular() {
     let found = examine(&text, &Tuning::default()).unwrap();
     assert_eq!(found.fit(), Standing::Proved, "{:#?}", found.checks);
     assert!(
-        found.checks[1].detail.contains("|det| lies in [1, 1]"),
+        found.checks[1]
+            .reason
+            .words()
+            .contains("|det| lies in [1, 1]"),
         "{}",
-        found.checks[1].detail
+        found.checks[1].reason.words()
     );
 }

@@ -8,6 +8,7 @@ use lynkeus_observers::{
     drift_observable::DriftObservable,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
+use lynkeus_words::Words;
 
 use super::{PLANT, list};
 
@@ -105,7 +106,11 @@ fn slow_poles_are_undecided_with_both_numbers() {
     assert_eq!(found.verdict(), Standing::Undecided);
     let open = found.weakest().unwrap();
     assert!(open.statement.to_string().starts_with("γ ≤ γ*"), "{open:?}");
-    assert!(open.detail.starts_with("1.11803 > 0."), "{}", open.detail); // √5/2
+    assert!(
+        open.reason.words().starts_with("1.11803 > 0."),
+        "{}",
+        open.reason.words()
+    ); // √5/2
     // and what would do: checked with a hundredth more
     let s = 1.01 * value(&found, "s0");
     let poles = tuning("bounded", &[("poles", &[-s, -1.2 * s])]);
@@ -131,7 +136,8 @@ fn the_papers_plant_is_undecided_and_says_where() {
     assert_eq!(found.verdict(), Standing::Undecided);
     let open = hypothesis(&found, "derivatives of the inputs");
     assert!(
-        open.detail
+        open.reason
+            .words()
             .contains("derivatives of u: give the key 'input_derivatives'")
     );
     let given = tuning(
@@ -141,7 +147,11 @@ fn the_papers_plant_is_undecided_and_says_where() {
     let found = certificate(&plant, &given, &[0.0; 3], &[0.0]);
     assert_eq!(found.verdict(), Standing::Undecided);
     let open = hypothesis(&found, "Q̄(x, U) is regular");
-    assert!(open.detail.contains("x3 = "), "{}", open.detail);
+    assert!(
+        open.reason.words().contains("x3 = "),
+        "{}",
+        open.reason.words()
+    );
     assert_eq!((found.rate, found.ultimate_bound), (None, None));
 }
 
@@ -154,9 +164,11 @@ fn a_variable_without_bounds_is_named() {
     let found = certificate(&plant(&text), &poles, &[0.0; 2], &[0.0]);
     let open = hypothesis(&found, "Lipschitz in these coordinates");
     assert!(
-        open.detail.contains("no bound of b: declare min and max"),
+        open.reason
+            .words()
+            .contains("no bound of b: declare min and max"),
         "{}",
-        open.detail
+        open.reason.words()
     );
     assert!((value(&found, "γ_Φ") - 1.0).abs() < 1e-9);
 }
@@ -277,10 +289,21 @@ fn disturbances_without_range_are_undecided_by_name() {
     let found = certificate(&plant(PENDULUM), &poles, &[0.0, f64::INFINITY], &[0.0]);
     assert_eq!(found.verdict(), Standing::Undecided);
     let open = hypothesis(&found, "disturbances and measurement errors are bounded");
-    assert!(open.detail.contains("acts on b:"), "{}", open.detail);
+    assert!(
+        open.reason.words().contains("acts on b:"),
+        "{}",
+        open.reason.words()
+    );
     assert_eq!((found.rate, found.ultimate_bound), (None, None));
     let noise = certificate(&plant(PENDULUM), &poles, &[0.0; 2], &[f64::INFINITY]);
-    assert!(noise.weakest().unwrap().detail.contains("acts on y:"));
+    assert!(
+        noise
+            .weakest()
+            .unwrap()
+            .reason
+            .words()
+            .contains("acts on y:")
+    );
 }
 
 /// Bounds that hold for every family stand in for the family's own key.

@@ -7,6 +7,7 @@ use lynkeus_observers::{
     Assumptions, Certificate, DesignError, Family, Tuning, unknown_input::UnknownInput,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
+use lynkeus_words::Words;
 
 use super::{tuning, with_partition};
 
@@ -182,15 +183,16 @@ fn where_a_left_inverse_is_not_covered_it_is_undecided() {
     assert_eq!((found.verdict(), found.rate), (Standing::Undecided, None));
     let open = hypothesis(&found, "Λ₂Λ₂⁺");
     assert!(
-        open.detail.contains("Λ₂ changes with X²"),
+        open.reason.words().contains("Λ₂ changes with X²"),
         "{}",
-        open.detail
+        open.reason.words()
     );
     assert!(
-        open.detail
+        open.reason
+            .words()
             .contains("square with partition = [\"ya\", \"yb\"]"),
         "{}",
-        open.detail
+        open.reason.words()
     );
     let given = with_partition(tuning(300.0, 15.0), &["ya", "yb"]);
     let found = certificate(&plant(&bent), &given, 0.0, 0.0);
@@ -262,9 +264,9 @@ fn shortened_chains_that_the_papers_gains_make_unstable_are_refused() {
     assert_eq!(found.verdict(), Standing::Undecided);
     let open = hypothesis(&found, "Λ₂Λ₂⁺");
     assert!(
-        open.detail.contains("chains that end early"),
+        open.reason.words().contains("chains that end early"),
         "{}",
-        open.detail
+        open.reason.words()
     );
 }
 

@@ -7,6 +7,7 @@ use lynkeus_observers::{
     Assumptions, Certificate, Family, Tuning, UltimateBound, Value, unknown_input::UnknownInput,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
+use lynkeus_words::Words;
 
 use super::EXAMPLE;
 
@@ -83,7 +84,11 @@ fn the_example_does_not_meet_the_papers_hypotheses() {
         open.statement.to_string().starts_with("Λ₂ is regular"),
         "{open:?}"
     );
-    assert!(open.detail.contains("x3 as measured = "), "{}", open.detail);
+    assert!(
+        open.reason.words().contains("x3 as measured = "),
+        "{}",
+        open.reason.words()
+    );
     assert_eq!((found.rate, found.ultimate_bound), (None, None));
     assert!(value(&found, "c1") > 60.0);
 }
@@ -100,7 +105,7 @@ fn small_gains_are_undecided() {
         assert_eq!(found.verdict(), Standing::Undecided);
         let open = found.weakest().unwrap();
         assert!(
-            open.statement.to_string().starts_with(name) && open.detail.starts_with(text),
+            open.statement.to_string().starts_with(name) && open.reason.words().starts_with(text),
             "{open:?}"
         );
     }
@@ -117,9 +122,11 @@ fn a_variable_without_bounds_is_named() {
         .find(|h| h.statement.to_string().starts_with("c1, c2"))
         .unwrap();
     assert!(
-        open.detail.contains("no bound of c: declare min and max"),
+        open.reason
+            .words()
+            .contains("no bound of c: declare min and max"),
         "{}",
-        open.detail
+        open.reason.words()
     );
     // what does not need it is said all the same
     assert!((value(&found, "c1") - 0.85 * 8f64.sqrt()).abs() < 1e-9);

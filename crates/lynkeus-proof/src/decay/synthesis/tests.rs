@@ -46,9 +46,9 @@ fn a_near_point_is_one_of_the_full_problem() {
     let full = scaled.inequalities(Extent::Full);
     let found = near.normalised().unwrap();
     let same = full.like(&near, &found);
-    assert_eq!(found.value(&near.P), same.value(&full.P));
-    assert_eq!(same.value(&full.P)[(0, n - 1)], 0.0);
-    assert_eq!(found.value(&near.Y), same.value(&full.Y));
+    assert_eq!(near.P.at(&found), full.P.at(&same));
+    assert_eq!(full.P.at(&same)[(0, n - 1)], 0.0);
+    assert_eq!(near.Y.at(&found), full.Y.at(&same));
     let mut problem = full.problem.clone();
     problem.minimise(&full.P.trace());
     assert!(problem.solve_from(&same).is_ok());

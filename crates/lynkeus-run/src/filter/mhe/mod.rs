@@ -15,18 +15,17 @@ mod quadratic;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::belief::{Belief, Bounds, confine};
-use super::ekf::Ekf;
-use super::kalman::Kalman;
-use super::model::FilterModel;
-use super::profile::Skyline;
-use super::root::{Root, dot};
+use super::belief::{Belief, confine};
+use super::model::NoisyModel;
+use super::profile::Profile;
+use super::root::dot;
 use super::sensing::{Believed, Sensing};
 use super::smoother::{History, Step};
-use super::transition::Stage;
+use super::transition::{Propagation, Stage};
+use crate::Error;
+use crate::noise::Limits;
+use crate::runner::Sample;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::system::Driven;
-use crate::{Error, EstimatorSettings};
 use quadratic::{Linear, Pass, Pin, Problem, Seen, Solution, carried, corrected};
 
 /// Most Gauss–Newton steps per sample,
@@ -40,10 +39,10 @@ const NOISE: f64 = 1e-3;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Mhe {
-    pub engine: Ekf,
     length: usize,
+    inputs: usize,
     sensors: usize,
-    bounds: Vec<Bounds>,
+    bounds: Vec<Limits>,
     /// what was known before the first row of the window
     prior: Belief,
     rows: VecDeque<Row>,
@@ -57,15 +56,13 @@ pub(crate) struct Mhe {
 
 impl Persist for Mhe {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        self.engine.walk(walk)?;
         self.prior.walk(walk)?;
         let states = self.bounds.len();
-        let inputs = self.engine.driven.evaluation.signals().len();
         let count = walk.length(self.rows.len())?;
         self.rows.resize_with(count, Row::default);
         for row in &mut self.rows {
             // a row that was not there yet has no room
-            row.make_room(inputs, states);
+            row.make_room(self.inputs, states);
             row.walk(walk, self.sensors)?;
         }
         Ok(())
@@ -73,29 +70,17 @@ impl Persist for Mhe {
 }
 
 impl Mhe {
-    pub fn new(
-        model: &FilterModel,
-        length: usize,
-        bounds: Vec<Bounds>,
-        run: EstimatorSettings,
-        keep: bool,
-    ) -> Result<Self, Error> {
+    pub fn new(model: &NoisyModel, length: usize, keep: bool) -> Result<Self, Error> {
         if length == 0 {
             return Err(Error::setting("horizon", "at least 1 sample", 0));
         }
-        if bounds.len() != model.dimension() {
-            let expected = format!("{}, one pair per state", model.dimension());
-            return Err(Error::setting("bounds", expected, bounds.len()));
-        }
+        let flow = model.flow.system();
         Ok(Self {
-            engine: Ekf::new(&model.flow, &model.process_noise, run)?,
             length,
+            inputs: flow.signals().len(),
             sensors: model.sensors.len(),
-            bounds,
-            prior: Belief {
-                x: model.flow.system().start().to_vec(),
-                root: Root::diagonal(&model.initial_variance),
-            },
+            bounds: model.ranges.clone(),
+            prior: Belief::new(flow.start(), &model.initial_variance),
             rows: VecDeque::new(),
             keep,
             window: vec![],
@@ -105,17 +90,14 @@ impl Mhe {
 
     /// Leaves to a smoother what the last correction has.
     pub fn leave(&mut self, history: &mut History) {
-        history.push_window(std::mem::take(&mut self.window));
-        self.left
-            .take()
-            .into_iter()
-            .for_each(|step| history.push(step));
+        history.windows.push(std::mem::take(&mut self.window));
+        history.steps.extend(self.left.take());
     }
 
     /// The rows of the window for a smoother; none where the problem has no value about them.
-    pub fn steps(&self, sensing: &Sensing) -> Option<Vec<Step>> {
-        let mut own = self.clone();
-        let problem = own.linearise(&mut sensing.clone()).ok()?;
+    pub fn steps(&self, propagation: &Propagation, sensing: &Sensing) -> Option<Vec<Step>> {
+        let problem = self.linearise(&mut propagation.clone(), &mut sensing.clone());
+        let problem = problem.ok()?;
         let pins: Vec<Vec<Pin>> = self.rows.iter().map(|row| row.met.clone()).collect();
         let passes = problem.forward(&pins);
         let mut steps: Vec<Step> = passes.into_iter().map(Pass::kept).collect();
@@ -123,10 +105,6 @@ impl Mhe {
             first.transition.clone_from(&row.entered);
         }
         Some(steps)
-    }
-
-    pub fn bounds(&self) -> &[Bounds] {
-        &self.bounds
     }
 
     /// How many samples before the newest a window reaches.
@@ -152,10 +130,7 @@ impl Mhe {
         let mut step = first.leaving();
         let met = !self.rows[0].met.is_empty();
         let free = Pass {
-            after: Belief {
-                x: first.after.x.clone(),
-                root: first.by_readings().clone(),
-            },
+            after: first.unpinned(),
             ..first
         };
         self.prior = match met {
@@ -174,11 +149,15 @@ impl Mhe {
     }
 
     /// Gauss–Newton steps from the guesses to the minimum.
-    fn solve(&mut self, sensing: &mut Sensing) -> Result<GaussNewtonStep, Error> {
+    fn solve(
+        &mut self,
+        propagation: &mut Propagation,
+        sensing: &mut Sensing,
+    ) -> Result<GaussNewtonStep, Error> {
         let mut share = 1.0;
         let mut best: Option<GaussNewtonStep> = None;
         for _ in 0..STEPS {
-            let tried = match (self.tried(sensing), &best) {
+            let tried = match (self.tried(propagation, sensing), &best) {
                 // the plant has no value along a step that was too long
                 (Err(_), Some(_)) => None,
                 (tried, _) => Some(tried?),
@@ -200,14 +179,21 @@ impl Mhe {
         }
         match best {
             Some(best) => Ok(self.settle(best, false)),
-            None => self.tried(sensing).map(|tried| self.settle(tried, false)),
+            None => {
+                let tried = self.tried(propagation, sensing)?;
+                Ok(self.settle(tried, false))
+            }
         }
     }
 
     /// One step from the guesses.
-    fn tried(&mut self, sensing: &mut Sensing) -> Result<GaussNewtonStep, Error> {
+    fn tried(
+        &self,
+        propagation: &mut Propagation,
+        sensing: &mut Sensing,
+    ) -> Result<GaussNewtonStep, Error> {
         let met = self.rows.iter().map(|row| row.met.clone()).collect();
-        let problem = self.linearise(sensing)?;
+        let problem = self.linearise(propagation, sensing)?;
         let solution = problem.solve(met);
         let Problem { rows, free, .. } = problem;
         let mut step = 0.0_f64;
@@ -257,7 +243,11 @@ impl Mhe {
     }
 
     /// The problem about the guesses, and the Kalman filter of it without bounds.
-    fn linearise(&mut self, sensing: &mut Sensing) -> Result<Problem<'_>, Error> {
+    fn linearise(
+        &self,
+        propagation: &mut Propagation,
+        sensing: &mut Sensing,
+    ) -> Result<Problem<'_>, Error> {
         let count = self.rows.len();
         let mut rows: Vec<Linear> = Vec::with_capacity(count);
         let mut free: Vec<Pass> = Vec::with_capacity(count);
@@ -265,20 +255,14 @@ impl Mhe {
             let stage = match (k.checked_sub(1).map(|k| &self.rows[k]), free.last()) {
                 (Some(from), Some(last)) if row.t > from.t => Some(match &row.stage {
                     Some(stage) => Arc::clone(stage),
-                    None => Arc::new(between(&mut self.engine, from, row, last)?),
+                    None => Arc::new(between(propagation, from, row, last)?),
                 }),
                 _ => None,
             };
             let before = carried(stage.as_ref(), &self.prior, free.last());
-            let spread = (0..row.guess.len()).map(|i| before.0.root.deviation(i));
-            let spread: Vec<f64> = spread.collect();
             let seen = seen(sensing, row)?;
-            free.push(corrected(&seen, &spread, &[], before));
-            rows.push(Linear {
-                stage,
-                seen,
-                spread,
-            });
+            free.push(corrected(&seen, None, &[], before));
+            rows.push(Linear { stage, seen });
         }
         Ok(Problem {
             prior: &self.prior,
@@ -287,48 +271,28 @@ impl Mhe {
             free,
         })
     }
-}
-
-impl Kalman for Mhe {
-    fn driven(&mut self) -> &mut Driven {
-        &mut self.engine.driven
-    }
-
-    /// By the extended filter, the estimate within its bounds.
-    fn predict(
-        &mut self,
-        belief: &mut Belief,
-        from: f64,
-        to: f64,
-        keep: bool,
-    ) -> Result<Skyline, Error> {
-        let result = self.engine.predict(belief, from, to, keep);
-        confine(&mut belief.x, &self.bounds);
-        result
-    }
 
     /// The new row's readings are judged by what the filter expects, then the window is solved.
-    fn correct(
+    pub fn correct(
         &mut self,
+        propagation: &mut Propagation,
         sensing: &mut Sensing,
         belief: &mut Belief,
-        t: f64,
-        readings: &[f64],
-        inputs: &[f64],
+        sample: &Sample<'_>,
     ) -> Result<(), Error> {
         (self.window, self.left) = (vec![], None);
         let mut taken = vec![];
-        sensing.judge_all(belief, t, readings, inputs, &mut taken)?;
+        sensing.judge_all(belief, sample, &mut taken)?;
         let mut guess = belief.x.clone();
         confine(&mut guess, &self.bounds);
         self.rows.push_back(Row {
-            t,
-            inputs: inputs.to_vec(),
+            t: sample.t,
+            inputs: sample.inputs.to_vec(),
             readings: taken,
             guess,
             ..Row::default()
         });
-        let solved = self.solve(sensing)?;
+        let solved = self.solve(propagation, sensing)?;
         sensing.health.unsolved += usize::from(!solved.solution.is_least);
         if let Some(newest) = self.rows.back() {
             belief.x.copy_from_slice(&newest.guess);
@@ -345,20 +309,25 @@ impl Kalman for Mhe {
             self.shorten(solved);
         }
         // the flow goes on from the newest row
-        self.engine.driven.start(inputs);
+        propagation.driven.start(sample.inputs);
         Ok(())
     }
 }
 
 /// The way between two rows, about the guess at the first.
-fn between(engine: &mut Ekf, from: &Row, to: &Row, last: &Pass) -> Result<Stage, Error> {
-    engine.driven.start(&from.inputs);
-    engine.driven.aim(from.t, to.t, &to.inputs);
+fn between(
+    propagation: &mut Propagation,
+    from: &Row,
+    to: &Row,
+    last: &Pass,
+) -> Result<Stage, Error> {
+    propagation.driven.start(&from.inputs);
+    propagation.driven.aim(from.t, to.t, &to.inputs);
     let about = Belief {
         x: from.guess.clone(),
         root: last.after.root.clone(),
     };
-    engine.stage(about, from.t, to.t)
+    propagation.stage(about, from.t, to.t)
 }
 
 /// A Gauss–Newton step.
@@ -392,7 +361,7 @@ pub(crate) struct Row {
     /// last step: the next window begins with it
     pub stage: Option<Arc<Stage>>,
     /// Φ from the row before, which has left; where a smoother will ask for it
-    pub entered: Option<Skyline>,
+    pub entered: Option<Profile>,
 }
 
 impl Row {
@@ -430,9 +399,11 @@ impl Row {
 
 /// The readings of a row, h linearised at its guess.
 pub(crate) fn seen(sensing: &mut Sensing, row: &Row) -> Result<Vec<Seen>, Error> {
-    let h = sensing.evaluate(row.t, &row.guess, &row.inputs)?.to_vec();
+    let map = &mut sensing.output_map;
+    let h = map.linearise(row.t, &row.guess, &row.inputs)?.to_vec();
     let seen = |believed: &Believed| {
-        let slopes = sensing.slopes(believed.sensor);
+        let mut slopes = vec![0.0; row.guess.len()];
+        map.write_slopes(believed.sensor, &mut slopes);
         let offset = h[believed.sensor] - dot(&slopes, &row.guess);
         let (value, variance) = believed.about(h[believed.sensor])?;
         Some(Seen {

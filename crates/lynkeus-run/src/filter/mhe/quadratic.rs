@@ -9,11 +9,12 @@
 
 use std::sync::Arc;
 
-use crate::filter::belief::{Belief, Bounds, confine};
-use crate::filter::profile::Skyline;
-use crate::filter::root::{Packed, Root, dot};
+use crate::filter::belief::{Belief, confine};
+use crate::filter::profile::Profile;
+use crate::filter::root::{Root, dot};
 use crate::filter::smoother::{Adjoint, Correction, Step};
 use crate::filter::transition::Stage;
+use crate::noise::Limits;
 
 /// Most changes of a set before it is taken to go round.
 const CHANGES: usize = 12;
@@ -30,7 +31,7 @@ const SHORT: f64 = 0.995;
 /// The problem.
 pub(crate) struct Problem<'a> {
     pub prior: &'a Belief,
-    pub bounds: &'a [Bounds],
+    pub bounds: &'a [Limits],
     pub rows: Vec<Linear>,
     /// without bounds
     pub free: Vec<Pass>,
@@ -71,10 +72,14 @@ struct Change {
 impl Problem<'_> {
     /// The least cost, from a first guess at the bounds that are met.
     pub fn solve(&self, met: Vec<Vec<Pin>>) -> Solution {
-        let free = backward(&self.free);
+        let (free, _) = backward(&self.free);
         if self.are_inside(&free) {
-            let met = vec![vec![]; self.rows.len()];
-            return Solution::least(free, met, None);
+            return Solution {
+                x: free,
+                met: vec![vec![]; self.rows.len()],
+                passes: None,
+                is_least: true,
+            };
         }
         if let Some(found) = self.by_sets(met) {
             return found;
@@ -94,42 +99,50 @@ impl Problem<'_> {
     /// The Kalman filter, with pins.
     pub fn forward(&self, pins: &[Vec<Pin>]) -> Vec<Pass> {
         let mut passes: Vec<Pass> = vec![];
-        for (linear, pins) in self.rows.iter().zip(pins) {
+        for ((linear, free), pins) in self.rows.iter().zip(&self.free).zip(pins) {
             let before = carried(linear.stage.as_ref(), self.prior, passes.last());
-            passes.push(corrected(&linear.seen, &linear.spread, pins, before));
+            passes.push(corrected(
+                &linear.seen,
+                Some(&free.before.root),
+                pins,
+                before,
+            ));
         }
         passes
     }
 
-    fn are_inside(&self, found: &[Smooth]) -> bool {
-        found.iter().all(|row| {
-            let mut all = row.x.iter().zip(self.bounds);
-            all.all(|(x, bounds)| exceeded(*x, *bounds).is_none())
-        })
+    fn are_inside(&self, x: &[Vec<f64>]) -> bool {
+        let mut all = x.iter().flat_map(|row| row.iter().zip(self.bounds));
+        all.all(|(x, bounds)| exceeded(*x, *bounds).is_none())
     }
 
     /// By sets; none where they go round, or do not hold the states.
     fn by_sets(&self, mut met: Vec<Vec<Pin>>) -> Option<Solution> {
         for _ in 0..CHANGES {
             let passes = self.forward(&met);
-            let found = backward(&passes);
-            if !self.change(&mut met, &found) {
-                let holds = self.are_inside(&found);
-                return holds.then(|| Solution::least(found, met, Some(passes)));
+            let (x, pushes) = backward(&passes);
+            if !self.change(&mut met, &x, &pushes) {
+                let holds = self.are_inside(&x);
+                return holds.then_some(Solution {
+                    x,
+                    met,
+                    passes: Some(passes),
+                    is_least: true,
+                });
             }
         }
         None
     }
 
-    /// Bounds that are exceeded are met from now on; those that pull inward are let go.
-    fn change(&self, met: &mut [Vec<Pin>], found: &[Smooth]) -> bool {
+    /// Limits that are exceeded are met from now on; those that pull inward are let go.
+    fn change(&self, met: &mut [Vec<Pin>], x: &[Vec<f64>], pushes: &[Vec<f64>]) -> bool {
         let mut changed = false;
-        for (met, Smooth { x, pushes }) in met.iter_mut().zip(found) {
+        for ((met, x), pushes) in met.iter_mut().zip(x).zip(pushes) {
             let before = met.len();
             let mut pushes = pushes.iter();
             met.retain(|pin| {
                 let force = pushes.next().copied().unwrap_or(0.0);
-                let Bounds { low, high } = self.bounds[pin.state];
+                let Limits { low, high } = self.bounds[pin.state];
                 let outward = if pin.value == low { -force } else { force };
                 // a single value pushes either way
                 low == high || outward <= 0.0
@@ -150,8 +163,7 @@ impl Problem<'_> {
 
     /// By an interior point method: the states, the bounds that they meet, and whether the cost is
     /// the least one.
-    fn by_interior_point(&self, free: Vec<Smooth>) -> (Vec<Vec<f64>>, Vec<Vec<Pin>>, bool) {
-        let mut x: Vec<Vec<f64>> = free.into_iter().map(|row| row.x).collect();
+    fn by_interior_point(&self, mut x: Vec<Vec<f64>>) -> (Vec<Vec<f64>>, Vec<Vec<Pin>>, bool) {
         let mut sides = self.sides(&mut x);
         let mut off = 1.0;
         let count = sides.len().max(1) as f64;
@@ -185,8 +197,7 @@ impl Problem<'_> {
             }
         }
         // what does not move may be outside
-        let mut all = x.iter().flat_map(|row| row.iter().zip(self.bounds));
-        is_least &= all.all(|(x, bounds)| exceeded(*x, *bounds).is_none());
+        is_least &= self.are_inside(&x);
         let mut met = self.single();
         for side in sides.iter().filter(|s| s.force > s.room) {
             met[side.row].push(Pin::at(side.state, side.bound));
@@ -210,8 +221,8 @@ impl Problem<'_> {
     fn sides(&self, x: &mut [Vec<f64>]) -> Vec<Side> {
         let mut sides = vec![];
         for (row, x) in x.iter_mut().enumerate() {
-            for (state, (x, Bounds { low, high })) in x.iter_mut().zip(self.bounds).enumerate() {
-                let unit = self.rows[row].spread[state];
+            for (state, (x, Limits { low, high })) in x.iter_mut().zip(self.bounds).enumerate() {
+                let unit = self.free[row].before.root.deviation(state);
                 // what does not move needs no bounds
                 if low == high || unit <= 0.0 {
                     continue;
@@ -262,19 +273,7 @@ impl Problem<'_> {
                 variance: first.unit * first.unit / weight,
             });
         }
-        let found = backward(&self.forward(&all));
-        found.into_iter().map(|smooth| smooth.x).collect()
-    }
-}
-
-impl Solution {
-    fn least(found: Vec<Smooth>, met: Vec<Vec<Pin>>, passes: Option<Vec<Pass>>) -> Self {
-        Self {
-            x: found.into_iter().map(|smooth| smooth.x).collect(),
-            met,
-            passes,
-            is_least: true,
-        }
+        backward(&self.forward(&all)).0
     }
 }
 
@@ -306,7 +305,7 @@ fn longest(sides: &[Side], changes: &[Change]) -> f64 {
 }
 
 /// The bound that a state is beyond, by more than rounding.
-fn exceeded(x: f64, Bounds { low, high }: Bounds) -> Option<f64> {
+fn exceeded(x: f64, Limits { low, high }: Limits) -> Option<f64> {
     let slack = 1e-9 * (high - low).min(x.abs().max(1e-3));
     match (x < low - slack, x > high + slack) {
         (true, _) => Some(low),
@@ -319,20 +318,11 @@ fn exceeded(x: f64, Bounds { low, high }: Bounds) -> Option<f64> {
 /// says nothing, and its gain would be rounding.
 const HELD: f64 = 1e-9;
 
-/// A row given the whole window.
-pub(crate) struct Smooth {
-    pub x: Vec<f64>,
-    /// how hard each of its pins pushes its state upward
-    pub pushes: Vec<f64>,
-}
-
 /// A row of the linearised problem.
 pub(crate) struct Linear {
     /// the way from the row before; none to the first, and to one at the same instant
     pub stage: Option<Arc<Stage>>,
     pub seen: Vec<Seen>,
-    /// deviations of the states by all readings up to the row before, without bounds
-    pub spread: Vec<f64>,
 }
 
 /// A reading: cᵀx = value, with noise.
@@ -369,16 +359,20 @@ pub(crate) struct Pass {
     /// the root before the pins, where there are any
     pub by_readings: Option<Root>,
     /// Φ from the row before; none of the first
-    pub transition: Option<Arc<Skyline>>,
+    pub transition: Option<Arc<Profile>>,
     pub readings: Vec<Correction>,
     /// what each pin did; none of a state that is held by other means
     pub pins: Vec<Option<Correction>>,
 }
 
 impl Pass {
-    /// The root by the readings alone.
-    pub fn by_readings(&self) -> &Root {
-        self.by_readings.as_ref().unwrap_or(&self.after.root)
+    /// The state with its pins, the root by the readings alone.
+    pub fn unpinned(&self) -> Belief {
+        let root = self.by_readings.as_ref().unwrap_or(&self.after.root);
+        Belief {
+            x: self.after.x.clone(),
+            root: root.clone(),
+        }
     }
 
     /// What a smoother keeps of a row that stays in the window: the bounds that it meets are
@@ -387,8 +381,7 @@ impl Pass {
         let pins = self.pins.into_iter().flatten();
         Step {
             transition: self.transition.map(Arc::unwrap_or_clone),
-            x: self.after.x,
-            root: Packed::of(&self.after.root),
+            belief: self.after,
             corrections: self.readings.into_iter().chain(pins).collect(),
         }
     }
@@ -398,8 +391,7 @@ impl Pass {
     pub fn leaving(&self) -> Step {
         Step {
             transition: self.transition.as_deref().cloned(),
-            x: self.after.x.clone(),
-            root: Packed::of(self.by_readings()),
+            belief: self.unpinned(),
             corrections: self.readings.clone(),
         }
     }
@@ -411,7 +403,7 @@ pub(crate) fn carried(
     stage: Option<&Arc<Stage>>,
     prior: &Belief,
     last: Option<&Pass>,
-) -> (Belief, Option<Arc<Skyline>>) {
+) -> (Belief, Option<Arc<Profile>>) {
     match (stage, last) {
         (Some(stage), Some(last)) => {
             let transition = Arc::clone(&stage.transition);
@@ -419,19 +411,19 @@ pub(crate) fn carried(
         }
         (None, Some(last)) => {
             let after = last.after.clone();
-            let identity = Skyline::identity(after.x.len());
+            let identity = Profile::identity(after.x.len());
             (after, Some(Arc::new(identity)))
         }
         (_, None) => (prior.clone(), None),
     }
 }
 
-/// A row by its readings, then by its pins.
+/// A row by its readings, then by its pins, if any; `free` is the root before it without bounds.
 pub(crate) fn corrected(
     seen: &[Seen],
-    spread: &[f64],
+    free: Option<&Root>,
     pins: &[Pin],
-    (before, transition): (Belief, Option<Arc<Skyline>>),
+    (before, transition): (Belief, Option<Arc<Profile>>),
 ) -> Pass {
     let mut after = before.clone();
     let mut readings = Vec::with_capacity(seen.len());
@@ -443,7 +435,7 @@ pub(crate) fn corrected(
     for pin in pins {
         let mut c = vec![0.0; after.x.len()];
         c[pin.state] = 1.0;
-        let least = HELD * spread[pin.state];
+        let least = free.map_or(0.0, |root| HELD * root.deviation(pin.state));
         at.push(take(&mut after, &c, pin.value, pin.variance, least));
     }
     Pass {
@@ -466,29 +458,28 @@ fn take(belief: &mut Belief, c: &[f64], y: f64, r: f64, least: f64) -> Option<Co
         return None;
     }
     let innovation = y - dot(c, &belief.x);
-    let gain = belief.root.update(&projected, r)?;
-    for (x, k) in belief.x.iter_mut().zip(&gain) {
-        *x += k * innovation;
+    let mut gain = vec![];
+    if !belief.take(&projected, innovation, r, &mut gain) {
+        return None;
     }
     Some(Correction::single(c.to_vec(), innovation, own + r, gain))
 }
 
-/// The window's rows given all of it.
-pub(crate) fn backward(passes: &[Pass]) -> Vec<Smooth> {
+/// The states of the window's rows given all of it, and how hard each pin of a row pushes its state upward.
+pub(crate) fn backward(passes: &[Pass]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
     let n = passes.first().map_or(0, |p| p.after.x.len());
-    let mut adjoint = Adjoint::nothing(n);
-    let mut rows = Vec::with_capacity(passes.len());
-    for pass in passes.iter().rev() {
+    let mut adjoint = Adjoint::nothing(n, false);
+    let (mut states, mut pushes) = (vec![vec![]; passes.len()], vec![vec![]; passes.len()]);
+    for (row, pass) in passes.iter().enumerate().rev() {
         let shift = pass.after.root.covariance_times(&adjoint.vector);
         let x = pass.after.x.iter().zip(&shift).map(|(x, s)| x - s);
-        let x = x.collect();
-        let mut pushes = vec![0.0; pass.pins.len()];
-        for (push, pin) in pushes.iter_mut().zip(&pass.pins).rev() {
+        states[row] = x.collect();
+        pushes[row] = vec![0.0; pass.pins.len()];
+        for (push, pin) in pushes[row].iter_mut().zip(&pass.pins).rev() {
             if let Some(correction) = pin {
                 *push = adjoint.over_vector(correction).iter().sum();
             }
         }
-        rows.push(Smooth { x, pushes });
         for reading in pass.readings.iter().rev() {
             adjoint.over_vector(reading);
         }
@@ -496,6 +487,5 @@ pub(crate) fn backward(passes: &[Pass]) -> Vec<Smooth> {
             adjoint.vector_through(transition);
         }
     }
-    rows.reverse();
-    rows
+    (states, pushes)
 }

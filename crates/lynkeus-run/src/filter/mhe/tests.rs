@@ -4,20 +4,22 @@ mod windows;
 
 use lynkeus_expr::Graph;
 
-use crate::filter::tests::{exact, scalar, window};
-use crate::filter::{Bounds, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor};
+use crate::filter::tests::{exact, scalar};
+use crate::filter::{FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor};
 use crate::{Estimator, Level};
 
 /// A level that cannot be below zero, read as −1 again and again: the estimate stays at zero
 /// where the filter goes below, and leaves it when the readings do.
 #[test]
 fn the_moving_horizon_keeps_to_the_bounds() {
-    let model = scalar(0.0, 0.05, 0.1);
-    let bounds = vec![Bounds {
-        low: 0.0,
-        high: 10.0,
-    }];
-    let settings = FilterSettings::of(FilterKind::MovingHorizon(5, bounds));
+    let model = NoisyModel {
+        ranges: vec![Limits {
+            low: 0.0,
+            high: 10.0,
+        }],
+        ..scalar(0.0, 0.05, 0.1)
+    };
+    let settings = FilterSettings::of(FilterKind::MovingHorizon(5));
     let mut horizon = Estimator::filter(&model, settings, exact()).unwrap();
     let mut filter =
         Estimator::filter(&model, FilterSettings::of(FilterKind::Extended), exact()).unwrap();
@@ -38,10 +40,10 @@ fn the_moving_horizon_keeps_to_the_bounds() {
 }
 
 /// A place, which is measured, and its velocity, both within bounds; a window of 20 samples.
-fn bounded_cart(bounds: [(f64, f64); 2]) -> Estimator {
+fn bounded_cart(ranges: [(f64, f64); 2]) -> Estimator {
     let g = Graph::new();
     let [time, x, v] = ["time", "x", "v"].map(|name| g.symbol(name));
-    let model = FilterModel::new(&FilterPlant {
+    let model = NoisyModel::new(&NoisyPlant {
         graph: &g,
         time: time.node(),
         states: vec![("x".into(), x.node(), 0.0), ("v".into(), v.node(), 0.2)],
@@ -55,10 +57,10 @@ fn bounded_cart(bounds: [(f64, f64); 2]) -> Estimator {
         }],
         process_noise: vec![0.01, 0.3],
         initial_variance: vec![1.0, 0.5],
+        ranges: ranges.map(|(low, high)| Limits { low, high }).to_vec(),
         confined: None,
     });
-    let bounds = bounds.map(|(low, high)| Bounds { low, high });
-    let settings = FilterSettings::of(FilterKind::MovingHorizon(20, bounds.to_vec()));
+    let settings = FilterSettings::of(FilterKind::MovingHorizon(20));
     Estimator::filter(&model.unwrap(), settings, exact()).unwrap()
 }
 
@@ -131,7 +133,7 @@ fn a_window_looks_back_as_the_smoother_does() {
         }
         filter
     };
-    let (filter, horizon) = (run(FilterKind::Extended), run(window(4, 100.0)));
+    let (filter, horizon) = (run(FilterKind::Extended), run(FilterKind::MovingHorizon(4)));
     for lag in [None, Some(0), Some(1), Some(3), Some(4)] {
         let [expected, found] = [&filter, &horizon].map(|f| f.smoothed(lag, true).unwrap());
         assert_eq!(found.len(), 15);
@@ -151,16 +153,18 @@ fn a_window_looks_back_as_the_smoother_does() {
 /// the first row on, and as sure as the readings make it. A gate lets the next reading in.
 #[test]
 fn a_bound_says_where_and_not_how_sure() {
-    let bounds = vec![Bounds {
-        low: 0.0,
-        high: 2.0,
-    }];
     let settings = FilterSettings {
         gate: Some(5.0),
         keep_history: true,
-        ..FilterSettings::of(FilterKind::MovingHorizon(3, bounds))
+        ..FilterSettings::of(FilterKind::MovingHorizon(3))
     };
-    let model = scalar(-0.1, 1e-3, 0.04);
+    let model = NoisyModel {
+        ranges: vec![Limits {
+            low: 0.0,
+            high: 2.0,
+        }],
+        ..scalar(-0.1, 1e-3, 0.04)
+    };
     let mut filter = Estimator::filter(&model, settings, exact()).unwrap();
     let mut free =
         Estimator::filter(&model, FilterSettings::of(FilterKind::Extended), exact()).unwrap();

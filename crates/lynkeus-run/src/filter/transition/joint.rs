@@ -12,11 +12,7 @@ use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place, Slop
 #[derive(Clone, Debug)]
 pub(crate) struct Joint {
     integrator: Integrator,
-    entries: Vec<(usize, usize)>,
-    slopes: Vec<f64>,
-    curvature: Curvature,
-    /// Q/q, empty where Q = 0
-    noise: Vec<f64>,
+    equation: Equation,
     /// q, the largest entry of Q
     scale: f64,
     /// the state of [`Variational`]
@@ -25,19 +21,15 @@ pub(crate) struct Joint {
 
 impl Joint {
     pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self, Error> {
-        let n = flow.system().states().len();
         let scale = process_noise.iter().fold(0.0_f64, |m, q| m.max(*q));
         let noise = match scale > 0.0 {
             true => process_noise.iter().map(|q| q / scale).collect(),
             false => vec![],
         };
-        let dimension = n + n * Variational::width(n, scale > 0.0);
+        let equation = Equation::new(flow, noise);
         Ok(Self {
-            integrator: Integrator::new(method, dimension)?,
-            entries: flow.jacobians().state.places().to_vec(),
-            slopes: vec![0.0; flow.system().outputs().len()],
-            curvature: Curvature::default(),
-            noise,
+            integrator: Integrator::new(method, equation.dimension())?,
+            equation,
             scale,
             z: vec![],
         })
@@ -52,17 +44,13 @@ impl Joint {
         x: &mut [f64],
         transition: &mut Transition<Profile>,
     ) -> Result<(), Error> {
-        let n = x.len();
-        let noisy = !self.noise.is_empty();
-        let width = Variational::width(n, noisy);
-        Variational::begin(x, noisy, &mut self.z);
-        let mut flow = Variational {
-            driven,
-            entries: &self.entries,
-            slopes: &mut self.slopes,
-            curvature: &mut self.curvature,
-            noise: &self.noise,
-        };
+        let equation = &mut self.equation;
+        let (n, width) = (equation.n, equation.width);
+        self.z.clear();
+        self.z.extend_from_slice(x);
+        self.z.resize(equation.dimension(), 0.0);
+        (0..n).for_each(|i| self.z[n + i * width + i] = 1.0);
+        let mut flow = Variational { driven, equation };
         self.integrator.advance(&mut flow, from, to, &mut self.z)?;
         x.copy_from_slice(&self.z[..n]);
         let columns = |first: usize, scale: f64| {
@@ -92,55 +80,67 @@ impl Persist for Joint {
 /// W in units of time.
 struct Variational<'a> {
     driven: &'a mut Driven,
-    entries: &'a [(usize, usize)],
-    /// values of the entries of F
-    slopes: &'a mut [f64],
-    curvature: &'a mut Curvature,
-    /// diagonal of Q/q, empty where Q = 0
-    noise: &'a [f64],
+    equation: &'a mut Equation,
 }
 
-impl Variational<'_> {
-    /// Entries of a row of (Φ W).
-    fn width(n: usize, noisy: bool) -> usize {
-        if noisy { 2 * n } else { n }
-    }
+/// What the variational equation is made of, and how the right-hand sides f, FΦ and FW + WFᵀ depend on
+/// x̂, Φ and W: F on each column, and through ∂F/∂x on x̂.
+#[derive(Clone, Debug)]
+struct Equation {
+    n: usize,
+    /// numbers in a row of (Φ W)
+    width: usize,
+    /// where F has entries
+    entries: Vec<(usize, usize)>,
+    /// their values
+    slopes: Vec<f64>,
+    /// diagonal of Q/q, empty where Q = 0
+    noise: Vec<f64>,
+    /// ∂F/∂x: its rows are the entries of F
+    second: Slopes,
+    /// where the entries of ∂F/∂x were when the terms were made
+    known: Option<Arc<[Place]>>,
+    places: Arc<[Place]>,
+    terms: Vec<Term>,
+}
 
-    /// The state at a sample.
-    fn begin(x: &[f64], noisy: bool, z: &mut Vec<f64>) {
-        let n = x.len();
-        let width = Self::width(n, noisy);
-        z.clear();
-        z.extend_from_slice(x);
-        z.resize(n + n * width, 0.0);
-        for i in 0..n {
-            z[n + i * width + i] = 1.0;
-        }
-    }
+/// One entry of the Jacobian.
+#[derive(Clone, Copy, Debug)]
+enum Term {
+    /// an entry of F
+    First(usize),
+    /// an entry of ∂F/∂x times a number of the state
+    Second { entry: usize, of: usize },
 }
 
 impl Dynamics for Variational<'_> {
     fn dimension(&self) -> usize {
-        let n = self.driven.dimension();
-        n + n * Self::width(n, !self.noise.is_empty())
+        self.equation.dimension()
     }
 
     fn derivatives(&mut self, t: f64, z: &[f64], dz: &mut [f64]) {
-        let n = self.driven.dimension();
-        let width = Self::width(n, !self.noise.is_empty());
+        let Equation {
+            n,
+            width,
+            entries,
+            slopes,
+            noise,
+            ..
+        } = &mut *self.equation;
+        let (n, width) = (*n, *width);
         let (x, rows) = z.split_at(n);
         let (dx, drows) = dz.split_at_mut(n);
         self.driven.derivatives(t, x, dx);
-        self.driven.evaluation.outputs(t, x, self.slopes);
+        self.driven.evaluation.outputs(t, x, slopes);
         drows.fill(0.0);
-        for (&(i, j), slope) in self.entries.iter().zip(&*self.slopes) {
+        for (&(i, j), slope) in entries.iter().zip(&*slopes) {
             let into = &mut drows[i * width..(i + 1) * width];
             for (into, from) in into.iter_mut().zip(&rows[j * width..(j + 1) * width]) {
                 *into += slope * from;
             }
         }
         // FW is there; its transpose and Q/q are added
-        for (i, q) in self.noise.iter().enumerate() {
+        for (i, q) in noise.iter().enumerate() {
             for j in 0..i {
                 let (a, b) = (i * width + n + j, j * width + n + i);
                 let sum = drows[a] + drows[b];
@@ -152,15 +152,13 @@ impl Dynamics for Variational<'_> {
     }
 
     fn slopes(&mut self, t: f64, z: &[f64], slopes: &mut Slopes) -> bool {
-        let n = self.driven.dimension();
-        let width = Self::width(n, !self.noise.is_empty());
-        if !(self.driven).output_slopes(t, &z[..n], &mut self.curvature.second) {
+        let Self { driven, equation } = self;
+        let x = &z[..equation.n];
+        if !driven.output_slopes(t, x, &mut equation.second) {
             return false;
         }
-        self.driven.evaluation.outputs(t, &z[..n], self.slopes);
-        let layout = Layout { n, width };
-        self.curvature
-            .write(layout, self.entries, self.slopes, z, slopes);
+        driven.evaluation.outputs(t, x, &mut equation.slopes);
+        equation.write_jacobian(z, slopes);
         true
     }
 
@@ -173,104 +171,80 @@ impl Dynamics for Variational<'_> {
     }
 
     fn not_finite(&mut self, t: f64, z: &[f64]) -> Error {
-        let n = self.driven.dimension();
+        let n = self.equation.n;
         self.driven.not_finite(t, &z[..n.min(z.len())])
     }
 }
 
-/// How the right-hand sides f, FΦ and FW + WFᵀ depend on x̂, Φ and W: F on each column, and
-/// through ∂F/∂x on x̂.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Curvature {
-    /// ∂F/∂x: its rows are the entries of F
-    pub second: Slopes,
-    /// where the entries of ∂F/∂x were when the terms were made
-    known: Option<Arc<[Place]>>,
-    places: Arc<[Place]>,
-    terms: Vec<Term>,
-}
-
-/// One entry.
-#[derive(Clone, Copy, Debug)]
-enum Term {
-    /// an entry of F
-    First(usize),
-    /// an entry of ∂F/∂x times a number of the state
-    Second { entry: usize, of: usize },
-}
-
-/// Where x̂, Φ and W are in the state.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Layout {
-    pub n: usize,
-    /// numbers in a row of (Φ W)
-    pub width: usize,
-}
-
-impl Layout {
-    /// An entry of (Φ W).
-    pub fn at(self, row: usize, column: usize) -> usize {
-        self.n + row * self.width + column
+impl Equation {
+    fn new(flow: &Linearised, noise: Vec<f64>) -> Self {
+        let n = flow.system().states().len();
+        Self {
+            n,
+            width: if noise.is_empty() { n } else { 2 * n },
+            entries: flow.jacobians().state.places().to_vec(),
+            slopes: vec![0.0; flow.system().outputs().len()],
+            noise,
+            second: Slopes::default(),
+            known: None,
+            places: Arc::default(),
+            terms: vec![],
+        }
     }
-}
 
-impl Curvature {
-    /// Writes the Jacobian at the state z, where F has these values at its places and ∂F/∂x is
-    /// [`Curvature::second`].
-    pub fn write(
-        &mut self,
-        layout: Layout,
-        entries: &[(usize, usize)],
-        first: &[f64],
-        z: &[f64],
-        slopes: &mut Slopes,
-    ) {
+    fn dimension(&self) -> usize {
+        self.n + self.n * self.width
+    }
+
+    /// Writes the Jacobian at the state z, F and ∂F/∂x being those there.
+    fn write_jacobian(&mut self, z: &[f64], slopes: &mut Slopes) {
         let second = self.second.places();
         if self.known.as_ref().is_none_or(|k| !Arc::ptr_eq(k, second)) {
             self.known = Some(second.clone());
-            self.arrange(layout, entries);
+            self.arrange();
         }
         let values = slopes.at(&self.places);
         for (value, term) in values.iter_mut().zip(&self.terms) {
             *value = match *term {
-                Term::First(entry) => first[entry],
+                Term::First(entry) => self.slopes[entry],
                 Term::Second { entry, of } => self.second.values()[entry] * z[of],
             };
         }
     }
 
-    fn arrange(&mut self, layout: Layout, entries: &[(usize, usize)]) {
+    fn arrange(&mut self) {
         let mut all: Vec<(Place, Term)> = vec![];
         let mut add = |row, column, term| all.push((Place { row, column }, term));
-        for (entry, &(i, j)) in entries.iter().enumerate() {
+        for (entry, &(i, j)) in self.entries.iter().enumerate() {
             add(i, j, Term::First(entry));
-            for (row, of) in affected(layout, i, j) {
+            for (row, of) in self.affected(i, j) {
                 add(row, of, Term::First(entry));
             }
         }
         // outputs that are no entries of F may follow them
         let places = self.second.places().iter().enumerate();
-        for (entry, at) in places.filter(|(_, at)| at.row < entries.len()) {
-            let (i, j) = entries[at.row];
-            for (row, of) in affected(layout, i, j) {
+        for (entry, at) in places.filter(|(_, at)| at.row < self.entries.len()) {
+            let (i, j) = self.entries[at.row];
+            for (row, of) in self.affected(i, j) {
                 add(row, at.column, Term::Second { entry, of });
             }
         }
         self.places = all.iter().map(|(place, _)| *place).collect();
         self.terms = all.into_iter().map(|(_, term)| term).collect();
     }
-}
 
-/// Which derivatives the entry (i, j) of F adds to, and of what it adds its multiple: (FΦ)ᵢ꜀ has
-/// Φⱼ꜀, and so has (FW)ᵢ꜀ and its mirror image.
-fn affected(layout: Layout, i: usize, j: usize) -> impl Iterator<Item = (usize, usize)> {
-    let n = layout.n;
-    let transition = (0..n).map(move |c| (layout.at(i, c), layout.at(j, c)));
-    let noise = (0..layout.width - n).flat_map(move |c| {
-        let of = layout.at(j, n + c);
-        [(layout.at(i, n + c), of), (layout.at(c, n + i), of)]
-    });
-    transition.chain(noise)
+    /// Which derivatives the entry (i, j) of F adds to, and of what it adds its multiple: (FΦ)ᵢ꜀ has
+    /// Φⱼ꜀, and so has (FW)ᵢ꜀ and its mirror image.
+    fn affected(&self, i: usize, j: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let (n, width) = (self.n, self.width);
+        let at = move |row: usize, column: usize| n + row * width + column;
+        let transition = (0..n).map(move |c| (at(i, c), at(j, c)));
+        let noise = (0..width - n).flat_map(move |c| {
+            let of = at(j, n + c);
+            [(at(i, n + c), of), (at(c, n + i), of)]
+        });
+        transition.chain(noise)
+    }
 }
 
 #[cfg(test)]
@@ -295,16 +269,12 @@ mod tests {
         let states = x.map(|x| ("x".to_owned(), x.node(), 0.0));
         let signals = [("w".to_owned(), w.node())];
         let flow = Linearised::flow(&g, time.node(), &states, &signals, &derivatives).unwrap();
-        let entries = flow.jacobians().state.places();
         let mut driven = Driven::new(flow.system(), BetweenSamples::Hold);
         driven.start(&[0.7]);
         for noise in [vec![], vec![0.3, 1.0, 0.5]] {
             let mut linearised = Variational {
                 driven: &mut driven,
-                entries,
-                slopes: &mut vec![0.0; entries.len()],
-                curvature: &mut Curvature::default(),
-                noise: &noise,
+                equation: &mut Equation::new(&flow, noise),
             };
             let dimension = linearised.dimension();
             let z: Vec<f64> = (0..dimension)

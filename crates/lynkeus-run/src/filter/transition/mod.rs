@@ -8,11 +8,11 @@ mod series;
 use std::sync::Arc;
 
 use super::belief::Belief;
-use super::profile::{Profile, Skyline};
+use super::profile::Profile;
 use super::root::{Factor, Root, dot};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::system::Driven;
-use crate::{Error, Linearised, Method, Step};
+use crate::{Error, EstimatorSettings, Linearised, Method, Step};
 use joint::Joint;
 use piecewise::Piecewise;
 use series::Transition;
@@ -21,15 +21,19 @@ use series::Transition;
 /// then the steps of all three.
 const FEW: usize = 8;
 
-/// Φ' = FΦ and W' = FW + WFᵀ + Q along the estimate, from Φ = I and W = 0 at a sample: the
-/// transition, and W = ∫ Φ(T,s) Q Φ(T,s)ᵀ ds, what the process noise comes to at the next sample.
+/// A flow under way with Φ' = FΦ and W' = FW + WFᵀ + Q along the estimate, from Φ = I and W = 0 at a
+/// sample: the transition, and W = ∫ Φ(T,s) Q Φ(T,s)ᵀ ds, what the process noise comes to at the next sample.
 #[derive(Clone, Debug)]
 pub(crate) struct Propagation {
-    way: Scheme,
+    pub driven: Driven,
+    scheme: Scheme,
     transition: Transition<Profile>,
+    /// the estimate at the end of the last way
+    pub end: Vec<f64>,
     /// of W
     factor: Factor,
-    n: usize,
+    rows: Vec<f64>,
+    sums: Vec<f64>,
 }
 
 /// How Φ and W are found.
@@ -41,31 +45,34 @@ enum Scheme {
 
 impl Propagation {
     /// Of a flow with F, and the densities of the noise on its states.
-    pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self, Error> {
+    pub fn new(
+        flow: &Linearised,
+        process_noise: &[f64],
+        run: EstimatorSettings,
+    ) -> Result<Self, Error> {
+        let method = run.method;
         let n = flow.system().states().len();
         let is_given = matches!(method, Method::Rk4(Step::AtMost(_) | Step::Substeps(_)));
-        let way = match n <= FEW || is_given {
+        let scheme = match n <= FEW || is_given {
             true => Scheme::Joint(Box::new(Joint::new(flow, process_noise, method)?)),
             false => Scheme::Piecewise(Box::new(Piecewise::new(flow, process_noise, method)?)),
         };
         Ok(Self {
-            way,
+            driven: Driven::new(flow.system(), run.between),
+            scheme,
             transition: Transition::start(n, process_noise.iter().any(|q| *q > 0.0)),
+            end: vec![],
             factor: Factor::default(),
-            n,
+            rows: vec![],
+            sums: vec![0.0; n],
         })
     }
 
-    /// Takes `x` to the next sample, from the belief's estimate.
-    pub fn advance(
-        &mut self,
-        driven: &mut Driven,
-        belief: &Belief,
-        from: f64,
-        to: f64,
-        x: &mut Vec<f64>,
-    ) -> Result<(), Error> {
-        match &mut self.way {
+    /// The way to the next sample from the belief's estimate, which stays.
+    pub fn advance(&mut self, belief: &Belief, from: f64, to: f64) -> Result<(), Error> {
+        let (driven, x) = (&mut self.driven, &mut self.end);
+        x.clone_from(&belief.x);
+        match &mut self.scheme {
             Scheme::Joint(joint) => joint.advance(driven, from, to, x, &mut self.transition)?,
             Scheme::Piecewise(variation) => {
                 self.transition = variation.advance(driven, belief, from, to, x)?;
@@ -74,9 +81,45 @@ impl Propagation {
         Ok(())
     }
 
+    /// x̂⁻ and P⁻ = ΦPΦᵀ + W at the next sample. A flow that fails leaves the belief as it was.
+    pub fn predict(&mut self, belief: &mut Belief, from: f64, to: f64) -> Result<(), Error> {
+        self.advance(belief, from, to)?;
+        belief.x.clone_from(&self.end);
+        self.carry(&mut belief.root);
+        Ok(())
+    }
+
+    /// ΦPΦᵀ + W over the last way.
+    pub fn carry(&mut self, root: &mut Root) {
+        let mut rows = std::mem::take(&mut self.rows);
+        rows.clear();
+        self.push_root(&mut rows);
+        carry(&self.transition.matrix, root, &mut rows, &mut self.sums);
+        self.rows = rows;
+    }
+
+    /// The way from a state, without carrying a belief along it; the root chooses units where there
+    /// are many states.
+    pub fn stage(&mut self, about: Belief, from: f64, to: f64) -> Result<Stage, Error> {
+        self.advance(&about, from, to)?;
+        let mut noise = vec![];
+        self.push_root(&mut noise);
+        Ok(Stage {
+            about: about.x,
+            end: self.end.clone(),
+            transition: Arc::new(self.transition.matrix.clone()),
+            noise,
+        })
+    }
+
     /// Φ of the last way.
     pub fn transition(&self) -> &Profile {
         &self.transition.matrix
+    }
+
+    /// Whether noise moves the states.
+    pub fn is_noisy(&self) -> bool {
+        self.transition.noise.is_some()
     }
 
     /// Adds the rows of Lᵀ, W = LLᵀ.
@@ -84,7 +127,7 @@ impl Propagation {
         let Some(noise) = &self.transition.noise else {
             return;
         };
-        let n = self.n;
+        let n = self.sums.len();
         let lower = self.factor.of(noise.entries(), n);
         let first = rows.len();
         rows.resize(first + n * n, 0.0);
@@ -99,7 +142,8 @@ impl Propagation {
 
 impl Persist for Propagation {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        match &mut self.way {
+        self.driven.walk(walk)?;
+        match &mut self.scheme {
             Scheme::Joint(joint) => joint.walk(walk),
             Scheme::Piecewise(variation) => variation.walk(walk),
         }
@@ -110,12 +154,12 @@ impl Persist for Propagation {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Stage {
     /// x̃
-    pub about: Vec<f64>,
+    about: Vec<f64>,
     /// φ(x̃)
-    pub end: Vec<f64>,
-    pub transition: Arc<Skyline>,
+    end: Vec<f64>,
+    pub transition: Arc<Profile>,
     /// rows whose sum of squares is W; none where nothing disturbs the states
-    pub noise: Vec<f64>,
+    noise: Vec<f64>,
 }
 
 impl Stage {
@@ -135,40 +179,32 @@ impl Stage {
 
     /// What is believed at the next sample.
     pub fn carry(&self, after: &Belief) -> Belief {
-        let n = self.end.len();
-        let off: Vec<f64> = after
-            .x
-            .iter()
-            .zip(&self.about)
-            .map(|(x, a)| x - a)
-            .collect();
+        let pairs = after.x.iter().zip(&self.about);
+        let off: Vec<f64> = pairs.map(|(x, a)| x - a).collect();
         let moved = self.end.iter().zip(self.transition.rows());
         let x = moved.map(|(x, (first, row))| x + dot(row, &off[first..]));
-        let x = x.collect();
-        let mut rows = Vec::with_capacity(self.noise.len() + n * n);
-        rows.extend_from_slice(&self.noise);
-        let mut sums = vec![0.0; n];
-        push_carried(self.transition.rows(), &after.root, &mut rows, &mut sums);
-        let mut root = Root {
-            n,
-            entries: vec![0.0; n * n],
-        };
-        root.of_rows_with(&mut rows, &mut sums);
-        Belief { x, root }
+        let mut root = after.root.clone();
+        let mut sums = vec![0.0; off.len()];
+        carry(
+            &self.transition,
+            &mut root,
+            &mut self.noise.clone(),
+            &mut sums,
+        );
+        Belief {
+            x: x.collect(),
+            root,
+        }
     }
 }
 
-/// Adds the rows of (ΦS)ᵀ, for the rows of Φ; with room for n numbers.
-pub(crate) fn push_carried<'m>(
-    transition: impl Iterator<Item = (usize, &'m [f64])>,
-    root: &Root,
-    rows: &mut Vec<f64>,
-    sums: &mut [f64],
-) {
+/// ΦPΦᵀ + W, where `rows` are those of W: they come first, since their zeros are spared in the
+/// reflections. `sums` is room for a number of each state.
+fn carry(transition: &Profile, root: &mut Root, rows: &mut Vec<f64>, sums: &mut [f64]) {
     let n = root.n;
     let begin = rows.len();
     rows.resize(begin + n * n, 0.0);
-    for (i, (first, row)) in transition.enumerate() {
+    for (i, (first, row)) in transition.rows().enumerate() {
         sums.fill(0.0);
         for (j, phi) in (first..).zip(row) {
             for (sum, s) in sums.iter_mut().zip(&root.row(j)[..=j]) {
@@ -178,4 +214,5 @@ pub(crate) fn push_carried<'m>(
         let column = rows[begin + i..].iter_mut().step_by(n);
         column.zip(&*sums).for_each(|(into, sum)| *into = *sum);
     }
+    root.of_rows(rows, sums);
 }

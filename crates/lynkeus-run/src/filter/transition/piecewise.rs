@@ -10,11 +10,11 @@ use nalgebra::DMatrix;
 
 use super::series::{Series, Transition};
 use crate::filter::belief::Belief;
-use crate::filter::profile::{Entry, Profile};
+use crate::filter::profile::Profile;
 use crate::method::resolution;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::system::Driven;
-use crate::{Dynamics, Error, Events, Integrator, Linearised, Method};
+use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place};
 
 /// Tolerance with fixed steps, whose error nobody states.
 const FIXED: f64 = 1e-8;
@@ -187,10 +187,10 @@ impl Piecewise {
         pairs.map(|(q, unit)| q * h / (unit * unit)).collect()
     }
 
-    fn sparse(&self, values: &[f64]) -> Vec<Entry> {
+    fn sparse(&self, values: &[f64]) -> Vec<(Place, f64)> {
         let pairs = self.entries.iter().zip(values);
-        let all = pairs.map(|(&(row, column), &value)| Entry { row, column, value });
-        all.filter(|e| e.value != 0.0).collect()
+        let all = pairs.map(|(&(row, column), &value)| (Place { row, column }, value));
+        all.filter(|entry| entry.1 != 0.0).collect()
     }
 
     fn segment(
@@ -259,7 +259,7 @@ impl Piecewise {
         piece: Piece,
         x: &[f64],
         end: &mut Vec<f64>,
-    ) -> Result<Option<Vec<Vec<Entry>>>, Error> {
+    ) -> Result<Option<Vec<Vec<(Place, f64)>>>, Error> {
         let h = piece.length();
         let first = self.scaled(driven, piece.from, x, h)?;
         let mut middle = x.to_vec();

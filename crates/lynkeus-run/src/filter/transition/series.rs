@@ -3,7 +3,8 @@
 
 use nalgebra::DMatrix;
 
-use crate::filter::profile::{Entry, Profile};
+use crate::Place;
+use crate::filter::profile::Profile;
 
 /// Terms after which a series is given up.
 const MOST_TERMS: usize = 60;
@@ -78,7 +79,7 @@ impl Series {
     /// cancels too much.
     pub fn advance(
         &mut self,
-        polynomial: &[Vec<Entry>],
+        polynomial: &[Vec<(Place, f64)>],
         drive: &[f64],
         transition: &mut Transition<Profile>,
         n: usize,
@@ -136,7 +137,7 @@ impl Series {
     fn term(
         &self,
         k: usize,
-        polynomial: &[Vec<Entry>],
+        polynomial: &[Vec<(Place, f64)>],
         drive: &[f64],
         next: &mut Transition<Profile>,
     ) {
@@ -168,10 +169,15 @@ impl Transition<DMatrix<f64>> {
     /// Over one time unit of Φ' = GΦ, W' = GW + WGᵀ + V with constant G: the series over 2⁻ᵏ of
     /// it, then k times Φ ← ΦΦ, W ← W + ΦWΦᵀ. Sums of what is not negative: decay does not
     /// cancel. None where G is too fast to double up from.
-    pub fn constant(n: usize, g: &[Entry], drive: &[f64], series: &mut Series) -> Option<Self> {
+    pub fn constant(
+        n: usize,
+        g: &[(Place, f64)],
+        drive: &[f64],
+        series: &mut Series,
+    ) -> Option<Self> {
         let mut sums = vec![0.0; n];
-        for entry in g {
-            sums[entry.row] += entry.value.abs();
+        for (at, value) in g {
+            sums[at.row] += value.abs();
         }
         let norm = sums.into_iter().fold(0.0, f64::max);
         let doublings = norm.max(1.0).log2().ceil() as u32;
@@ -179,21 +185,13 @@ impl Transition<DMatrix<f64>> {
             return None;
         }
         let share = 0.5_f64.powi(doublings as i32);
-        let shared = |e: &Entry| Entry {
-            value: share * e.value,
-            ..*e
-        };
-        let small: Vec<Entry> = g.iter().map(shared).collect();
+        let small = g.iter().map(|(at, value)| (*at, share * value)).collect();
         let drive: Vec<f64> = drive.iter().map(|v| share * v).collect();
         let mut transition = Transition::start(n, !drive.is_empty());
         if !series.advance(&[small], &drive, &mut transition, n, START_TOLERANCE) {
             return None;
         }
-        let dense = |m: &Profile| DMatrix::from_row_slice(n, n, m.entries());
-        let mut result = Self {
-            matrix: dense(&transition.matrix),
-            noise: transition.noise.as_ref().map(dense),
-        };
+        let mut result = Self::dense(&transition, n);
         for _ in 0..doublings {
             result = result.then(&result);
         }

@@ -1,7 +1,7 @@
 //! Readings at an end of what a sensor can show.
 
 use super::*;
-use lynkeus_structure::figures;
+use lynkeus_words::figures;
 
 /// The readings at an end in the run of a seed alone, and all of them.
 fn at_ends(study: &Study, seed: u64) -> (usize, usize) {

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::filter::root::factor;
 use crate::filter::tests::exact;
-use crate::filter::{Bounds, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor};
+use crate::filter::{FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor};
 use crate::{Estimator, Level};
 
 /// Xorshift.
@@ -39,7 +39,7 @@ struct Case {
     variances: Vec<f64>,
     start: Vec<f64>,
     noise: f64,
-    bounds: Vec<Bounds>,
+    bounds: Vec<Limits>,
     times: Vec<f64>,
     /// NaN where the sensor does not report
     readings: Vec<Vec<f64>>,
@@ -69,20 +69,20 @@ impl Case {
         let densities = (0..n).map(|_| sparse(&mut random, 0.1, 0.3)).collect();
         let variances = (0..n).map(|_| sparse(&mut random, 0.6, 0.1)).collect();
         let bounds = (0..n).map(|_| match random.below(6) {
-            0 => Bounds {
+            0 => Limits {
                 low: f64::NEG_INFINITY,
                 high: random.uniform(0.05, 0.4),
             },
-            1 => Bounds {
+            1 => Limits {
                 low: random.uniform(-0.4, -0.05),
                 high: f64::INFINITY,
             },
-            _ => Bounds {
+            _ => Limits {
                 low: random.uniform(-0.5, -0.02),
                 high: random.uniform(0.02, 0.5),
             },
         });
-        let bounds: Vec<Bounds> = bounds.collect();
+        let bounds: Vec<Limits> = bounds.collect();
         let start = bounds
             .iter()
             .map(|b| random.uniform(b.low.max(-0.4), b.high.min(0.4)));
@@ -124,7 +124,7 @@ impl Case {
         let row =
             |matrix: &DMatrix<f64>, i| -> Vec<f64> { matrix.row(i).iter().copied().collect() };
         let states = x.iter().zip(&self.start).enumerate();
-        let model = FilterModel::new(&FilterPlant {
+        let model = NoisyModel::new(&NoisyPlant {
             graph: &g,
             time: g.symbol("t").node(),
             states: states
@@ -142,9 +142,10 @@ impl Case {
                 .collect(),
             process_noise: self.densities.clone(),
             initial_variance: self.variances.clone(),
+            ranges: self.bounds.clone(),
             confined: None,
         });
-        let kind = FilterKind::MovingHorizon(20, self.bounds.clone());
+        let kind = FilterKind::MovingHorizon(20);
         Estimator::filter(&model.unwrap(), FilterSettings::of(kind), exact()).unwrap()
     }
 
@@ -214,7 +215,7 @@ impl Case {
         // Gξ ≥ h
         let (mut sides, mut ends) = (vec![], vec![]);
         for place in 0..size {
-            let Bounds { low, high } = self.bounds[place % n];
+            let Limits { low, high } = self.bounds[place % n];
             for (sign, bound) in [(1.0, low), (-1.0, high)] {
                 if bound.is_finite() {
                     sides.push(shape.row(place) * sign);
