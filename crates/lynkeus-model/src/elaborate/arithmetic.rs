@@ -228,12 +228,17 @@ impl Evaluator<'_> {
 
     /// Scalar product, or product of matrices and vectors.
     fn product(&self, left: &Value, right: &Value, span: Span) -> Result<Value> {
-        let (rows, inner, columns) = match (&left.dims[..], &right.dims[..]) {
-            (&[inner], &[across]) if inner == across => (1, inner, 1),
-            (&[inner], &[across, columns]) if inner == across => (1, inner, columns),
-            (&[rows, inner], &[across]) if inner == across => (rows, inner, 1),
-            (&[rows, inner], &[across, columns]) if inner == across => (rows, inner, columns),
-            (left, right) => return Err(no_product(left, right, span)),
+        let no_product = || no_product(&left.dims, &right.dims, span);
+        let [.., inner] = left.dims[..] else {
+            return Err(no_product());
+        };
+        let (rows, columns, dims) = match (&left.dims[..], &right.dims[..]) {
+            (_, &[across, ..]) if inner != across => return Err(no_product()),
+            (&[_], &[_]) => (1, 1, vec![]),
+            (&[_], &[_, columns]) => (1, columns, vec![columns]),
+            (&[rows, _], &[_]) => (rows, 1, vec![rows]),
+            (&[rows, _], &[_, columns]) => (rows, columns, vec![rows, columns]),
+            _ => return Err(no_product()),
         };
         let work = (rows as u64)
             .saturating_mul(inner as u64)
@@ -249,9 +254,6 @@ impl Evaluator<'_> {
                 elements.push(self.sum_of_products(terms, span)?);
             }
         }
-        let mut dims = vec![];
-        dims.extend((left.dims.len() == 2).then_some(rows));
-        dims.extend((right.dims.len() == 2).then_some(columns));
         Ok(Value { dims, elements })
     }
 

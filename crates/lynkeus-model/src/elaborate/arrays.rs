@@ -197,7 +197,7 @@ impl<'a> Evaluator<'a> {
 
     pub(super) fn ndims(&mut self, call: &'a Call) -> Result<Value> {
         let [argument] = self.arguments(call)?;
-        Ok(integer(self.dims_of(argument)?.len()).into())
+        Ok(Scalar::of_size(self.dims_of(argument)?.len()).into())
     }
 
     /// The elements that `sum(A)` or `sum(e for i in r)` goes over.
@@ -234,7 +234,9 @@ impl<'a> Evaluator<'a> {
         if call.arguments.len() == 1 {
             let [array] = self.arguments(call)?;
             let dims = self.dims_of(array)?;
-            return Ok(Value::vector(dims.into_iter().map(integer).collect()));
+            return Ok(Value::vector(
+                dims.into_iter().map(Scalar::of_size).collect(),
+            ));
         }
         let [array, axis] = self.arguments(call)?;
         let dims = self.dims_of(array)?;
@@ -242,7 +244,7 @@ impl<'a> Evaluator<'a> {
         let dim = usize::try_from(number)
             .ok()
             .and_then(|axis| dims.get(axis.checked_sub(1)?));
-        let dim = dim.copied().map(|dim| integer(dim).into());
+        let dim = dim.map(|&dim| Scalar::of_size(dim).into());
         dim.ok_or_else(|| self.no_dimension(number, &dims, axis))
     }
 
@@ -415,11 +417,6 @@ pub(super) fn matrix_dims(dims: &[usize]) -> Option<Vec<usize>> {
     let mut matrix = dims.to_vec();
     matrix.resize(2, 1);
     (dims.len() <= 2).then_some(matrix)
-}
-
-/// Sizes fit an Integer: every one of them is below the limit on elements.
-fn integer(size: usize) -> Scalar {
-    Scalar::Integer(i64::try_from(size).unwrap_or(i64::MAX))
 }
 
 impl<'a> Evaluator<'a> {

@@ -36,9 +36,8 @@ impl<'a> Evaluator<'a> {
             let message = format!("function `{}` has no output", class.path);
             Problem::new(span, message).hint("declare one: `output Real y;`")
         })?;
-        let value = number(first);
-        let value = value.map_err(|_| Problem::new(span, "expected a number, found a record"));
-        value.map(Some)
+        let no_number = |_| Problem::new(span, "expected a number, found a record");
+        number(first).map(Some).map_err(no_number)
     }
 
     /// The values of `(a, b) = f(x)`.

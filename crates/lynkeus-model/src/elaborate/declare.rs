@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::evaluate::Evaluator;
 use super::scope::Mode;
-use super::symbols::{Component, Symbols, gathered, is_outer_input};
+use super::symbols::{Component, Symbols, gathered, is_outer_input, literal_subscripts};
 use super::value::{
     Scalar, Value, check_size, describe_dims, element_count, element_name, expected_number,
 };
@@ -308,7 +308,11 @@ impl<'a> Symbols<'a> {
             }
             Some(values) => values.clone(),
             None if is_parameter && self.options.symbolic_parameters => parts.all_symbols(),
-            None => return Err(parts.no_value()),
+            None => {
+                let message = format!("parameter `{name}` has no value");
+                let hint = format!("write `{name} = …` here, or give the value on loading");
+                return Err(Problem::new(declaration.name, message).hint(hint));
+            }
         };
         Ok(Component {
             dims,
@@ -427,13 +431,6 @@ impl Parts<'_> {
             _ => Ok(Scalar::Real(constant(value))),
         }
     }
-
-    fn no_value(&self) -> Problem {
-        let name = self.name;
-        let hint = format!("write `{name} = …` here, or give the value on loading");
-        let message = format!("parameter `{name}` has no value");
-        Problem::new(self.declaration.name, message).hint(hint)
-    }
 }
 
 /// What the caller gives to a parameter, or to an element of one: its subscripts, and the value.
@@ -512,13 +509,12 @@ fn unknown(model: &FlatModel, name: &str) -> Problem {
 
 /// `H[3]` as `H` and 3.
 fn split(key: &str) -> Option<(&str, Vec<usize>)> {
-    let key = key.trim();
-    let Some((name, rest)) = key.split_once('[') else {
-        return Some((key, vec![]));
-    };
-    let subscripts = rest.strip_suffix(']')?.split(',');
-    let numbers = subscripts.map(|subscript| subscript.trim().parse().ok());
-    Some((name.trim(), numbers.collect::<Option<Vec<usize>>>()?))
+    match key.trim().split_once('[') {
+        None => Some((key.trim(), vec![])),
+        // one pair of brackets
+        Some((_, rest)) if rest.contains('[') => None,
+        Some(_) => literal_subscripts(key.trim()),
+    }
 }
 
 fn offset(subscripts: &[usize], dims: &[usize]) -> Option<usize> {

@@ -193,10 +193,8 @@ impl<'a> Evaluator<'a> {
     }
 
     fn end(&self, span: Span) -> Result<Value> {
-        let size = self.ends.last().and_then(|&size| i64::try_from(size).ok());
-        let outside = || Problem::new(span, "`end` stands only in subscripts");
-        size.map(|size| Scalar::Integer(size).into())
-            .ok_or_else(outside)
+        let size = self.ends.last().map(|&size| Scalar::of_size(size).into());
+        size.ok_or_else(|| Problem::new(span, "`end` stands only in subscripts"))
     }
 
     pub(super) fn varying(&self, span: Span) -> Problem {
