@@ -162,6 +162,15 @@ impl UnitFactor {
             upper: U.into_iter().enumerate().map(strict).collect(),
         })
     }
+
+    /// An entry of U.
+    pub fn U(&self, i: usize, j: usize) -> f64 {
+        match i.cmp(&j) {
+            std::cmp::Ordering::Less => self.upper[i][j - i - 1],
+            std::cmp::Ordering::Equal => 1.0,
+            std::cmp::Ordering::Greater => 0.0,
+        }
+    }
 }
 
 fn check_shape(S: &[Vec<f64>]) -> Result<(), FactorError> {
@@ -244,14 +253,9 @@ mod tests {
                 product + f64::from(u8::from(i == j)) * 0.1
             }).collect()).collect();
             let factor = UnitFactor::new(&S).unwrap();
-            let U = |i: usize, j: usize| match i.cmp(&j) {
-                std::cmp::Ordering::Less => factor.upper[i][j - i - 1],
-                std::cmp::Ordering::Equal => 1.0,
-                std::cmp::Ordering::Greater => 0.0,
-            };
             for (i, row) in S.iter().enumerate() {
                 for (j, entry) in row.iter().enumerate() {
-                    let product: f64 = (0..3).map(|k| U(k, i) * factor.diagonal[k] * U(k, j)).sum();
+                    let product: f64 = (0..3).map(|k| factor.U(k, i) * factor.diagonal[k] * factor.U(k, j)).sum();
                     prop_assert!((product - entry).abs() < 1e-13);
                 }
             }

@@ -1,11 +1,11 @@
 //! What can be guaranteed about an observer, and why.
 
 use lynkeus_expr::{Interval, MissingInput, Node, Spent};
-use lynkeus_structure::{AugmentedPlant, Dimension, Measurement, Region, Standing, range, short};
+use lynkeus_structure::{AugmentedPlant, Dimension, Measurement, Region, Standing, range};
 use nalgebra::DMatrix;
 
-use crate::statement::{proved, standing, sufficient, undecided};
-use crate::{Check, Statement};
+use crate::statement::{proved, standing, undecided};
+use crate::{Check, Reason, Statement};
 
 /// What a guarantee may take for granted beside the plant's equations.
 #[derive(Clone, Debug)]
@@ -65,16 +65,12 @@ impl Assumptions {
             .zip(sizes)
             .filter(|(_, size)| **size != 0.0);
         let (bounded, open): (Vec<_>, Vec<_>) = acting.partition(|(_, size)| size.is_finite());
-        let open: Vec<&str> = open.iter().map(|(name, _)| name.as_str()).collect();
-        let detail = match open.is_empty() {
-            true => "assumed, by the declared ranges and deviations".to_owned(),
-            false => format!(
-                "no bound of what acts on {}: declare min and max of the disturbances and of the states that they meet",
-                open.join(", ")
-            ),
-        };
+        let open: Vec<String> = open.iter().map(|(name, _)| (*name).clone()).collect();
         let any = !(bounded.is_empty() && open.is_empty());
-        any.then(|| sufficient(Statement::WhatActs, open.is_empty(), detail))
+        any.then(|| match open.is_empty() {
+            true => proved(Statement::WhatActs, Reason::Assumed),
+            false => undecided(Statement::WhatActs, Reason::ActsWithoutBound(open)),
+        })
     }
 
     /// With bounds of what acts on the plant, one per augmented state.
@@ -92,10 +88,10 @@ impl Assumptions {
     }
 
     /// The states that process noise moves.
-    fn moved(&self) -> Vec<&str> {
+    fn moved(&self) -> Vec<String> {
         let pairs = self.names.iter().zip(&self.process_noise);
         let moved = pairs.filter(|(_, density)| **density > 0.0);
-        moved.map(|(name, _)| name.as_str()).collect()
+        moved.map(|(name, _)| name.clone()).collect()
     }
 
     /// The unknown inputs, from state `first` on, that neither a bound of their rate of change nor process
@@ -141,28 +137,15 @@ impl Assumptions {
             let reading = self.reading(augmented, j, output)?;
             let is_shown = reading.is_defined() && reading.is_subset(limits);
             self.within_limits.get_or_insert_with(|| {
-                proved(
-                    Statement::ReadingsAreShown,
-                    "h on the box, with the measurement errors",
-                )
+                proved(Statement::ReadingsAreShown, Reason::ReadingsOnTheBox)
             });
             if !is_shown {
-                beyond.push(format!(
-                    "{} lies in [{}, {}] and its sensor shows [{}, {}]",
-                    output.variable.name,
-                    short(reading.lo()),
-                    short(reading.hi()),
-                    short(limits.lo()),
-                    short(limits.hi()),
-                ));
+                beyond.push((output.variable.name.clone(), reading, limits));
             }
         }
         if !beyond.is_empty() {
-            let detail = format!(
-                "{}: at an end of the range a reading is no value of h; narrow the box, or take family = \"ekf\", which counts it as a bound",
-                beyond.join("; ")
-            );
-            self.within_limits = Some(undecided(Statement::ReadingsAreShown, detail));
+            let reason = Reason::BeyondSensors(beyond);
+            self.within_limits = Some(undecided(Statement::ReadingsAreShown, reason));
         }
         Ok(self)
     }
@@ -212,6 +195,8 @@ pub struct Constant {
     pub value: f64,
     /// what it is, in a few words
     pub meaning: String,
+    /// numbers that stand in the place of `{}` in the meaning
+    pub numbers: Vec<f64>,
 }
 
 impl Constant {
@@ -221,6 +206,7 @@ impl Constant {
             name: name.into(),
             value,
             meaning: meaning.into(),
+            numbers: vec![],
         }
     }
 }
@@ -255,7 +241,7 @@ pub struct Bounds {
 pub struct Certificate {
     /// what proves it, e.g. `Theorem 2 of Hammouri, Targui and Armanet` or
     /// `linear matrix inequality`
-    pub basis: String,
+    pub basis: &'static str,
     /// guaranteed decay rate, 1/time unit; only where proved
     pub rate: Option<f64>,
     /// c of the bound above: the factor by which the error may peak; only where proved
@@ -277,9 +263,8 @@ pub struct Certificate {
     /// P of the Lyapunov function V = eᵀPe, V' ≤ −2·rate·V, in the order of the
     /// augmented states; only where the proof has one
     pub lyapunov: Option<DMatrix<f64>>,
-    /// what the reader should know, in words
-    pub notes: Vec<String>,
-    regularity: Check,
+    /// what the reader should know
+    pub notes: Vec<Reason>,
 }
 
 impl Certificate {
@@ -293,18 +278,14 @@ impl Certificate {
     /// A certificate without rate, bounds, constants and notes; its verdict is
     /// that of the hypotheses, of which the first is always that the plant has values on
     /// the box of the assumptions and does not jump there.
-    pub fn new(
-        basis: impl Into<String>,
-        assumptions: &Assumptions,
-        hypotheses: Vec<Check>,
-    ) -> Self {
+    pub fn new(basis: &'static str, assumptions: &Assumptions, hypotheses: Vec<Check>) -> Self {
         let bounded = |d: &&Dimension| d.symbol != assumptions.time || d.max.is_finite();
         let sides = assumptions.region.dimensions.iter().filter(bounded);
         let first = std::iter::once(assumptions.regularity.clone()).chain(assumptions.what_acts());
         let first = first.chain(assumptions.within_limits.clone());
         let hypotheses: Vec<Check> = first.chain(hypotheses).collect();
         Self {
-            basis: basis.into(),
+            basis,
             rate: None,
             overshoot: None,
             ultimate_bound: None,
@@ -315,62 +296,40 @@ impl Certificate {
             constants: vec![],
             lyapunov: None,
             notes: vec![],
-            regularity: assumptions.regularity.clone(),
         }
     }
 
     /// What is left of it where process noise moves the plant: that is Gaussian, no error has a bound for
     /// certain, and what would hold without it becomes a note.
     pub(crate) fn under(mut self, assumptions: &Assumptions) -> Self {
-        let moved = assumptions.moved().join(", ");
-        if moved.is_empty() || self.verdict() != Standing::Proved {
+        let states = assumptions.moved();
+        if states.is_empty() || self.verdict() != Standing::Proved {
             return self;
         }
+        let in_mean_square = self.mean_square.is_some();
+        self.notes.push(Reason::Moved {
+            states,
+            in_mean_square,
+        });
+        let states = std::mem::take(&mut self.ultimate);
         let without = self.ultimate_bound.take().filter(|norm| *norm > 0.0);
-        let each = std::mem::take(&mut self.ultimate);
-        let kept = match &self.mean_square {
-            Some(_) => {
-                "what ends within a bound is its mean square, for a plant that goes on outside of the box with the same slopes"
-            }
-            None => "of its mean square no bound is known here either",
-        };
-        self.notes.push(format!("the process noise of {moved} is Gaussian, so that no bound holds of the error for certain and plant and estimate leave any box now and then: {kept}"));
         self.notes.extend(without.map(|norm| {
-            let each: Vec<String> = each
-                .iter()
-                .map(|b| format!("{} of {}", short(b.value), b.name))
-                .collect();
-            match each.is_empty() {
-                true => format!(
-                    "without the process noise the error would end within {} (Euclidean norm)",
-                    short(norm)
-                ),
-                false => format!(
-                    "without the process noise the error would end within {}",
-                    each.join(", ")
-                ),
-            }
+            let states = states.into_iter().map(|b| (b.name, b.value)).collect();
+            Reason::WithoutNoise { norm, states }
         }));
         self
     }
 
     /// Of a Kalman filter, of which nothing is certified.
-    pub(crate) fn of_filter(basis: impl Into<String>, assumptions: &Assumptions) -> Self {
-        let reason = "its gain depends on the run: no theorem holds on the whole box, however good it is on a log";
-        let check = undecided(Statement::FilterConverges, reason);
+    pub(crate) fn of_filter(basis: &'static str, assumptions: &Assumptions) -> Self {
+        let check = undecided(Statement::FilterConverges, Reason::GainOfTheRun);
         Self::new(basis, assumptions, vec![check])
     }
 
     /// A limit ended the work: nothing is decided.
-    pub(crate) fn ended(basis: impl Into<String>, assumptions: &Assumptions, spent: Spent) -> Self {
-        let check = undecided(Statement::Finished, spent.to_string());
+    pub(crate) fn ended(basis: &'static str, assumptions: &Assumptions, spent: Spent) -> Self {
+        let check = undecided(Statement::Finished, Reason::Spent(spent));
         Self::new(basis, assumptions, vec![check])
-    }
-
-    /// That the plant has values on the box and does not jump: no certificate is made without
-    /// asking, and it is the first of the hypotheses.
-    pub fn regularity(&self) -> &Check {
-        &self.regularity
     }
 
     /// Proved: the error decays at the stated rate, for everything in the box. Refuted: a point

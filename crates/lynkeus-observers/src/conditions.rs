@@ -10,41 +10,11 @@ use lynkeus_proof::hurwitz;
 use lynkeus_proof::hurwitz::Stability;
 use lynkeus_structure::sign::Sign;
 use lynkeus_structure::{
-    AugmentedPlant, ChainRequest, Finding, Point, Region, Verdict, has_value_at, regularity, short,
-    sign,
+    AugmentedPlant, ChainRequest, Point, Region, Verdict, has_value_at, regularity, sign,
 };
 
 use crate::statement::proved;
-use crate::{Check, DesignError, KeySpec, Shape, Statement, Tuning, TuningError};
-
-/// ∂f_row/∂x_column with the verdict on its sign.
-fn partial(
-    augmented: &AugmentedPlant<'_>,
-    row: usize,
-    column: usize,
-    region: &Region,
-) -> Result<(Node, Sign), DesignError> {
-    let graph = augmented.graph();
-    // where the pattern has the dependency, a missing derivative is a step function's
-    let node = augmented
-        .partial(row, column)
-        .unwrap_or_else(|| graph.constant(0.0).node());
-    let mut found = sign::keeps_sign(graph, node, region)?;
-    // log(x) has a derivative at x < 0, where it has no value: no witness lies there
-    if let Verdict::Refuted(witness) = &found.finding.verdict
-        && !has_value_at(graph, augmented.derivatives[row], witness, region)?
-    {
-        let f = &augmented.states[row].name;
-        found.finding.reason = format!(
-            "{}, but where f({f}) has no value",
-            found.finding.reason.text()
-        )
-        .into();
-        let place = region.restricted(&graph.symbols_of(&[node])).dimensions;
-        found.finding.verdict = Verdict::Undecided(place);
-    }
-    Ok((node, found))
-}
+use crate::{Check, DesignError, KeySpec, Reason, Shape, Statement, Tuning, TuningError};
 
 /// ∂f_j/∂x_{j+1} along a chain.
 #[derive(Clone, Debug)]
@@ -80,23 +50,58 @@ pub(crate) fn partials(
     states: &[usize],
     region: &Region,
 ) -> Result<(Vec<Partial>, Vec<Check>), DesignError> {
-    let (mut found, mut checks) = (vec![], vec![]);
+    let graph = augmented.graph();
+    let (mut partials, mut checks) = (vec![], vec![]);
     for pair in states.windows(2) {
         lasts(augmented)?;
-        let (node, verdict) = partial(augmented, pair[0], pair[1], region)?;
-        found.push(Partial {
-            node,
-            sign: verdict.sign,
-            bounds: verdict.bounds,
-        });
-        let name = |i: usize| augmented.states[i].name.clone();
-        let statement = Statement::PartialKeepsSign {
-            of: name(pair[0]),
-            by: name(pair[1]),
+        // where the pattern has the dependency, a missing derivative is a step function's
+        let node = augmented.partial(pair[0], pair[1]);
+        let node = node.unwrap_or_else(|| graph.constant(0.0).node());
+        let Sign {
+            finding,
+            sign,
+            bounds,
+        } = sign::keeps_sign(graph, node, region)?;
+        let [of, by] = [pair[0], pair[1]].map(|i| augmented.states[i].name.clone());
+        // log(x) has a derivative at x < 0, where it has no value: no witness lies there
+        let is_nowhere = match &finding.verdict {
+            Verdict::Refuted(witness) => {
+                !has_value_at(graph, augmented.derivatives[pair[0]], witness, region)?
+            }
+            _ => false,
         };
-        checks.push(statement.with(verdict.finding));
+        let statement = Statement::PartialKeepsSign { of: of.clone(), by };
+        checks.push(match is_nowhere {
+            true => {
+                let place = region.restricted(&graph.symbols_of(&[node])).dimensions;
+                let found = finding.reason;
+                statement.found(
+                    Verdict::Undecided(place),
+                    Reason::WhereNothingIs { found, of },
+                )
+            }
+            false => statement.with(finding),
+        });
+        partials.push(Partial { node, sign, bounds });
     }
-    Ok((found, checks))
+    Ok((partials, checks))
+}
+
+/// The partials along every chain, by the places of its output and of its states, with the verdicts on
+/// them and on the outputs' slopes.
+pub(crate) fn along<'c>(
+    augmented: &AugmentedPlant<'_>,
+    chains: impl IntoIterator<Item = (usize, &'c [usize])>,
+    region: &Region,
+) -> Result<(Vec<Vec<Partial>>, Vec<Check>), DesignError> {
+    let (mut all, mut checks) = (vec![], vec![]);
+    for (output, states) in chains {
+        checks.extend(output_slope(augmented, output, region)?);
+        let (found, signs) = partials(augmented, states, region)?;
+        checks.extend(signs);
+        all.push(found);
+    }
+    Ok((all, checks))
 }
 
 /// The slope of an output in its state must not vanish; nothing to check where
@@ -171,28 +176,24 @@ pub(crate) fn lipschitz(
         if at_once || sign::bounded(graph, node, region)? {
             continue;
         }
-        let detail = format!(
-            "∂f({})/∂{} = {} is not known to be bounded; declare min and max, and mind divisions and roots at the edges of the box",
-            augmented.states[row].name,
-            augmented.states[column].name,
-            graph.render(node, 60)
-        );
         let used = region.restricted(&graph.symbols_of(&[node]));
-        let verdict = Verdict::Undecided(used.dimensions);
-        return Ok(Statement::Lipschitz.with(Finding {
-            verdict,
-            reason: detail.into(),
-        }));
+        let name = |i: usize| augmented.states[i].name.clone();
+        let reason = Reason::Unbounded {
+            of: name(row),
+            by: name(column),
+            slope: graph.render(node, 60),
+            undeclared: None,
+        };
+        return Ok(Statement::Lipschitz.found(Verdict::Undecided(used.dimensions), reason));
     }
-    let detail = format!("{} entries enclosed", jacobian.entries.len());
-    Ok(proved(Statement::Lipschitz, detail))
+    let reason = Reason::Enclosed(jacobian.entries.len());
+    Ok(proved(Statement::Lipschitz, reason))
 }
 
 /// The states of each chain, for the families that have chains.
 pub(crate) const CHAINS: KeySpec = KeySpec {
     name: "chains",
-    kind: "list of lists of names",
-    shape: Shape::List(&Shape::NAMES),
+    shape: Shape::As("list of lists of names", &Shape::List(&Shape::NAMES)),
     default: "found",
     meaning: "the states of each chain, from the sensor outward",
 };
@@ -298,24 +299,6 @@ impl GainedChain<'_> {
     }
 }
 
-/// What is said of eigenvalues: `eigenvalues −1, −2 ± 1i`, or that none were found.
-pub(crate) fn told(eigenvalues: &[(f64, f64)]) -> String {
-    match eigenvalues.is_empty() {
-        true => "eigenvalues beyond the range of numbers".to_owned(),
-        false => format!("eigenvalues {}", listed(eigenvalues)),
-    }
-}
-
-/// Eigenvalues in words: conjugate pairs once.
-fn listed(eigenvalues: &[(f64, f64)]) -> String {
-    let upper = eigenvalues.iter().filter(|λ| λ.1 >= 0.0);
-    let one = |&(re, im): &(f64, f64)| match im == 0.0 {
-        true => short(re),
-        false => format!("{} ± {}i", short(re), short(im)),
-    };
-    upper.map(one).collect::<Vec<_>>().join(", ")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -348,12 +331,11 @@ mod tests {
     }
 
     #[test]
-    fn pairs_are_listed_once() {
+    fn the_middle_of_partials_of_one_sign() {
         let chain = GainedChain {
             K: &[-2.0, 5.0],
             partials: &[(1.0, 1.0)],
         };
-        assert_eq!(listed(&chain.eigenvalues(&[1.0])), "1 ± 2i");
         assert_eq!(chain.middle(), Some(vec![1.0]));
         let mixed = GainedChain {
             K: &[1.0, 1.0],
@@ -385,13 +367,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_found_is_not_listed() {
+    fn eigenvalues_out_of_range_are_not_found() {
         let chain = GainedChain {
             K: &[1e200, 1e200],
             partials: &[(1e200, 1e200)],
         };
         assert_eq!(chain.eigenvalues(&[1e200]), []);
         assert_eq!(chain.witness(&[1e200]).value, 0.0);
-        assert!(!told(&[]).ends_with(' '));
     }
 }

@@ -5,7 +5,7 @@ use lynkeus_expr::{MissingInput, Spent};
 use lynkeus_structure::{AugmentedPlant, Region, Standing};
 
 use crate::statement::standing;
-use crate::{Check, Observer, Statement, TuningError};
+use crate::{Check, Observer, Reason, Statement, TuningError};
 
 /// Whether a family fits, in the words of reports: it does where every condition is proved, and
 /// does not where the form is another or a condition is refuted.
@@ -22,8 +22,8 @@ pub fn fit_word(fit: Standing) -> &'static str {
 pub struct Examination {
     /// name of the family
     pub family: &'static str,
-    /// what was found, in one or two sentences: the chains, or what breaks the form
-    pub summary: String,
+    /// what was found: the chains, or what breaks the form
+    pub summary: Reason,
     /// names of the states of each chain, where the form was found
     pub chains: Vec<Vec<String>>,
     /// every condition of the family with its verdict
@@ -52,14 +52,14 @@ impl Examination {
         augmented: &AugmentedPlant<'_>,
         region: &Region,
         family: &'static str,
-        summary: String,
+        summary: impl Into<Reason>,
         chains: Vec<Vec<String>>,
         checks: Vec<Check>,
     ) -> Result<Self, MissingInput> {
         let regularity = Statement::PlantIsRegular.with(augmented.regularity(region)?);
         Ok(Self {
             family,
-            summary,
+            summary: summary.into(),
             chains,
             checks,
             plant: PlantFit::Form(regularity),
@@ -67,10 +67,14 @@ impl Examination {
     }
 
     /// The plant does not have the form, or a condition ends the search for one.
-    pub(crate) fn unfit(family: &'static str, summary: String, checks: Vec<Check>) -> Self {
+    pub(crate) fn unfit(
+        family: &'static str,
+        summary: impl Into<Reason>,
+        checks: Vec<Check>,
+    ) -> Self {
         Self {
             family,
-            summary,
+            summary: summary.into(),
             chains: vec![],
             checks,
             plant: PlantFit::Unfit,
@@ -78,10 +82,10 @@ impl Examination {
     }
 
     /// Of a family that asks nothing of a plant, and promises nothing.
-    pub(crate) fn of_any_plant(family: &'static str, summary: String) -> Self {
+    pub(crate) fn of_any_plant(family: &'static str, summary: impl Into<Reason>) -> Self {
         Self {
             family,
-            summary,
+            summary: summary.into(),
             chains: vec![],
             checks: vec![],
             plant: PlantFit::Any,
@@ -92,7 +96,7 @@ impl Examination {
     pub(crate) fn ended(family: &'static str, spent: Spent) -> Self {
         Self {
             plant: PlantFit::Ended(spent),
-            ..Self::unfit(family, format!("undecided: {spent}"), vec![])
+            ..Self::unfit(family, Reason::Ended(spent), vec![])
         }
     }
 
@@ -153,10 +157,83 @@ pub struct Design {
     pub examination: Examination,
     /// gains, one per chain
     pub gains: Vec<ChainGain>,
-    /// numbers that the tool chose or was given, for the reader: (name, value)
-    pub parameters: Vec<(String, String)>,
+    /// what the tool chose or was given: (name, value)
+    pub parameters: Vec<(String, ParameterValue)>,
     /// what the user should know
-    pub notes: Vec<String>,
+    pub notes: Vec<Reason>,
+}
+
+/// The value of a parameter of a design.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ParameterValue {
+    /// names or expressions
+    Names(Vec<String>),
+    /// names in blocks, one after the other
+    Blocks(Vec<Vec<String>>),
+    /// the least excitation that raises no alarm
+    Alarm(f64),
+    /// numbers
+    Numbers(Vec<f64>),
+    /// pairs of them
+    Pairs(Vec<[f64; 2]>),
+    /// a number that is computed
+    Computed(f64),
+    /// numbers row by row, NaN where there is none
+    Matrix(Vec<Vec<f64>>),
+    /// expressions row by row
+    Expressions(Vec<Vec<String>>),
+    /// the same, each with its value at the start where all it reads has one
+    AtStart(Vec<Vec<Shown>>),
+    /// a gain on ŷ − y
+    Gain {
+        /// the gain
+        gain: Shown,
+        /// whether ŷ − y is limited before
+        limited: bool,
+    },
+    /// θ in the transient
+    Transient {
+        /// by chain
+        θ: Vec<f64>,
+        /// up to this time
+        until: f64,
+        /// the time constant of the change
+        fall: Option<f64>,
+    },
+    /// of a first estimate
+    Variance {
+        /// the variance
+        variance: f64,
+        /// it follows from the declared range
+        from_range: bool,
+    },
+}
+
+/// A number, or an expression with its value at the start where all that it reads has one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// the number or the expression
+    pub text: String,
+    /// the value of an expression
+    pub at_start: Option<f64>,
+}
+
+impl From<Vec<String>> for ParameterValue {
+    fn from(names: Vec<String>) -> Self {
+        Self::Names(names)
+    }
+}
+
+impl From<f64> for ParameterValue {
+    fn from(number: f64) -> Self {
+        Self::Numbers(vec![number])
+    }
+}
+
+impl From<Vec<f64>> for ParameterValue {
+    fn from(numbers: Vec<f64>) -> Self {
+        Self::Numbers(numbers)
+    }
 }
 
 /// Why there is no observer.
@@ -169,12 +246,12 @@ pub enum DesignError {
     #[error(transparent)]
     Tuning(#[from] TuningError),
     /// no gain of the kind asked for exists, or none is proved
-    #[error("{reason}")]
+    #[error("no gain as the key '{key}' asks for")]
     NoGain {
         /// the key that asks for too much
         key: &'static str,
-        /// what blocks it and what to do
-        reason: String,
+        /// what blocks it
+        reason: Reason,
     },
     /// the plant has parameters without value
     #[error(transparent)]
@@ -192,3 +269,27 @@ pub struct Found<F> {
 
 /// A form, or the examination that says why there is none.
 pub type Searched<F> = Result<Result<Found<F>, Examination>, DesignError>;
+
+/// Of the candidates the first whose conditions are proved, else the first that no condition refutes, else
+/// the first; there is one.
+pub fn first_fit<C, F>(
+    candidates: impl IntoIterator<Item = C>,
+    examined: impl Fn(C) -> Result<Found<F>, DesignError>,
+) -> Searched<F> {
+    let mut best: Option<Found<F>> = None;
+    for candidate in candidates {
+        let found = examined(candidate)?;
+        let fit = found.examination.fit();
+        if best
+            .as_ref()
+            .is_none_or(|best| fit < best.examination.fit())
+        {
+            best = Some(found);
+        }
+        if fit == Standing::Proved {
+            break;
+        }
+    }
+    let none = || TuningError::new("chains", "a chain", "none");
+    best.map(Ok).ok_or_else(|| none().into())
+}

@@ -22,7 +22,7 @@ use lynkeus_structure::{AugmentedPlant, Measurement, Region};
 use crate::conditions::Partial;
 use crate::tuning::is_or_has;
 use crate::{
-    Estimate, Initial, KeySpec, Observer, Shape, Signal, Tunable, Tunables, Tuning, TuningError,
+    Estimate, Initial, KeySpec, Observer, Reason, Shape, Signal, Tunable, Tuning, TuningError,
 };
 
 /// The keys of every observer, read.
@@ -178,7 +178,8 @@ impl PlantCopy<'_, '_> {
             estimates: self.estimates(),
             monitors: vec![],
             filter: None,
-            tunables: Tunables::default(),
+            tunables: vec![],
+            is_whole: false,
         })
     }
 }
@@ -204,7 +205,6 @@ pub(crate) fn middle(variable: &Variable) -> f64 {
 /// The study's key.
 pub(crate) const PROLONG: KeySpec = KeySpec {
     name: "prolong",
-    kind: "true, false",
     shape: Shape::Flag,
     default: "false",
     meaning: "outside of the declared ranges the plant's functions are [prolonged](triangular.md#options) as the papers ask, so that the theorem holds for every start of the estimate",
@@ -259,7 +259,7 @@ pub(crate) fn refuse(common: &Common, observer: &str) -> Result<(), TuningError>
 ///
 /// Everywhere only where the box of the proof is the one that the observer projects on and
 /// takes its slopes from: a smaller one of states (`tube`) or of inputs has other bounds.
-pub(crate) fn note(common: &Common, augmented: &AugmentedPlant<'_>, region: &Region) -> String {
+pub(crate) fn note(common: &Common, augmented: &AugmentedPlant<'_>, region: &Region) -> Reason {
     let whole = |variable: &Variable| {
         let mut sides = region.dimensions.iter();
         let side = sides.find(|d| d.symbol == variable.node);
@@ -267,9 +267,11 @@ pub(crate) fn note(common: &Common, augmented: &AugmentedPlant<'_>, region: &Reg
     };
     let declared = augmented.plant.states.iter().chain(&augmented.plant.inputs);
     match (common.prolong, declared.into_iter().all(whole)) {
-        (true, true) => "The guarantee holds for every start of the estimate, while the plant stays in the box: outside of it the functions are prolonged with the same bounds of their slopes ('prolong').".into(),
-        (true, false) => "The guarantee holds while plant and estimate stay in the box, which is smaller than the declared one that the functions are prolonged from ('prolong'): on the declared box it would hold for every start of the estimate.".into(),
-        (false, _) => box_note(common.clamp),
+        (true, true) => Reason::EveryStart,
+        (true, false) => Reason::PartOfTheBox,
+        (false, _) => Reason::InTheBox {
+            clamp: common.clamp,
+        },
     }
 }
 
@@ -278,10 +280,8 @@ pub(crate) fn note(common: &Common, augmented: &AugmentedPlant<'_>, region: &Reg
 pub(crate) struct Speed {
     /// the study's value
     value: f64,
-    /// its symbol, where it may be changed
-    symbol: Option<Node>,
-    name: String,
-    meaning: String,
+    /// where it may be changed
+    tunable: Option<Tunable>,
 }
 
 impl Speed {
@@ -292,15 +292,15 @@ impl Speed {
         meaning: String,
     ) -> Self {
         let name = name.into();
-        let graph = copy.augmented.graph();
+        let tunable = |name: String| Tunable {
+            symbol: copy.augmented.graph().fresh(name.as_str()).node(),
+            name,
+            value,
+            meaning,
+        };
         Self {
             value,
-            symbol: copy
-                .common
-                .tunable
-                .then(|| graph.fresh(name.as_str()).node()),
-            name,
-            meaning,
+            tunable: copy.common.tunable.then(|| tunable(name)),
         }
     }
 
@@ -327,8 +327,8 @@ impl Speed {
 
     /// The speed.
     pub fn expr<'g>(&self, graph: &'g Graph) -> Expr<'g> {
-        match self.symbol {
-            Some(symbol) => graph.expr(symbol),
+        match &self.tunable {
+            Some(tunable) => graph.expr(tunable.symbol),
             None => graph.constant(self.value),
         }
     }
@@ -336,9 +336,9 @@ impl Speed {
     /// A gain that is `gain` at the study's value and grows like a power of the speed.
     pub fn scaled<'g>(&self, graph: &'g Graph, gain: f64, exponent: f64) -> Expr<'g> {
         let gain = graph.constant(gain);
-        match self.symbol {
-            Some(symbol) => {
-                let ratio = graph.expr(symbol) / graph.constant(self.value);
+        match self.tunable {
+            Some(_) => {
+                let ratio = self.expr(graph) / graph.constant(self.value);
                 gain * ratio.pow(graph.constant(exponent))
             }
             None => gain,
@@ -349,23 +349,8 @@ impl Speed {
 impl Observer {
     /// The same, of which these may be changed where the tuning asks for that.
     pub(crate) fn tuned_by<'s>(mut self, speeds: impl IntoIterator<Item = &'s Speed>) -> Self {
-        let numbers = speeds.into_iter().filter_map(|speed| {
-            Some(Tunable {
-                name: speed.name.clone(),
-                symbol: speed.symbol?,
-                value: speed.value,
-                meaning: speed.meaning.clone(),
-            })
-        });
-        self.tunables.numbers.extend(numbers);
+        let numbers = speeds.into_iter().filter_map(|speed| speed.tunable.clone());
+        self.tunables.extend(numbers);
         self
-    }
-}
-
-/// What the box means for the guarantee.
-pub(crate) fn box_note(clamp: bool) -> String {
-    match clamp {
-        true => "The guarantee holds while plant and estimate stay in the box. Limiting what the functions see ('clamp') is no prolongation as the paper's: where an estimate is outside of its range, the functions do not react to it any more and the proof does not cover that time.".into(),
-        false => "The guarantee holds while plant and estimate stay in the box, or the functions are prolonged outside of it with the same bounds of their partial derivatives.".into(),
     }
 }

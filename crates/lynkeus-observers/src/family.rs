@@ -28,8 +28,6 @@ pub(crate) trait Stages: Sync {
     const KEYS: &'static [&'static [KeySpec]];
     /// how the entries of `theta` stand to one another where it has to be a list
     const SPEEDS: &'static [f64] = &[];
-    /// whether it takes any plant, without a theorem
-    const IS_FILTER: bool = false;
 
     /// The settings of a study.
     fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning)
@@ -67,7 +65,7 @@ pub(crate) trait Stages: Sync {
 }
 
 /// Work whose result counts only where the budget lasted.
-fn lasting<T>(
+pub(crate) fn lasting<T>(
     augmented: &AugmentedPlant<'_>,
     work: impl FnOnce() -> Result<T, DesignError>,
 ) -> Result<T, DesignError> {
@@ -86,10 +84,6 @@ impl<S: Stages> Family for S {
 
     fn speeds(&self) -> &'static [f64] {
         S::SPEEDS
-    }
-
-    fn is_filter(&self) -> bool {
-        S::IS_FILTER
     }
 
     fn keys(&self) -> Vec<&'static KeySpec> {
@@ -186,9 +180,17 @@ pub trait Family: Sync {
     }
     /// How the entries of `theta` stand to one another where it is a list of so many, the last one
     /// the rate at which the error decays; empty where it is one number.
-    fn speeds(&self) -> &'static [f64];
+    fn speeds(&self) -> &'static [f64] {
+        &[]
+    }
     /// Whether it is a filter: it takes any plant, and no theorem stands behind it.
-    fn is_filter(&self) -> bool;
+    fn is_filter(&self) -> bool {
+        false
+    }
+    /// Whether what it estimates over a log can be smoothed.
+    fn smooths(&self) -> bool {
+        false
+    }
     /// Whether every key has a value that can be used; a required one may be absent.
     ///
     /// # Errors

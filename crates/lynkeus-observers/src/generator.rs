@@ -7,8 +7,7 @@
 //! ∏(s − λᵢ) = sᵐ + k₁ sᵐ⁻¹ + … + k_m. Its states *are* u, u', …, u^(m−1), exact whatever the command does:
 //! with m ≥ n − r of them (4.1) has all it reads, and nothing is differenced.
 
-use lynkeus_expr::flow::Flow;
-use lynkeus_expr::{Graph, MissingInput, Node, flow};
+use lynkeus_expr::{Graph, Node};
 use lynkeus_gain::integrators::{Pole, place_all};
 
 use crate::{Observer, Signal};
@@ -19,18 +18,14 @@ pub enum Generator {
     /// u is this expression of time
     Time(Node),
     /// u is what a filter of gain one makes of a command
-    Prefilter(Prefilter),
-}
-
-/// A filter of gain one.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Prefilter {
-    /// its poles
-    pub poles: Vec<Pole>,
-    /// u, u', … where it starts; zeros where there are no more
-    pub start: Vec<f64>,
-    /// what the command is called
-    pub command: String,
+    Prefilter {
+        /// its poles
+        poles: Vec<Pole>,
+        /// u, u', … where it starts; zeros where there are no more
+        start: Vec<f64>,
+        /// what the command is called
+        command: String,
+    },
 }
 
 /// A generator that does not give what an observer reads.
@@ -73,7 +68,8 @@ impl Observer {
         };
         match generator {
             Generator::Time(u) => {
-                let derivatives = self.of_time(graph, input, *u);
+                let pair = [(input.to_owned(), *u)];
+                let derivatives = self.input_derivative_expressions(graph, &pair);
                 let derivatives = derivatives.map_err(|_| GeneratorError::NotOfTime {
                     input: input.to_owned(),
                 })?;
@@ -81,32 +77,19 @@ impl Observer {
                 self.generated.push((own.symbol, *u));
                 let own = (self.input_derivatives.iter()).filter(|needed| needed.input == input);
                 let own = own.map(|needed| needed.signal.symbol);
-                self.generated.extend(own.zip(derivatives));
+                self.generated
+                    .extend(own.zip(derivatives.into_iter().map(|(_, node)| node)));
                 self.see_generated(graph);
             }
-            Generator::Prefilter(filter) => self.filter_input(graph, place, filter)?,
+            Generator::Prefilter {
+                poles,
+                start,
+                command,
+            } => self.filter_input(graph, place, poles, start, command)?,
         }
         self.input_derivatives
             .retain(|needed| needed.input != input);
         Ok(())
-    }
-
-    /// The derivatives that are read of an input, as expressions of time.
-    fn of_time(&self, graph: &Graph, input: &str, u: Node) -> Result<Vec<Node>, MissingInput> {
-        let flow = Flow {
-            time: self.time,
-            states: &[],
-            derivatives: &[],
-            inputs: &[],
-        };
-        let needed = self.input_derivatives.iter();
-        let needed = needed.filter(|needed| needed.input == input);
-        let mut found = vec![];
-        for needed in needed {
-            let jets = flow::derivatives(graph, &flow, &[u], needed.order)?;
-            found.extend(jets.iter().flatten().last());
-        }
-        Ok(found)
     }
 
     /// Expressions of time in the place of what they generate.
@@ -126,9 +109,11 @@ impl Observer {
         &mut self,
         graph: &Graph,
         place: usize,
-        filter: &Prefilter,
+        poles: &[Pole],
+        start: &[f64],
+        command: &str,
     ) -> Result<(), GeneratorError> {
-        let k = place_all(&filter.poles);
+        let k = place_all(poles);
         let input = self.inputs[place].clone();
         let own = (self.input_derivatives.iter()).filter(|d| d.input == input.name);
         let read = own.clone().map(|d| d.order).max().unwrap_or(0) + 1;
@@ -145,7 +130,7 @@ impl Observer {
             _ => Signal::fresh(graph, "derivative", &format!("{order} of {}", input.name)),
         };
         let w: Vec<Signal> = (0..k.len()).map(entry).collect();
-        let command = Signal::fresh(graph, "command", &filter.command);
+        let command = Signal::fresh(graph, "command", command);
         let spring = graph.expr(command.symbol) - graph.expr(w[0].symbol);
         let mut last = graph.constant(k[k.len() - 1]) * spring;
         for (signal, &k) in w.iter().skip(1).zip(k.iter().rev().skip(1)) {
@@ -154,7 +139,7 @@ impl Observer {
         self.derivatives
             .extend(w.iter().skip(1).map(|signal| signal.symbol));
         self.derivatives.push(last.node());
-        let starts = filter.start.iter().copied().chain(std::iter::repeat(0.0));
+        let starts = start.iter().copied().chain(std::iter::repeat(0.0));
         self.states.extend(w.into_iter().zip(starts));
         self.inputs[place] = command;
         Ok(())
@@ -166,7 +151,7 @@ mod tests {
     use super::*;
     use lynkeus_expr::Tape;
 
-    use crate::{InputDerivative, Tunables};
+    use crate::InputDerivative;
 
     /// x' = u + u', nothing measured.
     fn observer(graph: &Graph) -> Observer {
@@ -190,7 +175,8 @@ mod tests {
             estimates: vec![],
             monitors: vec![],
             filter: None,
-            tunables: Tunables::default(),
+            tunables: vec![],
+            is_whole: false,
         }
     }
 
@@ -210,12 +196,10 @@ mod tests {
     fn a_filter_of_two_poles_by_hand() {
         let graph = Graph::new();
         let mut observer = observer(&graph);
-        let filter = |poles: &[f64]| {
-            Generator::Prefilter(Prefilter {
-                poles: poles.iter().map(|λ| Pole::Real(*λ)).collect(),
-                start: vec![0.5],
-                command: "r".into(),
-            })
+        let filter = |poles: &[f64]| Generator::Prefilter {
+            poles: poles.iter().map(|λ| Pole::Real(*λ)).collect(),
+            start: vec![0.5],
+            command: "r".into(),
         };
         let refused = observer.clone().generate(&graph, "u", &filter(&[-1.0]));
         assert!(matches!(

@@ -15,15 +15,14 @@
 
 use lynkeus_model::Variable;
 use lynkeus_run::filter::{FilterKind, SigmaPoints};
-use lynkeus_structure::{AugmentedPlant, Region, Standing};
+use lynkeus_structure::{AugmentedPlant, Standing};
 
-use crate::design::{Found, Searched};
 use crate::estimate::{Common, PlantCopy, Speed, limited};
-use crate::family::Stages;
+use crate::family::lasting;
 use crate::tuning::is_or_has;
 use crate::{
-    Assumptions, Certificate, Design, DesignError, Examination, FilterTuning, KeySpec, Shape,
-    Signal, Statement, Tuning, TuningError, Value,
+    Assumptions, Certificate, Design, DesignError, Examination, Family, FilterTuning, KeySpec,
+    ParameterValue, Reason, Shape, Signal, Statement, Tuning, TuningError, Value,
 };
 
 /// The tunable number of a filter: no equation reads it, the noises are the study's.
@@ -31,46 +30,33 @@ const NOISE_SCALE: &str = "process_noise_scale";
 
 const NOISE_MEANING: &str = "multiplies the densities of process noise";
 
-/// The family `ekf`.
+/// A filter as a family.
 #[derive(Clone, Copy, Debug)]
-pub struct Ekf;
+pub struct Filter {
+    name: &'static str,
+    paper: &'static str,
+    /// what people call it
+    called: &'static str,
+    keys: &'static [&'static [KeySpec]],
+    kind: fn(&Tuning) -> Result<FilterKind, TuningError>,
+}
+
+/// The family `ekf`.
+pub const EKF: Filter = Filter {
+    name: "ekf",
+    paper: "Jazwinski 1970, the extended Kalman filter, continuous-discrete",
+    called: "extended Kalman filter",
+    keys: &[&KEYS, &BOUNDS],
+    kind: |_| Ok(FilterKind::Extended),
+};
 
 /// The family `ukf`.
-#[derive(Clone, Copy, Debug)]
-pub struct Ukf;
-
-/// The family `mhe`.
-#[derive(Clone, Copy, Debug)]
-pub struct Mhe;
-
-/// What each has of its own.
-trait Kalman: Sync {
-    const NAME: &'static str;
-    const PAPER: &'static str;
-    const WORDS: &'static str;
-    const KEYS: &'static [&'static [KeySpec]];
-
-    fn kind(tuning: &Tuning) -> Result<FilterKind, TuningError>;
-}
-
-impl Kalman for Ekf {
-    const NAME: &'static str = "ekf";
-    const PAPER: &'static str = "Jazwinski 1970, the extended Kalman filter, continuous-discrete";
-    const WORDS: &'static str = "extended Kalman filter";
-    const KEYS: &'static [&'static [KeySpec]] = &[&KEYS, &BOUNDS];
-
-    fn kind(_: &Tuning) -> Result<FilterKind, TuningError> {
-        Ok(FilterKind::Extended)
-    }
-}
-
-impl Kalman for Ukf {
-    const NAME: &'static str = "ukf";
-    const PAPER: &'static str = "Julier and Uhlmann 1997, the unscented Kalman filter";
-    const WORDS: &'static str = "unscented Kalman filter";
-    const KEYS: &'static [&'static [KeySpec]] = &[&KEYS, &BOUNDS, &POINTS];
-
-    fn kind(tuning: &Tuning) -> Result<FilterKind, TuningError> {
+pub const UKF: Filter = Filter {
+    name: "ukf",
+    paper: "Julier and Uhlmann 1997, the unscented Kalman filter",
+    called: "unscented Kalman filter",
+    keys: &[&KEYS, &BOUNDS, &POINTS],
+    kind: |tuning| {
         let SigmaPoints { alpha, beta, kappa } = SigmaPoints::default();
         let [own_alpha, own_beta, own_kappa] = &POINTS;
         Ok(FilterKind::Unscented(SigmaPoints {
@@ -78,16 +64,16 @@ impl Kalman for Ukf {
             beta: number(tuning, own_beta)?.unwrap_or(beta),
             kappa: number(tuning, own_kappa)?.unwrap_or(kappa),
         }))
-    }
-}
+    },
+};
 
-impl Kalman for Mhe {
-    const NAME: &'static str = "mhe";
-    const PAPER: &'static str = "Rao, Rawlings and Mayne 2003, moving-horizon estimation";
-    const WORDS: &'static str = "moving-horizon estimator";
-    const KEYS: &'static [&'static [KeySpec]] = &[&KEYS, &WINDOW];
-
-    fn kind(tuning: &Tuning) -> Result<FilterKind, TuningError> {
+/// The family `mhe`.
+pub const MHE: Filter = Filter {
+    name: "mhe",
+    paper: "Rao, Rawlings and Mayne 2003, moving-horizon estimation",
+    called: "moving-horizon estimator",
+    keys: &[&KEYS, &WINDOW],
+    kind: |tuning| {
         let [horizon] = &WINDOW;
         let length = match number(tuning, horizon)? {
             None => HORIZON,
@@ -95,46 +81,41 @@ impl Kalman for Mhe {
             Some(x) => return Err(horizon.wrong(x)),
         };
         Ok(FilterKind::MovingHorizon(length))
+    },
+};
+
+impl Filter {
+    fn read(
+        &self,
+        augmented: &AugmentedPlant<'_>,
+        tuning: &Tuning,
+    ) -> Result<Settings, TuningError> {
+        Ok(Settings {
+            kind: (self.kind)(tuning)?,
+            common: Common::read(tuning)?,
+            gate: tuning.positive(GATE.name)?,
+            projects: tuning.meant(&BOUNDS[0], [true])?.is_some(),
+            variance: variances(augmented, tuning)?,
+        })
     }
-}
 
-impl<K: Kalman> Stages for K {
-    type Settings = Settings;
-    type Form<'e, 'p: 'e> = ();
-    const NAME: &'static str = K::NAME;
-    const PAPER: &'static str = K::PAPER;
-    const BASIS: &'static str = "no theorem";
-    const IS_FILTER: bool = true;
-    const KEYS: &'static [&'static [KeySpec]] = K::KEYS;
-
-    fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
-        Settings::read(augmented, tuning, K::kind(tuning)?)
-    }
-
-    fn form(augmented: &AugmentedPlant<'_>, _: &Settings, region: &Region) -> Searched<()> {
-        let regularity = Statement::PlantIsRegular.with(augmented.regularity(region)?);
-        let jumps = match regularity.standing() {
-            Standing::Refuted => format!(
-                "; {}: the filter linearises beside such places",
-                regularity.reason.text()
-            ),
-            _ => String::new(),
+    fn examined(&self, augmented: &AugmentedPlant<'_>) -> Result<Examination, DesignError> {
+        let region = augmented.region();
+        let regularity = Statement::PlantIsRegular.with(augmented.regularity(&region)?);
+        let irregular = match regularity.standing() {
+            Standing::Refuted => Some(Box::new(regularity.reason)),
+            _ => None,
         };
-        let summary = format!(
-            "the {} runs on any plant; no theorem bounds its error{jumps}",
-            K::WORDS
-        );
-        let examination = Examination::of_any_plant(K::NAME, summary);
-        Ok(Ok(Found {
-            form: (),
-            examination,
-        }))
+        let filter = self.called;
+        let summary = Reason::AnyPlant { filter, irregular };
+        Ok(Examination::of_any_plant(self.name, summary))
     }
 
-    fn design(
+    fn designed(
+        &self,
         augmented: &AugmentedPlant<'_>,
         settings: &Settings,
-        found: Found<()>,
+        examination: Examination,
     ) -> Result<Design, DesignError> {
         let copy = PlantCopy::new(augmented, &settings.common);
         let derivatives = copy.at_estimate(&augmented.derivatives);
@@ -145,7 +126,7 @@ impl<K: Kalman> Stages for K {
         let confined = augmented
             .graph()
             .substitute(&derivatives, &limits.collect());
-        let mut observer = copy.observer(K::NAME, derivatives)?;
+        let mut observer = copy.observer(self.name, derivatives)?;
         let scale = Speed::new(&copy, NOISE_SCALE, 1.0, NOISE_MEANING.to_owned());
         observer = observer.tuned_by([&scale]);
         let variance = settings.variances(augmented, &observer.states);
@@ -158,82 +139,129 @@ impl<K: Kalman> Stages for K {
             initial_variance: variance.clone(),
         });
         let given = settings.variance.iter().zip(&augmented.states);
-        let parameters = variance.iter().zip(given).map(|(value, (given, state))| {
-            let from = match given {
-                Some(_) => "",
-                None => " (from its range)",
-            };
-            (
-                format!("initial variance of {}", state.name),
-                format!("{value}{from}"),
-            )
-        });
+        let parameters = variance
+            .iter()
+            .zip(given)
+            .map(|(variance, (given, state))| {
+                let value = ParameterValue::Variance {
+                    variance: *variance,
+                    from_range: given.is_none(),
+                };
+                (format!("initial variance of {}", state.name), value)
+            });
         Ok(Design {
             observer,
-            examination: found.examination,
+            examination,
             gains: vec![],
             parameters: parameters.collect(),
             notes: vec![],
         })
     }
+}
+
+impl Family for Filter {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn paper(&self) -> &'static str {
+        self.paper
+    }
+
+    fn keys(&self) -> Vec<&'static KeySpec> {
+        self.keys.iter().copied().flatten().collect()
+    }
+
+    fn is_filter(&self) -> bool {
+        true
+    }
+
+    fn smooths(&self) -> bool {
+        self.name == EKF.name
+    }
+
+    fn verify(&self, augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<(), TuningError> {
+        self.read(augmented, tuning).map(drop)
+    }
+
+    fn examine(
+        &self,
+        augmented: &AugmentedPlant<'_>,
+        tuning: &Tuning,
+    ) -> Result<Examination, DesignError> {
+        self.read(augmented, tuning)?;
+        match lasting(augmented, || self.examined(augmented)) {
+            Err(DesignError::Spent(spent)) => Ok(Examination::ended(self.name, spent)),
+            examined => examined,
+        }
+    }
+
+    fn design(
+        &self,
+        augmented: &AugmentedPlant<'_>,
+        tuning: &Tuning,
+    ) -> Result<Design, DesignError> {
+        let settings = self.read(augmented, tuning)?;
+        let examination = lasting(augmented, || self.examined(augmented))?;
+        lasting(augmented, || {
+            self.designed(augmented, &settings, examination)
+        })
+    }
 
     fn theorem(
+        &self,
         _: &AugmentedPlant<'_>,
-        _: &Settings,
-        _: Found<()>,
+        _: &Tuning,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        Ok(Certificate::of_filter(Self::BASIS, assumptions))
+        Ok(Certificate::of_filter("no theorem", assumptions))
     }
 }
 
 const VARIANCE: KeySpec = KeySpec {
     name: "initial_variance",
-    kind: "table: name = number ≥ 0, and `default`",
-    shape: Shape::Table(&Shape::NotNegative),
+    shape: Shape::As(
+        "table: name = number ≥ 0, and `default`",
+        &Shape::Table(&Shape::NotNegative),
+    ),
     default: "the square of a quarter of the declared range (without a range: of the start value, or 1)",
     meaning: "how uncertain the first estimate is: the variance of each state and unknown input; `default` holds for everything not listed",
 };
 
 const GATE: KeySpec = KeySpec {
     name: "gate",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "none",
     meaning: "a reading whose innovation exceeds so many of its standard deviations is rejected and counted; after ten in a row the next is believed",
 };
 
 /// Those of every filter.
-pub(super) const KEYS: [KeySpec; 2] = [VARIANCE, GATE];
+const KEYS: [KeySpec; 2] = [VARIANCE, GATE];
 
 /// That of the filters that may go anywhere.
-pub(super) const BOUNDS: [KeySpec; 1] = [KeySpec {
+const BOUNDS: [KeySpec; 1] = [KeySpec {
     name: "bounds",
-    kind: "\"project\"",
-    shape: Shape::Word(&["project"]),
+    shape: Shape::As("\"project\"", &Shape::Word(&["project"])),
     default: "none",
     meaning: "\"project\": the estimate is kept in the declared ranges `[min, max]`: after each prediction and correction it is put to the nearest place inside by the covariance's metric, so that what is correlated moves along; the covariance stays",
 }];
 
 /// Those of the unscented filter.
-pub(super) const POINTS: [KeySpec; 3] = [
+const POINTS: [KeySpec; 3] = [
     KeySpec {
         name: "alpha",
-        kind: "number > 0",
         shape: Shape::Positive,
         default: "1",
         meaning: "α, the spread of the sigma points: λ = α²(n + κ) − n",
     },
     KeySpec {
         name: "beta",
-        kind: "number",
         shape: Shape::Number,
         default: "0",
         meaning: "β, what the first weight of the covariance gets on top",
     },
     KeySpec {
         name: "kappa",
-        kind: "number",
         shape: Shape::Number,
         default: "0",
         meaning: "κ, with n + κ above 0; the defaults make the cubature filter",
@@ -241,43 +269,28 @@ pub(super) const POINTS: [KeySpec; 3] = [
 ];
 
 /// Samples in the window where the study does not say.
-pub(super) const HORIZON: usize = 10;
+const HORIZON: usize = 10;
 
 /// That of the moving-horizon estimator.
-pub(super) const WINDOW: [KeySpec; 1] = [KeySpec {
+const WINDOW: [KeySpec; 1] = [KeySpec {
     name: "horizon",
-    kind: "whole number ≥ 1",
     shape: Shape::Whole(1),
     default: "10",
     meaning: "samples over which the states are estimated anew at each sample, within `[min, max]`",
 }];
 
 /// The keys, read.
-pub(crate) struct Settings {
-    pub common: Common,
-    pub kind: FilterKind,
-    pub gate: Option<f64>,
+struct Settings {
+    common: Common,
+    kind: FilterKind,
+    gate: Option<f64>,
     /// the estimate is kept in the declared ranges
-    pub projects: bool,
+    projects: bool,
     /// as given, by augmented state
     variance: Vec<Option<f64>>,
 }
 
 impl Settings {
-    pub fn read(
-        augmented: &AugmentedPlant<'_>,
-        tuning: &Tuning,
-        kind: FilterKind,
-    ) -> Result<Self, TuningError> {
-        Ok(Self {
-            common: Common::read(tuning)?,
-            kind,
-            gate: tuning.positive(GATE.name)?,
-            projects: tuning.meant(&BOUNDS[0], [true])?.is_some(),
-            variance: variances(augmented, tuning)?,
-        })
-    }
-
     /// The variances given, and those that follow from the declared ranges.
     fn variances(&self, augmented: &AugmentedPlant<'_>, starts: &[(Signal, f64)]) -> Vec<f64> {
         let states = augmented.states.iter().zip(starts).zip(&self.variance);
@@ -337,10 +350,6 @@ fn variances(
 }
 
 /// A number under a key.
-pub(super) fn number(tuning: &Tuning, key: &KeySpec) -> Result<Option<f64>, TuningError> {
-    match tuning.values.get(key.name) {
-        None => Ok(None),
-        Some(Value::Number(x)) => Ok(Some(*x)),
-        Some(other) => Err(key.wrong(other)),
-    }
+fn number(tuning: &Tuning, key: &KeySpec) -> Result<Option<f64>, TuningError> {
+    tuning.read(key.name, &key.kind(), Value::number)
 }

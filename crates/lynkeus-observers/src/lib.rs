@@ -19,7 +19,7 @@ pub mod drift_observable;
 mod estimate;
 mod family;
 mod generator;
-mod guarantee;
+pub mod guarantee;
 pub mod kalman;
 mod observer;
 mod peaking;
@@ -31,23 +31,27 @@ pub mod triangular;
 mod tuning;
 pub mod unknown_input;
 
+pub use block_triangular::Lee;
 pub use certificate::{Assumptions, Bounds, Certificate, Constant, UltimateBound};
-pub use design::{ChainGain, Design, DesignError, Examination, fit_word};
+pub use design::{ChainGain, Design, DesignError, Examination, ParameterValue, Shown, fit_word};
 pub use family::Family;
-pub use generator::{Generator, GeneratorError, Prefilter};
-pub use guarantee::{Claim, Correction, Injection, certify, is_certified_gain};
+pub use generator::{Generator, GeneratorError};
+pub use guarantee::{Claim, Correction, Inequality, Injection, certify, is_certified_gain};
 pub use lynkeus_gain::integrators::Pole;
 pub use observer::{
-    Estimate, FilterTuning, InputDerivative, Monitor, Observer, Sampled, Signal, Tunable, Tunables,
+    Estimate, FilterTuning, InputDerivative, Monitor, Observer, Sampled, Signal, Tunable,
 };
-pub use statement::{
-    Check, Farza, Germani, Hammouri, Inequality, Lee, Ltaief, Reason, Statement, Weight,
-};
+pub use statement::{Check, Reason, Statement};
+pub use triangular::Hammouri;
 pub use tuning::{Initial, KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
+
+pub use drift_observable::Germani;
+pub use state_affine::Ltaief;
+pub use unknown_input::Farza;
 
 use block_triangular::BlockTriangular;
 use drift_observable::DriftObservable;
-use kalman::{Ekf, Mhe, Ukf};
+use kalman::{EKF, MHE, UKF};
 use state_affine::StateAffine;
 use triangular::Triangular;
 use unknown_input::UnknownInput;
@@ -59,9 +63,9 @@ pub const FAMILIES: &[&dyn Family] = &[
     &StateAffine,
     &UnknownInput,
     &DriftObservable,
-    &Ekf,
-    &Ukf,
-    &Mhe,
+    &EKF,
+    &UKF,
+    &MHE,
 ];
 
 /// The family of that name.

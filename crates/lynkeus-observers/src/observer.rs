@@ -88,8 +88,11 @@ pub struct Observer {
     /// the filter that corrects the estimate when sensors report; none where the correction
     /// is part of the derivatives
     pub filter: Option<FilterTuning>,
-    /// numbers of the derivatives that may be changed while it runs
-    pub tunables: Tunables,
+    /// numbers of the derivatives that may be changed while it runs; none where the
+    /// [tuning](crate::Tuning::tunable) does not ask for them
+    pub tunables: Vec<Tunable>,
+    /// the gain is made, and proved, as a whole: there are none, whatever the tuning asks for
+    pub is_whole: bool,
 }
 
 /// A Kalman filter over the observer's flow. The noises are the study's, not the family's.
@@ -233,13 +236,4 @@ pub struct Tunable {
     pub value: f64,
     /// what it does, for people
     pub meaning: String,
-}
-
-/// What may be changed while an observer runs.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Tunables {
-    /// the numbers; none where the [tuning](crate::Tuning::tunable) does not ask for them
-    pub numbers: Vec<Tunable>,
-    /// why there are none, where it does
-    pub refused: Option<&'static str>,
 }

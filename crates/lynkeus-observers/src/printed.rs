@@ -3,12 +3,11 @@
 
 use std::collections::HashMap;
 
-use lynkeus_expr::real::rounded;
 use lynkeus_expr::{Graph, MissingInput, Node, Tape};
 use lynkeus_structure::{AugmentedPlant, Matrix};
 
 use crate::estimate::{PlantCopy, middle};
-use crate::{ChainGain, TuningError};
+use crate::{ChainGain, ParameterValue, Shown, TuningError};
 
 /// Longest expression that is printed, in characters.
 const LONGEST: usize = 120;
@@ -56,19 +55,15 @@ impl ChainCorrection<'_> {
         })
     }
 
-    /// The factors of ŷ − y as parameters: expressions, and their values at the start.
-    pub fn expressions(&self, start: &AtStart<'_>) -> Vec<(String, String)> {
+    /// The factors of ŷ − y as parameters.
+    pub fn expressions(&self, start: &AtStart<'_>) -> Vec<(String, ParameterValue)> {
         let augmented = start.augmented;
         let output = &augmented.outputs[self.output].variable.name;
         let named = self.states.iter().zip(self.on_output(augmented));
         let row = |(&state, gain): (&usize, Node)| {
             let name = format!("gain of {output} on {}", augmented.states[state].name);
-            let limited = if self.limited {
-                ", on the limited error"
-            } else {
-                ""
-            };
-            (name, format!("{}{limited}", start.shown(gain)))
+            let (gain, limited) = (start.shown(gain), self.limited);
+            (name, ParameterValue::Gain { gain, limited })
         };
         named.map(row).collect()
     }
@@ -106,28 +101,27 @@ impl<'a> AtStart<'a> {
     }
 
     /// A number, or an expression with its value at the start where all it reads has one.
-    pub fn shown(&self, node: Node) -> String {
+    pub fn shown(&self, node: Node) -> Shown {
         let graph: &Graph = self.augmented.graph();
-        let text = graph.render(node, LONGEST);
-        if graph.constant_value(node).is_some() {
-            return text;
-        }
-        let value = graph.substitute(&[node], &self.images)[0];
-        match graph.constant_value(value) {
-            Some(value) => format!("{text}; {value} at the start"),
-            None => text,
+        let at_start = match graph.constant_value(node) {
+            Some(_) => None,
+            None => graph.constant_value(graph.substitute(&[node], &self.images)[0]),
+        };
+        Shown {
+            text: graph.render(node, LONGEST),
+            at_start,
         }
     }
 
     /// A matrix row by row, a missing entry being zero everywhere.
-    pub fn table(&self, rows: &[Vec<Option<Node>>]) -> String {
-        let entry = |x: &Option<Node>| x.map_or_else(|| "0".to_owned(), |x| self.shown(x));
-        let row = |row: &Vec<Option<Node>>| {
-            let entries: Vec<String> = row.iter().map(entry).collect();
-            format!("({})", entries.join(", "))
+    pub fn table(&self, rows: &[Vec<Option<Node>>]) -> ParameterValue {
+        let zero = || Shown {
+            text: "0".to_owned(),
+            at_start: None,
         };
-        let rows: Vec<String> = rows.iter().map(row).collect();
-        rows.join(", ")
+        let entry = |x: &Option<Node>| x.map_or_else(zero, |x| self.shown(x));
+        let row = |row: &Vec<Option<Node>>| row.iter().map(entry).collect();
+        ParameterValue::AtStart(rows.iter().map(row).collect())
     }
 }
 
@@ -171,9 +165,9 @@ impl<'g> StartPoint<'g> {
             .collect())
     }
 
-    /// The same in words: `[[1, 0], [0, 0.5]]`.
-    pub fn shown(&self, A: &Matrix<'_>) -> Result<String, MissingInput> {
-        Ok(numbers(&self.values(A)?))
+    /// The same for the reader.
+    pub fn shown(&self, A: &Matrix<'_>) -> Result<ParameterValue, MissingInput> {
+        Ok(ParameterValue::Matrix(self.values(A)?))
     }
 }
 
@@ -182,35 +176,12 @@ pub(crate) fn is_constant(A: &Matrix<'_>) -> bool {
     A.graph().symbols_of(&A.nonzero()).is_empty()
 }
 
-/// `[[x1, 0], [0, 2]]`
-pub(crate) fn expressions(A: &Matrix<'_>) -> String {
+/// The entries of a matrix as expressions.
+pub(crate) fn expressions(A: &Matrix<'_>) -> ParameterValue {
     let entry = |i, j| match A.get(i, j) {
         Some(node) => A.graph().render(node, SHOWN),
         None => "0".to_owned(),
     };
     let row = |i| (0..A.columns).map(|j| entry(i, j)).collect();
-    rows((0..A.rows).map(row).collect())
-}
-
-/// Numbers row by row, with six digits; a dash where there is none.
-pub(crate) fn numbers(A: &[Vec<f64>]) -> String {
-    let number = |x: &f64| {
-        if x.is_nan() {
-            return "–".to_owned();
-        }
-        rounded(*x, 6).to_string()
-    };
-    rows(
-        A.iter()
-            .map(|row| row.iter().map(number).collect())
-            .collect(),
-    )
-}
-
-fn rows(A: Vec<Vec<String>>) -> String {
-    let rows: Vec<String> = A
-        .iter()
-        .map(|row| format!("[{}]", row.join(", ")))
-        .collect();
-    format!("[{}]", rows.join(", "))
+    ParameterValue::Expressions((0..A.rows).map(row).collect())
 }

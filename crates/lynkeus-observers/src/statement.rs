@@ -3,13 +3,21 @@
 //! A statement is known by its variant, never by its words: these are for people. Each paper
 //! has an enum of its own, as has the certificate by linear matrix inequalities.
 
-use std::fmt;
+use lynkeus_expr::{Interval, Spent};
+use lynkeus_structure::{Finding, Standing, Verdict, Witness};
 
-use lynkeus_structure::{Finding, Standing, Verdict, Witness, short};
+use crate::block_triangular::Lee;
+use crate::drift_observable::Germani;
+use crate::guarantee::Inequality;
+use crate::state_affine::Ltaief;
+use crate::triangular::Hammouri;
+use crate::unknown_input::Farza;
+use crate::{
+    block_triangular, drift_observable, guarantee, state_affine, triangular, unknown_input,
+};
 
 /// What has to hold: a condition of a family or a hypothesis of a theorem.
 #[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum Statement {
     /// f and h have values on the box and do not jump: asked of every plant
     PlantIsRegular,
@@ -53,40 +61,168 @@ pub enum Statement {
     Germani(Germani),
 }
 
-/// What decides a verdict, as data: `lynkeus-words` has the sentences.
+/// What is said of a plant, a verdict, an observer or a certificate, as data: `lynkeus-words` has
+/// the sentences.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Reason {
-    /// a sentence that is not data yet
-    Text(String),
     /// found in the structure of the plant
     Structure(lynkeus_structure::Reason),
+    /// a number that has to be at most a limit, and is or not
+    AtMost {
+        /// the number
+        found: f64,
+        /// what it is held against
+        limit: f64,
+    },
+    /// a number that has to be at least another, and is or not
+    AtLeast {
+        /// the number
+        found: f64,
+        /// what it is held against
+        least: f64,
+    },
+    /// a limit ended the work
+    Spent(Spent),
+    /// a limit ended an examination, so that the whole is undecided
+    Ended(Spent),
+    /// so many entries of ∂f/∂x have bounds
+    Enclosed(usize),
+    /// an entry of ∂f/∂x without bound
+    Unbounded {
+        /// the state whose equation it is of
+        of: String,
+        /// the state by which it is
+        by: String,
+        /// the entry
+        slope: String,
+        /// what keeps it from being bounded; none where that is not looked for
+        undeclared: Option<Vec<String>>,
+    },
+    /// an equation jumps
+    Switches {
+        /// the state whose equation it is
+        of: String,
+        /// the operation
+        with: String,
+    },
+    /// what would refute lies where an equation has no value
+    WhereNothingIs {
+        /// what was found there
+        found: lynkeus_structure::Reason,
+        /// the state whose equation it is
+        of: String,
+    },
+    /// the declared ranges and deviations are
+    Assumed,
+    /// what acts on these has no bound
+    ActsWithoutBound(Vec<String>),
+    /// by the outputs on the box and the measurement errors
+    ReadingsOnTheBox,
+    /// outputs that leave what their sensors show: name, the reading's range, the sensor's
+    BeyondSensors(Vec<(String, Interval, Interval)>),
+    /// process noise leaves no bound for certain
+    Moved {
+        /// the states that it moves
+        states: Vec<String>,
+        /// whether the mean square has a bound
+        in_mean_square: bool,
+    },
+    /// what the error would end within without process noise
+    WithoutNoise {
+        /// of the Euclidean norm
+        norm: f64,
+        /// by state; none where not known
+        states: Vec<(String, f64)>,
+    },
+    /// the proof has a rate, and no bound in the end
+    NoUltimateBound,
+    /// what holds for every start of the estimate, by the prolongation
+    EveryStart,
+    /// what would hold so on the declared box, of which this one is a part
+    PartOfTheBox,
+    /// what holds while plant and estimate stay in the box
+    InTheBox {
+        /// the functions see the estimate limited to it
+        clamp: bool,
+    },
+    /// a key of the study that makes an observer which the theorem does not cover
+    AnotherObserver {
+        /// the key
+        key: &'static str,
+    },
+    /// the low-power form is not proved to be stable for these partials
+    PartialsVary {
+        /// of the chain of this output
+        output: String,
+    },
+    /// a filter takes any plant
+    AnyPlant {
+        /// which filter
+        filter: &'static str,
+        /// where the plant is not regular
+        irregular: Option<Box<Reason>>,
+    },
+    /// the gain of a filter depends on the run
+    GainOfTheRun,
+    /// of the certificate by linear matrix inequalities
+    Guarantee(guarantee::Said),
+    /// of the family `triangular`
+    Triangular(triangular::Said),
+    /// of the family `block-triangular`
+    BlockTriangular(block_triangular::Said),
+    /// of the family `state-affine`
+    StateAffine(state_affine::Said),
+    /// of the family `unknown-input`
+    UnknownInput(unknown_input::Said),
+    /// of the family `drift-observable`
+    DriftObservable(drift_observable::Said),
 }
 
-impl Reason {
-    /// The sentence.
-    pub fn text(self) -> String {
-        match self {
-            Self::Text(text) => text,
-            Self::Structure(reason) => reason.text(),
-        }
-    }
-}
-
-impl From<String> for Reason {
-    fn from(text: String) -> Self {
-        Self::Text(text)
-    }
-}
-
-impl From<&str> for Reason {
-    fn from(text: &str) -> Self {
-        Self::Text(text.to_owned())
+impl From<lynkeus_structure::Misfit> for Reason {
+    fn from(misfit: lynkeus_structure::Misfit) -> Self {
+        Self::Structure(misfit.into())
     }
 }
 
 impl From<lynkeus_structure::Reason> for Reason {
     fn from(reason: lynkeus_structure::Reason) -> Self {
         Self::Structure(reason)
+    }
+}
+
+impl From<state_affine::Said> for Reason {
+    fn from(said: state_affine::Said) -> Self {
+        Self::StateAffine(said)
+    }
+}
+
+impl From<unknown_input::Said> for Reason {
+    fn from(said: unknown_input::Said) -> Self {
+        Self::UnknownInput(said)
+    }
+}
+
+impl From<drift_observable::Said> for Reason {
+    fn from(said: drift_observable::Said) -> Self {
+        Self::DriftObservable(said)
+    }
+}
+
+impl From<guarantee::Said> for Reason {
+    fn from(said: guarantee::Said) -> Self {
+        Self::Guarantee(said)
+    }
+}
+
+impl From<triangular::Said> for Reason {
+    fn from(said: triangular::Said) -> Self {
+        Self::Triangular(said)
+    }
+}
+
+impl From<block_triangular::Said> for Reason {
+    fn from(said: block_triangular::Said) -> Self {
+        Self::BlockTriangular(said)
     }
 }
 
@@ -99,27 +235,18 @@ pub struct Check {
     pub verdict: Verdict,
     /// what decides it
     pub reason: Reason,
-    /// what it weighs
-    pub weight: Weight,
-}
-
-/// What a condition weighs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Weight {
-    /// where it is refuted the whole is
-    Required,
-    /// it can leave the whole undecided and refuses nothing, as where the observer itself
-    /// watches it
-    Advisory,
+    /// it can leave the whole undecided and refutes nothing, as where the observer itself watches it
+    pub is_advisory: bool,
 }
 
 impl Check {
     /// What it makes of the whole.
     pub fn standing(&self) -> Standing {
-        match self.weight {
-            Weight::Required => self.verdict.standing(),
-            Weight::Advisory => self.verdict.standing().min(Standing::Undecided),
-        }
+        let most = match self.is_advisory {
+            true => Standing::Undecided,
+            false => Standing::Refuted,
+        };
+        self.verdict.standing().min(most)
     }
 
     /// Whether the statement is proved.
@@ -127,10 +254,12 @@ impl Check {
         self.verdict == Verdict::Proved
     }
 
-    /// The same as [`Weight::Advisory`].
+    /// The same as advice.
     pub(crate) fn advisory(self) -> Self {
-        let weight = Weight::Advisory;
-        Self { weight, ..self }
+        Self {
+            is_advisory: true,
+            ..self
+        }
     }
 }
 
@@ -151,7 +280,7 @@ impl Statement {
             statement: self,
             verdict,
             reason: reason.into(),
-            weight: Weight::Required,
+            is_advisory: false,
         }
     }
 }
@@ -188,126 +317,10 @@ pub(crate) fn sufficient(
     statement.into().found(verdict, reason)
 }
 
-impl fmt::Display for Statement {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::PlantIsRegular => {
-                f.write_str("f and h have values on the whole box and do not jump")
-            }
-            Self::WhatActs => f.write_str("disturbances and measurement errors are bounded"),
-            Self::ReadingsAreShown => f.write_str("no reading is beyond its sensor's range"),
-            Self::Finished => f.write_str("everything was examined"),
-            Self::PartialKeepsSign { of, by } => write!(f, "∂f({of})/∂{by} keeps its sign"),
-            Self::OutputKeepsSign { output, state } => {
-                write!(f, "∂{output}/∂{state} keeps its sign")
-            }
-            Self::Lipschitz => f.write_str("∂f/∂x is bounded on the box"),
-            Self::SlopesOfTheProof => {
-                f.write_str("every ∂f/∂x of the proof has a bound on the box")
-            }
-            Self::FilterConverges => f.write_str("the filter's error decays"),
-            Self::Inequality(part) => part.fmt(f),
-            Self::Hammouri(part) => part.fmt(f),
-            Self::Lee(part) => part.fmt(f),
-            Self::Ltaief(part) => part.fmt(f),
-            Self::Farza(part) => part.fmt(f),
-            Self::Germani(part) => part.fmt(f),
-        }
-    }
-}
-
-/// Of Hammouri, Targui and Armanet.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Hammouri {
-    /// the theorem is about this observer
-    Observer,
-    /// no division by partials that vary
-    ConstantGain,
-    /// what Lemma 1 starts from
-    PartialsAreBounded,
-    /// (17) for one chain
-    Lemma1 {
-        /// the chain
-        states: Vec<String>,
-        /// 2r
-        ρ: f64,
-    },
-    /// of the exponents
-    Window,
-    /// θ is large enough
-    Theta {
-        /// of the study
-        θ: f64,
-    },
-    /// where the chains have a θ each
-    Comparison,
-    /// where the S given does not stabilise the chains by itself
-    Damped,
-}
-
 impl From<Hammouri> for Statement {
     fn from(part: Hammouri) -> Self {
         Self::Hammouri(part)
     }
-}
-
-impl fmt::Display for Hammouri {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Observer => {
-                f.write_str("the observer is (9) with a constant gain from a tridiagonal S")
-            }
-            Self::ConstantGain => f.write_str("the gain is constant"),
-            Self::PartialsAreBounded => {
-                f.write_str("Lemma 1: every partial along the chains lies in some [α1, α2], α1 > 0")
-            }
-            Self::Lemma1 { states, ρ } => write!(
-                f,
-                "Lemma 1 for ({}): A(a)ᵀS + SA(a) − ρCᵀC < 0 for every a in its bounds, ρ = 2r = {}",
-                states.join(" → "),
-                short(*ρ)
-            ),
-            Self::Window => f.write_str("δ2/δ1 lies in the window of Theorem 2"),
-            Self::Theta { θ } => write!(f, "θ = {} is at least θ0", short(*θ)),
-            Self::Comparison => {
-                f.write_str("the comparison matrix is negative definite at the study's θ")
-            }
-            Self::Damped => {
-                f.write_str("the error decays where it is small, in the middle of the box")
-            }
-        }
-    }
-}
-
-/// Of Lee, Yee and Park.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Lee {
-    /// the theorem is about these observers
-    Observer,
-    /// K stabilises a chain of integrators
-    Stable {
-        /// the chain
-        states: Vec<String>,
-    },
-    /// K stabilises a chain whose partials are not 1
-    StableAlong {
-        /// the chain
-        states: Vec<String>,
-    },
-    /// what moves M is bounded
-    Assumption1,
-    /// the first inequality
-    Lyapunov {
-        /// the chain
-        states: Vec<String>,
-    },
-    /// the second inequality
-    Theta {
-        /// by block
-        θ: Vec<f64>,
-    },
 }
 
 impl From<Lee> for Statement {
@@ -316,135 +329,10 @@ impl From<Lee> for Statement {
     }
 }
 
-impl fmt::Display for Lee {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Observer => f.write_str("the observer is (7) or (3) with a constant θ"),
-            Self::Stable { states } => write!(f, "A − KC is stable for ({})", states.join(" → ")),
-            Self::StableAlong { states } => write!(
-                f,
-                "A(a) − KC is stable for every partial a along ({})",
-                states.join(" → ")
-            ),
-            Self::Assumption1 => {
-                f.write_str("M R M⁻¹ and Ṁ M⁻¹ have bounds on the box (Assumption 1)")
-            }
-            Self::Lyapunov { states } => {
-                write!(f, "(A − KC)ᵀP + P(A − KC) < 0 for ({})", states.join(" → "))
-            }
-            Self::Theta { θ } => write!(
-                f,
-                "θ = ({}) is large enough",
-                θ.iter().map(|&θ| short(θ)).collect::<Vec<_>>().join(", ")
-            ),
-        }
-    }
-}
-
-/// Of Ltaief, Maatoug, Farza, Ménard, M'Saad and Koubaa.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Ltaief {
-    /// F_k hides no direction of the next block
-    BlockShows {
-        /// k, counted from 0
-        factor: usize,
-        /// the block, as declared
-        states: Vec<String>,
-    },
-    /// bounds of C and F
-    A1,
-    /// bounds of the uncertainty
-    A3,
-    /// the excitation
-    A4,
-    /// θ is large enough
-    Theta {
-        /// of the study
-        θ: f64,
-    },
-}
-
 impl From<Ltaief> for Statement {
     fn from(part: Ltaief) -> Self {
         Self::Ltaief(part)
     }
-}
-
-impl fmt::Display for Ltaief {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::BlockShows { factor, states } => write!(
-                f,
-                "F_{factor} ξ ≠ 0 for every direction ξ of ({})",
-                states.join(", ")
-            ),
-            Self::A1 => f.write_str("C(u) and F(u, x) are bounded on the box (A1)"),
-            Self::A3 => {
-                f.write_str("what acts on the plant unknown to the observer is bounded (A3)")
-            }
-            Self::A4 => f.write_str("persistent excitation (A4): S(t) ≥ λ_m I"),
-            Self::Theta { θ } => write!(f, "θ = {} is large enough: μ_θ > 0", short(*θ)),
-        }
-    }
-}
-
-/// Of Farza, M'Saad, Liu and Targui.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Farza {
-    /// rank of a layer in the next
-    H1 {
-        /// counted from 1
-        layer: usize,
-        /// states of the next layer
-        rank: usize,
-    },
-    /// a layer tells the next
-    H2 {
-        /// counted from 1
-        layer: usize,
-    },
-    /// the unknown inputs show in x₁¹
-    H4i {
-        /// number of unknown inputs
-        rank: usize,
-    },
-    /// they and the next layer do together
-    H4ii {
-        /// states of the second layer and unknown inputs
-        rank: usize,
-    },
-    /// the rest of the outputs tells the second layer
-    Eleven {
-        /// states of the second layer
-        rank: usize,
-    },
-    /// a chain that ends early
-    ShortenedChain {
-        /// the last of the chain
-        layer: usize,
-        /// how many there are
-        gains: usize,
-    },
-    /// what Λ₂⁺ leaves out does no harm
-    LeftInverse,
-    /// the proof meets Λ₂ there
-    Regular,
-    /// G₁¹, Λ₂ and Z
-    Continuous,
-    /// of the proof
-    Constants,
-    /// the unknown inputs are slow
-    H5,
-    /// the study gives θ
-    ThetaGiven,
-    /// θ₁ is large enough
-    Theta1,
-    /// θ₂ is large enough
-    Theta2,
-    /// by more than rounding
-    Rate,
 }
 
 impl From<Farza> for Statement {
@@ -453,176 +341,15 @@ impl From<Farza> for Statement {
     }
 }
 
-impl fmt::Display for Farza {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::H1 { layer, rank } => write!(
-                f,
-                "(H1) rank ∂f{}/∂x{} = {rank}",
-                superscript(*layer),
-                superscript(layer + 1)
-            ),
-            Self::H2 { layer } => write!(
-                f,
-                "(H2) x{} ↦ f{} is one to one",
-                superscript(layer + 1),
-                superscript(*layer)
-            ),
-            Self::H4i { rank } => write!(f, "(H4) (i) rank G₁¹ = {}", rank),
-            Self::H4ii { rank } => write!(f, "(H4) (ii) rank (∂f̃¹/∂x² G¹) = {}", rank),
-            Self::Eleven { rank } => write!(f, "(11) rank ∂f̄₁²/∂x² = {}", rank),
-            Self::ShortenedChain { layer, gains } => write!(
-                f,
-                "the chain that ends in layer {layer} is stable with the first {layer} of the gains of {gains}: Routh's numbers are positive"
-            ),
-            Self::LeftInverse => {
-                f.write_str("Λ₂Λ₂⁺ = I, or it leaves whole chains: the step to (24)")
-            }
-            Self::Regular => {
-                f.write_str("Λ₂ is regular for estimates that differ from the measured signals")
-            }
-            Self::Continuous => {
-                f.write_str("what the proof differentiates has values on the box and does not jump")
-            }
-            Self::Constants => f.write_str("c1, c2, c4 and c5 are finite on the box"),
-            Self::H5 => f.write_str("(H5) v' is bounded"),
-            Self::ThetaGiven => f.write_str("θ1 ≥ θ1*"),
-            Self::Theta1 => f.write_str("θ1 ≥ θ1* = c1 + (c2 + c5)²θ2²/(4(θ2 − c4))"),
-            Self::Theta2 => f.write_str("θ2 ≥ θ2* = max(1, c4)"),
-            Self::Rate => f.write_str("λ > 0"),
-        }
-    }
-}
-
-/// Of Germani and Manes.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Germani {
-    /// Definition 2.2
-    Degree,
-    /// drift-observability
-    Regular,
-    /// the same for points far apart: Definition 2.1 asks for a diffeomorphism
-    OneToOne,
-    /// Φ̄ along the plant
-    Continuous,
-    /// what (3.1) asks of the input
-    SmallInput,
-    /// what (4.1) and (4.22) ask of the input
-    UniformlyObservable,
-    /// the same for bounded inputs
-    RegularWithin,
-    /// the remainder
-    ContinuousRows,
-    /// u, u', …
-    InputDerivatives,
-    /// hypothesis 1
-    Inverse,
-    /// hypothesis 2
-    LastRows,
-    /// there are gains
-    Gains,
-    /// hypothesis 4
-    Riccati,
-    /// the same with the input
-    Input,
-    /// the filter's inequality
-    Filter,
-}
-
 impl From<Germani> for Statement {
     fn from(part: Germani) -> Self {
         Self::Germani(part)
     }
 }
 
-impl fmt::Display for Germani {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Degree => {
-                f.write_str("the observation relative degree r is known (Definition 2.2)")
-            }
-            Self::Regular => f.write_str("Q(x) is regular on the box (drift-observable)"),
-            Self::OneToOne => f.write_str(
-                "the map to the outputs' derivatives is one-to-one on the box (Definition 2.1)",
-            ),
-            Self::Continuous => f.write_str(
-                "the map to the outputs' derivatives has values on the box and does not jump",
-            ),
-            Self::SmallInput => f.write_str("r = n, or the input is small (Theorem 3.3)"),
-            Self::UniformlyObservable => {
-                f.write_str("Q̄(x, U) is regular on the box for every U (uniformly observable)")
-            }
-            Self::RegularWithin => {
-                f.write_str("Q̄(x, U) is regular on the box for U within its bounds")
-            }
-            Self::ContinuousRows => {
-                f.write_str("the last rows have values on the box and do not jump")
-            }
-            Self::InputDerivatives => f.write_str("the derivatives of the inputs are bounded"),
-            Self::Inverse => f.write_str(
-                "the map from x to the output's derivatives has a Lipschitz inverse on the box",
-            ),
-            Self::LastRows => f.write_str("the last rows are Lipschitz in these coordinates"),
-            Self::Gains => f.write_str("K and P solve the Riccati inequality"),
-            Self::Riccati => f.write_str("γ ≤ γ*: K and some P > 0 solve the Riccati inequality"),
-            Self::Input => f.write_str("|u| ≤ u_M"),
-            Self::Filter => f.write_str("K2 and P_a solve (4.27)"),
-        }
-    }
-}
-
-/// ¹, ², …
-fn superscript(k: usize) -> String {
-    let digit = |c: char| match c {
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        '4' => '⁴',
-        '5' => '⁵',
-        '6' => '⁶',
-        '7' => '⁷',
-        '8' => '⁸',
-        '9' => '⁹',
-        _ => '⁰',
-    };
-    k.to_string().chars().map(digit).collect()
-}
-
-/// Of the certificate by linear matrix inequalities.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Inequality {
-    /// the error system is one in x̂ − x
-    StatesAreTheEstimate,
-    /// the box gives the error system ranges
-    SlopesAreBounded,
-    /// the inequality
-    OneLyapunovFunction,
-    /// what a point of rest refutes
-    SmallErrorsDecay,
-}
-
 impl From<Inequality> for Statement {
     fn from(part: Inequality) -> Self {
         Self::Inequality(part)
-    }
-}
-
-impl fmt::Display for Inequality {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::StatesAreTheEstimate => f.write_str("the observer's states are the estimate"),
-            Self::SlopesAreBounded => {
-                f.write_str("every slope of a nonlinear term is bounded on the box")
-            }
-            Self::OneLyapunovFunction => {
-                f.write_str("one Lyapunov function eᵀPe for the whole box")
-            }
-            Self::SmallErrorsDecay => {
-                f.write_str("small errors decay wherever the plant stays in the box")
-            }
-        }
     }
 }
 
@@ -638,15 +365,18 @@ mod tests {
             coordinates: vec![],
             value: 0.0,
         };
-        let failing = || refuted(Germani::UniformlyObservable, zero.clone(), "");
-        let holding = || proved(Germani::Regular, "");
+        let failing = || refuted(Germani::UniformlyObservable, zero.clone(), Reason::Assumed);
+        let holding = || proved(Germani::Regular, Reason::Assumed);
         for (checks, expected) in [
             (vec![], Standing::Proved),
             (vec![holding(), holding()], Standing::Proved),
             (vec![holding(), failing().advisory()], Standing::Undecided),
             (vec![failing(), holding()], Standing::Refuted),
             (
-                vec![undecided(Germani::Degree, ""), failing().advisory()],
+                vec![
+                    undecided(Germani::Degree, Reason::Assumed),
+                    failing().advisory(),
+                ],
                 Standing::Undecided,
             ),
             (vec![holding().advisory()], Standing::Proved),

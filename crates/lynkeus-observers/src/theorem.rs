@@ -1,5 +1,5 @@
 //! What the theorems of several families share: how steep the equations are on the box, bounds
-//! of expressions and of matrices of them (outward rounded), and the words of a conclusion.
+//! of expressions and of matrices of them (outward rounded), and the conclusion.
 
 use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
@@ -10,12 +10,12 @@ use lynkeus_proof::inverse::Inverse;
 use lynkeus_proof::magnitude::{norm, plus, product, size, times};
 use lynkeus_proof::matrix::IntervalMatrix;
 use lynkeus_structure::{
-    AugmentedPlant, Dimension, Finding, Matrix, Region, Standing, Verdict, enclosure_within,
-    magnitude_within, range, short,
+    AugmentedPlant, Dimension, Matrix, Region, Standing, Verdict, enclosure_within,
+    magnitude_within, range,
 };
 
-use crate::statement::{proved, undecided};
-use crate::{Assumptions, Bounds, Certificate, Check, Constant, DesignError, Hammouri, Statement};
+use crate::statement::proved;
+use crate::{Assumptions, Bounds, Certificate, Check, Constant, DesignError, Reason, Statement};
 
 /// Upper bounds of the entries of ∂f/∂x that can differ from zero, with the
 /// hypothesis that all are finite; `skip` leaves out entries that are not needed.
@@ -27,16 +27,20 @@ pub(crate) fn slopes(
     let graph = augmented.graph();
     let symbols = augmented.symbols();
     let jacobian = jacobian::forward(graph, &augmented.derivatives, &symbols);
-    let (mut found, mut open) = (vec![], vec![]);
+    let name = |i: usize| augmented.states[i].name.clone();
+    let shown = |node: Option<Node>| node.map_or_else(String::new, |n| graph.render(n, 60));
+    // the first entry without a bound, and what all of these read
+    let (mut first, mut open, mut found) = (None, vec![], vec![]);
     for row in 0..symbols.len() {
         let jump = jump(graph, augmented.derivatives[row], &symbols);
         // a jump spoils the whole equation, its skipped entries too
-        open.extend(jump.map(|node| Open {
-            row,
-            column: row,
-            node: Some(node),
-            jumps: true,
-        }));
+        if jump.is_some() {
+            first.get_or_insert_with(|| Reason::Switches {
+                of: name(row),
+                with: shown(jump),
+            });
+            open.extend(jump);
+        }
         for &column in augmented.pattern[row].iter().filter(|&&b| !skip(row, b)) {
             let node = jacobian.get(row, column);
             let size = match (jump, node) {
@@ -45,18 +49,27 @@ pub(crate) fn slopes(
                 (None, None) => 0.0,
             };
             if size.is_infinite() && jump.is_none() {
-                open.push(Open {
-                    row,
-                    column,
-                    node,
-                    jumps: false,
+                first.get_or_insert_with(|| Reason::Unbounded {
+                    of: name(row),
+                    by: name(column),
+                    slope: shown(node),
+                    undeclared: Some(vec![]),
                 });
+                open.extend(node);
             }
             found.push(Slope { row, column, size });
         }
     }
-    let check = check(augmented, region, &found, &open);
-    Ok((found, check))
+    let statement = Statement::SlopesOfTheProof;
+    let Some(mut reason) = first else {
+        let enclosed = Reason::Enclosed(found.len());
+        return Ok((found, proved(statement, enclosed)));
+    };
+    if let Reason::Unbounded { undeclared, .. } = &mut reason {
+        *undeclared = Some(self::undeclared(augmented, &open, region));
+    }
+    let place = region.restricted(&graph.symbols_of(&open)).dimensions;
+    Ok((found, statement.found(Verdict::Undecided(place), reason)))
 }
 
 /// Upper bound of |node| on the region; infinite where there is none, or where
@@ -90,46 +103,6 @@ fn jump(graph: &Graph, f: Node, states: &[Node]) -> Option<Node> {
     let depends = |node: Node| !jacobian::pattern(graph, &[node], states)[0].is_empty();
     let mut nodes = graph.reachable(&[f]).into_iter();
     nodes.find(|&node| graph.jumps(node) && depends(node))
-}
-
-/// An entry without a bound.
-struct Open {
-    row: usize,
-    column: usize,
-    node: Option<Node>,
-    jumps: bool,
-}
-
-fn check(augmented: &AugmentedPlant<'_>, region: &Region, found: &[Slope], open: &[Open]) -> Check {
-    let Some(first) = open.first() else {
-        let detail = format!("{} entries enclosed", found.len());
-        return proved(Statement::SlopesOfTheProof, detail);
-    };
-    let graph = augmented.graph();
-    let nodes: Vec<Node> = open.iter().filter_map(|o| o.node).collect();
-    let (f, x) = (
-        &augmented.states[first.row].name,
-        &augmented.states[first.column].name,
-    );
-    let shown = first.node.map_or_else(String::new, |n| graph.render(n, 60));
-    let missing = undeclared(augmented, &nodes, region);
-    let detail = match (first.jumps, missing.is_empty()) {
-        (true, _) => {
-            format!("f({f}) switches with {shown}, so no Lipschitz constant is known for it")
-        }
-        (false, false) => format!(
-            "∂f({f})/∂{x} = {shown} has no bound: declare min and max of {}",
-            missing.join(", ")
-        ),
-        (false, true) => format!(
-            "∂f({f})/∂{x} = {shown} has no bound on the box: mind divisions and roots at its edges"
-        ),
-    };
-    let used = region.restricted(&graph.symbols_of(&nodes));
-    Statement::SlopesOfTheProof.with(Finding {
-        verdict: Verdict::Undecided(used.dimensions),
-        reason: detail.into(),
-    })
 }
 
 /// Bounds of the error of the states that the outputs show: that of the output
@@ -204,9 +177,7 @@ pub(crate) fn conclude(
             certificate.ultimate_bound = Some(bounds.norm);
             certificate.ultimate = bounds.states;
         }
-        None => certificate.notes.push(
-            "no ultimate bound: the assumed drift or noise has no bound, or S⁻¹ could not be enclosed".into(),
-        ),
+        None => certificate.notes.push(Reason::NoUltimateBound),
     }
     Ok(())
 }
@@ -219,23 +190,6 @@ fn bounds(augmented: &AugmentedPlant<'_>, found: Ultimate) -> Option<Bounds> {
     let states = states.into_iter().map(name).collect();
     let norm = found.norm;
     norm.is_finite().then_some(Bounds { norm, states })
-}
-
-/// The hypothesis θ ≥ θ0; `holds`: the inequality is proved at θ itself.
-pub(crate) fn reached(θ: f64, θ0: Option<f64>, holds: bool) -> Check {
-    let name = Hammouri::Theta { θ };
-    match (θ0, holds) {
-        (Some(θ0), true) => proved(name, format!("θ0 = {}", short(θ0))),
-        (Some(θ0), false) => undecided(
-            name,
-            format!(
-                "θ0 = {}: the theorem proves the decay from there on and says nothing below; it is sufficient, not necessary",
-                short(θ0)
-            ),
-        ),
-        (None, true) => proved(name, "no θ0 was found, but the inequality holds at this θ"),
-        (None, false) => undecided(name, "no θ0 was found up to 1e12 times the study's θ"),
-    }
 }
 
 /// Cells examined per end of the range of an entry.

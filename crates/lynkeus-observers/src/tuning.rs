@@ -19,6 +19,37 @@ pub enum Value {
     Table(BTreeMap<String, Value>),
 }
 
+impl Value {
+    /// A number.
+    pub(crate) fn number(&self) -> Option<f64> {
+        match self {
+            Self::Number(x) => Some(*x),
+            _ => None,
+        }
+    }
+
+    /// A text.
+    pub(crate) fn text(&self) -> Option<String> {
+        match self {
+            Self::Text(text) => Some(text.clone()),
+            _ => None,
+        }
+    }
+
+    /// The entries of a list.
+    pub(crate) fn list(&self) -> Option<&[Self]> {
+        match self {
+            Self::List(entries) => Some(entries),
+            _ => None,
+        }
+    }
+
+    /// What the entries of a list are, where each of them is that.
+    pub(crate) fn all<T>(&self, entry: impl Fn(&Self) -> Option<T>) -> Option<Vec<T>> {
+        self.list()?.iter().map(entry).collect()
+    }
+}
+
 impl std::fmt::Display for Value {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -128,6 +159,17 @@ impl Tuning {
         }
     }
 
+    /// What stands under a key, where it is as expected.
+    pub(crate) fn read<T>(
+        &self,
+        key: &str,
+        expected: &str,
+        meant: impl Fn(&Value) -> Option<T>,
+    ) -> Result<Option<T>, TuningError> {
+        let read = |value| meant(value).ok_or_else(|| TuningError::new(key, expected, value));
+        self.values.get(key).map(read).transpose()
+    }
+
     /// A number, or a list of them.
     ///
     /// # Errors
@@ -170,11 +212,9 @@ impl Tuning {
     /// # Errors
     /// Anything else.
     pub fn positive(&self, key: &str) -> Result<Option<f64>, TuningError> {
-        match self.values.get(key) {
-            None => Ok(None),
-            Some(Value::Number(x)) if *x > 0.0 && x.is_finite() => Ok(Some(*x)),
-            Some(other) => Err(TuningError::new(key, "a positive number", other)),
-        }
+        self.read(key, "a positive number", |value| {
+            value.number().filter(|x| *x > 0.0 && x.is_finite())
+        })
     }
 
     /// true or false; false if the key is absent.
@@ -182,11 +222,11 @@ impl Tuning {
     /// # Errors
     /// Anything else.
     pub fn flag(&self, key: &str) -> Result<bool, TuningError> {
-        match self.values.get(key) {
-            None => Ok(false),
-            Some(Value::Flag(flag)) => Ok(*flag),
-            Some(other) => Err(TuningError::new(key, "true or false", other)),
-        }
+        let found = self.read(key, "true or false", |value| match value {
+            Value::Flag(flag) => Some(*flag),
+            _ => None,
+        });
+        Ok(found?.unwrap_or(false))
     }
 
     /// One of some words.
@@ -194,14 +234,10 @@ impl Tuning {
     /// # Errors
     /// Anything else.
     pub fn choice(&self, key: &str, words: &[&str]) -> Result<Option<String>, TuningError> {
-        match self.values.get(key) {
-            None => Ok(None),
-            Some(Value::Text(text)) if words.contains(&text.as_str()) => Ok(Some(text.clone())),
-            Some(other) => {
-                let words: Vec<String> = words.iter().map(|w| format!("\"{w}\"")).collect();
-                Err(TuningError::new(key, words.join(" or "), other))
-            }
-        }
+        let expected: Vec<String> = words.iter().map(|w| format!("\"{w}\"")).collect();
+        self.read(key, &expected.join(" or "), |value| {
+            value.text().filter(|text| words.contains(&text.as_str()))
+        })
     }
 
     /// What the word under a key stands for; `meanings` are those of its allowed words, in their order.
@@ -210,7 +246,7 @@ impl Tuning {
         key: &KeySpec,
         meanings: [T; N],
     ) -> Result<Option<T>, TuningError> {
-        let Shape::Word(words) = key.shape else {
+        let Shape::Word(words) = key.shape.plain() else {
             return Ok(None);
         };
         let found = self.choice(key.name, words)?;
@@ -223,24 +259,9 @@ impl Tuning {
     /// # Errors
     /// Anything else.
     pub fn name_lists(&self, key: &str) -> Result<Option<Vec<Vec<String>>>, TuningError> {
-        let Some(value) = self.values.get(key) else {
-            return Ok(None);
-        };
-        let wrong = || TuningError::new(key, "a list of lists of state names", value);
-        let names = |list: &Value| match list {
-            Value::List(names) => names
-                .iter()
-                .map(|name| match name {
-                    Value::Text(name) => Ok(name.clone()),
-                    _ => Err(wrong()),
-                })
-                .collect(),
-            _ => Err(wrong()),
-        };
-        match value {
-            Value::List(lists) => lists.iter().map(names).collect::<Result<_, _>>().map(Some),
-            _ => Err(wrong()),
-        }
+        self.read(key, "a list of lists of state names", |value| {
+            value.all(|names| names.all(Value::text))
+        })
     }
 
     /// A list of names.
@@ -248,18 +269,7 @@ impl Tuning {
     /// # Errors
     /// Anything else.
     pub fn names(&self, key: &str) -> Result<Option<Vec<String>>, TuningError> {
-        let Some(value) = self.values.get(key) else {
-            return Ok(None);
-        };
-        let wrong = || TuningError::new(key, "a list of names", value);
-        let Value::List(names) = value else {
-            return Err(wrong());
-        };
-        let name = |name: &Value| match name {
-            Value::Text(name) => Ok(name.clone()),
-            _ => Err(wrong()),
-        };
-        names.iter().map(name).collect::<Result<_, _>>().map(Some)
+        self.read(key, "a list of names", |value| value.all(Value::text))
     }
 
     /// A list of tables, each with lists of numbers under exactly the given keys.
@@ -309,9 +319,7 @@ fn numbers(key: &str, value: &Value) -> Result<Vec<f64>, TuningError> {
 pub struct KeySpec {
     /// the key
     pub name: &'static str,
-    /// what may stand there, in words
-    pub kind: &'static str,
-    /// the same for programs
+    /// what may stand there
     pub shape: Shape,
     /// what holds where it is absent
     pub default: &'static str,
@@ -353,24 +361,69 @@ pub enum Shape {
     Section(&'static [&'static [KeySpec]]),
     /// one of several shapes
     Either(&'static [Shape]),
+    /// a shape that documentation and messages call by these words
+    As(&'static str, &'static Shape),
 }
 
 impl Shape {
     /// A number > 0, or one per chain or output.
-    pub const POSITIVES: Self = Self::Either(&[Self::Positive, Self::List(&Self::Positive)]);
+    pub const POSITIVES: Self = Self::As(
+        "number > 0, or one per chain",
+        &Self::Either(&[Self::Positive, Self::List(&Self::Positive)]),
+    );
     /// A list of names.
-    pub const NAMES: Self = Self::List(&Self::Text);
+    pub const NAMES: Self = Self::As("list of names", &Self::List(&Self::Text));
     /// A list of lists of numbers.
     pub const ROWS: Self = Self::List(&Self::List(&Self::Number));
+
+    /// The words of a key of this shape.
+    fn words(&self) -> String {
+        match self {
+            Self::Number => "number".to_owned(),
+            Self::Positive => "number > 0".to_owned(),
+            Self::NotNegative => "number ≥ 0".to_owned(),
+            Self::Share => "number between 0 and 1".to_owned(),
+            Self::Between { least, most } => format!("number in [{least:?}, {most:?}]"),
+            Self::Whole(least) => format!("whole number ≥ {least}"),
+            Self::Flag => "true, false".to_owned(),
+            Self::Text => "text".to_owned(),
+            Self::Word(words) => {
+                let words: Vec<String> = words.iter().map(|w| format!("`\"{w}\"`")).collect();
+                words.join(", ")
+            }
+            Self::List(entry) => format!("list: {}", entry.words()),
+            Self::Table(value) => format!("table: name = {}", value.words()),
+            Self::Section(_) => "table".to_owned(),
+            Self::Either(shapes) => {
+                let shapes: Vec<String> = shapes.iter().map(Self::words).collect();
+                shapes.join(", or ")
+            }
+            Self::As(words, _) => (*words).to_owned(),
+        }
+    }
+
+    /// The shape without the words for it.
+    pub(crate) fn plain(&self) -> &Self {
+        match self {
+            Self::As(_, shape) => shape.plain(),
+            plain => plain,
+        }
+    }
 }
 
 /// The default of a key that has none.
 pub const REQUIRED: &str = "required";
 
 impl KeySpec {
+    /// What may stand there, in words.
+    #[must_use]
+    pub fn kind(&self) -> String {
+        self.shape.words()
+    }
+
     /// The error that `found` stands under this key.
     pub fn wrong(&self, found: impl ToString) -> TuningError {
-        TuningError::new(self.name, self.kind, found)
+        TuningError::new(self.name, self.kind(), found)
     }
 
     /// The key as a row of a table of keys.
@@ -378,11 +431,11 @@ impl KeySpec {
     pub fn row(&self) -> String {
         let Self {
             name,
-            kind,
             default,
             meaning,
             ..
         } = self;
+        let kind = self.kind();
         format!("| `{name}` | {kind} | {default} | {meaning} |")
     }
 }

@@ -2,10 +2,18 @@
 //! here each gets its words, and advice that names keys of a study. One file per crate or family.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod block_triangular;
+mod chains;
 mod conditions;
+mod drift_observable;
+mod guarantee;
 mod numbers;
 mod observability;
+mod parameters;
+mod state_affine;
 mod structure;
+mod triangular;
+mod unknown_input;
 
 pub use numbers::{counted, figures, short};
 
@@ -13,4 +21,13 @@ pub use numbers::{counted, figures, short};
 pub trait Words {
     /// As people read it, without a full stop.
     fn words(&self) -> String;
+}
+
+/// `(x1, x2) → (x3)`: lists of names that lead from one to the next.
+fn arrows(lists: &[Vec<String>]) -> String {
+    let each: Vec<String> = lists
+        .iter()
+        .map(|names| format!("({})", names.join(", ")))
+        .collect();
+    each.join(" → ")
 }

@@ -4,10 +4,11 @@ use std::ops::ControlFlow;
 
 use lynkeus_observers::{Bounds, Certificate, Claim, Design, Tuning};
 use lynkeus_structure::{AugmentedPlant, Standing};
+use lynkeus_words::Words;
 
 use crate::declared::{Account, Declared};
 use crate::interval::{self, Intervals};
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, StudyDesign};
 use crate::{Correction, Error, Study, correction, prepare, simulate, words};
 
 mod assumptions;
@@ -27,9 +28,11 @@ pub struct CertifyReport {
     /// name of the plant
     pub plant: String,
     /// the observer that is certified
-    pub design: Design,
+    pub design: StudyDesign,
     /// by linear matrix inequalities, for observers whose states are the estimate
     pub certificate: Certificate,
+    /// what the study adds to it: the inputs for which it holds, a limit that has a say in the family
+    pub notes: Vec<String>,
     /// by the family's own theorem; none for a gain that no paper gives
     pub theorem: Option<Certificate>,
     /// how the measurements enter the observer that was certified
@@ -107,18 +110,18 @@ impl<'a> Task<'a> {
         };
         let mut place = &declared;
         let mut certificate = self.certificate(&declared, &design, claim)?;
+        let mut notes = vec![];
         if let Some(simulated) = &simulated
             && certificate.verdict() != Standing::Proved
         {
             let wide = certificate.verdict();
             certificate = self.certificate(simulated, &design, claim)?;
-            let note = self.reach(&design, &certificate, wide)?;
-            certificate.notes.push(note);
+            notes.push(self.reach(&design, &certificate, wide)?);
             place = simulated;
         }
         // a limit that has a say in the family is no note of a proof only
         if let Some(choice) = self.prepared.choice()?.filter(|c| c.ended.is_some()) {
-            certificate.notes.extend(choice.notes());
+            notes.extend(choice.notes());
         }
         let family = lynkeus_observers::find(design.observer.family).filter(|_| !lmi);
         let theorem = match family {
@@ -155,6 +158,7 @@ impl<'a> Task<'a> {
             excited,
             design,
             certificate,
+            notes,
             theorem,
             correction,
             assumed: assumptions::notes(&self.prepared, place),
@@ -307,6 +311,15 @@ impl CertifyReport {
     pub fn is_contradiction(&self) -> bool {
         let theorem = self.theorem.as_ref().map(|theorem| theorem.verdict());
         self.certificate.verdict() == Standing::Refuted && theorem == Some(Standing::Proved)
+    }
+
+    /// What the reader should know of a certificate of this report.
+    pub(crate) fn notes_of(&self, certificate: &Certificate) -> Vec<String> {
+        let own = certificate.notes.iter().map(Words::words);
+        match self.is_theorem(certificate) {
+            true => own.collect(),
+            false => own.chain(self.notes.iter().cloned()).collect(),
+        }
     }
 
     /// Whether a certificate of this report is the theorem's.

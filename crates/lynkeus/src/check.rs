@@ -17,7 +17,7 @@ use lynkeus_model::Plant;
 use lynkeus_observability::{Answer, Verdict};
 use lynkeus_observers::{Examination, fit_word};
 use lynkeus_structure::{Sensors, determined, uniformity};
-use lynkeus_words::counted;
+use lynkeus_words::{Words, counted};
 
 use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
@@ -312,7 +312,7 @@ impl fmt::Display for Report {
                 examination.family,
                 fit_word(examination.fit())
             )?;
-            writeln!(f, "  {}", examination.summary)?;
+            writeln!(f, "  {}", examination.summary.words())?;
             conditions(f, examination.conditions(), "conditions on the whole box")?;
         }
         if self.examinations.is_empty() {
@@ -340,7 +340,7 @@ impl Report {
             let same = |e: &&Examination| e.summary == *reason;
             let (told, rest): (Vec<_>, Vec<_>) = open.iter().copied().partition(same);
             let names: Vec<&str> = told.iter().map(|e| e.family).collect();
-            writeln!(f, "\n{}: undecided\n  {reason}", names.join(", "))?;
+            writeln!(f, "\n{}: undecided\n  {}", names.join(", "), reason.words())?;
             open = rest;
         }
         Ok(())

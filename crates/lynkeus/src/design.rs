@@ -4,7 +4,7 @@ use std::fmt;
 
 use lynkeus_observers::{Design, fit_word};
 use lynkeus_structure::Standing;
-use lynkeus_words::counted;
+use lynkeus_words::{Words, counted};
 use serde_json::{Map, Value, json};
 
 use crate::certify::{self, certificate_json};
@@ -40,12 +40,11 @@ impl DesignReport {
             observer,
             examination,
             parameters,
-            notes,
             ..
-        } = &self.certified.design;
+        } = &*self.certified.design;
         let parameters: Map<String, Value> = parameters
             .iter()
-            .map(|(name, value)| (name.clone(), json!(value)))
+            .map(|(name, value)| (name.clone(), json!(value.words())))
             .collect();
         let starts: Map<String, Value> = observer
             .states
@@ -62,7 +61,7 @@ impl DesignReport {
             "parameters": parameters,
             "initial": starts,
             "certificate": certificate_json(&self.certified),
-            "notes": notes,
+            "notes": self.certified.design.notes,
         })
     }
 }
@@ -73,9 +72,8 @@ impl fmt::Display for DesignReport {
             observer,
             examination,
             parameters,
-            notes,
             ..
-        } = &self.certified.design;
+        } = &*self.certified.design;
         writeln!(
             f,
             "{}: {} observer, {}",
@@ -83,7 +81,7 @@ impl fmt::Display for DesignReport {
             observer.family,
             counted(observer.states.len(), "state")
         )?;
-        writeln!(f, "  {}", examination.summary)?;
+        writeln!(f, "  {}", examination.summary.words())?;
         if examination.fit() == Standing::Undecided {
             writeln!(
                 f,
@@ -92,7 +90,7 @@ impl fmt::Display for DesignReport {
         }
         writeln!(f, "\nparameters")?;
         for (name, value) in parameters {
-            writeln!(f, "  {name:<14} {value}")?;
+            writeln!(f, "  {name:<14} {}", value.words())?;
         }
         write!(f, "{}", self.certified.correction)?;
         writeln!(
@@ -100,7 +98,7 @@ impl fmt::Display for DesignReport {
             "\n{}; `lynkeus certify` says more",
             self.certified.conclusion()
         )?;
-        for note in notes {
+        for note in &self.certified.design.notes {
             writeln!(f, "\nnote: {note}")?;
         }
         Ok(())

@@ -14,7 +14,7 @@ use crate::fixed_steps::unlocated;
 use crate::frozen::{Channel, Frozen, frozen};
 use crate::inputs::{are_logged, refuse_strays, supplied};
 use crate::outcome::{Raw, is_observers_answer, measurements, settle};
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, StudyDesign};
 use crate::replay::{Watch, refuse_smoothing, replay};
 use crate::study::{BetweenSamples, EstimateSettings};
 use crate::systems::{self, method};
@@ -71,7 +71,7 @@ pub(crate) fn estimated(
 /// The same by the observer that was designed for the study.
 pub(crate) fn with_design(
     prepared: &Prepared<'_>,
-    design: Design,
+    design: StudyDesign,
     table: &Table,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Outcome, Error> {
@@ -80,7 +80,7 @@ pub(crate) fn with_design(
 
 fn watched(
     prepared: &Prepared<'_>,
-    mut design: Design,
+    mut design: StudyDesign,
     table: &Table,
     watch: Watch<'_>,
 ) -> Result<Outcome, Error> {
@@ -222,7 +222,11 @@ pub(crate) fn at_readings(prepared: &Prepared<'_>) -> Vec<AtReading> {
 }
 
 /// Lets them start at the first readings of a log.
-pub(crate) fn start_at_readings(prepared: &Prepared<'_>, samples: &Samples, design: &mut Design) {
+pub(crate) fn start_at_readings(
+    prepared: &Prepared<'_>,
+    samples: &Samples,
+    design: &mut StudyDesign,
+) {
     for at in at_readings(prepared) {
         let readings = samples.readings.get(at.sensor);
         let Some(y) = readings.and_then(|r| r.iter().find(|y| y.is_finite())) else {

@@ -1,6 +1,6 @@
 //! Where an observer that runs on samples has its known inputs, and derivatives of them, from.
 
-use lynkeus_observers::{Design, Generator, InputDerivative, Prefilter, Signal};
+use lynkeus_observers::{Design, Generator, InputDerivative, Signal};
 
 use crate::columns::{Log, held};
 use crate::headers::{command, header};
@@ -80,7 +80,7 @@ fn generated(prepared: &Prepared<'_>, design: &mut Design) -> Result<Vec<Source>
             .map_err(|error| name.blame(Error::input(error.to_string())))?;
         match generator {
             Generator::Time(_) => drop(sources.remove(place)),
-            Generator::Prefilter(filter) => sources[place] = Source::Column(filter.command),
+            Generator::Prefilter { command, .. } => sources[place] = Source::Column(command),
         }
     }
     Ok(sources)
@@ -98,11 +98,11 @@ fn generator(
             let mut inputs = prepared.augmented().inputs.iter();
             let start = inputs.find(|u| u.name == name.text).and_then(|u| u.start);
             let initial = initial.clone();
-            Ok(Generator::Prefilter(Prefilter {
+            Ok(Generator::Prefilter {
                 poles: poles.clone(),
                 start: initial.unwrap_or_else(|| start.into_iter().collect()),
                 command: command(name, given).unwrap_or_default(),
-            }))
+            })
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
+use std::ops::{Deref, DerefMut};
 use std::time::Duration;
 
 use lynkeus_expr::{Budget, Spent};
@@ -122,6 +123,28 @@ pub struct Prepared<'a> {
     choice: OnceCell<Option<Choice>>,
 }
 
+/// The observer of a study.
+#[derive(Clone, Debug)]
+pub struct StudyDesign {
+    design: Design,
+    /// what its reader should know: what the family notes of it, how it was chosen, and where it starts
+    pub notes: Vec<String>,
+}
+
+impl Deref for StudyDesign {
+    type Target = Design;
+
+    fn deref(&self) -> &Design {
+        &self.design
+    }
+}
+
+impl DerefMut for StudyDesign {
+    fn deref_mut(&mut self) -> &mut Design {
+        &mut self.design
+    }
+}
+
 /// Sides of a smaller box: name, least and greatest value.
 pub(crate) type Sides = [(String, f64, f64)];
 
@@ -235,7 +258,7 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// No family fits ([`ErrorKind::Refused`](crate::ErrorKind)), or a key of
     /// `[observer]` cannot be used.
-    pub fn design(&self) -> Result<Design, Error> {
+    pub fn design(&self) -> Result<StudyDesign, Error> {
         self.design_with(&self.study.observer.tuning)
     }
 
@@ -255,7 +278,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// The same with another tuning.
-    pub(crate) fn design_with(&self, tuning: &Tuning) -> Result<Design, Error> {
+    pub(crate) fn design_with(&self, tuning: &Tuning) -> Result<StudyDesign, Error> {
         let examinations = self.examinations()?;
         let Some(choice) = self.choice()? else {
             return Err(none_fits(self.study, examinations));
@@ -264,9 +287,10 @@ impl<'a> Prepared<'a> {
         if let (Some(_), Some(spent)) = (choice.ended, self.study.budget.spent()) {
             return Err(limited(self.study, spent));
         }
-        let mut design = self.made(choice, tuning)?;
-        design.notes.extend(choice.notes());
-        Ok(design)
+        let design = self.made(choice, tuning)?;
+        let mut notes: Vec<String> = design.notes.iter().map(Words::words).collect();
+        notes.extend(choice.notes());
+        Ok(StudyDesign { design, notes })
     }
 
     fn made(&self, choice: &Choice, tuning: &Tuning) -> Result<Design, Error> {

@@ -5,9 +5,8 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use lynkeus_model::Plant;
-use lynkeus_observers::Design;
 
-use crate::prepare::{Prepared, is_certified_gain};
+use crate::prepare::{Prepared, StudyDesign, is_certified_gain};
 use crate::simulate::{self, Rig};
 use crate::study::SimulateSettings;
 use crate::{Error, Outcome, Study, Table, choose, estimate, prepare, systems};
@@ -19,7 +18,7 @@ use crate::{Error, Outcome, Study, Table, choose, estimate, prepare, systems};
 pub struct Runner {
     study: Study,
     simulated: Kept<Rig>,
-    replayed: Kept<Design>,
+    replayed: Kept<StudyDesign>,
 }
 
 impl Runner {

@@ -230,7 +230,7 @@ fn tuned(
         observer, outputs, ..
     }: &mut Sampled,
 ) -> Result<Option<Tuned>, Error> {
-    let numbers = &observer.tunables.numbers;
+    let numbers = &observer.tunables;
     let named = |tunable: &Tunable| (tunable.name.clone(), tunable.symbol);
     let signals: Vec<(String, Node)> = numbers.iter().map(named).collect();
     let values = numbers.iter().map(|tunable| tunable.value).collect();

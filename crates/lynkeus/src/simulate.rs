@@ -13,7 +13,7 @@ use crate::crew::within;
 use crate::fixed_steps::unlocated;
 use crate::headers::log_time;
 use crate::outcome::{Raw, interrupted, is_answer, measurements, settle};
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, StudyDesign};
 use crate::recorded::Recorded;
 use crate::spread::Spread;
 use crate::study::SimulateSettings;
@@ -58,7 +58,7 @@ pub(crate) fn of_rig(
 /// A study's plant with its observer, ready for the run of any seed.
 #[derive(Clone, Debug)]
 pub(crate) struct Rig {
-    pub design: Design,
+    pub design: StudyDesign,
     /// a filter works on what the plant's sensors show, and is not in it
     pub simulation: Simulation,
     spread: Spread,
@@ -107,7 +107,7 @@ impl Rig {
     ///
     /// # Errors
     /// A study that cannot be run.
-    pub fn of(prepared: &Prepared<'_>, design: Design) -> Result<Self, Error> {
+    pub fn of(prepared: &Prepared<'_>, design: StudyDesign) -> Result<Self, Error> {
         let (study, plant) = (prepared.study(), prepared.plant());
         let settings = settings(study)?;
         let mut simulation = open_loop(study, settings, plant)?;
@@ -309,7 +309,7 @@ pub(crate) fn open_loop(
 /// A run with what is to be said of it.
 pub(crate) fn outcome(
     prepared: &Prepared<'_>,
-    design: Design,
+    design: StudyDesign,
     run: &Recorded,
     mut course: Course,
 ) -> Result<Outcome, Error> {

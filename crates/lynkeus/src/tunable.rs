@@ -5,10 +5,10 @@ use lynkeus_observers::{Design, Tunable, Tuning};
 use lynkeus_run::{Blueprint, Updates};
 
 use crate::Error;
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, StudyDesign};
 
 /// The design with what may be changed as symbols.
-pub(crate) fn design(prepared: &Prepared<'_>) -> Result<Design, Error> {
+pub(crate) fn design(prepared: &Prepared<'_>) -> Result<StudyDesign, Error> {
     let tuning = Tuning {
         tunable: true,
         ..prepared.study().observer.tuning.clone()
@@ -18,7 +18,7 @@ pub(crate) fn design(prepared: &Prepared<'_>) -> Result<Design, Error> {
 
 /// The numbers of an estimator that may be changed.
 fn tunables<'d>(design: &'d Design, made: &Blueprint) -> &'d [Tunable] {
-    let numbers = &design.observer.tunables.numbers;
+    let numbers = &design.observer.tunables;
     match &made.updates {
         Updates::Jumps { tuned: Some(_), .. } => numbers,
         Updates::Filter { model, .. } if model.process_noise.iter().any(|q| *q > 0.0) => numbers,
@@ -36,10 +36,12 @@ pub(crate) fn note(design: &Design, made: &Blueprint) -> String {
             names.join(", ")
         );
     }
-    let reason = match (design.observer.tunables.refused, &made.updates) {
-        (Some(reason), _) => reason,
-        (None, Updates::Filter { .. }) => "without process noise there is none to scale",
-        (None, Updates::Jumps { .. }) => "its equations read no gain",
+    let reason = match (design.observer.is_whole, &made.updates) {
+        (true, _) => {
+            "a gain by linear matrix inequalities has no θ: it is made, and proved, as a whole"
+        }
+        (false, Updates::Filter { .. }) => "without process noise there is none to scale",
+        (false, Updates::Jumps { .. }) => "its equations read no gain",
     };
     format!("nothing may be changed while it runs: {reason}")
 }

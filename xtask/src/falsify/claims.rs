@@ -2,9 +2,9 @@
 //! that knows what certificates look like.
 
 use lynkeus::observers::{
-    Certificate, Check, Design, Examination, FAMILIES, Statement, Tuning, UltimateBound,
+    Certificate, Check, Examination, FAMILIES, Statement, Tuning, UltimateBound,
 };
-use lynkeus::prepare::Prepared;
+use lynkeus::prepare::{Prepared, StudyDesign};
 use lynkeus::structure::{AugmentedPlant, Dimension, Standing, Verdict};
 use nalgebra::DMatrix;
 
@@ -40,7 +40,7 @@ pub struct Refutation {
 /// Everything said about one case.
 pub struct Findings {
     /// none where the family does not take the plant
-    pub design: Option<Design>,
+    pub design: Option<StudyDesign>,
     pub claims: Vec<Claim>,
     pub refutations: Vec<Refutation>,
     /// the family that the study asks for
@@ -165,7 +165,7 @@ fn claim(certificate: &Certificate) -> Option<Claim> {
         return None;
     }
     Some(Claim {
-        basis: certificate.basis.clone(),
+        basis: certificate.basis.to_owned(),
         rate: certificate.rate.unwrap_or(0.0),
         overshoot: certificate.overshoot,
         ultimate: certificate.ultimate_bound,

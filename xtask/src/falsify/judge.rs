@@ -256,13 +256,13 @@ impl Look<'_, '_> {
 
     fn witnesses(&mut self) {
         for refutation in &self.found.refutations {
-            match refute::check(refutation, self.augmented, self.found.design.as_ref()) {
+            match refute::check(refutation, self.augmented, self.found.design.as_deref()) {
                 refute::Answer::Confirmed => self.counts.refutations += 1,
                 refute::Answer::Unread => self.counts.unread += 1,
                 refute::Answer::Wrong(evidence) => {
                     self.counts.refutations += 1;
                     self.counts.wrong += 1;
-                    let evidence = format!("{}: {evidence}", refutation.condition);
+                    let evidence = format!("{:?}: {evidence}", refutation.condition);
                     self.note(Flaw::Witness, evidence);
                 }
             }

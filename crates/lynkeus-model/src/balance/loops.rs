@@ -234,7 +234,7 @@ impl Torn<'_> {
     }
 
     /// `only_near_starts`: on this side of a threshold, beyond which they are regular.
-    fn undetermined(&self, rows: &[usize], only_near_starts: bool) -> Problem {
+    fn undetermined(&self, rows: &[usize], only_near_starts: bool) -> Box<Problem> {
         let start = |equation: &usize| self.system.equations[*equation].span.start;
         let left: Vec<usize> = self.equations.iter().copied().collect();
         let dependent = rows.iter().map(|&row| left[row]);

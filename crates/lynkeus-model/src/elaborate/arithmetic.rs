@@ -5,7 +5,6 @@ use lynkeus_expr::{Binary, Expr, Node, Unary};
 use super::evaluate::Evaluator;
 use super::value::{Scalar, Value, describe_dims, expected_number, unequal_sizes};
 use crate::diagnostic::{Problem, Result, Span};
-use crate::syntax::ast::{BinaryOperator, Relation};
 
 impl Evaluator<'_> {
     /// A number as a Real expression.
@@ -68,64 +67,54 @@ impl Evaluator<'_> {
 
     pub(super) fn binary(
         &self,
-        operator: BinaryOperator,
+        operation: Binary,
+        elementwise: bool,
         left: Value,
         right: Value,
         span: Span,
     ) -> Result<Value> {
-        use BinaryOperator as B;
-        match operator {
-            B::And | B::Or => {
+        match operation {
+            Binary::And | Binary::Or => {
                 let (left, right) = (self.boolean(&left, span)?, self.boolean(&right, span)?);
-                let operation = match operator {
-                    B::And => Binary::And,
-                    _ => Binary::Or,
-                };
                 let node = self.graph.binary(operation, left, right);
                 return Ok(Scalar::Boolean(node).into());
             }
-            B::Add | B::Subtract if left.dims != right.dims => {
+            _ if elementwise => {}
+            Binary::Add | Binary::Sub if left.dims != right.dims => {
                 let problem = unequal_sizes(&left.dims, &right.dims, span);
                 return Err(match left.dims.is_empty() || right.dims.is_empty() {
                     true => problem.hint("`.+` and `.-` take a scalar with every element"),
                     false => problem,
                 });
             }
-            B::Multiply if !left.dims.is_empty() && !right.dims.is_empty() => {
+            Binary::Mul if !left.dims.is_empty() && !right.dims.is_empty() => {
                 return self.product(&left, &right, span);
             }
-            B::Divide if !right.dims.is_empty() => {
+            Binary::Div if !right.dims.is_empty() => {
                 return Err(Problem::new(span, "division by an array")
                     .hint("`./` divides by every element"));
             }
             _ => {}
         }
         if let (Some(a), Some(b)) = (left.as_scalar(), right.as_scalar()) {
-            return Ok(self.scalar_binary(operator, a, b, span)?.into());
+            return Ok(self.scalar_binary(operation, a, b, span)?.into());
         }
         self.elementwise(left, right, span, |evaluator, a, b, span| {
-            evaluator.scalar_binary(operator, a, b, span)
+            evaluator.scalar_binary(operation, a, b, span)
         })
     }
 
     pub(super) fn scalar_binary(
         &self,
-        operator: BinaryOperator,
+        operation: Binary,
         left: Scalar,
         right: Scalar,
         span: Span,
     ) -> Result<Scalar> {
-        use BinaryOperator as B;
-        match operator {
-            B::Add | B::ElementAdd => {
-                self.of_two(left, right, span, i64::checked_add, |a, b| a + b)
-            }
-            B::Subtract | B::ElementSubtract => {
-                self.of_two(left, right, span, i64::checked_sub, |a, b| a - b)
-            }
-            B::Multiply | B::ElementMultiply => {
-                self.of_two(left, right, span, i64::checked_mul, |a, b| a * b)
-            }
+        match operation {
+            Binary::Add => self.of_two(left, right, span, i64::checked_add, |a, b| a + b),
+            Binary::Sub => self.of_two(left, right, span, i64::checked_sub, |a, b| a - b),
+            Binary::Mul => self.of_two(left, right, span, i64::checked_mul, |a, b| a * b),
             _ => {
                 let (left, right) = (self.real(left, span)?, self.real(right, span)?);
                 if self.graph.constant_value(right) == Some(0.0) {
@@ -206,7 +195,7 @@ impl Evaluator<'_> {
 
     pub(super) fn compare(
         &self,
-        relation: Relation,
+        relation: &str,
         left: Scalar,
         right: Scalar,
         span: Span,
@@ -214,12 +203,12 @@ impl Evaluator<'_> {
         let sides = left.with(right, self.graph);
         let (left, right) = sides.ok_or_else(|| expected_number(span))?;
         Ok(match relation {
-            Relation::Less => self.graph.binary(Binary::Less, left, right),
-            Relation::LessEqual => self.graph.binary(Binary::LessEq, left, right),
-            Relation::Greater => self.graph.binary(Binary::Less, right, left),
-            Relation::GreaterEqual => self.graph.binary(Binary::LessEq, right, left),
-            Relation::Equal => self.graph.binary(Binary::Equal, left, right),
-            Relation::NotEqual => {
+            "<" => self.graph.binary(Binary::Less, left, right),
+            "<=" => self.graph.binary(Binary::LessEq, left, right),
+            ">" => self.graph.binary(Binary::Less, right, left),
+            ">=" => self.graph.binary(Binary::LessEq, right, left),
+            "==" => self.graph.binary(Binary::Equal, left, right),
+            _ => {
                 let equal = self.graph.binary(Binary::Equal, left, right);
                 self.graph.unary(Unary::Not, equal)
             }
@@ -269,9 +258,9 @@ impl Evaluator<'_> {
             if a.number(self.graph) == Some(0.0) || b.number(self.graph) == Some(0.0) {
                 continue;
             }
-            let term = self.scalar_binary(BinaryOperator::Multiply, a, b, span)?;
+            let term = self.scalar_binary(Binary::Mul, a, b, span)?;
             sum = Some(match sum {
-                Some(sum) => self.scalar_binary(BinaryOperator::Add, sum, term, span)?,
+                Some(sum) => self.scalar_binary(Binary::Add, sum, term, span)?,
                 None => term,
             });
         }
@@ -279,11 +268,11 @@ impl Evaluator<'_> {
     }
 }
 
-pub(super) fn overflow(span: Span) -> Problem {
+pub(super) fn overflow(span: Span) -> Box<Problem> {
     Problem::new(span, "this Integer does not fit in 64 bits").hint("use Real numbers")
 }
 
-fn no_product(left: &[usize], right: &[usize], span: Span) -> Problem {
+fn no_product(left: &[usize], right: &[usize], span: Span) -> Box<Problem> {
     let (left, right) = (describe_dims(left), describe_dims(right));
     Problem::new(span, format!("no product of sizes {left} and {right}"))
         .hint("the inner sizes of a matrix product must agree; `.*` multiplies element by element")

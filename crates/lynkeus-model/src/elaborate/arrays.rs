@@ -1,12 +1,14 @@
 //! Arrays: constructors (`{…}`, `[…; …]`, ranges, comprehensions), subscripts (`x[2:end]`), and the
 //! functions that make, measure and reduce them.
 
+use lynkeus_expr::Binary;
+
 use super::evaluate::{Evaluator, HOW_TO_BE_WHOLE};
 use super::scope::Named;
 use super::value::{Scalar, Value, describe_dims, element_count, unequal_sizes};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_RANK;
-use crate::syntax::ast::{BinaryOperator, Call, ExprId, ForIndex, Kind};
+use crate::syntax::ast::{Call, ExprId, ForIndex, Kind};
 use crate::syntax::{plain, too_many_dimensions};
 
 impl<'a> Evaluator<'a> {
@@ -175,7 +177,7 @@ impl<'a> Evaluator<'a> {
         &mut self,
         call: &'a Call,
         span: Span,
-        operator: BinaryOperator,
+        operator: Binary,
         empty: i64,
     ) -> Result<Value> {
         let elements = self.reduced(call, span)?;
@@ -377,7 +379,7 @@ impl<'a> Evaluator<'a> {
         self.concatenate(axis.saturating_sub(1), arrays, span)
     }
 
-    fn no_dimension(&self, axis: i64, dims: &[usize], at: ExprId) -> Problem {
+    fn no_dimension(&self, axis: i64, dims: &[usize], at: ExprId) -> Box<Problem> {
         let found = describe_dims(dims);
         let message = format!("there is no dimension {axis}: the size is {found}");
         Problem::new(self.span(at), message)
@@ -568,12 +570,12 @@ fn within(text: &str, dim: usize, value: i64, span: Span) -> Result<usize> {
     })
 }
 
-fn not_an_array(text: &str, span: Span) -> Problem {
+fn not_an_array(text: &str, span: Span) -> Box<Problem> {
     let message = format!("`{text}` is a scalar and takes no subscripts");
     Problem::new(span, message)
 }
 
-fn not_whole(span: Span) -> Problem {
+fn not_whole(span: Span) -> Box<Problem> {
     let message = "a subscript must be an Integer or a range of Integers";
     Problem::new(span, message).hint(HOW_TO_BE_WHOLE)
 }

@@ -17,7 +17,7 @@ use crate::syntax::{plain, unquoted};
 use crate::{Assertion, Parameter, Plant, Variable, balance};
 
 /// The plant, with what looks wrong in it. Its graph is still the caller's: this one is empty.
-pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec<Problem>)> {
+pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec<Box<Problem>>)> {
     let (graph, model) = (symbols.graph, symbols.model);
     let (unknowns, inputs) = unknowns(symbols, &flat.equations)?;
     let equations = std::mem::take(&mut flat.equations);
@@ -44,8 +44,8 @@ pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec
             continue;
         }
         let elements = elements(symbols, declaration, component)?;
-        if declaration.prefix.variability == Variability::Continuous {
-            let is_output = declaration.prefix.causality == Causality::Output;
+        if declaration.variability == Variability::Continuous {
+            let is_output = declaration.causality == Causality::Output;
             for element in elements {
                 variable(symbols, element, is_output, &inputs, &solution, &mut plant);
             }
@@ -70,7 +70,7 @@ fn unknowns(
     let sides = equations.iter().flat_map(|e| [e.left, e.right]);
     let equated: HashSet<Node> = sides.collect();
     for (_, declaration, component) in symbols.all().filter(|(.., c)| !c.is_known) {
-        let is_input = declaration.prefix.causality == Causality::Input;
+        let is_input = declaration.causality == Causality::Input;
         for element in elements(symbols, declaration, component)? {
             let node = element.node;
             let is_open = declaration.binding.is_none() && !equated.contains(&node);
@@ -165,9 +165,8 @@ fn parameters(
     elements: Vec<Variable>,
     plant: &mut Plant,
 ) {
-    let prefix = &declaration.prefix;
-    let is_fixed = prefix.variability == Variability::Constant || prefix.is_final;
-    if is_fixed || prefix.type_name == TypeName::Boolean {
+    let is_fixed = declaration.variability == Variability::Constant || declaration.is_final;
+    if is_fixed || declaration.type_name == TypeName::Boolean {
         return;
     }
     for (offset, mut variable) in elements.into_iter().enumerate() {
@@ -204,7 +203,7 @@ fn elements(
             .unwrap_or(f64::NEG_INFINITY),
         max: f64::INFINITY,
         nominal: None,
-        integer: declaration.prefix.is_integer(),
+        integer: declaration.is_integer(),
         fixed: false,
     };
     let elements = component.elements.iter().enumerate().map(element);
@@ -314,7 +313,7 @@ fn numbers(
     id: ExprId,
 ) -> Result<Vec<f64>> {
     let is_truth = name == "fixed";
-    let is_boolean = declaration.prefix.type_name == TypeName::Boolean;
+    let is_boolean = declaration.type_name == TypeName::Boolean;
     let mut evaluator = Evaluator::new(symbols, Mode::Structural);
     let span = evaluator.span(id);
     let Some(value) = evaluator.value_if_known(id)? else {
@@ -345,14 +344,15 @@ fn fix_starts(
     flat: &Flat,
     solution: &HashMap<Node, Node>,
     states: &mut [Variable],
-) -> Vec<Problem> {
+) -> Vec<Box<Problem>> {
     let graph = symbols.graph;
     let mut at_start = solution.clone();
     at_start.insert(symbols.time(), graph.constant(0.0).node());
     let values = symbols.parameter_values();
     let places: HashMap<Node, usize> = states.iter().map(|state| state.node).zip(0..).collect();
     let unread = flat.initial_unread.iter();
-    let mut warnings: Vec<Problem> = unread.map(|&span| without_effect(span, UNREAD)).collect();
+    let mut warnings: Vec<Box<Problem>> =
+        unread.map(|&span| without_effect(span, UNREAD)).collect();
     for equation in &flat.initial {
         let sides = graph.substitute(&[equation.left, equation.right], &at_start);
         match start_fixed(graph, &values, &places, [sides[0], sides[1]]) {
@@ -437,7 +437,7 @@ const UNREAD: &str = "an initial equation of a derivative has no effect";
 const FIXES_NONE: &str =
     "this initial equation fixes the start of no state by itself: it has no effect";
 
-fn without_effect(span: Span, message: &str) -> Problem {
+fn without_effect(span: Span, message: &str) -> Box<Problem> {
     Problem::new(span, message)
         .hint("starts are taken from `start = …` and from initial equations as `x = …`")
 }
@@ -461,7 +461,7 @@ fn failing_at_start(
     symbols: &Symbols<'_>,
     assertions: &[(Assertion, Span)],
     plant: &Plant,
-) -> Vec<Problem> {
+) -> Vec<Box<Problem>> {
     let mut known = symbols.parameter_values();
     known.insert(symbols.time(), Some(0.0));
     let variables = plant.states.iter().chain(&plant.inputs);

@@ -103,7 +103,7 @@ impl<'a> Evaluator<'a> {
         self.calls.push(&class.path);
         let done = self.inside(class, |evaluator| {
             for declaration in &declarations {
-                let value = match declaration.prefix.causality {
+                let value = match declaration.causality {
                     Causality::Input => given.next().flatten(),
                     _ => None,
                 };
@@ -238,7 +238,7 @@ impl<'a> Evaluator<'a> {
 impl<'a> Evaluator<'a> {
     /// The class that a variable of another class is declared as.
     fn type_of(&self, declaration: &Declaration, of: &Class) -> Option<&'a Class> {
-        match declaration.prefix.type_name {
+        match declaration.type_name {
             TypeName::Named(name) => self.class(name, &[&of.path]),
             _ => None,
         }
@@ -260,7 +260,7 @@ impl<'a> Evaluator<'a> {
         span: Span,
     ) -> Result<()> {
         let name = &declaration.label;
-        let type_name = declaration.prefix.type_name;
+        let type_name = declaration.type_name;
         match (self.type_of(declaration, class), type_name) {
             (Some(record), _) if record.kind == ClassKind::Record => {
                 return self.introduce_record(class, declaration, record, given, span);
@@ -284,7 +284,7 @@ impl<'a> Evaluator<'a> {
             }
         };
         let dims = self.dims_declared(declaration, value.as_ref(), span)?;
-        let mut local = Local::without_value(dims, declaration.prefix.is_integer());
+        let mut local = Local::without_value(dims, declaration.is_integer());
         if let Some(value) = value {
             check_size(name, &local.dims, &value.dims, span)?;
             let elements = value.elements.into_iter();
@@ -330,7 +330,7 @@ impl<'a> Evaluator<'a> {
                 check_given(class, declaration, span)?;
                 for member in self.declarations_of(record)? {
                     let dims = self.dims_declared(member, None, member.name)?;
-                    let local = Local::without_value(dims, member.prefix.is_integer());
+                    let local = Local::without_value(dims, member.is_integer());
                     members.push((member.label.clone(), local));
                 }
             }
@@ -367,7 +367,7 @@ impl<'a> Evaluator<'a> {
 
 /// Refuses an input that has no value; other variables are given theirs by statements.
 fn check_given(class: &Class, declaration: &Declaration, span: Span) -> Result<()> {
-    if declaration.prefix.causality != Causality::Input {
+    if declaration.causality != Causality::Input {
         return Ok(());
     }
     let (name, function) = (&declaration.label, &class.path);
@@ -536,7 +536,7 @@ impl<'a> Evaluator<'a> {
 
     /// A member of a record with its value, or those of the record that it is.
     fn member_value(&mut self, declaration: &Declaration, id: ExprId) -> Result<Members> {
-        let members = match declaration.prefix.type_name {
+        let members = match declaration.type_name {
             TypeName::Named(_) => self.members(id)?,
             _ => number_of(self.value(id)?),
         };
@@ -561,7 +561,7 @@ fn with_causality<'a>(
     causality: Causality,
 ) -> impl Iterator<Item = &'a Declaration> {
     let declarations = declarations.iter().copied();
-    declarations.filter(move |declaration| declaration.prefix.causality == causality)
+    declarations.filter(move |declaration| declaration.causality == causality)
 }
 
 /// A number or an array as the one member without a name.

@@ -48,7 +48,7 @@ impl<'a> Symbols<'a> {
     fn component(&self, place: usize, given: &[Given]) -> Result<Component> {
         let declaration = &self.model.declarations[place];
         let name = declaration.label.as_str();
-        if declaration.prefix.variability != Variability::Continuous {
+        if declaration.variability != Variability::Continuous {
             return self.parameter(declaration, self.dependent[place], given);
         }
         let mut evaluator = Evaluator::of(self, declaration, Mode::Structural);
@@ -58,13 +58,13 @@ impl<'a> Symbols<'a> {
                 .hint("write a number or a parameter instead of `:`"))
         })?;
         self.charge(&dims, declaration)?;
-        let is_boolean = declaration.prefix.type_name == TypeName::Boolean;
-        if is_boolean && declaration.prefix.causality == Causality::Input {
+        let is_boolean = declaration.type_name == TypeName::Boolean;
+        if is_boolean && declaration.causality == Causality::Input {
             let problem = Problem::new(declaration.name, "a Boolean input is not supported");
             return Err(problem.hint("use a Real and compare it, as in `if u > 0.5 then …`"));
         }
         let may_have_derivative =
-            declaration.prefix.type_name == TypeName::Real && !is_outer_input(declaration);
+            declaration.type_name == TypeName::Real && !is_outer_input(declaration);
         let mut derivatives = self.derivatives.borrow_mut();
         let symbol = |offset: usize| {
             let symbol = self.graph.symbol(&element_name(name, &dims, offset)).node();
@@ -142,9 +142,8 @@ fn dependent(declarations: &[Declaration], needs: &[Vec<usize>], sequence: &[usi
     let mut dependent = vec![false; declarations.len()];
     for &place in sequence {
         let depends = |&need: &usize| {
-            let prefix = &declarations[need].prefix;
-            let settable = prefix.variability == Variability::Parameter && !prefix.is_final;
-            dependent[need] || (settable && !prefix.is_integer())
+            let needed = &declarations[need];
+            dependent[need] || (needed.is_settable() && !needed.is_integer())
         };
         dependent[place] = needs[place].iter().any(depends);
     }
@@ -154,7 +153,7 @@ fn dependent(declarations: &[Declaration], needs: &[Vec<usize>], sequence: &[usi
 impl<'a> Symbols<'a> {
     /// Declarations whose size or value this one reads.
     fn needs(&self, declaration: &Declaration) -> Vec<usize> {
-        let is_known = declaration.prefix.variability != Variability::Continuous;
+        let is_known = declaration.variability != Variability::Continuous;
         let binding = declaration.binding.filter(|_| is_known);
         let own: Vec<&str> = self.model.scopes.iter().map(String::as_str).collect();
         let package = declaration.package.as_deref();
@@ -245,7 +244,7 @@ fn sort(declarations: &[Declaration], needs: &[Vec<usize>]) -> Result<Vec<usize>
     Ok(sequence)
 }
 
-fn cycle(declarations: &[Declaration], path: &[(usize, usize)], closing: usize) -> Problem {
+fn cycle(declarations: &[Declaration], path: &[(usize, usize)], closing: usize) -> Box<Problem> {
     let start = path.iter().position(|(place, _)| *place == closing);
     let cycle = &path[start.unwrap_or(0)..];
     let name = |place: usize| format!("`{}`", declarations[place].label);
@@ -272,8 +271,7 @@ impl<'a> Symbols<'a> {
     ) -> Result<Component> {
         let label = declaration.label.as_str();
         let name = label.strip_prefix('.').unwrap_or(label);
-        let prefix = &declaration.prefix;
-        if prefix.causality == Causality::Input {
+        if declaration.causality == Causality::Input {
             let message = format!("`{name}` is both a parameter and an input");
             return Err(Problem::new(declaration.name, message).hint("choose one of the two"));
         }
@@ -295,8 +293,8 @@ impl<'a> Symbols<'a> {
             dims: &dims,
         };
         let values = parts.elements(known, true)?;
-        let is_parameter = prefix.variability == Variability::Parameter;
-        let keeps_symbols = is_parameter && !prefix.is_final && prefix.type_name == TypeName::Real;
+        let is_parameter = declaration.variability == Variability::Parameter;
+        let keeps_symbols = declaration.is_settable() && declaration.type_name == TypeName::Real;
         let elements = match &values {
             _ if dependent && self.options.symbolic_parameters => {
                 let symbolic = self.binding(declaration, Mode::Parametric)?;
@@ -395,14 +393,14 @@ impl Parts<'_> {
     fn typed(&self, element: Scalar, must_be_known: bool, span: Span) -> Result<Scalar> {
         let graph = self.symbols.graph;
         let is_known = |node| !must_be_known || graph.constant_value(node).is_some();
-        if self.declaration.prefix.type_name == TypeName::Boolean {
+        if self.declaration.type_name == TypeName::Boolean {
             return match element {
                 Scalar::Boolean(node) if is_known(node) => Ok(element),
                 _ => Err(Problem::new(span, "expected `true` or `false`")),
             };
         }
         let node = element.real(graph).ok_or_else(|| expected_number(span))?;
-        let is_integer = must_be_known && self.declaration.prefix.is_integer();
+        let is_integer = must_be_known && self.declaration.is_integer();
         match element {
             Scalar::Integer(_) if is_integer => Ok(element),
             _ if is_integer => {
@@ -420,7 +418,7 @@ impl Parts<'_> {
     /// A number from outside as a value of the declared type.
     fn converted(&self, value: f64) -> Result<Scalar> {
         let constant = |value: f64| self.symbols.graph.constant(value).node();
-        match self.declaration.prefix.type_name {
+        match self.declaration.type_name {
             TypeName::Boolean => Ok(Scalar::Boolean(constant(f64::from(value != 0.0)))),
             TypeName::Integer if value.fract() != 0.0 || value.abs() > 2f64.powi(53) => {
                 let name = self.name;
@@ -482,9 +480,8 @@ fn by_offset(given: &[Given], name: &str, dims: &[usize], span: Span) -> Result<
 }
 
 fn check_settable(name: &str, declaration: &Declaration) -> Result<()> {
-    let prefix = &declaration.prefix;
-    let what = match prefix.variability {
-        Variability::Parameter if prefix.is_final => "a final parameter",
+    let what = match declaration.variability {
+        Variability::Parameter if declaration.is_final => "a final parameter",
         Variability::Parameter => return Ok(()),
         Variability::Constant => "a constant",
         Variability::Continuous => "a variable",
@@ -493,9 +490,9 @@ fn check_settable(name: &str, declaration: &Declaration) -> Result<()> {
     Err(Problem::new(declaration.name, message).hint("only parameters can be set"))
 }
 
-fn unknown(model: &FlatModel, name: &str) -> Problem {
+fn unknown(model: &FlatModel, name: &str) -> Box<Problem> {
     let declarations = model.declarations.iter();
-    let settable = declarations.filter(|d| check_settable(name, d).is_ok());
+    let settable = declarations.filter(|d| d.is_settable());
     let names: Vec<&str> = settable.map(|d| d.label.as_str()).collect();
     let model_name = &model.title;
     let hint =

@@ -11,9 +11,7 @@ use crate::diagnostic::{Problem, Result, Span};
 use crate::flat::constant;
 use crate::limits::{Budget, MAX_CALL_DEPTH};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{
-    Ast, BinaryOperator, Declaration, ExprId, Kind, PathPart, Relation, UnaryOperator,
-};
+use crate::syntax::ast::{Ast, Declaration, ExprId, Kind, PathPart, Term};
 use crate::syntax::{plain, shortened};
 
 /// What to do about a Real where an Integer is needed.
@@ -139,13 +137,24 @@ impl<'a> Evaluator<'a> {
             Kind::Array(elements) => self.array(elements, span),
             Kind::Matrix(rows) => self.matrix(rows, span),
             Kind::Comprehension(body, iterators) => self.comprehension(*body, iterators, span),
-            Kind::Unary(operator, operand) => self.unary(*operator, *operand),
+            Kind::Not(operand) => {
+                let node = self.condition(*operand)?;
+                Ok(Scalar::Boolean(self.graph.unary(Unary::Not, node)).into())
+            }
+            Kind::Plus(operand) => {
+                let value = self.value(*operand)?;
+                self.map(value, self.span(*operand), |_, scalar, _| Ok(scalar))
+            }
+            Kind::Minus(operand) => {
+                let value = self.value(*operand)?;
+                self.map(value, self.span(*operand), Self::negated)
+            }
             Kind::Chain(head, rest) => self.chain(*head, rest),
             Kind::Power(base, exponent, elementwise) => {
                 let (base, exponent) = (self.value(*base)?, self.value(*exponent)?);
                 self.power(base, exponent, *elementwise, span)
             }
-            Kind::Relation(relation, left, right) => self.relation(*relation, *left, *right),
+            Kind::Relation(relation, left, right) => self.relation(relation, *left, *right),
             Kind::If(branches, otherwise) => self.conditional(branches, *otherwise),
             Kind::Range(start, step, stop) => self.range(*start, *step, *stop, span),
         }
@@ -197,14 +206,14 @@ impl<'a> Evaluator<'a> {
         size.ok_or_else(|| Problem::new(span, "`end` stands only in subscripts"))
     }
 
-    pub(super) fn varying(&self, span: Span) -> Problem {
+    pub(super) fn varying(&self, span: Span) -> Box<Problem> {
         let name = self.text(span);
         let message = format!("`{name}` is a variable, but a known value is needed here");
         Problem::new(span, message)
             .hint("sizes, loop bounds, subscripts, attributes and parameters use parameters only")
     }
 
-    pub(super) fn without_value(&mut self, span: Span) -> Problem {
+    pub(super) fn without_value(&mut self, span: Span) -> Box<Problem> {
         self.valueless = true;
         let name = self.text(span);
         let message = format!("parameter `{name}` has no value, but one is needed here");
@@ -213,7 +222,7 @@ impl<'a> Evaluator<'a> {
         ))
     }
 
-    pub(super) fn unknown_name(&self, span: Span) -> Problem {
+    pub(super) fn unknown_name(&self, span: Span) -> Box<Problem> {
         let name = self.text(span);
         if name == "time" {
             return self.varying(span);
@@ -236,31 +245,18 @@ impl<'a> Evaluator<'a> {
         Problem::new(span, message).maybe_hint(for_pi.or(suggestion))
     }
 
-    fn unary(&mut self, operator: UnaryOperator, operand: ExprId) -> Result<Value> {
-        let value = self.value(operand)?;
-        let span = self.span(operand);
-        match operator {
-            UnaryOperator::Not => {
-                let node = self.boolean(&value, span)?;
-                Ok(Scalar::Boolean(self.graph.unary(Unary::Not, node)).into())
-            }
-            UnaryOperator::Plus => self.map(value, span, |_, scalar, _| Ok(scalar)),
-            UnaryOperator::Minus => self.map(value, span, Self::negated),
-        }
-    }
-
-    fn chain(&mut self, head: ExprId, rest: &'a [(BinaryOperator, ExprId)]) -> Result<Value> {
+    fn chain(&mut self, head: ExprId, rest: &'a [Term]) -> Result<Value> {
         let mut value = self.value(head)?;
         let start = self.span(head);
-        for &(operator, operand) in rest {
+        for &(operation, elementwise, operand) in rest {
             let right = self.value(operand)?;
             let span = start.to(self.span(operand));
-            value = self.binary(operator, value, right, span)?;
+            value = self.binary(operation, elementwise, value, right, span)?;
         }
         Ok(value)
     }
 
-    fn relation(&mut self, relation: Relation, left: ExprId, right: ExprId) -> Result<Value> {
+    fn relation(&mut self, relation: &str, left: ExprId, right: ExprId) -> Result<Value> {
         let span = self.span(left).to(self.span(right));
         let (left, right) = (self.scalar(left)?, self.scalar(right)?);
         let holds = self.compare(relation, left, right, span)?;
@@ -438,7 +434,7 @@ impl<'a> Evaluator<'a> {
         Some(Scalar::Real(self.graph.constant(known?).node()))
     }
 
-    pub(super) fn unassigned(&self, name: &str, span: Span) -> Problem {
+    pub(super) fn unassigned(&self, name: &str, span: Span) -> Box<Problem> {
         let message = format!("`{name}` is read before it has a value in every case");
         Problem::new(span, message).hint("assign it first, in each branch of an `if`")
     }

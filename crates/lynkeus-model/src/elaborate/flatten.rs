@@ -30,7 +30,7 @@ pub(super) fn flatten(symbols: &Symbols<'_>) -> Result<Flat> {
     let model = symbols.model;
     let mut evaluator = Evaluator::new(symbols, Mode::Continuous);
     for (_, declaration, component) in symbols.all() {
-        if declaration.prefix.variability == Variability::Continuous
+        if declaration.variability == Variability::Continuous
             && let Some(binding) = declaration.binding
         {
             let value = evaluator.value(binding)?;

@@ -10,7 +10,7 @@ use super::value::{Scalar, Value, expected_number};
 use crate::balance::total_derivative;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{BinaryOperator, Call, ExprId, Relation};
+use crate::syntax::ast::{Call, ExprId};
 use crate::syntax::shortened;
 
 /// Where the library has functions that are known without it.
@@ -56,10 +56,8 @@ const FUNCTIONS: [(&str, Function); 47] = [
     ("semiLinear", |e, c, s| e.semi_linear(c, s)),
     ("cross", |e, c, s| e.cross(c, s)),
     (INTERPOLATE, |e, c, s| e.interpolate(c, s)),
-    ("sum", |e, c, s| e.fold(c, s, BinaryOperator::Add, 0)),
-    ("product", |e, c, s| {
-        e.fold(c, s, BinaryOperator::Multiply, 1)
-    }),
+    ("sum", |e, c, s| e.fold(c, s, Binary::Add, 0)),
+    ("product", |e, c, s| e.fold(c, s, Binary::Mul, 1)),
     ("array", |e, c, s| e.array_of(c, s)),
     ("size", |e, c, _| e.size(c)),
     ("ndims", |e, c, _| e.ndims(c)),
@@ -118,7 +116,7 @@ impl<'a> Evaluator<'a> {
         name.strip_prefix(LIBRARY).unwrap_or(name)
     }
 
-    fn unknown_function(&self, span: Span, name: &str) -> Problem {
+    fn unknown_function(&self, span: Span, name: &str) -> Box<Problem> {
         if let Some((_, hint)) = REFUSED.iter().find(|(refused, _)| *refused == name) {
             return Problem::new(span, format!("`{name}` is not supported")).hint(*hint);
         }
@@ -301,7 +299,7 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    fn no_derivative(&self, span: Span) -> Problem {
+    fn no_derivative(&self, span: Span) -> Box<Problem> {
         let name = self.text(span);
         let message = format!("`der({name})`: `{name}` is not a Real variable");
         Problem::new(span, message)
@@ -332,10 +330,10 @@ impl<'a> Evaluator<'a> {
         let x = self.scalar(x)?;
         let (above, below) = (self.scalar(above)?, self.scalar(below)?);
         let zero = Scalar::Integer(0);
-        let positive = self.compare(Relation::GreaterEqual, x, zero, span)?;
+        let positive = self.compare(">=", x, zero, span)?;
         let slope = above.select(positive, below, self.graph);
         let slope = slope.ok_or_else(|| expected_number(span))?;
-        let product = self.scalar_binary(BinaryOperator::Multiply, slope, x, span)?;
+        let product = self.scalar_binary(Binary::Mul, slope, x, span)?;
         Ok(product.into())
     }
 
@@ -347,9 +345,9 @@ impl<'a> Evaluator<'a> {
             return Err(Problem::new(span, message));
         };
         let term = |p: &Scalar, q: &Scalar, r: &Scalar, s: &Scalar| {
-            let first = self.scalar_binary(BinaryOperator::Multiply, *p, *q, span)?;
-            let second = self.scalar_binary(BinaryOperator::Multiply, *r, *s, span)?;
-            self.scalar_binary(BinaryOperator::Subtract, first, second, span)
+            let first = self.scalar_binary(Binary::Mul, *p, *q, span)?;
+            let second = self.scalar_binary(Binary::Mul, *r, *s, span)?;
+            self.scalar_binary(Binary::Sub, first, second, span)
         };
         let elements = vec![
             term(a2, b3, a3, b2)?,

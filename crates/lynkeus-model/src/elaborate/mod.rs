@@ -31,7 +31,7 @@ use symbols::{Names, Symbols};
 pub(crate) use evaluate::Evaluator;
 
 /// The plant of a Modelica text, with what looks wrong in it.
-pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<Problem>)> {
+pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<Box<Problem>>)> {
     let mut ast = parse_file(source)?;
     let place = choose_model(&ast, options)?;
     let model = flat_model(source, &mut ast, place)?;
@@ -65,7 +65,7 @@ pub(crate) fn evaluated<T>(
 }
 
 /// A limit ended the reading.
-fn ended(model: &FlatModel, spent: Spent) -> Problem {
+fn ended(model: &FlatModel, spent: Spent) -> Box<Problem> {
     Problem::new(model.name, format!("the model was not read: {spent}"))
 }
 

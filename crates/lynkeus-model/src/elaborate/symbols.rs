@@ -171,7 +171,7 @@ impl Symbols<'_> {
         let is_constant = |name: &&str| {
             let place = self.by_name.get(name);
             let declaration = place.and_then(|&place| self.model.declarations.get(place));
-            declaration.is_some_and(|d| d.prefix.variability == Variability::Constant)
+            declaration.is_some_and(|d| d.variability == Variability::Constant)
         };
         let name = own.filter(is_constant);
         name.map_or(Named::Unknown, |name| self.named(name, mode))
@@ -208,7 +208,7 @@ impl Symbols<'_> {
 /// True for an input that nothing in the model can determine: one of a part, as `r1.u`, may be
 /// equated with another variable.
 pub(super) fn is_outer_input(declaration: &Declaration) -> bool {
-    declaration.prefix.causality == Causality::Input
+    declaration.causality == Causality::Input
         && declaration.binding.is_none()
         && !declaration.label.contains('.')
 }

@@ -116,7 +116,7 @@ pub(crate) fn element_name(name: &str, dims: &[usize], offset: usize) -> String 
     format!("{name}[{}]", subscripts.join(","))
 }
 
-pub(super) fn unequal_sizes(left: &[usize], right: &[usize], span: Span) -> Problem {
+pub(super) fn unequal_sizes(left: &[usize], right: &[usize], span: Span) -> Box<Problem> {
     let (left, right) = (describe_dims(left), describe_dims(right));
     let message = format!("the sizes differ: left is {left}, right is {right}");
     Problem::new(span, message)
@@ -163,7 +163,7 @@ pub(super) fn check_size(name: &str, has: &[usize], found: &[usize], span: Span)
 }
 
 /// Refuses a truth value where a number must stand.
-pub(super) fn expected_number(span: Span) -> Problem {
+pub(super) fn expected_number(span: Span) -> Box<Problem> {
     Problem::new(span, "expected a number, found a Boolean").hint("write `if a then 1 else 0`")
 }
 

@@ -10,13 +10,14 @@ use lynkeus_proof::chain::Chain;
 use lynkeus_proof::hurwitz::Stability;
 use lynkeus_proof::lyapunov;
 use lynkeus_proof::matrix::points;
-use lynkeus_structure::{AugmentedPlant, Blocks, Region, Standing, blocks, short};
+use lynkeus_structure::{AugmentedPlant, Blocks, Region, blocks};
 
-use super::settings::{Correction, Settings};
-use crate::conditions::{GainedChain, Partial, lipschitz, names, output_slope, partials, told};
-use crate::design::{Found, Searched};
+use super::said::{Correction, Lee, Said};
+use super::settings::Settings;
+use crate::conditions::{GainedChain, Partial, lipschitz, names, output_slope, partials};
+use crate::design::{Found, Searched, first_fit};
 use crate::statement::{proved, refuted, undecided};
-use crate::{Check, DesignError, Examination, Lee, TuningError};
+use crate::{Check, DesignError, Examination, Reason, TuningError};
 
 pub(super) const NAME: &str = "block-triangular";
 
@@ -37,30 +38,18 @@ pub(super) fn form(
     settings: &Settings,
     region: &Region,
 ) -> Searched<Form> {
-    let refusal = |summary: String| Examination::unfit(NAME, summary, vec![]);
+    let refusal = |summary| Ok(Err(Examination::unfit(NAME, summary, vec![])));
+    if settings.impossible() {
+        return refusal(Said::OnlyClassical.into());
+    }
     let arrangements = match blocks::find(augmented, &settings.request, settings.order.as_deref()) {
         Ok(arrangements) => arrangements,
-        Err(summary) => return Ok(Err(refusal(summary))),
+        Err(summary) => return refusal(Reason::from(summary)),
     };
-    let mut best: Option<Found<Form>> = None;
-    for choice in distinct(augmented, settings, &arrangements)?
-        .into_iter()
-        .take(EXAMINED)
-    {
-        let form = examined(augmented, settings, region, choice)?;
-        let better = |best: &Found<Form>| form.examination.fit() < best.examination.fit();
-        if best.as_ref().is_none_or(better) {
-            best = Some(form);
-        }
-        if best
-            .as_ref()
-            .is_some_and(|b| b.examination.fit() == Standing::Proved)
-        {
-            break;
-        }
-    }
-    best.map(Ok)
-        .ok_or_else(|| TuningError::new("chains", "a chain", "none").into())
+    let choices = distinct(augmented, settings, &arrangements)?;
+    first_fit(choices.into_iter().take(EXAMINED), |choice| {
+        examined(augmented, settings, region, choice)
+    })
 }
 
 /// One arrangement of those with the same chains.
@@ -108,15 +97,9 @@ fn examined(
     let (mut checks, mut all): (Vec<Check>, Vec<Vec<Partial>>) = (vec![], vec![]);
     for (output, chain) in &blocks.order {
         checks.extend(output_slope(augmented, *output, region)?);
-        let (found, signs) = partials(augmented, &chain.states, region)?;
+        let (found, signs) = partials(augmented, chain, region)?;
         checks.extend(signs);
-        checks.extend(stable(
-            augmented,
-            settings,
-            &chain.states,
-            &K[*output],
-            &found,
-        ));
+        checks.extend(stable(augmented, settings, chain, &K[*output], &found));
         all.push(found);
     }
     checks.push(lipschitz(augmented, region)?);
@@ -124,24 +107,15 @@ fn examined(
         .iter()
         .flatten()
         .map(|partial| graph.constant_value(partial.node));
-    let mut summary = blocks.describe(augmented);
-    summary += match (settings.correction, numbers.clone().all(|a| a == Some(1.0))) {
-        (_, true) => "",
-        // numbers are 1 in other units
-        (Correction::Lee, false) if numbers.clone().all(|a| a.is_some()) => {
-            "; every ∂f/∂x along the chains is a number: the paper's form (2) in other units"
-        }
-        (Correction::Lee, false) => {
-            "; not every ∂f/∂x along the chains is a number, so convergence is local (Remark 3)"
-        }
-        (Correction::Classical, false) => {
-            "; not every ∂f/∂x along the chains is 1, as in the paper's form (2)"
-        }
+    let ordered = blocks.order.iter();
+    let summary = Said::Form {
+        chains: ordered.map(|(_, c)| names(augmented, c)).collect(),
+        correction: settings.correction,
+        ones: numbers.clone().all(|a| a == Some(1.0)),
+        // which are 1 in other units
+        numbers: numbers.clone().all(|a| a.is_some()),
+        orders,
     };
-    if orders > 1 {
-        summary +=
-            &format!("; one of {orders} orders of these chains, the key 'order' decides otherwise");
-    }
     let chains = blocks.names(augmented);
     let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
     let form = Form {
@@ -178,48 +152,40 @@ pub(super) fn stable(
         false => Lee::StableAlong { states },
     };
     let Some(a) = chain.middle() else {
-        let detail = "a partial is not known to keep one sign between finite bounds";
-        return Some(undecided(name, detail));
+        return Some(undecided(name, Said::SignUnknown));
     };
-    let eigenvalues = told(&chain.eigenvalues(&a));
+    let eigenvalues = chain.eigenvalues(&a);
     let constant = ranges.iter().all(|(low, high)| low == high);
     Some(match (chain.frozen(), constant) {
         (Stability::Unstable, _) => {
-            let detail = format!("{eigenvalues}; {}", advice(settings.correction, K, &a));
-            refuted(name, chain.witness(&a), detail)
+            let divided = divided(settings.correction, K, &a);
+            let said = Said::Unstable {
+                eigenvalues,
+                divided,
+            };
+            refuted(name, chain.witness(&a), said)
         }
-        (Stability::Stable, true) => proved(name, eigenvalues),
+        (Stability::Stable, true) => proved(name, Said::Eigenvalues(eigenvalues)),
         _ => match decay(K, &a, &ranges) {
-            Some(_) => proved(name, "one Lyapunov function for all of their bounds"),
-            None => {
-                let detail = format!(
-                    "{eigenvalues} in the middle of the partials' bounds, and no Lyapunov function of the middle covers them all; correction = \"lee\" follows the partials"
-                );
-                undecided(name, detail)
-            }
+            Some(_) => proved(name, Said::OneLyapunovFunction),
+            None => undecided(name, Said::NoLyapunovFunction { eigenvalues }),
         },
     })
 }
 
-fn advice(correction: Correction, K: &[f64], a: &[f64]) -> String {
+/// The K for partials `a` where the one given is one for partials that are 1.
+fn divided(correction: Correction, K: &[f64], a: &[f64]) -> Option<Vec<f64>> {
     let ones = vec![(1.0, 1.0); a.len()];
     let for_integrators = GainedChain { K, partials: &ones }.frozen() == Stability::Stable;
-    match correction {
-        _ if !for_integrators => "k_poles places them, and without k they are all −1".to_owned(),
-        Correction::Lee => "k_poles places them, and without k they are all −1".to_owned(),
-        Correction::Classical => {
-            let mut product = 1.0;
-            let divisors = std::iter::once(1.0).chain(a.iter().map(|a| {
-                product *= a;
-                product
-            }));
-            let divided: Vec<String> = K.iter().zip(divisors).map(|(k, d)| short(k / d)).collect();
-            format!(
-                "observer (3) is made for partials that are 1: correction = \"lee\" divides by them; so does, in the middle of their bounds, k = [{}] for this chain, where the k here is one for partials that are 1",
-                divided.join(", ")
-            )
-        }
+    if !for_integrators || correction == Correction::Lee {
+        return None;
     }
+    let mut product = 1.0;
+    let divisors = std::iter::once(1.0).chain(a.iter().map(|a| {
+        product *= a;
+        product
+    }));
+    Some(K.iter().zip(divisors).map(|(k, d)| k / d).collect())
 }
 
 /// μ of the first inequality with the P of the partials `a`.
@@ -237,15 +203,18 @@ fn decay(K: &[f64], a: &[f64], ranges: &[(f64, f64)]) -> Option<f64> {
 }
 
 /// Lemma 2's condition on θ.
-pub(super) fn chain_rule(blocks: &Blocks, θ: &[f64]) -> Option<String> {
+pub(super) fn chain_rule(blocks: &Blocks, θ: &[f64]) -> Option<Reason> {
     blocks.order.windows(2).find_map(|pair| {
         let ((before, chain), (after, _)) = (&pair[0], &pair[1]);
-        let needed = θ[*before].powi(chain.states.len() as i32);
-        (needed > θ[*after]).then(|| {
-            format!(
-                "theta: {} for the later chain is below {needed} = {}^{} of the chain before it; the proof of Theorem 1 needs at least that",
-                θ[*after], θ[*before], chain.states.len()
-            )
-        })
+        let count = chain.len();
+        let (before, later) = (θ[*before], θ[*after]);
+        let needed = before.powi(count as i32);
+        let said = Said::BreaksRule {
+            later,
+            before,
+            count,
+            needed,
+        };
+        (needed > later).then(|| said.into())
     })
 }

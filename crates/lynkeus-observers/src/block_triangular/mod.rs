@@ -16,6 +16,7 @@
 
 mod form;
 mod observer;
+mod said;
 mod settings;
 mod theorem;
 mod transformed;
@@ -25,11 +26,11 @@ use lynkeus_structure::{AugmentedPlant, Region};
 use crate::design::{Found, Searched};
 use crate::family::Stages;
 use crate::{
-    Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Tuning, TuningError,
-    guarantee,
+    Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError, guarantee,
 };
 use form::{Form, NAME};
 use observer::observer;
+pub use said::{Correction, Lee, Said};
 use settings::Settings;
 use theorem::BASIS;
 
@@ -58,13 +59,7 @@ impl Stages for BlockTriangular {
         settings: &Settings,
         region: &Region,
     ) -> Searched<Form> {
-        match settings.impossible() {
-            true => {
-                let summary = observer::ONLY_CLASSICAL.to_owned();
-                Ok(Err(Examination::unfit(NAME, summary, vec![])))
-            }
-            false => form::form(augmented, settings, region),
-        }
+        form::form(augmented, settings, region)
     }
 
     fn design(
@@ -77,7 +72,7 @@ impl Stages for BlockTriangular {
                 let examination = found.examination;
                 guarantee::design_lmi(augmented, &settings.common, lmi, NAME, examination)
             }
-            (None, true) => observer::assemble(augmented, settings, found),
+            (None, true) => observer::low_power(augmented, settings, found),
             (None, false) => observer(augmented, settings, found),
         }
     }

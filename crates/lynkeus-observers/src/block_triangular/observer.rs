@@ -7,17 +7,13 @@ use lynkeus_expr::{Expr, Graph, Node, jacobian};
 use lynkeus_structure::{AugmentedPlant, Blocks, Chain};
 
 use super::form::{Form, NAME, chain_rule};
-use super::settings::{Correction, Settings};
-use crate::conditions::Partial;
+use super::said::Correction;
+use super::settings::Settings;
 use crate::design::Found;
 use crate::estimate::{PlantCopy, Speed, prolong};
-use crate::peaking::{self, Part, Run, Transient, factor_rows, variation};
+use crate::peaking::{Part, Transient};
 use crate::printed::AtStart;
-use crate::{Design, DesignError, TuningError, estimate, printed};
-
-/// Why there is no such form of the default observer.
-pub(super) const ONLY_CLASSICAL: &str =
-    "correction = \"classical\" with form = \"low-power\": observer (7) has no such form";
+use crate::{Design, DesignError, estimate, peaking, printed};
 
 /// Observer (7) or (3).
 pub(super) fn observer(
@@ -33,11 +29,10 @@ pub(super) fn observer(
     let (θ, K) = (settings.θ()?, settings.K(&blocks.lengths()));
     let correction = settings.correction;
     let start = AtStart::new(&copy)?;
-    let text = |x: &[f64]| x.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
-    let mut parameters = vec![("θ".to_owned(), text(&θ))];
+    let mut parameters = vec![("θ".to_owned(), θ.clone().into())];
     parameters.extend(transient.as_ref().map(Transient::parameter));
     let coefficients = K.iter().enumerate();
-    parameters.extend(coefficients.map(|(i, k)| (format!("K{}", i + 1), text(k))));
+    parameters.extend(coefficients.map(|(i, k)| (format!("K{}", i + 1), k.clone().into())));
     let mut derivatives = copy.at_estimate(&augmented.derivatives);
     let mut gains = vec![];
     let speeds = Speed::of_chains(&copy, &θ);
@@ -60,19 +55,15 @@ pub(super) fn observer(
             Correction::Lee => lee(augmented, chain, &timed),
         };
         let gain = copy.at_estimate(&graph.substitute(&gain, &injected));
-        let f: Vec<Node> = chain
-            .states
-            .iter()
-            .map(|&i| augmented.derivatives[i])
-            .collect();
+        let f: Vec<Node> = chain.iter().map(|&i| augmented.derivatives[i]).collect();
         let f = copy.at_estimate(&graph.substitute(&f, &injected));
-        for ((&state, f), gain) in chain.states.iter().zip(f).zip(&gain) {
+        for ((&state, f), gain) in chain.iter().zip(f).zip(&gain) {
             derivatives[state] =
                 (graph.expr(f) - graph.expr(*gain) * graph.expr(innovation)).node();
         }
         let printed = printed::ChainCorrection {
             output: *output,
-            states: &chain.states,
+            states: chain,
             factors: &gain,
             limited: remedies.limit.is_some(),
         };
@@ -80,19 +71,19 @@ pub(super) fn observer(
             Some(constant) => gains.push(constant),
             None => {
                 if correction == Correction::Lee {
-                    let found = transformation(augmented, chain);
-                    let L: Vec<_> = found.L.into_iter().map(|l| vec![l]).collect();
-                    parameters.push((format!("M{}", output + 1), start.table(&found.M)));
+                    let found = Steps::new(augmented, chain);
+                    let L: Vec<_> = found.L.iter().map(|&l| vec![l]).collect();
+                    parameters.push((format!("M{}", output + 1), start.table(&found.M(graph))));
                     parameters.push((format!("L{}", output + 1), start.table(&L)));
                 }
                 let constants: Vec<f64> = steady.iter().map(|gain| gain.0).collect();
-                parameters.push((format!("Δ⁻¹K{}", output + 1), text(&constants)));
+                parameters.push((format!("Δ⁻¹K{}", output + 1), constants.into()));
                 parameters.extend(printed.expressions(&start));
             }
         }
     }
     for ((_, chain), partials) in blocks.order.iter().zip(&form.partials) {
-        prolong(&copy, &chain.states, partials, &mut derivatives)?;
+        prolong(&copy, chain, partials, &mut derivatives)?;
     }
     Ok(Design {
         observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
@@ -112,96 +103,46 @@ fn injected(copy: &PlantCopy<'_, '_>, blocks: &Blocks, place: usize) -> HashMap<
         .collect()
 }
 
-pub(super) fn assemble(
+/// The observer whose chains have the low-power form.
+pub(super) fn low_power(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Form>,
 ) -> Result<Design, DesignError> {
-    let Settings {
-        common, remedies, ..
-    } = settings;
-    estimate::refuse(common, "form = \"low-power\"")?;
-    let blocks = &form.blocks;
-    let graph = augmented.graph();
-    let copy = PlantCopy::new(augmented, common);
+    estimate::refuse(&settings.common, "form = \"low-power\"")?;
+    let (blocks, graph) = (&form.blocks, augmented.graph());
+    let copy = PlantCopy::new(augmented, &settings.common);
     let θ = settings.θ()?;
-    let transient = remedies.transient.as_ref();
-    let coefficients = remedies.coefficients(&blocks.lengths())?;
-    let mut run = Run::new(&copy, transient)?;
-    let speeds = Speed::of_chains(&copy, &θ);
-    let (mut notes, mut factors) = (vec![], vec![]);
-    for (place, (output, chain)) in blocks.order.iter().enumerate() {
-        let Some(innovation) = remedies.innovation(&copy, *output) else {
-            continue;
-        };
-        let derivative = |&state: &usize| augmented.derivatives[state];
-        let f: Vec<Node> = chain.states.iter().map(derivative).collect();
-        let output_name = &augmented.outputs[*output].variable.name;
-        let found = &form.partials[place];
-        notes.extend(variation(
-            output_name,
-            &bounds(found),
-            &coefficients[*output],
-        ));
-        let added = run.add(&Part {
-            states: &chain.states,
-            f: &graph.substitute(&f, &injected(&copy, blocks, place)),
-            divisors: &divisors(augmented, found)?,
-            innovation,
-            K: &coefficients[*output],
-            θ: &speeds[*output],
-            δ: 1.0,
-            number: *output,
-        });
-        factors.extend(factor_rows(output_name, added));
-    }
-    let text: Vec<String> = θ.iter().map(f64::to_string).collect();
-    let mut parameters = vec![("θ".to_owned(), text.join(", "))];
-    parameters.extend(transient.map(Transient::parameter));
-    parameters.extend(peaking::parameters(&coefficients));
-    parameters.extend(factors);
-    notes.extend(chain_rule(blocks, &θ));
-    Ok(Design {
-        observer: run.finish(NAME)?.tuned_by(&speeds),
-        notes,
-        examination,
-        gains: vec![],
-        parameters,
-    })
+    let part = |place: usize| Part {
+        output: blocks.order[place].0,
+        states: &blocks.order[place].1,
+        partials: &form.partials[place],
+        δ: 1.0,
+    };
+    let parts: Vec<Part<'_>> = (0..blocks.order.len()).map(part).collect();
+    let derivative = |&state: &usize| augmented.derivatives[state];
+    let f = |place: usize| {
+        let f: Vec<Node> = parts[place].states.iter().map(derivative).collect();
+        graph.substitute(&f, &injected(&copy, blocks, place))
+    };
+    let advice = Some("declare min and max in the model");
+    let remedies = &settings.remedies;
+    let mut design = peaking::low_power(&copy, remedies, &θ, &parts, f, advice, examination)?;
+    design.notes.extend(chain_rule(blocks, &θ));
+    Ok(design)
 }
 
-/// The constant that stands for each partial along a chain; 1 in the paper's form (2).
-fn divisors(
-    augmented: &AugmentedPlant<'_>,
-    partials: &[Partial],
-) -> Result<Vec<Node>, DesignError> {
-    let mut found = vec![];
-    for partial in partials {
-        let Some(middle) = partial.nominal() else {
-            let expected = "partial derivatives with known positive bounds for form = \"low-power\"; declare min and max in the model";
-            let bounds = format!("bounds {} and {}", partial.bounds.0, partial.bounds.1);
-            return Err(TuningError::new("form", expected, bounds).into());
-        };
-        found.push(augmented.graph().constant(middle).node());
-    }
-    Ok(found)
-}
-
-fn bounds(partials: &[Partial]) -> Vec<(f64, f64)> {
-    partials.iter().map(|partial| partial.bounds).collect()
-}
-
-/// M̄, L and W of the five steps.
-struct Steps {
+/// M̄, L and W of the five steps: they make the similarity transformation M = W⁻¹M̄ of the error.
+pub(super) struct Steps {
     M̄: Vec<Vec<Sparse>>,
-    L: Vec<Sparse>,
+    pub L: Vec<Sparse>,
     W: Vec<Vec<Sparse>>,
 }
 
 impl Steps {
-    fn new(augmented: &AugmentedPlant<'_>, chain: &Chain) -> Self {
+    pub fn new(augmented: &AugmentedPlant<'_>, chain: &Chain) -> Self {
         let graph = augmented.graph();
-        let n = chain.states.len();
+        let n = chain.len();
         let F = own_jacobian(augmented, chain);
         // Step 1: M̄ = (C; CF; …; CF^{n−1}), lower triangular, and the next power CFⁿ
         let mut rows = vec![unit(graph, n)];
@@ -228,11 +169,30 @@ impl Steps {
         }
         Self { M̄, L, W }
     }
+
+    /// M, row by row; the observer does without.
+    pub fn M(&self, graph: &Graph) -> Vec<Vec<Sparse>> {
+        solved(graph, &self.W, &self.M̄)
+    }
+
+    /// M⁻¹ = M̄⁻¹W.
+    pub fn inverse(&self, graph: &Graph) -> Vec<Vec<Sparse>> {
+        solved(graph, &self.M̄, &self.W)
+    }
+}
+
+/// A⁻¹B for a lower triangular A.
+fn solved(graph: &Graph, A: &[Vec<Sparse>], B: &[Vec<Sparse>]) -> Vec<Vec<Sparse>> {
+    let n = A.len();
+    let column = |j: usize| solve_lower(graph, A, B.iter().map(|row| row[j]).collect());
+    let columns: Vec<Vec<Sparse>> = (0..n).map(column).collect();
+    let row = |i: usize| columns.iter().map(|c| c[i]).collect();
+    (0..n).map(row).collect()
 }
 
 /// M⁻¹(L + Δ⁻¹K) by the five steps. Since M = W⁻¹M̄, it is M̄⁻¹W(L + Δ⁻¹K): one
 /// triangular solve.
-pub(super) fn lee(augmented: &AugmentedPlant<'_>, chain: &Chain, gains: &[Node]) -> Vec<Node> {
+fn lee(augmented: &AugmentedPlant<'_>, chain: &Chain, gains: &[Node]) -> Vec<Node> {
     let graph = augmented.graph();
     let Steps { M̄, L, W } = Steps::new(augmented, chain);
     // Step 5, multiplied out
@@ -247,49 +207,13 @@ pub(super) fn lee(augmented: &AugmentedPlant<'_>, chain: &Chain, gains: &[Node])
     gain.into_iter().map(|g| g.unwrap_or(zero)).collect()
 }
 
-/// The similarity transformation of the error, row by row.
-pub(super) struct Transformation {
-    /// M = W⁻¹M̄
-    pub M: Vec<Vec<Sparse>>,
-    /// M⁻¹ = M̄⁻¹W
-    pub inverse: Vec<Vec<Sparse>>,
-    /// L
-    pub L: Vec<Sparse>,
-}
-
-/// M, M⁻¹ and L of Step 5, for the proof; the observer needs none of them.
-pub(super) fn transformation(augmented: &AugmentedPlant<'_>, chain: &Chain) -> Transformation {
-    let graph = augmented.graph();
-    let Steps { M̄, L, W } = Steps::new(augmented, chain);
-    let solved = |A: &[Vec<Sparse>], B: &[Vec<Sparse>]| {
-        let n = A.len();
-        let column = |j: usize| solve_lower(graph, A, B.iter().map(|row| row[j]).collect());
-        let columns: Vec<Vec<Sparse>> = (0..n).map(column).collect();
-        let row = |i: usize| columns.iter().map(|c| c[i]).collect();
-        (0..n).map(row).collect()
-    };
-    Transformation {
-        M: solved(&W, &M̄),
-        inverse: solved(&M̄, &W),
-        L,
-    }
-}
-
 /// An entry that may be zero everywhere.
 pub(super) type Sparse = Option<Node>;
 
 /// F_i = ∂f_i/∂x_i, row by row.
 pub(super) fn own_jacobian(augmented: &AugmentedPlant<'_>, chain: &Chain) -> Vec<Vec<Sparse>> {
-    let f: Vec<Node> = chain
-        .states
-        .iter()
-        .map(|&i| augmented.derivatives[i])
-        .collect();
-    let x: Vec<Node> = chain
-        .states
-        .iter()
-        .map(|&i| augmented.states[i].node)
-        .collect();
+    let f: Vec<Node> = chain.iter().map(|&i| augmented.derivatives[i]).collect();
+    let x: Vec<Node> = chain.iter().map(|&i| augmented.states[i].node).collect();
     let jacobian = jacobian::forward(augmented.graph(), &f, &x);
     let n = f.len();
     (0..n)

@@ -2,6 +2,7 @@
 
 use lynkeus_structure::{AugmentedPlant, ChainRequest};
 
+use super::said::Correction;
 use crate::conditions::{CHAINS, chain_request};
 use crate::estimate::{Common, PROLONG};
 use crate::guarantee::{LMI, LMI_KEYS, Lmi};
@@ -11,7 +12,6 @@ use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value, peaking};
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
-    kind: "number > 0, or one per chain",
     shape: Shape::POSITIVES,
     default: REQUIRED,
     meaning: "θᵢ",
@@ -19,23 +19,23 @@ const THETA: KeySpec = KeySpec {
 
 const GIVEN: KeySpec = KeySpec {
     name: "k",
-    kind: "list of lists of numbers, one per chain",
-    shape: Shape::ROWS,
+    shape: Shape::As("list of lists of numbers, one per chain", &Shape::ROWS),
     default: "poles at −1",
     meaning: "Kᵢ: the coefficients that place the poles of Aᵢ − KᵢCᵢ",
 };
 
 const POLES: KeySpec = KeySpec {
     name: "k_poles",
-    kind: "list of lists of negative numbers, one per chain",
-    shape: Shape::ROWS,
+    shape: Shape::As(
+        "list of lists of negative numbers, one per chain",
+        &Shape::ROWS,
+    ),
     default: "−1, −1, …",
     meaning: "the eigenvalues of Aᵢ − KᵢCᵢ, instead of `k`",
 };
 
 const CORRECTION: KeySpec = KeySpec {
     name: "correction",
-    kind: "`\"lee\"`, `\"classical\"`",
     shape: Shape::Word(&["lee", "classical"]),
     default: "`\"lee\"`",
     meaning: "observer (7), or (3)",
@@ -43,15 +43,13 @@ const CORRECTION: KeySpec = KeySpec {
 
 const ORDER: KeySpec = KeySpec {
     name: "order",
-    kind: "list of every measured output",
-    shape: Shape::NAMES,
+    shape: Shape::As("list of every measured output", &Shape::NAMES),
     default: "searched",
     meaning: "the order of the blocks",
 };
 
 const GAIN: KeySpec = KeySpec {
     name: "gain",
-    kind: "`\"lmi\"`",
     shape: Shape::Word(&[LMI]),
     default: "by `k` or `k_poles`",
     meaning: "[a certified gain](certificates.md) instead of the paper's",
@@ -64,15 +62,6 @@ const OWN: [KeySpec; 8] = [
 
 /// Every key of the family.
 pub(super) const KEYS: &[&[KeySpec]] = &[&OWN, &LMI_KEYS, &peaking::KEYS];
-
-/// Which observer of the paper.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Correction {
-    /// (7)
-    Lee,
-    /// (3)
-    Classical,
-}
 
 /// The keys, read.
 pub struct Settings {
@@ -179,7 +168,7 @@ fn order(
 }
 
 /// K with the eigenvalues of A − KC at the poles: the coefficients of Π(s − pole).
-pub(super) fn placed(poles: &[f64]) -> Vec<f64> {
+fn placed(poles: &[f64]) -> Vec<f64> {
     let mut coefficients = vec![1.0];
     for pole in poles {
         let shifted = coefficients.iter().map(|c| -pole * c);
@@ -193,24 +182,8 @@ pub(super) fn placed(poles: &[f64]) -> Vec<f64> {
 }
 
 /// Lists of numbers, one per chain.
-pub(super) fn number_lists(
-    tuning: &Tuning,
-    key: &str,
-) -> Result<Option<Vec<Vec<f64>>>, TuningError> {
-    let Some(value) = tuning.values.get(key) else {
-        return Ok(None);
-    };
-    let wrong = || TuningError::new(key, "a list of lists of numbers, one per chain", value);
-    let Value::List(rows) = value else {
-        return Err(wrong());
-    };
-    let number = |x: &Value| match x {
-        Value::Number(x) if x.is_finite() => Ok(*x),
-        _ => Err(wrong()),
-    };
-    let row = |row: &Value| match row {
-        Value::List(row) => row.iter().map(number).collect(),
-        _ => Err(wrong()),
-    };
-    rows.iter().map(row).collect::<Result<_, _>>().map(Some)
+fn number_lists(tuning: &Tuning, key: &str) -> Result<Option<Vec<Vec<f64>>>, TuningError> {
+    let number = |x: &Value| x.number().filter(|x| x.is_finite());
+    let expected = "a list of lists of numbers, one per chain";
+    tuning.read(key, expected, |value| value.all(|row| row.all(number)))
 }

@@ -11,18 +11,19 @@ use lynkeus_proof::magnitude::{plus, product, times};
 use lynkeus_proof::matrix::{square, sum};
 use lynkeus_proof::search::{first, lightest};
 use lynkeus_proof::{lyapunov, metzler};
-use lynkeus_structure::{AugmentedPlant, Blocks, Standing, short};
+use lynkeus_structure::{AugmentedPlant, Blocks, Standing};
 use nalgebra::DMatrix;
 
 use super::form::chain_rule;
-use super::settings::{Correction, Settings};
+use super::said::{Correction, Lee, Said};
+use super::settings::Settings;
 use super::transformed::{Plant, Similar, Table, Term};
-use crate::conditions::{GainedChain, Partial, names, output_slope, partials};
-use crate::estimate::{Common, box_note};
+use crate::conditions::{GainedChain, Partial, along, names};
+use crate::estimate::Common;
 use crate::peaking::departure;
 use crate::statement::{proved, standing, undecided};
 use crate::theorem::{conclude, slopes, state_noise};
-use crate::{Assumptions, Certificate, Check, Constant, DesignError, Lee, estimate};
+use crate::{Assumptions, Certificate, Check, Constant, DesignError, Reason, estimate};
 
 pub(super) const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
 
@@ -48,157 +49,132 @@ pub(super) fn certificate(
         K: order.iter().map(|&o| K[o].clone()).collect(),
         noise: pick(&noise),
     };
-    let study = Study {
+    let mut study = Study {
         classical: settings.correction == Correction::Classical,
         θ: pick(&by_output),
         rule: chain_rule(blocks, &by_output),
         plant: &plant,
         common: &settings.common,
+        partials: vec![],
+        similar: vec![],
+        terms: vec![],
     };
-    study.certificate()
+    let checks = study.examine()?;
+    study.certificate(checks)
 }
 
-pub(super) struct Study<'a> {
-    pub plant: &'a Plant<'a>,
+struct Study<'a> {
+    plant: &'a Plant<'a>,
     common: &'a Common,
     classical: bool,
     /// in the order of the blocks
-    pub θ: Vec<f64>,
+    θ: Vec<f64>,
     /// what breaks Lemma 2's rule
-    rule: Option<String>,
-}
-
-/// Everything that does not depend on θ.
-pub(super) struct Facts {
-    checks: Vec<Check>,
+    rule: Option<Reason>,
+    // what does not depend on θ
     partials: Vec<Vec<(f64, f64)>>,
-    pub similar: Vec<Similar>,
-    pub terms: Vec<Term>,
+    similar: Vec<Similar>,
+    terms: Vec<Term>,
 }
 
 impl Study<'_> {
-    pub fn blocks(&self) -> &Blocks {
+    fn blocks(&self) -> &Blocks {
         self.plant.blocks
     }
 
-    fn certificate(&self) -> Result<Certificate, DesignError> {
+    fn certificate(&self, mut checks: Vec<Check>) -> Result<Certificate, DesignError> {
         let augmented = self.plant.augmented;
-        let facts = self.facts()?;
-        let mut checks = facts.checks.clone();
         let mut constants = vec![];
         let mut found = None;
         if standing(&checks) != Standing::Refuted
-            && let Some((P, μ)) = self.first_inequality(&facts, &mut checks)
+            && let Some((P, μ)) = self.first_inequality(&mut checks)
         {
-            self.paper_constants(&facts, &P, &mut constants);
-            found = self.second_inequality(&facts, &P, &μ, &mut checks, &mut constants);
+            self.paper_constants(&P, &mut constants);
+            found = self.second_inequality(&P, &μ, &mut checks, &mut constants);
         }
         let mut certificate = Certificate::new(BASIS, self.plant.assumptions, checks);
         certificate.constants = constants;
         certificate.notes = self.notes();
         if let Some((σ, chains)) = found {
-            let left = |process: &[f64]| self.ultimate(&facts, &chains, σ, process);
+            let left = |process: &[f64]| self.ultimate(&chains, σ, process);
             conclude(&mut certificate, augmented, σ, self.plant.assumptions, left)?;
         }
         Ok(certificate)
     }
 
-    fn facts(&self) -> Result<Facts, DesignError> {
-        let augmented = self.plant.augmented;
+    /// Finds what does not depend on θ, with what has to hold of it.
+    fn examine(&mut self) -> Result<Vec<Check>, DesignError> {
+        let (augmented, classical) = (self.plant.augmented, self.classical);
         let region = &self.plant.assumptions.region;
         let order = &self.blocks().order;
-        let (mut checks, mut ranges): (Vec<Check>, Vec<Vec<(f64, f64)>>) = (vec![], vec![]);
-        for (output, chain) in order {
-            checks.extend(output_slope(augmented, *output, region)?);
-            let (found, signs) = partials(augmented, &chain.states, region)?;
-            checks.extend(signs);
-            ranges.push(match self.classical {
-                // M takes the partials out: a chain of integrators is left
-                false => vec![(1.0, 1.0); found.len()],
-                true => found.iter().map(Partial::range).collect(),
-            });
-        }
+        let places = order.iter().map(|(output, c)| (*output, &c[..]));
+        let (partials, mut checks) = along(augmented, places, region)?;
+        let range = |partial: &Partial| match classical {
+            // M takes the partials out: a chain of integrators is left
+            false => (1.0, 1.0),
+            true => partial.range(),
+        };
+        let ranges = partials
+            .iter()
+            .map(|chain| chain.iter().map(range).collect());
         let (plain, check) = slopes(augmented, region, |a, b| self.skipped(a, b))?;
         checks.push(check);
-        let similar: Vec<Similar> = match self.classical {
-            true => vec![],
-            false => (0..order.len())
-                .map(|i| self.plant.similar(i))
-                .collect::<Result<_, _>>()?,
-        };
-        let terms = match self.classical {
+        let count = if classical { 0 } else { order.len() };
+        let similar = (0..count).map(|i| self.plant.similar(i));
+        let similar: Vec<Similar> = similar.collect::<Result<_, _>>()?;
+        self.terms = match classical {
             true => plain.into_iter().map(steady).collect(),
             false => self.plant.terms(&similar)?,
         };
-        if terms.iter().any(|t: &Term| !t.at(&self.θ).size.is_finite())
-            && standing(&checks) == Standing::Proved
-        {
-            checks.push(self.unbounded());
+        (self.partials, self.similar) = (ranges.collect(), similar);
+        let mut sizes = self.terms.iter().map(|term| term.at(&self.θ).size);
+        if sizes.any(|size| !size.is_finite()) && standing(&checks) == Standing::Proved {
+            checks.push(undecided(Lee::Assumption1, Said::NoBounds));
         }
-        Ok(Facts {
-            checks,
-            partials: ranges,
-            similar,
-            terms,
-        })
+        Ok(checks)
     }
 
     /// The partial along a chain, which is in A, and measured heads of later chains.
     fn skipped(&self, row: usize, column: usize) -> bool {
         let order = &self.blocks().order;
-        let place = |state: usize| order.iter().position(|(_, c)| c.states.contains(&state));
+        let place = |state: usize| order.iter().position(|(_, c)| c.contains(&state));
         let along = order
             .iter()
-            .any(|(_, c)| c.states.windows(2).any(|p| p == [row, column]));
+            .any(|(_, c)| c.windows(2).any(|p| p == [row, column]));
         along || place(column) > place(row)
     }
 
-    fn unbounded(&self) -> Check {
-        undecided(
-            Lee::Assumption1,
-            "they have none: declare min and max of the states that M depends on and of the chains' heads; where M depends on an input, bound its derivative under `input_derivatives` in [certify]; correction = \"classical\" needs none of this",
-        )
-    }
-
     /// P_i and μ_i of the first inequality, where it holds for every chain.
-    fn first_inequality(
-        &self,
-        facts: &Facts,
-        checks: &mut Vec<Check>,
-    ) -> Option<(Vec<DMatrix<f64>>, Vec<f64>)> {
+    fn first_inequality(&self, checks: &mut Vec<Check>) -> Option<(Vec<DMatrix<f64>>, Vec<f64>)> {
         let (mut all, mut decays) = (vec![], vec![]);
         for (i, (_, chain)) in self.blocks().order.iter().enumerate() {
-            let states = names(self.plant.augmented, &chain.states);
+            let states = names(self.plant.augmented, chain);
             let name = Lee::Lyapunov { states };
             let gained = GainedChain {
                 K: &self.plant.K[i],
-                partials: &facts.partials[i],
+                partials: &self.partials[i],
             };
             let middle = gained
                 .middle()
                 .and_then(|a| lyapunov::of_chain(gained.K, &a));
             let found = middle.and_then(|P| {
-                let μ = self.chain(i, facts, &P, self.θ[i], 1.0).decay()?;
+                let μ = self.chain(i, &P, self.θ[i], 1.0).decay()?;
                 Some((P, μ))
             });
             match found {
                 Some((P, μ)) => {
-                    let detail = format!("≤ −{}·diag(P), for every ∂f/∂x along the chain", short(μ));
-                    checks.push(proved(name, detail));
+                    checks.push(proved(name, Said::Decays(μ)));
                     all.push(P);
                     decays.push(μ);
                 }
-                None => checks.push(undecided(
-                    name,
-                    "not with the P of the middle of the partials' bounds: K does not stabilise the chain, or (classical observer) the partials vary too much",
-                )),
+                None => checks.push(undecided(name, Said::NoDecay)),
             }
         }
         (all.len() == self.θ.len()).then_some((all, decays))
     }
 
-    fn chain(&self, i: usize, facts: &Facts, P: &DMatrix<f64>, θ: f64, c: f64) -> Chain {
-        let states = self.blocks().order[i].1.states.clone();
+    fn chain(&self, i: usize, P: &DMatrix<f64>, θ: f64, c: f64) -> Chain {
+        let states = self.blocks().order[i].1.clone();
         let speed = Interval::point(θ);
         let weighed = |i, j| Interval::point(c) * Interval::point(P[(i, j)]);
         let error = Interval::new(1.0 - 1e-12, 1.0 + 1e-12).unwrap_or(Interval::ONE);
@@ -211,35 +187,24 @@ impl Study<'_> {
                 .iter()
                 .map(|&k| Interval::point(k) * error)
                 .collect(),
-            partials: facts.partials[i]
-                .iter()
-                .map(|&range| range.into())
-                .collect(),
+            partials: self.partials[i].iter().map(|&range| range.into()).collect(),
         }
     }
 
-    fn chains(&self, facts: &Facts, P: &[DMatrix<f64>], θ: &[f64], c: &[f64]) -> Vec<Chain> {
+    fn chains(&self, P: &[DMatrix<f64>], θ: &[f64], c: &[f64]) -> Vec<Chain> {
         (0..P.len())
-            .map(|i| self.chain(i, facts, &P[i], θ[i], c[i]))
+            .map(|i| self.chain(i, &P[i], θ[i], c[i]))
             .collect()
     }
 
-    fn comparison(
-        &self,
-        facts: &Facts,
-        P: &[DMatrix<f64>],
-        μ: &[f64],
-        θ: &[f64],
-        c: &[f64],
-    ) -> Comparison {
-        let slopes: Vec<Slope> = facts.terms.iter().map(|t| t.at(θ)).collect();
-        Comparison::new(&self.chains(facts, P, θ, c), μ, &slopes)
+    fn comparison(&self, P: &[DMatrix<f64>], μ: &[f64], θ: &[f64], c: &[f64]) -> Comparison {
+        let slopes: Vec<Slope> = self.terms.iter().map(|t| t.at(θ)).collect();
+        Comparison::new(&self.chains(P, θ, c), μ, &slopes)
     }
 
     /// σ with the chains it was proved for.
     fn second_inequality(
         &self,
-        facts: &Facts,
         P: &[DMatrix<f64>],
         μ: &[f64],
         checks: &mut Vec<Check>,
@@ -248,9 +213,9 @@ impl Study<'_> {
         // θ_i = θ^ν_i: along this curve through the study's θ
         let ν: Vec<f64> = self.θ.iter().map(|θ| θ.ln() / self.θ[0].ln()).collect();
         let curve = |θ: f64| ν.iter().map(|ν| θ.powf(*ν)).collect::<Vec<f64>>();
-        let falls = self.θ[0] > 1.0 && self.falls(facts, &ν);
+        let falls = self.θ[0] > 1.0 && self.falls(&ν);
         let at = |c: &[f64]| {
-            let holds = |θ: f64| self.comparison(facts, P, μ, &curve(θ), c).holds();
+            let holds = |θ: f64| self.comparison(P, μ, &curve(θ), c).holds();
             if falls {
                 first(self.θ[0], holds)
             } else {
@@ -258,7 +223,7 @@ impl Study<'_> {
             }
         };
         let (c, θ0) = lightest(P.len(), at);
-        let σ = self.comparison(facts, P, μ, &self.θ, &c).rate();
+        let σ = self.comparison(P, μ, &self.θ, &c).rate();
         for (i, c) in c.iter().enumerate().skip(1) {
             constants.push(Constant::new(
                 format!("c{}", i + 1),
@@ -267,32 +232,32 @@ impl Study<'_> {
             ));
         }
         if let Some(θ0) = θ0 {
-            let exponents: Vec<String> = ν.iter().map(|&ν| short(ν)).collect();
-            let meaning = format!(
-                "the decay is proved for θ_i = θ^ν_i, ν = ({}), and every θ from here on",
-                exponents.join(", ")
-            );
-            constants.push(Constant::new("θ0", θ0, meaning));
+            constants.push(Constant {
+                name: "θ0".to_owned(),
+                value: θ0,
+                meaning: "the decay is proved for θ_i = θ^ν_i, ν = ({}), and every θ from here on"
+                    .to_owned(),
+                numbers: ν.to_vec(),
+            });
         }
         let name = Lee::Theta {
             θ: self.θ.clone()
         };
         checks.push(match (σ, θ0) {
-            (Some(_), _) => proved(name, "the comparison matrix is negative definite"),
-            (None, Some(θ0)) => undecided(name, format!("proved from θ1 = θ0 = {} on (the others in proportion of their logarithms); the theorem is sufficient, not necessary", short(θ0))),
-            (None, None) => undecided(name, "no θ0 was found: in this box the bound of Ṁ or of the couplings grows as fast as the decay. The theorem is sufficient, not necessary"),
+            (Some(_), _) => proved(name, Said::NegativeDefinite),
+            (None, θ0) => undecided(name, Said::Threshold(θ0)),
         });
-        σ.map(|σ| (σ, self.chains(facts, P, &self.θ, &c)))
+        σ.map(|σ| (σ, self.chains(P, &self.θ, &c)))
     }
 
     /// Whether no entry of the comparison matrix, divided by the speeds, grows along
     /// the curve: then what holds at θ0 holds beyond.
-    fn falls(&self, facts: &Facts, ν: &[f64]) -> bool {
+    fn falls(&self, ν: &[f64]) -> bool {
         let place = |state: usize| {
             let mut chains = self.blocks().order.iter().enumerate();
-            chains.find_map(|(i, (_, c))| Some((i, c.states.iter().position(|s| *s == state)? + 1)))
+            chains.find_map(|(i, (_, c))| Some((i, c.iter().position(|s| *s == state)? + 1)))
         };
-        facts.terms.iter().all(|term| {
+        self.terms.iter().all(|term| {
             let (Some((i, l)), Some((k, m))) = (place(term.row), place(term.column)) else {
                 return false;
             };
@@ -305,23 +270,22 @@ impl Study<'_> {
     }
 
     /// Where the estimate may be: M of observer (7) moves with it, so the box bounds it.
-    fn place(&self) -> String {
+    fn place(&self) -> Reason {
         match self.classical {
             true => {
                 let region = &self.plant.assumptions.region;
                 estimate::note(self.common, self.plant.augmented, region)
             }
-            false => box_note(self.common.clamp),
+            false => Reason::InTheBox {
+                clamp: self.common.clamp,
+            },
         }
     }
 
-    fn notes(&self) -> Vec<String> {
-        let mut notes = vec![self.place()];
-        notes.extend(self.rule.clone());
-        if !self.classical {
-            notes.push("Observer (7): M(x̂) moves with the correction, so its derivative grows with θ and with the error (the paper's Lemma 2 ii takes it as bounded independently of θ). The bound used here is that of the declared box, |y − x̂_1| at most the width of the range of x_1: a proof for that box, not a global one. Narrow ranges make it sharper; correction = \"classical\" does without.".into());
-        }
-        notes
+    fn notes(&self) -> Vec<Reason> {
+        let moving = (!self.classical).then(|| Said::MovingM.into());
+        let notes = std::iter::once(self.place()).chain(self.rule.clone());
+        notes.chain(moving).collect()
     }
 }
 
@@ -336,12 +300,7 @@ fn steady(slope: Slope) -> Term {
 
 impl Study<'_> {
     /// μ_ij and θ_i0 as in the proof, with norms, at the study's θ.
-    pub(super) fn paper_constants(
-        &self,
-        facts: &Facts,
-        P: &[DMatrix<f64>],
-        constants: &mut Vec<Constant>,
-    ) {
+    fn paper_constants(&self, P: &[DMatrix<f64>], constants: &mut Vec<Constant>) {
         let count = P.len();
         let λ: Vec<f64> = P
             .iter()
@@ -350,7 +309,7 @@ impl Study<'_> {
         let mut μ = vec![vec![0.0; count]; count];
         for i in 0..count {
             for j in 0..=i {
-                let norm = self.scaled_norm(facts, i, j);
+                let norm = self.scaled_norm(i, j);
                 match i == j {
                     true => μ[i][i] += (Interval::point(2.0 * λ[i]) * Interval::point(norm)).hi(),
                     // 2ab ≤ a² + b²
@@ -385,13 +344,10 @@ impl Study<'_> {
     }
 
     /// ‖Δ_i H_ij Δ_j⁻¹‖ at the study's θ.
-    fn scaled_norm(&self, facts: &Facts, i: usize, j: usize) -> f64 {
-        let (rows, columns) = (
-            &self.blocks().order[i].1.states,
-            &self.blocks().order[j].1.states,
-        );
+    fn scaled_norm(&self, i: usize, j: usize) -> f64 {
+        let (rows, columns) = (&self.blocks().order[i].1, &self.blocks().order[j].1);
         let mut H = vec![vec![0.0; columns.len()]; rows.len()];
-        for term in &facts.terms {
+        for term in &self.terms {
             let l = rows.iter().position(|s| *s == term.row);
             let m = columns.iter().position(|s| *s == term.column);
             if let (Some(l), Some(m)) = (l, m) {
@@ -404,18 +360,17 @@ impl Study<'_> {
     }
 
     /// The bounds of ē taken back to e = M⁻¹ ē.
-    pub(super) fn ultimate(
+    fn ultimate(
         &self,
-        facts: &Facts,
         chains: &[Chain],
         σ: f64,
         process: &[f64],
     ) -> Result<Option<Ultimate>, DesignError> {
-        let drift = self.drift(facts)?;
+        let drift = self.drift()?;
         let outside = Disturbance {
             drift: &drift,
             noise: &self.plant.noise,
-            process: &self.process(facts, process),
+            process: &self.process(process),
         };
         let Some(mut found) = ultimate(chains, σ, &outside) else {
             return Ok(None);
@@ -428,7 +383,7 @@ impl Study<'_> {
                 .take(chain.states.len())
                 .map(|&(_, b)| vec![b])
                 .collect();
-            let back = match facts.similar.get(i) {
+            let back = match self.similar.get(i) {
                 Some(similar) => product(&similar.inverse, &column),
                 None => column,
             };
@@ -447,10 +402,8 @@ impl Study<'_> {
         found.states = states;
         // e(0) goes through M of that time, ē(t) back through M⁻¹ of another
         let norms = |table: fn(&Similar) -> &Table| {
-            let all = facts
-                .similar
-                .iter()
-                .map(|s| metzler::spectral_norm(table(s)));
+            let all = self.similar.iter();
+            let all = all.map(|s| metzler::spectral_norm(table(s)));
             Interval::point(all.fold(1.0, f64::max))
         };
         let factor = norms(|s| &s.M) * norms(|s| &s.inverse);
@@ -460,18 +413,15 @@ impl Study<'_> {
 
     /// Densities on ē' that make no smaller a trace than those of M ξ, ξ white with the densities given:
     /// m mᵀ ≤ n·diag(m_a²) for a column m of n entries.
-    fn process(&self, facts: &Facts, given: &[f64]) -> Vec<f64> {
+    fn process(&self, given: &[f64]) -> Vec<f64> {
         let mut found = given.to_vec();
         for (i, (_, chain)) in self.blocks().order.iter().enumerate() {
-            let Some(similar) = facts.similar.get(i) else {
+            let Some(similar) = self.similar.get(i) else {
                 continue;
             };
-            let count = Interval::point(chain.states.len() as f64);
-            for (&state, row) in chain.states.iter().zip(&similar.M) {
-                let terms = row
-                    .iter()
-                    .zip(&chain.states)
-                    .filter(|(_, k)| given[**k] > 0.0);
+            let count = Interval::point(chain.len() as f64);
+            for (&state, row) in chain.iter().zip(&similar.M) {
+                let terms = row.iter().zip(chain).filter(|(_, k)| given[**k] > 0.0);
                 let terms =
                     terms.map(|(m, k)| Interval::point(*m).powi(2) * Interval::point(given[*k]));
                 found[state] = (count * sum(terms)).hi();
@@ -482,27 +432,27 @@ impl Study<'_> {
 
     /// What acts on ē beside K·noise: M d, L w, and the noise of the heads of later
     /// chains, which the equations read.
-    fn drift(&self, facts: &Facts) -> Result<Vec<f64>, DesignError> {
+    fn drift(&self) -> Result<Vec<f64>, DesignError> {
         let order = &self.blocks().order;
         let given = &self.plant.assumptions.drift;
         let mut drift = vec![0.0; self.plant.augmented.states.len()];
         for (i, (_, chain)) in order.iter().enumerate() {
             let mut column: Table = vec![];
-            for &state in &chain.states {
+            for &state in chain {
                 let mut d = Interval::point(given.get(state).copied().unwrap_or(f64::INFINITY));
                 for (k, (_, later)) in order.iter().enumerate().skip(i + 1) {
-                    let slope = self.plant.jacobian(&[state], &later.states[..1])?[0][0];
+                    let slope = self.plant.jacobian(&[state], &later[..1])?[0][0];
                     if slope != 0.0 && self.plant.noise[k] != 0.0 {
                         d = d + Interval::point(slope) * Interval::point(self.plant.noise[k]);
                     }
                 }
                 column.push(vec![d.hi()]);
             }
-            let (column, L) = match facts.similar.get(i) {
+            let (column, L) = match self.similar.get(i) {
                 Some(similar) => (product(&similar.M, &column), similar.L.clone()),
-                None => (column, vec![0.0; chain.states.len()]),
+                None => (column, vec![0.0; chain.len()]),
             };
-            for ((&state, d), l) in chain.states.iter().zip(column).zip(L) {
+            for ((&state, d), l) in chain.iter().zip(column).zip(L) {
                 let noisy = times(l, self.plant.noise[i]);
                 drift[state] = plus(d[0], noisy);
             }

@@ -18,7 +18,7 @@ use lynkeus_proof::magnitude::{plus, product, times};
 use lynkeus_proof::matrix::sum;
 use lynkeus_structure::{AugmentedPlant, Blocks, Chain, Matrix, range};
 
-use super::observer::{Sparse, own_jacobian, transformation};
+use super::observer::{Sparse, Steps, own_jacobian};
 use crate::theorem::magnitude;
 use crate::{Assumptions, DesignError};
 
@@ -85,17 +85,15 @@ impl Plant<'_> {
     }
 
     pub fn similar(&self, place: usize) -> Result<Similar, DesignError> {
-        let found = transformation(self.augmented, self.chain(place));
-        let L = found
-            .L
-            .iter()
-            .map(|&l| self.size(l))
-            .collect::<Result<_, _>>()?;
+        let graph = self.augmented.graph();
+        let found = Steps::new(self.augmented, self.chain(place));
+        let nodes = found.M(graph);
+        let L = found.L.iter().map(|&l| self.size(l));
         Ok(Similar {
-            M: self.table(&found.M)?,
-            inverse: self.table(&found.inverse)?,
-            L,
-            nodes: found.M,
+            L: L.collect::<Result<_, _>>()?,
+            M: self.table(&nodes)?,
+            inverse: self.table(&found.inverse(graph))?,
+            nodes,
         })
     }
 
@@ -116,7 +114,7 @@ impl Plant<'_> {
     }
 
     fn entries(&self, i: usize, j: usize, table: &Table) -> Vec<Term> {
-        let (rows, columns) = (&self.chain(i).states, &self.chain(j).states);
+        let (rows, columns) = (self.chain(i), self.chain(j));
         let pairs = table.iter().zip(rows).flat_map(|(entries, &row)| {
             let columns = entries.iter().zip(columns);
             columns.map(move |(&size, &column)| Term {
@@ -153,7 +151,7 @@ impl Plant<'_> {
 
     /// |∂f_i/∂x_j|
     fn coupling(&self, i: usize, j: usize) -> Result<Table, DesignError> {
-        self.jacobian(&self.chain(i).states, &self.chain(j).states)
+        self.jacobian(self.chain(i), self.chain(j))
     }
 
     /// |∂f/∂x| for the equations of `rows` and the states `columns`.
@@ -174,9 +172,9 @@ impl Plant<'_> {
 
     /// Adds Ṁ M⁻¹ to the terms of chain i.
     fn moving(&self, i: usize, similar: &[Similar], terms: &mut [Term]) -> Result<(), DesignError> {
-        let n = self.chain(i).states.len();
+        let n = self.chain(i).len();
         for (c, (_, chain)) in self.blocks.order.iter().enumerate() {
-            for (place, &state) in chain.states.iter().enumerate() {
+            for (place, &state) in chain.iter().enumerate() {
                 let slope = self.slope_of_M(&similar[i], self.augmented.states[state].node)?;
                 let product = product(&slope, &similar[i].inverse);
                 if product.iter().flatten().all(|x| *x == 0.0) {
@@ -226,7 +224,7 @@ impl Plant<'_> {
         i: usize,
         similar: &[Similar],
     ) -> Result<(f64, Vec<(usize, f64)>), DesignError> {
-        let state = self.chain(c).states[place];
+        let state = self.chain(c)[place];
         let f = self.size(Some(self.augmented.derivatives[state]))?;
         if c > i {
             let drift = self
@@ -244,7 +242,7 @@ impl Plant<'_> {
                 vec![],
             ));
         }
-        let head = &self.augmented.states[self.chain(c).states[0]];
+        let head = &self.augmented.states[self.chain(c)[0]];
         let side = self
             .assumptions
             .region

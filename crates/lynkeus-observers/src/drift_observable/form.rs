@@ -6,14 +6,16 @@ use std::collections::HashMap;
 use lynkeus_expr::{Binary, Graph, Node, Op, Spent};
 use lynkeus_structure::output_map::{AffineForm, Degree, Rows};
 use lynkeus_structure::{
-    AugmentedPlant, Dimension, Matrix, Region, Verdict, output_map, regularity, short,
+    AugmentedPlant, Dimension, Finding, Matrix, Measurement, Region, Verdict, output_map, rank,
+    regularity,
 };
 
+use super::said::Said;
 use super::settings::{Settings, Variant};
 use crate::conditions::{lasts, lipschitz, names};
 use crate::design::Found;
 use crate::statement::{sufficient, undecided};
-use crate::{Check, DesignError, Examination, Germani, Statement};
+use crate::{Check, DesignError, Examination, Germani, Reason, Statement};
 
 pub(super) const NAME: &str = "drift-observable";
 
@@ -32,13 +34,13 @@ const ANY: f64 = 1e6;
 
 /// What does not depend on how many derivatives of which output count.
 pub(super) struct Map<'s> {
-    pub affine: AffineForm,
+    affine: AffineForm,
     /// L_f^k h_i: output by output, k = 0 … n − 1
     lie: Vec<Vec<Node>>,
     /// ∂L_f^k h_i/∂x
     pub gradients: Vec<Rows>,
     /// symbols of u_j', u_j'', … for each known input, n of them
-    pub slopes: Vec<Vec<Node>>,
+    slopes: Vec<Vec<Node>>,
     /// the right-hand side is Lipschitz
     lipschitz: Check,
     settings: &'s Settings,
@@ -71,38 +73,6 @@ impl<'s> Map<'s> {
     }
 }
 
-/// The conditions, each by what it is about.
-#[derive(Clone)]
-pub struct Checks {
-    /// Definition 2.2
-    pub degree: Check,
-    /// drift-observability: Q is regular
-    pub regular: Check,
-    /// Φ tells points far apart as well
-    pub one_to_one: Check,
-    /// ∂f/∂x is bounded
-    pub lipschitz: Check,
-    /// the map has values and does not jump
-    pub continuous: Check,
-    /// what the observer needs of the inputs, where the map reads them. Advisory: Q̄ is
-    /// regular for small enough inputs whatever the box says (Theorem 2.4), and the observer
-    /// watches it
-    pub inputs: Option<Check>,
-}
-
-impl Checks {
-    pub fn all(&self) -> Vec<Check> {
-        let first = [
-            &self.degree,
-            &self.regular,
-            &self.one_to_one,
-            &self.lipschitz,
-            &self.continuous,
-        ];
-        first.into_iter().chain(&self.inputs).cloned().collect()
-    }
-}
-
 /// The map of a plant with the facts about it.
 pub struct Form {
     pub variant: Variant,
@@ -112,95 +82,189 @@ pub struct Form {
     pub indices: Vec<usize>,
     /// symbols of u_j, u_j', … on which Φ̄ depends: n − r of them for one output
     pub U: Vec<Vec<Node>>,
-    /// the derivative of each input that is one order further
-    pub w: Vec<Node>,
+    /// the same with one derivative more
+    pub further: Vec<Vec<Node>>,
     /// Q or, for (4.1) and (4.22), Q̄
     pub Q: Rows,
     /// Q̄_a, columns in the order of `U`; empty for (3.1)
     pub Q_a: Rows,
-    pub checks: Checks,
 }
 
 impl Form {
+    /// Whether Φ̄ reads inputs.
+    pub fn has_inputs(&self) -> bool {
+        self.U.iter().any(|jet| !jet.is_empty())
+    }
+
     /// Whether the map reads inputs.
     pub fn reads_inputs(&self) -> bool {
-        self.variant != Variant::Bounded && self.U.iter().any(|jet| !jet.is_empty())
+        self.variant != Variant::Bounded && self.has_inputs()
     }
 
     /// With μ_i derivatives of output i, Σμ_i = n.
     pub(super) fn new(
         augmented: &AugmentedPlant<'_>,
         map: &Map<'_>,
-        indices: Vec<usize>,
+        indices: &[usize],
         region: &Region,
     ) -> Result<Found<Self>, DesignError> {
-        let degrees = degrees(augmented, map, &indices, region)?;
-        let U = input_symbols(augmented, map, &indices, &degrees);
-        let variant = map.settings.variant.unwrap_or_else(|| Variant::suited(&U));
-        let rows: Vec<(usize, usize)> = indices
-            .iter()
-            .enumerate()
+        let degrees = degrees(augmented, map, indices, region)?;
+        let orders = orders(augmented, indices, &degrees);
+        let U = jets(augmented, map, &orders);
+        let orders: Vec<usize> = orders.iter().map(|order| order + 1).collect();
+        let each = indices.iter().enumerate();
+        let rows: Vec<(usize, usize)> = each
             .flat_map(|(i, &μ)| (0..μ).map(move |k| (i, k)))
             .collect();
-        let Q: Rows = rows
-            .iter()
-            .map(|&(i, k)| map.gradients[i][k].clone())
-            .collect();
-        lasts(augmented)?;
-        let regular = regular(augmented, Germani::Regular, &Q, region)?;
-        lasts(augmented)?;
-        let Φ: Vec<Node> = rows.iter().map(|&(i, k)| map.lie[i][k]).collect();
-        let one_to_one = one_to_one(augmented, &Φ, &regular, region)?;
-        lasts(augmented)?;
-        let (Φ, Q, Q_a) = match variant {
-            Variant::Bounded => (Φ, Q, vec![]),
-            _ => with_inputs(augmented, &rows, &U)?,
-        };
-        // the map is followed along the plant: as states, inputs and time move
-        let slopes = map.settings.known_slopes(augmented, &U);
-        let moving = with_slopes(augmented, &U, &slopes, region);
-        let continuous = regularity(augmented.graph(), &Φ, &moving.symbols(), &moving)?;
-        let reads = U.iter().any(|jet| !jet.is_empty());
-        let inputs = Inputs {
-            augmented,
-            U: &U,
-            slopes: &slopes,
-            Q̄: &Q,
-            region,
-        };
-        let checks = Checks {
-            degree: known(augmented, &indices, &degrees),
-            regular,
-            one_to_one,
-            lipschitz: map.lipschitz.clone(),
-            continuous: Statement::from(Germani::Continuous).with(continuous),
-            inputs: match reads {
-                true => Some(inputs.check(variant)?.advisory()),
-                false => None,
-            },
-        };
-        let every: Vec<usize> = (0..augmented.states.len()).collect();
-        let summary = summary(augmented, variant, &rows, &U);
-        let chains = vec![names(augmented, &every)];
-        let examination = Examination::new(augmented, region, NAME, summary, chains, checks.all())?;
-        let next = map.slopes.iter().zip(&U);
-        let form = Self {
-            variant,
-            rows,
-            indices,
-            w: next
-                .filter_map(|(slopes, U)| slopes.get(U.len().saturating_sub(1)).copied())
-                .collect(),
+        let gradient = |&(i, k): &(usize, usize)| map.gradients[i][k].clone();
+        let mut form = Self {
+            variant: map.settings.variant.unwrap_or_else(|| Variant::suited(&U)),
+            indices: indices.to_vec(),
+            further: jets(augmented, map, &orders),
             U,
-            Q,
-            Q_a,
-            checks,
+            Q: rows.iter().map(gradient).collect(),
+            Q_a: vec![],
+            rows,
         };
+        lasts(augmented)?;
+        let regular = regular(augmented, &form.Q, region)?;
+        lasts(augmented)?;
+        let mut Φ: Vec<Node> = form.rows.iter().map(|&(i, k)| map.lie[i][k]).collect();
+        let one_to_one = one_to_one(augmented, &Φ, regular.is_proved(), region)?;
+        lasts(augmented)?;
+        if form.variant != Variant::Bounded {
+            (Φ, form.Q, form.Q_a) = with_inputs(augmented, &form.rows, &form.U)?;
+        }
+        // the map is followed along the plant: as states, inputs and time move
+        let slopes = map.settings.known_slopes(augmented, &form.U);
+        let moving = with_slopes(augmented, &form.U, &slopes, region);
+        let continuous = regularity(augmented.graph(), &Φ, &moving.symbols(), &moving)?;
+        let mut checks = vec![
+            known(augmented, indices, &degrees),
+            Statement::from(Germani::Regular).with(regular),
+            Statement::from(Germani::OneToOne).with(one_to_one),
+            map.lipschitz.clone(),
+            Statement::from(Germani::Continuous).with(continuous),
+        ];
+        if form.has_inputs() {
+            checks.push(form.of_inputs(augmented, &slopes, region)?.advisory());
+        }
+        let every: Vec<usize> = (0..augmented.states.len()).collect();
+        let (summary, chains) = (form.summary(augmented), vec![names(augmented, &every)]);
+        let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
         Ok(Found { form, examination })
+    }
+
+    fn summary(&self, augmented: &AugmentedPlant<'_>) -> Said {
+        let y = |i: usize| &augmented.outputs[i].variable.name;
+        let rows = self.rows.iter();
+        let inputs = augmented.inputs.iter().zip(&self.U);
+        Said::Form {
+            variant: self.variant.word(),
+            map: rows.map(|&(i, k)| derivative_name(y(i), k)).collect(),
+            inputs: inputs
+                .flat_map(|(input, jet)| (0..jet.len()).map(|k| derivative_name(&input.name, k)))
+                .collect(),
+            indices: self.indices.clone(),
+            others: vec![],
+        }
+    }
+
+    /// What the observer needs of the inputs where the map reads them; `slopes` bound |u'|, |u''|, …
+    /// as far as they are declared. Advisory: Q̄ is regular for small enough inputs whatever the box
+    /// says (Theorem 2.4), and the observer watches it.
+    fn of_inputs(
+        &self,
+        augmented: &AugmentedPlant<'_>,
+        slopes: &[Vec<f64>],
+        region: &Region,
+    ) -> Result<Check, DesignError> {
+        if self.variant == Variant::Bounded {
+            return Ok(undecided(Germani::SmallInput, Said::InputsNotCounted));
+        }
+        let (mut statement, mut bounds) = (Germani::UniformlyObservable, vec![]);
+        // a singular point for a constant input is the better witness
+        let still = self.still(augmented.graph());
+        let mut found = regular(augmented, &at(augmented.graph(), &self.Q, &still), region)?;
+        if !matches!(found.verdict, Verdict::Refuted(_)) && !still.is_empty() {
+            let wider = with_slopes(augmented, &self.U, slopes, region);
+            found = regular(augmented, &self.Q, &wider)?;
+            bounds = self.declared(augmented, slopes);
+            if !bounds.is_empty() {
+                statement = Germani::RegularWithin;
+            }
+        }
+        let said = Said::Inputs {
+            reason: found.reason.clone(),
+            bounds,
+            is_proved: found.is_proved(),
+        };
+        Ok(Statement::from(statement).found(found.verdict, said))
+    }
+
+    /// The bounds of the derivatives that Q̄ reads.
+    fn declared(&self, augmented: &AugmentedPlant<'_>, slopes: &[Vec<f64>]) -> Vec<(String, f64)> {
+        let jets = augmented.inputs.iter().zip(&self.U).zip(slopes);
+        let each = jets.flat_map(|((input, jet), bounds)| {
+            let read = bounds.iter().take(jet.len().saturating_sub(1));
+            let each = read.enumerate();
+            each.map(|(k, bound)| (derivative_name(&input.name, k + 1), *bound))
+        });
+        each.collect()
+    }
+
+    /// Ū of Theorem 2.4: the largest radius, to a few thousandths of its size, for which Q̄ is proved regular on
+    /// the box of the states for all |u|, |u'|, … ≤ Ū; none where even the smallest inputs leave it undecided.
+    pub fn largest_inputs(
+        &self,
+        augmented: &AugmentedPlant<'_>,
+        region: &Region,
+    ) -> Result<Option<f64>, DesignError> {
+        let holds = |radius: f64| -> Result<bool, DesignError> {
+            let mut region = region.clone();
+            let is_input = |symbol: Node| augmented.inputs.iter().any(|u| u.node == symbol);
+            let sides = region.dimensions.iter_mut();
+            for side in sides.filter(|side| is_input(side.symbol)) {
+                (side.min, side.max) = (-radius, radius);
+            }
+            let jets = self.U.iter();
+            let slopes: Vec<Vec<f64>> = jets.map(|jet| vec![radius; jet.len()]).collect();
+            let region = with_slopes(augmented, &self.U, &slopes, &region);
+            Ok(regular(augmented, &self.Q, &region)?.is_proved())
+        };
+        let (mut low, mut high) = (1e-6, ANY);
+        if !holds(low)? {
+            return Ok(None);
+        }
+        if holds(high)? {
+            return Ok(Some(f64::INFINITY));
+        }
+        for _ in 0..HALVINGS {
+            let middle = f64::sqrt(low * high);
+            match holds(middle)? {
+                true => low = middle,
+                false => high = middle,
+            }
+        }
+        Ok(Some(low))
+    }
+
+    /// u', u'', … ↦ 0
+    fn still(&self, graph: &Graph) -> HashMap<Node, Node> {
+        let zero = graph.constant(0.0).node();
+        let slopes = self.U.iter().flat_map(|jet| jet.iter().skip(1));
+        slopes.map(|&symbol| (symbol, zero)).collect()
     }
 }
 
-pub(super) fn unfit(summary: String) -> Examination {
+/// A matrix at other values of its symbols.
+fn at(graph: &Graph, Q: &Rows, images: &HashMap<Node, Node>) -> Rows {
+    let entry = |e: &Option<Node>| Some(graph.substitute(&[(*e)?], images)[0]);
+    let row = |row: &Vec<Option<Node>>| row.iter().map(entry).collect();
+    Q.iter().map(row).collect()
+}
+
+pub(super) fn unfit(summary: impl Into<Reason>) -> Examination {
     Examination::unfit(NAME, summary, vec![])
 }
 
@@ -220,33 +284,8 @@ fn with_inputs(
     Ok((Φ̄, Q̄, Q̄_a))
 }
 
-fn summary(
-    augmented: &AugmentedPlant<'_>,
-    variant: Variant,
-    rows: &[(usize, usize)],
-    U: &[Vec<Node>],
-) -> String {
-    let y = |&(i, k): &(usize, usize)| derivative_name(&augmented.outputs[i].variable.name, k);
-    let map: Vec<String> = rows.iter().map(y).collect();
-    let u = augmented
-        .inputs
-        .iter()
-        .zip(U)
-        .flat_map(|(input, jet)| (0..jet.len()).map(|k| derivative_name(&input.name, k)));
-    let u: Vec<String> = u.collect();
-    let inputs = match u.is_empty() {
-        true => "free of the inputs (r = n)".to_owned(),
-        false => format!("which read {}", u.join(", ")),
-    };
-    format!(
-        "the state from {}, {inputs}; variant {}",
-        map.join(", "),
-        variant.word()
-    )
-}
-
 /// r_ij of output i with respect to input j, for indices μ.
-pub(super) fn degrees(
+fn degrees(
     augmented: &AugmentedPlant<'_>,
     map: &Map<'_>,
     μ: &[usize],
@@ -286,20 +325,18 @@ pub(super) fn degrees(
     )
 }
 
-/// u_j, u_j', …, as many as Φ̄ depends on: for one output n − r.
-pub(super) fn input_symbols(
+/// How many of u_j, u_j', … Φ̄ depends on: for one output n − r.
+fn orders(
     augmented: &AugmentedPlant<'_>,
-    map: &Map<'_>,
     indices: &[usize],
     degrees: &[Vec<Degree>],
-) -> Vec<Vec<Node>> {
+) -> Vec<usize> {
     let needed = |j: usize| {
         let pairs = indices.iter().zip(degrees);
         let orders = pairs.map(|(μ, d)| μ.saturating_sub(d[j].r));
         orders.max().unwrap_or(0)
     };
-    let orders: Vec<usize> = (0..augmented.inputs.len()).map(needed).collect();
-    jets(augmented, map, &orders)
+    (0..augmented.inputs.len()).map(needed).collect()
 }
 
 /// The symbols of u_j, u_j', …, so many of each input.
@@ -313,7 +350,7 @@ fn jets(augmented: &AugmentedPlant<'_>, map: &Map<'_>, orders: &[usize]) -> Vec<
 }
 
 /// Symbols of u_j', u_j'', …, as many as there are states, for each known input.
-pub(super) fn slopes(augmented: &AugmentedPlant<'_>) -> Vec<Vec<Node>> {
+fn slopes(augmented: &AugmentedPlant<'_>) -> Vec<Vec<Node>> {
     let graph = augmented.graph();
     let symbol = |name: &str, k: usize| graph.fresh(format!("derivative {k} of {name}")).node();
     let orders = 1..=augmented.states.len();
@@ -348,37 +385,26 @@ pub(super) fn with_slopes(
 }
 
 /// Definition 2.2, with the zeros proved or not.
-pub(super) fn known(
-    augmented: &AugmentedPlant<'_>,
-    indices: &[usize],
-    degrees: &[Vec<Degree>],
-) -> Check {
-    let mut found = vec![];
-    let mut proved = true;
-    for (i, row) in degrees.iter().enumerate().filter(|(i, _)| indices[*i] > 0) {
-        let y = &augmented.outputs[i].variable.name;
-        for degree in row {
-            proved &= degree.proved;
-            found.push(format!("{y}: r = {}, {}", degree.r, degree.detail));
-        }
-    }
-    if found.is_empty() {
-        found.push("no known input".to_owned());
-    }
-    if !proved {
-        found.push("zeros before r are found at points, not proved".to_owned());
-    }
-    sufficient(Germani::Degree, proved, found.join("; "))
+fn known(augmented: &AugmentedPlant<'_>, indices: &[usize], degrees: &[Vec<Degree>]) -> Check {
+    let used = degrees.iter().zip(&augmented.outputs).zip(indices);
+    let used = used.filter(|(_, μ)| **μ > 0);
+    let name = |output: &Measurement| output.variable.name.clone();
+    let found: Vec<(String, Degree)> = used
+        .flat_map(|((row, output), _)| row.iter().map(|r| (name(output), r.clone())))
+        .collect();
+    let are_proved = found.iter().all(|(_, degree)| degree.proved);
+    sufficient(
+        Germani::Degree,
+        are_proved,
+        Said::Degrees { found, are_proved },
+    )
 }
 
 /// Refuses a map that the budget is not enough for.
 ///
 /// # Errors
 /// How many operations it would have.
-pub(super) fn affordable(
-    augmented: &AugmentedPlant<'_>,
-    form: &AffineForm,
-) -> Result<(), DesignError> {
+fn affordable(augmented: &AugmentedPlant<'_>, form: &AffineForm) -> Result<(), DesignError> {
     let budget = augmented.graph().budget();
     let operations = operations(augmented, form);
     let time = budget.left().map(|left| left.as_secs_f64() * PER_SECOND);
@@ -416,27 +442,30 @@ fn is_linear(graph: &Graph, op: Op) -> bool {
     }
 }
 
+/// The entries of a matrix of this size; those that its rows lack are zero.
+pub(super) fn matrix<'g>(graph: &'g Graph, rows: &Rows, size: (usize, usize)) -> Matrix<'g> {
+    Matrix::from_fn(graph, size, |i, j| {
+        rows.get(i).and_then(|row| *row.get(j)?)
+    })
+}
+
 /// Whether a square matrix is regular on the whole region.
 pub(super) fn regular(
     augmented: &AugmentedPlant<'_>,
-    statement: Germani,
     Q: &Rows,
     region: &Region,
-) -> Result<Check, DesignError> {
-    let n = Q.len();
-    let Q = Matrix::from_fn(augmented.graph(), (n, n), |i, j| {
-        Q.get(i).and_then(|row| *row.get(j)?)
-    });
-    Ok(Statement::from(statement).with(lynkeus_structure::rank::regular(&Q, region)?))
+) -> Result<Finding, DesignError> {
+    let Q = matrix(augmented.graph(), Q, (Q.len(), Q.len()));
+    Ok(rank::regular(&Q, region)?)
 }
 
-/// Whether Φ, whose Jacobian was found `regular` or not, is one-to-one on the whole region.
-pub(super) fn one_to_one(
+/// Whether Φ is one-to-one on the whole region.
+fn one_to_one(
     augmented: &AugmentedPlant<'_>,
     Φ: &[Node],
-    regular: &Check,
+    is_regular: bool,
     region: &Region,
-) -> Result<Check, DesignError> {
+) -> Result<Finding, DesignError> {
     let states = augmented.symbols();
     let map = lynkeus_structure::one_to_one::Map {
         graph: augmented.graph(),
@@ -444,122 +473,8 @@ pub(super) fn one_to_one(
         states: &states,
         region,
     };
-    let found = map.one_to_one(&vec![false; states.len()], regular.is_proved())?;
-    Ok(Statement::from(Germani::OneToOne).with(found.finding))
-}
-
-/// The map where it reads inputs.
-pub(super) struct Inputs<'a, 'p> {
-    pub augmented: &'a AugmentedPlant<'p>,
-    pub U: &'a [Vec<Node>],
-    /// bounds of |u'|, |u''|, … per input, as far as they are declared
-    pub slopes: &'a [Vec<f64>],
-    pub Q̄: &'a Rows,
-    pub region: &'a Region,
-}
-
-impl Inputs<'_, '_> {
-    /// What the observer needs of the input where r < n.
-    pub fn check(&self, variant: Variant) -> Result<Check, DesignError> {
-        if variant == Variant::Bounded {
-            return Ok(undecided(
-                Germani::SmallInput,
-                "the input appears before the n-th derivative of the output and (3.1) takes no account of it: it converges for u_M ≤ β λ_min(P) only; variant = \"theoretical\" or \"practical\" does not need that",
-            ));
-        }
-        let name = || Germani::UniformlyObservable;
-        // a singular point for a constant input is the better witness
-        let still = self.still();
-        let mut check = regular(self.augmented, name(), &self.at_rest(&still), self.region)?;
-        if !matches!(check.verdict, Verdict::Refuted(_)) && !still.is_empty() {
-            let wider = with_slopes(self.augmented, self.U, self.slopes, self.region);
-            let declared = self.declared();
-            let statement = match declared.is_empty() {
-                true => name(),
-                false => Germani::RegularWithin,
-            };
-            check = regular(self.augmented, statement, self.Q̄, &wider)?;
-            if !declared.is_empty() {
-                check.reason = format!(
-                    "{}; for {declared}, as `input_derivatives` bounds them",
-                    check.reason.text()
-                )
-                .into();
-            }
-        }
-        if !check.is_proved() {
-            check.reason = (check.reason.text() + "; small and slow inputs keep it regular (Theorem 2.4), the column rcond and its flag tell").into();
-        }
-        Ok(check)
-    }
-
-    /// The bounds of the derivatives that Q̄ reads, in words.
-    fn declared(&self) -> String {
-        let jets = self.augmented.inputs.iter().zip(self.U).zip(self.slopes);
-        let each = jets.flat_map(|((input, jet), bounds)| {
-            let read = jet.len().saturating_sub(1);
-            let each = bounds.iter().take(read).enumerate();
-            each.map(|(k, bound)| {
-                format!(
-                    "|{}| ≤ {}",
-                    derivative_name(&input.name, k + 1),
-                    short(*bound)
-                )
-            })
-        });
-        each.collect::<Vec<_>>().join(", ")
-    }
-
-    /// Ū of Theorem 2.4: the largest radius, to a few thousandths of its size, for which Q̄ is proved regular on
-    /// the box of the states for all |u|, |u'|, … ≤ Ū; none where even the smallest inputs leave it undecided.
-    pub fn largest(&self) -> Result<Option<f64>, DesignError> {
-        let holds = |radius: f64| -> Result<bool, DesignError> {
-            let mut region = self.region.clone();
-            let is_input = |symbol: Node| self.augmented.inputs.iter().any(|u| u.node == symbol);
-            for side in region
-                .dimensions
-                .iter_mut()
-                .filter(|side| is_input(side.symbol))
-            {
-                (side.min, side.max) = (-radius, radius);
-            }
-            let orders = self.U.iter().map(|jet| vec![radius; jet.len()]);
-            let region = with_slopes(self.augmented, self.U, &orders.collect::<Vec<_>>(), &region);
-            Ok(regular(self.augmented, Germani::RegularWithin, self.Q̄, &region)?.is_proved())
-        };
-        let (mut low, mut high) = (1e-6, ANY);
-        if !holds(low)? {
-            return Ok(None);
-        }
-        if holds(high)? {
-            return Ok(Some(f64::INFINITY));
-        }
-        for _ in 0..HALVINGS {
-            let middle = f64::sqrt(low * high);
-            match holds(middle)? {
-                true => low = middle,
-                false => high = middle,
-            }
-        }
-        Ok(Some(low))
-    }
-
-    /// u', u'', … ↦ 0
-    fn still(&self) -> HashMap<Node, Node> {
-        let zero = self.augmented.graph().constant(0.0).node();
-        let slopes = self.U.iter().flat_map(|jet| jet.iter().skip(1));
-        slopes.map(|&symbol| (symbol, zero)).collect()
-    }
-
-    /// Q̄ for constant inputs.
-    fn at_rest(&self, still: &HashMap<Node, Node>) -> Rows {
-        let graph = self.augmented.graph();
-        let constant = |row: &Vec<Option<Node>>| {
-            let entry = |e: &Option<Node>| Some(graph.substitute(&[(*e)?], still)[0]);
-            row.iter().map(entry).collect()
-        };
-        self.Q̄.iter().map(constant).collect()
-    }
+    let found = map.one_to_one(&vec![false; states.len()], is_regular)?;
+    Ok(found.finding)
 }
 
 /// y, y', y'', y^(3), …

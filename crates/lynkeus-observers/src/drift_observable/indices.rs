@@ -14,15 +14,16 @@ use lynkeus_structure::output_map::Codistribution;
 use lynkeus_structure::{AugmentedPlant, Region, Standing, Verdict};
 
 use super::form::{Form, Map, unfit};
-use super::settings::{Asked, POLES, Settings};
+use super::said::{Known, Said};
+use super::settings::{POLES, Settings};
 use crate::conditions::lasts;
 use crate::design::{Found, Searched};
-use crate::{DesignError, Examination, TuningError, fit_word};
+use crate::{DesignError, Examination, Reason, TuningError};
 
 /// Further index vectors that are examined.
 const EXAMINED: usize = 6;
 
-/// Further index vectors that are told.
+/// Index vectors that are told where none fits.
 const TOLD: usize = 4;
 
 /// The form of the plant on `region`, or why there is none.
@@ -35,10 +36,10 @@ pub(super) fn form(
         Ok(map) => map,
         Err(examination) => return Ok(Err(examination)),
     };
-    let lengths = match settings.asked.clone() {
-        Asked::Indices(indices) => return Ok(Ok(Form::new(augmented, &map, indices, region)?)),
-        Asked::Lengths(lengths) => lengths,
-    };
+    let asked: Option<Vec<usize>> = settings.indices.iter().copied().collect();
+    if let Some(indices) = asked.filter(|indices| !indices.is_empty()) {
+        return Ok(Ok(Form::new(augmented, &map, &indices, region)?));
+    }
     lasts(augmented)?;
     let mut rows = Codistribution::new(augmented, &map.gradients)?;
     lasts(augmented)?;
@@ -46,19 +47,17 @@ pub(super) fn form(
     if first.iter().sum::<usize>() < augmented.states.len() {
         return Ok(Err(blind(augmented)?));
     }
-    let mut search = Search {
-        augmented,
-        map: &map,
-        region: declared(augmented, region),
-        rows,
-        others: vec![],
-    };
-    let found = search.best(&first, &lengths)?;
-    let mut chosen = match search.region == *region {
+    let candidates = candidates(&mut rows, first, &settings.indices)?;
+    let wide = declared(augmented, region);
+    let examined = |μ: &[usize]| Form::new(augmented, &map, μ, &wide);
+    let (found, left) = best(&mut rows, &candidates, examined)?;
+    let mut chosen = match wide == *region {
         true => found,
-        false => Form::new(augmented, &map, found.form.indices, region)?,
+        false => Form::new(augmented, &map, &found.form.indices, region)?,
     };
-    chosen.examination.summary += &told(&chosen.form.indices, &search.others);
+    if let Reason::DriftObservable(Said::Form { others, .. }) = &mut chosen.examination.summary {
+        *others = left;
+    }
     Ok(Ok(chosen))
 }
 
@@ -75,88 +74,59 @@ fn declared(augmented: &AugmentedPlant<'_>, region: &Region) -> Region {
     region
 }
 
-/// An index vector that was not chosen.
-struct Other {
-    indices: Vec<usize>,
-    known: Known,
-}
-
-/// What is known of it.
-enum Known {
-    /// every condition was looked at
-    Examined(Standing),
-    /// det Q has both signs at points of the box
-    Singular,
-    /// nothing
-    Open,
-}
-
-struct Search<'a, 'p> {
-    augmented: &'a AugmentedPlant<'p>,
-    map: &'a Map<'a>,
-    region: Region,
-    rows: Codistribution,
-    /// those that were not chosen
-    others: Vec<Other>,
-}
-
-impl Search<'_, '_> {
-    /// The first of the candidates with which most is proved.
-    fn best(
-        &mut self,
-        first: &[usize],
-        lengths: &[Option<usize>],
-    ) -> Result<Found<Form>, DesignError> {
-        let mut candidates = vec![first.to_vec()];
-        if first.len() > 1 {
-            candidates.extend(self.rows.alternatives(first));
-        }
-        let fits = |μ: &Vec<usize>| {
-            μ.iter()
-                .zip(lengths)
-                .all(|(μ, l)| l.is_none_or(|l| l == *μ))
-        };
-        let impossible = listed(&candidates);
-        candidates.retain(fits);
-        let Some((first, rest)) = candidates.split_first() else {
-            let expected =
-                format!("lists of lengths that make up a map of the state: {impossible}");
-            let found = "lists of other lengths";
-            return Err(TuningError::new(POLES.name, expected, found).into());
-        };
-        let mut form = self.examined(first)?;
-        let mut examined = 0;
-        for indices in rest {
-            let open = form.examination.fit() != Standing::Proved && examined < EXAMINED;
-            let known = match open {
-                false => Known::Open,
-                true if self.rows.changes_sign(indices) => Known::Singular,
-                true => {
-                    examined += 1;
-                    let next = self.examined(indices)?;
-                    let (kept, left) = match rank(&next) < rank(&form) {
-                        true => (next, form),
-                        false => (form, next),
-                    };
-                    form = kept;
-                    self.others.push(Other {
-                        indices: left.form.indices,
-                        known: Known::Examined(left.examination.fit()),
-                    });
-                    continue;
-                }
-            };
-            self.others.push(Other {
-                indices: indices.clone(),
-                known,
-            });
-        }
-        Ok(form)
+/// Index vectors of the lengths that the study asks for, the first of them Krener and
+/// Respondek's where it may be.
+fn candidates(
+    rows: &mut Codistribution,
+    first: Vec<usize>,
+    asked: &[Option<usize>],
+) -> Result<Vec<Vec<usize>>, TuningError> {
+    let further = match first.len() > 1 {
+        true => rows.alternatives(&first),
+        false => vec![],
+    };
+    let all: Vec<Vec<usize>> = std::iter::once(first).chain(further).collect();
+    let fits = |μ: &&Vec<usize>| {
+        let mut pairs = μ.iter().zip(asked);
+        pairs.all(|(μ, asked)| asked.is_none_or(|asked| asked == *μ))
+    };
+    let found: Vec<Vec<usize>> = all.iter().filter(fits).cloned().collect();
+    if found.is_empty() {
+        let shown: Vec<String> = all.iter().take(TOLD).map(|μ| format!("{μ:?}")).collect();
+        let expected = format!(
+            "lists of lengths that make up a map of the state: {}",
+            shown.join(", ")
+        );
+        let found = "lists of other lengths";
+        return Err(TuningError::new(POLES.name, expected, found));
     }
+    Ok(found)
+}
 
-    fn examined(&self, indices: &[usize]) -> Result<Found<Form>, DesignError> {
-        Form::new(self.augmented, self.map, indices.to_vec(), &self.region)
+/// The first of the candidates with which most is proved, and those that were not chosen.
+fn best(
+    rows: &mut Codistribution,
+    candidates: &[Vec<usize>],
+    form: impl Fn(&[usize]) -> Result<Found<Form>, DesignError>,
+) -> Result<(Found<Form>, Vec<(Vec<usize>, Known)>), DesignError> {
+    let mut best = form(&candidates[0])?;
+    let (mut others, mut examined) = (vec![], 0);
+    for μ in &candidates[1..] {
+        let open = best.examination.fit() != Standing::Proved && examined < EXAMINED;
+        if !open || rows.changes_sign(μ) {
+            let known = if open { Known::Singular } else { Known::Open };
+            others.push((μ.clone(), known));
+            continue;
+        }
+        examined += 1;
+        let mut left = form(μ)?;
+        if rank(&left) < rank(&best) {
+            std::mem::swap(&mut left, &mut best);
+        }
+        let fit = left.examination.fit();
+        others.push((left.form.indices, Known::Examined(fit)));
     }
+    Ok((best, others))
 }
 
 /// Smaller for what is closer to a proof.
@@ -170,32 +140,6 @@ fn rank(form: &Found<Form>) -> (Standing, usize, usize) {
         count(|v| matches!(v, Verdict::Refuted(_))),
         count(|v| matches!(v, Verdict::Undecided(_))),
     )
-}
-
-fn listed(all: &[Vec<usize>]) -> String {
-    let shown: Vec<String> = all.iter().take(TOLD).map(|μ| format!("{μ:?}")).collect();
-    shown.join(", ")
-}
-
-/// The chosen indices and the others, for the summary; nothing where there is no choice.
-fn told(chosen: &[usize], others: &[Other]) -> String {
-    if others.is_empty() {
-        return String::new();
-    }
-    let one = |other: &Other| {
-        let known = match other.known {
-            Known::Examined(Standing::Proved) => "fits, too",
-            Known::Examined(fit) => fit_word(fit),
-            Known::Singular => "det Q changes its sign",
-            Known::Open => "not examined",
-        };
-        format!("{:?} {known}", other.indices)
-    };
-    let mut shown: Vec<String> = others.iter().take(TOLD).map(one).collect();
-    if others.len() > TOLD {
-        shown.push(format!("{} more", others.len() - TOLD));
-    }
-    format!("; indices {chosen:?} (others: {})", shown.join(", "))
 }
 
 /// The share of the time for the names of what is not seen.
@@ -220,15 +164,11 @@ pub(super) fn blind(augmented: &AugmentedPlant<'_>) -> Result<Examination, Desig
     if !augmented.inputs.is_empty() {
         hidden = self::hidden(&answer(augmented, vec![])?);
     }
-    let advice = match hidden.is_empty() {
-        true => "the rest shows only where the inputs are not zero; write the model around an operating point, u = u0 + du with the input du".to_owned(),
-        false => format!("no measured output feels {}; measure more", hidden.join(", ")),
-    };
-    Ok(unfit(format!(
-        "with u = 0 the outputs and their derivatives determine {} of {} combinations of states: {advice}",
-        drift.rank,
-        augmented.states.len()
-    )))
+    Ok(unfit(Said::Blind {
+        rank: drift.rank,
+        of: augmented.states.len(),
+        hidden,
+    }))
 }
 
 /// States that no derivative of an output tells.

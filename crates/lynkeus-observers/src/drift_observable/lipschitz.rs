@@ -18,12 +18,15 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{MissingInput, Node};
 use lynkeus_proof::magnitude::{length, norm, plus, product, times};
-use lynkeus_structure::{AugmentedPlant, Matrix, Region, output_map, regularity};
+use lynkeus_structure::output_map::{
+    Rows, affine_form, along_column, jacobian_rows, lie_derivatives, output_derivatives,
+};
+use lynkeus_structure::{AugmentedPlant, Finding, Matrix, Region, regularity};
 
-use super::form::{Form, derivative_name, regular};
+use super::form::{Form, matrix, regular, with_slopes};
 use super::settings::Variant;
+use crate::DesignError;
 use crate::theorem::Enclosure;
-use crate::{Check, DesignError, Germani, Statement};
 
 /// Bounds on the box.
 pub(super) struct Lipschitz {
@@ -38,207 +41,132 @@ pub(super) struct Lipschitz {
     pub unseen: Vec<f64>,
     /// |Q̄| entry by entry
     pub Q: Vec<Vec<f64>>,
-    /// what the error of each state is made of
-    pub states: Vec<Share>,
+    /// |Q̃⁻¹|: |e_x| of state i is at most Σ_j `of_z`_ij |e_z,j| + `of_a`_i |e_a|
+    pub of_z: Vec<Vec<f64>>,
+    /// the lengths of the rows of |Q̃⁻¹Q̃_a|
+    pub of_a: Vec<f64>,
     /// det Q̄ keeps its sign for inputs and slopes within bounds
-    pub regular: Check,
+    pub regular: Finding,
     /// the last rows have values and do not jump
-    pub continuous: Check,
+    pub continuous: Finding,
     /// what has no bound
     pub open: Vec<String>,
-}
-
-/// |e_x| of one state is at most Σ_j z_j |e_z,j| + through |e_a|.
-pub(super) struct Share {
-    /// its row of |Q̃⁻¹|
-    pub z: Vec<f64>,
-    /// the length of its row of |Q̃⁻¹Q̃_a|
-    pub through: f64,
 }
 
 pub(super) fn bounds(
     augmented: &AugmentedPlant<'_>,
     form: &Form,
-    slopes: &[Option<Vec<f64>>],
+    slopes: &[Vec<f64>],
     region: &Region,
 ) -> Result<Lipschitz, DesignError> {
-    let graph = augmented.graph();
-    let mut box_ = Enclosure::new(augmented, region);
-    let U = further(augmented, form, slopes, &mut box_);
-    let n = form.rows.len();
-    let of_rows = |rows: &output_map::Rows, columns: usize| {
-        Matrix::from_fn(graph, (n, columns), |i, j| {
-            rows.get(i).and_then(|row| *row.get(j)?)
-        })
-    };
-    let columns = form.Q_a.first().map_or(0, Vec::len);
-    let (Q, Q_a) = (of_rows(&form.Q, n), of_rows(&form.Q_a, columns));
+    let (graph, n) = (augmented.graph(), form.rows.len());
+    let region = with_slopes(augmented, &form.further, slopes, region);
+    let box_ = Enclosure::new(augmented, &region);
     let x_a: Vec<Node> = match form.variant {
         Variant::Practical => form.U.concat(),
         _ => vec![],
     };
-    let Q_a = if x_a.is_empty() {
-        of_rows(&vec![], 0)
-    } else {
-        Q_a
-    };
-    let Remainders {
-        drift,
-        input,
-        unseen,
-        w,
-    } = remainders(augmented, form, &U)?;
-    let rows: Vec<Node> = input.iter().flatten().chain(&drift).copied().collect();
-    let sides = box_.region();
-    let continuous = regularity(graph, &rows, &sides.symbols(), sides)?;
+    let Q = matrix(graph, &form.Q, (n, n));
+    let Q_a = matrix(graph, &form.Q_a, (n, x_a.len()));
+    let Remainder { rows, inputs, w } = Remainder::new(augmented, form)?;
+    let still: HashMap<Node, Node> = w.iter().map(|&w| (w, graph.constant(0.0).node())).collect();
+    let drift = graph.substitute(&rows, &still);
+    let every: Vec<Node> = inputs.iter().flatten().chain(&drift).copied().collect();
+    let continuous = regularity(graph, &every, &region.symbols(), &region)?;
     let found = box_.inverse(&Q)?;
     let unknown = || vec![vec![f64::INFINITY; n]; n];
-    let size = found.as_ref().map_or_else(unknown, |found| found.bounds());
+    let of_z = found.as_ref().map_or_else(unknown, |found| found.bounds());
     let (Q_size, Q_a_size) = (box_.magnitudes(&Q)?, box_.magnitudes(&Q_a)?);
-    let mixed = |left: &[Vec<f64>]| product(left, &Q_a_size);
-    let of_remainder = |r: &[Node]| -> Result<Vec<f64>, MissingInput> {
+    let beside = |A: &[Vec<f64>], B: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        A.iter().zip(B).map(|(a, b)| [&a[..], b].concat()).collect()
+    };
+    let γ = |r: &[Node]| -> Result<Vec<f64>, MissingInput> {
         let x = Matrix::jacobian(graph, r, &augmented.symbols());
         let a = box_.magnitudes(&Matrix::jacobian(graph, r, &x_a))?;
         let z = match &found {
             Some(inverse) => box_.divided(&x, inverse)?,
-            None => product(&box_.magnitudes(&x)?, &size),
+            None => product(&box_.magnitudes(&x)?, &of_z),
         };
-        let through = mixed(&z);
-        let row = |i: usize| {
-            let a = a[i].iter().zip(&through[i]).map(|(a, t)| a + t);
-            length(&z[i].iter().copied().chain(a).collect::<Vec<_>>())
-        };
-        Ok((0..r.len()).map(row).collect())
+        let a = a.iter().zip(product(&z, &Q_a_size));
+        let a: Vec<Vec<f64>> = a
+            .map(|(a, through)| a.iter().zip(through).map(|(a, t)| a + t).collect())
+            .collect();
+        Ok(beside(&z, &a).iter().map(|row| length(row)).collect())
     };
-    let mut input_rows = vec![0.0; n];
-    for column in &input {
-        for (sum, γ) in input_rows.iter_mut().zip(of_remainder(column)?) {
+    let mut input = vec![0.0; n];
+    for column in &inputs {
+        for (sum, γ) in input.iter_mut().zip(γ(column)?) {
             *sum += γ;
         }
     }
-    let beside = |A: &[Vec<f64>], B: &[Vec<f64>]| -> Vec<Vec<f64>> {
-        A.iter().zip(B).map(|(a, b)| [&a[..], b].concat()).collect()
-    };
-    let size_a = mixed(&size);
-    let states = size.iter().zip(&size_a);
+    let of_a = product(&of_z, &Q_a_size);
     Ok(Lipschitz {
         map: norm(&beside(&Q_size, &Q_a_size)),
-        inverse: norm(&beside(&size, &size_a)),
-        drift: of_remainder(&drift)?,
-        input: input_rows,
-        unseen: forced(&unseen, &w, &box_)?,
-        states: states
-            .map(|(z, a)| Share {
-                z: z.clone(),
-                through: length(a),
-            })
-            .collect(),
+        inverse: norm(&beside(&of_z, &of_a)),
+        drift: γ(&drift)?,
+        input,
+        unseen: forced(&jacobian_rows(graph, &rows, &w), &w, &box_)?,
+        of_a: of_a.iter().map(|row| length(row)).collect(),
+        of_z,
         Q: Q_size,
-        regular: regular(augmented, Germani::RegularWithin, &form.Q, box_.region())?,
-        continuous: Statement::from(Germani::ContinuousRows).with(continuous),
+        regular: regular(augmented, &form.Q, &region)?,
+        continuous,
         open: box_.open(),
     })
 }
 
-/// u, u', …, one order further than the observer reads, each with its bounds.
-fn further(
-    augmented: &AugmentedPlant<'_>,
-    form: &Form,
-    slopes: &[Option<Vec<f64>>],
-    box_: &mut Enclosure<'_>,
-) -> Vec<Vec<Node>> {
-    let mut U = vec![];
-    let jets = form.U.iter().zip(&form.w);
-    for ((input, (jet, &w)), given) in augmented.inputs.iter().zip(jets).zip(slopes) {
-        let mut symbols = vec![input.node];
-        for k in 1..=jet.len() {
-            let symbol = jet.get(k).copied().unwrap_or(w);
-            let bound = given.as_ref().and_then(|b| b.get(k - 1).copied());
-            let bound = bound.unwrap_or(f64::INFINITY);
-            box_.add(derivative_name(&input.name, k), symbol, -bound, bound);
-            symbols.push(symbol);
-        }
-        U.push(symbols);
-    }
-    U
-}
-
 /// What z' holds beside the next row, row by row of z.
-struct Remainders {
-    /// without the inputs for (3.1), without w for (4.22)
-    drift: Vec<Node>,
+struct Remainder {
+    /// without the inputs for (3.1)
+    rows: Vec<Node>,
     /// (3.1): the factor of each input
-    input: Vec<Vec<Node>>,
-    /// (4.22): n̄, a column per entry of w
-    unseen: Vec<Vec<Option<Node>>>,
-    /// the symbols of w
+    inputs: Vec<Vec<Node>>,
+    /// (4.22): the first derivative of each input that its filter lacks
     w: Vec<Node>,
 }
 
-fn remainders(
-    augmented: &AugmentedPlant<'_>,
-    form: &Form,
-    U: &[Vec<Node>],
-) -> Result<Remainders, MissingInput> {
-    let graph = augmented.graph();
-    let zero = graph.constant(0.0).node();
-    let order = form.indices.iter().copied().max().unwrap_or(0);
-    let bounded = match form.variant {
-        Variant::Bounded => output_map::affine_form(augmented)?.ok(),
-        _ => None,
-    };
-    let y = match &bounded {
-        Some(affine) => output_map::lie_derivatives(augmented, affine, order)?,
-        None => output_map::output_derivatives(augmented, U, order)?,
-    };
-    let last = |&(i, k): &(usize, usize)| match k + 1 == form.indices[i] {
-        true => y[i][k + 1],
-        false => zero,
-    };
-    let drift: Vec<Node> = form.rows.iter().map(last).collect();
-    let w = match form.variant {
-        Variant::Practical => unseen_derivatives(form, U),
-        _ => vec![],
-    };
-    let still: HashMap<Node, Node> = w.iter().map(|&w| (w, zero)).collect();
-    Ok(Remainders {
-        unseen: output_map::jacobian_rows(graph, &drift, &w),
-        w,
-        drift: graph.substitute(&drift, &still),
-        input: bounded.map_or_else(Vec::new, |affine| {
-            let columns = affine.input_columns.iter();
-            columns.map(|g| along(augmented, form, g)).collect()
-        }),
-    })
-}
-
-/// L_g of every row of the map.
-fn along(augmented: &AugmentedPlant<'_>, form: &Form, g: &[Option<Node>]) -> Vec<Node> {
-    let graph = augmented.graph();
-    let of_row = |row: &Vec<Option<Node>>| {
-        let pairs = row.iter().zip(g);
-        let terms = pairs.filter_map(|(q, g)| Some(graph.expr((*q)?) * graph.expr((*g)?)));
-        terms
-            .reduce(|a, b| a + b)
-            .map_or_else(|| graph.constant(0.0).node(), |sum| sum.node())
-    };
-    form.Q.iter().map(of_row).collect()
-}
-
-/// The first derivative of each input that its filter lacks.
-fn unseen_derivatives(form: &Form, U: &[Vec<Node>]) -> Vec<Node> {
-    let pairs = form.U.iter().zip(U).filter(|(jet, _)| !jet.is_empty());
-    pairs
-        .filter_map(|(jet, further)| further.get(jet.len()).copied())
-        .collect()
+impl Remainder {
+    fn new(augmented: &AugmentedPlant<'_>, form: &Form) -> Result<Self, MissingInput> {
+        let graph = augmented.graph();
+        let zero = graph.constant(0.0).node();
+        let order = form.indices.iter().copied().max().unwrap_or(0);
+        let (mut inputs, mut w) = (vec![], vec![]);
+        let affine = match form.variant {
+            Variant::Bounded => affine_form(augmented)?.ok(),
+            _ => None,
+        };
+        let y = match &affine {
+            Some(affine) => {
+                let L_g = |row: &Vec<_>, g| along_column(graph, row, g).unwrap_or(zero);
+                let columns = affine.input_columns.iter();
+                inputs = columns
+                    .map(|g| form.Q.iter().map(|row| L_g(row, g)).collect())
+                    .collect();
+                lie_derivatives(augmented, affine, order)?
+            }
+            None => output_derivatives(augmented, &form.further, order)?,
+        };
+        if form.variant == Variant::Practical {
+            let further = form.U.iter().zip(&form.further);
+            let further = further.filter(|(jet, _)| !jet.is_empty());
+            w = further
+                .filter_map(|(_, further)| further.last().copied())
+                .collect();
+        }
+        let last = |&(i, k): &(usize, usize)| match k + 1 == form.indices[i] {
+            true => y[i][k + 1],
+            false => zero,
+        };
+        Ok(Self {
+            rows: form.rows.iter().map(last).collect(),
+            inputs,
+            w,
+        })
+    }
 }
 
 /// Bounds of |n̄ w| row by row. y^(μ) is affine in w, so that n̄ reads none of it.
-fn forced(
-    unseen: &[Vec<Option<Node>>],
-    w: &[Node],
-    box_: &Enclosure<'_>,
-) -> Result<Vec<f64>, MissingInput> {
+fn forced(n̄: &Rows, w: &[Node], box_: &Enclosure<'_>) -> Result<Vec<f64>, MissingInput> {
     let row = |row: &Vec<Option<Node>>| {
         let mut sum = 0.0;
         for (factor, &w) in row.iter().zip(w) {
@@ -249,5 +177,5 @@ fn forced(
         }
         Ok(sum)
     };
-    unseen.iter().map(row).collect()
+    n̄.iter().map(row).collect()
 }

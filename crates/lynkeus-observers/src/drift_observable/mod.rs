@@ -20,6 +20,7 @@ mod form;
 mod indices;
 mod lipschitz;
 mod observer;
+mod said;
 mod settings;
 mod theorem;
 
@@ -29,6 +30,7 @@ use crate::design::{Found, Searched};
 use crate::family::Stages;
 use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
 use form::{Form, NAME};
+pub use said::{Germani, Known, Said};
 use settings::Settings;
 
 const PAPER: &str = "Germani, Manes 1999, http://dml.cz/dmlcz/135297";
@@ -63,8 +65,7 @@ impl Stages for DriftObservable {
         settings: &Settings,
         found: Found<Form>,
     ) -> Result<Design, DesignError> {
-        let gains = observer::Gains::new(augmented, settings, &found.form)?;
-        observer::design(augmented, &settings.common, found, gains)
+        observer::design(augmented, settings, found)
     }
 
     fn theorem(
@@ -73,6 +74,6 @@ impl Stages for DriftObservable {
         found: Found<Form>,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        theorem::certificate(augmented, settings, &found.form, assumptions)
+        theorem::certificate(augmented, settings, found, assumptions)
     }
 }

@@ -11,12 +11,13 @@ use lynkeus_structure::AugmentedPlant;
 use nalgebra::{DMatrix, DVector};
 
 use super::form::{Form, NAME, derivative_name};
-use super::settings;
-use super::settings::{Needed, Settings, Variant, spaced};
+use super::said::Said;
+use super::settings::{Settings, Variant, spaced};
 use crate::design::Found;
-use crate::estimate::{Common, PlantCopy, Speed};
+use crate::estimate::{PlantCopy, Speed};
 use crate::{
-    ChainGain, Design, DesignError, InputDerivative, Monitor, Observer, Signal, TuningError,
+    ChainGain, Design, DesignError, InputDerivative, Monitor, Observer, ParameterValue, Reason,
+    Signal, TuningError,
 };
 
 /// Below this rcond of Q̄, with rows and columns scaled, the flag is raised.
@@ -28,20 +29,22 @@ const ALARM: f64 = 1e-2;
 const WITHDRAWN: f64 = 1e-4;
 
 /// From here on the correction is not withdrawn at all.
-pub(super) const WHOLE: f64 = 6.0 * WITHDRAWN;
+const WHOLE: f64 = 6.0 * WITHDRAWN;
 
 pub(super) fn design(
     augmented: &AugmentedPlant<'_>,
-    common: &Common,
+    settings: &Settings,
     Found { form, examination }: Found<Form>,
-    gains: Gains,
 ) -> Result<Design, DesignError> {
     let graph = augmented.graph();
-    let copy = PlantCopy::new(augmented, common);
+    let gains = Gains::new(augmented, settings, &form)?;
+    let copy = PlantCopy::new(augmented, &settings.common);
     let speed = Speed::new(&copy, "pole_scale", 1.0, scale_of_poles(&gains));
-    let filters = filters(augmented, &form, &gains, &speed);
-    let seen = filters.seen();
+    let filters = filters(augmented, &gains, &speed);
     // the plant and its map at x̂, and at x̂_a where (4.22) has it
+    let pairs = form.U.iter().zip(&filters);
+    let seen = pairs.flat_map(|(U, filter)| U.iter().zip(&filter.x_a).map(|(&u, x)| (u, x.symbol)));
+    let seen: HashMap<Node, Node> = seen.collect();
     let at = |expressions: &[Node]| graph.substitute(&copy.at_estimate(expressions), &seen);
     let right = innovations(&copy, &form, &gains, &speed, &filters, &at);
     let Q = numbers(graph, &form.Q, &at);
@@ -51,9 +54,10 @@ pub(super) fn design(
     let mut derivatives: Vec<Node> = derivatives
         .map(|(&f, &x)| (graph.expr(f) + graph.expr(x)).node())
         .collect();
-    derivatives.extend(filters.derivatives(graph));
+    derivatives.extend(filters.iter().flat_map(|filter| filter.derivatives(graph)));
     let mut observer = copy.observer(NAME, derivatives)?.tuned_by([&speed]);
-    observer.states.extend(filters.states(&gains));
+    let x_a = filters.into_iter().flat_map(|filter| filter.x_a);
+    observer.states.extend(x_a.zip(gains.filter_start.concat()));
     let matrix = match form.variant {
         Variant::Bounded => "Q",
         Variant::Theoretical | Variant::Practical => "Q̄",
@@ -70,30 +74,15 @@ pub(super) fn design(
     if form.variant == Variant::Theoretical {
         observer.input_derivatives = input_derivatives(augmented, &form);
     }
-    let laid = Laid {
-        augmented,
-        form: &form,
-        gains: &gains,
-        Q: &Q,
-        solution: &solution,
-        observer: &observer,
-    };
+    let mut parameters = parameters(augmented, &form, &gains);
+    parameters.extend(matrices(augmented, &form, &gains, &observer, matrix, &Q)?);
     Ok(Design {
         notes: notes(augmented, &form, &observer.input_derivatives),
-        gains: laid.constant_gains()?,
-        parameters: laid.parameters()?,
+        gains: constant_gains(augmented, &form, &gains, &observer, &Q, solution.alone)?,
+        parameters,
         observer,
         examination,
     })
-}
-
-/// x̂_a: per input the symbols of its filter, empty where there is none.
-struct Filters {
-    input: Vec<Variable>,
-    x_a: Vec<Vec<Signal>>,
-    U: Vec<Vec<Node>>,
-    /// K₂ per input
-    K2: Vec<Vec<Node>>,
 }
 
 /// What the factor on the poles does.
@@ -106,69 +95,47 @@ fn scale_of_poles(gains: &Gains) -> String {
     }
 }
 
-fn filters(augmented: &AugmentedPlant<'_>, form: &Form, gains: &Gains, speed: &Speed) -> Filters {
-    let graph = augmented.graph();
-    let state = |input: &Variable, k: usize| {
-        let name = format!("filter of {}", derivative_name(&input.name, k));
-        let symbol = graph.fresh(&name).node();
-        Signal { name, symbol }
-    };
-    let gain = |(k, gain): (usize, &f64), follows: bool| match follows {
-        true => speed.scaled(graph, *gain, (k + 1) as f64).node(),
-        false => graph.constant(*gain).node(),
-    };
-    let pairs = augmented.inputs.iter().zip(&gains.K2);
-    Filters {
-        input: augmented.inputs.clone(),
-        x_a: pairs
-            .map(|(input, K2)| (0..K2.len()).map(|k| state(input, k)).collect())
-            .collect(),
-        U: form.U.clone(),
-        K2: gains
-            .K2
-            .iter()
-            .zip(&gains.filter_follows)
-            .map(|(K2, follows)| K2.iter().enumerate().map(|k| gain(k, *follows)).collect())
-            .collect(),
-    }
+/// The filter of an input, empty where there is none.
+struct Filter<'g> {
+    /// x̂_a
+    x_a: Vec<Signal>,
+    /// K₂(u − C x̂_a)
+    correction: Vec<Expr<'g>>,
 }
 
-impl Filters {
-    /// u, u', … ↦ x̂_a
-    fn seen(&self) -> HashMap<Node, Node> {
-        let pairs = self.U.iter().zip(&self.x_a);
-        pairs
-            .flat_map(|(U, x_a)| U.iter().zip(x_a).map(|(&u, x)| (u, x.symbol)))
-            .collect()
-    }
-
-    /// u − C x̂_a
-    fn innovation<'g>(&self, graph: &'g Graph, j: usize) -> Option<Expr<'g>> {
-        let first = self.x_a[j].first()?;
-        Some(graph.expr(self.input[j].node) - graph.expr(first.symbol))
-    }
-
-    fn states(&self, gains: &Gains) -> Vec<(Signal, f64)> {
-        let signals = self.x_a.iter().flatten().cloned();
-        signals.zip(gains.filter_start.concat()).collect()
-    }
-
-    /// x̂_a' = A x̂_a + K₂(u − C x̂_a)
-    fn derivatives(&self, graph: &Graph) -> Vec<Node> {
-        let mut derivatives = vec![];
-        for (j, x_a) in self.x_a.iter().enumerate() {
-            let Some(e) = self.innovation(graph, j) else {
-                continue;
+fn filters<'g>(augmented: &AugmentedPlant<'g>, gains: &Gains, speed: &Speed) -> Vec<Filter<'g>> {
+    let graph = augmented.graph();
+    let one = |(j, input): (usize, &Variable)| {
+        let K2 = &gains.K2[j];
+        let state = |k: usize| {
+            let name = format!("filter of {}", derivative_name(&input.name, k));
+            let symbol = graph.fresh(&name).node();
+            Signal { name, symbol }
+        };
+        let x_a: Vec<Signal> = (0..K2.len()).map(state).collect();
+        let correction = |(k, &gain): (usize, &f64)| {
+            let gain = match gains.filter_follows[j] {
+                true => speed.scaled(graph, gain, (k + 1) as f64),
+                false => graph.constant(gain),
             };
-            for (k, &gain) in self.K2[j].iter().enumerate() {
-                let correction = graph.expr(gain) * e;
-                derivatives.push(match x_a.get(k + 1) {
-                    Some(next) => (graph.expr(next.symbol) + correction).node(),
-                    None => correction.node(),
-                });
-            }
-        }
-        derivatives
+            gain * (graph.expr(input.node) - graph.expr(x_a[0].symbol))
+        };
+        let correction = K2.iter().enumerate().map(correction).collect();
+        Filter { x_a, correction }
+    };
+    augmented.inputs.iter().enumerate().map(one).collect()
+}
+
+impl<'g> Filter<'g> {
+    /// x̂_a' = A x̂_a + K₂(u − C x̂_a)
+    fn derivatives(&self, graph: &'g Graph) -> Vec<Node> {
+        let next = self.x_a.iter().skip(1).map(|x| Some(graph.expr(x.symbol)));
+        let pairs = self.correction.iter().zip(next.chain([None]));
+        let sum = |(&correction, next): (&Expr<'g>, Option<Expr<'g>>)| match next {
+            Some(next) => (next + correction).node(),
+            None => correction.node(),
+        };
+        pairs.map(sum).collect()
     }
 }
 
@@ -178,21 +145,15 @@ fn innovations(
     form: &Form,
     gains: &Gains,
     speed: &Speed,
-    filters: &Filters,
+    filters: &[Filter<'_>],
     at: &dyn Fn(&[Node]) -> Vec<Node>,
 ) -> Vec<Node> {
     let augmented = copy.augmented;
     let graph = augmented.graph();
-    let y = &copy.measured;
-    let x̂: HashMap<Node, Node> = augmented
-        .symbols()
-        .into_iter()
-        .zip(copy.hats.iter().map(|hat| hat.symbol))
-        .collect();
-    let e: Vec<Expr<'_>> = augmented
-        .outputs
-        .iter()
-        .zip(y)
+    let hats = copy.hats.iter().map(|hat| hat.symbol);
+    let x̂: HashMap<Node, Node> = augmented.symbols().into_iter().zip(hats).collect();
+    let outputs = augmented.outputs.iter().zip(&copy.measured);
+    let e: Vec<Expr<'_>> = outputs
         .map(|(output, y)| {
             // the innovation sees the estimate itself, as in the other families,
             // except where h may leave its domain
@@ -204,23 +165,19 @@ fn innovations(
                 .fold(graph.expr(y.symbol), |y, &h| y - graph.expr(h))
         })
         .collect();
-    // K₂(u − C x̂_a), an entry per column of Q̄_a; none without a filter
-    let filtered: Vec<Expr<'_>> = (0..form.U.len())
-        .filter_map(|j| Some((j, filters.innovation(graph, j)?)))
-        .flat_map(|(j, e_a)| {
-            filters.K2[j]
-                .iter()
-                .map(move |&gain| graph.expr(gain) * e_a)
-        })
+    // an entry per column of Q̄_a; none without a filter
+    let e_a: Vec<Expr<'_>> = filters
+        .iter()
+        .flat_map(|filter| filter.correction.clone())
         .collect();
     let Q_a = numbers(graph, &form.Q_a, at);
     let row = |(place, &(i, k)): (usize, &(usize, usize))| {
         let gain = speed.scaled(graph, gains.K[i][k], (k + 1) as f64);
         let mut sum = gain * e[i];
         let entries = form.Q_a.get(place).into_iter().flatten().enumerate();
-        for ((column, entry), &e_a) in entries.zip(&filtered) {
+        for ((column, entry), &e) in entries.zip(&e_a) {
             if entry.is_some() {
-                sum = sum - graph.expr(Q_a[place * filtered.len() + column]) * e_a;
+                sum = sum - graph.expr(Q_a[place * e_a.len() + column]) * e;
             }
         }
         sum.node()
@@ -239,11 +196,11 @@ fn numbers(
 }
 
 /// The correction and the rcond that it was found with.
-pub(super) struct Solution {
+struct Solution {
     x: Vec<Node>,
-    pub rcond: Node,
+    rcond: Node,
     /// the same number as an expression that does not read the right-hand side
-    pub alone: Node,
+    alone: Node,
 }
 
 /// x with Q x = b. Columns are scaled by the states' ranges and rows to length
@@ -291,20 +248,19 @@ fn scale(state: &Variable) -> f64 {
 }
 
 fn input_derivatives(augmented: &AugmentedPlant<'_>, form: &Form) -> Vec<InputDerivative> {
-    let mut needed = vec![];
-    for (input, U) in augmented.inputs.iter().zip(&form.U) {
-        for (order, &symbol) in U.iter().enumerate().skip(1) {
-            needed.push(InputDerivative {
-                input: input.name.clone(),
-                order,
-                signal: Signal {
-                    name: derivative_name(&input.name, order),
-                    symbol,
-                },
-            });
-        }
-    }
-    needed
+    let jets = augmented.inputs.iter().zip(&form.U);
+    let each = jets.flat_map(|(input, U)| {
+        let needed = U.iter().enumerate().skip(1);
+        needed.map(|(order, &symbol)| InputDerivative {
+            input: input.name.clone(),
+            order,
+            signal: Signal {
+                name: derivative_name(&input.name, order),
+                symbol,
+            },
+        })
+    });
+    each.collect()
 }
 
 /// Default ratio of the filter's slowest pole to that of the observer: that of the
@@ -337,38 +293,35 @@ impl Gains {
             Some(λ) => (λ, vec![]),
             None => by_lemma(settings, &form.indices)?,
         };
-        let filters: Vec<usize> = match form.variant {
+        let orders: Vec<usize> = match form.variant {
             Variant::Practical => form.U.iter().map(Vec::len).collect(),
             _ => vec![0; form.U.len()],
         };
-        let needed = Needed::new(augmented, filters.clone());
         let filter_slowest = -FILTER_SPEED * slowest(&λ);
-        let filter_given = settings.filter_poles(&needed)?;
+        let filter_given = settings.filter_poles(&orders)?;
         let filter_follows = filter_given.iter().map(Option::is_none).collect();
         let filter_λ: Vec<Vec<Pole>> = filter_given
             .into_iter()
-            .zip(&filters)
+            .zip(&orders)
             .map(|(given, &order)| given.unwrap_or_else(|| spaced(filter_slowest, order)))
             .collect();
-        let start = |j: usize| {
-            let mut start = vec![0.0; filters[j]];
-            if let Some(u) = start.first_mut() {
-                *u = augmented.inputs[j].start.unwrap_or(0.0);
-            }
-            start
+        let start = |(input, &order): (&Variable, &usize)| {
+            let zeros = std::iter::repeat(0.0);
+            let start = [input.start.unwrap_or(0.0)].into_iter().chain(zeros);
+            start.take(order).collect()
         };
-        let filter_start = settings.filter_initial(&needed)?.into_iter();
-        let filter_start = filter_start
-            .enumerate()
-            .map(|(j, given)| given.unwrap_or_else(|| start(j)))
-            .collect();
+        let starts = augmented.inputs.iter().zip(&orders).map(start);
+        let given = settings.filter_initial(&orders)?.into_iter();
         let place = |λ: &Vec<Pole>| integrators::place_all(λ);
         Ok(Self {
             K: λ.iter().map(place).collect(),
             K2: filter_λ.iter().map(place).collect(),
             λ,
             filter_λ,
-            filter_start,
+            filter_start: given
+                .zip(starts)
+                .map(|(given, start)| given.unwrap_or(start))
+                .collect(),
             filter_follows,
             lemma,
         })
@@ -427,163 +380,158 @@ pub(super) fn spread(s: &[f64]) -> DMatrix<f64> {
 /// Characters of an entry of a matrix.
 const WIDTH: usize = 60;
 
-pub(super) fn notes(
+fn notes(
     augmented: &AugmentedPlant<'_>,
     form: &Form,
     derivatives: &[InputDerivative],
-) -> Vec<String> {
+) -> Vec<Reason> {
     let mut notes = vec![];
-    if let [_, _, ..] = form.indices[..] {
-        let outputs = augmented.outputs.iter().zip(&form.indices);
-        let parts: Vec<String> = outputs
-            .map(|(o, μ)| format!("{} {μ}", o.variable.name))
-            .collect();
-        notes.push(format!(
-            "derivatives used of each output: {}; the key 'indices' decides otherwise",
-            parts.join(", ")
-        ));
+    if form.indices.len() > 1 {
+        let names = augmented.outputs.iter().map(|o| o.variable.name.clone());
+        notes.push(Said::Indices(names.zip(form.indices.clone()).collect()));
     }
     if !derivatives.is_empty() {
-        let names: Vec<&str> = derivatives.iter().map(|d| d.signal.name.as_str()).collect();
-        notes.push(format!(
-            "the theoretical observer needs {} exactly, which a simulation has; a log needs columns of them (`input_derivatives` of [estimate]) or the `generator` of the input, or variant = \"practical\"",
-            names.join(", ")
+        let names = derivatives.iter().map(|d| d.signal.name.clone());
+        notes.push(Said::ExactDerivatives(names.collect()));
+    }
+    if form.variant == Variant::Bounded && form.has_inputs() {
+        notes.push(Said::SmallInputsOnly);
+    }
+    notes.into_iter().map(Reason::from).collect()
+}
+
+/// Q⁻¹K where Q is a matrix of numbers: then the observer is f − Q⁻¹K (ŷ − y). None where
+/// Q follows the estimate, or where a filter takes part.
+fn constant_gains(
+    augmented: &AugmentedPlant<'_>,
+    form: &Form,
+    gains: &Gains,
+    observer: &Observer,
+    Q: &[Node],
+    rcond: Node,
+) -> Result<Vec<ChainGain>, DesignError> {
+    let graph = augmented.graph();
+    let numbers: Option<Vec<f64>> = Q.iter().map(|&q| graph.constant_value(q)).collect();
+    let filtered = gains.K2.iter().any(|K2| !K2.is_empty());
+    let (Some(numbers), false) = (numbers, filtered) else {
+        return Ok(vec![]);
+    };
+    let whole = at_start(graph, observer, &[rcond])?.is_some_and(|rcond| rcond[0] >= WHOLE);
+    let found = whole.then(|| corrections(augmented, form, gains, &numbers));
+    Ok(found.flatten().unwrap_or_default())
+}
+
+/// Q⁻¹K column by column: what a unit of y − ŷ adds to each state's derivative.
+fn corrections(
+    augmented: &AugmentedPlant<'_>,
+    form: &Form,
+    gains: &Gains,
+    Q: &[f64],
+) -> Option<Vec<ChainGain>> {
+    let n = form.rows.len();
+    let Q = DMatrix::from_row_slice(n, n, Q).lu();
+    let outputs = augmented.outputs.iter().enumerate();
+    let used = outputs.filter(|(i, _)| form.indices[*i] > 0);
+    used.map(|(i, output)| {
+        let K = |&(row_of, k): &(usize, usize)| match row_of == i {
+            true => gains.K[i][k],
+            false => 0.0,
+        };
+        let column = DVector::from_iterator(n, form.rows.iter().map(K));
+        let gain = Q.solve(&column)?;
+        if !gain.iter().all(|k| k.is_finite()) {
+            return None;
+        }
+        let states = augmented.states.iter().map(|s| s.name.clone());
+        Some(ChainGain {
+            output: output.variable.name.clone(),
+            entries: states.zip(gain.iter().copied()).collect(),
+        })
+    })
+    .collect()
+}
+
+/// The poles and what they give.
+fn parameters(
+    augmented: &AugmentedPlant<'_>,
+    form: &Form,
+    gains: &Gains,
+) -> Vec<(String, ParameterValue)> {
+    let mut rows = vec![(
+        "variant".to_owned(),
+        vec![form.variant.word().to_owned()].into(),
+    )];
+    let mut add = |names: [String; 2], λ: &[Pole], K: &Vec<f64>| {
+        if !λ.is_empty() {
+            let [of_λ, of_K] = names;
+            let poles: Vec<String> = λ.iter().map(Pole::to_string).collect();
+            rows.push((of_λ, poles.into()));
+            rows.push((of_K, K.clone().into()));
+        }
+    };
+    let outputs = augmented.outputs.iter().zip(&gains.λ).zip(&gains.K);
+    for ((output, λ), K) in outputs {
+        let y = &output.variable.name;
+        add([format!("λ of {y}"), format!("K of {y}")], λ, K);
+    }
+    let inputs = augmented.inputs.iter().zip(&gains.filter_λ).zip(&gains.K2);
+    for ((input, λ), K2) in inputs {
+        let u = &input.name;
+        let names = ["λ", "K2"].map(|what| format!("{what} of the filter of {u}"));
+        add(names, λ, K2);
+    }
+    for found in &gains.lemma {
+        rows.push(("σ of Lemma 3.2".to_owned(), found.σ.into()));
+        rows.push(("√cn(P)".to_owned(), found.peaking.into()));
+    }
+    rows
+}
+
+/// The matrix of the paper as an expression of the estimate and at its start.
+fn matrices(
+    augmented: &AugmentedPlant<'_>,
+    form: &Form,
+    gains: &Gains,
+    observer: &Observer,
+    name: &str,
+    Q: &[Node],
+) -> Result<Vec<(String, ParameterValue)>, DesignError> {
+    let graph = augmented.graph();
+    let mut rows = vec![];
+    for (&(i, k), entries) in form.rows.iter().zip(Q.chunks(form.rows.len().max(1))) {
+        let y = derivative_name(&augmented.outputs[i].variable.name, k);
+        let entries: Vec<String> = entries.iter().map(|&q| graph.render(q, WIDTH)).collect();
+        rows.push((format!("{name}, row {y}"), entries.into()));
+    }
+    let start = at_start(graph, observer, Q)?;
+    let found = start.and_then(|start| corrections(augmented, form, gains, &start));
+    for gain in found.unwrap_or_default() {
+        let column: Vec<f64> = gain.entries.iter().map(|e| e.1).collect();
+        rows.push((
+            format!("{name}⁻¹K of {} at the start", gain.output),
+            column.into(),
         ));
     }
-    if form.variant == Variant::Bounded && form.U.iter().any(|U| !U.is_empty()) {
-        notes.push("the bounded variant converges for small inputs only (Theorem 3.3)".to_owned());
-    }
-    notes
+    Ok(rows)
 }
 
-/// An observer with what it was made from.
-pub(super) struct Laid<'a, 'p> {
-    pub augmented: &'a AugmentedPlant<'p>,
-    pub form: &'a Form,
-    pub gains: &'a Gains,
-    /// Q or Q̄ at the estimate, row by row
-    pub Q: &'a [Node],
-    pub solution: &'a Solution,
-    pub observer: &'a Observer,
-}
-
-impl Laid<'_, '_> {
-    /// Q⁻¹K where Q is a matrix of numbers: then the observer is f − Q⁻¹K (ŷ − y). None where
-    /// Q follows the estimate, or where a filter takes part.
-    pub fn constant_gains(&self) -> Result<Vec<ChainGain>, DesignError> {
-        let graph = self.augmented.graph();
-        let numbers: Option<Vec<f64>> = self.Q.iter().map(|&q| graph.constant_value(q)).collect();
-        let filtered = self.gains.K2.iter().any(|K2| !K2.is_empty());
-        let (Some(numbers), false) = (numbers, filtered) else {
-            return Ok(vec![]);
-        };
-        let whole = self.at_start(&[self.solution.alone])?;
-        match whole {
-            Some(rcond) if rcond[0] >= WHOLE => {}
-            _ => return Ok(vec![]),
-        }
-        Ok(self.corrections(&numbers).unwrap_or_default())
+/// The values where the observer starts; none where they depend on more than its states.
+fn at_start(
+    graph: &Graph,
+    observer: &Observer,
+    nodes: &[Node],
+) -> Result<Option<Vec<f64>>, DesignError> {
+    let (symbols, start): (Vec<Node>, Vec<f64>) = observer
+        .states
+        .iter()
+        .map(|(signal, start)| (signal.symbol, *start))
+        .unzip();
+    if graph.symbols_of(nodes).iter().any(|s| !symbols.contains(s)) {
+        return Ok(None);
     }
-
-    /// Q⁻¹K column by column: what a unit of y − ŷ adds to each state's derivative.
-    fn corrections(&self, Q: &[f64]) -> Option<Vec<ChainGain>> {
-        let n = self.form.rows.len();
-        let Q = DMatrix::from_row_slice(n, n, Q).lu();
-        let outputs = self.augmented.outputs.iter().enumerate();
-        let used = outputs.filter(|(i, _)| self.form.indices[*i] > 0);
-        used.map(|(i, output)| {
-            let K = |&(row_of, k): &(usize, usize)| match row_of == i {
-                true => self.gains.K[i][k],
-                false => 0.0,
-            };
-            let column = DVector::from_iterator(n, self.form.rows.iter().map(K));
-            let gain = Q.solve(&column)?;
-            if !gain.iter().all(|k| k.is_finite()) {
-                return None;
-            }
-            let states = self.augmented.states.iter().map(|s| s.name.clone());
-            Some(ChainGain {
-                output: output.variable.name.clone(),
-                entries: states.zip(gain.iter().copied()).collect(),
-            })
-        })
-        .collect()
-    }
-
-    /// The matrices of the paper, as expressions of the estimate and at its start.
-    pub fn parameters(&self) -> Result<Vec<(String, String)>, DesignError> {
-        let mut rows = vec![("variant".to_owned(), self.form.variant.word().to_owned())];
-        let outputs = self.augmented.outputs.iter().zip(&self.gains.λ);
-        for ((output, λ), K) in outputs
-            .zip(&self.gains.K)
-            .filter(|((_, λ), _)| !λ.is_empty())
-        {
-            let y = &output.variable.name;
-            rows.push((format!("λ of {y}"), settings::list(λ)));
-            rows.push((format!("K of {y}"), listed(K)));
-        }
-        let inputs = self.augmented.inputs.iter().zip(&self.gains.filter_λ);
-        for ((input, λ), K2) in inputs
-            .zip(&self.gains.K2)
-            .filter(|((_, λ), _)| !λ.is_empty())
-        {
-            let u = &input.name;
-            rows.push((format!("λ of the filter of {u}"), settings::list(λ)));
-            rows.push((format!("K2 of the filter of {u}"), listed(K2)));
-        }
-        for found in &self.gains.lemma {
-            rows.push(("σ of Lemma 3.2".to_owned(), found.σ.to_string()));
-            let peaking = match found.peaking.is_finite() {
-                true => found.peaking.to_string(),
-                false => "beyond the range of numbers".to_owned(),
-            };
-            rows.push(("√cn(P)".to_owned(), peaking));
-        }
-        self.add_matrices(&mut rows)?;
-        Ok(rows)
-    }
-
-    fn add_matrices(&self, rows: &mut Vec<(String, String)>) -> Result<(), DesignError> {
-        let graph = self.augmented.graph();
-        let Q = match self.form.variant {
-            Variant::Bounded => "Q",
-            _ => "Q̄",
-        };
-        let n = self.form.rows.len();
-        for (&(i, k), entries) in self.form.rows.iter().zip(self.Q.chunks(n.max(1))) {
-            let y = derivative_name(&self.augmented.outputs[i].variable.name, k);
-            let entries: Vec<String> = entries.iter().map(|&q| graph.render(q, WIDTH)).collect();
-            rows.push((format!("{Q}, row {y}"), entries.join(", ")));
-        }
-        let Some(start) = self.at_start(self.Q)? else {
-            return Ok(());
-        };
-        for gain in self.corrections(&start).unwrap_or_default() {
-            let column: Vec<f64> = gain.entries.iter().map(|e| e.1).collect();
-            let name = format!("{Q}⁻¹K of {} at the start", gain.output);
-            rows.push((name, listed(&column)));
-        }
-        Ok(())
-    }
-
-    /// The values where the observer starts; none where they depend on more than its states.
-    fn at_start(&self, nodes: &[Node]) -> Result<Option<Vec<f64>>, DesignError> {
-        let graph = self.augmented.graph();
-        let states = &self.observer.states;
-        let symbols: Vec<Node> = states.iter().map(|(signal, _)| signal.symbol).collect();
-        if graph.symbols_of(nodes).iter().any(|s| !symbols.contains(s)) {
-            return Ok(None);
-        }
-        let start: Vec<f64> = states.iter().map(|(_, start)| *start).collect();
-        let mut values = vec![0.0; nodes.len()];
-        Tape::new(graph, &symbols, nodes)?
-            .evaluator()
-            .eval(&start, &mut values);
-        Ok(values.iter().all(|v| v.is_finite()).then_some(values))
-    }
-}
-
-fn listed(values: &[f64]) -> String {
-    let values: Vec<String> = values.iter().map(f64::to_string).collect();
-    values.join(", ")
+    let mut values = vec![0.0; nodes.len()];
+    Tape::new(graph, &symbols, nodes)?
+        .evaluator()
+        .eval(&start, &mut values);
+    Ok(values.iter().all(|v| v.is_finite()).then_some(values))
 }

@@ -1,6 +1,8 @@
 //! The study's keys: which of the three observers, indices, poles, filters, bounds of slopes.
 //! What depends on the form is kept as it stands until the indices are known.
 
+use std::collections::BTreeMap;
+
 use lynkeus_expr::Node;
 use lynkeus_gain::integrators::{self, Lemma32, Pole};
 use lynkeus_structure::AugmentedPlant;
@@ -16,25 +18,28 @@ const PER_INPUT: Shape = Shape::Either(&[SPEEDS, Shape::Table(&SPEEDS)]);
 
 const BESIDE_ALPHA: &str = "poles by Lemma 3.2 instead, with `alpha`, see below";
 
+/// Words of [`Variant`].
+const VARIANTS: [&str; 3] = ["bounded", "theoretical", "practical"];
+
 const VARIANT: KeySpec = KeySpec {
     name: "variant",
-    kind: "`\"bounded\"`, `\"theoretical\"`, `\"practical\"`",
-    shape: Shape::Word(&["bounded", "theoretical", "practical"]),
+    shape: Shape::Word(&VARIANTS),
     default: "see above",
     meaning: "which observer",
 };
 
 pub(super) const POLES: KeySpec = KeySpec {
     name: "poles",
-    kind: "n poles; for several outputs one list of μ_i each, or the slowest pole of each",
-    shape: Shape::Either(&[SPEEDS, Shape::List(&SPEEDS), Shape::List(&Shape::ROWS)]),
+    shape: Shape::As(
+        "n poles; for several outputs one list of μ_i each, or the slowest pole of each",
+        &Shape::Either(&[SPEEDS, Shape::List(&SPEEDS), Shape::List(&Shape::ROWS)]),
+    ),
     default: "required, or `alpha`",
     meaning: "the eigenvalues of A − KC, see below",
 };
 
 pub(super) const ALPHA: KeySpec = KeySpec {
     name: "alpha",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "required, or `poles`",
     meaning: "the decay α: poles by Lemma 3.2 instead, see below",
@@ -42,7 +47,6 @@ pub(super) const ALPHA: KeySpec = KeySpec {
 
 const BETA: KeySpec = KeySpec {
     name: "beta",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "1",
     meaning: BESIDE_ALPHA,
@@ -50,7 +54,6 @@ const BETA: KeySpec = KeySpec {
 
 pub(super) const GAMMA: KeySpec = KeySpec {
     name: "gamma",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "required with `alpha`",
     meaning: BESIDE_ALPHA,
@@ -58,36 +61,38 @@ pub(super) const GAMMA: KeySpec = KeySpec {
 
 pub(super) const FILTER_POLES: KeySpec = KeySpec {
     name: "filter_poles",
-    kind: "n − r poles or the slowest; for several inputs a table `{ u = […], v = […] }`",
-    shape: Shape::Either(&[
-        SPEEDS,
-        Shape::ROWS,
-        Shape::Table(&Shape::Either(&[SPEEDS, Shape::ROWS])),
-    ]),
+    shape: Shape::As(
+        "n − r poles or the slowest; for several inputs a table `{ u = […], v = […] }`",
+        &Shape::Either(&[
+            SPEEDS,
+            Shape::ROWS,
+            Shape::Table(&Shape::Either(&[SPEEDS, Shape::ROWS])),
+        ]),
+    ),
     default: "10 times the slowest pole, each 1.2 times the one before",
     meaning: "the eigenvalues of the input filter",
 };
 
 pub(super) const FILTER_INITIAL: KeySpec = KeySpec {
     name: "filter_initial",
-    kind: "as `filter_poles`",
-    shape: PER_INPUT,
+    shape: Shape::As("as `filter_poles`", &PER_INPUT),
     default: "the input's start value, then zeros",
     meaning: "x̂ₐ(0)",
 };
 
 pub(super) const INDICES: KeySpec = KeySpec {
     name: "indices",
-    kind: "a whole number per measured output",
-    shape: Shape::Either(&[Shape::Whole(0), Shape::List(&Shape::Whole(0))]),
+    shape: Shape::As(
+        "a whole number per measured output",
+        &Shape::Either(&[Shape::Whole(0), Shape::List(&Shape::Whole(0))]),
+    ),
     default: "found",
     meaning: "how many derivatives of each output count",
 };
 
 pub(super) const SLOPES: KeySpec = KeySpec {
     name: "input_derivatives",
-    kind: "n − r numbers; for several inputs a table",
-    shape: PER_INPUT,
+    shape: Shape::As("n − r numbers; for several inputs a table", &PER_INPUT),
     default: "those of `[certify]`",
     meaning: "bounds of &#124;u'&#124;, …, &#124;u^(n−r)&#124;, read by guarantees only",
 };
@@ -110,115 +115,94 @@ pub(super) const KEYS: [KeySpec; 9] = [
 pub struct Settings {
     pub common: Common,
     pub variant: Option<Variant>,
-    pub asked: Asked,
-    poles: Option<Value>,
-    pub α: Option<f64>,
-    pub β: Option<f64>,
-    pub γ: Option<f64>,
-    filter_poles: Option<Value>,
-    filter_initial: Option<Value>,
-    slopes: Option<Value>,
+    /// how many derivatives of each output count, where the study says so: under `indices`, or by
+    /// the lengths of the lists under `poles`
+    pub indices: Vec<Option<usize>>,
+    /// α, β and γ of Lemma 3.2
+    lemma: [Option<f64>; 3],
+    values: BTreeMap<String, Value>,
+    /// names of the known inputs
+    inputs: Vec<String>,
 }
 
 impl Settings {
     pub fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
-        let value = |key: KeySpec| tuning.values.get(key.name).cloned();
-        let poles = value(POLES);
+        let positive = |key: KeySpec| tuning.positive(key.name);
+        let names = augmented.inputs.iter().map(|input| input.name.clone());
         Ok(Self {
             common: Common::read(tuning)?,
             variant: tuning.meant(&VARIANT, Variant::ALL)?,
-            asked: indices(augmented, tuning, poles.as_ref())?,
-            poles,
-            α: tuning.positive(ALPHA.name)?,
-            β: tuning.positive(BETA.name)?,
-            γ: tuning.positive(GAMMA.name)?,
-            filter_poles: value(FILTER_POLES),
-            filter_initial: value(FILTER_INITIAL),
-            slopes: value(SLOPES),
+            indices: indices(augmented, tuning)?,
+            lemma: [positive(ALPHA)?, positive(BETA)?, positive(GAMMA)?],
+            values: tuning.values.clone(),
+            inputs: names.collect(),
         })
     }
 
     /// Whether the study decides the poles.
     pub fn has_poles(&self) -> bool {
-        self.poles.is_some() || self.α.is_some()
+        self.values.contains_key(POLES.name) || self.lemma[0].is_some()
     }
 
     /// `poles`: for one output its n poles; for several a list or the slowest pole of each. A single
     /// number is the slowest pole of every output. None where they are not listed.
     pub fn poles(&self, μ: &[usize]) -> Result<Option<Vec<Vec<Pole>>>, TuningError> {
-        let Some(value) = &self.poles else {
+        let Some(value) = self.values.get(POLES.name) else {
             return Ok(None);
         };
         let given = per_output(value, μ.len())?;
         let pairs = given.iter().zip(μ);
         let lists: Option<Vec<Vec<Pole>>> = pairs.map(|(poles, &μ)| poles.of_length(μ)).collect();
-        let lengths: Vec<String> = μ.iter().map(usize::to_string).collect();
-        let expected = match μ {
-            [n] => format!("{n} negative numbers, one per state"),
-            _ => format!(
-                "a list of negative numbers per measured output, of lengths {}, or the slowest pole of each",
-                lengths.join(", ")
-            ),
-        };
-        lists
-            .map(Some)
-            .ok_or_else(|| TuningError::new(POLES.name, expected, value))
+        lists.map(Some).ok_or_else(|| {
+            let lengths: Vec<String> = μ.iter().map(usize::to_string).collect();
+            let expected = match μ {
+                [n] => format!("{n} negative numbers, one per state"),
+                _ => format!(
+                    "a list of negative numbers per measured output, of lengths {}, or the slowest pole of each",
+                    lengths.join(", ")
+                ),
+            };
+            TuningError::new(POLES.name, expected, value)
+        })
     }
 
     /// Lemma 3.2 with `alpha`, `beta`, `gamma`; none for an output that is not used.
     pub fn lemma(&self, μ: &[usize]) -> Result<Vec<Option<Lemma32>>, TuningError> {
-        let Some(α) = self.α else {
-            let expected = "the eigenvalues of the error, negative numbers, or alpha, beta and gamma for Lemma 3.2 to choose them";
-            return Err(TuningError::absent(POLES.name, expected));
-        };
-        let missing = || {
-            TuningError::absent(
-                GAMMA.name,
-                "the Lipschitz constant for Lemma 3.2, a positive number",
-            )
-        };
-        let γ = self.γ.ok_or_else(missing)?;
+        let absent = |key: KeySpec, expected| TuningError::absent(key.name, expected);
+        let [α, β, γ] = self.lemma;
+        let α = α.ok_or_else(|| absent(POLES, "the eigenvalues of the error, negative numbers, or alpha, beta and gamma for Lemma 3.2 to choose them"))?;
+        let constant = "the Lipschitz constant for Lemma 3.2, a positive number";
+        let γ = γ.ok_or_else(|| absent(GAMMA, constant))?;
         // (4.7) has β = 1
-        let β = self.β.unwrap_or(1.0);
-        let of = |&μ: &usize| match μ {
-            0 => Ok(None),
-            _ => integrators::lemma_3_2(μ, α, β, γ)
-                .map(Some)
-                .map_err(|error| {
-                    TuningError::new(ALPHA.name, "numbers Lemma 3.2 can be used with", error)
-                }),
-        };
-        μ.iter().map(of).collect()
+        let found = |&μ: &usize| integrators::lemma_3_2(μ, α, β.unwrap_or(1.0), γ);
+        let used = |μ: &usize| (*μ > 0).then(|| found(μ)).transpose();
+        μ.iter()
+            .map(used)
+            .collect::<Result<_, _>>()
+            .map_err(|error| {
+                TuningError::new(ALPHA.name, "numbers Lemma 3.2 can be used with", error)
+            })
     }
 
-    /// `filter_poles`: the eigenvalues of the filter per input.
-    pub fn filter_poles(&self, needed: &Needed<'_>) -> Result<Vec<Option<Vec<Pole>>>, TuningError> {
-        let entries = PerInput::read(
-            self.filter_poles.as_ref(),
-            FILTER_POLES,
-            "numbers for the filter of",
-            needed,
-        )?;
-        entries.map(|value, order| {
+    /// `filter_poles`: the eigenvalues of the filter per input, so many of each.
+    pub fn filter_poles(&self, orders: &[usize]) -> Result<Vec<Option<Vec<Pole>>>, TuningError> {
+        let what = "numbers for the filter of";
+        self.per_input(FILTER_POLES, what, orders, |value, order| {
             let poles = Poles::read(FILTER_POLES.name, value)?;
             Ok(poles.and_then(|poles| poles.of_length(order)))
         })
     }
 
     /// x̂ₐ(0) per input.
-    pub fn filter_initial(
-        &self,
-        needed: &Needed<'_>,
-    ) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
-        let what = "numbers for the filter of";
-        numbers_per_input(self.filter_initial.as_ref(), FILTER_INITIAL, what, needed)
+    pub fn filter_initial(&self, orders: &[usize]) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
+        self.per_input(FILTER_INITIAL, "numbers for the filter of", orders, numbers)
     }
 
     /// Bounds of |u'|, |u''|, … per input as far as any are declared: the family's key, else those of the plant. A
     /// list that has not the length that a guarantee needs is no help here.
     pub fn known_slopes(&self, augmented: &AugmentedPlant<'_>, U: &[Vec<Node>]) -> Vec<Vec<f64>> {
-        let needed = Needed::new(augmented, U.iter().map(Vec::len).collect());
-        let own = self.slopes(&needed).unwrap_or_default().into_iter();
+        let orders: Vec<usize> = U.iter().map(Vec::len).collect();
+        let own = self.slopes(&orders).unwrap_or_default().into_iter();
         let own = own.chain(std::iter::repeat(None));
         let general = augmented.input_derivatives.iter();
         own.zip(general)
@@ -228,13 +212,8 @@ impl Settings {
 
     /// `input_derivatives`: per input bounds of |u'|, |u''|, …, one more than the observer
     /// reads; for guarantees only. None where they are left out.
-    pub fn slopes(&self, needed: &Needed<'_>) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
-        let found = numbers_per_input(
-            self.slopes.as_ref(),
-            SLOPES,
-            "bounds of the derivatives of",
-            needed,
-        )?;
+    pub fn slopes(&self, orders: &[usize]) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
+        let found = self.per_input(SLOPES, "bounds of the derivatives of", orders, numbers)?;
         match found.iter().flatten().flatten().find(|x| **x < 0.0) {
             Some(x) => Err(TuningError::new(
                 SLOPES.name,
@@ -242,6 +221,52 @@ impl Settings {
                 x,
             )),
             None => Ok(found),
+        }
+    }
+
+    /// What the key has for each input that takes numbers, so many of each: a value for the only
+    /// one, or a table by their names. None where it is left out.
+    fn per_input<T>(
+        &self,
+        key: KeySpec,
+        what: &str,
+        orders: &[usize],
+        read: impl Fn(&Value, usize) -> Result<Option<T>, TuningError>,
+    ) -> Result<Vec<Option<T>>, TuningError> {
+        let mut found: Vec<Option<T>> = self.inputs.iter().map(|_| None).collect();
+        let Some(all) = self.values.get(key.name) else {
+            return Ok(found);
+        };
+        let takes: Vec<usize> = (0..found.len()).filter(|&j| orders[j] > 0).collect();
+        let wrong = || TuningError::new(key.name, self.expected(what, &takes, orders), all);
+        let mut entries = vec![];
+        match (all, &takes[..]) {
+            (Value::Table(table), _) => {
+                for (name, value) in table {
+                    let j = takes.iter().find(|&&j| self.inputs[j] == *name);
+                    entries.push((*j.ok_or_else(wrong)?, value));
+                }
+            }
+            (value, &[j]) => entries.push((j, value)),
+            _ => return Err(wrong()),
+        }
+        entries.sort_unstable_by_key(|entry| entry.0);
+        for (j, value) in entries {
+            found[j] = Some(read(value, orders[j])?.ok_or_else(wrong)?);
+        }
+        Ok(found)
+    }
+
+    /// What may stand for the inputs that take numbers.
+    fn expected(&self, what: &str, takes: &[usize], orders: &[usize]) -> String {
+        match *takes {
+            [] => "no such key: this observer has no filter and reads no derivative".to_owned(),
+            [j] => format!("{} {what} {}", orders[j], self.inputs[j]),
+            _ => {
+                let one = |&j: &usize| format!("{} = {} numbers", self.inputs[j], orders[j]);
+                let all: Vec<String> = takes.iter().map(one).collect();
+                format!("a table {{ {} }}", all.join(", "))
+            }
         }
     }
 }
@@ -261,11 +286,7 @@ impl Variant {
     const ALL: [Self; 3] = [Self::Bounded, Self::Theoretical, Self::Practical];
 
     pub fn word(self) -> &'static str {
-        match self {
-            Self::Bounded => "bounded",
-            Self::Theoretical => "theoretical",
-            Self::Practical => "practical",
-        }
+        VARIANTS[self as usize]
     }
 
     /// The least demanding one that takes account of the inputs: with r = n the
@@ -279,35 +300,12 @@ impl Variant {
     }
 }
 
-/// What is asked for of the known inputs: (name, how many numbers), in their order.
-pub struct Needed<'a> {
-    pub names: Vec<&'a str>,
-    pub orders: Vec<usize>,
-}
-
-impl<'a> Needed<'a> {
-    pub fn new(augmented: &'a AugmentedPlant<'_>, orders: Vec<usize>) -> Self {
-        let names = augmented.inputs.iter().map(|i| i.name.as_str()).collect();
-        Self { names, orders }
-    }
-}
-
-/// How many derivatives of which output the study asks for.
-#[derive(Clone)]
-pub enum Asked {
-    /// the key `indices`, or as many poles for every output
-    Indices(Vec<usize>),
-    /// per output, where its poles are listed
-    Lengths(Vec<Option<usize>>),
-}
-
 /// `indices`: one whole number per measured output, n in sum; else the lengths of the lists
-/// under `poles`.
-pub(super) fn indices(
+/// under `poles`, n in sum where every output has one.
+fn indices(
     augmented: &AugmentedPlant<'_>,
     tuning: &Tuning,
-    poles: Option<&Value>,
-) -> Result<Asked, TuningError> {
+) -> Result<Vec<Option<usize>>, TuningError> {
     let (p, n) = (augmented.outputs.len(), augmented.states.len());
     if let Some(found) = tuning.numbers(INDICES.name)? {
         let whole = |x: &f64| *x >= 0.0 && x.fract() == 0.0 && *x <= n as f64;
@@ -318,22 +316,21 @@ pub(super) fn indices(
             let found: Vec<String> = found.iter().map(f64::to_string).collect();
             return Err(TuningError::new(INDICES.name, expected, found.join(", ")));
         }
-        return Ok(Asked::Indices(found.iter().map(|&x| x as usize).collect()));
+        return Ok(found.iter().map(|&x| Some(x as usize)).collect());
     }
     // one output has n derivatives whatever the list says
-    let Some(value) = poles.filter(|_| p > 1) else {
-        return Ok(Asked::Lengths(vec![None; p]));
+    let Some(value) = tuning.values.get(POLES.name).filter(|_| p > 1) else {
+        return Ok(vec![None; p]);
     };
     let given = per_output(value, p)?;
     let lengths: Vec<Option<usize>> = given.iter().map(Poles::count).collect();
     let all: Option<Vec<usize>> = lengths.iter().copied().collect();
     match all {
-        Some(indices) if indices.iter().sum::<usize>() == n => Ok(Asked::Indices(indices)),
-        Some(_) => {
+        Some(all) if all.iter().sum::<usize>() != n => {
             let expected = format!("as many poles as states ({n}) in all");
             Err(TuningError::new(POLES.name, expected, value))
         }
-        None => Ok(Asked::Lengths(lengths)),
+        _ => Ok(lengths),
     }
 }
 
@@ -365,92 +362,17 @@ fn per_output(value: &Value, p: usize) -> Result<Vec<Poles>, TuningError> {
     }
 }
 
-/// Numbers for each input that takes some; none where they are left out.
-pub(super) fn numbers_per_input(
-    value: Option<&Value>,
-    key: KeySpec,
-    what: &str,
-    needed: &Needed<'_>,
-) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
-    let entries = PerInput::read(value, key, what, needed)?;
-    entries.map(|value, order| Ok(numbers(value).filter(|numbers| numbers.len() == order)))
-}
-
-/// A value for the only input that takes one, or a table of them by the inputs' names.
-struct PerInput<'a> {
-    key: &'static str,
-    /// per input its value and how many numbers it takes
-    entries: Vec<Option<(&'a Value, usize)>>,
-    /// the key's value
-    all: Option<&'a Value>,
-    expected: String,
-}
-
-impl<'a> PerInput<'a> {
-    fn read(
-        all: Option<&'a Value>,
-        key: KeySpec,
-        what: &str,
-        needed: &Needed<'_>,
-    ) -> Result<Self, TuningError> {
-        let Needed { names, orders } = needed;
-        let some: Vec<usize> = (0..names.len()).filter(|&j| orders[j] > 0).collect();
-        let expected = match some[..] {
-            [] => "no such key: this observer has no filter and reads no derivative".to_owned(),
-            [j] => format!("{} {what} {}", orders[j], names[j]),
-            _ => {
-                let one = |&j: &usize| format!("{} = {} numbers", names[j], orders[j]);
-                let all: Vec<String> = some.iter().map(one).collect();
-                format!("a table {{ {} }}", all.join(", "))
-            }
-        };
-        let mut found = Self {
-            key: key.name,
-            entries: vec![None; names.len()],
-            all,
-            expected,
-        };
-        match (found.all, &some[..]) {
-            (None, _) => {}
-            (Some(Value::Table(table)), _) => {
-                for (name, value) in table {
-                    let j = some.iter().copied().find(|&j| names[j] == name.as_str());
-                    let j = j.ok_or_else(|| found.wrong())?;
-                    found.entries[j] = Some((value, orders[j]));
-                }
-            }
-            (Some(value), &[j]) => found.entries[j] = Some((value, orders[j])),
-            _ => return Err(found.wrong()),
-        }
-        Ok(found)
-    }
-
-    fn wrong(&self) -> TuningError {
-        let found = self.all.map_or_else(String::new, Value::to_string);
-        TuningError::new(self.key, self.expected.clone(), found)
-    }
-
-    fn map<T>(
-        &self,
-        read: impl Fn(&Value, usize) -> Result<Option<T>, TuningError>,
-    ) -> Result<Vec<Option<T>>, TuningError> {
-        let one = |entry: &Option<(&Value, usize)>| match entry {
-            None => Ok(None),
-            Some((value, order)) => read(value, *order)?.map(Some).ok_or_else(|| self.wrong()),
-        };
-        self.entries.iter().map(one).collect()
-    }
-}
-
-fn numbers(value: &Value) -> Option<Vec<f64>> {
+/// So many finite numbers.
+fn numbers(value: &Value, count: usize) -> Result<Option<Vec<f64>>, TuningError> {
     let number = |value: &Value| match value {
         Value::Number(x) if x.is_finite() => Some(*x),
         _ => None,
     };
-    match value {
+    let found: Option<Vec<f64>> = match value {
         Value::List(values) => values.iter().map(number).collect(),
-        one => Some(vec![number(one)?]),
-    }
+        one => number(one).map(|x| vec![x]),
+    };
+    Ok(found.filter(|found| found.len() == count))
 }
 
 /// Ratio of each pole to the one before where only the slowest is given: that of the
@@ -532,10 +454,4 @@ fn negative(key: &str, pole: f64) -> Result<f64, TuningError> {
         true => Ok(pole),
         false => Err(TuningError::new(key, "negative numbers", pole)),
     }
-}
-
-/// Poles for a message or a table.
-pub(super) fn list(poles: &[Pole]) -> String {
-    let poles: Vec<String> = poles.iter().map(Pole::to_string).collect();
-    poles.join(", ")
 }

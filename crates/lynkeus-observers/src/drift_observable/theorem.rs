@@ -29,79 +29,66 @@ use lynkeus_expr::Interval;
 use lynkeus_gain::integrators::{self, Pole};
 use lynkeus_proof::magnitude::{length, plus, size, times, total};
 use lynkeus_proof::riccati::Riccati;
-use lynkeus_structure::{AugmentedPlant, Verdict, short};
+use lynkeus_structure::{AugmentedPlant, Verdict};
 use nalgebra::DMatrix;
 
-use super::form::{Form, Inputs};
+use super::form::Form;
 use super::lipschitz;
-use super::lipschitz::{Lipschitz, Share};
+use super::lipschitz::Lipschitz;
 use super::observer::{Gains, closed_loop, slowest, spread};
-use super::settings::{Needed, SLOPES, Settings, Variant};
+use super::said::Said;
+use super::settings::{Settings, Variant};
+use crate::design::Found;
 use crate::statement::{sufficient, undecided};
 use crate::{
-    Assumptions, Bounds, Certificate, Check, Constant, DesignError, Germani, TuningError,
-    UltimateBound,
+    Assumptions, Bounds, Certificate, Check, Constant, DesignError, Germani, Reason, Statement,
+    TuningError, UltimateBound,
 };
 
 pub(super) fn certificate(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
-    form: &Form,
+    Found { form, examination }: Found<Form>,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
-    let slopes = slopes(augmented, settings, form, assumptions)?;
-    let lipschitz = lipschitz::bounds(augmented, form, &slopes, &assumptions.region)?;
+    let slopes = slopes(settings, &form, assumptions)?;
+    let lipschitz = lipschitz::bounds(augmented, &form, &slopes, &assumptions.region)?;
     let u_M = largest_input(augmented, assumptions);
-    let gains = gains(augmented, settings, form)?;
-    // not that on inputs, which is about slopes without bounds
-    let conditions = form.checks.clone();
-    let mut hypotheses = vec![
-        conditions.degree,
-        conditions.regular,
-        conditions.one_to_one,
-        conditions.lipschitz,
-        conditions.continuous,
-        lipschitz.continuous.clone(),
-    ];
-    hypotheses.extend(of_the_map(augmented, form, &slopes, &lipschitz));
-    let order = |jet: &Vec<_>, given: &Option<Vec<f64>>| match (jet.is_empty(), given) {
-        (true, _) => 0.0,
-        (_, Some(bounds)) => bounds.last().copied().unwrap_or(0.0),
-        (_, None) => f64::INFINITY,
+    let gains = match settings.has_poles() {
+        true => Some(Gains::new(augmented, settings, &form)?),
+        false => None,
     };
-    let w = form
-        .U
-        .iter()
-        .zip(&slopes)
-        .map(|(jet, given)| order(jet, given));
-    let mut constants = of_lipschitz(form, &lipschitz, u_M);
-    constants.extend(largest_inputs(augmented, form, assumptions)?);
+    // not that on inputs, which is about slopes without bounds
+    let mut hypotheses = examination.checks;
+    hypotheses.retain(|check| !check.is_advisory);
+    let continuous = lipschitz.continuous.clone();
+    hypotheses.push(Statement::from(Germani::ContinuousRows).with(continuous));
+    hypotheses.extend(of_the_map(augmented, &form, &slopes, &lipschitz));
+    let mut constants = of_lipschitz(&form, &lipschitz, u_M);
+    constants.extend(largest_inputs(augmented, &form, assumptions)?);
     let mut found = None;
     match &gains {
         Some(gains) => {
             let proof = Proof {
                 augmented,
-                form,
+                form: &form,
                 gains,
                 lipschitz: &lipschitz,
                 A: closed_loop(&gains.K),
                 slowest: slowest(&gains.λ),
-                w: w.collect(),
+                w: driving(&form, &slopes),
             };
             let (P, checks) = proof.riccati(u_M, &mut constants);
             hypotheses.extend(checks);
-            found = P.map(|P| (proof, P));
+            found = (!P.is_empty()).then_some((proof, P));
         }
-        None => hypotheses.push(undecided(
-            Germani::Gains,
-            "the study gives neither poles nor alpha and gamma",
-        )),
+        None => hypotheses.push(undecided(Germani::Gains, Said::NoPoles)),
     }
     let mut certificate = Certificate::new(basis(form.variant), assumptions, hypotheses);
     certificate.constants = constants;
-    certificate.notes = notes(augmented, form, assumptions);
+    certificate.notes = notes(augmented, &form, assumptions);
     if let Some((proof, P)) = found.filter(|_| certificate.weakest().is_none()) {
-        conclude(&proof, &P, assumptions, &mut certificate);
+        proof.conclude(&P, assumptions, &mut certificate);
     }
     Ok(certificate)
 }
@@ -114,55 +101,43 @@ fn basis(variant: Variant) -> &'static str {
     }
 }
 
-fn notes(augmented: &AugmentedPlant<'_>, form: &Form, assumptions: &Assumptions) -> Vec<String> {
-    let mut notes = vec![match form.variant {
-        Variant::Practical => "taken for granted, not proved: plant and estimate stay in the box, and so do the filter's estimates of the inputs and of their derivatives; the bound holds once the filter has settled, at the same rate".to_owned(),
-        _ => "taken for granted, not proved: plant and estimate stay in the box".to_owned(),
-    }];
+fn notes(augmented: &AugmentedPlant<'_>, form: &Form, assumptions: &Assumptions) -> Vec<Reason> {
+    let with_filter = form.variant == Variant::Practical;
     let constant = assumptions.constant(augmented.plant_states());
-    if !constant.is_empty() {
-        notes.push(format!(
-            "taken as constant: {}; bounds of rates of change go under `slew` in [certify]",
-            constant.join(", ")
-        ));
-    }
-    notes.push("where the column rcond is below 6·10⁻⁴ the tool withdraws a part of the correction, and the theorem says nothing".to_owned());
-    notes
+    let constant: Vec<String> = constant.into_iter().map(str::to_owned).collect();
+    let constant = (!constant.is_empty()).then_some(Said::TakenAsConstant(constant));
+    let notes = std::iter::once(Said::Box { with_filter }).chain(constant);
+    notes.chain([Said::Withdrawn]).map(Reason::from).collect()
 }
 
 /// Per input bounds of u', u'', …, one more than the observer reads: the family's key, else
-/// what holds for every family.
+/// what holds for every family; empty where there are none.
 fn slopes(
-    augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     form: &Form,
     assumptions: &Assumptions,
-) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
+) -> Result<Vec<Vec<f64>>, TuningError> {
     let orders: Vec<usize> = match form.variant {
         Variant::Bounded => vec![0; form.U.len()],
         _ => form.U.iter().map(Vec::len).collect(),
     };
-    let own = settings.slopes(&Needed::new(augmented, orders.clone()))?;
     let general = |j: usize| {
         let bounds = assumptions.input_derivatives.get(j)?;
         bounds.get(..orders[j]).map(<[f64]>::to_vec)
     };
-    let own = own.into_iter().enumerate();
+    let own = settings.slopes(&orders)?.into_iter().enumerate();
     Ok(own
-        .map(|(j, bounds)| bounds.or_else(|| general(j)))
+        .map(|(j, bounds)| bounds.or_else(|| general(j)).unwrap_or_default())
         .collect())
 }
 
-/// None where the study has no pole yet.
-fn gains(
-    augmented: &AugmentedPlant<'_>,
-    settings: &Settings,
-    form: &Form,
-) -> Result<Option<Gains>, TuningError> {
-    match settings.has_poles() {
-        true => Gains::new(augmented, settings, form).map(Some),
-        false => Ok(None),
-    }
+/// Per input the bound of the derivative that drives the filter.
+fn driving(form: &Form, slopes: &[Vec<f64>]) -> Vec<f64> {
+    let last = |(jet, bounds): (&Vec<_>, &Vec<f64>)| match jet.is_empty() {
+        true => 0.0,
+        false => bounds.last().copied().unwrap_or(f64::INFINITY),
+    };
+    form.U.iter().zip(slopes).map(last).collect()
 }
 
 /// The largest |u_j| of the box.
@@ -182,15 +157,9 @@ fn largest_inputs(
     if !form.reads_inputs() {
         return Ok(None);
     }
-    let inputs = Inputs {
-        augmented,
-        U: &form.U,
-        slopes: &[],
-        Q̄: &form.Q,
-        region: &assumptions.region,
-    };
     let meaning = "of Theorem 2.4: det Q̄ ≠ 0 is proved on the box for inputs and derivatives of inputs up to it";
-    let found = inputs.largest()?.filter(|radius| radius.is_finite());
+    let found = form.largest_inputs(augmented, &assumptions.region)?;
+    let found = found.filter(|radius| radius.is_finite());
     Ok(found.map(|radius| Constant::new("Ū", radius, meaning)))
 }
 
@@ -198,68 +167,39 @@ fn largest_inputs(
 fn of_the_map(
     augmented: &AugmentedPlant<'_>,
     form: &Form,
-    slopes: &[Option<Vec<f64>>],
+    slopes: &[Vec<f64>],
     found: &Lipschitz,
 ) -> Vec<Check> {
     let mut checks = vec![];
     if form.reads_inputs() {
         let pairs = form.U.iter().zip(slopes).zip(&augmented.inputs);
-        let lacking = pairs.filter(|((jet, given), _)| !jet.is_empty() && given.is_none());
-        let names: Vec<&str> = lacking.map(|(_, input)| input.name.as_str()).collect();
-        let detail = match names.is_empty() {
-            true => "assumed, as the study gives them".to_owned(),
-            false => format!(
-                "no bound of the derivatives of {}: give the key '{}', in [observer] or in [certify]",
-                names.join(", "),
-                SLOPES.name
-            ),
-        };
-        checks.push(sufficient(
-            Germani::InputDerivatives,
-            names.is_empty(),
-            detail,
-        ));
-        let mut regular = found.regular.clone();
-        if let Verdict::Refuted(_) = regular.verdict {
+        let open = pairs.filter(|((jet, bounds), _)| !jet.is_empty() && bounds.is_empty());
+        let open: Vec<String> = open.map(|(_, input)| input.name.clone()).collect();
+        let (bounded, open) = (open.is_empty(), Said::InputDerivatives(open));
+        checks.push(sufficient(Germani::InputDerivatives, bounded, open));
+        let regular = found.regular.clone();
+        checks.push(match regular.verdict {
             // the observer passes such a place, only the proof does not
-            regular.reason = format!("{} ({})", regular.reason.text(), regular.verdict).into();
-            regular.verdict = Verdict::open();
-        }
-        checks.push(regular);
+            Verdict::Refuted(_) => undecided(Germani::RegularWithin, Said::OnlyOfTheProof(regular)),
+            _ => Statement::from(Germani::RegularWithin).with(regular),
+        });
     }
-    let detail = match found.inverse.is_finite() {
-        true => format!(
-            "γ_Φ = {}, γ_Φ⁻¹ = {}",
-            short(found.map),
-            short(found.inverse)
-        ),
-        false => format!(
-            "the means of its Jacobian over lines in the box are not known to be regular: {}",
-            open_or(found, "take a smaller box")
-        ),
+    let open = || found.open.clone();
+    let (map, inverse) = (found.map, found.inverse);
+    let said = match inverse.is_finite() {
+        true => Said::Map { map, inverse },
+        false => Said::NoInverse(open()),
     };
-    checks.push(sufficient(
-        Germani::Inverse,
-        found.inverse.is_finite() && found.map.is_finite(),
-        detail,
-    ));
-    let γ = length(&found.drift) + length(&found.input);
-    let detail = match γ.is_finite() {
-        true => format!("γ = {}", short(length(&found.drift))),
-        false => open_or(found, "the inverse has no bound"),
+    let bounded = inverse.is_finite() && map.is_finite();
+    checks.push(sufficient(Germani::Inverse, bounded, said));
+    let γ = length(&found.drift);
+    let bounded = (γ + length(&found.input)).is_finite();
+    let said = match bounded {
+        true => Said::LastRows(γ),
+        false => Said::NoLastRows(open()),
     };
-    checks.push(sufficient(Germani::LastRows, γ.is_finite(), detail));
+    checks.push(sufficient(Germani::LastRows, bounded, said));
     checks
-}
-
-fn open_or(found: &Lipschitz, otherwise: &str) -> String {
-    match found.open.is_empty() {
-        true => otherwise.to_owned(),
-        false => {
-            let shown: Vec<&str> = found.open.iter().map(String::as_str).take(4).collect();
-            format!("no bound of {}: declare min and max", shown.join(", "))
-        }
-    }
 }
 
 /// γ_Φ, γ_Φ⁻¹, γ, and σ of Lemma 3.2 for that γ.
@@ -295,195 +235,6 @@ fn of_lipschitz(form: &Form, found: &Lipschitz, u_M: f64) -> Vec<Constant> {
 /// Shares of the filter's slowest pole tried for α₂.
 const FILTER_SHARES: [f64; 4] = [0.5, 0.65, 0.8, 0.9];
 
-/// The filter: α₂, √cn(P_a), and a bound of |e_a| as t → ∞.
-struct Filter {
-    α: f64,
-    peak: f64,
-    rest: f64,
-}
-
-pub(super) fn conclude(
-    proof: &Proof<'_, '_>,
-    solutions: &Solutions,
-    assumptions: &Assumptions,
-    found: &mut Certificate,
-) {
-    let P = &solutions.fastest;
-    let filtered = proof.form.variant == Variant::Practical && proof.w.iter().any(|&w| w > 0.0)
-        || proof.gains.K2.iter().any(|K| !K.is_empty());
-    let filter = match filtered {
-        true => match filter(proof) {
-            Some(filter) => Some(filter),
-            None => {
-                let detail = "no P_a was found for the filter's poles";
-                found.hypotheses.push(undecided(Germani::Filter, detail));
-                return;
-            }
-        },
-        false => None,
-    };
-    let peak = P.peak();
-    let α = filter.as_ref().map_or(P.α, |f| P.α.min(f.α));
-    found.rate = Some(α);
-    let φ = of_rows(P, &proof.lipschitz.unseen);
-    let parts = filter.as_ref().zip(Some(φ));
-    let μ = times(times(peak, proof.lipschitz.map), proof.lipschitz.inverse);
-    // with a filter the error peaks by what the filter's leaves as well
-    found.overshoot = filter.is_none().then_some(μ);
-    print(proof, P, μ, parts, &mut found.constants);
-    let a = filter.map_or(0.0, |f| f.rest);
-    let left = std::iter::once(P)
-        .chain(&solutions.slower)
-        .map(|P| left(proof, P, a, assumptions));
-    if let Some(left) = left.min_by(|x, y| x.norm.total_cmp(&y.norm)) {
-        found.ultimate_bound = Some(left.norm);
-        found.ultimate = left.states;
-    }
-}
-
-/// Bounds as t → ∞ by P, where |e_a| → a: √ν settles where 2αν = a² + 2f√ν, and
-/// |e_z,j| ≤ √(P_jj ν).
-fn left(proof: &Proof<'_, '_>, P: &Riccati, a: f64, assumptions: &Assumptions) -> Bounds {
-    let f = size(of_rows(P, &proof.lipschitz.unseen)) + size(forces(proof, P, assumptions));
-    let twice = Interval::point(2.0) * Interval::point(P.α);
-    let root_ν = (f + (f.powi(2) + twice * size(a).powi(2)).sqrt()) / twice;
-    let e_z = Interval::point(P.largest).sqrt() * root_ν;
-    let part = |j: usize| (Interval::point(P.P[(j, j)]).sqrt() * root_ν).min(e_z).hi();
-    let parts: Vec<f64> = (0..P.P.nrows()).map(part).collect();
-    let e_z = e_z.hi();
-    let of_state = |share: &Share| {
-        let one_by_one = total(share.z.iter().zip(&parts).map(|(z, e)| times(*z, *e)));
-        let together = times(length(&share.z), e_z);
-        plus(one_by_one.min(together), times(share.through, a))
-    };
-    let each: Vec<f64> = proof.lipschitz.states.iter().map(of_state).collect();
-    let norm = times(proof.lipschitz.inverse, length(&[e_z, a])).min(length(&each));
-    let names = proof.augmented.states.iter().map(|x| x.name.clone());
-    let states = names.zip(each).map(UltimateBound::from).collect();
-    Bounds { norm, states }
-}
-
-/// The P_a of (4.27) with the smallest bound of the filter's error.
-fn filter(proof: &Proof<'_, '_>) -> Option<Filter> {
-    let gains = proof.gains;
-    let mut w = vec![];
-    for (K, &bound) in gains.K2.iter().zip(&proof.w) {
-        w.extend((0..K.len()).map(|k| if k + 1 == K.len() { bound } else { 0.0 }));
-    }
-    let driven = w.iter().any(|&w| w > 0.0);
-    let limit = slowest(&gains.filter_λ);
-    let A = closed_loop(&gains.K2);
-    let one = |share: f64| {
-        let P = Riccati::solve(&A, &spread(&w), share * limit, 0.0)?;
-        let twice = Interval::point(2.0) * Interval::point(P.α);
-        let rest = (Interval::point(P.largest) / twice).sqrt().hi();
-        Some(Filter {
-            α: P.α,
-            peak: P.peak(),
-            rest: if driven { rest } else { 0.0 },
-        })
-    };
-    let found = FILTER_SHARES.into_iter().filter_map(one);
-    found.min_by(|a, b| a.rest.total_cmp(&b.rest))
-}
-
-/// √(fᵀP⁻¹f) for every f with |f_k| ≤ `size[k]`.
-fn of_rows(P: &Riccati, size: &[f64]) -> f64 {
-    let unit = |k: usize| {
-        let entry = |i: usize| f64::from(u8::from(i == k));
-        (0..size.len()).map(entry).collect::<Vec<_>>()
-    };
-    let each = size.iter().enumerate().filter(|(_, size)| **size > 0.0);
-    let one_by_one = total(each.map(|(k, size)| times(P.weight(&unit(k)), *size)));
-    one_by_one.min(P.weight_of_length(length(size)))
-}
-
-/// √(fᵀP⁻¹f) for the disturbances, as the map sees them, and the noise.
-fn forces(proof: &Proof<'_, '_>, P: &Riccati, assumptions: &Assumptions) -> f64 {
-    let n = proof.A.nrows();
-    let pushed = |row: &Vec<f64>| {
-        let terms = row.iter().zip(&assumptions.drift);
-        total(terms.map(|(q, d)| times(*q, *d)))
-    };
-    let q: Vec<f64> = proof.lipschitz.Q.iter().map(pushed).collect();
-    let mut sum = of_rows(P, &q);
-    let mut start = 0;
-    for (i, K) in proof.gains.K.iter().enumerate() {
-        let noise = assumptions.noise.get(i).copied().unwrap_or(0.0);
-        let mut column = vec![0.0; n];
-        column[start..start + K.len()].copy_from_slice(K);
-        if noise > 0.0 && !K.is_empty() {
-            sum = plus(sum, times(P.weight(&column), noise));
-        }
-        start += K.len();
-    }
-    sum
-}
-
-fn print(
-    proof: &Proof<'_, '_>,
-    P: &Riccati,
-    μ: f64,
-    filter: Option<(&Filter, f64)>,
-    constants: &mut Vec<Constant>,
-) {
-    let inverse = proof.lipschitz.inverse;
-    let mut add = |name: &str, value: f64, meaning: &str| {
-        constants.push(Constant::new(name, value, meaning));
-    };
-    for (output, K) in proof.augmented.outputs.iter().zip(&proof.gains.K) {
-        for (k, gain) in K.iter().enumerate() {
-            let meaning = format!("gain of {}", output.variable.name);
-            add(&format!("K{}", k + 1), *gain, &meaning);
-        }
-    }
-    for lemma in &proof.gains.lemma {
-        add(
-            "σ",
-            lemma.σ,
-            "of Lemma 3.2, for the study's alpha, beta and gamma",
-        );
-    }
-    add("‖P‖", P.largest, "largest eigenvalue of P");
-    add("λmin(P)", P.smallest, "smallest eigenvalue of P");
-    add("α", P.α, "the rate that P proves");
-    let Some((filter, φ)) = filter else {
-        add(
-            "μ",
-            μ,
-            "√cn(P) γ_Φ γ_Φ⁻¹: the factor by which the error may peak",
-        );
-        return;
-    };
-    let (root, α) = (Interval::point(P.largest).sqrt(), Interval::point(P.α));
-    let spreading = (root * size(filter.peak)).hi();
-    let left = size(filter.rest) / (Interval::point(2.0) * α).sqrt();
-    let e_z = (root * (left + size(φ) / α)).hi();
-    let n̄ = length(&proof.lipschitz.unseen);
-    add("α2", filter.α, "the rate of the filter");
-    add("c1", μ, "of (4.30): the factor of the initial errors");
-    add(
-        "c2",
-        times(inverse, spreading),
-        "of (4.30): the factor of √ε and the filter's initial error",
-    );
-    add(
-        "c3",
-        times(inverse, length(&[e_z, filter.rest])),
-        "of (4.30), corrected: what the filter and n̄w leave",
-    );
-    add(
-        "|n̄w|",
-        n̄,
-        "missing in (4.25): the part of the last derivatives that (4.22) lacks",
-    );
-    add(
-        "c4",
-        times(inverse, filter.peak),
-        "missing in (4.30): the filter's initial error as x sees it",
-    );
-}
-
 /// Steps of a bisection on a logarithmic scale.
 const STEPS: usize = 40;
 
@@ -491,93 +242,84 @@ const STEPS: usize = 40;
 const SHARES: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 0.9];
 
 /// α of the question whether there is any, as a share of the slowest pole.
-pub(super) const SLOW: f64 = 1e-6;
+const SLOW: f64 = 1e-6;
 
-/// Everything the conclusions are drawn from.
-pub(super) struct Proof<'a, 'p> {
-    pub augmented: &'a AugmentedPlant<'p>,
-    pub form: &'a Form,
-    pub gains: &'a Gains,
-    pub lipschitz: &'a Lipschitz,
-    /// A − KC
-    pub A: DMatrix<f64>,
-    /// the slowest pole's absolute value
-    pub slowest: f64,
-    /// per input: the bound of the derivative that drives the filter
-    pub w: Vec<f64>,
+/// The filter: α₂, √cn(P_a), and a bound of |e_a| as t → ∞.
+struct Filter {
+    α: f64,
+    peak: f64,
+    rest: f64,
 }
 
-/// Solutions of the Riccati inequality; any of them proves something.
-pub(super) struct Solutions {
-    /// with the largest α
-    pub fastest: Riccati,
-    /// with smaller α, which may leave smaller bounds as t → ∞
-    pub slower: Vec<Riccati>,
+/// Everything the conclusions are drawn from.
+struct Proof<'a, 'p> {
+    augmented: &'a AugmentedPlant<'p>,
+    form: &'a Form,
+    gains: &'a Gains,
+    lipschitz: &'a Lipschitz,
+    /// A − KC
+    A: DMatrix<f64>,
+    /// the slowest pole's absolute value
+    slowest: f64,
+    /// per input: the bound of the derivative that drives the filter
+    w: Vec<f64>,
 }
 
 impl Proof<'_, '_> {
-    /// P for the study's gain, and hypothesis 4 with both numbers.
-    pub fn riccati(
-        &self,
-        u_M: f64,
-        constants: &mut Vec<Constant>,
-    ) -> (Option<Solutions>, Vec<Check>) {
+    /// Solutions of the Riccati inequality for the study's gain, any of which proves something: with the
+    /// largest α, and with smaller ones, which may leave smaller bounds as t → ∞. And hypothesis 4
+    /// with both numbers.
+    fn riccati(&self, u_M: f64, constants: &mut Vec<Constant>) -> (Vec<Riccati>, Vec<Check>) {
         let mut checks = vec![];
-        let drift = &self.lipschitz.drift;
+        let Lipschitz { drift, input, .. } = self.lipschitz;
         let with_input = |u: f64| -> Vec<f64> {
-            let pairs = drift.iter().zip(&self.lipschitz.input);
-            pairs
-                .map(|(γ, H)| {
-                    if *H > 0.0 {
-                        plus(*γ, times(u, *H))
-                    } else {
-                        *γ
-                    }
-                })
-                .collect()
+            let row = |(γ, H): (&f64, &f64)| match *H > 0.0 {
+                true => plus(*γ, times(u, *H)),
+                false => *γ,
+            };
+            drift.iter().zip(input).map(row).collect()
         };
         let γ = length(drift);
         let limit = self.largest(|s| drift.iter().map(|g| g * s).collect()) * γ;
-        let name = || Germani::Riccati;
+        let at_most = |found: f64, limit: f64| Reason::AtMost { found, limit };
         let holds = limit >= γ;
         if limit.is_finite() && γ.is_finite() && γ > 0.0 {
             constants.push(Constant::new("γ*", limit, "what these poles can bear"));
-            let word = if holds { "≤" } else { ">" };
-            let detail = format!("{} {word} {}", short(γ), short(limit));
-            checks.push(sufficient(name(), holds, detail));
+            checks.push(sufficient(Germani::Riccati, holds, at_most(γ, limit)));
             constants.extend(self.scale());
         } else if !γ.is_finite() {
-            checks.push(undecided(name(), "γ has no bound"));
+            checks.push(undecided(Germani::Riccati, Said::NoLipschitzConstant));
         }
         if !γ.is_finite() || (γ > 0.0 && !holds) {
-            return (None, checks);
+            return (vec![], checks);
         }
-        if length(&self.lipschitz.input) > 0.0 {
+        if length(input) > 0.0 {
             let limit = self.largest(with_input);
             if limit.is_finite() {
                 let meaning = "the largest |u| that these poles can bear";
                 constants.push(Constant::new("u_M", limit, meaning));
             }
-            let word = if u_M <= limit { "≤" } else { ">" };
-            let detail = format!("{} {word} {}", short(u_M), short(limit));
-            checks.push(sufficient(Germani::Input, u_M <= limit, detail));
+            checks.push(sufficient(
+                Germani::Input,
+                u_M <= limit,
+                at_most(u_M, limit),
+            ));
         }
         let g = with_input(u_M);
         if !g.iter().all(|g| g.is_finite()) {
-            return (None, checks);
+            return (vec![], checks);
         }
         let E = spread(&g);
-        let P = Riccati::fastest(&self.A, &E, 1.0, self.slowest).map(|fastest| {
-            let at = |share: &f64| Riccati::solve(&self.A, &E, share * fastest.α, 1.0);
-            Solutions {
-                slower: SHARES.iter().filter_map(at).collect(),
-                fastest,
-            }
-        });
-        if P.is_none() && checks.iter().all(Check::is_proved) {
-            checks.push(undecided(name(), "no P was found for these poles"));
+        let fastest = Riccati::fastest(&self.A, &E, 1.0, self.slowest);
+        if fastest.is_none() && checks.iter().all(Check::is_proved) {
+            checks.push(undecided(Germani::Riccati, Said::NoP));
         }
-        (P, checks)
+        let with_slower = |fastest: Riccati| {
+            let at = |share: &f64| Riccati::solve(&self.A, &E, share * fastest.α, 1.0);
+            let slower: Vec<Riccati> = SHARES.iter().filter_map(at).collect();
+            [vec![fastest], slower].concat()
+        };
+        (fastest.map_or(vec![], with_slower), checks)
     }
 
     /// The largest s for which g(s) can be borne; 0 where none can, infinite
@@ -609,6 +351,166 @@ impl Proof<'_, '_> {
         let meaning = "the proof allows these poles times this factor, without input";
         Some(Constant::new("s0", s, meaning))
     }
+
+    /// Rate, peak and bounds as t → ∞, where every hypothesis is proved.
+    fn conclude(&self, P: &[Riccati], assumptions: &Assumptions, found: &mut Certificate) {
+        let fastest = &P[0];
+        let (gains, lipschitz) = (self.gains, self.lipschitz);
+        let filtered = self.form.variant == Variant::Practical && self.w.iter().any(|&w| w > 0.0)
+            || gains.K2.iter().any(|K| !K.is_empty());
+        let filter = if filtered { self.filter() } else { None };
+        if filtered && filter.is_none() {
+            let check = undecided(Germani::Filter, Said::NoFilterP);
+            found.hypotheses.push(check);
+            return;
+        }
+        found.rate = Some(filter.as_ref().map_or(fastest.α, |f| fastest.α.min(f.α)));
+        let μ = times(times(fastest.peak(), lipschitz.map), lipschitz.inverse);
+        // with a filter the error peaks by what the filter's leaves as well
+        found.overshoot = filter.is_none().then_some(μ);
+        self.print(fastest, μ, filter.as_ref(), &mut found.constants);
+        let a = filter.map_or(0.0, |f| f.rest);
+        let left = P.iter().map(|P| self.left(P, a, assumptions));
+        if let Some(left) = left.min_by(|x, y| x.norm.total_cmp(&y.norm)) {
+            found.ultimate_bound = Some(left.norm);
+            found.ultimate = left.states;
+        }
+    }
+
+    /// Bounds as t → ∞ by P, where |e_a| → a: √ν settles where 2αν = a² + 2f√ν, and
+    /// |e_z,j| ≤ √(P_jj ν).
+    fn left(&self, P: &Riccati, a: f64, assumptions: &Assumptions) -> Bounds {
+        let found = self.lipschitz;
+        let f = size(of_rows(P, &found.unseen)) + size(self.forces(P, assumptions));
+        let twice = Interval::point(2.0) * Interval::point(P.α);
+        let root_ν = (f + (f.powi(2) + twice * size(a).powi(2)).sqrt()) / twice;
+        let e_z = Interval::point(P.largest).sqrt() * root_ν;
+        let part = |j: usize| (Interval::point(P.P[(j, j)]).sqrt() * root_ν).min(e_z).hi();
+        let parts: Vec<f64> = (0..P.P.nrows()).map(part).collect();
+        let e_z = e_z.hi();
+        let of_state = |(z, of_a): (&Vec<f64>, &f64)| {
+            let one_by_one = total(z.iter().zip(&parts).map(|(z, e)| times(*z, *e)));
+            let together = times(length(z), e_z);
+            plus(one_by_one.min(together), times(*of_a, a))
+        };
+        let each = found.of_z.iter().zip(&found.of_a);
+        let each: Vec<f64> = each.map(of_state).collect();
+        let norm = times(found.inverse, length(&[e_z, a])).min(length(&each));
+        let names = self.augmented.states.iter().map(|x| x.name.clone());
+        let states = names.zip(each).map(UltimateBound::from).collect();
+        Bounds { norm, states }
+    }
+
+    /// The P_a of (4.27) with the smallest bound of the filter's error.
+    fn filter(&self) -> Option<Filter> {
+        let gains = self.gains;
+        let mut w = vec![];
+        for (K, &bound) in gains.K2.iter().zip(&self.w) {
+            w.extend((0..K.len()).map(|k| if k + 1 == K.len() { bound } else { 0.0 }));
+        }
+        let driven = w.iter().any(|&w| w > 0.0);
+        let limit = slowest(&gains.filter_λ);
+        let A = closed_loop(&gains.K2);
+        let one = |share: f64| {
+            let P = Riccati::solve(&A, &spread(&w), share * limit, 0.0)?;
+            let twice = Interval::point(2.0) * Interval::point(P.α);
+            let rest = (Interval::point(P.largest) / twice).sqrt().hi();
+            Some(Filter {
+                α: P.α,
+                peak: P.peak(),
+                rest: if driven { rest } else { 0.0 },
+            })
+        };
+        let found = FILTER_SHARES.into_iter().filter_map(one);
+        found.min_by(|a, b| a.rest.total_cmp(&b.rest))
+    }
+
+    /// √(fᵀP⁻¹f) for the disturbances, as the map sees them, and the noise.
+    fn forces(&self, P: &Riccati, assumptions: &Assumptions) -> f64 {
+        let pushed = |row: &Vec<f64>| {
+            let terms = row.iter().zip(&assumptions.drift);
+            total(terms.map(|(q, d)| times(*q, *d)))
+        };
+        let q: Vec<f64> = self.lipschitz.Q.iter().map(pushed).collect();
+        let mut sum = of_rows(P, &q);
+        let mut start = 0;
+        for (i, K) in self.gains.K.iter().enumerate() {
+            let noise = assumptions.noise.get(i).copied().unwrap_or(0.0);
+            let mut column = vec![0.0; self.A.nrows()];
+            column[start..start + K.len()].copy_from_slice(K);
+            if noise > 0.0 && !K.is_empty() {
+                sum = plus(sum, times(P.weight(&column), noise));
+            }
+            start += K.len();
+        }
+        sum
+    }
+
+    /// The numbers of (4.30), or of its like without a filter.
+    fn print(&self, P: &Riccati, μ: f64, filter: Option<&Filter>, constants: &mut Vec<Constant>) {
+        let found = self.lipschitz;
+        let mut add = |name: &str, value: f64, meaning: &str| {
+            constants.push(Constant::new(name, value, meaning));
+        };
+        for (output, K) in self.augmented.outputs.iter().zip(&self.gains.K) {
+            for (k, gain) in K.iter().enumerate() {
+                let meaning = format!("gain of {}", output.variable.name);
+                add(&format!("K{}", k + 1), *gain, &meaning);
+            }
+        }
+        for lemma in &self.gains.lemma {
+            let meaning = "of Lemma 3.2, for the study's alpha, beta and gamma";
+            add("σ", lemma.σ, meaning);
+        }
+        add("‖P‖", P.largest, "largest eigenvalue of P");
+        add("λmin(P)", P.smallest, "smallest eigenvalue of P");
+        add("α", P.α, "the rate that P proves");
+        let Some(filter) = filter else {
+            let meaning = "√cn(P) γ_Φ γ_Φ⁻¹: the factor by which the error may peak";
+            return add("μ", μ, meaning);
+        };
+        let (root, α) = (Interval::point(P.largest).sqrt(), Interval::point(P.α));
+        let spreading = (root * size(filter.peak)).hi();
+        let left = size(filter.rest) / (Interval::point(2.0) * α).sqrt();
+        let e_z = (root * (left + size(of_rows(P, &found.unseen)) / α)).hi();
+        let c2 = times(found.inverse, spreading);
+        let c3 = times(found.inverse, length(&[e_z, filter.rest]));
+        let c4 = times(found.inverse, filter.peak);
+        let n̄ = length(&found.unseen);
+        add("α2", filter.α, "the rate of the filter");
+        add("c1", μ, "of (4.30): the factor of the initial errors");
+        add(
+            "c2",
+            c2,
+            "of (4.30): the factor of √ε and the filter's initial error",
+        );
+        add(
+            "c3",
+            c3,
+            "of (4.30), corrected: what the filter and n̄w leave",
+        );
+        add(
+            "|n̄w|",
+            n̄,
+            "missing in (4.25): the part of the last derivatives that (4.22) lacks",
+        );
+        add(
+            "c4",
+            c4,
+            "missing in (4.30): the filter's initial error as x sees it",
+        );
+    }
+}
+
+/// √(fᵀP⁻¹f) for every f with |f_k| ≤ `size[k]`.
+fn of_rows(P: &Riccati, size: &[f64]) -> f64 {
+    let unit = |k: usize| {
+        let entry = |i: usize| f64::from(u8::from(i == k));
+        (0..size.len()).map(entry).collect::<Vec<_>>()
+    };
+    let each = size.iter().enumerate().filter(|(_, size)| **size > 0.0);
+    let one_by_one = total(each.map(|(k, size)| times(P.weight(&unit(k)), *size)));
+    one_by_one.min(P.weight_of_length(length(size)))
 }
 
 /// The smallest s > 0 from which on `holds`, to a thousandth, rounded up; none up to 10⁶.

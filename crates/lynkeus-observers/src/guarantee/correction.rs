@@ -1,13 +1,11 @@
 //! How the measurements enter an observer, read from its own equations.
 
-use std::collections::HashMap;
-
 use lynkeus_expr::{MissingInput, Node, Tape, jacobian};
-use lynkeus_structure::AugmentedPlant;
+use lynkeus_structure::{AugmentedPlant, Dimension};
 use nalgebra::DMatrix;
 
-use super::error_system::edges;
-use super::refute::{Side, spread};
+use super::error_system::{edges, hats, readings};
+use super::refute::{finite, spread};
 use crate::Observer;
 
 /// Points at which the copy of the plant is recognised.
@@ -85,14 +83,10 @@ fn is_copy(
         return Ok(false);
     }
     let graph = augmented.graph();
-    let hats = augmented.states.iter().zip(&observer.states);
-    let hats: HashMap<Node, Node> = hats
-        .map(|(state, (hat, _))| (state.node, hat.symbol))
-        .collect();
-    let outputs: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
-    let seen = graph.substitute(&outputs, &hats);
-    let signals = observer.measured.iter().map(|m| m.symbol);
-    let measured: HashMap<Node, Node> = signals.zip(seen.iter().copied()).collect();
+    let hats = hats(augmented, observer);
+    let measured = readings(augmented, observer);
+    let signals = observer.measured.iter();
+    let seen: Vec<Node> = signals.map(|m| measured[&m.symbol]).collect();
     let mut roots = graph.substitute(&observer.derivatives, &measured);
     roots.extend(graph.substitute(&augmented.derivatives, &hats));
     roots.extend(&seen);
@@ -100,7 +94,7 @@ fn is_copy(
     for side in &mut region.dimensions {
         side.symbol = *hats.get(&side.symbol).unwrap_or(&side.symbol);
     }
-    let sides: Vec<Side> = region.dimensions.iter().map(Side::finite).collect();
+    let sides: Vec<Dimension> = region.dimensions.iter().map(finite).collect();
     let mut evaluator = Tape::new(graph, &region.symbols(), &roots)?.evaluator();
     let mut values = vec![0.0; roots.len()];
     let mut compared = 0;

@@ -12,13 +12,13 @@ use lynkeus_proof::decay;
 use lynkeus_proof::decay::ErrorModel;
 use lynkeus_proof::matrix::IntervalMatrix;
 use lynkeus_structure::{
-    AugmentedPlant, Dimension, Finding, Innovation, Region, Slopes, Verdict, counted, range,
-    range_within,
+    AugmentedPlant, Dimension, Innovation, Region, Slopes, Verdict, range, range_within,
 };
 use nalgebra::DMatrix;
 
+use super::said::{Inequality, Said};
 use crate::statement::proved;
-use crate::{Assumptions, Check, Inequality, InputDerivative, Observer, Statement};
+use crate::{Assumptions, Check, InputDerivative, Observer, Statement};
 
 /// Cells examined per end of the range of an injection.
 const CELLS: usize = 200;
@@ -50,16 +50,14 @@ impl ErrorSystem {
         augmented: &AugmentedPlant<'_>,
         observer: &Observer,
         assumptions: &Assumptions,
-    ) -> Result<Result<Self, String>, MissingInput> {
+    ) -> Result<Result<Self, Said>, MissingInput> {
         let pairs = observer.states.iter().zip(&observer.estimates);
         let same = pairs.filter(|((s, _), e)| s.symbol == e.node).count();
         if same != observer.states.len() || same != augmented.states.len() {
-            let reason = format!(
-                "the observer has {} for {} to be estimated: its gain is a state, or its coordinates are not the plant's; see what its theorem says",
-                counted(observer.states.len(), "state"),
-                augmented.states.len()
-            );
-            return Ok(Err(reason));
+            return Ok(Err(Said::OtherStates {
+                states: observer.states.len(),
+                estimated: augmented.states.len(),
+            }));
         }
         let symbols: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
         let region = seen_by(augmented, observer, assumptions)?;
@@ -112,23 +110,16 @@ impl ErrorSystem {
 
     /// The hypothesis that every slope is bounded.
     pub fn bounded(&self) -> Check {
-        let Some((slope, open)) = self.slopes.unbounded(&self.region) else {
-            let detail = format!("{} enclosed", counted(self.slopes.slopes.len(), "slope"));
-            return proved(Inequality::SlopesAreBounded, detail);
-        };
-        let cure = match open.is_empty() {
-            true => {
-                "it jumps or its derivative is infinite at the edge of the box: tighten min and max"
-                    .to_owned()
-            }
-            false => format!("declare min and max of {}", open.join(", ")),
+        let Some((slope, undeclared)) = self.slopes.unbounded(&self.region) else {
+            let said = Said::SlopesEnclosed(self.slopes.slopes.len());
+            return proved(Inequality::SlopesAreBounded, said);
         };
         let sides = self.region.dimensions.iter();
         let left = sides.filter(|d| slope.variables.contains(&d.name)).cloned();
-        Statement::from(Inequality::SlopesAreBounded).with(Finding {
-            verdict: Verdict::Undecided(left.collect()),
-            reason: format!("the slope of {} has no bound; {cure}", slope.term).into(),
-        })
+        let verdict = Verdict::Undecided(left.collect());
+        let term = slope.term.clone();
+        let said = Said::Unbounded { term, undeclared };
+        Statement::from(Inequality::SlopesAreBounded).found(verdict, said)
     }
 
     /// A as an expression of estimate, known inputs, measurements and time, row by row.
@@ -168,21 +159,6 @@ impl ErrorSystem {
     }
 }
 
-/// The slopes with the innovations apart: an observer is right where they vanish, whatever
-/// its gain is there.
-fn around_innovations(
-    augmented: &AugmentedPlant<'_>,
-    observer: &Observer,
-    symbols: &[Node],
-    region: &Region,
-) -> Result<Slopes, MissingInput> {
-    let found = of(augmented, observer, region)?;
-    let graph = augmented.graph();
-    let derivatives = graph.substitute(&observer.derivatives, &found.images);
-    let innovations = &found.innovations;
-    Slopes::around(graph, &derivatives, symbols, innovations, &found.region)
-}
-
 /// What the system is where the estimate is right: what is measured is then h at the
 /// estimate. Derivatives of the inputs are 0 there: the inputs are constant.
 fn right(
@@ -191,18 +167,7 @@ fn right(
     system: &mut ErrorSystem,
 ) -> Result<(), MissingInput> {
     let graph = augmented.graph();
-    let hats = augmented.states.iter().zip(&observer.states);
-    let hats: HashMap<Node, Node> = hats
-        .map(|(state, (hat, _))| (state.node, hat.symbol))
-        .collect();
-    let outputs: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
-    let seen = graph.substitute(&outputs, &hats);
-    let measured: HashMap<Node, Node> = observer
-        .measured
-        .iter()
-        .map(|m| m.symbol)
-        .zip(seen)
-        .collect();
+    let measured = readings(augmented, observer);
     let entries = graph.substitute(&system.entries, &measured);
     let corrected = graph.substitute(&observer.derivatives, &measured);
     let mut sides = system.region.clone();
@@ -230,12 +195,7 @@ fn seen_by(
     assumptions: &Assumptions,
 ) -> Result<Region, MissingInput> {
     let region = &assumptions.region;
-    let hats: HashMap<Node, Node> = augmented
-        .states
-        .iter()
-        .zip(&observer.states)
-        .map(|(state, (hat, _))| (state.node, hat.symbol))
-        .collect();
+    let hats = hats(augmented, observer);
     let mut seen = region.clone();
     for side in &mut seen.dimensions {
         side.symbol = *hats.get(&side.symbol).unwrap_or(&side.symbol);
@@ -298,42 +258,26 @@ fn size(variable: &lynkeus_model::Variable) -> f64 {
     typical.map_or(1.0, f64::abs)
 }
 
-/// The innovations of an observer.
-pub(super) struct Innovations {
-    pub innovations: Vec<Innovation>,
-    /// the nodes that are innovations, over the symbols that stand for them
-    pub images: HashMap<Node, Node>,
-    /// with a side for each of the symbols
-    pub region: Region,
-}
-
-/// Finds h(x̂) − y and x̂_s − x_s(y), in either order.
-pub(super) fn of(
+/// The slopes with the innovations h(x̂) − y and x̂_s − x_s(y), in either order, apart: an observer is
+/// right where they vanish, whatever its gain is there.
+fn around_innovations(
     augmented: &AugmentedPlant<'_>,
     observer: &Observer,
+    symbols: &[Node],
     region: &Region,
-) -> Result<Innovations, MissingInput> {
+) -> Result<Slopes, MissingInput> {
     let graph = augmented.graph();
-    let hats = augmented.states.iter().zip(&observer.states);
-    let hats: HashMap<Node, Node> = hats
-        .map(|(state, (hat, _))| (state.node, hat.symbol))
-        .collect();
-    let mut found = Innovations {
-        innovations: vec![],
-        images: HashMap::new(),
-        region: region.clone(),
-    };
+    let hats = hats(augmented, observer);
+    // the nodes that are innovations, over symbols that stand for them and have a side each
+    let (mut innovations, mut images) = (Vec::<Innovation>::new(), HashMap::new());
+    let mut sides = region.clone();
     for (output, signal) in augmented.outputs.iter().zip(&observer.measured) {
         let Some((state, slope, offset)) = output.state else {
             continue;
         };
         let name = format!("error of {}", augmented.states[state].name);
         let symbol = graph.fresh(&name);
-        let (y, slope, offset) = (
-            graph.expr(signal.symbol),
-            graph.expr(slope),
-            graph.expr(offset),
-        );
+        let [y, slope, offset] = [signal.symbol, slope, offset].map(|node| graph.expr(node));
         let hat = observer.states[state].0.symbol;
         let seen = graph.substitute(&[output.variable.node], &hats)[0];
         let shown = ((y - offset) / slope).node();
@@ -344,17 +288,15 @@ pub(super) fn of(
         for (estimate, measured, error) in pairs {
             let forth = graph.binary(Binary::Sub, estimate, measured);
             let back = graph.binary(Binary::Sub, measured, estimate);
-            found.images.insert(forth, error);
-            found.images.insert(back, graph.unary(Unary::Neg, error));
+            images.insert(forth, error);
+            images.insert(back, graph.unary(Unary::Neg, error));
         }
         // a second sensor of the same state reads the same error
-        if found.innovations.iter().any(|i| i.state == state) {
+        if innovations.iter().any(|i| i.state == state) {
             continue;
         }
-        found.innovations.push(Innovation {
-            symbol: symbol.node(),
-            state,
-        });
+        let symbol = symbol.node();
+        innovations.push(Innovation { symbol, state });
         let values = range(graph, hat, region)?.enclosure;
         let size = (Interval::point(values.hi()) - Interval::point(values.lo())).magnitude();
         let size = if size.is_finite() {
@@ -362,15 +304,34 @@ pub(super) fn of(
         } else {
             f64::INFINITY
         };
-        found.region.dimensions.push(Dimension {
+        sides.dimensions.push(Dimension {
             name,
-            symbol: symbol.node(),
+            symbol,
             min: -size,
             max: size,
             integer: false,
         });
     }
-    Ok(found)
+    let derivatives = graph.substitute(&observer.derivatives, &images);
+    Slopes::around(graph, &derivatives, symbols, &innovations, &sides)
+}
+
+/// The plant's states as the observer estimates them.
+pub(super) fn hats(augmented: &AugmentedPlant<'_>, observer: &Observer) -> HashMap<Node, Node> {
+    let pairs = augmented.states.iter().zip(&observer.states);
+    pairs
+        .map(|(state, (hat, _))| (state.node, hat.symbol))
+        .collect()
+}
+
+/// What is measured where the estimate is right: h at the estimate.
+pub(super) fn readings(augmented: &AugmentedPlant<'_>, observer: &Observer) -> HashMap<Node, Node> {
+    let outputs: Vec<Node> = augmented.outputs.iter().map(|o| o.variable.node).collect();
+    let seen = augmented
+        .graph()
+        .substitute(&outputs, &hats(augmented, observer));
+    let signals = observer.measured.iter().map(|m| m.symbol);
+    signals.zip(seen).collect()
 }
 
 /// Expressions over `moving` that vanish wherever one of the roots may have a kink, a step

@@ -7,29 +7,25 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use lynkeus_expr::{Budget, MissingInput};
+use lynkeus_expr::Budget;
 use lynkeus_proof::decay;
 use lynkeus_proof::decay::{Aim, ErrorModel, Gain, NoGain, Request};
-use lynkeus_structure::{AugmentedPlant, Measurement, Slopes, range, short};
+use lynkeus_structure::{AugmentedPlant, Measurement, Slopes, range};
 
 use super::error_system::{ErrorSystem, expanded};
+use super::said::{Obstacle, Said};
 use crate::conditions::on_output;
 use crate::estimate::{Common, PlantCopy};
 use crate::{
-    ChainGain, Design, DesignError, Examination, KeySpec, Shape, Tuning, TuningError, Value,
-    estimate,
+    ChainGain, Design, DesignError, Examination, KeySpec, ParameterValue, Shape, Tuning,
+    TuningError, Value, estimate,
 };
-
-/// Why nothing of such an observer may be changed.
-const NO_SPEED: &str =
-    "a gain by linear matrix inequalities has no θ: it is made, and proved, as a whole";
 
 /// Bisections of the rate where only the gain is limited.
 const HALVINGS: usize = 9;
 
 const RATE: KeySpec = KeySpec {
     name: "rate",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "required with `\"lmi\"` unless `gain_limit` is given",
     meaning: "the decay to be proved, in 1/(unit of time)",
@@ -37,7 +33,6 @@ const RATE: KeySpec = KeySpec {
 
 const LIMIT: KeySpec = KeySpec {
     name: "gain_limit",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "none",
     meaning: "the largest entry of the gain K on ŷ − y, with `\"lmi\"`",
@@ -45,7 +40,6 @@ const LIMIT: KeySpec = KeySpec {
 
 const MINIMISE: KeySpec = KeySpec {
     name: "minimise",
-    kind: "`\"noise\"`, `\"gain\"`, `\"peak\"`",
     shape: Shape::Word(&["noise", "gain", "peak"]),
     default: "`\"noise\"`",
     meaning: "what the gain makes small at that rate, with `\"lmi\"`",
@@ -105,20 +99,11 @@ pub(crate) fn design_lmi(
 ) -> Result<Design, DesignError> {
     estimate::refuse(common, "gain = \"lmi\"")?;
     let copy = PlantCopy::new(augmented, common);
-    let (measured, slopes) = shown(augmented, &copy)?;
+    let (measured, slopes) = shown(augmented)?;
     let system = ErrorSystem::open_loop(augmented, &augmented.region())?;
-    if let Some((slope, open)) = system.slopes.unbounded(&system.region) {
-        let cure = match open.is_empty() {
-            true => "tighten its range".to_owned(),
-            false => format!("declare min and max of {}", open.join(", ")),
-        };
-        return Err(DesignError::NoGain {
-            key: "gain",
-            reason: format!(
-                "the slope of {} has no bound on the box; {cure}",
-                slope.term
-            ),
-        });
+    if let Some((slope, undeclared)) = system.slopes.unbounded(&system.region) {
+        let term = slope.term.clone();
+        return Err(none("gain", Said::NoGainUnbounded { term, undeclared }));
     }
     let request = Request {
         rate: asked.rate.unwrap_or(0.0),
@@ -144,20 +129,24 @@ pub(crate) fn design_lmi(
 
 /// Of each output the state that it shows, and |c| of y = c·x + d: the smallest on the box where it
 /// varies.
-fn shown(
-    augmented: &AugmentedPlant<'_>,
-    copy: &PlantCopy<'_, '_>,
-) -> Result<(Vec<usize>, Vec<f64>), DesignError> {
+fn shown(augmented: &AugmentedPlant<'_>) -> Result<(Vec<usize>, Vec<f64>), DesignError> {
+    let graph = augmented.graph();
     let (mut measured, mut slopes) = (vec![], vec![]);
-    for (i, output) in augmented.outputs.iter().enumerate() {
+    for output in &augmented.outputs {
         let wrong = |expected: &str| {
             let name = &output.variable.name;
             TuningError::new("gain", expected, format!("the output {name}"))
         };
-        let Some((state, _)) = copy.measured_state(i) else {
+        let Some((state, slope, _)) = output.state else {
             return Err(wrong("outputs that each show one state (y = c·x + d)").into());
         };
-        let c = slope(augmented, i)?;
+        let c = match graph.constant_value(slope) {
+            Some(c) => c.abs(),
+            None => {
+                let values = range(graph, slope, &augmented.region())?;
+                values.enclosure.mignitude()
+            }
+        };
         if c <= 0.0 || !c.is_finite() {
             return Err(wrong("outputs y = c·x + d with a c that is 0 nowhere on the box").into());
         }
@@ -165,20 +154,6 @@ fn shown(
         slopes.push(c);
     }
     Ok((measured, slopes))
-}
-
-/// The smallest |c| on the box of an output y = c·x + d; 0 where it is none.
-fn slope(augmented: &AugmentedPlant<'_>, output: usize) -> Result<f64, MissingInput> {
-    let Some((_, slope, _)) = augmented.outputs[output].state else {
-        return Ok(0.0);
-    };
-    let graph = augmented.graph();
-    match graph.constant_value(slope) {
-        Some(c) => Ok(c.abs()),
-        None => Ok(range(graph, slope, &augmented.region())?
-            .enclosure
-            .mignitude()),
-    }
 }
 
 /// Sizes of the measurement errors, one per output: as declared, and all the same where none is.
@@ -205,25 +180,23 @@ fn aim(tuning: &Tuning) -> Result<Aim, TuningError> {
     })
 }
 
+fn none(key: &'static str, said: Said) -> DesignError {
+    let reason = said.into();
+    DesignError::NoGain { key, reason }
+}
+
 fn refusal(system: &ErrorSystem, request: &Request, error: NoGain) -> DesignError {
+    let rate = request.rate;
     match error {
         NoGain::Spent(spent) => spent.into(),
-        NoGain::Limit(found) => DesignError::NoGain {
-            key: "gain_limit",
-            reason: format!(
-                "the rate {} needs larger gains than {}: the smallest largest entry found is {found:.4}; raise gain_limit or lower rate",
-                request.rate,
-                request.limit.unwrap_or(f64::INFINITY)
-            ),
-        },
-        _ => DesignError::NoGain {
-            key: "rate",
-            reason: format!(
-                "no gain is proved to reach {} on the box: {}",
-                request.rate,
-                reason(system, request)
-            ),
-        },
+        NoGain::Limit(least) => {
+            let limit = request.limit.unwrap_or(f64::INFINITY);
+            none(LIMIT.name, Said::BeyondLimit { rate, limit, least })
+        }
+        _ => {
+            let obstacle = obstacle(system, request);
+            none(RATE.name, Said::NotReached { rate, obstacle })
+        }
     }
 }
 
@@ -293,15 +266,14 @@ fn assemble(
         });
     }
     let mut observer = copy.observer(family, derivatives)?;
-    observer.tunables.refused = copy.common.tunable.then_some(NO_SPEED);
+    observer.is_whole = copy.common.tunable;
     let slopes = gain.proof.multipliers.first().map_or(0, |t| t.len());
+    let row = |name: &str, value| (name.to_owned(), value);
+    let largest = ParameterValue::Computed(request.largest(&gain.K));
     let parameters = vec![
-        ("rate".to_owned(), format!("{}", request.rate)),
-        (
-            "largest gain".to_owned(),
-            format!("{:.6}", request.largest(&gain.K)),
-        ),
-        ("slopes".to_owned(), format!("{slopes}")),
+        row("rate", request.rate.into()),
+        row("largest gain", largest),
+        row("slopes", (slopes as f64).into()),
     ];
     Ok(Design {
         observer,
@@ -358,8 +330,8 @@ pub(super) fn provable_share(system: &ErrorSystem, budget: &Budget) -> Option<f6
     share.filter(|_| budget.marked().is_none())
 }
 
-/// In words: what keeps every gain from a proof of the requested rate.
-pub(super) fn reason(system: &ErrorSystem, request: &Request) -> String {
+/// What keeps every gain from a proof of the requested rate.
+fn obstacle(system: &ErrorSystem, request: &Request) -> Obstacle {
     let slopes = &system.slopes;
     let request = &Request {
         budget: request.budget.within(EXPLAINING),
@@ -370,37 +342,16 @@ pub(super) fn reason(system: &ErrorSystem, request: &Request) -> String {
     let least = || decay::is_reachable(&cut(slopes, |_| LEAST), request, false);
     let share = share(slopes, works).or_else(|| least().then_some(LEAST));
     if request.budget.marked().is_some() {
-        return "which range stands in the way takes longer to find out: narrow the box or lower the rate".into();
+        return Obstacle::TakesLonger;
     }
     let Some(share) = share else {
-        return "not even the linearisation in the middle of the box reaches it: a state leaves too weak a trace in the outputs, or the rate is beyond what they allow".into();
-    };
-    let range = |k: usize| {
-        let slope = &slopes.slopes[k];
-        format!(
-            "the slope of {} in [{}, {}]{}",
-            slope.term,
-            short(slope.range.lo()),
-            short(slope.range.hi()),
-            match slope.variables.is_empty() {
-                true => String::new(),
-                false => format!(" (over the range of {})", slope.variables.join(", ")),
-            }
-        )
+        return Obstacle::Middle;
     };
     // one inequality per slope is affordable only for few
-    let tried = match slopes.slopes.len() {
-        few if few <= SINGLES => few,
-        _ => 0,
-    };
-    let mut blocking =
-        (0..tried).filter(|&only| works(&cut(slopes, |k| if k == only { 0.0 } else { 1.0 })));
-    let blocked = match blocking.next() {
-        Some(k) => format!("{} alone blocks it; ", range(k)),
-        None => String::new(),
-    };
-    format!(
-        "{blocked}with every slope's range cut to {:.0} % about its middle there is a gain: narrow the box",
-        100.0 * share
-    )
+    let few = slopes.slopes.len() <= SINGLES;
+    let mut tried = slopes.slopes.iter().enumerate().filter(|_| few);
+    let alone = tried
+        .find(|(only, _)| works(&cut(slopes, |k| if k == *only { 0.0 } else { 1.0 })))
+        .map(|(_, slope)| slope.clone());
+    Obstacle::Ranges { share, alone }
 }

@@ -25,6 +25,7 @@ mod correction;
 mod error_system;
 mod lmi;
 mod refute;
+mod said;
 
 pub use correction::{Correction, Injection};
 pub use lmi::is_certified_gain;
@@ -36,11 +37,12 @@ use lynkeus_proof::definite::is_below;
 use lynkeus_proof::magnitude::times;
 use lynkeus_proof::matrix::sum;
 use lynkeus_proof::{decay, spectrum};
-use lynkeus_structure::{AugmentedPlant, Standing, short};
+use lynkeus_structure::{AugmentedPlant, Standing};
 use nalgebra::DMatrix;
+pub use said::{Inequality, Obstacle, Said};
 
 use crate::statement::{proved, undecided};
-use crate::{Assumptions, Bounds, Certificate, Check, Constant, DesignError, Inequality, Observer};
+use crate::{Assumptions, Bounds, Certificate, Check, Constant, DesignError, Observer, Reason};
 use error_system::ErrorSystem;
 use refute::Sample;
 
@@ -88,7 +90,10 @@ fn certified(
 ) -> Result<Certificate, DesignError> {
     let system = match ErrorSystem::new(augmented, observer, assumptions)? {
         Ok(system) => system,
-        Err(reason) => return Ok(not_covered(assumptions, reason)),
+        Err(said) => {
+            let check = undecided(Inequality::StatesAreTheEstimate, said);
+            return Ok(Certificate::new(BASIS, assumptions, vec![check]));
+        }
     };
     let mut hypotheses = vec![system.bounded()];
     if assumptions.may_saturate() {
@@ -110,7 +115,7 @@ fn certified(
     };
     let spent = search.marked();
     hypotheses.push(match (&found, spent) {
-        (None, Some(spent)) => undecided(Inequality::OneLyapunovFunction, spent.to_string()),
+        (None, Some(spent)) => undecided(Inequality::OneLyapunovFunction, Reason::Spent(spent)),
         _ => inequality(&system, &sample, found.as_ref()),
     });
     let mut certificate = Certificate::new(BASIS, assumptions, hypotheses);
@@ -121,7 +126,7 @@ fn certified(
                 certificate.mean_square =
                     mean_square(augmented, &system, &proof, assumptions, &search);
             }
-            let faster = |spent| format!("a faster rate was sought: {spent}");
+            let faster = |spent| Said::FasterSought(spent).into();
             certificate.notes.extend(spent.map(faster));
         }
         None if claim == Claim::Fastest => {
@@ -133,57 +138,28 @@ fn certified(
     Ok(certificate)
 }
 
-fn not_covered(assumptions: &Assumptions, reason: String) -> Certificate {
-    let check = undecided(Inequality::StatesAreTheEstimate, reason);
-    Certificate::new(BASIS, assumptions, vec![check])
-}
-
 fn inequality(system: &ErrorSystem, sample: &Sample, proof: Option<&Proof>) -> Check {
-    let slopes = match system.slopes.slopes.len() {
-        0 => String::new(),
-        1 => " for the one slope within its range".to_owned(),
-        count => format!(" for all {count} slopes within their ranges"),
-    };
+    let slopes = system.slopes.slopes.len();
     let name = Inequality::OneLyapunovFunction;
-    match proof.filter(|proof| proof.rate > 0.0) {
-        Some(proof) => proved(
-            name,
-            format!(
-                "He(P J) + 2·{}·P < 0{slopes}, by interval Cholesky factorisation",
-                short(proof.rate)
-            ),
-        ),
-        None => undecided(
-            name,
-            match sample.unstable {
-                true => format!(
-                    "there is none in these coordinates: the largest real part of an eigenvalue of the error's Jacobian is {}. This refutes no convergence: the plant is not seen to rest at such a point, and while it moves the Jacobian changes",
-                    sample.worst
-                ),
-                false => format!("none was found{slopes}"),
-            },
-        ),
+    match (proof.filter(|proof| proof.rate > 0.0), sample.unstable) {
+        (Some(proof), _) => {
+            let rate = proof.rate;
+            proved(name, Said::Holds { rate, slopes })
+        }
+        (None, true) => undecided(name, Said::Unstable(sample.worst.clone())),
+        (None, false) => undecided(name, Said::NotFound { slopes }),
     }
 }
 
 /// What can be said without a proof on the whole box.
-fn still_said(system: &ErrorSystem, sample: &Sample, search: &Budget) -> Vec<String> {
-    let mut notes = vec![];
-    if let Some(slowest) = sample.slowest.filter(|slowest| *slowest > 0.0) {
-        notes.push(format!(
-            "at every point examined the error's Jacobian is stable, the slowest mode decaying at {}",
-            short(slowest)
-        ));
-    }
-    if system.is_bounded()
-        && let Some(share) = lmi::provable_share(system, search)
-    {
-        notes.push(format!(
-            "the inequality holds once every slope's range is cut to {:.0} % about its middle: a smaller box would do",
-            100.0 * share
-        ));
-    }
-    notes
+fn still_said(system: &ErrorSystem, sample: &Sample, search: &Budget) -> Vec<Reason> {
+    let slowest = sample.slowest.filter(|slowest| *slowest > 0.0);
+    let stable = slowest.map(|slowest| Said::StableEverywhere { slowest });
+    let share = system
+        .is_bounded()
+        .then(|| lmi::provable_share(system, search));
+    let share = share.flatten().map(Said::HoldsForShare);
+    stable.into_iter().chain(share).map(Reason::from).collect()
 }
 
 /// Rate, bounds and constants of a proof.
@@ -212,18 +188,14 @@ fn fill(
             "|e(t)| is at most this times e^(−rate·t)·|e(0)|",
         ));
     }
-    match bounds(augmented, system, proof, assumptions) {
+    match bounds(augmented, system, proof, assumptions, Interval::ZERO) {
         Some(bounds) => {
             certificate.ultimate_bound = Some(bounds.norm);
             certificate.ultimate = bounds.states;
         }
-        None => certificate.notes.push(
-            "no ultimate bound: what acts on the plant unknown to the observer, or a measurement error, has no bound".into(),
-        ),
+        None => certificate.notes.push(Said::NoUltimateBound.into()),
     }
-    certificate.notes.push(
-        "holds while plant and estimate stay in the box; an estimate that starts near the plant stays near it".into(),
-    );
+    certificate.notes.push(Said::StaysNear.into());
 }
 
 /// A guessed bound of a quadratic form is raised by this before it is tried.
@@ -234,16 +206,6 @@ const TRIES: usize = 40;
 
 /// Slower rates whose P may leave a smaller mean square, as shares of the fastest.
 const SLOWER: [f64; 3] = [0.85, 0.6, 0.35];
-
-/// What the error ends within without process noise; none where an assumed size is infinite.
-fn bounds(
-    augmented: &AugmentedPlant<'_>,
-    system: &ErrorSystem,
-    proof: &Proof,
-    assumptions: &Assumptions,
-) -> Option<Bounds> {
-    of(augmented, system, proof, assumptions, Interval::ZERO)
-}
 
 /// What the root of its mean square ends within with process noise, by the P of the proof and those of
 /// slower rates: each of the bounds holds.
@@ -262,7 +224,7 @@ fn mean_square(
         let densities = assumptions.process_noise.iter().enumerate();
         let trace =
             sum(densities.map(|(i, q)| Interval::point(proof.P[(i, i)]) * Interval::point(*q)));
-        of(augmented, system, &proof, assumptions, trace)
+        bounds(augmented, system, &proof, assumptions, trace)
     });
     each.reduce(|a, b| Bounds {
         norm: a.norm.min(b.norm),
@@ -275,7 +237,9 @@ fn mean_square(
     })
 }
 
-fn of(
+/// What the root of the error's mean square ends within where process noise adds `trace` to (E V)', the error
+/// itself where it adds nothing; none where an assumed size is infinite.
+fn bounds(
     augmented: &AugmentedPlant<'_>,
     system: &ErrorSystem,
     proof: &Proof,

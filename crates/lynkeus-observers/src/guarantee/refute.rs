@@ -23,8 +23,9 @@ use lynkeus_structure::{AugmentedPlant, Coordinate, Dimension, Point};
 use nalgebra::{DMatrix, DVector};
 
 use super::error_system::{ErrorSystem, edges};
+use super::said::{Inequality, Said};
 use crate::statement::refuted;
-use crate::{Check, Inequality, Observer};
+use crate::{Check, Observer};
 
 /// Points tried before the search climbs from the best of them.
 const POINTS: usize = 400;
@@ -53,7 +54,7 @@ pub(super) struct Sample {
 
 /// The worst point that a deterministic search finds.
 pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Sample {
-    let sides = system.sides.dimensions.iter().map(Side::finite);
+    let sides = system.sides.dimensions.iter().map(finite);
     let mut search = Search {
         system,
         evaluator: system.evaluator(),
@@ -73,7 +74,11 @@ pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Sample {
         }
     }
     if highest.is_finite() {
-        (best, highest) = search.climbed(best, highest);
+        let moves = |side: &Dimension| !side.integer && side.min != side.max;
+        let sides = search.sides.clone();
+        (highest, best) = climbed(&sides, HALVINGS, moves, (highest, best), |point| {
+            Some((search.abscissa(&point)?, point))
+        });
     }
     let coordinates = system.sides.dimensions.iter().zip(&best);
     let named = coordinates.map(|(d, x)| (d.name.clone(), *x));
@@ -105,18 +110,12 @@ pub(super) fn growing(
         return Ok(None);
     }
     if sample.unstable && is_constant(augmented, observer, system) {
-        let detail = "whatever the plant does, the error obeys e' = A e with the same A everywhere, which has an eigenvalue with a positive real part, by interval arithmetic";
-        return Ok(Some(refuted(
-            Inequality::SmallErrorsDecay,
-            sample.worst.clone(),
-            detail,
-        )));
+        let point = sample.worst.clone();
+        let check = refuted(Inequality::SmallErrorsDecay, point, Said::GrowsEverywhere);
+        return Ok(Some(check));
     }
     let found = repelling(augmented, observer, system)?;
-    Ok(found.map(|point| {
-        let detail = "the plant can rest at this point, with these inputs, and there the error's Jacobian has an eigenvalue with a positive real part, both by interval arithmetic: the estimate leaves the plant, however close it starts";
-        refuted(Inequality::SmallErrorsDecay, point, detail)
-    }))
+    Ok(found.map(|point| refuted(Inequality::SmallErrorsDecay, point, Said::Repelling)))
 }
 
 /// Whether e' = A e with an A that reads nothing. One that a known input moves refutes nothing by
@@ -131,57 +130,45 @@ fn is_constant(augmented: &AugmentedPlant<'_>, observer: &Observer, system: &Err
 struct Search<'a> {
     system: &'a ErrorSystem,
     evaluator: Evaluator,
-    sides: Vec<Side>,
+    sides: Vec<Dimension>,
     /// the eigenvalues at a point were not found
     skipped: bool,
 }
 
-/// A side of the box within which points are tried.
-#[derive(Clone, Debug)]
-pub(super) struct Side {
-    pub low: f64,
-    pub high: f64,
-    /// only whole numbers count
-    pub whole: bool,
-}
-
-impl Side {
-    /// With infinite ends replaced by large ones.
-    pub fn finite(side: &Dimension) -> Self {
-        let low = if side.min.is_finite() {
-            side.min
-        } else {
-            side.max.min(1.0) - 2.0
-        };
-        let high = if side.max.is_finite() {
-            side.max
-        } else {
-            low.max(-1.0) + 2.0
-        };
-        Self {
-            low,
-            high: high.max(low),
-            whole: side.integer,
-        }
+/// A side of the box with infinite ends replaced by large ones.
+pub(super) fn finite(side: &Dimension) -> Dimension {
+    let min = match side.min.is_finite() {
+        true => side.min,
+        false => side.max.min(1.0) - 2.0,
+    };
+    let max = match side.max.is_finite() {
+        true => side.max,
+        false => min.max(-1.0) + 2.0,
+    };
+    let max = max.max(min);
+    Dimension {
+        min,
+        max,
+        ..side.clone()
     }
 }
 
 /// The side without its ends and with another middle: a kink there, as of |x| at 0, has
 /// no slope, and that of one side need not be met in the box.
-fn inner((i, side): (usize, Side)) -> Side {
-    if side.whole {
+fn inner((i, side): (usize, Dimension)) -> Dimension {
+    if side.integer {
         return side;
     }
-    let cut = INSET * (1.0 + (i as f64 * GOLDEN).fract()) * (side.high - side.low);
-    Side {
-        low: side.low + cut,
-        high: side.high - 0.5 * cut,
-        whole: false,
+    let cut = INSET * (1.0 + (i as f64 * GOLDEN).fract()) * (side.max - side.min);
+    Dimension {
+        min: side.min + cut,
+        max: side.max - 0.5 * cut,
+        ..side
     }
 }
 
 /// The middle, corners and points between, spread by irrational steps.
-pub(super) fn spread(sides: &[Side], index: usize) -> Vec<f64> {
+pub(super) fn spread(sides: &[Dimension], index: usize) -> Vec<f64> {
     let place = |i: usize| match index {
         0 => 0.5,
         _ if index % 2 == 1 => ((index * (i + 1)) as f64 * GOLDEN + i as f64 * 0.37)
@@ -196,8 +183,8 @@ pub(super) fn spread(sides: &[Side], index: usize) -> Vec<f64> {
     sides
         .map(|(i, side)| {
             // low + (high − low) may be above high by rounding
-            let x = (side.low + place(i) * (side.high - side.low)).min(side.high);
-            if side.whole { x.round() } else { x }
+            let x = (side.min + place(i) * (side.max - side.min)).min(side.max);
+            if side.integer { x.round() } else { x }
         })
         .collect()
 }
@@ -209,30 +196,36 @@ impl Search<'_> {
         self.skipped |= found.is_none();
         found
     }
+}
 
-    /// Coordinate by coordinate to a worse point, with ever smaller steps.
-    fn climbed(&mut self, mut point: Vec<f64>, mut highest: f64) -> (Vec<f64>, f64) {
-        let mut step = 0.5;
-        for _ in 0..HALVINGS {
-            for i in 0..point.len() {
-                let Side { low, high, whole } = self.sides[i].clone();
-                if whole || low == high {
-                    continue;
+/// Coordinate by coordinate to a worse point, with ever smaller steps: of those that move, to what is
+/// found near the next place.
+fn climbed(
+    sides: &[Dimension],
+    halvings: usize,
+    moves: impl Fn(&Dimension) -> bool,
+    mut best: (f64, Vec<f64>),
+    mut found: impl FnMut(Vec<f64>) -> Option<(f64, Vec<f64>)>,
+) -> (f64, Vec<f64>) {
+    let mut step = 0.5;
+    for _ in 0..halvings {
+        for (i, side) in sides.iter().enumerate().filter(|(_, side)| moves(side)) {
+            for step in [-step, step] {
+                let mut next = best.1.clone();
+                next[i] = (next[i] + step * (side.max - side.min)).clamp(side.min, side.max);
+                if side.integer {
+                    next[i] = next[i].round();
                 }
-                for direction in [-1.0, 1.0] {
-                    let mut next = point.clone();
-                    next[i] = (point[i] + direction * step * (high - low)).clamp(low, high);
-                    if let Some(abscissa) = self.abscissa(&next)
-                        && abscissa > highest
-                    {
-                        (point, highest) = (next, abscissa);
-                    }
+                if let Some(next) = found(next)
+                    && next.0 > best.0
+                {
+                    best = next;
                 }
             }
-            step *= 0.5;
         }
-        (point, highest)
+        step *= 0.5;
     }
+    best
 }
 
 /// Points from which an equilibrium is sought.
@@ -279,7 +272,11 @@ pub(super) fn repelling(
     if let Some(best) = found.first().cloned()
         && best.0 <= 0.0
     {
-        found.insert(0, search.climbed(best));
+        // along the equilibria to one that repels more
+        let sides = search.sides.clone();
+        let settled = |z| search.settled(z);
+        let all = |_: &Dimension| true;
+        found.insert(0, climbed(&sides, EQUILIBRIUM_HALVINGS, all, best, settled));
     }
     let growing = found.iter().filter(|(value, _)| *value > 0.0);
     let confirmed = growing
@@ -298,7 +295,7 @@ struct EquilibriumSearch<'a> {
     /// what must not vanish, then what must be defined, over the sides of the system
     smooth: Tape,
     edges: usize,
-    sides: Vec<Side>,
+    sides: Vec<Dimension>,
     states: usize,
 }
 
@@ -331,7 +328,7 @@ impl<'a> EquilibriumSearch<'a> {
         let wide = sides
             .iter()
             .take(states)
-            .all(|s| s.high > s.low && !s.whole);
+            .all(|s| s.max > s.min && !s.integer);
         if !still || !wide || sides.len() != symbols.len() {
             return Ok(None);
         }
@@ -362,7 +359,7 @@ impl<'a> EquilibriumSearch<'a> {
     }
 
     fn width(&self, i: usize) -> f64 {
-        self.sides[i].high - self.sides[i].low
+        self.sides[i].max - self.sides[i].min
     }
 
     /// A point of the sides of the system: derivatives of the inputs are 0.
@@ -385,7 +382,7 @@ impl<'a> EquilibriumSearch<'a> {
             if !f.iter().chain(&J).all(|x| x.is_finite()) {
                 return None;
             }
-            let widths = |j: usize| match self.sides[j].whole {
+            let widths = |j: usize| match self.sides[j].integer {
                 true => 0.0,
                 false => self.width(j),
             };
@@ -405,7 +402,7 @@ impl<'a> EquilibriumSearch<'a> {
             step = found.amax();
             for j in 0..columns {
                 let next = z[j] - widths(j) * found[j];
-                z[j] = next.clamp(self.sides[j].low, self.sides[j].high);
+                z[j] = next.clamp(self.sides[j].min, self.sides[j].max);
             }
             if step < STILL * 1e-4 {
                 break;
@@ -418,30 +415,6 @@ impl<'a> EquilibriumSearch<'a> {
     fn abscissa(&mut self, z: &[f64]) -> Option<f64> {
         let full = self.full(z, 0.0);
         spectrum::abscissa(self.system.at(&mut self.right, &full))
-    }
-
-    /// Along the equilibria to one that repels more.
-    fn climbed(&mut self, mut best: (f64, Vec<f64>)) -> (f64, Vec<f64>) {
-        let mut share = 0.5;
-        for _ in 0..EQUILIBRIUM_HALVINGS {
-            for i in 0..self.sides.len() {
-                for direction in [-share, share] {
-                    let mut z = best.1.clone();
-                    let side = &self.sides[i];
-                    z[i] = (z[i] + direction * self.width(i)).clamp(side.low, side.high);
-                    if side.whole {
-                        z[i] = z[i].round();
-                    }
-                    if let Some(next) = self.settled(z)
-                        && next.0 > best.0
-                    {
-                        best = next;
-                    }
-                }
-            }
-            share *= 0.5;
-        }
-        best
     }
 
     /// The equilibrium near z, if it is proved to exist, inside the box, with a smooth
@@ -486,8 +459,8 @@ impl<'a> EquilibriumSearch<'a> {
             let width = self.width(i);
             let digits = 10f64.powf(6.0 - width.log10().floor());
             let x = (z[i] * digits).round() / digits;
-            match x.is_finite() && !self.sides[i].whole {
-                true => x.clamp(self.sides[i].low, self.sides[i].high),
+            match x.is_finite() && !self.sides[i].integer {
+                true => x.clamp(self.sides[i].min, self.sides[i].max),
                 false => z[i],
             }
         };
@@ -509,7 +482,7 @@ impl<'a> EquilibriumSearch<'a> {
         let mut J = vec![0.0; rows * columns];
         self.slopes.evaluator().eval(z, &mut J);
         let J = DMatrix::from_row_slice(rows, columns, &J);
-        let movable = |j: usize| match self.sides[j].whole {
+        let movable = |j: usize| match self.sides[j].integer {
             true => 0.0,
             false => self.width(j),
         };
@@ -551,20 +524,20 @@ impl<'a> EquilibriumSearch<'a> {
 }
 
 /// States, a little inside of the box, and inputs.
-fn sides(system: &ErrorSystem, count: usize) -> Vec<Side> {
+fn sides(system: &ErrorSystem, count: usize) -> Vec<Dimension> {
     let dimensions = system.sides.dimensions.iter().take(count);
     let states = system.scale.len();
-    let sides = dimensions.map(Side::finite).enumerate();
+    let sides = dimensions.map(finite).enumerate();
     sides
         .map(|(i, side)| {
             let cut = match i < states {
-                true => EQUILIBRIUM_INSET * (side.high - side.low),
+                true => EQUILIBRIUM_INSET * (side.max - side.min),
                 false => 0.0,
             };
-            Side {
-                low: side.low + cut,
-                high: side.high - cut,
-                whole: side.whole,
+            Dimension {
+                min: side.min + cut,
+                max: side.max - cut,
+                ..side
             }
         })
         .collect()

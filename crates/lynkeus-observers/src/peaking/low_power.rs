@@ -26,14 +26,17 @@ use lynkeus_gain::low_power::Coefficients;
 
 use super::transient;
 use super::transient::Transient;
+use crate::conditions::Partial;
 use crate::estimate::{PlantCopy, Speed};
-use crate::{KeySpec, Observer, Shape, Signal, Tuning, TuningError, Value};
+use crate::{KeySpec, Shape, Signal, Tuning, TuningError, Value};
 
 /// Eigenvalues of M.
 pub(super) const POLES: KeySpec = KeySpec {
     name: "low_power_poles",
-    kind: "one list per chain of 2n − 2 negative numbers",
-    shape: Shape::ROWS,
+    shape: Shape::As(
+        "one list per chain of 2n − 2 negative numbers",
+        &Shape::ROWS,
+    ),
     default: "−1, −1, …",
     meaning: "with `form = \"low-power\"`: the eigenvalues of the form's error system",
 };
@@ -41,8 +44,10 @@ pub(super) const POLES: KeySpec = KeySpec {
 /// The coefficients themselves.
 pub(super) const GIVEN: KeySpec = KeySpec {
     name: "low_power_k",
-    kind: "one list per chain of a pair `[k1, k2]` per state but the last",
-    shape: Shape::List(&Shape::ROWS),
+    shape: Shape::As(
+        "one list per chain of a pair `[k1, k2]` per state but the last",
+        &Shape::List(&Shape::ROWS),
+    ),
     default: "by `low_power_poles`",
     meaning: "with `form = \"low-power\"`: its coefficients",
 };
@@ -85,16 +90,6 @@ pub(super) fn refuse_unstable(tuning: &Tuning) -> Result<(), TuningError> {
     Ok(())
 }
 
-/// The coefficients of each chain, for the reader.
-pub(crate) fn parameters(coefficients: &[Coefficients]) -> Vec<(String, String)> {
-    let pair = |k: &[f64; 2]| format!("({}, {})", k[0], k[1]);
-    let row = |(i, K): (usize, &Coefficients)| {
-        let K: Vec<String> = K.iter().map(pair).collect();
-        (format!("K of chain {}", i + 1), K.join(", "))
-    };
-    coefficients.iter().enumerate().map(row).collect()
-}
-
 /// What the lists under the two keys hold, in words.
 const PAIRS: &str = "one list per chain of a pair [k1, k2] per state but the last";
 
@@ -113,18 +108,12 @@ fn explicit(given: &Value, lengths: &[usize]) -> Result<Vec<Coefficients>, Tunin
 
 /// The pairs of a chain, if M is stable with them.
 fn stable_pairs(chain: &Value, given: &Value) -> Result<Coefficients, TuningError> {
+    let pair = |pair: &Value| match pair.list()? {
+        [a, b] => Some([a.number()?, b.number()?]),
+        _ => None,
+    };
     let wrong = || TuningError::new(GIVEN.name, PAIRS, given);
-    let Value::List(pairs) = chain else {
-        return Err(wrong());
-    };
-    let pair = |pair: &Value| match pair {
-        Value::List(pair) => match pair[..] {
-            [Value::Number(a), Value::Number(b)] => Ok([a, b]),
-            _ => Err(wrong()),
-        },
-        _ => Err(wrong()),
-    };
-    let coefficients: Coefficients = pairs.iter().map(pair).collect::<Result<_, _>>()?;
+    let coefficients: Coefficients = chain.all(pair).ok_or_else(wrong)?;
     let abscissa = low_power::abscissa(&coefficients);
     // a chain of one state has no block, hence no eigenvalue
     if coefficients.is_empty() || abscissa < 0.0 {
@@ -152,44 +141,25 @@ fn placed(given: &Value, lengths: &[usize]) -> Result<Vec<Coefficients>, TuningE
 
 /// The poles of a chain.
 fn negative(chain: &Value, given: &Value) -> Result<Vec<f64>, TuningError> {
-    let wrong = || TuningError::new(POLES.name, NUMBERS, given);
-    let Value::List(poles) = chain else {
-        return Err(wrong());
-    };
-    let number = |pole: &Value| match pole {
-        Value::Number(pole) if *pole < 0.0 => Ok(*pole),
-        _ => Err(wrong()),
-    };
-    poles.iter().map(number).collect()
+    let poles = chain.all(|pole| pole.number().filter(|pole| *pole < 0.0));
+    poles.ok_or_else(|| TuningError::new(POLES.name, NUMBERS, given))
 }
 
 fn chains<'v>(key: &str, value: &'v Value) -> Result<&'v [Value], TuningError> {
-    match value {
-        Value::List(chains) => Ok(chains),
-        _ => Err(TuningError::new(key, "one list per chain", value)),
-    }
+    let wrong = || TuningError::new(key, "one list per chain", value);
+    value.list().ok_or_else(wrong)
 }
 
-/// The factors of a chain as parameters: each acts on the innovation of its block, not on
-/// ŷ − y, so they are no gain K.
-pub(crate) fn factor_rows(output: &str, factors: Vec<(String, f64)>) -> Vec<(String, String)> {
-    let row =
-        |(state, factor): (String, f64)| (format!("{output}: on {state}"), factor.to_string());
-    factors.into_iter().map(row).collect()
-}
-
-/// What the reader should know where the partials, with sizes in `bounds`, move and the
+/// Whether the form's stability is not proved where the partials, with sizes in `bounds`, move and the
 /// gain does not.
-pub(crate) fn variation(output: &str, bounds: &[(f64, f64)], K: &[[f64; 2]]) -> Option<String> {
+pub(super) fn varies(bounds: &[(f64, f64)], K: &[[f64; 2]]) -> bool {
     // to the geometric mean, which the gain is made for
     let ratio = |&(low, high): &(f64, f64)| {
         let half = (high / low).sqrt();
         (1.0 / half, half)
     };
     let ratios: Vec<(f64, f64)> = bounds.iter().map(ratio).collect();
-    (!bounds.is_empty() && !low_power::tolerates(K, &ratios)).then(|| {
-        format!("form: in the chain of {output} the partials vary more than the stability of M is proved for; narrower min and max help, and for the family triangular partials = true, which makes M constant")
-    })
+    !bounds.is_empty() && !low_power::tolerates(K, &ratios)
 }
 
 fn rows<'v>(
@@ -210,70 +180,62 @@ fn rows<'v>(
 
 /// A chain to be put in this form.
 pub(crate) struct Part<'a> {
+    /// place of its output
+    pub output: usize,
     /// places of its states, sensor end first
     pub states: &'a [usize],
+    pub partials: &'a [Partial],
+    /// ℓ = θ^δ
+    pub δ: f64,
+}
+
+/// A chain with what corrects it.
+pub(super) struct Blocks<'a> {
+    pub part: &'a Part<'a>,
     /// f_1, …, f_n over the plant's symbols
     pub f: &'a [Node],
     /// what the second gain of each block is divided by, over the plant's symbols
     pub divisors: &'a [Node],
     /// x̂_1 − y
     pub innovation: Node,
-    /// K_i
     pub K: &'a [[f64; 2]],
-    /// ℓ = θ^δ
     pub θ: &'a Speed,
-    pub δ: f64,
-    /// number of the chain in `theta`
-    pub number: usize,
 }
 
-/// The observer while its chains are added.
-pub(crate) struct Run<'c, 'e, 'p> {
-    copy: &'c PlantCopy<'e, 'p>,
-    transient: Option<&'c Transient>,
-    starts: Vec<f64>,
-    derivatives: Vec<Node>,
+/// The observer, of dimension Σ max(1, 2n − 2), while its chains are added.
+pub(super) struct Run<'c, 'e, 'p> {
+    pub copy: &'c PlantCopy<'e, 'p>,
+    pub transient: Option<&'c Transient>,
+    pub starts: Vec<f64>,
+    pub derivatives: Vec<Node>,
     /// c with its start and its derivative
-    copies: Vec<((Signal, f64), Node)>,
+    pub copies: Vec<((Signal, f64), Node)>,
 }
 
-impl<'c, 'e, 'p> Run<'c, 'e, 'p> {
-    pub fn new(
-        copy: &'c PlantCopy<'e, 'p>,
-        transient: Option<&'c Transient>,
-    ) -> Result<Self, TuningError> {
-        let starts = copy.states()?.into_iter().map(|(_, start)| start);
-        Ok(Self {
-            copy,
-            transient,
-            starts: starts.collect(),
-            derivatives: copy.at_estimate(&copy.augmented.derivatives),
-            copies: vec![],
-        })
-    }
-
+impl Run<'_, '_, '_> {
     /// Corrects one chain; the steady gains with the states that they act on.
-    pub fn add(&mut self, part: &Part<'_>) -> Vec<(String, f64)> {
+    pub fn add(&mut self, blocks: &Blocks<'_>) -> Vec<(String, f64)> {
+        let part = blocks.part;
         let n = part.states.len();
-        let constants = constants(part);
-        let gains = transient::gains(self.transient, self.copy, part.number, part.θ, &constants);
+        let constants = constants(blocks);
+        let gains = transient::gains(self.transient, self.copy, part.output, blocks.θ, &constants);
         let graph = self.copy.augmented.graph();
         let signals: Vec<Signal> = (0..n).map(|j| self.second(part, j)).collect();
         let mut names = vec![];
         // a chain of one state has no block: its correction is ℓ e_1
         for i in 0..n.max(2) - 1 {
-            let e = self.innovation(part, &signals, i);
+            let e = self.innovation(blocks, &signals, i);
             let here = self.seen(part, &signals, &[i + 1]);
-            let f = self.copy.at_estimate_with(&part.f[i..=i], &here)[0];
+            let f = self.copy.at_estimate_with(&blocks.f[i..=i], &here)[0];
             self.derivatives[part.states[i]] = plus(graph, f, gains[2 * i], e);
             names.push(self.copy.hats[part.states[i]].name.clone());
             if i + 1 == n {
                 break;
             }
-            let divisor = self.copy.at_estimate_with(&part.divisors[i..=i], &here)[0];
+            let divisor = self.copy.at_estimate_with(&blocks.divisors[i..=i], &here)[0];
             let gain = graph.expr(gains[2 * i + 1]) / graph.expr(divisor);
             let next = self.seen(part, &signals, &[i + 1, i + 2]);
-            let f = self.copy.at_estimate_with(&part.f[i + 1..=i + 1], &next)[0];
+            let f = self.copy.at_estimate_with(&blocks.f[i + 1..=i + 1], &next)[0];
             let derivative = plus(graph, f, gain.node(), e);
             names.push(signals[i + 1].name.clone());
             if i + 2 == n {
@@ -284,10 +246,8 @@ impl<'c, 'e, 'p> Run<'c, 'e, 'p> {
                     .push(((signals[i + 1].clone(), start), derivative));
             }
         }
-        names
-            .into_iter()
-            .zip(constants.iter().map(|c| c.0))
-            .collect()
+        let steady = constants.iter().map(|c| c.0);
+        names.into_iter().zip(steady).collect()
     }
 
     /// c_{j+1}, counted from 0: x̂_n for the last.
@@ -302,12 +262,12 @@ impl<'c, 'e, 'p> Run<'c, 'e, 'p> {
     }
 
     /// y − x̂_1, then c_i − x̂_i.
-    fn innovation(&self, part: &Part<'_>, signals: &[Signal], i: usize) -> Node {
+    fn innovation(&self, blocks: &Blocks<'_>, signals: &[Signal], i: usize) -> Node {
         let graph = self.copy.augmented.graph();
         match i {
-            0 => (-graph.expr(part.innovation)).node(),
+            0 => (-graph.expr(blocks.innovation)).node(),
             _ => {
-                let state = part.states[i];
+                let state = blocks.part.states[i];
                 let c = self.copy.seen_as(state, signals[i].symbol);
                 (graph.expr(c) - graph.expr(self.copy.hats[state].symbol)).node()
             }
@@ -321,26 +281,16 @@ impl<'c, 'e, 'p> Run<'c, 'e, 'p> {
             .map(|&j| (part.states[j], signals[j].symbol))
             .collect()
     }
-
-    /// The observer, dimension Σ max(1, 2n − 2).
-    pub fn finish(self, family: &'static str) -> Result<Observer, TuningError> {
-        let mut observer = self.copy.observer(family, self.derivatives)?;
-        for (state, derivative) in self.copies {
-            observer.states.push(state);
-            observer.derivatives.push(derivative);
-        }
-        Ok(observer)
-    }
 }
 
 /// (ℓk_i1, 1), (ℓ²k_i2, 2), … with their powers of ℓ as powers of θ.
-fn constants(part: &Part<'_>) -> Vec<(f64, f64)> {
-    let (L, δ) = (part.θ.value().powf(part.δ), part.δ);
-    if part.K.is_empty() {
+fn constants(Blocks { part, K, θ, .. }: &Blocks<'_>) -> Vec<(f64, f64)> {
+    let (L, δ) = (θ.value().powf(part.δ), part.δ);
+    if K.is_empty() {
         return vec![(L, δ)];
     }
     let block = |k: &[f64; 2]| [(L * k[0], δ), (L * L * k[1], 2.0 * δ)];
-    part.K.iter().flat_map(block).collect()
+    K.iter().flat_map(block).collect()
 }
 
 fn plus(graph: &Graph, f: Node, gain: Node, e: Node) -> Node {

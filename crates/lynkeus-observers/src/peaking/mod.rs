@@ -5,19 +5,23 @@
 mod low_power;
 mod transient;
 
-pub(crate) use low_power::{Part, Run, factor_rows, parameters, variation};
-use lynkeus_expr::Node;
+pub(crate) use low_power::Part;
+use low_power::{Blocks, Run};
+use lynkeus_expr::{Graph, Node};
 use lynkeus_gain::low_power::Coefficients;
 pub(crate) use transient::{Transient, gains};
 
-use crate::estimate::PlantCopy;
+use crate::conditions::Partial;
+use crate::estimate::{PlantCopy, Speed};
 use crate::guarantee::Lmi;
 use crate::statement::undecided;
-use crate::{Check, KeySpec, Shape, Statement, Tuning, TuningError, Value};
+use crate::{
+    Check, Design, Examination, KeySpec, ParameterValue, Reason, Shape, Statement, Tuning,
+    TuningError, Value,
+};
 
 const FORM: KeySpec = KeySpec {
     name: "form",
-    kind: "`\"standard\"`, `\"low-power\"`",
     shape: Shape::Word(&["standard", "low-power"]),
     default: "`\"standard\"`",
     meaning: "the observer with gains of order θ² at most, with `low_power_poles` or `low_power_k`",
@@ -78,7 +82,7 @@ impl Remedies {
     }
 
     /// The coefficients of the low-power form for chains of these lengths.
-    pub(crate) fn coefficients(&self, lengths: &[usize]) -> Result<Vec<Coefficients>, TuningError> {
+    fn coefficients(&self, lengths: &[usize]) -> Result<Vec<Coefficients>, TuningError> {
         low_power::coefficients(self.given.as_ref(), self.poles.as_ref(), lengths)
     }
 
@@ -99,8 +103,7 @@ impl Remedies {
 /// The study's key.
 pub(super) const LIMIT: KeySpec = KeySpec {
     name: "innovation_limit",
-    kind: "number > 0, or one per output",
-    shape: Shape::POSITIVES,
+    shape: Shape::As("number > 0, or one per output", &Shape::POSITIVES),
     default: "none",
     meaning: "the correction sees the innovation limited to ± this: a remedy against [peaking](peaking.md)",
 };
@@ -119,7 +122,100 @@ pub(crate) fn departure(
         (remedies.limit.is_some(), LIMIT.name),
     ];
     let (_, key) = departures.into_iter().find(|(asked, _)| *asked)?;
-    let detail =
-        format!("the key '{key}' makes another observer, which the theorem does not cover");
-    Some(undecided(statement, detail))
+    Some(undecided(statement, Reason::AnotherObserver { key }))
+}
+
+/// The observer with every chain in the low-power form; `θ` is by output, `f` has f_1, …, f_n of a part over
+/// the plant's symbols. The gains are divided by constants in the middle of the partials' bounds, with `advice` for
+/// where there is none, or by the partials at the estimate.
+pub(crate) fn low_power(
+    copy: &PlantCopy<'_, '_>,
+    remedies: &Remedies,
+    θ: &[f64],
+    parts: &[Part<'_>],
+    f: impl Fn(usize) -> Vec<Node>,
+    advice: Option<&str>,
+    examination: Examination,
+) -> Result<Design, TuningError> {
+    let mut lengths = vec![0; parts.len()];
+    for part in parts {
+        lengths[part.output] = part.states.len();
+    }
+    let K = remedies.coefficients(&lengths)?;
+    let starts = copy.states()?.into_iter().map(|(_, start)| start);
+    let transient = remedies.transient.as_ref();
+    let mut run = Run {
+        copy,
+        transient,
+        starts: starts.collect(),
+        derivatives: copy.at_estimate(&copy.augmented.derivatives),
+        copies: vec![],
+    };
+    let speeds = Speed::of_chains(copy, θ);
+    let mut parameters = vec![("θ".to_owned(), θ.to_vec().into())];
+    parameters.extend(transient.map(Transient::parameter));
+    let pairs = K.iter().enumerate().map(|(i, K)| {
+        let name = format!("K of chain {}", i + 1);
+        (name, ParameterValue::Pairs(K.clone()))
+    });
+    parameters.extend(pairs);
+    let mut notes = vec![];
+    for (place, part) in parts.iter().enumerate() {
+        let Some(innovation) = remedies.innovation(copy, part.output) else {
+            continue;
+        };
+        let (output, K) = (
+            &copy.augmented.outputs[part.output].variable.name,
+            &K[part.output],
+        );
+        let bounds: Vec<(f64, f64)> = part.partials.iter().map(|p| p.bounds).collect();
+        if advice.is_some() && low_power::varies(&bounds, K) {
+            let output = output.clone();
+            notes.push(Reason::PartialsVary { output });
+        }
+        let blocks = Blocks {
+            part,
+            f: &f(place),
+            divisors: &divisors(copy.augmented.graph(), part.partials, advice)?,
+            innovation,
+            K,
+            θ: &speeds[part.output],
+        };
+        // each acts on the innovation of its block, not on ŷ − y: they are no gain K
+        let added = run.add(&blocks).into_iter();
+        parameters.extend(added.map(|(state, x)| (format!("{output}: on {state}"), x.into())));
+    }
+    let mut observer = copy.observer(examination.family, run.derivatives)?;
+    for (state, derivative) in run.copies {
+        observer.states.push(state);
+        observer.derivatives.push(derivative);
+    }
+    Ok(Design {
+        observer: observer.tuned_by(&speeds),
+        examination,
+        gains: vec![],
+        parameters,
+        notes,
+    })
+}
+
+/// What the second gain of each block is divided by, over the plant's symbols: a_i itself, or the
+/// constant that stands for it.
+fn divisors(
+    graph: &Graph,
+    partials: &[Partial],
+    advice: Option<&str>,
+) -> Result<Vec<Node>, TuningError> {
+    let divisor = |partial: &Partial| match (advice, partial.nominal()) {
+        (None, _) => Ok(partial.node),
+        (Some(_), Some(middle)) => Ok(graph.constant(middle).node()),
+        (Some(advice), None) => {
+            let expected = format!(
+                "partial derivatives with known positive bounds for form = \"low-power\"; {advice}"
+            );
+            let found = format!("bounds {} and {}", partial.bounds.0, partial.bounds.1);
+            Err(TuningError::new(FORM.name, expected, found))
+        }
+    };
+    partials.iter().map(divisor).collect()
 }

@@ -5,20 +5,21 @@ use std::collections::BTreeMap;
 use lynkeus_expr::Node;
 
 use crate::estimate::{PlantCopy, Speed};
-use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
+use crate::{KeySpec, ParameterValue, REQUIRED, Shape, Tuning, TuningError, Value};
 
 /// The study's key.
 pub(super) const TRANSIENT: KeySpec = KeySpec {
     name: "transient",
-    kind: "`{ theta = …, until = …, fall = … }`",
-    shape: Shape::Section(&[&[THETA, UNTIL, FALL]]),
+    shape: Shape::As(
+        "`{ theta = …, until = …, fall = … }`",
+        &Shape::Section(&[&[THETA, UNTIL, FALL]]),
+    ),
     default: "none",
     meaning: "another θ up to a time, then the study's; `fall` is the time constant of a smooth change",
 };
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
-    kind: "number > 0, or one per chain",
     shape: Shape::POSITIVES,
     default: REQUIRED,
     meaning: "θ at the start",
@@ -26,7 +27,6 @@ const THETA: KeySpec = KeySpec {
 
 const UNTIL: KeySpec = KeySpec {
     name: "until",
-    kind: "number",
     shape: Shape::Number,
     default: REQUIRED,
     meaning: "the time up to which it holds, on the axis of the study",
@@ -34,7 +34,6 @@ const UNTIL: KeySpec = KeySpec {
 
 const FALL: KeySpec = KeySpec {
     name: "fall",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "at once",
     meaning: "the time constant of the change",
@@ -78,48 +77,19 @@ impl Transient {
         }))
     }
 
-    /// The gains of chain `i` that grow like θ^exponent: `(gain, exponent)` at the study's steady θ.
-    pub(crate) fn gains(
-        &self,
-        copy: &PlantCopy<'_, '_>,
-        i: usize,
-        θ: &Speed,
-        steady: &[(f64, f64)],
-    ) -> Vec<Node> {
-        let graph = copy.augmented.graph();
-        let time = graph.expr(copy.augmented.plant.time);
-        let until = graph.constant(self.until);
-        let gain = |&(gain, exponent): &(f64, f64)| match self.fall {
-            None => {
-                let ratio = self.θ[i] / θ.value();
-                let transient = graph.constant(gain * ratio.powf(exponent));
-                let steady = θ.scaled(graph, gain, exponent);
-                time.less(until).select(transient, steady)
-            }
-            Some(fall) => {
-                let since = (time - until).max(graph.constant(0.0));
-                let left = (-since / graph.constant(fall)).exp();
-                // θ(t)/θ
-                let change = graph.constant(self.θ[i]) / θ.expr(graph) - 1.0;
-                let ratio = graph.constant(1.0) + change * left;
-                θ.scaled(graph, gain, exponent) * ratio.pow(graph.constant(exponent))
-            }
-        };
-        steady.iter().map(gain).map(|gain| gain.node()).collect()
-    }
-
     /// For the reader.
-    pub fn parameter(&self) -> (String, String) {
-        let θ: Vec<String> = self.θ.iter().map(f64::to_string).collect();
-        let mut text = format!("{} until t = {}", θ.join(", "), self.until);
-        if let Some(fall) = self.fall {
-            text += &format!(", then to θ with the time constant {fall}");
-        }
-        ("θ in the transient".to_owned(), text)
+    pub fn parameter(&self) -> (String, ParameterValue) {
+        let value = ParameterValue::Transient {
+            θ: self.θ.clone(),
+            until: self.until,
+            fall: self.fall,
+        };
+        ("θ in the transient".to_owned(), value)
     }
 }
 
-/// The gains of chain `i`, with or without a transient.
+/// The gains of chain `i` that grow like θ^exponent, with or without a transient: `(gain, exponent)` at
+/// the study's steady θ.
 pub(crate) fn gains(
     transient: Option<&Transient>,
     copy: &PlantCopy<'_, '_>,
@@ -128,13 +98,31 @@ pub(crate) fn gains(
     steady: &[(f64, f64)],
 ) -> Vec<Node> {
     let graph = copy.augmented.graph();
-    match transient {
-        Some(transient) => transient.gains(copy, i, θ, steady),
-        None => steady
-            .iter()
-            .map(|&(gain, exponent)| θ.scaled(graph, gain, exponent).node())
-            .collect(),
-    }
+    let time = graph.expr(copy.augmented.plant.time);
+    let until = transient.map(|transient| graph.constant(transient.until));
+    let gain = |&(gain, exponent): &(f64, f64)| {
+        let steady = || θ.scaled(graph, gain, exponent);
+        let (Some(transient), Some(until)) = (transient, until) else {
+            return steady().node();
+        };
+        let gain = match transient.fall {
+            None => {
+                let ratio = transient.θ[i] / θ.value();
+                let first = graph.constant(gain * ratio.powf(exponent));
+                time.less(until).select(first, steady())
+            }
+            Some(fall) => {
+                let since = (time - until).max(graph.constant(0.0));
+                let left = (-since / graph.constant(fall)).exp();
+                // θ(t)/θ
+                let change = graph.constant(transient.θ[i]) / θ.expr(graph) - 1.0;
+                let ratio = graph.constant(1.0) + change * left;
+                steady() * ratio.pow(graph.constant(exponent))
+            }
+        };
+        gain.node()
+    };
+    steady.iter().map(gain).collect()
 }
 
 /// A positive number or one per chain, with the key named as `transient.theta`.

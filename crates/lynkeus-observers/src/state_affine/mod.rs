@@ -15,21 +15,19 @@
 //! e^{−θμ_θt} with μ_θ → ½, as (24) and (26) have it, not e^{−μ_θt} with μ_θ → 1.
 //! Beyond the print: C(u) need not be square, and y = C(u)x + d(u) is understood.
 
+mod form;
 mod observer;
+mod said;
 mod settings;
 mod theorem;
 
-use lynkeus_structure::{AugmentedPlant, Region, Standing, Superdiagonal, superdiagonal};
+use lynkeus_structure::{AugmentedPlant, Region};
 
-use crate::conditions::{lipschitz, names};
 use crate::design::{Found, Searched};
 use crate::family::Stages;
-use crate::statement::standing;
-use crate::{
-    Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Ltaief, Statement, Tuning,
-    TuningError,
-};
-use observer::{NAME, assemble};
+use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
+use form::{Form, NAME};
+pub use said::{Ltaief, Said};
 use settings::Settings;
 use theorem::BASIS;
 
@@ -39,7 +37,7 @@ pub struct StateAffine;
 
 impl Stages for StateAffine {
     type Settings = Settings;
-    type Form<'e, 'p: 'e> = Superdiagonal;
+    type Form<'e, 'p: 'e> = Form;
     const NAME: &'static str = NAME;
     const PAPER: &'static str = "Ltaief, Maatoug, Farza, Ménard, M'Saad, Koubaa, observer (7)–(8)";
     const BASIS: &'static str = BASIS;
@@ -53,58 +51,24 @@ impl Stages for StateAffine {
         settings.late()
     }
 
-    fn form(
-        augmented: &AugmentedPlant<'_>,
-        _: &Settings,
-        region: &Region,
-    ) -> Searched<Superdiagonal> {
-        form(augmented, region)
+    fn form(augmented: &AugmentedPlant<'_>, _: &Settings, region: &Region) -> Searched<Form> {
+        form::form(augmented, region)
     }
 
     fn design(
         augmented: &AugmentedPlant<'_>,
         settings: &Settings,
-        found: Found<Superdiagonal>,
+        found: Found<Form>,
     ) -> Result<Design, DesignError> {
-        assemble(augmented, settings, &found.form, found.examination)
+        observer::assemble(augmented, settings, found)
     }
 
     fn theorem(
         augmented: &AugmentedPlant<'_>,
         settings: &Settings,
-        found: Found<Superdiagonal>,
+        found: Found<Form>,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
         theorem::certificate(augmented, settings, found, assumptions)
     }
-}
-
-/// The blocks with what is known of A2 and A4.
-pub(crate) fn form(augmented: &AugmentedPlant<'_>, region: &Region) -> Searched<Superdiagonal> {
-    let form = match superdiagonal::find(augmented) {
-        Ok(form) => form,
-        Err(summary) => {
-            return Ok(Err(Examination::unfit(NAME, summary, vec![])));
-        }
-    };
-    let mut checks = vec![];
-    for (k, factor) in form.factors.iter().enumerate() {
-        let mut declared = factor.columns.clone();
-        declared.sort_unstable();
-        let statement = Ltaief::BlockShows {
-            factor: k,
-            states: names(augmented, &declared),
-        };
-        let found = factor.column_rank(augmented, k, region)?;
-        checks.push(Statement::from(statement).with(found));
-    }
-    let excited = standing(&checks) == Standing::Undecided;
-    checks.push(lipschitz(augmented, region)?);
-    let mut summary = form.describe(augmented);
-    if excited {
-        summary += "; which inputs suffice depends on their excitation (A4), which the monitor 'excitation' watches";
-    }
-    let chains = form.declared().map(|block| names(augmented, &block));
-    let examination = Examination::new(augmented, region, NAME, summary, chains.collect(), checks)?;
-    Ok(Ok(Found { form, examination }))
 }

@@ -50,15 +50,18 @@
 
 use lynkeus_expr::{Expr, Graph, Node, jacobian};
 use lynkeus_gain::UnitFactor;
-use lynkeus_structure::{AugmentedPlant, Matrix, Superdiagonal, range};
+use lynkeus_proof::matrix::square;
+use lynkeus_structure::output_map::Rows;
+use lynkeus_structure::{AugmentedPlant, Matrix, Measurement, range};
 
-use super::settings::{Numbers, Settings};
+use super::form::{Form, NAME};
+use super::said::Said;
+use super::settings::Settings;
 use crate::conditions::names;
+use crate::design::Found;
 use crate::estimate::{PlantCopy, Speed};
-use crate::printed::{StartPoint, expressions, numbers};
-use crate::{Design, DesignError, Examination, Monitor, Signal};
-
-pub(super) const NAME: &str = "state-affine";
+use crate::printed::{StartPoint, expressions};
+use crate::{Design, DesignError, Monitor, ParameterValue, Reason, Signal};
 
 /// The smallest d_i that forgetting leaves.
 const D_LEAST: f64 = 1e-100;
@@ -74,49 +77,44 @@ const ALARM: f64 = 1e-6;
 pub(super) fn assemble(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
-    form: &Superdiagonal,
-    examination: Examination,
+    Found { form, examination }: Found<Form>,
 ) -> Result<Design, DesignError> {
     let graph = augmented.graph();
-    let order: Vec<usize> = form.blocks().flatten().copied().collect();
-    let numbers = settings.numbers(&order)?;
+    let (given, S0) = (settings.θ()?, settings.S0(&form.order)?);
     let copy = PlantCopy::new(augmented, &settings.common);
-    let matrices = Matrices::new(&copy, form, &order);
-    let names: Vec<&str> = order
-        .iter()
-        .map(|&i| augmented.states[i].name.as_str())
-        .collect();
-    let factor = Factor::new(graph, &names, &numbers.S0);
+    let [C, F] = [&form.C, &form.F].map(|A| at_estimate(&copy, A));
+    let factor = Factor::new(graph, &names(augmented, &form.order), &S0);
     let mut derivatives = copy.at_estimate(&augmented.derivatives);
-    prolong(&copy, &matrices.F, &order, &mut derivatives);
-    let Matrices { C, F } = matrices;
+    prolong(&copy, &F, &form.order, &mut derivatives);
     let v: Vec<Vec<Sparse<'_>>> = C.iter().map(|row| factor.forward(row)).collect();
     // θΔ_θ⁻¹ = diag(θI, θ²I, …) over the blocks
     let meaning = "the speed θ of the gain and of S".to_owned();
-    let θ = Speed::new(&copy, "theta", numbers.θ, meaning);
-    let exponents = form
-        .blocks()
-        .enumerate()
-        .flat_map(|(k, block)| block.iter().map(move |_| k as i32 + 1));
+    let θ = Speed::new(&copy, "theta", given, meaning);
     let correction = factor.gain(&v, &innovations(&copy));
-    for ((&state, exponent), z) in order.iter().zip(exponents).zip(correction) {
+    for ((&state, &k), z) in form.order.iter().zip(&form.block).zip(correction) {
         if let Some(z) = z {
-            let power = θ.scaled(graph, numbers.θ.powi(exponent), f64::from(exponent));
+            let power = θ.scaled(graph, given.powi(k as i32 + 1), (k + 1) as f64);
             derivatives[state] = (graph.expr(derivatives[state]) - power * z).node();
         }
     }
     derivatives.extend(factor.derivatives(θ.expr(graph), &F, &v));
-    let alarm = alarm(augmented, form, settings)?;
+    let alarm = alarm(augmented, &form, settings)?;
     let mut observer = copy.observer(NAME, derivatives)?.tuned_by([&θ]);
     observer.monitors.extend(monitor(&factor, alarm));
     observer.states.extend(factor.states);
-    let parameters = parameters(&copy, form, &order, &numbers, alarm)?;
+    let outside = outside_last(augmented, &form).into_iter();
     Ok(Design {
         observer,
-        notes: outside_last(augmented, form).into_iter().collect(),
-        examination,
+        notes: outside.map(Reason::from).collect(),
         gains: vec![],
-        parameters,
+        parameters: parameters(
+            &copy,
+            &form,
+            (given, &S0),
+            alarm,
+            examination.chains.clone(),
+        )?,
+        examination,
     })
 }
 
@@ -147,7 +145,7 @@ fn prolong<'g>(
 /// Below this excitation the flag is raised.
 pub(super) fn alarm(
     augmented: &AugmentedPlant<'_>,
-    form: &Superdiagonal,
+    form: &Form,
     settings: &Settings,
 ) -> Result<f64, DesignError> {
     match settings.alarm.clone()? {
@@ -168,36 +166,13 @@ fn monitor(factor: &Factor<'_>, alarm_below: f64) -> Option<Monitor> {
     })
 }
 
-/// C(u) and F(u, x̂), dense, in the order of the blocks.
-struct Matrices<'g> {
-    C: Vec<Vec<Sparse<'g>>>,
-    F: Vec<Vec<Sparse<'g>>>,
-}
-
-impl<'g> Matrices<'g> {
-    fn new(copy: &PlantCopy<'_, 'g>, form: &Superdiagonal, order: &[usize]) -> Self {
-        let graph: &'g Graph = copy.augmented.graph();
-        let n = order.len();
-        let place = |state: usize| order.iter().position(|&i| i == state);
-        let mut matrices = Self {
-            C: vec![vec![None; n]; copy.augmented.outputs.len()],
-            F: vec![vec![None; n]; n],
-        };
-        for (k, factor) in form.factors.iter().enumerate() {
-            for &(i, j, node) in &factor.entries {
-                let entry: Expr<'g> = graph.expr(copy.at_estimate(&[node])[0]);
-                let Some(column) = place(factor.columns[j]) else {
-                    continue;
-                };
-                match (k, place(factor.rows[i])) {
-                    (0, _) => matrices.C[factor.rows[i]][column] = Some(entry),
-                    (_, Some(row)) => matrices.F[row][column] = Some(entry),
-                    (_, None) => {}
-                }
-            }
-        }
-        matrices
-    }
+/// The entries at the estimate.
+fn at_estimate<'g>(copy: &PlantCopy<'_, 'g>, A: &Rows) -> Vec<Vec<Sparse<'g>>> {
+    let graph: &'g Graph = copy.augmented.graph();
+    let entry = |e: &Option<Node>| Some(graph.expr(copy.at_estimate(&[(*e)?])[0]));
+    A.iter()
+        .map(|row| row.iter().map(entry).collect())
+        .collect()
 }
 
 /// C(u)x̂ − y, one per output.
@@ -206,7 +181,7 @@ fn innovations<'g>(copy: &PlantCopy<'_, 'g>) -> Vec<Expr<'g>> {
     let graph: &'g Graph = augmented.graph();
     let hats = augmented.states.iter().zip(&copy.hats);
     let unlimited = hats.map(|(state, hat)| (state.node, hat.symbol)).collect();
-    let innovation = |(o, y): (&lynkeus_structure::Measurement, &Signal)| {
+    let innovation = |(o, y): (&Measurement, &Signal)| {
         let h = graph.substitute(&[o.variable.node], &unlimited)[0];
         graph.expr(h) - graph.expr(y.symbol)
     };
@@ -221,11 +196,11 @@ fn innovations<'g>(copy: &PlantCopy<'_, 'g>) -> Vec<Expr<'g>> {
 /// How large the diagonal of S could be at best for the least visible state:
 /// g = 1 for an output, g_j = Σ_i g_i max|F_ij|² for a state. It carries the units
 /// of F, so that the alarm does not depend on them. Unbounded entries count as 1.
-fn least_reach(augmented: &AugmentedPlant<'_>, form: &Superdiagonal) -> Result<f64, DesignError> {
+fn least_reach(augmented: &AugmentedPlant<'_>, form: &Form) -> Result<f64, DesignError> {
     let (graph, region) = (augmented.graph(), augmented.region());
     let mut reach = vec![1.0; augmented.outputs.len()];
     let mut least = f64::INFINITY;
-    for factor in &form.factors {
+    for factor in &form.blocks.factors {
         let mut next = vec![0.0; factor.columns.len()];
         for &(i, j, node) in &factor.entries {
             let found = range(graph, node, &region)?.enclosure;
@@ -241,9 +216,9 @@ fn least_reach(augmented: &AugmentedPlant<'_>, form: &Superdiagonal) -> Result<f
 
 /// (1) has ε in the last block only. Elsewhere its trace in the blocks behind
 /// does not shrink as θ grows: worth a note, no reason to refuse.
-fn outside_last(augmented: &AugmentedPlant<'_>, form: &Superdiagonal) -> Option<String> {
+fn outside_last(augmented: &AugmentedPlant<'_>, form: &Form) -> Option<Said> {
     let plant = augmented.plant;
-    let last = form.declared().last()?;
+    let last = form.blocks.declared().last()?;
     let known = |v: &lynkeus_model::Variable| {
         augmented.inputs.iter().any(|i| i.node == v.node)
             || augmented.state_index(&v.name).is_some()
@@ -260,98 +235,64 @@ fn outside_last(augmented: &AugmentedPlant<'_>, form: &Superdiagonal) -> Option<
         !last.contains(&i) && (unknown_input || !pattern[i].is_empty())
     };
     let states: Vec<usize> = (0..augmented.states.len()).filter(acts).collect();
-    (!states.is_empty()).then(|| {
-        format!(
-            "an uncertainty acts on {}, outside of the last block ({}); Theorem 1 covers the last one only, and the error of the blocks behind need not shrink as theta grows",
-            names(augmented, &states).join(", "),
-            names(augmented, &last).join(", ")
-        )
+    (!states.is_empty()).then(|| Said::OutsideLast {
+        states: names(augmented, &states),
+        last: names(augmented, &last),
     })
 }
 
-pub(super) fn parameters(
+fn parameters(
     copy: &PlantCopy<'_, '_>,
-    form: &Superdiagonal,
-    order: &[usize],
-    given: &Numbers,
+    form: &Form,
+    (θ, S0): (f64, &UnitFactor),
     alarm: f64,
-) -> Result<Vec<(String, String)>, DesignError> {
+    chains: Vec<Vec<String>>,
+) -> Result<Vec<(String, ParameterValue)>, DesignError> {
     let augmented = copy.augmented;
-    let start = StartPoint::new(copy)?;
-    let n = order.len();
-    let place = |state: usize| order.iter().position(|&i| i == state);
-    let factor = |k: usize, rows: usize, row: &dyn Fn(usize) -> Option<usize>| {
-        Matrix::from_fn(augmented.graph(), (rows, n), |i, j| {
-            let factor = form.factors.get(k)?;
-            let is_here = |&&(r, c, _): &&(usize, usize, _)| {
-                row(factor.rows[r]) == Some(i) && place(factor.columns[c]) == Some(j)
-            };
-            factor.entries.iter().find(is_here).map(|entry| entry.2)
-        })
-    };
-    let C = factor(0, augmented.outputs.len(), &Some);
-    let F = (1..form.factors.len())
-        .map(|k| factor(k, n, &place))
-        .reduce(|all, next| all.plus(&next));
-    let gain = gain(&start.values(&C)?, form, given);
-    let names: Vec<&str> = order
-        .iter()
-        .map(|&i| augmented.states[i].name.as_str())
-        .collect();
-    let mut found: Vec<(String, String)> = vec![
-        ("θ".into(), given.θ.to_string()),
-        ("blocks".into(), form.describe(augmented)),
-        ("alarm".into(), format!("excitation below {alarm:.3e}")),
-        ("rows".into(), names.join(", ")),
-        ("C(u)".into(), expressions(&C)),
-    ];
-    if let Some(F) = F {
-        found.push(("F(u, x)".into(), expressions(&F)));
+    let [C, F] = [&form.C, &form.F].map(|A| {
+        let size = (A.len(), form.order.len());
+        Matrix::from_fn(augmented.graph(), size, |i, j| A[i][j])
+    });
+    let gain = gain(&StartPoint::new(copy)?.values(&C)?, form, θ, S0);
+    let mut found: Vec<(String, ParameterValue)> = vec![("θ".into(), θ.into())];
+    let mut add = |name: &str, value| found.push((name.to_owned(), value));
+    add("blocks", ParameterValue::Blocks(chains));
+    add("alarm", ParameterValue::Alarm(alarm));
+    add("rows", names(augmented, &form.order).into());
+    add("C(u)", expressions(&C));
+    if form.blocks.factors.len() > 1 {
+        add("F(u, x)", expressions(&F));
     }
-    found.push(("S(0)".into(), numbers(&product(&given.S0))));
-    found.push(("θΔ⁻¹S⁻¹Cᵀ at the start".into(), numbers(&gain)));
+    add("S(0)", ParameterValue::Matrix(product(S0)));
+    add("θΔ⁻¹S⁻¹Cᵀ at the start", ParameterValue::Matrix(gain));
     Ok(found)
 }
 
 /// S = UᵀDU
 fn product(S: &UnitFactor) -> Vec<Vec<f64>> {
-    let n = S.diagonal.len();
-    let entry = |i: usize, j: usize| {
-        let terms = (0..=i.min(j)).map(|k| U(S, k, i) * S.diagonal[k] * U(S, k, j));
+    square(S.diagonal.len(), |i, j| {
+        let terms = (0..=i.min(j)).map(|k| S.U(k, i) * S.diagonal[k] * S.U(k, j));
         terms.sum()
-    };
-    (0..n)
-        .map(|i| (0..n).map(|j| entry(i, j)).collect())
-        .collect()
-}
-
-/// An entry of U, j ≥ k.
-fn U(S: &UnitFactor, k: usize, j: usize) -> f64 {
-    match j == k {
-        true => 1.0,
-        false => S.upper[k][j - k - 1],
-    }
+    })
 }
 
 /// θ Δ_θ⁻¹ S(0)⁻¹ Cᵀ: by Uᵀv = Cᵀ and then Uz = D⁻¹v, as the observer has it.
-fn gain(C: &[Vec<f64>], form: &Superdiagonal, given: &Numbers) -> Vec<Vec<f64>> {
-    let (S, θ) = (&given.S0, given.θ);
+fn gain(C: &[Vec<f64>], form: &Form, θ: f64, S: &UnitFactor) -> Vec<Vec<f64>> {
     let n = S.diagonal.len();
     let column = |c: &Vec<f64>| {
         let mut v = c.clone();
         for i in 0..n {
-            let known: f64 = (0..i).map(|k| U(S, k, i) * v[k]).sum();
+            let known: f64 = (0..i).map(|k| S.U(k, i) * v[k]).sum();
             v[i] -= known;
         }
         for i in (0..n).rev() {
-            let known: f64 = (i + 1..n).map(|k| U(S, i, k) * v[k]).sum();
+            let known: f64 = (i + 1..n).map(|k| S.U(i, k) * v[k]).sum();
             v[i] = v[i] / S.diagonal[i] - known;
         }
         v
     };
     let columns: Vec<Vec<f64>> = C.iter().map(column).collect();
-    let blocks = form.blocks().enumerate();
-    let powers = blocks.flat_map(|(k, block)| block.iter().map(move |_| θ.powi(k as i32 + 1)));
+    let powers = form.block.iter().map(|&k| θ.powi(k as i32 + 1));
     powers
         .enumerate()
         .map(|(i, power)| columns.iter().map(|z| power * z[i]).collect())
@@ -359,10 +300,10 @@ fn gain(C: &[Vec<f64>], form: &Superdiagonal, given: &Numbers) -> Vec<Vec<f64>> 
 }
 
 /// An entry that may be zero everywhere.
-pub(super) type Sparse<'g> = Option<Expr<'g>>;
+type Sparse<'g> = Option<Expr<'g>>;
 
 /// The states of the factors as symbols.
-pub(super) struct Factor<'g> {
+struct Factor<'g> {
     graph: &'g Graph,
     /// ln d_i
     pub δ: Vec<Expr<'g>>,
@@ -391,7 +332,7 @@ fn minus<'g>(a: Sparse<'g>, b: Sparse<'g>) -> Sparse<'g> {
 
 impl<'g> Factor<'g> {
     /// Symbols for the factors of S, named after the states and starting at S(0).
-    pub fn new(graph: &'g Graph, names: &[&str], start: &UnitFactor) -> Self {
+    pub fn new(graph: &'g Graph, names: &[String], start: &UnitFactor) -> Self {
         let n = names.len();
         let mut states = vec![];
         let mut state = |name: String, start: f64| {
@@ -511,7 +452,7 @@ impl<'g> Factor<'g> {
 }
 
 /// ℓ for A = S⁻¹, whose rows start at the diagonal.
-pub(super) fn least_eigenvalue<'g>(A: &[Vec<Expr<'g>>]) -> Option<Expr<'g>> {
+fn least_eigenvalue<'g>(A: &[Vec<Expr<'g>>]) -> Option<Expr<'g>> {
     let trace = trace(A)?;
     let mut B = divided(A, trace);
     let mut bound = 1.0 / trace;

@@ -1,6 +1,7 @@
 //! The study's keys.
 
 use lynkeus_gain::UnitFactor;
+use lynkeus_proof::matrix::square;
 use lynkeus_structure::AugmentedPlant;
 
 use crate::estimate::{Common, PROLONG};
@@ -9,7 +10,6 @@ use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: REQUIRED,
     meaning: "the speed θ, in 1/(unit of time): the gain of block k grows like θ^k. Theorem 1 is stated for θ ≥ 1, so choose a unit of time in which the entries of F are of the order of 1",
@@ -17,15 +17,16 @@ const THETA: KeySpec = KeySpec {
 
 const START: KeySpec = KeySpec {
     name: "S0",
-    kind: "number s > 0, or a matrix as a list of rows",
-    shape: Shape::Either(&[Shape::Positive, Shape::ROWS]),
+    shape: Shape::As(
+        "number s > 0, or a matrix as a list of rows",
+        &Shape::Either(&[Shape::Positive, Shape::ROWS]),
+    ),
     default: "1",
     meaning: "S(0) = s·I, or the matrix; rows and columns in the order of the plant's states, then the unknown inputs",
 };
 
 const ALARM: KeySpec = KeySpec {
     name: "alarm",
-    kind: "number > 0",
     shape: Shape::Positive,
     default: "see below",
     meaning: "the flag is raised where `excitation` is below this",
@@ -66,29 +67,29 @@ impl Settings {
         Ok(())
     }
 
-    /// The numbers of (7)–(8) with the states in this order.
-    pub(super) fn numbers(&self, order: &[usize]) -> Result<Numbers, TuningError> {
+    /// θ, which has no default.
+    pub fn θ(&self) -> Result<f64, TuningError> {
         let expected = "a positive number (the gain of block k grows like theta^k)";
         let missing = || TuningError::absent(THETA.name, expected);
-        let θ = self.θ.clone()?.ok_or_else(missing)?;
-        let given = self.S0.as_ref().map_err(TuningError::clone)?;
-        let ordered: Vec<Vec<f64>> = match given {
-            Given::Number(s) => scaled_identity(order.len(), *s),
-            Given::Matrix(given) => {
-                let row = |&i: &usize| order.iter().map(|&j| given[i][j]).collect();
-                order.iter().map(row).collect()
-            }
-        };
-        let S0 = UnitFactor::new(&ordered).map_err(|error| START.wrong(error))?;
-        Ok(Numbers { θ, S0 })
+        self.θ.clone()?.ok_or_else(missing)
     }
-}
 
-/// The numbers of (7)–(8).
-pub(super) struct Numbers {
-    pub θ: f64,
-    /// S(0) in the order of the blocks
-    pub S0: UnitFactor,
+    /// S(0) with the states in this order.
+    pub fn S0(&self, order: &[usize]) -> Result<UnitFactor, TuningError> {
+        let given = self.S0.as_ref().map_err(TuningError::clone)?;
+        let entry = |i: usize, j: usize| match given {
+            Given::Number(s) => {
+                if i == j {
+                    *s
+                } else {
+                    0.0
+                }
+            }
+            Given::Matrix(given) => given[order[i]][order[j]],
+        };
+        let n = order.len();
+        UnitFactor::new(&square(n, entry)).map_err(|error| START.wrong(error))
+    }
 }
 
 /// S(0) as the study has it: a large plant needs no matrix before its observer does.
@@ -127,13 +128,6 @@ fn start(tuning: &Tuning, n: usize) -> Late<Given> {
     // refused in the user's order, factored in that of the blocks
     UnitFactor::new(&given).map_err(|error| wrong(error.to_string()))?;
     Ok(Given::Matrix(given))
-}
-
-fn scaled_identity(n: usize, s: f64) -> Vec<Vec<f64>> {
-    let entry = |i: usize, j: usize| if i == j { s } else { 0.0 };
-    (0..n)
-        .map(|i| (0..n).map(|j| entry(i, j)).collect())
-        .collect()
 }
 
 #[cfg(test)]

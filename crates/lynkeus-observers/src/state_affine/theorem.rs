@@ -21,21 +21,23 @@
 //!
 //! S(t) of (8) is bounded from above and, where F and C are numbers, from below.
 
-use lynkeus_expr::{Interval, Node};
+use lynkeus_expr::Interval;
 use lynkeus_gain::UnitFactor;
 use lynkeus_proof::chain::Slope;
 use lynkeus_proof::definite::least_eigenvalue;
 use lynkeus_proof::matrix::{IntervalMatrix, square, sum, upper};
-use lynkeus_proof::metzler;
 use lynkeus_proof::metzler::spectral_radius;
 use lynkeus_proof::search::first;
-use lynkeus_structure::{AugmentedPlant, Region, Standing, Superdiagonal, Verdict, short};
+use lynkeus_structure::output_map::Rows;
+use lynkeus_structure::{AugmentedPlant, Region, Standing, Verdict};
 
+use super::form::Form;
 use super::observer::alarm;
-use super::settings::{Numbers, Settings};
+use super::said::Said;
+use super::settings::Settings;
 use crate::design::Found;
 use crate::estimate::Common;
-use crate::statement::{proved, standing, undecided};
+use crate::statement::{proved, standing, sufficient, undecided};
 use crate::theorem::{magnitude, slopes, undeclared};
 use crate::{
     Assumptions, Bounds, Certificate, Check, Constant, DesignError, Ltaief, Statement, estimate,
@@ -46,16 +48,10 @@ pub(super) const BASIS: &str = "Theorem 1 of Ltaief, Maatoug, Farza, Ménard, M'
 pub(super) fn certificate(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
-    Found { form, examination }: Found<Superdiagonal>,
+    Found { form, examination }: Found<Form>,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
-    let order: Vec<usize> = form.blocks().flatten().copied().collect();
-    let numbers = settings.numbers(&order)?;
-    let block: Vec<usize> = form
-        .blocks()
-        .enumerate()
-        .flat_map(|(k, b)| b.iter().map(move |_| k))
-        .collect();
+    let (θ, S0) = (settings.θ()?, settings.S0(&form.order)?);
     let alarm = alarm(augmented, &form, settings)?;
     let shows = |c: &&Check| matches!(&c.statement, Statement::Ltaief(Ltaief::BlockShows { .. }));
     let always_shown = examination
@@ -67,9 +63,8 @@ pub(super) fn certificate(
         augmented,
         assumptions,
         form: &form,
-        order,
-        block,
-        numbers,
+        θ,
+        S0,
         common: &settings.common,
         alarm,
         always_shown,
@@ -83,12 +78,9 @@ pub(super) fn certificate(
 struct Study<'a> {
     augmented: &'a AugmentedPlant<'a>,
     assumptions: &'a Assumptions,
-    form: &'a Superdiagonal,
-    /// the states in the order of the blocks
-    order: Vec<usize>,
-    /// the block of each place
-    block: Vec<usize>,
-    numbers: Numbers,
+    form: &'a Form,
+    θ: f64,
+    S0: UnitFactor,
     common: &'a Common,
     alarm: f64,
     /// every F_k has full column rank on the box
@@ -98,47 +90,32 @@ struct Study<'a> {
 /// Entries row by row.
 type Table = Vec<Vec<f64>>;
 
-/// |C| and |F| in the order of the blocks, and whether all entries are numbers.
-struct Sizes {
-    C: Table,
-    F: Table,
-    numbers: Option<(Table, Table)>,
-    check: Check,
-}
-
-/// λ_m and λ_M.
-#[derive(Clone, Copy)]
-struct Spectrum {
-    smallest: f64,
-    largest: f64,
-    /// λ_m is a number of the plant, not the alarm
-    is_proved: bool,
-}
-
 impl Study<'_> {
     fn region(&self) -> &Region {
         &self.assumptions.region
     }
 
     fn place(&self, state: usize) -> Option<usize> {
-        self.order.iter().position(|s| *s == state)
+        self.form.order.iter().position(|s| *s == state)
     }
 
     fn certificate(&self, mut checks: Vec<Check>) -> Result<Certificate, DesignError> {
         let next = |row: usize, column: usize| match (self.place(row), self.place(column)) {
-            (Some(p), Some(q)) => self.block[q] > self.block[p],
+            (Some(p), Some(q)) => self.form.block[q] > self.form.block[p],
             _ => false,
         };
         let (slopes, lipschitz) = slopes(self.augmented, self.region(), next)?;
-        let sizes = self.sizes()?;
-        let bounded = [&lipschitz, &sizes.check].iter().all(|c| c.is_proved());
-        checks.extend([lipschitz, sizes.check.clone(), self.uncertainty()]);
+        let (sizes, a1) = self.sizes()?;
+        let bounded = lipschitz.is_proved() && a1.is_proved();
+        checks.extend([lipschitz, a1, self.uncertainty()]);
         let mut constants = vec![];
-        let excitation = self.excitation(&sizes);
+        let excitation = self.excitation();
         let mut found = None;
         if bounded {
-            let spectrum = self.spectrum(&sizes, excitation, &mut constants);
-            found = self.decay(&slopes, &spectrum, &mut checks, &mut constants);
+            let λ = self.spectrum(&sizes, excitation, &mut constants);
+            let is_lasting = self.always_shown || excitation.is_some();
+            let rate = self.decay(&slopes, λ, is_lasting, &mut checks, &mut constants);
+            found = rate.map(|rate| (rate, λ));
         }
         let everything_else = standing(&checks) == Standing::Proved;
         checks.push(self.a4(excitation));
@@ -146,136 +123,103 @@ impl Study<'_> {
         certificate.constants = constants;
         let note = estimate::note(self.common, self.augmented, self.region());
         certificate.notes.push(note);
-        if let Some((rate, spectrum)) = found.filter(|_| everything_else) {
-            self.conclude(&mut certificate, rate, &spectrum);
+        if let Some((rate, λ)) = found.filter(|_| everything_else) {
+            self.conclude(&mut certificate, rate, λ);
         }
         Ok(certificate)
     }
 
-    /// A1: bounds of C and F.
-    fn sizes(&self) -> Result<Sizes, DesignError> {
+    /// A1: |C| and |F| with the verdict on their bounds.
+    fn sizes(&self) -> Result<([Table; 2], Check), DesignError> {
         let graph = self.augmented.graph();
-        let n = self.order.len();
-        let mut C = vec![vec![0.0; n]; self.augmented.outputs.len()];
-        let mut F = vec![vec![0.0; n]; n];
-        let (mut values, mut open): (Option<(Table, Table)>, Vec<Node>) =
-            (Some((C.clone(), F.clone())), vec![]);
-        for (k, factor) in self.form.factors.iter().enumerate() {
-            for &(i, j, node) in &factor.entries {
-                let size = magnitude(graph, node, self.region())?;
-                let value = graph.constant_value(node);
-                if size.is_infinite() {
-                    open.push(node);
-                }
-                let row = if k == 0 {
-                    Some(factor.rows[i])
-                } else {
-                    self.place(factor.rows[i])
-                };
-                let (Some(row), Some(column)) = (row, self.place(factor.columns[j])) else {
-                    continue;
-                };
-                let table = if k == 0 { &mut C } else { &mut F };
-                table[row][column] = size;
-                values = values.and_then(|(mut c, mut f): (Table, Table)| {
-                    let table = if k == 0 { &mut c } else { &mut f };
-                    table[row][column] = value?;
-                    Some((c, f))
-                });
+        let size = |node| magnitude(graph, node, self.region());
+        let mut open = vec![];
+        for &(.., node) in self
+            .form
+            .blocks
+            .factors
+            .iter()
+            .flat_map(|factor| &factor.entries)
+        {
+            if size(node)?.is_infinite() {
+                open.push(node);
             }
         }
-        let name = Ltaief::A1;
         let check = match open.first() {
-            None => proved(name, "every entry enclosed"),
+            None => proved(Ltaief::A1, Said::Enclosed),
             Some(&node) => {
-                let missing = undeclared(self.augmented, &open, self.region());
-                let advice = match missing.is_empty() {
-                    true => "mind divisions and roots at the edges of the box".to_owned(),
-                    false => format!("declare min and max of {}", missing.join(", ")),
-                };
-                undecided(
-                    name,
-                    format!("{} has no bound: {advice}", graph.render(node, 60)),
-                )
+                let entry = graph.render(node, 60);
+                let undeclared = undeclared(self.augmented, &open, self.region());
+                undecided(Ltaief::A1, Said::NoBound { entry, undeclared })
             }
         };
-        Ok(Sizes {
-            C,
-            F,
-            numbers: values,
-            check,
-        })
+        let table = |rows: &Rows| -> Result<Table, DesignError> {
+            let entry = |e: &Option<_>| e.map_or(Ok(0.0), size);
+            rows.iter()
+                .map(|row| row.iter().map(entry).collect())
+                .collect()
+        };
+        Ok(([table(&self.form.C)?, table(&self.form.F)?], check))
     }
 
     /// A3: the uncertainty is bounded.
     fn uncertainty(&self) -> Check {
-        let name = Ltaief::A3;
         let drift = &self.assumptions.drift;
         let known = |&state: &usize| drift.get(state).is_some_and(|d| d.is_finite());
-        match self.order.iter().find(|state| !known(state)) {
-            None => proved(name, self.assumed_drift()),
-            Some(&state) => {
-                let name_of = &self.augmented.states[state].name;
-                undecided(
-                    name,
-                    format!("no bound is assumed for the drift of {name_of}"),
-                )
+        match self.form.order.iter().find(|state| !known(state)) {
+            None => {
+                let constant = self.assumptions.constant(self.augmented.plant_states());
+                let constant = constant.into_iter().map(str::to_owned).collect();
+                proved(Ltaief::A3, Said::Drift { constant })
             }
-        }
-    }
-
-    fn assumed_drift(&self) -> String {
-        let constant = self.assumptions.constant(self.augmented.plant_states());
-        match constant.is_empty() {
-            true => "by the assumed drift".to_owned(),
-            false => format!(
-                "by the assumed drift, which takes {} as constant",
-                constant.join(", ")
-            ),
+            Some(&state) => {
+                let name = self.augmented.states[state].name.clone();
+                undecided(Ltaief::A3, Said::NoDrift(name))
+            }
         }
     }
 
     /// λ_m where F and C are numbers.
-    fn excitation(&self, sizes: &Sizes) -> Option<f64> {
-        let (C, F) = sizes.numbers.as_ref()?;
-        below(C, F, self.form.factors.len())
+    fn excitation(&self) -> Option<f64> {
+        let graph = self.augmented.graph();
+        let entry = |e: &Option<_>| e.map_or(Some(0.0), |node| graph.constant_value(node));
+        let numbers = |rows: &Rows| -> Option<Table> {
+            rows.iter()
+                .map(|row| row.iter().map(entry).collect())
+                .collect()
+        };
+        let Form { C, F, blocks, .. } = self.form;
+        below(&numbers(C)?, &numbers(F)?, blocks.factors.len())
     }
 
     fn a4(&self, excitation: Option<f64>) -> Check {
-        let name = Ltaief::A4;
         match excitation {
-            Some(λ) => proved(
-                name,
-                format!("C and F are numbers: λ_m = {} for t ≥ {TAU}/θ", short(λ)),
-            ),
-            None => undecided(
-                name,
-                format!(
-                    "it depends on the inputs and the estimate, which no box decides. While the monitor 'excitation' is above its alarm {}, λ_m is at least that, δ_0/α(θ) = e·λ_m, and the constants hold; the key 'alarm' sets it. What is missing for a proof is a lower bound of the excitation for all time{}",
-                    short(self.alarm),
-                    match self.always_shown {
-                        true => "",
-                        false =>
-                            ". (12), α(θ)/θ² → 0, holds for no inputs without jumps where a block hides a direction at some instant: λ_min(S) falls like θ^−2 there",
-                    }
-                ),
-            ),
+            Some(λ) => proved(Ltaief::A4, Said::Excited { λ, from: TAU }),
+            None => {
+                let (alarm, always_shown) = (self.alarm, self.always_shown);
+                let watched = Said::Watched {
+                    alarm,
+                    always_shown,
+                };
+                undecided(Ltaief::A4, watched)
+            }
         }
     }
 
+    /// λ_m and λ_M.
     fn spectrum(
         &self,
-        sizes: &Sizes,
+        [C, F]: &[Table; 2],
         excitation: Option<f64>,
         constants: &mut Vec<Constant>,
-    ) -> Spectrum {
-        let largest = largest_eigenvalue(&above(&self.numbers.S0, &sizes.C, &sizes.F, &self.block));
-        let smallest = excitation.unwrap_or(self.alarm);
-        let source = match excitation {
-            Some(_) => "lower bound of the eigenvalues of S(t), t ≥ 10/θ",
-            None => {
-                "lower bound of the eigenvalues of S(t) while the monitor raises no flag: the alarm"
-            }
+    ) -> [f64; 2] {
+        let largest = spectral_radius(&above(&self.S0, C, F, &self.form.block));
+        let (smallest, source) = match excitation {
+            Some(λ) => (λ, "lower bound of the eigenvalues of S(t), t ≥ 10/θ"),
+            None => (
+                self.alarm,
+                "lower bound of the eigenvalues of S(t) while the monitor raises no flag: the alarm",
+            ),
         };
         let mut add = |name: &str, value: f64, meaning: &str| {
             constants.push(Constant::new(name, value, meaning));
@@ -292,53 +236,42 @@ impl Study<'_> {
             δ0,
             "e·λ_m: what (11) has to provide for it, by (16)",
         );
-        Spectrum {
-            smallest,
-            largest,
-            is_proved: excitation.is_some(),
-        }
+        [smallest, largest]
     }
 
     /// ‖G(θ)‖ ≤ √ρ(GᵀG)
     fn coupling(&self, slopes: &[Slope], θ: f64) -> f64 {
-        let n = self.order.len();
+        let n = self.form.order.len();
         let mut G = vec![vec![0.0; n]; n];
         for slope in slopes {
             if let (Some(p), Some(q)) = (self.place(slope.row), self.place(slope.column)) {
-                let power = Interval::point(θ).powi((self.block[p] - self.block[q]) as i32);
+                let power =
+                    Interval::point(θ).powi((self.form.block[p] - self.form.block[q]) as i32);
                 G[p][q] = (Interval::point(slope.size) / power).hi();
             }
         }
-        let square: Vec<Vec<f64>> = (0..n)
-            .map(|i| {
-                let entry = |j: usize| {
-                    sum(G
-                        .iter()
-                        .map(|row| Interval::point(row[i]) * Interval::point(row[j])))
-                    .hi()
-                };
-                (0..n).map(entry).collect()
-            })
-            .collect();
-        Interval::point(spectral_radius(&square)).sqrt().hi()
+        let product =
+            |row: &Vec<f64>, i: usize, j: usize| Interval::point(row[i]) * Interval::point(row[j]);
+        let G2 = square(n, |i, j| sum(G.iter().map(|row| product(row, i, j))).hi());
+        Interval::point(spectral_radius(&G2)).sqrt().hi()
     }
 
-    /// θμ_θ with the hypothesis μ_θ > 0.
+    /// θμ_θ with the hypothesis μ_θ > 0; a λ_m that is lasting does not fall as θ grows.
     fn decay(
         &self,
         slopes: &[Slope],
-        spectrum: &Spectrum,
+        [smallest, largest]: [f64; 2],
+        is_lasting: bool,
         checks: &mut Vec<Check>,
         constants: &mut Vec<Constant>,
-    ) -> Option<(f64, Spectrum)> {
-        let ratio = (Interval::point(spectrum.largest) / Interval::point(spectrum.smallest)).sqrt();
+    ) -> Option<f64> {
+        let ratio = (Interval::point(largest) / Interval::point(smallest)).sqrt();
         let μ = |θ: f64| {
             let loss = ratio * Interval::point(self.coupling(slopes, θ)) / Interval::point(θ);
             (Interval::point(0.5) - loss).lo()
         };
-        let θ = self.numbers.θ;
+        let θ = self.θ;
         // a λ_m that falls as θ grows gives none
-        let is_lasting = self.always_shown || spectrum.is_proved;
         let θ0 = first(θ, |θ| μ(θ) > 0.0).filter(|_| is_lasting);
         let mut add = |name: &str, value: f64, meaning: &str| {
             constants.push(Constant::new(name, value, meaning));
@@ -359,40 +292,36 @@ impl Study<'_> {
         }
         if !is_lasting {
             let share = Interval::point(2.0 * self.coupling(slopes, θ)) / Interval::point(θ);
-            let needed = Interval::point(spectrum.largest) * share * share;
+            let needed = Interval::point(largest) * share * share;
             add(
                 "λ_m needed",
                 needed.hi(),
                 "λ_M(2L/θ)²: where λ_min(S) is above it at the study's θ, μ_θ > 0",
             );
         }
-        let name = Ltaief::Theta { θ };
-        let from = match θ0 {
-            Some(θ0) => format!("θ0 = {}", short(θ0)),
-            None if is_lasting => "no θ0 was found".to_owned(),
-            None => "no θ0 follows from a λ_m that falls as θ grows".to_owned(),
+        let μ = μ(θ);
+        let rate = (Interval::point(θ) * Interval::point(μ)).lo();
+        let is_proved = rate > 0.0;
+        let said = Said::Rate {
+            μ,
+            θ0,
+            is_lasting,
+            is_proved,
         };
-        let rate = (Interval::point(θ) * Interval::point(μ(θ))).lo();
-        checks.push(match rate > 0.0 {
-            true => proved(name, format!("μ_θ = {}, {from}", short(μ(θ)))),
-            false => undecided(
-                name,
-                format!("μ_θ = {}, {from}; sufficient, not necessary", short(μ(θ))),
-            ),
-        });
-        (rate > 0.0).then_some((rate, *spectrum))
+        checks.push(sufficient(Ltaief::Theta { θ }, is_proved, said));
+        is_proved.then_some(rate)
     }
 
     /// Rate and ultimate bounds: of the certificate where A4 is proved, else as
     /// constants that hold while the monitor raises no flag.
-    fn conclude(&self, certificate: &mut Certificate, rate: f64, spectrum: &Spectrum) {
-        let θ = Interval::point(self.numbers.θ);
-        let scale = |p: usize| θ.powi(self.block[p] as i32);
-        let drift = self.order.iter().enumerate().map(|(p, &state)| {
+    fn conclude(&self, certificate: &mut Certificate, rate: f64, [smallest, largest]: [f64; 2]) {
+        let θ = Interval::point(self.θ);
+        let scale = |p: usize| θ.powi(self.form.block[p] as i32);
+        let drift = self.form.order.iter().enumerate().map(|(p, &state)| {
             let d = Interval::point(self.assumptions.drift[state]) / scale(p);
             d * d
         });
-        let b = (Interval::point(spectrum.largest) * sum(drift)).sqrt();
+        let b = (Interval::point(largest) * sum(drift)).sqrt();
         let count = self.augmented.outputs.len();
         let noise = |i: usize| {
             self.assumptions
@@ -406,18 +335,19 @@ impl Study<'_> {
         let twice = Interval::point(2.0) * Interval::point(rate);
         let root = |added: Interval| {
             let v = (b + (b * b + twice * (θ * w2 + added)).sqrt()) / twice;
-            v / Interval::point(spectrum.smallest).sqrt()
+            v / Interval::point(smallest).sqrt()
         };
-        let densities = self.order.iter().enumerate().map(|(p, &state)| {
+        let densities = self.form.order.iter().enumerate().map(|(p, &state)| {
             Interval::point(self.assumptions.process_noise[state]) / scale(p).powi(2)
         });
-        let moved = Interval::point(spectrum.largest) * sum(densities);
+        let moved = Interval::point(largest) * sum(densities);
         let radius = root(Interval::ZERO);
-        let last = self.block.iter().copied().max().unwrap_or(0);
+        let last = self.form.block.iter().copied().max().unwrap_or(0);
         let norm = |radius: Interval| (θ.powi(last as i32).max(Interval::ONE) * radius).hi();
         let bounds = |radius: Interval| {
-            let name = |p: usize| self.augmented.states[self.order[p]].name.clone();
-            let each = (0..self.order.len()).map(|p| (name(p), (scale(p) * radius).hi()).into());
+            let name = |p: usize| self.augmented.states[self.form.order[p]].name.clone();
+            let each =
+                (0..self.form.order.len()).map(|p| (name(p), (scale(p) * radius).hi()).into());
             let norm = norm(radius);
             norm.is_finite().then(|| Bounds {
                 norm,
@@ -456,18 +386,13 @@ impl Study<'_> {
 }
 
 /// After this many 1/θ the past is forgotten but for e^{−τ}.
-pub(super) const TAU: f64 = 10.0;
+const TAU: f64 = 10.0;
 
 /// |S_ij(t)| ≤ B_ij for all t. Entry by entry (8) is S_ij' = −θ(S_ij − r_ij), so
 /// |S_ij| ≤ max(|S_ij(0)|, sup|r_ij|), and r_ij = (CᵀC − FᵀS − SF)_ij has entries of S
 /// of earlier blocks only. `block` is the block of each place, from 0; `C` and `F`
 /// bound the entries. The paper adds where this takes the larger.
-pub(super) fn above(
-    S0: &UnitFactor,
-    C: &[Vec<f64>],
-    F: &[Vec<f64>],
-    block: &[usize],
-) -> Vec<Vec<f64>> {
+fn above(S0: &UnitFactor, C: &[Vec<f64>], F: &[Vec<f64>], block: &[usize]) -> Vec<Vec<f64>> {
     let n = block.len();
     let start = product(S0);
     let mut B = vec![vec![Interval::ZERO; n]; n];
@@ -487,19 +412,10 @@ pub(super) fn above(
 /// UᵀDU
 fn product(S0: &UnitFactor) -> IntervalMatrix {
     let n = S0.diagonal.len();
-    let U = |k: usize, j: usize| match j.cmp(&k) {
-        std::cmp::Ordering::Less => Interval::ZERO,
-        std::cmp::Ordering::Equal => Interval::ONE,
-        std::cmp::Ordering::Greater => Interval::point(S0.upper[k][j - k - 1]),
-    };
+    let U = |k: usize, j: usize| Interval::point(S0.U(k, j));
     square(n, |i, j| {
         sum((0..n).map(|k| U(k, i) * Interval::point(S0.diagonal[k]) * U(k, j)))
     })
-}
-
-/// An upper bound of the largest eigenvalue of every S(t).
-pub(super) fn largest_eigenvalue(B: &Vec<Vec<f64>>) -> f64 {
-    metzler::spectral_radius(B)
 }
 
 /// A lower bound of the least eigenvalue of S(t) for t ≥ TAU/θ where F and C are
@@ -508,7 +424,7 @@ pub(super) fn largest_eigenvalue(B: &Vec<Vec<f64>>) -> f64 {
 /// S(t) ≥ ∫₀^τ e^{−s} e^{−Fᵀs} CᵀC e^{−Fs} ds = Σ_ab (−1)^{a+b}/(a! b!) I_{a+b} (CF^a)ᵀCF^b,
 ///
 /// I_m = ∫₀^τ e^{−s} s^m ds = m I_{m−1} − e^{−τ} τ^m.
-pub(super) fn below(C: &[Vec<f64>], F: &[Vec<f64>], blocks: usize) -> Option<f64> {
+fn below(C: &[Vec<f64>], F: &[Vec<f64>], blocks: usize) -> Option<f64> {
     let n = F.len();
     let τ = Interval::point(TAU);
     let left = (-τ).exp();

@@ -4,15 +4,16 @@
 use lynkeus_expr::{MissingInput, Tape, jacobian};
 use lynkeus_proof::hurwitz::Stability;
 use lynkeus_proof::spectrum;
-use lynkeus_structure::{Assignment, AugmentedPlant, Region, Standing, chains};
+use lynkeus_structure::{Assignment, AugmentedPlant, Region, chains};
 use nalgebra::DMatrix;
 
 use super::form::{Form, Gains, NAME, Window};
+use super::said::{Hammouri, Loose, Said};
 use super::settings::Settings;
-use crate::conditions::{GainedChain, lipschitz, names, output_slope, partials, told};
-use crate::design::{Found, Searched};
+use crate::conditions::{GainedChain, along, lipschitz, names};
+use crate::design::{Found, Searched, first_fit};
 use crate::statement::undecided;
-use crate::{DesignError, Examination, Hammouri, TuningError};
+use crate::{DesignError, Examination, Reason};
 
 /// The first assignment whose conditions are proved, else the first that no condition
 /// refutes, else the first with its refusal; or the examination that says why there is none.
@@ -21,17 +22,16 @@ pub(super) fn form(
     settings: &Settings,
     region: &Region,
 ) -> Searched<Form> {
-    let refusal = |summary: String| Examination::unfit(NAME, summary, vec![]);
+    let refusal = |summary| Ok(Err(Examination::unfit(NAME, summary, vec![])));
     let mut assignments = match chains::find(augmented, &settings.request) {
         Ok(assignments) => assignments,
-        Err(summary) => return Ok(Err(refusal(summary))),
+        Err(summary) => return refusal(Reason::from(summary)),
     };
     if let Some(leading) = settings.leading {
         assignments.retain(|a| a.leads.contains(&leading));
         assignments.iter_mut().for_each(|a| a.leading = leading);
         if assignments.is_empty() {
-            let summary = "the chain that 'leading' names cannot lead: beside its last equation it reads another chain's hidden states";
-            return Ok(Err(refusal(summary.into())));
+            return refusal(Said::CannotLead.into());
         }
     } else if let Some(δ) = &settings.δ {
         assignments
@@ -39,26 +39,9 @@ pub(super) fn form(
             .for_each(|a| lead_within_window(a, δ));
     }
     let choices = assignments.len();
-    let mut best: Option<Found<Form>> = None;
-    for assignment in assignments {
-        let form = examined(augmented, settings, region, assignment, choices)?;
-        match form.examination.fit() {
-            Standing::Proved => return Ok(Ok(form)),
-            Standing::Undecided
-                if best
-                    .as_ref()
-                    .is_none_or(|b| b.examination.fit() == Standing::Refuted) =>
-            {
-                best = Some(form);
-            }
-            _ => {
-                best.get_or_insert(form);
-            }
-        }
-    }
-    // chains::find never returns an empty list
-    best.map(Ok)
-        .ok_or_else(|| TuningError::new("chains", "a chain", "none").into())
+    first_fit(assignments, |assignment| {
+        examined(augmented, settings, region, assignment, choices)
+    })
 }
 
 /// Where several chains can lead, the first for which the given exponents lie in the window.
@@ -80,113 +63,74 @@ fn examined(
     assignment: Assignment,
     choices: usize,
 ) -> Result<Found<Form>, DesignError> {
-    let (mut checks, mut all) = (vec![], vec![]);
-    for (i, chain) in assignment.chains.iter().enumerate() {
-        checks.extend(output_slope(augmented, i, region)?);
-        let (found, signs) = partials(augmented, &chain.states, region)?;
-        checks.extend(signs);
-        all.push(found);
-    }
+    let places = assignment.chains.iter().map(|c| &c[..]);
+    let (partials, mut checks) = along(augmented, places.enumerate(), region)?;
     checks.push(lipschitz(augmented, region)?);
-    let chains = assignment
-        .chains
-        .iter()
-        .map(|c| names(augmented, &c.states))
-        .collect();
-    let mut summary = chains::describe(augmented, &assignment);
-    if choices > 1 {
-        summary += &format!(
-            ", the most balanced of {choices} assignments that the equations allow; the key 'chains' decides otherwise"
-        );
-    }
-    if assignment.leads.len() > 1 {
-        let leading = &augmented.outputs[assignment.leading].variable.name;
-        let which = match assignment.leads.len() {
-            count if count < assignment.chains.len() => format!("{count} of the chains"),
-            2 => "either chain".to_owned(),
-            _ => "any chain".to_owned(),
-        };
-        summary += &format!(
-            "; {which} can lead in Theorem 2, that of {leading} does, the key 'leading' decides otherwise"
-        );
-    }
-    let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
+    let chains = assignment.chains.iter();
+    let chains: Vec<Vec<String>> = chains.map(|c| names(augmented, c)).collect();
+    let leads = assignment.leads.len();
+    let leading = augmented.outputs[assignment.leading].variable.name.clone();
     let form = Form {
         assignment,
-        partials: all,
+        partials,
     };
-    let mut found = Found { form, examination };
-    settle(&mut found, augmented, settings, region)?;
-    Ok(found)
+    // a plant that is damped by itself may carry a gain that does not stabilise its chain, as the paper's
+    // column does; where it does not even in the middle of the box, the gain is not called fit
+    let mut loose = form.loose(augmented, settings);
+    let count = augmented.states.len();
+    let is_large = count > LARGEST;
+    if !loose.is_empty() && (is_large || !form.is_damped(augmented, settings, region)?) {
+        let said = Said::Loose {
+            chains: std::mem::take(&mut loose),
+            too_many: is_large.then_some((count, LARGEST)),
+        };
+        checks.push(undecided(Hammouri::Damped, said));
+    }
+    let summary = Said::Form {
+        chains: chains.clone(),
+        choices,
+        leads,
+        leading,
+        loose,
+    };
+    let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
+    Ok(Found { form, examination })
 }
 
 /// Most states whose eigenvalues are computed: their number cubed is the work, and those of a long
 /// chain with a gain move as far as they are large by rounding alone.
 const LARGEST: usize = 200;
 
-/// What is said of a chain that the gain does not stabilise by itself; none where it does, or
-/// where the partials have no middle.
-fn loose_by(chain: &GainedChain<'_>, states: &[String]) -> Option<String> {
+/// A chain that the gain does not stabilise by itself; none where it does, or where the partials have
+/// no middle.
+fn loose_by(chain: &GainedChain<'_>, states: &[String]) -> Option<Loose> {
     let a = chain.middle()?;
     let frozen = chain.frozen();
+    let is_unstable = frozen == Stability::Unstable;
     if let ([first, .., last], true) = (states, states.len() > LARGEST) {
-        let verdict = match frozen {
-            Stability::Stable => return None,
-            Stability::Unstable => "is not stable",
-            Stability::Unknown => "is not proved to be stable",
-        };
-        return Some(format!("{verdict} for ({first} → … → {last})"));
+        let states = vec![first.clone(), "…".to_owned(), last.clone()];
+        return (frozen != Stability::Stable).then_some(Loose {
+            states,
+            is_unstable,
+            eigenvalues: None,
+        });
     }
     let eigenvalues = chain.eigenvalues(&a);
-    let states = states.join(" → ");
     let seen_stable = eigenvalues.first().map(|λ| λ.0 < 0.0);
-    match (frozen, seen_stable) {
-        // what Routh's table proves no rounded eigenvalue takes back
-        (Stability::Stable, _) | (Stability::Unknown, Some(true)) => None,
-        (Stability::Unknown, None) => Some(format!("is not proved to be stable for ({states})")),
-        (Stability::Unstable, None) => Some(format!("is not stable for ({states})")),
-        (_, Some(_)) => Some(format!(
-            "is not stable for ({states}), {} in the middle of the partials' bounds",
-            told(&eigenvalues)
-        )),
+    // what Routh's table proves no rounded eigenvalue takes back
+    if frozen == Stability::Stable || (!is_unstable && seen_stable == Some(true)) {
+        return None;
     }
-}
-
-/// Says where A(a) − rS⁻¹CᵀC is not stable. A plant that is damped by itself may carry
-/// such a gain, as the paper's column does; where it does not even in the middle of the
-/// box, the gain is not called fit.
-pub(super) fn settle(
-    Found { form, examination }: &mut Found<Form>,
-    augmented: &AugmentedPlant<'_>,
-    settings: &Settings,
-    region: &Region,
-) -> Result<(), DesignError> {
-    let loose = form.loose(augmented, settings);
-    if loose.is_empty() {
-        return Ok(());
-    }
-    let words = format!(
-        "with the S given A(a) − rS⁻¹CᵀC {}; only a plant that is damped by itself converges with such a gain, Lemma 1's own S (leave the key S out) is stable",
-        loose.join(" and ")
-    );
-    let n = augmented.states.len();
-    let words = match n > LARGEST {
-        true => format!(
-            "{words}; whether this plant's damping is enough is not looked into: it has {n} states, more than {LARGEST}"
-        ),
-        false if form.is_damped(augmented, settings, region)? => {
-            examination.summary += &format!("; {words}");
-            return Ok(());
-        }
-        false => words,
-    };
-    examination.checks.push(undecided(Hammouri::Damped, words));
-    Ok(())
+    Some(Loose {
+        states: states.to_vec(),
+        is_unstable,
+        eigenvalues: seen_stable.map(|_| eigenvalues),
+    })
 }
 
 impl Form {
-    /// The chains that the gain does not stabilise by itself, with their eigenvalues.
-    fn loose(&self, augmented: &AugmentedPlant<'_>, settings: &Settings) -> Vec<String> {
+    /// The chains that the S given does not stabilise by itself.
+    fn loose(&self, augmented: &AugmentedPlant<'_>, settings: &Settings) -> Vec<Loose> {
         let Some(S) = &settings.S else {
             return vec![];
         };
@@ -205,7 +149,7 @@ impl Form {
                 K: &K,
                 partials: &bounds.collect::<Vec<_>>(),
             };
-            loose.extend(loose_by(&gained, &names(augmented, &chain.states)));
+            loose.extend(loose_by(&gained, &names(augmented, chain)));
         }
         loose
     }
@@ -235,14 +179,14 @@ impl Form {
         }
         for (i, chain) in self.assignment.chains.iter().enumerate() {
             // the signs of Remark 2, or divided by the partials
-            let along = chain.states.windows(2).map(|pair| A[(pair[0], pair[1])]);
+            let along = chain.windows(2).map(|pair| A[(pair[0], pair[1])]);
             let factors: Vec<f64> = along
                 .map(|a| if gains.divided { 1.0 / a } else { a.signum() })
                 .collect();
             let mut product = 1.0;
-            for (j, (&state, k)) in chain.states.iter().zip(gains.chain(i)).enumerate() {
+            for (j, (&state, k)) in chain.iter().zip(gains.chain(i)).enumerate() {
                 product *= if j == 0 { 1.0 } else { factors[j - 1] };
-                A[(state, chain.states[0])] -= product * k;
+                A[(state, chain[0])] -= product * k;
             }
         }
         Ok(spectrum::abscissa(A).is_some_and(|largest| largest < 0.0))
@@ -253,7 +197,7 @@ impl Form {
 mod tests {
     use super::*;
 
-    fn said(K: &[f64], partials: &[(f64, f64)]) -> Option<String> {
+    fn said(K: &[f64], partials: &[(f64, f64)]) -> Option<Loose> {
         let names: Vec<String> = (1..=K.len()).map(|i| format!("x{i}")).collect();
         loose_by(&GainedChain { K, partials }, &names)
     }
@@ -282,15 +226,15 @@ mod tests {
     fn what_is_not_found_is_not_called_stable() {
         // s³ + s² + 1e400 s + 1e600
         let large = [(1e200, 1e200); 2];
-        let text = said(&[1.0, 1e200, 1e200], &large).unwrap();
-        assert_eq!(text, "is not proved to be stable for (x1 → x2 → x3)");
-        let text = said(&[-1e200, 1e200], &[(1e200, 1e200)]).unwrap();
-        assert_eq!(text, "is not stable for (x1 → x2)");
-        let text = said(&[-2.0, 5.0], &[(1.0, 1.0)]).unwrap();
-        assert!(
-            text.contains("(x1 → x2), eigenvalues 1 ± 2i in the middle"),
-            "{text}"
-        );
+        let found = said(&[1.0, 1e200, 1e200], &large).unwrap();
+        assert!(!found.is_unstable && found.eigenvalues.is_none());
+        let found = said(&[-1e200, 1e200], &[(1e200, 1e200)]).unwrap();
+        assert!(found.is_unstable && found.eigenvalues.is_none());
+        let found = said(&[-2.0, 5.0], &[(1.0, 1.0)]).unwrap();
+        let [(re, im), _] = found.eigenvalues.unwrap()[..] else {
+            panic!("not two")
+        };
+        assert!((re - 1.0).abs() < 1e-12 && (im.abs() - 2.0).abs() < 1e-12);
         // 3·3 > a₂ in the middle only
         assert_eq!(said(&[3.0, 3.0, 1.0], &[(1.0, 1.0), (4.0, 16.0)]), None);
     }

@@ -5,11 +5,12 @@ use lynkeus_expr::Node;
 use lynkeus_gain::{Bounds, Tridiagonal, lemma1};
 use lynkeus_structure::Assignment;
 
+use super::said::Said;
 use super::settings::Settings;
 use crate::conditions::Partial;
 use crate::estimate::{PlantCopy, Speed};
 use crate::peaking::Transient;
-use crate::{TuningError, peaking};
+use crate::{ParameterValue, Reason, TuningError, peaking};
 
 pub(super) const NAME: &str = "triangular";
 
@@ -28,7 +29,7 @@ pub(super) struct Gains<'s> {
     pub S: Vec<Tridiagonal>,
     pub divided: bool,
     pub transient: Option<&'s Transient>,
-    pub notes: Vec<String>,
+    pub notes: Vec<Reason>,
 }
 
 impl<'s> Gains<'s> {
@@ -75,20 +76,17 @@ impl<'s> Gains<'s> {
     }
 
     /// The numbers, for the reader.
-    pub fn parameters(&self) -> Vec<(String, String)> {
-        let list = |values: &[f64]| {
-            let values: Vec<String> = values.iter().map(|x| format!("{x}")).collect();
-            values.join(", ")
-        };
+    pub fn parameters(&self) -> Vec<(String, ParameterValue)> {
+        let row = |name: String, numbers: &[f64]| (name, numbers.to_vec().into());
         let mut rows = vec![
-            ("θ".to_owned(), list(&self.θ)),
-            ("δ".to_owned(), list(&self.δ)),
-            ("r".to_owned(), list(&self.r)),
+            row("θ".to_owned(), &self.θ),
+            row("δ".to_owned(), &self.δ),
+            row("r".to_owned(), &self.r),
         ];
         rows.extend(self.transient.map(Transient::parameter));
         for (i, s) in self.S.iter().enumerate() {
-            rows.push((format!("S{} diagonal", i + 1), list(s.diagonal())));
-            rows.push((format!("S{} beside it", i + 1), list(s.off_diagonal())));
+            rows.push(row(format!("S{} diagonal", i + 1), s.diagonal()));
+            rows.push(row(format!("S{} beside it", i + 1), s.off_diagonal()));
         }
         rows
     }
@@ -190,12 +188,10 @@ impl Window {
     }
 
     /// What the reader should know of an observer outside of it.
-    pub fn note(&self) -> Option<String> {
+    pub fn note(&self) -> Option<Reason> {
         let Self {
             low, high, ratio, ..
-        } = self;
-        (!self.holds()).then(|| {
-            format!("delta: the ratio {ratio:.4} lies outside ({low:.4}, {high:.4}), the window of Theorem 2; its proof does not cover this observer")
-        })
+        } = *self;
+        (!self.holds()).then(|| Said::OutsideWindow { low, high, ratio }.into())
     }
 }

@@ -12,6 +12,7 @@
 mod conditions;
 mod form;
 mod observer;
+mod said;
 mod settings;
 mod theorem;
 
@@ -24,6 +25,7 @@ use crate::{
 };
 use form::{Form, Gains, NAME};
 use observer::observer;
+pub use said::{Hammouri, Loose, Said};
 use settings::Settings;
 use theorem::BASIS;
 
@@ -65,7 +67,7 @@ impl Stages for Triangular {
             return guarantee::design_lmi(augmented, &settings.common, lmi, NAME, examination);
         }
         if settings.remedies.low_power {
-            return Ok(observer::assemble(augmented, settings, found)?);
+            return Ok(observer::low_power(augmented, settings, found)?);
         }
         let Found { form, examination } = found;
         let gains = Gains::new(&form, settings)?;

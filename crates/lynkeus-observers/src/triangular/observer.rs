@@ -12,9 +12,9 @@ use super::settings::Settings;
 use crate::conditions::Partial;
 use crate::design::Found;
 use crate::estimate::{PlantCopy, Speed, prolong};
-use crate::peaking::{self, Part, Run, Transient, factor_rows, variation};
+use crate::peaking::Part;
 use crate::printed::{AtStart, ChainCorrection};
-use crate::{Design, Examination, TuningError, estimate};
+use crate::{Design, Examination, TuningError, estimate, peaking};
 
 /// Observer (9).
 pub(super) fn observer(
@@ -37,27 +37,26 @@ pub(super) fn observer(
         };
         let timed = gains.timed(&copy, i, θ);
         let scaled = scaled(graph, &copy, &form.partials[i], &timed, gains.divided);
-        for (&state, gain) in chain.states.iter().zip(&scaled) {
+        for (&state, gain) in chain.iter().zip(&scaled) {
             let correction = graph.expr(*gain) * graph.expr(innovation);
             derivatives[state] = (graph.expr(derivatives[state]) - correction).node();
         }
         let printed = ChainCorrection {
             output: i,
-            states: &chain.states,
+            states: chain,
             factors: &scaled,
             limited: remedies.limit.is_some(),
         };
         match printed.constant(augmented) {
             Some(constant) => table.push(constant),
             None => {
-                let constants: Vec<String> = gains.chain(i).iter().map(f64::to_string).collect();
-                parameters.push((format!("rΔS⁻¹Cᵀ{}", i + 1), constants.join(", ")));
+                parameters.push((format!("rΔS⁻¹Cᵀ{}", i + 1), gains.chain(i).into()));
                 parameters.extend(printed.expressions(&start));
             }
         }
     }
     for (chain, partials) in form.assignment.chains.iter().zip(&form.partials) {
-        prolong(&copy, &chain.states, partials, &mut derivatives)?;
+        prolong(&copy, chain, partials, &mut derivatives)?;
     }
     Ok(Design {
         observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
@@ -96,86 +95,30 @@ fn scaled(
     scaled
 }
 
-pub(super) fn assemble(
+/// The observer whose chains have the low-power form.
+pub(super) fn low_power(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Form>,
 ) -> Result<Design, TuningError> {
-    let Settings {
-        common, remedies, ..
-    } = settings;
-    estimate::refuse(common, "form = \"low-power\"")?;
-    let chains = &form.assignment.chains;
+    estimate::refuse(&settings.common, "form = \"low-power\"")?;
     let (θ, δ) = (settings.θ()?, exponents(&form, settings));
-    let transient = remedies.transient.as_ref();
-    let coefficients = remedies.coefficients(&form.assignment.lengths())?;
-    let divided = settings.divided;
-    let copy = PlantCopy::new(augmented, common);
-    let mut run = Run::new(&copy, transient)?;
-    let speeds = Speed::of_chains(&copy, &θ);
-    let (mut factors, mut notes) = (vec![], vec![]);
-    for (i, chain) in chains.iter().enumerate() {
-        let Some(innovation) = remedies.innovation(&copy, i) else {
-            continue;
-        };
-        let derivative = |&state: &usize| augmented.derivatives[state];
-        let f: Vec<Node> = chain.states.iter().map(derivative).collect();
-        let output = &augmented.outputs[i].variable.name;
-        if !divided {
-            let bounds: Vec<(f64, f64)> = form.partials[i].iter().map(|p| p.bounds).collect();
-            notes.extend(variation(output, &bounds, &coefficients[i]));
-        }
-        let added = run.add(&Part {
-            states: &chain.states,
-            f: &f,
-            divisors: &divisors(augmented, &form.partials[i], divided)?,
-            innovation,
-            K: &coefficients[i],
-            θ: &speeds[i],
-            δ: δ[i],
-            number: i,
-        });
-        factors.extend(factor_rows(output, added));
-    }
-    notes.extend(
-        Window::of(&form.assignment, &δ)
-            .iter()
-            .filter_map(Window::note),
-    );
-    let list = |values: &[f64]| {
-        values
-            .iter()
-            .map(f64::to_string)
-            .collect::<Vec<_>>()
-            .join(", ")
+    let copy = PlantCopy::new(augmented, &settings.common);
+    let part = |i: usize| Part {
+        output: i,
+        states: &form.assignment.chains[i],
+        partials: &form.partials[i],
+        δ: δ[i],
     };
-    let mut parameters = vec![("θ".to_owned(), list(&θ)), ("δ".to_owned(), list(&δ))];
-    parameters.extend(transient.map(Transient::parameter));
-    parameters.extend(peaking::parameters(&coefficients));
-    parameters.extend(factors);
-    Ok(Design {
-        observer: run.finish(NAME)?.tuned_by(&speeds),
-        examination,
-        gains: vec![],
-        parameters,
-        notes,
-    })
-}
-
-/// a_i itself, or the constant that stands for it.
-fn divisors(
-    augmented: &AugmentedPlant<'_>,
-    partials: &[Partial],
-    divided: bool,
-) -> Result<Vec<Node>, TuningError> {
-    let divisor = |partial: &Partial| match (divided, partial.nominal()) {
-        (true, _) => Ok(partial.node),
-        (false, Some(middle)) => Ok(augmented.graph().constant(middle).node()),
-        (false, None) => {
-            let expected = "partial derivatives with known positive bounds for form = \"low-power\"; declare min and max in the model, or set partials = true";
-            let found = format!("bounds {} and {}", partial.bounds.0, partial.bounds.1);
-            Err(TuningError::new("form", expected, found))
-        }
-    };
-    partials.iter().map(divisor).collect()
+    let parts: Vec<Part<'_>> = (0..δ.len()).map(part).collect();
+    let derivative = |&state: &usize| augmented.derivatives[state];
+    let f = |i: usize| parts[i].states.iter().map(derivative).collect();
+    let advice = "declare min and max in the model, or set partials = true";
+    let advice = (!settings.divided).then_some(advice);
+    let remedies = &settings.remedies;
+    let mut design = peaking::low_power(&copy, remedies, &θ, &parts, f, advice, examination)?;
+    let windows = Window::of(&form.assignment, &δ);
+    design.notes.extend(windows.iter().filter_map(Window::note));
+    design.parameters.insert(1, ("δ".to_owned(), δ.into()));
+    Ok(design)
 }

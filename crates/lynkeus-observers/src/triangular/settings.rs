@@ -12,7 +12,6 @@ use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, peaking};
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
-    kind: "number > 0, or one per chain",
     shape: Shape::POSITIVES,
     default: REQUIRED,
     meaning: "the speed θ, in 1/(unit of time): larger converges faster, peaks higher and passes more noise",
@@ -20,7 +19,6 @@ const THETA: KeySpec = KeySpec {
 
 const DELTA: KeySpec = KeySpec {
     name: "delta",
-    kind: "number > 0, or one per chain",
     shape: Shape::POSITIVES,
     default: "1, and the middle of Theorem 2's window",
     meaning: "the exponents δ of θ",
@@ -28,7 +26,6 @@ const DELTA: KeySpec = KeySpec {
 
 const FACTOR: KeySpec = KeySpec {
     name: "r",
-    kind: "number > 0, or one per chain",
     shape: Shape::POSITIVES,
     default: "1",
     meaning: "the factor r of the gain; with Lemma 1 its ρ/2",
@@ -36,7 +33,6 @@ const FACTOR: KeySpec = KeySpec {
 
 const GAIN: KeySpec = KeySpec {
     name: "gain",
-    kind: "`\"lemma1\"`, `\"lmi\"`",
     shape: Shape::Word(&["lemma1", LMI]),
     default: "`\"lemma1\"`",
     meaning: "where the gain comes from: Lemma 1's S (unless `S` is given), or [a linear matrix inequality](certificates.md)",
@@ -44,31 +40,30 @@ const GAIN: KeySpec = KeySpec {
 
 const MATRICES: KeySpec = KeySpec {
     name: "S",
-    kind: "list of `{ diag = […], off = […] }`, one per chain",
-    shape: Shape::List(&Shape::Section(&[&[DIAGONAL, BESIDE]])),
+    shape: Shape::As(
+        "list of `{ diag = […], off = […] }`, one per chain",
+        &Shape::List(&Shape::Section(&[&[DIAGONAL, BESIDE]])),
+    ),
     default: "Lemma 1's",
     meaning: "explicit tridiagonal matrices: n numbers on the diagonal, n − 1 beside it",
 };
 
 const DIAGONAL: KeySpec = KeySpec {
     name: "diag",
-    kind: "list of n numbers",
-    shape: Shape::List(&Shape::Number),
+    shape: Shape::As("list of n numbers", &Shape::List(&Shape::Number)),
     default: REQUIRED,
     meaning: "on the diagonal",
 };
 
 const BESIDE: KeySpec = KeySpec {
     name: "off",
-    kind: "list of n − 1 numbers",
-    shape: Shape::List(&Shape::Number),
+    shape: Shape::As("list of n − 1 numbers", &Shape::List(&Shape::Number)),
     default: REQUIRED,
     meaning: "beside it",
 };
 
 const PARTIALS: KeySpec = KeySpec {
     name: "partials",
-    kind: "true, false",
     shape: Shape::Flag,
     default: "false",
     meaning: "divide the gain by the chain's partials at the estimate",
@@ -76,8 +71,7 @@ const PARTIALS: KeySpec = KeySpec {
 
 const LEADING: KeySpec = KeySpec {
     name: "leading",
-    kind: "name of a measured output",
-    shape: Shape::Text,
+    shape: Shape::As("name of a measured output", &Shape::Text),
     default: "the first chain that can; with `delta`, one for which it lies in the window",
     meaning: "which of several chains plays the first part in Theorem 2, where more than one can",
 };

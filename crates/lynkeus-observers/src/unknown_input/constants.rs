@@ -18,14 +18,14 @@
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Interval, MissingInput, Node, jacobian};
+use lynkeus_expr::{Interval, MissingInput, Node};
 use lynkeus_gain::integrators::Chain;
 use lynkeus_proof::magnitude::{length, norm, plus, product, size, times, total};
 use lynkeus_proof::matrix::sum;
-use lynkeus_structure::{AugmentedPlant, Layers, Matrix, rank, regularity, sign};
+use lynkeus_structure::{AugmentedPlant, Matrix, rank, regularity, sign};
 
-use super::form;
-use super::form::{Form, Shape};
+use super::form::{Form, along, column, covered};
+use super::said::{Said, Shape};
 use crate::statement::{proved, undecided};
 use crate::theorem::Enclosure;
 use crate::{Assumptions, Check, DesignError, Farza, Statement};
@@ -38,7 +38,10 @@ struct Signals<'e, 'p> {
     box_: Enclosure<'p>,
 }
 
-pub(super) fn norms(form: &Form<'_, '_>, assumptions: &Assumptions) -> Result<Norms, DesignError> {
+pub(super) fn norms<'p>(
+    form: &Form<'_, 'p>,
+    assumptions: &Assumptions,
+) -> Result<Norms, DesignError> {
     let signals = Signals::new(form, assumptions)?;
     let (form, box_) = (&signals.form, &signals.box_);
     let q = form.q();
@@ -59,85 +62,54 @@ pub(super) fn norms(form: &Form<'_, '_>, assumptions: &Assumptions) -> Result<No
     }
     let P = form.Λ2();
     let tall = form.shape() == Shape::Tall;
-    let Coordinates { Z, Ψ, P_inverse } = match tall && !form.bends() {
-        true => signals.straight(&P)?,
-        false => signals.curved(&P, &γ)?,
+    let each = |matrices: &[Matrix<'_>]| -> Result<Vec<f64>, MissingInput> {
+        matrices.iter().map(|A| box_.norm(A)).collect()
     };
-    let each = |A: &Matrix<'_>| box_.norm(A);
+    let (Ψ, Z, P_inverse) = match tall && !form.bends() {
+        // ζ_k = P_k η_k where P does not read X²: ∂ζ_k/∂x^k = P_k alone
+        true => {
+            let inverse: Vec<Matrix<'_>> = P.iter().map(|P| P.left_divide(&one(P.rows))).collect();
+            let own = |k: usize, j: usize| (j == k).then(|| P[k].clone());
+            let ψ = |k: usize, j: usize| Some(signals.straight_remainder(&P[k], k, j));
+            (signals.lower(ψ)?, signals.lower(own)?, each(&inverse)?)
+        }
+        false => {
+            let Z = signals.coordinates(&P);
+            let ψ = signals.remainders(&P, &Z, &γ);
+            let inverse = P.iter().map(|P| box_.inverse_norm(P));
+            let slopes = |A: &[Matrix<'p>], k: usize, j: usize| signals.slopes_in(&A[k], j + 1);
+            (
+                signals.lower(|k, j| Some(slopes(&ψ, k, j)))?,
+                signals.lower(|k, j| Some(slopes(&Z, k, j)))?,
+                inverse.collect::<Result<_, _>>()?,
+            )
+        }
+    };
     let Y: Vec<Matrix<'_>> = (1..=q).map(|k| signals.Y(k, &γ)).collect();
-    let turning = signals.along(&form.G11()).times(&left);
+    let turning = along(&form.G11(), &signals.slopes).times(&left);
     Ok(Norms {
         N0: box_.norm(&N0)?,
         N,
         turning: box_.norm(&turning)?,
         G11: box_.norm(&form.G11())?,
         left: box_.norm(&left)?,
-        γ: γ.iter().map(each).collect::<Result<_, _>>()?,
+        γ: each(&γ)?,
         W: inverse_triangle(&Z, &P_inverse),
         Z,
         Ψ,
-        Y: Y.iter().map(each).collect::<Result<_, _>>()?,
+        Y: each(&Y)?,
         P_inverse,
         tall,
-        blocks: form::covered(form, box_.region())?,
-        regular: signals.regular(&P)?,
-        continuous: signals.continuous(&P)?,
+        checks: [
+            covered(form, box_.region())?,
+            signals.regular(&P)?,
+            signals.continuous(&P)?,
+        ],
         open: box_.open(),
     })
 }
 
-/// Norms of ∂Z_k/∂x^j, of Ψ_kj and of Λ₂'s inverses.
-struct Coordinates {
-    Z: Vec<Vec<f64>>,
-    Ψ: Vec<Vec<f64>>,
-    P_inverse: Vec<f64>,
-}
-
 impl<'e, 'p> Signals<'e, 'p> {
-    /// The coordinates Z_k.
-    fn curved(&self, P: &[Matrix<'p>], γ: &[Matrix<'p>]) -> Result<Coordinates, MissingInput> {
-        let Z = self.coordinates(P);
-        let inverse = |P: &Matrix<'_>| self.box_.inverse_norm(P);
-        Ok(Coordinates {
-            Ψ: self.lower(&self.remainders(P, &Z, γ))?,
-            Z: self.lower(&Z)?,
-            P_inverse: P.iter().map(inverse).collect::<Result<_, _>>()?,
-        })
-    }
-
-    /// ζ_k = P_k η_k where P does not read X²: ∂ζ_k/∂x^k = P_k alone, and
-    /// Ψ_kj = P_k ∂f̄_k/∂x^j, with P_k' where j = k.
-    fn straight(&self, P: &[Matrix<'p>]) -> Result<Coordinates, MissingInput> {
-        let q = P.len();
-        let own = |k: usize, j: usize| match j == k {
-            true => self.box_.norm(&P[k]),
-            false => Ok(0.0),
-        };
-        let slope = |k: usize, j: usize| -> Result<f64, MissingInput> {
-            if j > k {
-                return Ok(0.0);
-            }
-            let block = P[k].times(&self.slopes_in(&self.reduced(k + 1), j + 1));
-            match j == k {
-                true => self.box_.norm(&block.plus(&self.along(&P[k]))),
-                false => self.box_.norm(&block),
-            }
-        };
-        let table = |entry: &dyn Fn(usize, usize) -> Result<f64, MissingInput>| {
-            let row = |k| (0..q).map(|j| entry(k, j)).collect::<Result<Vec<f64>, _>>();
-            (0..q).map(row).collect::<Result<Vec<_>, _>>()
-        };
-        let inverse = |P: &Matrix<'p>| {
-            let unit = Matrix::identity(P.graph(), P.rows);
-            self.box_.norm(&P.left_divide(&unit))
-        };
-        Ok(Coordinates {
-            Z: table(&own)?,
-            Ψ: table(&slope)?,
-            P_inverse: P.iter().map(inverse).collect::<Result<_, _>>()?,
-        })
-    }
-
     /// A symbol for each measured signal that G reads, apart from the state that it
     /// shows: a mean over states does not move the signal.
     fn new(form: &Form<'e, 'p>, assumptions: &Assumptions) -> Result<Self, MissingInput> {
@@ -173,73 +145,53 @@ impl<'e, 'p> Signals<'e, 'p> {
         }
         let factors = &form.layers.factors;
         let factors = factors.map(|node| graph.substitute(&[node], &measured)[0]);
-        let layers = Layers {
-            factors,
-            ..form.layers.clone()
-        };
-        let form = Form {
-            layers,
-            ..form.clone()
-        };
+        let form = form.with_factors(factors);
         Ok(Self { form, slopes, box_ })
-    }
-
-    /// The derivative of each entry while states other than x₁¹ rest.
-    fn along(&self, A: &Matrix<'p>) -> Matrix<'p> {
-        let graph = self.form.augmented.graph();
-        let signals: Vec<Node> = self.slopes.iter().map(|s| s.0).collect();
-        A.map(|node| {
-            let gradient = jacobian::forward(graph, &[node], &signals);
-            let terms = gradient
-                .row(0)
-                .map(|(i, d)| graph.expr(d) * graph.expr(self.slopes[i].1));
-            let sum = terms.reduce(|a, b| a + b);
-            sum.unwrap_or_else(|| graph.constant(0.0)).node()
-        })
-    }
-
-    fn column(&self, entries: &[Node]) -> Matrix<'p> {
-        let graph = self.form.augmented.graph();
-        Matrix::from_fn(graph, (entries.len(), 1), |i, _| Some(entries[i]))
-    }
-
-    fn symbols(&self, states: &[usize]) -> Vec<Node> {
-        let states = states.iter();
-        states
-            .map(|&i| self.form.augmented.states[i].node)
-            .collect()
     }
 
     /// f̄_k
     fn reduced(&self, k: usize) -> Matrix<'p> {
         let form = &self.form;
-        let first = self.column(&form.drift(&form.x11()));
-        self.column(&form.drift(&form.block(k)))
-            .minus(&form.γ_times(k, &first))
+        let graph = form.augmented.graph();
+        let first = column(graph, &form.drift(&form.x11()));
+        column(graph, &form.drift(&form.block(k))).minus(&form.γ_times(k, &first))
     }
 
     /// Z₁, …, Z_q
     fn coordinates(&self, P: &[Matrix<'p>]) -> Vec<Matrix<'p>> {
-        let first = self.column(&self.symbols(&self.form.block(1)));
+        let graph = self.form.augmented.graph();
+        let first = column(graph, &self.form.symbols(&self.form.block(1)));
         let further = (1..self.form.q()).map(|k| P[k - 1].times(&self.reduced(k)));
         std::iter::once(first).chain(further).collect()
     }
 
     /// ∂(column)/∂x^j
     fn slopes_in(&self, column: &Matrix<'p>, j: usize) -> Matrix<'p> {
-        let x = self.symbols(&self.form.block(j));
+        let x = self.form.symbols(&self.form.block(j));
         Matrix::jacobian(column.graph(), &column.dense(), &x)
     }
 
-    /// Norms of ∂(columns_k)/∂x^j for j ≤ k.
-    fn lower(&self, columns: &[Matrix<'p>]) -> Result<Vec<Vec<f64>>, MissingInput> {
-        let one = |k: usize, j: usize| match j <= k {
-            true => self.box_.norm(&self.slopes_in(&columns[k], j + 1)),
-            false => Ok(0.0),
+    /// Norms of matrices k, j for j ≤ k, 0 where there is none.
+    fn lower(
+        &self,
+        entry: impl Fn(usize, usize) -> Option<Matrix<'p>>,
+    ) -> Result<Vec<Vec<f64>>, MissingInput> {
+        let one = |k: usize, j: usize| match (j <= k).then(|| entry(k, j)).flatten() {
+            Some(A) => self.box_.norm(&A),
+            None => Ok(0.0),
         };
-        let q = columns.len();
+        let q = self.form.q();
         let row = |k| (0..q).map(|j| one(k, j)).collect();
         (0..q).map(row).collect()
+    }
+
+    /// Ψ_kj = P_k ∂f̄_k/∂x^j, with P_k' where j = k; k and j from 0.
+    fn straight_remainder(&self, P: &Matrix<'p>, k: usize, j: usize) -> Matrix<'p> {
+        let block = P.times(&self.slopes_in(&self.reduced(k + 1), j + 1));
+        match j == k {
+            true => block.plus(&along(P, &self.slopes)),
+            false => block,
+        }
     }
 
     /// The proof follows G₁¹, Λ₂ and the coordinates Z along the plant: as states, signals,
@@ -270,17 +222,10 @@ impl<'e, 'p> Signals<'e, 'p> {
                 false => rank::full_column_rank(P, region)?,
             };
             if !found.is_proved() {
-                let detail = format!(
-                    "block {}: {} ({})",
-                    k + 1,
-                    found.reason.text(),
-                    found.verdict
-                );
-                return Ok(undecided(Farza::Regular, detail));
+                return Ok(undecided(Farza::Regular, Said::Block(k + 1, found)));
             }
         }
-        let detail = "each block has full column rank on the box";
-        Ok(proved(Farza::Regular, detail))
+        Ok(proved(Farza::Regular, Said::FullColumnRank))
     }
 
     /// ψ_k = Z_k' − Z_{k+1}, where X² moves by f̄ + D x₁¹' and the signals by their slopes.
@@ -292,10 +237,10 @@ impl<'e, 'p> Signals<'e, 'p> {
             found.map_or(x, |s| s.1)
         };
         let first: Vec<Node> = self.form.x11().into_iter().map(slope).collect();
-        let first = self.column(&first);
+        let first = column(self.form.augmented.graph(), &first);
         let moved = |j: usize| self.reduced(j).plus(&γ[j - 1].times(&first));
         let one = |k: usize| {
-            let mut sum = self.along(&Z[k - 1]);
+            let mut sum = along(&Z[k - 1], &self.slopes);
             for j in 1..k {
                 sum = sum.plus(&self.slopes_in(&Z[k - 1], j).times(&moved(j)));
             }
@@ -311,9 +256,9 @@ impl<'e, 'p> Signals<'e, 'p> {
     /// Y_k = ∂f̄_k/∂x₁¹ + Σ_j ∂f̄_k/∂x^j γ_j − γ_k': what e₁ does to X̃².
     fn Y(&self, k: usize, γ: &[Matrix<'p>]) -> Matrix<'p> {
         let reduced = self.reduced(k);
-        let x = self.symbols(&self.form.x11());
+        let x = self.form.symbols(&self.form.x11());
         let direct = Matrix::jacobian(reduced.graph(), &reduced.dense(), &x);
-        let mut sum = direct.minus(&self.along(&γ[k - 1]));
+        let mut sum = direct.minus(&along(&γ[k - 1], &self.slopes));
         for j in 1..=(k + 1).min(self.form.q()) {
             sum = sum.plus(&self.slopes_in(&reduced, j).times(&γ[j - 1]));
         }
@@ -367,27 +312,15 @@ pub(super) struct Norms {
     pub P_inverse: Vec<f64>,
     /// whether x₂¹ has more outputs than each layer behind it states
     pub tall: bool,
-    /// whether the proof covers the shape of the blocks of Λ₂
-    pub blocks: Check,
-    /// whether Λ₂ is regular with the signals apart from the states they show
-    pub regular: Check,
-    /// whether what the proof differentiates has values and does not jump
-    pub continuous: Check,
+    /// that the proof covers the shape of the blocks of Λ₂, that Λ₂ is regular with the signals
+    /// apart from the states they show, that what is differentiated has values and does not jump
+    pub checks: [Check; 3],
     /// what has no bound on the box
     pub open: Vec<String>,
 }
 
-/// c₁, c₂, c₄ and c₅ of (24).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Constants {
-    pub c1: f64,
-    pub c2: f64,
-    pub c4: f64,
-    pub c5: f64,
-}
-
 /// W from |η_k| ≤ w_k (|e²_k| + Σ_{j<k} Z_kj |η_j|).
-pub(super) fn inverse_triangle(Z: &[Vec<f64>], w: &[f64]) -> Vec<Vec<f64>> {
+fn inverse_triangle(Z: &[Vec<f64>], w: &[f64]) -> Vec<Vec<f64>> {
     let q = w.len();
     let mut W = vec![vec![0.0; q]; q];
     for k in 0..q {
@@ -404,7 +337,7 @@ pub(super) fn inverse_triangle(Z: &[Vec<f64>], w: &[f64]) -> Vec<Vec<f64>> {
 
 impl Norms {
     /// c₁, c₂, c₄ and c₅ for every θ₂ ≥ 1.
-    pub fn constants(&self) -> Constants {
+    pub fn constants(&self) -> [f64; 4] {
         let q = self.W.len();
         let S2 = Chain::new(q);
         let (two, root8) = (Interval::point(2.0), Interval::point(8.0).sqrt());
@@ -433,8 +366,7 @@ impl Norms {
         let p = (0..q).map(|k| plus(pushed[k][0], times(back[k], γ1)));
         let p = in_S(&S2, &p.collect::<Vec<_>>());
         let c5 = root8 * size(plus(p, times(self.push(&S2), γ1)));
-        let [c1, c2, c4, c5] = [c1, c2, c4, c5].map(|c| c.hi());
-        Constants { c1, c2, c4, c5 }
+        [c1, c2, c4, c5].map(|c| c.hi())
     }
 
     /// √V₂ for Δ₂ times the correction of an innovation of length one, divided by θ₂: √(CS₂⁻¹Cᵀ) = √q, and q

@@ -13,16 +13,17 @@
 //! as in (24). Between 1 and q the S₂ of the paper need not decrease (it does not for k = 2 of
 //! q = 3), and for k ≥ 5 the chain itself may be unstable.
 
-use lynkeus_expr::{Interval, MissingInput, Node};
+use lynkeus_expr::{Graph, MissingInput, Node, jacobian};
 use lynkeus_gain::integrators::shortened_stability;
 use lynkeus_structure::{
-    AugmentedPlant, Finding, Layers, Matrix, Point, Region, Standing, counted, layers, rank,
+    AugmentedPlant, Layers, Matrix, Point, Region, Standing, Verdict, layers, rank,
 };
 
+use super::said::{Said, Shape};
 use super::settings::{Settings, wrong_size};
 use crate::conditions::{lipschitz, names, output_slope};
 use crate::design::{Found, Searched};
-use crate::statement::{proved, standing, undecided};
+use crate::statement::{proved, standing, sufficient};
 use crate::{Check, DesignError, Examination, Farza, Statement, TuningError};
 
 pub(super) const NAME: &str = "unknown-input";
@@ -45,6 +46,15 @@ pub struct Form<'e, 'p> {
 }
 
 impl<'p> Form<'_, 'p> {
+    /// The same with G at other signals.
+    pub fn with_factors(&self, factors: Matrix<'p>) -> Self {
+        let layers = self.layers.clone();
+        Self {
+            layers: Layers { factors, ..layers },
+            ..self.clone()
+        }
+    }
+
     /// Number q of layers.
     pub fn q(&self) -> usize {
         self.layers.layers.len()
@@ -77,11 +87,14 @@ impl<'p> Form<'_, 'p> {
 
     /// ∂f̃_rows/∂x_columns
     pub fn jacobian(&self, rows: &[usize], columns: &[usize]) -> Matrix<'p> {
-        let x: Vec<Node> = columns
-            .iter()
-            .map(|&i| self.augmented.states[i].node)
-            .collect();
+        let x = self.symbols(columns);
         Matrix::jacobian(self.augmented.graph(), &self.drift(rows), &x)
+    }
+
+    /// The symbols of some states.
+    pub fn symbols(&self, states: &[usize]) -> Vec<Node> {
+        let states = states.iter();
+        states.map(|&i| self.augmented.states[i].node).collect()
     }
 
     /// G of some states.
@@ -162,9 +175,7 @@ pub(super) fn search<'e, 'p>(
 ) -> Searched<Form<'e, 'p>> {
     let layers = match layers::find(augmented) {
         Ok(layers) => layers,
-        Err(summary) => {
-            return Ok(Err(Examination::unfit(NAME, summary, vec![])));
-        }
+        Err(summary) => return Ok(Err(Examination::unfit(NAME, summary, vec![]))),
     };
     let given = given(augmented, &layers, settings)?;
     let shared = shared(augmented, &layers, region)?;
@@ -239,8 +250,8 @@ fn given(
     }
 }
 
-/// A partition that meets (H4) and makes every block of Λ₂ square, as `partition` wants it.
-pub(super) fn square(form: &Form<'_, '_>, region: &Region) -> Result<Option<String>, DesignError> {
+/// A partition that meets (H4) and makes every block of Λ₂ square: its outputs.
+fn square(form: &Form<'_, '_>, region: &Region) -> Result<Option<Vec<String>>, DesignError> {
     let augmented = form.augmented;
     let own = form.block(form.q().min(2)).len();
     let size = augmented.outputs.len() - own;
@@ -251,9 +262,8 @@ pub(super) fn square(form: &Form<'_, '_>, region: &Region) -> Result<Option<Stri
     for first in all.into_iter().take(MAX_ADVISED) {
         let candidate = self::form(augmented, &form.layers, first);
         if standing(&conditions(&candidate, region)?) == Standing::Proved {
-            let name = |&i: &usize| format!("\"{}\"", augmented.outputs[i].variable.name);
-            let outputs: Vec<String> = candidate.first.iter().map(name).collect();
-            return Ok(Some(outputs.join(", ")));
+            let name = |&i: &usize| augmented.outputs[i].variable.name.clone();
+            return Ok(Some(candidate.first.iter().map(name).collect()));
         }
     }
     Ok(None)
@@ -273,7 +283,7 @@ fn shared(
     for (k, pair) in layers.layers.windows(2).enumerate() {
         let f: Vec<Node> = pair[0].iter().map(|&i| layers.drift[i]).collect();
         let x: Vec<Node> = pair[1].iter().map(|&i| augmented.states[i].node).collect();
-        let jacobian = lynkeus_structure::Matrix::jacobian(graph, &f, &x);
+        let jacobian = Matrix::jacobian(graph, &f, &x);
         let (layer, rank) = (k + 1, x.len());
         let h1 = Statement::from(Farza::H1 { layer, rank });
         checks.push(h1.with(rank::full_column_rank(&jacobian, region)?));
@@ -298,11 +308,11 @@ fn conditions(form: &Form<'_, '_>, region: &Region) -> Result<Vec<Check>, Design
     if eleven.standing() == Standing::Refuted {
         return Ok(vec![i, eleven]);
     }
+    let ii = Statement::from(Farza::H4ii { rank: n2 + m });
     let ii = match standing([&i, &eleven]) {
-        Standing::Proved => Finding::proved("follows from (i) and (11)"),
-        _ => rank::full_column_rank(&form.ii(), region)?,
+        Standing::Proved => proved(ii, Said::FollowsFromIAndEleven),
+        _ => ii.with(rank::full_column_rank(&form.ii(), region)?),
     };
-    let ii = Statement::from(Farza::H4ii { rank: n2 + m }).with(ii);
     let mut checks = vec![i, eleven, ii];
     checks.extend(shortened(form));
     Ok(checks)
@@ -319,13 +329,12 @@ fn finish<'e, 'p>(
     let mut chains = vec![names(augmented, &form.x11())];
     chains.extend((1..=form.q()).map(|k| names(augmented, &form.block(k))));
     let unknown: Vec<usize> = (augmented.plant_states()..augmented.states.len()).collect();
-    let summary = format!(
-        "layers {}; the unknown {} read from x₁¹ = ({}), the rest from x₂¹ = ({})",
-        form.layers.describe(augmented),
-        names(augmented, &unknown).join(", "),
-        chains[0].join(", "),
-        chains[1].join(", ")
-    );
+    let summary = Said::Form {
+        layers: layer_names(augmented, &form.layers),
+        unknown: names(augmented, &unknown),
+        first: chains[0].clone(),
+        second: chains[1].clone(),
+    };
     let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
     Ok(Found { form, examination })
 }
@@ -337,45 +346,29 @@ fn none(
     shared: Vec<Check>,
     refuted: Vec<(Form<'_, '_>, Vec<Check>)>,
 ) -> Examination {
-    let count = refuted.len();
-    let fails = |check: &Check| check.standing() == Standing::Refuted;
+    let tried = refuted.len();
+    let fails = |check: &&Check| check.standing() == Standing::Refuted;
     let met = |own: &[Check]| own.iter().take_while(|check| !fails(check)).count();
     let furthest = refuted.into_iter().rev().max_by_key(|(_, own)| met(own));
-    let mut summary = format!("layers {}", layers.describe(augmented));
-    let own = match furthest {
-        Some((form, own)) => {
-            let which = match count {
-                1 => "the partition".to_owned(),
-                _ => format!(
-                    "none of {count} partitions of the measured outputs meets (H4); the closest,"
-                ),
-            };
-            summary += &format!(
-                "; {which} x₁¹ = ({}) fails {}",
-                names(augmented, &form.x11()).join(", "),
-                own.iter()
-                    .find(|check| fails(check))
-                    .map_or(String::new(), |c| c.statement.to_string())
-            );
-            own
-        }
-        None => {
-            summary += "; there are too many measured outputs to try every partition, give the key 'partition'";
-            vec![]
-        }
+    let closest =
+        furthest
+            .as_ref()
+            .and_then(|(form, own)| match &own.iter().find(fails)?.statement {
+                Statement::Farza(failed) => Some((names(augmented, &form.x11()), failed.clone())),
+                _ => None,
+            });
+    let summary = Said::NoPartition {
+        layers: layer_names(augmented, layers),
+        tried,
+        closest,
     };
+    let own = furthest.map_or(vec![], |(_, own)| own);
     Examination::unfit(NAME, summary, [shared, own].concat())
 }
 
-/// Sizes of the blocks: p − m₁, n₂, …, n_q.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Shape {
-    /// p − m₁ = n₂ = … = n_q
-    Square,
-    /// p − m₁ > n₂ = … = n_q
-    Tall,
-    /// further layers have fewer states
-    Narrowing,
+fn layer_names(augmented: &AugmentedPlant<'_>, layers: &Layers<'_>) -> Vec<Vec<String>> {
+    let layers = layers.layers.iter();
+    layers.map(|layer| names(augmented, layer)).collect()
 }
 
 impl Form<'_, '_> {
@@ -410,59 +403,54 @@ fn ends(sizes: &[usize]) -> Vec<usize> {
 
 /// The chains that end before the last layer are stable with the gains of q; nothing to
 /// check where none ends.
-pub(super) fn shortened(form: &Form<'_, '_>) -> Option<Check> {
+fn shortened(form: &Form<'_, '_>) -> Option<Check> {
     let q = form.q();
     let found = |k: usize| (k, shortened_stability(q, k));
-    let weakest = ends(&form.sizes())
-        .into_iter()
-        .map(found)
-        .min_by(|a, b| a.1.lo().total_cmp(&b.1.lo()))?;
-    Some(shortened_check(q, weakest.0, weakest.1))
-}
-
-fn shortened_check(q: usize, k: usize, least: Interval) -> Check {
-    let found = if least.is_positive() {
-        Finding::proved("they are stable")
+    let ends = ends(&form.sizes()).into_iter().map(found);
+    let (k, least) = ends.min_by(|a, b| a.1.lo().total_cmp(&b.1.lo()))?;
+    let verdict = if least.is_positive() {
+        Verdict::Proved
     } else if least.is_negative() {
-        let point = Point {
-            coordinates: vec![],
-            value: least.midpoint(),
-        };
-        let detail = "poles to the right of the imaginary axis: the error grows for every large θ2";
-        Finding::refuted(point, detail)
+        let (coordinates, value) = (vec![], least.midpoint());
+        Verdict::Refuted(Point { coordinates, value }.into())
     } else {
-        Finding::undecided("hidden by rounding")
+        Verdict::open()
     };
-    Statement::from(Farza::ShortenedChain { layer: k, gains: q }).with(found)
+    let said = Said::Shortened(verdict.standing());
+    let statement = Farza::ShortenedChain { layer: k, gains: q };
+    Some(Statement::from(statement).found(verdict, said))
 }
 
 /// Whether the proof covers the blocks; `form` with the signals apart from the states.
 pub(super) fn covered(form: &Form<'_, '_>, region: &Region) -> Result<Check, DesignError> {
-    let sizes = form.sizes();
-    let proved = |detail: String| proved(Farza::LeftInverse, detail);
-    let reason = match (form.shape(), form.bends()) {
-        (Shape::Square, _) => {
-            return Ok(proved(format!(
-                "the blocks of Λ₂ are square: {} in each block of X²",
-                counted(sizes[0], "state")
-            )));
-        }
-        (Shape::Tall, false) => {
-            return Ok(proved(format!(
-                "blocks of {sizes:?} states, and Λ₂ does not read X²: what Λ₂⁺ leaves out of x₂¹ decays with the pole −qθ₂"
-            )));
-        }
-        (Shape::Tall, true) => "Λ₂ changes with X², and so does the range of its left inverse",
-        (Shape::Narrowing, _) => {
-            "the chains that end early get the first gains of longer ones, for which the paper's S₂ is no Lyapunov function"
-        }
+    let (shape, bends) = (form.shape(), form.bends());
+    let covered = shape == Shape::Square || shape == Shape::Tall && !bends;
+    let said = Said::Blocks {
+        shape,
+        sizes: form.sizes(),
+        bends,
+        partition: if covered { None } else { square(form, region)? },
     };
-    let advice = match square(form, region)? {
-        Some(outputs) => format!("; the blocks are square with partition = [{outputs}]"),
-        None => String::new(),
-    };
-    let detail = format!("blocks of {sizes:?} states: Λ₂Λ₂⁺ is a projection, and {reason}{advice}");
-    Ok(undecided(Farza::LeftInverse, detail))
+    Ok(sufficient(Farza::LeftInverse, covered, said))
+}
+
+/// A matrix of one column.
+pub(super) fn column<'g>(graph: &'g Graph, entries: &[Node]) -> Matrix<'g> {
+    Matrix::from_fn(graph, (entries.len(), 1), |i, _| Some(entries[i]))
+}
+
+/// The derivative of each entry while symbols move with their slopes.
+pub(super) fn along<'g>(A: &Matrix<'g>, moving: &[(Node, Node)]) -> Matrix<'g> {
+    let graph = A.graph();
+    let symbols: Vec<Node> = moving.iter().map(|pair| pair.0).collect();
+    A.map(|node| {
+        let gradient = jacobian::forward(graph, &[node], &symbols);
+        let terms = gradient
+            .row(0)
+            .map(|(i, d)| graph.expr(d) * graph.expr(moving[i].1));
+        let sum = terms.reduce(|a, b| a + b);
+        sum.unwrap_or_else(|| graph.constant(0.0)).node()
+    })
 }
 
 #[cfg(test)]

@@ -21,6 +21,7 @@
 mod constants;
 mod form;
 mod observer;
+mod said;
 mod settings;
 mod theorem;
 
@@ -30,6 +31,7 @@ use crate::design::{Found, Searched};
 use crate::family::Stages;
 use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
 use form::NAME;
+pub use said::{Farza, Said, Shape};
 use settings::Settings;
 
 /// The family `unknown-input`.

@@ -22,18 +22,18 @@
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Expr, MissingInput, Node, jacobian};
-use lynkeus_gain::integrators;
+use lynkeus_expr::{Expr, MissingInput, Node};
 use lynkeus_gain::integrators::Chain;
-use lynkeus_structure::{AugmentedPlant, Matrix, Region};
+use lynkeus_structure::{AugmentedPlant, Matrix};
 
-use super::form::{Form, NAME, Shape};
-use super::settings::{Settings, Thetas, no_theta};
+use super::form::{Form, NAME, along, column};
+use super::said::{Said, Shape};
+use super::settings::{Settings, no_theta};
 use crate::conditions::names;
 use crate::estimate::{PlantCopy, Speed, limited};
-use crate::printed::{StartPoint, expressions, is_constant, numbers};
-use crate::theorem::Enclosure;
-use crate::{ChainGain, Design, DesignError, Examination};
+use crate::printed::{StartPoint, expressions, is_constant};
+use crate::theorem::{Enclosure, undeclared};
+use crate::{ChainGain, Design, DesignError, Examination, ParameterValue};
 
 pub(super) fn design(
     augmented: &AugmentedPlant<'_>,
@@ -44,12 +44,12 @@ pub(super) fn design(
     let (thetas, note) = match settings.thetas.clone()? {
         Some(given) => (given, None),
         None => {
-            let (found, note) = thetas(form)?;
-            (found, Some(note))
+            let (found, c) = thetas(form)?;
+            (found, Some(Said::Thetas(found, c)))
         }
     };
     let copy = PlantCopy::new(augmented, &settings.common);
-    let speeds = speeds(&copy, &thetas);
+    let speeds = speeds(&copy, thetas);
     let derivatives = derivatives(form, &copy, settings, &speeds);
     let start = StartPoint::new(&copy)?;
     let matrices = Matrices::new(form, thetas);
@@ -57,22 +57,19 @@ pub(super) fn design(
         observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
         gains: matrices.gains(&start)?,
         parameters: matrices.parameters(&start)?,
-        notes: note.into_iter().collect(),
+        notes: note.into_iter().map(Into::into).collect(),
         examination,
     })
 }
 
 /// θ₁ and θ₂ of the observer.
-fn speeds(copy: &PlantCopy<'_, '_>, thetas: &Thetas) -> [Speed; 2] {
+fn speeds(copy: &PlantCopy<'_, '_>, [θ1, θ2]: [f64; 2]) -> [Speed; 2] {
     let speed = |place: usize, value: f64, of: &str| {
         let meaning = format!("θ{place}, of {of}");
         Speed::new(copy, format!("theta[{place}]"), value, meaning)
     };
     let first = "the unknown inputs and of the outputs that show them";
-    [
-        speed(1, thetas.θ1, first),
-        speed(2, thetas.θ2, "the other states"),
-    ]
+    [speed(1, θ1, first), speed(2, θ2, "the other states")]
 }
 
 /// The right-hand side of (14), in the order of the augmented states.
@@ -106,18 +103,12 @@ fn derivatives(
         total[state] = total[state] - twice(θ1) * graph.expr(e1.node(row, 0));
     }
     // D (9) at s; G at s makes left inverses and products at s
-    let at_measured = Form {
-        layers: lynkeus_structure::Layers {
-            factors: at_s,
-            ..form.layers.clone()
-        },
-        ..form.clone()
-    };
+    let at_measured = form.with_factors(at_s);
     let D_e1: Vec<Matrix<'_>> = (1..=form.q())
         .map(|k| at_measured.γ_times(k, &e1))
         .collect();
     let Λ2 = at_tilde(&at_measured, copy, settings, &measured, &D_e1);
-    let K = integrators::Chain::new(form.q()).gain;
+    let K = Chain::new(form.q()).gain;
     for k in 1..=form.q() {
         let correction = Λ2[k - 1].left_divide(&e2);
         let gain = θ2.value().powi(k as i32) * K[k - 1];
@@ -134,14 +125,9 @@ fn derivatives(
     total.into_iter().map(Expr::node).collect()
 }
 
-fn column<'g>(graph: &'g lynkeus_expr::Graph, entries: &[Node]) -> Matrix<'g> {
-    Matrix::from_fn(graph, (entries.len(), 1), |i, _| Some(entries[i]))
-}
-
 /// x̂ − y for some measured outputs. The form has only outputs that show a state.
 fn innovations(copy: &PlantCopy<'_, '_>, outputs: &[usize]) -> Vec<Node> {
-    let innovations = outputs.iter().filter_map(|&i| copy.innovation(i));
-    innovations.collect()
+    outputs.iter().filter_map(|&i| copy.innovation(i)).collect()
 }
 
 /// Λ₂ at x₁¹ = y₁ and X̃² = X̂² − D (x̂₁¹ − y₁).
@@ -178,9 +164,9 @@ fn at_tilde<'p>(
 }
 
 /// What multiplies the innovations.
-pub(super) struct Matrices<'f, 'e, 'p> {
+struct Matrices<'f, 'e, 'p> {
     form: &'f Form<'e, 'p>,
-    θ: Thetas,
+    θ: [f64; 2],
     /// (G₁¹)⁺
     left: Matrix<'p>,
     /// the blocks of D (9)
@@ -190,7 +176,7 @@ pub(super) struct Matrices<'f, 'e, 'p> {
 }
 
 impl<'f, 'e, 'p> Matrices<'f, 'e, 'p> {
-    pub fn new(form: &'f Form<'e, 'p>, θ: Thetas) -> Self {
+    fn new(form: &'f Form<'e, 'p>, θ: [f64; 2]) -> Self {
         let unit = Matrix::identity(form.augmented.graph(), form.first.len());
         Self {
             form,
@@ -209,8 +195,8 @@ impl<'f, 'e, 'p> Matrices<'f, 'e, 'p> {
 
     /// K of x̂' = f(x̂, u) − K(ŷ − y), where (14) is of that form with numbers for K: G, Λ₂
     /// and the slopes of the outputs are numbers.
-    pub fn gains(&self, start: &StartPoint<'_>) -> Result<Vec<ChainGain>, MissingInput> {
-        let (form, Thetas { θ1, θ2 }) = (self.form, self.θ);
+    fn gains(&self, start: &StartPoint<'_>) -> Result<Vec<ChainGain>, MissingInput> {
+        let (form, [θ1, θ2]) = (self.form, self.θ);
         let Some(slopes) = self.slopes() else {
             return Ok(vec![]);
         };
@@ -261,43 +247,40 @@ impl<'f, 'e, 'p> Matrices<'f, 'e, 'p> {
     }
 
     /// Everything that (14) multiplies the innovations with.
-    pub fn parameters(
+    fn parameters(
         &self,
         start: &StartPoint<'_>,
-    ) -> Result<Vec<(String, String)>, MissingInput> {
-        let (form, Thetas { θ1, θ2 }) = (self.form, self.θ);
+    ) -> Result<Vec<(String, ParameterValue)>, MissingInput> {
+        let (form, [θ1, θ2]) = (self.form, self.θ);
         let augmented = form.augmented;
-        let joined = |states: &[usize]| names(augmented, states).join(", ");
-        let outputs: Vec<&str> = form
-            .first
-            .iter()
-            .map(|&i| augmented.outputs[i].variable.name.as_str())
-            .collect();
-        let mut found: Vec<(String, String)> = vec![
-            ("θ1".into(), θ1.to_string()),
-            ("θ2".into(), θ2.to_string()),
-            ("partition".into(), outputs.join(", ")),
-            ("x₁¹".into(), joined(&form.x11())),
-        ];
+        let outputs = form.first.iter();
+        let outputs = outputs.map(|&i| augmented.outputs[i].variable.name.clone());
+        let outputs: Vec<String> = outputs.collect();
+        let mut found: Vec<(String, ParameterValue)> =
+            vec![("θ1".into(), θ1.into()), ("θ2".into(), θ2.into())];
+        let mut add = |name: &str, value| found.push((name.to_owned(), value));
+        add("partition", outputs.into());
+        add("x₁¹", names(augmented, &form.x11()).into());
         for k in 1..=form.q() {
-            found.push((format!("X² {k}"), joined(&form.block(k))));
+            add(&format!("X² {k}"), names(augmented, &form.block(k)).into());
         }
-        let gain = |n: usize| numbers(&[Chain::new(n).gain]);
-        found.push(("S₁⁻¹C₁ᵀ".into(), gain(2)));
-        found.push(("S₂⁻¹C₂ᵀ".into(), gain(form.q())));
-        found.push(("G₁¹".into(), expressions(&form.G11())));
-        found.push(("(G₁¹)⁺ at the start".into(), start.shown(&self.left)?));
-        for k in 0..form.q() {
-            let name = |what: &str| format!("{what} {}", k + 1);
-            let G = form.factors(&form.block(k + 1));
-            found.push((name("G²"), expressions(&G)));
-            found.push((name("D at the start,"), start.shown(&self.D[k])?));
+        let gain = |n: usize| ParameterValue::Matrix(vec![Chain::new(n).gain]);
+        add("S₁⁻¹C₁ᵀ", gain(2));
+        add("S₂⁻¹C₂ᵀ", gain(form.q()));
+        add("G₁¹", expressions(&form.G11()));
+        add("(G₁¹)⁺ at the start", start.shown(&self.left)?);
+        for k in 1..=form.q() {
+            let G = form.factors(&form.block(k));
+            add(&format!("G² {k}"), expressions(&G));
+            add(
+                &format!("D at the start, {k}"),
+                start.shown(&self.D[k - 1])?,
+            );
         }
-        for k in 1..form.q() {
-            let name = |what: &str| format!("{what} {}", k + 1);
-            found.push((name("Λ₂"), expressions(&self.Λ2[k])));
-            let left = self.Λ2_left(k);
-            found.push((name("Λ₂⁺ at the start,"), start.shown(&left)?));
+        for k in 2..=form.q() {
+            add(&format!("Λ₂ {k}"), expressions(&self.Λ2[k - 1]));
+            let left = self.Λ2_left(k - 1);
+            add(&format!("Λ₂⁺ at the start, {k}"), start.shown(&left)?);
         }
         Ok(found)
     }
@@ -309,9 +292,9 @@ const MARGIN: f64 = 1.1;
 /// Larger gains are not chosen: no integrator follows them.
 const LARGEST: f64 = 1e6;
 
-/// The smallest θ₁ that the inequality allows, with θ₂ = max(1, 2c₄), which makes it so; and what
-/// is to be said about them.
-pub(super) fn thetas(form: &Form<'_, '_>) -> Result<(Thetas, String), DesignError> {
+/// The smallest θ₁ that the inequality allows, with θ₂ = max(1, 2c₄), which makes it so; with
+/// c₁, c₂, c₄ and c₅.
+pub(super) fn thetas(form: &Form<'_, '_>) -> Result<([f64; 2], [f64; 4]), DesignError> {
     let q = form.q();
     if form.shape() != Shape::Square {
         return Err(missing(
@@ -332,10 +315,7 @@ pub(super) fn thetas(form: &Form<'_, '_>) -> Result<(Thetas, String), DesignErro
         );
         return Err(no_theta(&reason).into());
     }
-    let note = format!(
-        "theta: [{θ1:.4e}, {θ2:.4e}] from the inequality at the end of the proof of Theorem 1 with c1 = {c1:.3e}, c2 = {c2:.3e}, c4 = {c4:.3e}, c5 = {c5:.3e}, bounds on the declared box of the error linearised along the trajectory; sufficient, by far not necessary: give theta to amplify noise less"
-    );
-    Ok((Thetas { θ1, θ2 }, note))
+    Ok(([θ1, θ2], [c1, c2, c4, c5]))
 }
 
 fn missing(reason: &str) -> DesignError {
@@ -406,20 +386,10 @@ fn rate<'p>(form: &Form<'_, 'p>, A: &Matrix<'p>) -> Result<Matrix<'p>, DesignErr
         let reason = format!("it needs the derivative of the input {}", input.name);
         return Err(missing(&reason));
     }
-    let one = graph.constant(1.0).node();
-    let x = [&augmented.symbols()[..], &[augmented.plant.time]].concat();
-    let slopes = [&augmented.derivatives[..], &[one]].concat();
-    let along = |node: Node| {
-        let gradient = jacobian::forward(graph, &[node], &x);
-        let terms = gradient
-            .row(0)
-            .map(|(i, d)| graph.expr(d) * graph.expr(slopes[i]));
-        terms
-            .reduce(|a, b| a + b)
-            .unwrap_or_else(|| graph.constant(0.0))
-            .node()
-    };
-    Ok(A.map(along))
+    let states = augmented.symbols().into_iter();
+    let mut moving: Vec<(Node, Node)> = states.zip(augmented.derivatives.clone()).collect();
+    moving.push((augmented.plant.time, graph.constant(1.0).node()));
+    Ok(along(A, &moving))
 }
 
 /// An upper bound over the box of the Frobenius norm, hence of the spectral norm.
@@ -430,28 +400,15 @@ fn norm(form: &Form<'_, '_>, A: &Matrix<'_>) -> Result<f64, DesignError> {
     for node in A.nonzero() {
         let bound = box_.magnitude(node)?;
         if !bound.is_finite() {
-            return Err(unbounded(form, node, &region));
+            let open = undeclared(form.augmented, &[node], &region);
+            let hint = match open.is_empty() {
+                true => String::new(),
+                false => format!("; declare min and max of {}", open.join(", ")),
+            };
+            let shown = A.graph().render(node, 60);
+            return Err(missing(&format!("{shown} is not bounded on the box{hint}")));
         }
         sum += bound * bound;
     }
     Ok(sum.sqrt())
-}
-
-fn unbounded(form: &Form<'_, '_>, node: Node, region: &Region) -> DesignError {
-    let graph = form.augmented.graph();
-    let used = region.restricted(&graph.symbols_of(&[node])).dimensions;
-    let open: Vec<String> = used
-        .into_iter()
-        .filter(|d| d.symbol != form.augmented.plant.time)
-        .filter(|d| !(d.min.is_finite() && d.max.is_finite()))
-        .map(|d| d.name)
-        .collect();
-    let hint = match open.is_empty() {
-        true => String::new(),
-        false => format!("; declare min and max of {}", open.join(", ")),
-    };
-    missing(&format!(
-        "{} is not bounded on the box{hint}",
-        graph.render(node, 60)
-    ))
 }

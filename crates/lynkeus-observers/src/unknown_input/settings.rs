@@ -8,16 +8,17 @@ use crate::{KeySpec, Shape, Tuning, TuningError, Value};
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
-    kind: "list of two numbers > 0, [θ1, θ2]",
-    shape: Shape::List(&Shape::Positive),
+    shape: Shape::As(
+        "list of two numbers > 0, [θ1, θ2]",
+        &Shape::List(&Shape::Positive),
+    ),
     default: "from the proof, where a bound exists",
     meaning: "θ1 for the unknown inputs and x₁¹, θ2 for the rest",
 };
 
 const PARTITION: KeySpec = KeySpec {
     name: "partition",
-    kind: "list of measured outputs",
-    shape: Shape::NAMES,
+    shape: Shape::As("list of measured outputs", &Shape::NAMES),
     default: "found",
     meaning: "the outputs of x₁¹",
 };
@@ -25,19 +26,12 @@ const PARTITION: KeySpec = KeySpec {
 /// Every key of the family.
 pub(super) const KEYS: [KeySpec; 2] = [THETA, PARTITION];
 
-/// θ₁ and θ₂.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Thetas {
-    pub θ1: f64,
-    pub θ2: f64,
-}
-
 /// The keys, read.
 pub struct Settings {
     pub common: Common,
-    /// none where the proof is to choose them; `theta` belongs to other families too, with
-    /// another shape
-    pub thetas: Late<Option<Thetas>>,
+    /// θ₁ and θ₂, none where the proof is to choose them; `theta` belongs to other families too,
+    /// with another shape
+    pub thetas: Late<Option<[f64; 2]>>,
     /// places of the measured outputs of x₁¹ in ascending order; none to search them
     pub partition: Option<Vec<usize>>,
 }
@@ -58,7 +52,7 @@ impl Settings {
     }
 }
 
-fn thetas(tuning: &Tuning) -> Result<Option<Thetas>, TuningError> {
+fn thetas(tuning: &Tuning) -> Late<Option<[f64; 2]>> {
     let Some(found) = tuning.numbers(THETA.name)? else {
         return Ok(None);
     };
@@ -67,7 +61,7 @@ fn thetas(tuning: &Tuning) -> Result<Option<Thetas>, TuningError> {
     };
     match [θ1, θ2].iter().find(|θ| !(**θ > 0.0 && θ.is_finite())) {
         Some(wrong) => Err(THETA.wrong(wrong)),
-        None => Ok(Some(Thetas { θ1, θ2 })),
+        None => Ok(Some([θ1, θ2])),
     }
 }
 

@@ -12,16 +12,17 @@ use lynkeus_expr::Interval;
 use lynkeus_gain::integrators::Chain;
 use lynkeus_proof::magnitude::{length, plus, size, times, total};
 use lynkeus_proof::matrix::sum;
-use lynkeus_structure::{Verdict, short};
 
-use super::constants::{Constants, Norms, in_S};
+use super::constants::{Norms, in_S};
 use super::form::Form;
-use super::settings::{Settings, Thetas};
+use super::said::Said;
+use super::settings::Settings;
 use super::{constants, observer};
 use crate::statement::{sufficient, undecided};
 use crate::theorem::Enclosure;
 use crate::{
-    Assumptions, Certificate, Check, Constant, DesignError, Examination, Farza, UltimateBound,
+    Assumptions, Certificate, Check, Constant, DesignError, Examination, Farza, Reason,
+    UltimateBound,
 };
 
 pub(super) const BASIS: &str = "Theorem 1 of Farza, M'Saad, Liu and Targui";
@@ -42,18 +43,17 @@ pub(super) fn certificate(
     let thetas = given.or_else(chosen);
     let proof = Proof { form, norms, c };
     let mut hypotheses = examination.checks;
-    hypotheses.push(proof.norms.blocks.clone());
-    hypotheses.push(proof.norms.regular.clone());
-    hypotheses.push(proof.norms.continuous.clone());
-    hypotheses.push(proof.finite());
-    hypotheses.push(proof.slow(assumptions));
-    hypotheses.extend(proof.gains(thetas.as_ref()));
+    hypotheses.extend(proof.norms.checks.clone());
+    hypotheses.extend([proof.finite(), proof.slow(assumptions)]);
+    hypotheses.extend(proof.gains(thetas));
     let mut found = Certificate::new(BASIS, assumptions, hypotheses);
-    proof.print_constants(thetas.as_ref(), &mut found.constants);
-    found.notes = proof.notes();
+    proof.print_constants(thetas, &mut found.constants);
+    if proof.norms.γ.iter().any(|&γ| γ > 0.0) {
+        found.notes.push(Said::Tilde.into());
+    }
     let proved = found.weakest().is_none();
-    if let Some(Thetas { θ1, θ2, .. }) = thetas.filter(|_| proved) {
-        proof.conclude([θ1, θ2], assumptions, &mut found)?;
+    if let Some(θ) = thetas.filter(|_| proved) {
+        proof.conclude(θ, assumptions, &mut found)?;
     }
     Ok(found)
 }
@@ -62,75 +62,57 @@ pub(super) fn certificate(
 struct Proof<'f, 'e, 'p> {
     form: &'f Form<'e, 'p>,
     norms: Norms,
-    c: Constants,
+    /// c₁, c₂, c₄ and c₅ of (24)
+    c: [f64; 4],
 }
 
 impl Proof<'_, '_, '_> {
     fn finite(&self) -> Check {
-        let Constants { c1, c2, c4, c5 } = self.c;
-        let finite = [c1, c2, c4, c5].iter().all(|c| c.is_finite());
-        let shown: Vec<&str> = self.norms.open.iter().map(String::as_str).take(4).collect();
-        let further = self.norms.open.len() > shown.len();
-        let detail = match (finite, self.norms.open.is_empty()) {
-            (true, _) => "bounds of f, G and their derivatives on the box".to_owned(),
-            (false, false) => format!(
-                "no bound of {}: declare min and max{}",
-                shown.join(", "),
-                if further { ", and so on" } else { "" }
-            ),
-            (false, true) if self.norms.blocks.verdict != Verdict::Proved => {
-                "Λ₂ has no inverse but a left one".to_owned()
-            }
-            (false, true) => "Λ₂ has no bounded inverse as far as interval arithmetic can tell on a box this large: declare a smaller one".to_owned(),
+        let finite = self.c.iter().all(|c| c.is_finite());
+        let said = match finite {
+            true => Said::Constants,
+            false => Said::NoConstants {
+                open: self.norms.open.clone(),
+                left: !self.norms.checks[0].is_proved(),
+            },
         };
-        sufficient(Farza::Constants, finite, detail)
+        sufficient(Farza::Constants, finite, said)
     }
 
     /// (H5)
     fn slow(&self, assumptions: &Assumptions) -> Check {
         let ε = self.unknown_drift(assumptions);
         let constant = assumptions.constant(self.form.augmented.plant_states());
-        let detail = match (ε == 0.0, constant.is_empty()) {
-            (true, false) => "assumed constant".to_owned(),
-            (true, true) => "assumed constant but for its process noise".to_owned(),
-            (false, _) => format!("assumed: |v'| ≤ {}", short(ε)),
-        };
-        sufficient(Farza::H5, ε.is_finite(), detail)
+        let are_constant = !constant.is_empty();
+        sufficient(Farza::H5, ε.is_finite(), Said::Slow { ε, are_constant })
     }
 
     /// θ₂ and θ₁ against what they have to exceed.
-    fn gains(&self, thetas: Option<&Thetas>) -> Vec<Check> {
-        let Some(&Thetas { θ1, θ2, .. }) = thetas else {
+    fn gains(&self, thetas: Option<[f64; 2]>) -> Vec<Check> {
+        let Some([θ1, θ2]) = thetas else {
             let (first, second) = self.smallest();
-            let detail = match first.is_finite() {
-                true => format!(
-                    "no theta is given; the proof asks for one like [{}, {}]",
-                    short(first * 1.1),
-                    short(second)
-                ),
-                false => "no theta is given, and the proof gives none on this box".to_owned(),
-            };
-            return vec![sufficient(Farza::ThetaGiven, false, detail)];
+            let like = first.is_finite().then_some([first * 1.1, second]);
+            return vec![sufficient(Farza::ThetaGiven, false, Said::NoTheta(like))];
         };
-        if !self.c.c4.is_finite() {
-            return vec![undecided(Farza::Theta2, "c4 has no bound")];
+        let [_, _, c4, _] = self.c;
+        if !c4.is_finite() {
+            return vec![undecided(Farza::Theta2, Said::NoC4)];
         }
-        let second = self.c.c4.max(1.0) * CLEAR;
+        let second = c4.max(1.0) * CLEAR;
         let first = self.first(θ2) * CLEAR;
-        let against = |found: f64, least: f64| {
-            let word = if found >= least { "≥" } else { "<" };
-            format!("{} {word} {}", short(found), short(least))
-        };
-        let mut checks = vec![sufficient(Farza::Theta2, θ2 >= second, against(θ2, second))];
-        if θ2 >= second {
-            checks.push(sufficient(Farza::Theta1, θ1 >= first, against(θ1, first)));
+        let at_least = |found: f64, least: f64| Reason::AtLeast { found, least };
+        let holds = θ2 >= second;
+        let mut checks = vec![sufficient(Farza::Theta2, holds, at_least(θ2, second))];
+        if holds {
+            let reason = at_least(θ1, first);
+            checks.push(sufficient(Farza::Theta1, θ1 >= first, reason));
         }
         checks
     }
 
     /// What θ₁ has to exceed for this θ₂ > c₄.
     fn first(&self, θ2: f64) -> f64 {
-        let Constants { c1, c2, c4, c5 } = self.c;
+        let [c1, c2, c4, c5] = self.c;
         if !c4.is_finite() {
             return f64::INFINITY;
         }
@@ -142,12 +124,13 @@ impl Proof<'_, '_, '_> {
 
     /// (θ₁*, θ₂) with the smallest θ₁* of all θ₂.
     fn smallest(&self) -> (f64, f64) {
-        let θ2 = (2.0 * self.c.c4).max(1.0) * CLEAR;
+        let [_, _, c4, _] = self.c;
+        let θ2 = (2.0 * c4).max(1.0) * CLEAR;
         (self.first(θ2), θ2)
     }
 
-    fn print_constants(&self, thetas: Option<&Thetas>, constants: &mut Vec<Constant>) {
-        let Constants { c1, c2, c4, c5 } = self.c;
+    fn print_constants(&self, thetas: Option<[f64; 2]>, constants: &mut Vec<Constant>) {
+        let [c1, c2, c4, c5] = self.c;
         let c3 = (Interval::point(8.0).sqrt() * size(self.norms.G11)).hi();
         let (first, second) = self.smallest();
         let mut list = vec![
@@ -158,21 +141,13 @@ impl Proof<'_, '_, '_> {
             ("c5", c5, "from V₁ to V₂ in (24), times θ₂"),
             ("θ2*", c4.max(1.0), "θ₂ has to exceed it"),
         ];
-        if let Some(Thetas { θ2, .. }) = thetas.filter(|t| t.θ2 > c4) {
-            list.push(("θ1*", self.first(*θ2), "θ₁ has to exceed it, with this θ₂"));
+        if let Some([_, θ2]) = thetas.filter(|[_, θ2]| *θ2 > c4) {
+            list.push(("θ1*", self.first(θ2), "θ₁ has to exceed it, with this θ₂"));
         }
         list.push(("θ1,0", first, "the smallest θ₁* of all θ₂"));
         list.push(("θ2,0", second, "the θ₂ that allows it"));
         let finite = list.into_iter().filter(|c| c.1.is_finite());
         constants.extend(finite.map(|(name, value, meaning)| Constant::new(name, value, meaning)));
-    }
-
-    fn notes(&self) -> Vec<String> {
-        let mut notes = vec![];
-        if self.norms.γ.iter().any(|&γ| γ > 0.0) {
-            notes.push("in the box beside plant and estimate: X̃² = X̂² − D (x̂₁¹ − y₁), at which Λ₂ is taken; with the key 'clamp' the observer sees to Λ₂'s argument, not to X̃² itself".to_owned());
-        }
-        notes
     }
 
     fn unknown_drift(&self, assumptions: &Assumptions) -> f64 {
@@ -190,28 +165,21 @@ impl Proof<'_, '_, '_> {
         let λ = self.λ(θ);
         if λ.is_nan() || λ <= 0.0 {
             // θ₁ exceeds θ₁* by less than rounding
-            found.hypotheses.push(undecided(Farza::Rate, short(λ)));
+            found.hypotheses.push(undecided(Farza::Rate, Said::Rate(λ)));
             return Ok(());
         }
         found.rate = Some(λ / 2.0);
         let peak = times(self.root_V_of(θ), length(&self.out_of_V(θ)));
-        let list = &mut found.constants;
-        list.push(Constant::new(
-            "μ",
-            λ / 2.0,
-            "guaranteed decay rate of the error",
-        ));
-        list.push(Constant::new(
-            "λθ1",
-            peak,
-            "the factor by which the error may peak",
-        ));
+        let rate = "guaranteed decay rate of the error";
+        let factor = "the factor by which the error may peak";
+        found.constants.push(Constant::new("μ", λ / 2.0, rate));
+        found.constants.push(Constant::new("λθ1", peak, factor));
         let Some(δ) = self.unknown_forces(θ, assumptions)? else {
-            found.notes.push("no ultimate bound: G or Λ₂ reads measured signals, and the proof does not cover noise in them".to_owned());
+            found.notes.push(Said::NoiseInSignals.into());
             return Ok(());
         };
         if !δ.is_finite() {
-            found.notes.push("no ultimate bound: a disturbance or a measurement error has none; declare min and max of the disturbances".to_owned());
+            found.notes.push(Said::NoUltimateBound.into());
             return Ok(());
         }
         let root_V = (Interval::point(2.0) * size(δ) / Interval::point(λ)).hi();
@@ -224,7 +192,7 @@ impl Proof<'_, '_, '_> {
 
     /// The smallest eigenvalue of −V̇ as a form in √V₁ and √V₂, rounded down.
     fn λ(&self, θ: [f64; 2]) -> f64 {
-        let Constants { c1, c2, c4, c5 } = self.c;
+        let [c1, c2, c4, c5] = self.c;
         let [c1, c2, c4, c5, θ1, θ2] = [c1, c2, c4, c5, θ[0], θ[1]].map(Interval::point);
         let two = Interval::point(2.0);
         let (a, b, half) = (θ1 - c1, θ2 - c4, (c2 + c5) * θ2 / two);

@@ -3,6 +3,7 @@
 use crate::common::{assert_close, design_with, plant, refused, slope};
 use lynkeus_observers::{Tuning, Value, block_triangular::BlockTriangular};
 use lynkeus_structure::Standing;
+use lynkeus_words::Words;
 
 /// System (14), states declared in another order than they are chained.
 const EXAMPLE: &str = "model Lee
@@ -87,9 +88,9 @@ fn the_correction_cancels_the_nonlinearity_for_any_length() {
     )
     .unwrap();
     assert!(
-        design.examination.summary.contains("Remark 3"),
+        design.examination.summary.words().contains("Remark 3"),
         "{}",
-        design.examination.summary
+        design.examination.summary.words()
     );
     let at = [0.3, 0.5, -0.4, 0.7, 0.2, -0.6];
     let y = [0.3, 0.5, 0.7];
@@ -119,7 +120,11 @@ fn the_rule_for_theta_is_checked() {
     let list = Value::List(vec![Value::Number(3.0), Value::Number(8.0)]);
     short.values.insert("theta".into(), list);
     let design = design_with(&BlockTriangular, &plant, &[], &short).unwrap();
-    assert!(design.notes[0].contains("9 = 3^2"), "{:?}", design.notes);
+    assert!(
+        design.notes[0].words().contains("9 = 3^2"),
+        "{:?}",
+        design.notes
+    );
 }
 
 #[test]
@@ -133,9 +138,10 @@ fn an_equation_with_two_new_states_is_named() {
     assert!(
         examination
             .summary
+            .words()
             .contains("equation of a depends on b, c"),
         "{}",
-        examination.summary
+        examination.summary.words()
     );
 }
 

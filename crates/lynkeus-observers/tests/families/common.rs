@@ -8,6 +8,7 @@ use lynkeus_observers::{
     Assumptions, Certificate, Check, Design, DesignError, Examination, Family, Tuning,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors};
+use lynkeus_words::Words;
 
 /// A plant from its text.
 pub fn plant(text: &str) -> Plant {
@@ -242,7 +243,7 @@ pub fn hypothesis<'c>(certificate: &'c Certificate, part: &str) -> &'c Check {
     let found = certificate
         .hypotheses
         .iter()
-        .find(|c| c.statement.to_string().contains(part));
+        .find(|c| c.statement.words().contains(part));
     found.unwrap_or_else(|| panic!("no {part} in {:?}", certificate.hypotheses))
 }
 

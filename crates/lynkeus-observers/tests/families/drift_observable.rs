@@ -104,7 +104,7 @@ fn parameter(design: &Design, name: &str) -> String {
     let row = design.parameters.iter().find(|(n, _)| n == name);
     row.unwrap_or_else(|| panic!("{name} in {:?}", design.parameters))
         .1
-        .clone()
+        .words()
 }
 
 fn assert_near(found: &[f64], expected: &[f64], tolerance: f64) {
@@ -301,9 +301,9 @@ fn the_examination_tells_the_degree_and_the_singular_surface() {
     let found = family.examine(&augmented, &Tuning::default()).unwrap();
     assert_eq!(found.fit(), Standing::Undecided);
     assert!(
-        found.summary.contains("variant practical"),
+        found.summary.words().contains("variant practical"),
         "{}",
-        found.summary
+        found.summary.words()
     );
     let words: Vec<&str> = found.checks.iter().map(|c| c.verdict.word()).collect();
     // one-to-one among them
@@ -345,7 +345,7 @@ fn a_maximal_relative_degree_needs_nothing_of_the_input() {
     };
     let design = design_with(&DriftObservable, &plant, &[], &poles).unwrap();
     assert_eq!(design.examination.fit(), Standing::Proved);
-    assert_eq!(design.parameters[0].1, "bounded");
+    assert_eq!(design.parameters[0].1.words(), "bounded");
     let found = slope(&plant, &design, &[0.4, 0.2], &[0.3], &[0.5]);
     let expected = [0.2 + 5.0 * 0.1, 0.3 - 0.4f64.sin() + 6.0 * 0.1];
     assert_near(&found, &expected, 1e-14);
@@ -419,7 +419,9 @@ fn plants_of_another_form_are_refused_with_the_reason() {
             values: [("poles".to_owned(), list(&[-1.0, -1.0]))].into(),
             ..Tuning::default()
         };
-        refused(&DriftObservable, &plant(text), &poles).summary
+        refused(&DriftObservable, &plant(text), &poles)
+            .summary
+            .words()
     };
     let square = summary(
         "model S input Real u; Real a; Real b; output Real y = a; equation der(a) = b; der(b) = u^2; end S;",
@@ -450,7 +452,7 @@ fn a_singular_map_is_refused_with_the_point() {
          equation der(a) = b^2; der(b) = -b; end Q;",
     );
     let error = design_with(&DriftObservable, &plant, &[], &Tuning::default()).unwrap_err();
-    let text = error.to_string();
+    let text = error.words();
     assert!(
         text.contains("Q(x) is regular on the box (drift-observable): refuted"),
         "{text}"

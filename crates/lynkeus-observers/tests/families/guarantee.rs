@@ -3,6 +3,7 @@
 use crate::common::{design_with, plant};
 use lynkeus_observers::{Assumptions, Certificate, Claim, Tuning, certify, triangular::Triangular};
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
+use lynkeus_words::Words;
 
 /// The certificate of x̂' = −x̂ − f(x̂) − θ(x̂ − y) on x in [0, 2].
 fn certified(f: &str) -> Certificate {
@@ -20,7 +21,8 @@ fn certified(f: &str) -> Certificate {
 fn points_without_eigenvalues_are_not_called_stable() {
     let found = certified("exp(400*x)");
     assert_eq!(found.verdict(), Standing::Undecided);
-    let said = found.notes.join("\n");
+    let said: Vec<String> = found.notes.iter().map(Words::words).collect();
+    let said = said.join("\n");
     assert!(
         !said.contains("at every point") && !said.contains("inf"),
         "{said}"

@@ -8,6 +8,7 @@ use lynkeus_observers::{
     Design, DesignError, Family, Tuning, Value, block_triangular::BlockTriangular,
     triangular::Triangular,
 };
+use lynkeus_words::Words;
 
 /// Four states in a chain, nonlinear at its end.
 const FOUR: &str = "model Four
@@ -96,7 +97,7 @@ fn the_low_power_form_converges_with_gains_of_second_power() {
     // no K on ŷ − y: the factors of the blocks are parameters
     assert!(design.gains.is_empty());
     let factors = design.parameters.iter().filter(|p| p.0.contains(": on "));
-    let gains: Vec<f64> = factors.map(|p| p.1.parse().unwrap()).collect();
+    let gains: Vec<f64> = factors.map(|p| p.1.words().parse().unwrap()).collect();
     assert_close(
         &gains,
         &[2.0 * θ, 3.0 * θ * θ, 2.0 * θ, θ * θ, 2.0 * θ, θ * θ / 3.0],
@@ -185,7 +186,7 @@ fn the_classical_observer_in_the_low_power_form() {
     assert!(largest(&errors(&plant, &design, 8.0, 6.0)) < 1e-5);
     let lee = low_power(6.0, &[]);
     let lee = refused(&BlockTriangular, &plant, &lee);
-    assert!(lee.summary.contains("correction = \"classical\""));
+    assert!(lee.summary.words().contains("correction = \"classical\""));
 }
 
 /// With `clamp` the blocks are driven by bounded signals: the last state peaks less.

@@ -63,7 +63,7 @@ fn the_example_of_the_paper() {
         seven
             .notes
             .iter()
-            .any(|n| n.contains("moves with the correction"))
+            .any(|n| n.words().contains("moves with the correction"))
     );
     // from θ0 on the decay is proved
     let fast = study(&plant, tuning(&[115.0, 115.0 * 115.0], "classical")).certificate();

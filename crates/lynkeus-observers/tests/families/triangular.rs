@@ -6,6 +6,7 @@ use crate::common::{assert_close, design_with, plant, slope};
 use lynkeus_model::Plant;
 use lynkeus_observers::{Design, DesignError, Initial, Tuning, Value, triangular::Triangular};
 use lynkeus_structure::{Standing, Verdict};
+use lynkeus_words::Words;
 
 fn design(plant: &Plant, unknown: &[&str], tuning: &Tuning) -> Result<Design, DesignError> {
     design_with(&Triangular, plant, unknown, tuning)
@@ -145,7 +146,7 @@ fn a_square_is_refused_at_its_zero() {
          equation der(x1) = x2^2; der(x2) = 0; end Square;",
     );
     let error = design(&plant, &[], &Tuning::from([("theta", 1.0)])).unwrap_err();
-    let text = error.to_string();
+    let text = error.words();
     assert!(
         text.contains("∂f(x1)/∂x2 keeps its sign: refuted: it is 0 at x2 = 0"),
         "{text}"
@@ -160,7 +161,7 @@ fn two_chains_have_the_exponents_of_theorem_2() {
          equation der(a) = b; der(b) = -a + c; der(c) = -c + a*b; end Two;",
     );
     let design = design(&plant, &[], &Tuning::from([("theta", 4.0)])).unwrap();
-    let δ = &design.parameters[1].1;
+    let δ = design.parameters[1].1.words();
     // (a, b) leads with n₁ = 2, (c) follows with n₂ = 1: δ₂ = 4/1
     assert_eq!(δ, "1, 4");
     assert!(design.notes.is_empty());
@@ -178,7 +179,7 @@ fn exponents_outside_the_window_are_noted() {
     tuning.values.insert("delta".into(), δ);
     let design = design(&plant, &[], &tuning).unwrap();
     assert!(
-        design.notes[0].contains("window of Theorem 2"),
+        design.notes[0].words().contains("window of Theorem 2"),
         "{:?}",
         design.notes
     );

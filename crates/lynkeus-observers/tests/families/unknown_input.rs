@@ -12,6 +12,7 @@ use lynkeus_observers::{
     Design, DesignError, FAMILIES, Family, Tuning, TuningError, Value, unknown_input::UnknownInput,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
+use lynkeus_words::Words;
 
 /// System (15) with a = 1, which the paper leaves open.
 const EXAMPLE: &str = "model Farza
@@ -116,9 +117,9 @@ fn the_only_possible_partition() {
         };
         let refuted = examination.refuted().unwrap();
         assert!(
-            refuted.statement.to_string().contains("(i)"),
+            refuted.statement.words().contains("(i)"),
             "{}",
-            refuted.statement
+            refuted.statement.words()
         );
     }
     let tuning = with_partition(tuning(60.0, 15.0), &["y2", "y1"]);
@@ -268,7 +269,7 @@ fn a_counter_example_to_lemma_1() {
             .refuted()
             .unwrap()
             .statement
-            .to_string()
+            .words()
             .starts_with("(11)")
     );
     // the search finds x₁¹ = (a), with x₂¹ = (b, c) taller than x² = (d)
@@ -290,13 +291,13 @@ fn theta_from_the_proof() {
     let plant = plant(SMALL);
     let design = design(&plant, &Tuning::default()).unwrap();
     assert!(
-        design.notes[0].contains("proof of Theorem 1"),
+        design.notes[0].words().contains("proof of Theorem 1"),
         "{:?}",
         design.notes
     );
     let θ: Vec<f64> = design.parameters[..2]
         .iter()
-        .map(|p| p.1.parse().unwrap())
+        .map(|p| p.1.words().parse().unwrap())
         .collect();
     assert!(θ[0] > θ[1] && θ[1] >= 1.0 && θ[0] < 1e4, "{θ:?}");
     let rows = run(
@@ -368,9 +369,9 @@ fn wrong_keys_are_named() {
 fn what_is_missing_is_said() {
     let examination = refused(&UnknownInput, &plant(EXAMPLE), &tuning(60.0, 15.0));
     assert!(
-        examination.summary.contains("'unknown'"),
+        examination.summary.words().contains("'unknown'"),
         "{}",
-        examination.summary
+        examination.summary.words()
     );
     let hidden = EXAMPLE.replace("- 2*cos(time)*v", "- x5*v");
     let Err(DesignError::Refused(examination)) = design(&plant(&hidden), &tuning(60.0, 15.0))
@@ -380,9 +381,10 @@ fn what_is_missing_is_said() {
     assert!(
         examination
             .summary
+            .words()
             .contains("equation of x4 the factor of v depends on x5"),
         "{}",
-        examination.summary
+        examination.summary.words()
     );
 }
 
@@ -400,9 +402,9 @@ fn a_rank_that_is_lost_is_refuted() {
     };
     let refuted = examination.refuted().unwrap();
     assert!(
-        refuted.statement.to_string().starts_with("(H1)"),
+        refuted.statement.words().starts_with("(H1)"),
         "{}",
-        refuted.statement
+        refuted.statement.words()
     );
     assert!(matches!(refuted.verdict, Verdict::Refuted(_)));
 }

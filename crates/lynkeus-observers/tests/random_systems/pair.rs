@@ -67,7 +67,8 @@ pub fn observer(augmented: &AugmentedPlant<'_>, K: &DMatrix<f64>) -> Observer {
         measured,
         monitors: vec![],
         filter: None,
-        tunables: lynkeus_observers::Tunables::default(),
+        tunables: vec![],
+        is_whole: false,
         states: hats.into_iter().map(|hat| (hat, 0.0)).collect(),
     }
 }

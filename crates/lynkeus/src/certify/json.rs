@@ -34,17 +34,14 @@ pub(crate) fn certificate(report: &CertifyReport) -> Value {
     object["outside_box"] = report.strays.to_json();
     object["excitation"] = json!(report.excited.as_ref().map(Excited::to_json));
     object["sampling"] = json!(report.sampling.map(sampling));
-    let notes = report.theorem.iter().flat_map(|t| &t.notes);
     let strays = report.strays.words(false);
     let strays = strays.map(|words| format!("the certificate is for the box only, and {words}"));
     object["notes"] = json!(
-        report
-            .certificate
-            .notes
-            .iter()
-            .chain(notes)
-            .chain(&report.assumed)
-            .chain(&strays)
+        std::iter::once(&report.certificate)
+            .chain(&report.theorem)
+            .flat_map(|certificate| report.notes_of(certificate))
+            .chain(report.assumed.iter().cloned())
+            .chain(strays)
             .collect::<Vec<_>>()
     );
     if let Some(theorem) = &report.theorem {
@@ -66,7 +63,7 @@ fn summary(certificate: &Certificate) -> Value {
     let constants = certificate
         .constants
         .iter()
-        .map(|c| json!({ "name": c.name, "value": c.value, "meaning": c.meaning }));
+        .map(|c| json!({ "name": c.name, "value": c.value, "meaning": c.words() }));
     json!({
         "basis": certificate.basis,
         "verdict": certificate.verdict().word(),
@@ -89,7 +86,7 @@ fn sampling(intervals: Intervals) -> Value {
 
 fn hypothesis(check: &Check) -> Value {
     let mut entry = json!({
-        "name": check.statement.to_string(),
+        "name": check.statement.words(),
         "verdict": check.verdict.word(),
         "detail": check.reason.words(),
     });

@@ -48,7 +48,7 @@ impl Report {
 fn family(examination: &Examination) -> Value {
     let check = |check: &Check| {
         let mut entry = json!({
-            "name": check.statement.to_string(),
+            "name": check.statement.words(),
             "verdict": check.verdict.word(),
             "detail": check.reason.words(),
         });
@@ -69,7 +69,7 @@ fn family(examination: &Examination) -> Value {
     json!({
         "family": examination.family,
         "fit": fit_word(examination.fit()),
-        "summary": examination.summary,
+        "summary": examination.summary.words(),
         "chains": examination.chains,
         "checks": examination.conditions().map(check).collect::<Vec<_>>(),
     })

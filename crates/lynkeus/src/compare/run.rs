@@ -97,12 +97,11 @@ pub(super) fn of_family(study: &Study, family: &dyn Family) -> Study {
     let mut own = study.clone();
     own.observer.family = Some(Name::from(family.name()));
     own.observer.tuning.values.retain(|key, _| family.owns(key));
-    if family.name() != "ekf" {
+    if !family.smooths() {
         own.estimate.smoothing = None;
     }
     // their standard deviations are those of held samples
-    let is_filter = family.owns("initial_variance");
-    if !is_filter && own.estimate.between_samples == BetweenSamples::Linear {
+    if !family.is_filter() && own.estimate.between_samples == BetweenSamples::Linear {
         own.estimate.deviations = false;
         own.estimate.innovations = false;
     }

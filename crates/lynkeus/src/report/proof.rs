@@ -20,7 +20,7 @@ pub(super) fn certificate(html: &mut Html, report: &CertifyReport) {
 }
 
 fn one(html: &mut Html, report: &CertifyReport, certificate: &Certificate) {
-    let basis = escaped(&certificate.basis);
+    let basis = escaped(certificate.basis);
     let word = badge(report.word(certificate));
     html.raw(&format!("<h3>{basis}: {word}</h3>"));
     let guaranteed = [
@@ -59,7 +59,7 @@ fn one(html: &mut Html, report: &CertifyReport, certificate: &Certificate) {
         vec![
             Cell::from(c.name.as_str()),
             Cell::Number(number(c.value)),
-            Cell::from(c.meaning.as_str()),
+            Cell::from(c.words()),
         ]
     });
     html.table(&["constant", "value", "meaning"], constants.collect());
@@ -73,7 +73,7 @@ fn one(html: &mut Html, report: &CertifyReport, certificate: &Certificate) {
         });
         html.table(&["quantity", "from", "to"], sides.collect());
     });
-    html.list(&certificate.notes);
+    html.list(&report.notes_of(certificate));
 }
 
 /// How the measurements enter.
@@ -116,11 +116,11 @@ pub(super) fn conditions<'a>(html: &mut Html, checks: impl IntoIterator<Item = &
     let row = |check: &Check| {
         let mut detail = check.reason.words();
         if let Verdict::Refuted(_) = check.verdict {
-            detail = format!("{detail}; {}", check.verdict);
+            detail = format!("{detail}; {}", check.verdict.words());
         }
         vec![
             Cell::Verdict(check.verdict.word()),
-            Cell::from(check.statement.to_string()),
+            Cell::from(check.statement.words()),
             Cell::from(detail),
         ]
     };

@@ -1,7 +1,7 @@
 //! What a page says, section by section.
 
 use lynkeus_observers::{Examination, fit_word};
-use lynkeus_words::{counted, figures};
+use lynkeus_words::{Words, counted, figures};
 
 use super::data::ROWS;
 use super::html::{Cell, Html, badge, words};
@@ -166,7 +166,7 @@ impl Told<'_> {
         let rows = design
             .parameters
             .iter()
-            .map(|(name, value)| vec![Cell::from(name.as_str()), Cell::from(value.to_string())]);
+            .map(|(name, value)| vec![Cell::from(name.as_str()), Cell::from(value.words())]);
         html.table(&["parameter", "value"], rows.collect());
         if let Ok(certified) = &self.certified {
             proof::correction(html, &certified.correction);
@@ -238,7 +238,7 @@ fn examination(html: &mut Html, examination: &Examination) {
         "<p>{}: {} {}</p>",
         super::html::escaped(examination.family),
         badge(fit_word(examination.fit())),
-        super::html::escaped(&examination.summary)
+        super::html::escaped(&examination.summary.words())
     ));
     proof::conditions(html, examination.conditions());
 }

@@ -15,28 +15,24 @@ const EXPRESSION: Shape = Shape::Either(&[Shape::Number, Shape::Text]);
 pub(super) const KEYS: [KeySpec; 4] = [
     KeySpec {
         name: "plant",
-        kind: "text",
         shape: Shape::Text,
         default: "required by the command",
         meaning: "the Modelica file",
     },
     KeySpec {
         name: "model",
-        kind: "text",
         shape: Shape::Text,
         default: "the file's only model",
         meaning: "which model, where the file holds several",
     },
     KeySpec {
         name: "parameters",
-        kind: "table: name = number",
         shape: Shape::Table(&Shape::Number),
         default: "none",
         meaning: "values that replace those of the plant",
     },
     KeySpec {
         name: "tables",
-        kind: "`\"linear\"`, `\"monotone\"`",
         shape: Shape::Word(&["linear", "monotone"]),
         default: "`\"linear\"`",
         meaning: "what the plant's [tables](modelica.md#tables) are between their points: straight lines, or monotone cubics, whose slopes do not jump",
@@ -47,73 +43,66 @@ pub(super) const KEYS: [KeySpec; 4] = [
 pub(super) const SECTIONS: [KeySpec; 10] = [
     KeySpec {
         name: "sensors",
-        kind: "table",
         shape: Shape::Section(&[&SENSORS]),
         default: "none",
         meaning: "what is measured, what is unknown, how noisy",
     },
     KeySpec {
         name: "process_noise",
-        kind: "table: name = number ≥ 0",
         shape: Shape::Table(&Shape::NotNegative),
         default: "0; for an unknown input, from its range and the log's length",
         meaning: "spectral density (variance per unit of time) of white noise on a state's derivative; for an unknown input, how fast it wanders. Read by the [filters](ekf.md), `sd` and `--how-well`; `simulate` moves the plant's states by it, and [`certify`](certificates.md) then bounds the error in mean square",
     },
     KeySpec {
         name: "observer",
-        kind: "table",
         shape: Shape::Section(&[&OBSERVER]),
         default: "none",
         meaning: "the observer family and its tuning",
     },
     KeySpec {
         name: "box",
-        kind: "table: name = number, or `[smallest, largest]`",
-        shape: Shape::Table(&Shape::Either(&[
-            Shape::Number,
-            Shape::List(&Shape::Number),
-        ])),
+        shape: Shape::As(
+            "table: name = number, or `[smallest, largest]`",
+            &Shape::Table(&Shape::Either(&[
+                Shape::Number,
+                Shape::List(&Shape::Number),
+            ])),
+        ),
         default: "none",
         meaning: "ranges narrower than the model's `min` and `max`",
     },
     KeySpec {
         name: "certify",
-        kind: "table",
         shape: Shape::Section(&[&CERTIFY]),
         default: "none",
         meaning: "what a guarantee takes for granted",
     },
     KeySpec {
         name: "simulate",
-        kind: "table",
         shape: Shape::Section(&[&SIMULATE, &INTEGRATOR]),
         default: "none",
         meaning: "how the plant and its observer are run together",
     },
     KeySpec {
         name: "estimate",
-        kind: "table",
         shape: Shape::Section(&[&ESTIMATE, &INTEGRATOR]),
         default: "none",
         meaning: "how a log is replayed",
     },
     KeySpec {
         name: "tune",
-        kind: "table",
         shape: Shape::Section(&[&TUNE]),
         default: "none",
         meaning: "which keys are swept, and what a value is judged by",
     },
     KeySpec {
         name: "compare",
-        kind: "table",
         shape: Shape::Section(&[&COMPARE]),
         default: "none",
         meaning: "which families are compared",
     },
     KeySpec {
         name: "plot",
-        kind: "table",
         shape: Shape::Section(&[&PLOT]),
         default: "none",
         meaning: "what is drawn",
@@ -124,40 +113,41 @@ pub(super) const SECTIONS: [KeySpec; 10] = [
 pub(super) const SENSORS: [KeySpec; 5] = [
     KeySpec {
         name: "limits",
-        kind: "table: output = `[lowest, highest]`",
-        shape: Shape::Table(&Shape::List(&Shape::Number)),
+        shape: Shape::As(
+            "table: output = `[lowest, highest]`",
+            &Shape::Table(&Shape::List(&Shape::Number)),
+        ),
         default: "none",
         meaning: "the range that a sensor can show. `simulate` shows no more than that, and `certify` proves nothing where readings may leave it. A reading at an end only says \"at most\" or \"at least\": the [filters](ekf.md) take it as a censored one, and `--how-well` counts what a clipped reading tells (Fisher's information); the other families take it as it stands, and a note says how often",
     },
     KeySpec {
         name: "measured",
-        kind: "list of outputs",
-        shape: Shape::NAMES,
+        shape: Shape::As("list of outputs", &Shape::NAMES),
         default: "every output of the model",
         meaning: "what the sensors see. The order counts: the first entry of `theta`, `S`, … belongs to the chain of the first measured output",
     },
     KeySpec {
         name: "unknown",
-        kind: "list of inputs and parameters",
-        shape: Shape::NAMES,
+        shape: Shape::As("list of inputs and parameters", &Shape::NAMES),
         default: "none",
         meaning: "inputs that nobody measures, estimated along with the state; and parameters, estimated as constants",
     },
     KeySpec {
         name: "disturbances",
-        kind: "list of inputs",
-        shape: Shape::NAMES,
+        shape: Shape::As("list of inputs", &Shape::NAMES),
         default: "none",
         meaning: "inputs that act on the plant and that the observer takes as zero",
     },
     KeySpec {
         name: "noise",
-        kind: "table: output = number, text `\"5%\"`, or `{ uniform = number }`",
-        shape: Shape::Table(&Shape::Either(&[
-            Shape::NotNegative,
-            Shape::Text,
-            Shape::Section(&[&NOISE]),
-        ])),
+        shape: Shape::As(
+            "table: output = number, text `\"5%\"`, or `{ uniform = number }`",
+            &Shape::Table(&Shape::Either(&[
+                Shape::NotNegative,
+                Shape::Text,
+                Shape::Section(&[&NOISE]),
+            ])),
+        ),
         default: "no noise",
         meaning: "white measurement noise: its standard deviation, in the output's unit or as a share of its present value; or uniform noise, every error up to ± the number (in the output's unit) equally likely and none larger. Used by `simulate`, `tune`, the [filters](ekf.md), [`check --how-well`](precision.md) and [`certify`](certificates.md)",
     },
@@ -166,7 +156,6 @@ pub(super) const SENSORS: [KeySpec; 5] = [
 /// `{ uniform = … }` of `noise` in `[sensors]`
 pub(super) const NOISE: [KeySpec; 1] = [KeySpec {
     name: "uniform",
-    kind: "number ≥ 0",
     shape: Shape::NotNegative,
     default: REQUIRED,
     meaning: "every error up to ± this, in the output's unit, is equally likely and none is larger",
@@ -176,7 +165,6 @@ pub(super) const NOISE: [KeySpec; 1] = [KeySpec {
 pub(super) const OBSERVER: [KeySpec; 3] = [
     KeySpec {
         name: "family",
-        kind: "`\"auto\"`, `\"triangular\"`, `\"block-triangular\"`, `\"state-affine\"`, `\"drift-observable\"`, `\"unknown-input\"`, `\"ekf\"`, `\"ukf\"`, `\"mhe\"`",
         shape: Shape::Word(&[
             "auto",
             "triangular",
@@ -193,14 +181,15 @@ pub(super) const OBSERVER: [KeySpec; 3] = [
     },
     KeySpec {
         name: "initial",
-        kind: "table: name = number, and `default`",
-        shape: Shape::Table(&Shape::Number),
+        shape: Shape::As(
+            "table: name = number, and `default`",
+            &Shape::Table(&Shape::Number),
+        ),
         default: "the plant's start values",
         meaning: "where the estimate starts; `default` holds for everything not listed",
     },
     KeySpec {
         name: "clamp",
-        kind: "true, false",
         shape: Shape::Flag,
         default: "false",
         meaning: "the plant's functions see the estimate limited to `[min, max]`; the reported estimate is never altered",
@@ -211,25 +200,28 @@ pub(super) const OBSERVER: [KeySpec; 3] = [
 pub(super) const CERTIFY: [KeySpec; 3] = [
     KeySpec {
         name: "tube",
-        kind: "number > 0",
         shape: Shape::Positive,
         default: "none",
         meaning: "every state stays within this distance of its start value, too",
     },
     KeySpec {
         name: "slew",
-        kind: "table: unknown input = number > 0",
-        shape: Shape::Table(&Shape::Positive),
+        shape: Shape::As(
+            "table: unknown input = number > 0",
+            &Shape::Table(&Shape::Positive),
+        ),
         default: "0: constant",
         meaning: "bounds of the rates of change of unknown inputs",
     },
     KeySpec {
         name: "input_derivatives",
-        kind: "table: known input = number ≥ 0, or a list of them",
-        shape: Shape::Table(&Shape::Either(&[
-            Shape::NotNegative,
-            Shape::List(&Shape::NotNegative),
-        ])),
+        shape: Shape::As(
+            "table: known input = number ≥ 0, or a list of them",
+            &Shape::Table(&Shape::Either(&[
+                Shape::NotNegative,
+                Shape::List(&Shape::NotNegative),
+            ])),
+        ),
         default: "none",
         meaning: "bounds of &#124;u'&#124;, &#124;u''&#124;, …, for theorems that need them",
     },
@@ -239,14 +231,12 @@ pub(super) const CERTIFY: [KeySpec; 3] = [
 pub(super) const INTEGRATOR: [KeySpec; 5] = [
     KeySpec {
         name: "method",
-        kind: "`\"adaptive\"`, `\"explicit\"`, `\"stiff\"`, `\"rk4\"`",
         shape: Shape::Word(&["adaptive", "explicit", "stiff", "rk4"]),
         default: "`\"adaptive\"`",
         meaning: "step control with a solver chosen by the tool, with the explicit or the stiff one; or the classical Runge–Kutta method with fixed steps",
     },
     KeySpec {
         name: "rtol",
-        kind: "number in [1e-13, 0.1]",
         shape: Shape::Between {
             least: *Tolerances::RELATIVE.start(),
             most: *Tolerances::RELATIVE.end(),
@@ -256,21 +246,18 @@ pub(super) const INTEGRATOR: [KeySpec; 5] = [
     },
     KeySpec {
         name: "atol",
-        kind: "number > 0",
         shape: Shape::Positive,
         default: "1e-12",
         meaning: "absolute tolerance of the adaptive methods",
     },
     KeySpec {
         name: "step",
-        kind: "number > 0",
         shape: Shape::Positive,
         default: "`substeps`",
         meaning: "longest step of `rk4`",
     },
     KeySpec {
         name: "substeps",
-        kind: "whole number ≥ 1",
         shape: Shape::Whole(1),
         default: "16",
         meaning: "steps of `rk4` from one row to the next, where `step` is not given",
@@ -281,57 +268,55 @@ pub(super) const INTEGRATOR: [KeySpec; 5] = [
 pub(super) const SIMULATE: [KeySpec; 8] = [
     KeySpec {
         name: "until",
-        kind: "number > `start`",
-        shape: Shape::Number,
+        shape: Shape::As("number > `start`", &Shape::Number),
         default: REQUIRED,
         meaning: "the last instant",
     },
     KeySpec {
         name: "start",
-        kind: "number",
         shape: Shape::Number,
         default: "0",
         meaning: "the first instant",
     },
     KeySpec {
         name: "output_step",
-        kind: "number > 0",
         shape: Shape::Positive,
         default: "500 rows",
         meaning: "spacing of the rows of the result",
     },
     KeySpec {
         name: "sample_step",
-        kind: "number > 0",
         shape: Shape::Positive,
         default: "`output_step`",
         meaning: "spacing of the sensor's samples where there is noise",
     },
     KeySpec {
         name: "inputs",
-        kind: "table: name = number, or Modelica expression of `time` as text",
-        shape: Shape::Table(&EXPRESSION),
+        shape: Shape::As(
+            "table: name = number, or Modelica expression of `time` as text",
+            &Shape::Table(&EXPRESSION),
+        ),
         default: "the inputs' start values",
         meaning: "the plant's inputs, the unknown ones included; `pi` is known",
     },
     KeySpec {
         name: "initial",
-        kind: "table: name = number",
         shape: Shape::Table(&Shape::Number),
         default: "the plant's start values",
         meaning: "where the *plant* starts",
     },
     KeySpec {
         name: "seed",
-        kind: "whole number ≥ 0",
         shape: Shape::Whole(0),
         default: "0",
         meaning: "seed of the noise and of `spread`",
     },
     KeySpec {
         name: "spread",
-        kind: "table: state or parameter (or an array of them) = number ≥ 0",
-        shape: Shape::Table(&Shape::NotNegative),
+        shape: Shape::As(
+            "table: state or parameter (or an array of them) = number ≥ 0",
+            &Shape::Table(&Shape::NotNegative),
+        ),
         default: "none",
         meaning: "standard deviation by which `simulate` moves where the plant starts, and the plant's parameters, from run to run (normal, by the seed); the observer keeps the values of the model",
     },
@@ -341,14 +326,12 @@ pub(super) const SIMULATE: [KeySpec; 8] = [
 pub(super) const PAIR: [KeySpec; 2] = [
     KeySpec {
         name: "re",
-        kind: "number < 0",
-        shape: Shape::Number,
+        shape: Shape::As("number < 0", &Shape::Number),
         default: REQUIRED,
         meaning: "real part of both",
     },
     KeySpec {
         name: "im",
-        kind: "number",
         shape: Shape::Number,
         default: REQUIRED,
         meaning: "imaginary part of one of them",
@@ -362,21 +345,24 @@ const POLE: Shape = Shape::Either(&[Shape::Number, Shape::Section(&[&PAIR])]);
 pub(super) const GENERATOR: [KeySpec; 3] = [
     KeySpec {
         name: "poles",
-        kind: "negative number, or a list of them and of pairs `{ re, im }`",
-        shape: Shape::Either(&[POLE, Shape::List(&POLE)]),
+        shape: Shape::As(
+            "negative number, or a list of them and of pairs `{ re, im }`",
+            &Shape::Either(&[POLE, Shape::List(&POLE)]),
+        ),
         default: REQUIRED,
         meaning: "the filter's poles, as many as the observer reads of u, u', … or more; its gain is one",
     },
     KeySpec {
         name: "initial",
-        kind: "number, or list of numbers",
-        shape: Shape::Either(&[Shape::Number, Shape::List(&Shape::Number)]),
+        shape: Shape::As(
+            "number, or list of numbers",
+            &Shape::Either(&[Shape::Number, Shape::List(&Shape::Number)]),
+        ),
         default: "the input's start value, then zeros",
         meaning: "u, u', … at the first row",
     },
     KeySpec {
         name: "command",
-        kind: "text",
         shape: Shape::Text,
         default: "`\"<input>_command\"`",
         meaning: "the log's column of what the filter reads",
@@ -387,78 +373,73 @@ pub(super) const GENERATOR: [KeySpec; 3] = [
 pub(super) const ESTIMATE: [KeySpec; 11] = [
     KeySpec {
         name: "late",
-        kind: "number > 0",
         shape: Shape::Positive,
         default: "ten usual steps",
         meaning: "how late a row may come, in units of time: it is put in its place; one that is later says that the clock jumped, and is refused",
     },
     KeySpec {
         name: "smooth",
-        kind: "true, false",
         shape: Shape::Flag,
         default: "false",
         meaning: "also `<name>_smooth`, the estimate given all rows, later ones included ([filters](ekf.md) only)",
     },
     KeySpec {
         name: "lag",
-        kind: "whole number ≥ 1",
         shape: Shape::Whole(1),
         default: "none",
         meaning: "also `<name>_smooth`, the estimate given so many later rows: causal with that delay",
     },
     KeySpec {
         name: "sd",
-        kind: "true, false",
         shape: Shape::Flag,
         default: "false",
         meaning: "also `<name>_sd`, the standard deviation of each estimate; with `smooth` or `lag` also `<name>_smooth_sd`",
     },
     KeySpec {
         name: "innovations",
-        kind: "true, false",
         shape: Shape::Flag,
         default: "false",
         meaning: "also `<name>_innovation` and `<name>_innovation_sd` of each measured output: its reading less what was expected of it, and the standard deviation of that ([what they are judged by](credibility.md))",
     },
     KeySpec {
         name: "between_samples",
-        kind: "`\"hold\"`, `\"predict\"`, `\"linear\"`",
         shape: Shape::Word(&["hold", "predict", "linear"]),
         default: "`\"hold\"`",
         meaning: "what the observer sees between two rows: the latest row, as a live observer would; what the model makes of the latest reading (`w' = L_f h(x̂)`, the inter-sample predictor); or the straight line to the next, which looks ahead one sample",
     },
     KeySpec {
         name: "time",
-        kind: "text",
         shape: Shape::Text,
         default: "`\"t\"`; `\"time\"` where the log has an output or an input called `t`",
         meaning: "header of the log's time column",
     },
     KeySpec {
         name: "columns",
-        kind: "table: name = text",
         shape: Shape::Table(&Shape::Text),
         default: "the plant's names",
         meaning: "where the log's header names a signal differently",
     },
     KeySpec {
         name: "input_derivatives",
-        kind: "table: input = text, or list of texts",
-        shape: Shape::Table(&Shape::Either(&[Shape::Text, Shape::NAMES])),
+        shape: Shape::As(
+            "table: input = text, or list of texts",
+            &Shape::Table(&Shape::Either(&[Shape::Text, Shape::NAMES])),
+        ),
         default: "none",
         meaning: "the log's columns of u', u'', … of a known input, for an observer that reads them ([drift-observable](drift-observable.md), `variant = \"theoretical\"`)",
     },
     KeySpec {
         name: "generator",
-        kind: "table: input = expression of `time`, or `{ poles, initial, command }`",
-        shape: Shape::Table(&Shape::Either(&[EXPRESSION, Shape::Section(&[&GENERATOR])])),
+        shape: Shape::As(
+            "table: input = expression of `time`, or `{ poles, initial, command }`",
+            &Shape::Table(&Shape::Either(&[EXPRESSION, Shape::Section(&[&GENERATOR])])),
+        ),
         default: "none",
         meaning: "what makes a known input, for an observer that reads u', u'', …: [see below](#what-makes-an-input)",
     },
     KeySpec {
         name: "strict",
-        kind: "`true`, `false`",
-        shape: Shape::Flag,
+        shape: Shape::As("`true`, `false`", &Shape::Flag),
         default: "`false`",
         meaning: "refuse a log in which a cell that is read has no number, or whose times do not increase",
     },

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use lynkeus_observers::{
     DesignError, FAMILIES, Family, Initial, KeySpec, Tuning, TuningError, Value,
 };
+use lynkeus_words::Words;
 
 use super::keys::OBSERVER;
 use super::section::{Entry, Section};
@@ -55,7 +56,7 @@ impl ObserverSettings {
 
     /// The answer no to what a key asks for, with the key's place.
     pub(crate) fn place(&self, key: &str, file: &str, error: &DesignError) -> Error {
-        let refusal = Error::refused(format!("`{key}` of [observer]: {error}"));
+        let refusal = Error::refused(format!("`{key}` of [observer]: {}", error.words()));
         match self.places.get(key) {
             Some(place) => refusal.at(place),
             None => refusal.at(file),

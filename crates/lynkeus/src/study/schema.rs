@@ -88,11 +88,9 @@ fn key(spec: &KeySpec) -> Value {
 
 /// The meaning, type and default of a key without the marks of the documentation's tables.
 fn described(spec: &KeySpec) -> String {
+    let kind = spec.kind();
     let KeySpec {
-        kind,
-        default,
-        meaning,
-        ..
+        default, meaning, ..
     } = spec;
     plain(&format!("{meaning} ({kind}; default: {default})"))
 }
@@ -134,6 +132,7 @@ fn shape(shape: &Shape) -> Value {
             json!({ "type": "object", "additionalProperties": self::shape(value) })
         }
         Shape::Section(keys) => section(keys),
+        Shape::As(_, shape) => self::shape(shape),
         Shape::Either(shapes) => {
             let shapes: Vec<Value> = shapes.iter().map(self::shape).collect();
             json!({ "anyOf": shapes })

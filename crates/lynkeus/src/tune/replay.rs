@@ -1,7 +1,5 @@
 //! One value on a log: how well held-out samples are predicted, and how white the innovation is.
 
-use lynkeus_observers::Design;
-
 use super::errors::{rms, run_away};
 use super::filtered;
 use super::holdout::{predicted, switchable};
@@ -13,7 +11,7 @@ use crate::course::Course;
 use crate::crew::{Watch, part};
 use crate::estimate::start_at_readings;
 use crate::inputs::supplied;
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, StudyDesign};
 use crate::series::steps;
 use crate::{Error, Series, systems};
 
@@ -23,7 +21,7 @@ use crate::{Error, Series, systems};
 /// A study or a log that cannot be used.
 pub(super) fn logged(
     prepared: &Prepared<'_>,
-    mut design: Design,
+    mut design: StudyDesign,
     record: &Record<'_>,
     mut row: Row,
     watch: &mut Watch<'_>,
@@ -52,7 +50,7 @@ pub(super) fn logged(
 struct Replay<'a> {
     prepared: &'a Prepared<'a>,
     /// its observer is switchable
-    design: Design,
+    design: StudyDesign,
     record: &'a Record<'a>,
 }
 

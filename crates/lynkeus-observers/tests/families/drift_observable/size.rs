@@ -5,6 +5,7 @@ use std::time::Duration;
 use lynkeus_expr::{Budget, Spent};
 use lynkeus_observers::{Examination, Family, Tuning, drift_observable::DriftObservable};
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
+use lynkeus_words::Words;
 
 use crate::common::plant;
 
@@ -29,7 +30,12 @@ fn examined(n: usize, declared: &str, equations: &str, seconds: u64) -> Examinat
 #[test]
 fn what_rounding_hides_is_undecided() {
     let found = examined(30, "", "", 100);
-    assert_eq!(found.spent(), Some(Spent::Digits), "{}", found.summary);
+    assert_eq!(
+        found.spent(),
+        Some(Spent::Digits),
+        "{}",
+        found.summary.words()
+    );
     assert_eq!(found.fit(), Standing::Undecided);
 }
 
@@ -39,7 +45,11 @@ fn what_is_hidden_is_told_exactly_in_a_long_chain() {
     assert_eq!(found.fit(), Standing::Refuted);
     let told =
         "determine 25 of 26 combinations of states: no measured output feels h; measure more";
-    assert!(found.summary.ends_with(told), "{}", found.summary);
+    assert!(
+        found.summary.words().ends_with(told),
+        "{}",
+        found.summary.words()
+    );
 }
 
 #[test]
@@ -47,7 +57,7 @@ fn a_map_that_is_too_large_is_not_begun() {
     let begun = std::time::Instant::now();
     let found = examined(400, "", "", 10);
     let Some(Spent::Size(operations)) = found.spent() else {
-        panic!("{}", found.summary)
+        panic!("{}", found.summary.words())
     };
     // n² products of the cube's series alone, with n slopes each
     assert!(operations > 400 * 400 * 400, "{operations}");

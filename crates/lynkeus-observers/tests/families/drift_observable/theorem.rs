@@ -4,7 +4,7 @@
 use crate::common::{plant, run};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Assumptions, Certificate, Check, Design, Family, Germani, Tuning, UltimateBound, Value,
+    Assumptions, Certificate, Check, Design, Family, Germani, Reason, Tuning, UltimateBound, Value,
     drift_observable::DriftObservable,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
@@ -65,7 +65,7 @@ fn value(found: &Certificate, name: &str) -> f64 {
 
 fn hypothesis<'c>(found: &'c Certificate, name: &str) -> &'c Check {
     let mut all = found.hypotheses.iter();
-    all.find(|h| h.statement.to_string().contains(name))
+    all.find(|h| h.statement.words().contains(name))
         .unwrap_or_else(|| panic!("{name} in {:#?}", found.hypotheses))
 }
 
@@ -105,7 +105,7 @@ fn slow_poles_are_undecided_with_both_numbers() {
     let found = certificate(&plant(PENDULUM), &poles, &[0.0; 2], &[0.0]);
     assert_eq!(found.verdict(), Standing::Undecided);
     let open = found.weakest().unwrap();
-    assert!(open.statement.to_string().starts_with("γ ≤ γ*"), "{open:?}");
+    assert!(open.statement.words().starts_with("γ ≤ γ*"), "{open:?}");
     assert!(
         open.reason.words().starts_with("1.11803 > 0."),
         "{}",
@@ -341,7 +341,10 @@ fn the_stay_in_the_box_is_said() {
             &[0.0; 2],
             &[0.0],
         );
-        let said = |note: &String| note.contains("not proved: plant and estimate stay in the box");
+        let said = |note: &Reason| {
+            note.words()
+                .contains("not proved: plant and estimate stay in the box")
+        };
         assert!(found.notes.iter().any(said), "{:?}", found.notes);
     }
 }

@@ -232,9 +232,9 @@ fn shortened_chains_that_the_papers_gains_make_unstable_are_refused() {
     };
     let refuted = examination.refuted().unwrap();
     assert!(
-        refuted.statement.to_string().contains("ends in layer 7"),
+        refuted.statement.words().contains("ends in layer 7"),
         "{}",
-        refuted.statement
+        refuted.statement.words()
     );
     let fine = design_with(
         &UnknownInput,
@@ -301,7 +301,7 @@ fn the_matrices_of_the_paper_are_shown() {
         found
             .unwrap_or_else(|| panic!("{name}: {:?}", design.parameters))
             .1
-            .clone()
+            .words()
     };
     assert_eq!(value("G₁¹"), "[[b + 2]]");
     assert_eq!(value("(G₁¹)⁺ at the start"), "[[0.4]]");

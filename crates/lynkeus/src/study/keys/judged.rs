@@ -8,38 +8,39 @@ use super::EXPRESSION;
 pub(crate) const TUNE: [KeySpec; 5] = [
     KeySpec {
         name: "keys",
-        kind: "table: key of `[observer]`, or an entry of one such as `\"theta[1]\"` = list of numbers, or `{ from, to, points, scale }`",
-        shape: Shape::Table(&Shape::Either(&[
-            Shape::List(&Shape::Number),
-            Shape::Section(&[&RANGE]),
-        ])),
+        shape: Shape::As(
+            "table: key of `[observer]`, or an entry of one such as `\"theta[1]\"` = list of numbers, or `{ from, to, points, scale }`",
+            &Shape::Table(&Shape::Either(&[
+                Shape::List(&Shape::Number),
+                Shape::Section(&[&RANGE]),
+            ])),
+        ),
         default: "see [tuning](tune.md)",
         meaning: "what is swept; several keys make a grid. The values of a key that is a list are factors on all its numbers. `points` is 21, `scale` `\"log\"` (or `\"linear\"`)",
     },
     KeySpec {
         name: "tolerance",
-        kind: "number between 0 and 1",
         shape: Shape::Share,
         default: "0.05",
         meaning: "error, as a share of the range, below which an estimate is settled",
     },
     KeySpec {
         name: "disturbance",
-        kind: "table: input = number, or expression of `time`",
-        shape: Shape::Table(&EXPRESSION),
+        shape: Shape::As(
+            "table: input = number, or expression of `time`",
+            &Shape::Table(&EXPRESSION),
+        ),
         default: "none",
         meaning: "added to inputs of the plant, unseen by the observer, for the ultimate bound",
     },
     KeySpec {
         name: "held_out",
-        kind: "number between 0 and 1",
         shape: Shape::Share,
         default: "0.25",
         meaning: "on a log: share of each block that is held out",
     },
     KeySpec {
         name: "blocks",
-        kind: "whole number ≥ 2",
         shape: Shape::Whole(2),
         default: "20",
         meaning: "on a log: number of blocks",
@@ -50,28 +51,24 @@ pub(crate) const TUNE: [KeySpec; 5] = [
 pub(crate) const RANGE: [KeySpec; 4] = [
     KeySpec {
         name: "from",
-        kind: "number",
         shape: Shape::Number,
         default: "a quarter of the study's value",
         meaning: "the first value",
     },
     KeySpec {
         name: "to",
-        kind: "number",
         shape: Shape::Number,
         default: "four times the study's value",
         meaning: "the last value",
     },
     KeySpec {
         name: "points",
-        kind: "whole number ≥ 2",
         shape: Shape::Whole(2),
         default: "21",
         meaning: "how many, ends included",
     },
     KeySpec {
         name: "scale",
-        kind: "`\"log\"`, `\"linear\"`",
         shape: Shape::Word(&["log", "linear"]),
         default: "`\"log\"`",
         meaning: "equal ratios, or equal differences",
@@ -81,8 +78,7 @@ pub(crate) const RANGE: [KeySpec; 4] = [
 /// `[compare]`
 pub(crate) const COMPARE: [KeySpec; 1] = [KeySpec {
     name: "families",
-    kind: "list of families",
-    shape: Shape::NAMES,
+    shape: Shape::As("list of families", &Shape::NAMES),
     default: "every family that is not refuted, and the filters",
     meaning: "what `compare` runs; each gets the keys of `[observer]` that it owns",
 }];
@@ -91,14 +87,12 @@ pub(crate) const COMPARE: [KeySpec; 1] = [KeySpec {
 pub(crate) const PLOT: [KeySpec; 2] = [
     KeySpec {
         name: "show",
-        kind: "list of names",
         shape: Shape::NAMES,
         default: "unknown inputs, hidden states, then what is measured; six at most",
         meaning: "the quantities to draw, one panel each",
     },
     KeySpec {
         name: "time_unit",
-        kind: "text",
         shape: Shape::Text,
         default: "none",
         meaning: "the unit on the time axis",
