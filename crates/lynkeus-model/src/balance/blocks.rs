@@ -6,7 +6,7 @@ use lynkeus_expr::{Binary, Implicit, ImplicitUnknown, Node, Unary, components};
 
 use super::linear::{Elimination, Given, Row};
 use super::loops::Torn;
-use super::system::{FlatEquation, System, Unknown, arguments};
+use super::system::{FlatEquation, System, Unknown};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_COUPLED;
 
@@ -188,23 +188,20 @@ impl Solver<'_> {
     fn replace(&mut self, root: Node) -> Node {
         let mut stack = vec![root];
         while let Some(&node) = stack.last() {
-            if self.replaced.contains_key(&node) {
-                stack.pop();
-                continue;
-            }
-            let open = arguments(self.system.graph.op(node))
-                .filter(|argument| !self.replaced.contains_key(argument));
             let before = stack.len();
-            if self.system.contains(node) {
+            if self.system.contains(node) && !self.replaced.contains_key(&node) {
+                let mut open = self.system.graph.arguments(node);
+                open.retain(|argument| !self.replaced.contains_key(argument));
                 stack.extend(open);
             }
             if stack.len() == before {
-                let new = self.rebuilt(node);
-                self.replaced.insert(node, new);
                 stack.pop();
+                if !self.replaced.contains_key(&node) {
+                    self.replaced.insert(node, self.rebuilt(node));
+                }
             }
         }
-        self.replaced.get(&root).copied().unwrap_or(root)
+        self.replaced[&root]
     }
 
     fn rebuilt(&self, node: Node) -> Node {

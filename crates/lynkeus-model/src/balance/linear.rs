@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
 
-use super::system::{FlatEquation, System, arguments};
+use super::system::{FlatEquation, System};
 use crate::diagnostic::{Result, Span};
 
 /// coefficient · unknown + rest; `None` is zero.
@@ -32,7 +32,7 @@ impl System<'_> {
     fn form(&self, root: Node, unknown: Node, span: Span) -> Result<Option<Form>> {
         let mut forms: HashMap<Node, Option<Form>> = HashMap::new();
         for node in self.below(root, span)? {
-            let op = self.graph.op(node);
+            let arguments = self.graph.arguments(node);
             if node == unknown {
                 let one = self.graph.constant(1.0).node();
                 let form = Form {
@@ -40,8 +40,11 @@ impl System<'_> {
                     rest: None,
                 };
                 forms.insert(node, Some(form));
-            } else if arguments(op).any(|argument| forms.contains_key(&argument)) {
-                forms.insert(node, self.combined(op, &forms));
+            } else if arguments
+                .iter()
+                .any(|argument| forms.contains_key(argument))
+            {
+                forms.insert(node, self.combined(self.graph.op(node), &forms));
             }
         }
         let constant = self.constant_form(root);
@@ -63,7 +66,7 @@ impl System<'_> {
         while let Some(node) = stack.pop() {
             if self.contains(node) && found.insert(node) {
                 self.budget.charge(1, span)?;
-                stack.extend(arguments(self.graph.op(node)));
+                stack.extend(self.graph.arguments(node));
             }
         }
         let mut nodes: Vec<Node> = found.into_iter().collect();
@@ -128,12 +131,8 @@ impl System<'_> {
         let coefficient = self.minus(left.coefficient, right.coefficient)?;
         let zero = || self.graph.constant(0.0).node();
         let value = self.minus(right.rest, left.rest).unwrap_or_else(zero);
-        Some(match self.graph.constant_value(coefficient) {
-            Some(0.0) => return None,
-            Some(1.0) => value,
-            Some(-1.0) => self.negated(value),
-            _ => self.graph.binary(Binary::Div, value, coefficient),
-        })
+        let is_zero = self.graph.constant_value(coefficient) == Some(0.0);
+        (!is_zero).then(|| self.graph.binary(Binary::Div, value, coefficient))
     }
 }
 
@@ -174,8 +173,8 @@ impl System<'_> {
         let below = self.below(residual, span)?;
         let mut holds: HashSet<Node> = HashSet::new();
         for &node in &below {
-            let below = arguments(graph.op(node)).any(|argument| holds.contains(&argument));
-            if below || place.contains_key(&node) {
+            let below = graph.arguments(node);
+            if below.iter().any(|argument| holds.contains(argument)) || place.contains_key(&node) {
                 holds.insert(node);
             }
         }
@@ -185,21 +184,20 @@ impl System<'_> {
             passed: HashMap::new(),
             row: Row::default(),
         };
-        walk.pass(residual, Passed::whole(graph));
+        let whole = Passed {
+            factor: graph.constant(1.0).node(),
+            guard: None,
+        };
+        walk.pass(residual, whole);
         for &node in below.iter().rev() {
             let Some(passed) = walk.passed.remove(&node) else {
                 continue;
             };
-            match place.get(&node) {
-                Some(&place) => {
-                    let coefficient = passed.guarded(graph, passed.factor);
-                    walk.row.coefficients.insert(place, coefficient);
-                }
-                None => {
-                    if !walk.through(node, passed) {
-                        return Ok(None);
-                    }
-                }
+            if let Some(&place) = place.get(&node) {
+                let coefficient = walk.guarded(passed, passed.factor);
+                walk.row.coefficients.insert(place, coefficient);
+            } else if !walk.through(node, passed) {
+                return Ok(None);
             }
         }
         let is_zero = |factor: &Node| graph.constant_value(*factor) == Some(0.0);
@@ -216,57 +214,6 @@ struct Passed {
     guard: Option<Node>,
 }
 
-impl Passed {
-    fn whole(graph: &Graph) -> Self {
-        Self {
-            factor: graph.constant(1.0).node(),
-            guard: None,
-        }
-    }
-
-    fn with_factor(self, factor: Node) -> Self {
-        Self { factor, ..self }
-    }
-
-    fn under(self, graph: &Graph, condition: Node) -> Self {
-        let guard = match self.guard {
-            Some(guard) => graph.binary(Binary::And, guard, condition),
-            None => condition,
-        };
-        Self {
-            guard: Some(guard),
-            ..self
-        }
-    }
-
-    /// The value where it counts, else 0.
-    fn guarded(self, graph: &Graph, value: Node) -> Node {
-        match self.guard {
-            Some(guard) => graph.select(guard, value, graph.constant(0.0).node()),
-            None => value,
-        }
-    }
-
-    /// Both factors of one node, which counts where either does.
-    fn plus(self, graph: &Graph, other: Self) -> Self {
-        if let (Some(one), Some(two)) = (self.guard, other.guard)
-            && graph.unary(Unary::Not, one) == two
-        {
-            return Self {
-                factor: graph.select(one, self.factor, other.factor),
-                guard: None,
-            };
-        }
-        let guards = self.guard.zip(other.guard);
-        let one = self.guarded(graph, self.factor);
-        let two = other.guarded(graph, other.factor);
-        Self {
-            factor: graph.binary(Binary::Add, one, two),
-            guard: guards.map(|(one, two)| graph.binary(Binary::Or, one, two)),
-        }
-    }
-}
-
 struct Walk<'g> {
     graph: &'g Graph,
     /// nodes that contain an unknown of the block
@@ -281,10 +228,38 @@ impl Walk<'_> {
             return self.add_rest(node, passed);
         }
         let sum = match self.passed.get(&node) {
-            Some(before) => before.plus(self.graph, passed),
+            Some(before) => self.sum(*before, passed),
             None => passed,
         };
         self.passed.insert(node, sum);
+    }
+
+    /// Both factors of one node, which counts where either does.
+    fn sum(&self, a: Passed, b: Passed) -> Passed {
+        let graph = self.graph;
+        let guards = a.guard.zip(b.guard);
+        if let Some((one, two)) = guards
+            && graph.unary(Unary::Not, one) == two
+        {
+            return Passed {
+                factor: graph.select(one, a.factor, b.factor),
+                guard: None,
+            };
+        }
+        let (one, two) = (self.guarded(a, a.factor), self.guarded(b, b.factor));
+        Passed {
+            factor: graph.binary(Binary::Add, one, two),
+            guard: guards.map(|(one, two)| graph.binary(Binary::Or, one, two)),
+        }
+    }
+
+    /// The value where what is passed counts, else 0.
+    fn guarded(&self, passed: Passed, value: Node) -> Node {
+        let zero = || self.graph.constant(0.0).node();
+        let guarded = passed
+            .guard
+            .map(|guard| self.graph.select(guard, value, zero()));
+        guarded.unwrap_or(value)
     }
 
     fn add_rest(&mut self, node: Node, passed: Passed) {
@@ -295,10 +270,10 @@ impl Walk<'_> {
         }
         let negative = factor == Some(-1.0);
         let term = match factor {
-            Some(1.0) | Some(-1.0) => node,
+            Some(1.0 | -1.0) => node,
             _ => graph.binary(Binary::Mul, passed.factor, node),
         };
-        let term = passed.guarded(graph, term);
+        let term = self.guarded(passed, term);
         self.row.rest = Some(match (self.row.rest, negative) {
             (Some(rest), false) => graph.binary(Binary::Add, rest, term),
             (Some(rest), true) => graph.binary(Binary::Sub, rest, term),
@@ -311,9 +286,20 @@ impl Walk<'_> {
     fn through(&mut self, node: Node, passed: Passed) -> bool {
         let graph = self.graph;
         let free = |node: Node| !self.holds.contains(&node);
-        let negative = || passed.with_factor(graph.unary(Unary::Neg, passed.factor));
-        let times = |operation: Binary, by: Node| {
-            passed.with_factor(graph.binary(operation, passed.factor, by))
+        let negative = || Passed {
+            factor: graph.unary(Unary::Neg, passed.factor),
+            ..passed
+        };
+        let times = |operation: Binary, by: Node| Passed {
+            factor: graph.binary(operation, passed.factor, by),
+            ..passed
+        };
+        let under = |condition: Node| {
+            let both = |guard| graph.binary(Binary::And, guard, condition);
+            Passed {
+                guard: Some(passed.guard.map_or(condition, both)),
+                ..passed
+            }
         };
         match graph.op(node) {
             Op::Unary(Unary::Neg, a) => self.pass(a, negative()),
@@ -330,8 +316,8 @@ impl Walk<'_> {
             }
             Op::Binary(Binary::Div, a, b) if free(b) => self.pass(a, times(Binary::Div, b)),
             Op::Select(c, a, b) if free(c) => {
-                self.pass(a, passed.under(graph, c));
-                self.pass(b, passed.under(graph, graph.unary(Unary::Not, c)));
+                self.pass(a, under(c));
+                self.pass(b, under(graph.unary(Unary::Not, c)));
             }
             _ => return false,
         }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Graph, Interval, Node, Op};
+use lynkeus_expr::{Graph, Interval, Node};
 
 use super::matching::Matching;
 use crate::diagnostic::Span;
@@ -126,7 +126,11 @@ impl<'a> System<'a> {
     fn mark(&mut self) {
         let sides = self.equations.iter().flat_map(|e| [e.left, e.right]);
         for node in self.graph.reachable(&sides.collect::<Vec<_>>()) {
-            let below = arguments(self.graph.op(node)).any(|argument| self.contains(argument));
+            let below = self
+                .graph
+                .arguments(node)
+                .into_iter()
+                .any(|a| self.contains(a));
             self.contains[node.index()] = below || self.place.contains_key(&node);
         }
     }
@@ -142,7 +146,7 @@ impl<'a> System<'a> {
                     continue;
                 }
                 found.extend(self.place.get(&node));
-                stack.extend(arguments(self.graph.op(node)));
+                stack.extend(self.graph.arguments(node));
             }
             found.sort_unstable();
             found
@@ -192,15 +196,4 @@ impl<'a> System<'a> {
             Some((last, before)) => format!("lines {} and {last}", before.join(", ")),
         }
     }
-}
-
-/// Arguments of an operation; systems are only built after this stage.
-pub(super) fn arguments(op: Op) -> impl Iterator<Item = Node> {
-    let arguments = match op {
-        Op::Constant(_) | Op::Symbol(_) | Op::System(_) => [None; 3],
-        Op::Unary(_, a) | Op::Powi(a, _) | Op::Entry(a, _) => [Some(a), None, None],
-        Op::Binary(_, a, b) => [Some(a), Some(b), None],
-        Op::Select(c, a, b) => [Some(c), Some(a), Some(b)],
-    };
-    arguments.into_iter().flatten()
 }

@@ -1,6 +1,6 @@
 //! Operators on scalars, arrays and matrices.
 
-use lynkeus_expr::{Binary, Node, Unary};
+use lynkeus_expr::{Binary, Expr, Node, Unary};
 
 use super::evaluate::Evaluator;
 use super::value::{Scalar, Value, describe_dims, expected_number, unequal_sizes};
@@ -111,31 +111,56 @@ impl Evaluator<'_> {
         right: Scalar,
         span: Span,
     ) -> Result<Scalar> {
-        if let (Scalar::Integer(a), Scalar::Integer(b)) = (left, right) {
-            let exact = match operation {
-                Binary::Add => Some(a.checked_add(b)),
-                Binary::Sub => Some(a.checked_sub(b)),
-                Binary::Mul => Some(a.checked_mul(b)),
-                _ => None,
-            };
-            if let Some(exact) = exact {
-                return exact.map(Scalar::Integer).ok_or_else(|| overflow(span));
+        match operation {
+            Binary::Add => self.of_two(left, right, span, i64::checked_add, |a, b| a + b),
+            Binary::Sub => self.of_two(left, right, span, i64::checked_sub, |a, b| a - b),
+            Binary::Mul => self.of_two(left, right, span, i64::checked_mul, |a, b| a * b),
+            _ => {
+                let (left, right) = (self.real(left, span)?, self.real(right, span)?);
+                if self.graph.constant_value(right) == Some(0.0) {
+                    return Err(Problem::new(span, "division by zero"));
+                }
+                Ok(Scalar::Real(self.graph.binary(Binary::Div, left, right)))
             }
         }
-        let (left, right) = (self.real(left, span)?, self.real(right, span)?);
-        if operation == Binary::Div && self.graph.constant_value(right) == Some(0.0) {
-            return Err(Problem::new(span, "division by zero"));
-        }
-        Ok(Scalar::Real(self.graph.binary(operation, left, right)))
     }
 
     pub(super) fn negated(&self, scalar: Scalar, span: Span) -> Result<Scalar> {
-        if let Scalar::Integer(value) = scalar {
-            let negated = value.checked_neg();
-            return negated.map(Scalar::Integer).ok_or_else(|| overflow(span));
+        self.of_one(scalar, span, i64::checked_neg, |a| -a)
+    }
+
+    /// Of an Integer the exact result, which must fit; else that of a Real.
+    pub(super) fn of_one(
+        &self,
+        a: Scalar,
+        span: Span,
+        exact: impl Fn(i64) -> Option<i64>,
+        real: impl for<'g> Fn(Expr<'g>) -> Expr<'g>,
+    ) -> Result<Scalar> {
+        if let Scalar::Integer(a) = a {
+            return exact(a).map(Scalar::Integer).ok_or_else(|| overflow(span));
         }
-        let node = self.real(scalar, span)?;
-        Ok(Scalar::Real(self.graph.unary(Unary::Neg, node)))
+        let a = self.graph.expr(self.real(a, span)?);
+        Ok(Scalar::Real(real(a).node()))
+    }
+
+    /// Of two Integers the exact result, which must fit; else that of Reals.
+    pub(super) fn of_two(
+        &self,
+        a: Scalar,
+        b: Scalar,
+        span: Span,
+        exact: impl Fn(i64, i64) -> Option<i64>,
+        real: impl for<'g> Fn(Expr<'g>, Expr<'g>) -> Expr<'g>,
+    ) -> Result<Scalar> {
+        if let (Scalar::Integer(a), Scalar::Integer(b)) = (a, b) {
+            let exact = exact(a, b).map(Scalar::Integer);
+            return exact.ok_or_else(|| overflow(span));
+        }
+        let (a, b) = (self.real(a, span)?, self.real(b, span)?);
+        Ok(Scalar::Real(
+            real(self.graph.expr(a), self.graph.expr(b)).node(),
+        ))
     }
 
     pub(super) fn power(
@@ -192,12 +217,17 @@ impl Evaluator<'_> {
 
     /// Scalar product, or product of matrices and vectors.
     fn product(&self, left: &Value, right: &Value, span: Span) -> Result<Value> {
-        let (rows, inner, columns) = match (&left.dims[..], &right.dims[..]) {
-            (&[inner], &[across]) if inner == across => (1, inner, 1),
-            (&[inner], &[across, columns]) if inner == across => (1, inner, columns),
-            (&[rows, inner], &[across]) if inner == across => (rows, inner, 1),
-            (&[rows, inner], &[across, columns]) if inner == across => (rows, inner, columns),
-            (left, right) => return Err(no_product(left, right, span)),
+        let no_product = || no_product(&left.dims, &right.dims, span);
+        let [.., inner] = left.dims[..] else {
+            return Err(no_product());
+        };
+        let (rows, columns, dims) = match (&left.dims[..], &right.dims[..]) {
+            (_, &[across, ..]) if inner != across => return Err(no_product()),
+            (&[_], &[_]) => (1, 1, vec![]),
+            (&[_], &[_, columns]) => (1, columns, vec![columns]),
+            (&[rows, _], &[_]) => (rows, 1, vec![rows]),
+            (&[rows, _], &[_, columns]) => (rows, columns, vec![rows, columns]),
+            _ => return Err(no_product()),
         };
         let work = (rows as u64)
             .saturating_mul(inner as u64)
@@ -213,9 +243,6 @@ impl Evaluator<'_> {
                 elements.push(self.sum_of_products(terms, span)?);
             }
         }
-        let mut dims = vec![];
-        dims.extend((left.dims.len() == 2).then_some(rows));
-        dims.extend((right.dims.len() == 2).then_some(columns));
         Ok(Value { dims, elements })
     }
 

@@ -169,27 +169,24 @@ impl<'a> Evaluator<'a> {
         let values = (0..count).map(|turn| Scalar::Real(value(turn).node()));
         Ok(Value::vector(values.collect()))
     }
+}
 
-    /// The elements joined by an operator; `empty` where there are none.
-    fn fold(&self, operator: Binary, elements: &[Scalar], empty: i64, span: Span) -> Result<Value> {
+impl<'a> Evaluator<'a> {
+    /// `sum` and `product`: all elements joined by an operator; `empty` where there are none.
+    pub(super) fn fold(
+        &mut self,
+        call: &'a Call,
+        span: Span,
+        operator: Binary,
+        empty: i64,
+    ) -> Result<Value> {
+        let elements = self.reduced(call, span)?;
         self.budget.charge(elements.len() as u64, span)?;
         let Some((&first, rest)) = elements.split_first() else {
             return Ok(Scalar::Integer(empty).into());
         };
         let join = |sum, &next| self.scalar_binary(operator, sum, next, span);
         rest.iter().try_fold(first, join).map(Value::from)
-    }
-}
-
-impl<'a> Evaluator<'a> {
-    pub(super) fn sum(&mut self, call: &'a Call, span: Span) -> Result<Value> {
-        let elements = self.reduced(call, span)?;
-        self.fold(Binary::Add, &elements, 0, span)
-    }
-
-    pub(super) fn product_of_all(&mut self, call: &'a Call, span: Span) -> Result<Value> {
-        let elements = self.reduced(call, span)?;
-        self.fold(Binary::Mul, &elements, 1, span)
     }
 
     /// `array(a, b)` or `array(e for i in r)`
@@ -202,7 +199,7 @@ impl<'a> Evaluator<'a> {
 
     pub(super) fn ndims(&mut self, call: &'a Call) -> Result<Value> {
         let [argument] = self.arguments(call)?;
-        Ok(integer(self.dims_of(argument)?.len()).into())
+        Ok(Scalar::of_size(self.dims_of(argument)?.len()).into())
     }
 
     /// The elements that `sum(A)` or `sum(e for i in r)` goes over.
@@ -239,7 +236,9 @@ impl<'a> Evaluator<'a> {
         if call.arguments.len() == 1 {
             let [array] = self.arguments(call)?;
             let dims = self.dims_of(array)?;
-            return Ok(Value::vector(dims.into_iter().map(integer).collect()));
+            return Ok(Value::vector(
+                dims.into_iter().map(Scalar::of_size).collect(),
+            ));
         }
         let [array, axis] = self.arguments(call)?;
         let dims = self.dims_of(array)?;
@@ -247,7 +246,7 @@ impl<'a> Evaluator<'a> {
         let dim = usize::try_from(number)
             .ok()
             .and_then(|axis| dims.get(axis.checked_sub(1)?));
-        let dim = dim.copied().map(|dim| integer(dim).into());
+        let dim = dim.map(|&dim| Scalar::of_size(dim).into());
         dim.ok_or_else(|| self.no_dimension(number, &dims, axis))
     }
 
@@ -286,8 +285,22 @@ impl<'a> Evaluator<'a> {
         Ok(Value { dims, elements })
     }
 
+    /// Sizes as they are declared; `open` gives that of an axis for `:`.
+    pub(super) fn sizes(
+        &mut self,
+        dimensions: &[ExprId],
+        open: impl Fn(usize) -> Result<usize>,
+    ) -> Result<Vec<usize>> {
+        let sizes = dimensions.iter().enumerate();
+        let size = |(axis, &id)| match self.ast.expression(id).kind {
+            Kind::All => open(axis),
+            _ => self.length(id),
+        };
+        sizes.map(size).collect()
+    }
+
     /// A size: an Integer from 0 on.
-    pub(crate) fn length(&mut self, id: ExprId) -> Result<usize> {
+    pub(super) fn length(&mut self, id: ExprId) -> Result<usize> {
         let value = self.known_integer(id, "a size")?;
         usize::try_from(value).map_err(|_| {
             let message = format!("a size must not be negative, this is {value}");
@@ -406,11 +419,6 @@ pub(super) fn matrix_dims(dims: &[usize]) -> Option<Vec<usize>> {
     let mut matrix = dims.to_vec();
     matrix.resize(2, 1);
     (dims.len() <= 2).then_some(matrix)
-}
-
-/// Sizes fit an Integer: every one of them is below the limit on elements.
-fn integer(size: usize) -> Scalar {
-    Scalar::Integer(i64::try_from(size).unwrap_or(i64::MAX))
 }
 
 impl<'a> Evaluator<'a> {

@@ -348,25 +348,17 @@ fn fix_starts(
     let graph = symbols.graph;
     let mut at_start = solution.clone();
     at_start.insert(symbols.time(), graph.constant(0.0).node());
-    let starts = Starts {
-        graph,
-        values: symbols.parameter_values(),
-        states: states.iter().map(|state| state.node).zip(0..).collect(),
-    };
+    let values = symbols.parameter_values();
+    let places: HashMap<Node, usize> = states.iter().map(|state| state.node).zip(0..).collect();
     let unread = flat.initial_unread.iter();
     let mut warnings: Vec<Problem> = unread.map(|&span| without_effect(span, UNREAD)).collect();
     for equation in &flat.initial {
         let sides = graph.substitute(&[equation.left, equation.right], &at_start);
-        let (left, right) = (sides[0], sides[1]);
-        let found = starts
-            .explicit(left, right)
-            .or_else(|| starts.explicit(right, left))
-            .or_else(|| starts.solved(graph.binary(Binary::Sub, left, right)));
-        match found {
-            Some((place, node, value)) => {
+        match start_fixed(graph, &values, &places, [sides[0], sides[1]]) {
+            Some((place, start, value)) => {
                 let state = &mut states[place];
                 state.start = value;
-                state.start_node = (!graph.symbols_of(&[node]).is_empty()).then_some(node);
+                state.start_node = (!graph.symbols_of(&[start]).is_empty()).then_some(start);
                 state.fixed = true;
             }
             None => warnings.push(without_effect(equation.span, FIXES_NONE)),
@@ -375,59 +367,58 @@ fn fix_starts(
     warnings
 }
 
-struct Starts<'g> {
-    graph: &'g Graph,
-    /// values of the parameters that are symbols, where they have one
-    values: HashMap<Node, Option<f64>>,
-    /// places of the states by their symbols
-    states: HashMap<Node, usize>,
+/// The place of the state whose start an equation fixes, the start as an expression over parameters,
+/// and as a number, where these have `values`.
+fn start_fixed(
+    graph: &Graph,
+    values: &HashMap<Node, Option<f64>>,
+    places: &HashMap<Node, usize>,
+    [left, right]: [Node; 2],
+) -> Option<(usize, Node, Option<f64>)> {
+    let varying = |node: Node| {
+        let mut symbols = graph.symbols_of(&[node]);
+        symbols.retain(|symbol| !values.contains_key(symbol));
+        symbols
+    };
+    // `x = e` with e free of variables
+    let explicit = |state: Node, start: Node| {
+        let place = *places.get(&state)?;
+        varying(start).is_empty().then_some((place, start))
+    };
+    let solved = || {
+        let residual = graph.binary(Binary::Sub, left, right);
+        match varying(residual)[..] {
+            [state] => Some((*places.get(&state)?, root(graph, residual, state)?)),
+            _ => None,
+        }
+    };
+    // none where the start has neither a value nor symbols
+    let valued = |(place, start): (usize, Node)| {
+        let value = graph.constant_value(start).or_else(|| {
+            let value = computed(graph, start, |symbol| values.get(&symbol).copied()?);
+            value.filter(|value| value.is_finite())
+        });
+        let is_symbolic = !graph.symbols_of(&[start]).is_empty();
+        (value.is_some() || is_symbolic).then_some((place, start, value))
+    };
+    let found = explicit(left, right).and_then(valued);
+    let found = found.or_else(|| explicit(right, left).and_then(valued));
+    found.or_else(|| solved().and_then(valued))
 }
 
-impl Starts<'_> {
-    /// `x = e` with e free of variables.
-    fn explicit(&self, state: Node, start: Node) -> Option<(usize, Node, Option<f64>)> {
-        let place = *self.states.get(&state)?;
-        let symbols = self.graph.symbols_of(&[start]);
-        let mut known = symbols.iter();
-        if !known.all(|symbol| self.values.contains_key(symbol)) {
-            return None;
-        }
-        self.with_value(place, start)
+/// Where a residual vanishes that is linear in a symbol.
+fn root(graph: &Graph, residual: Node, symbol: Node) -> Option<Node> {
+    let slope = jacobian::reverse(graph, &[residual], &[symbol]).get(0, 0)?;
+    if graph.symbols_of(&[slope]).contains(&symbol) {
+        return None;
     }
-
-    /// The state that a residual fixes, with its start as an expression of the parameters and
-    /// as a number.
-    fn solved(&self, residual: Node) -> Option<(usize, Node, Option<f64>)> {
-        let graph = self.graph;
-        let mut symbols = graph.symbols_of(&[residual]);
-        symbols.retain(|symbol| !self.values.contains_key(symbol));
-        let [state] = symbols[..] else {
-            return None;
-        };
-        let place = *self.states.get(&state)?;
-        let slope = jacobian::reverse(graph, &[residual], &[state]).get(0, 0)?;
-        if graph.symbols_of(&[slope]).contains(&state) {
-            return None;
-        }
-        let zero = HashMap::from([(state, graph.constant(0.0).node())]);
-        let rest = graph.substitute(&[residual], &zero)[0];
-        let start = match graph.constant_value(slope) {
-            Some(0.0) => return None,
-            Some(1.0) => graph.unary(Unary::Neg, rest),
-            Some(-1.0) => rest,
-            _ => graph.unary(Unary::Neg, graph.binary(Binary::Div, rest, slope)),
-        };
-        self.with_value(place, start)
-    }
-
-    /// None where the start has neither a value nor symbols.
-    fn with_value(&self, place: usize, start: Node) -> Option<(usize, Node, Option<f64>)> {
-        let value = self.graph.constant_value(start).or_else(|| {
-            let value = |symbol| self.values.get(&symbol).copied()?;
-            computed(self.graph, start, value).filter(|value| value.is_finite())
-        });
-        let is_symbolic = !self.graph.symbols_of(&[start]).is_empty();
-        (value.is_some() || is_symbolic).then_some((place, start, value))
+    let zero = HashMap::from([(symbol, graph.constant(0.0).node())]);
+    let rest = graph.substitute(&[residual], &zero)[0];
+    match graph.constant_value(slope) {
+        Some(0.0) => None,
+        Some(1.0) => Some(graph.unary(Unary::Neg, rest)),
+        Some(-1.0) => Some(rest),
+        _ => Some(graph.unary(Unary::Neg, graph.binary(Binary::Div, rest, slope))),
     }
 }
 

@@ -33,9 +33,8 @@ impl<'a> Evaluator<'a> {
             let message = format!("function `{}` has no output", class.path);
             Problem::new(span, message).hint("declare one: `output Real y;`")
         })?;
-        let value = number(first);
-        let value = value.map_err(|_| Problem::new(span, "expected a number, found a record"));
-        value.map(Some)
+        let no_number = |_| Problem::new(span, "expected a number, found a record");
+        number(first).map(Some).map_err(no_number)
     }
 
     /// The values of `(a, b) = f(x)`.
@@ -234,12 +233,17 @@ impl<'a> Evaluator<'a> {
 }
 
 impl<'a> Evaluator<'a> {
-    /// The record that a variable of a class is declared as.
+    /// The class that a variable of another class is declared as.
+    fn type_of(&self, declaration: &Declaration, of: &Class) -> Option<&'a Class> {
+        match declaration.type_name {
+            TypeName::Named(name) => self.class(name, &[&of.path]),
+            _ => None,
+        }
+    }
+
+    /// The record that it is declared as.
     fn record_type(&self, declaration: &Declaration, of: &Class) -> Option<&'a Class> {
-        let TypeName::Named(name) = declaration.type_name else {
-            return None;
-        };
-        let class = self.class(name, &[&of.path]);
+        let class = self.type_of(declaration, of);
         class.filter(|class| class.kind == ClassKind::Record)
     }
 
@@ -252,12 +256,17 @@ impl<'a> Evaluator<'a> {
         given: Option<Members>,
         span: Span,
     ) -> Result<()> {
-        if let Some(record) = self.record_type(declaration, class) {
-            return self.introduce_record(class, declaration, record, given, span);
-        }
         let name = &declaration.label;
-        if let TypeName::Named(type_name) = declaration.type_name {
-            self.check_number(class, type_name)?;
+        let type_name = declaration.type_name;
+        match (self.type_of(declaration, class), type_name) {
+            (Some(record), _) if record.kind == ClassKind::Record => {
+                return self.introduce_record(class, declaration, record, given, span);
+            }
+            (Some(other), TypeName::Named(at)) if other.kind != ClassKind::Type => {
+                let message = format!("`{}` is not a type of numbers", plain(self.text(at)));
+                return Err(Problem::new(at, message).hint("write the formula where it is used"));
+            }
+            _ => {}
         }
         let value = match (given.map(number), declaration.binding) {
             (Some(Ok(value)), _) => Some(value),
@@ -287,21 +296,6 @@ impl<'a> Evaluator<'a> {
         Ok(())
     }
 
-    /// Refuses variables of functions that are no numbers.
-    fn check_number(&self, class: &Class, type_name: Span) -> Result<()> {
-        match self
-            .class(type_name, &[&class.path])
-            .map(|class| class.kind)
-        {
-            None | Some(ClassKind::Type) => Ok(()),
-            Some(_) => {
-                let name = plain(self.text(type_name));
-                let message = format!("`{name}` is not a type of numbers");
-                Err(Problem::new(type_name, message).hint("write the formula where it is used"))
-            }
-        }
-    }
-
     fn introduce_record(
         &mut self,
         class: &'a Class,
@@ -311,42 +305,40 @@ impl<'a> Evaluator<'a> {
         span: Span,
     ) -> Result<()> {
         let name = &declaration.label;
-        let (value, span) = match (given, declaration.binding) {
-            (Some(given), _) => (number(given).err(), span),
-            (None, Some(id)) => (self.record(id)?, self.span(id)),
-            (None, None) => {
-                check_given(class, declaration, span)?;
-                return self.open_record(record, name);
-            }
+        let no_record = |span| {
+            let message = format!("`{name}` takes a record, found a number");
+            Problem::new(span, message)
         };
-        let value = value.ok_or_else(|| {
-            Problem::new(span, format!("`{name}` takes a record, found a number"))
-        })?;
-        let members = value.into_iter();
-        let known = members.map(|(member, value)| (member, Local::of(value)));
-        self.insert_record(name, known.collect());
-        Ok(())
-    }
-
-    /// A record of which no member has a value yet.
-    fn open_record(&mut self, record: &'a Class, name: &str) -> Result<()> {
+        let value = match (given, declaration.binding) {
+            (Some(given), _) => Some(number(given).err().ok_or_else(|| no_record(span))?),
+            (None, Some(id)) => {
+                let record = self.record(id)?;
+                Some(record.ok_or_else(|| no_record(self.span(id)))?)
+            }
+            (None, None) => None,
+        };
         let mut members = vec![];
-        for declaration in self.declarations_of(record)? {
-            let dims = self.dims_declared(declaration, None, declaration.name)?;
-            let local = Local::without_value(dims, declaration.is_integer());
-            members.push((declaration.label.clone(), local));
+        match value {
+            Some(value) => {
+                let known = value.into_iter();
+                members.extend(known.map(|(member, value)| (member, Local::of(value))));
+            }
+            None => {
+                check_given(class, declaration, span)?;
+                for member in self.declarations_of(record)? {
+                    let dims = self.dims_declared(member, None, member.name)?;
+                    let local = Local::without_value(dims, member.is_integer());
+                    members.push((member.label.clone(), local));
+                }
+            }
         }
-        self.insert_record(name, members);
-        Ok(())
-    }
-
-    fn insert_record(&mut self, name: &str, members: Vec<(String, Local)>) {
         if let Some(frame) = self.frame.as_mut() {
-            let names = members.iter().map(|(member, _)| member.clone()).collect();
-            frame.records.insert(name.to_owned(), names);
+            let names = members.iter().map(|(member, _)| member.clone());
+            frame.records.insert(name.clone(), names.collect());
             let full = |(member, local)| (format!("{name}.{member}"), local);
             frame.locals.extend(members.into_iter().map(full));
         }
+        Ok(())
     }
 
     /// The size of a variable of a function; `:` is taken from its value.
@@ -356,20 +348,14 @@ impl<'a> Evaluator<'a> {
         value: Option<&Value>,
         span: Span,
     ) -> Result<Vec<usize>> {
-        let mut dims = vec![];
-        for (axis, &id) in declaration.dimensions.iter().enumerate() {
-            let open = matches!(self.ast.expression(id).kind, Kind::All);
-            dims.push(match (open, value.and_then(|value| value.dims.get(axis))) {
-                (true, Some(&dim)) => dim,
-                (true, None) => {
-                    let name = &declaration.label;
-                    let message =
-                        format!("the size `:` of `{name}` needs a value to be taken from");
-                    return Err(Problem::new(declaration.name, message));
-                }
-                (false, _) => self.length(id)?,
-            });
-        }
+        let dims = self.sizes(&declaration.dimensions, |axis| {
+            let found = value.and_then(|value| value.dims.get(axis));
+            found.copied().ok_or_else(|| {
+                let name = &declaration.label;
+                let message = format!("the size `:` of `{name}` needs a value to be taken from");
+                Problem::new(declaration.name, message)
+            })
+        })?;
         let count = element_count(&dims).unwrap_or(u64::MAX);
         self.budget.charge(count, span)?;
         Ok(dims)

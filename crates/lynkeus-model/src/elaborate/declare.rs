@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::evaluate::Evaluator;
 use super::scope::Mode;
-use super::symbols::{Component, Symbols, gathered, is_outer_input};
+use super::symbols::{Component, Symbols, gathered, is_outer_input, literal_subscripts};
 use super::value::{
     Scalar, Value, check_size, describe_dims, element_count, element_name, expected_number,
 };
@@ -51,7 +51,8 @@ impl<'a> Symbols<'a> {
         if declaration.variability != Variability::Continuous {
             return self.parameter(declaration, self.dependent[place], given);
         }
-        let dims = self.dims_of(declaration, |_| {
+        let mut evaluator = Evaluator::of(self, declaration, Mode::Structural);
+        let dims = evaluator.sizes(&declaration.dimensions, |_| {
             let message = format!("the size of variable `{name}` must be given");
             Err(Problem::new(declaration.name, message)
                 .hint("write a number or a parameter instead of `:`"))
@@ -83,21 +84,6 @@ impl<'a> Symbols<'a> {
         })
     }
 
-    /// Sizes as declared; `open` gives that of an axis for `:`.
-    fn dims_of(
-        &self,
-        declaration: &Declaration,
-        open: impl Fn(usize) -> Result<usize>,
-    ) -> Result<Vec<usize>> {
-        let mut evaluator = Evaluator::of(self, declaration, Mode::Structural);
-        let sizes = declaration.dimensions.iter().enumerate();
-        let size = |(axis, &id)| match self.ast.expression(id).kind {
-            Kind::All => open(axis),
-            _ => evaluator.length(id),
-        };
-        sizes.map(size).collect()
-    }
-
     /// Takes what a declaration is written out to from the budgets.
     fn charge(&self, dims: &[usize], declaration: &Declaration) -> Result<()> {
         // A size beside a size of zero counts as well: slices walk along it.
@@ -105,14 +91,12 @@ impl<'a> Symbols<'a> {
         let count = element_count(&walked).unwrap_or(u64::MAX);
         self.scalars.charge(count, declaration.name)?;
         let description = declaration.description.as_ref().map_or(0, String::len);
-        let attributes = declaration.attributes.iter();
-        let values = attributes.filter_map(|attribute| Some(self.ast.expression(attribute.value?)));
+        let values = declaration.attributes.iter().filter_map(|a| a.value);
+        let values = values.map(|value| self.ast.expression(value));
         let texts = values.filter(|value| matches!(value.kind, Kind::Text));
-        let length: u64 = texts
-            .map(|text| text.span)
-            .chain([declaration.name])
-            .map(|span| u64::from(span.end.saturating_sub(span.start)))
-            .sum();
+        let spans = texts.map(|text| text.span).chain([declaration.name]);
+        let lengths = spans.map(|span| u64::from(span.end.saturating_sub(span.start)));
+        let length: u64 = lengths.sum();
         let each = length.saturating_add(description as u64);
         self.texts
             .charge(count.saturating_mul(each), declaration.name)
@@ -292,7 +276,8 @@ impl<'a> Symbols<'a> {
             return Err(Problem::new(declaration.name, message).hint("choose one of the two"));
         }
         let known = self.binding(declaration, Mode::Structural)?;
-        let dims = self.dims_of(declaration, |axis| {
+        let mut evaluator = Evaluator::of(self, declaration, Mode::Structural);
+        let dims = evaluator.sizes(&declaration.dimensions, |axis| {
             let found = known.as_ref().and_then(|(value, _)| value.dims.get(axis));
             found.copied().ok_or_else(|| {
                 let message = "the size `:` needs a value to be taken from";
@@ -321,7 +306,11 @@ impl<'a> Symbols<'a> {
             }
             Some(values) => values.clone(),
             None if is_parameter && self.options.symbolic_parameters => parts.all_symbols(),
-            None => return Err(parts.no_value()),
+            None => {
+                let message = format!("parameter `{name}` has no value");
+                let hint = format!("write `{name} = …` here, or give the value on loading");
+                return Err(Problem::new(declaration.name, message).hint(hint));
+            }
         };
         Ok(Component {
             dims,
@@ -440,13 +429,6 @@ impl Parts<'_> {
             _ => Ok(Scalar::Real(constant(value))),
         }
     }
-
-    fn no_value(&self) -> Problem {
-        let name = self.name;
-        let hint = format!("write `{name} = …` here, or give the value on loading");
-        let message = format!("parameter `{name}` has no value");
-        Problem::new(self.declaration.name, message).hint(hint)
-    }
 }
 
 /// What the caller gives to a parameter, or to an element of one: its subscripts, and the value.
@@ -524,13 +506,12 @@ fn unknown(model: &FlatModel, name: &str) -> Problem {
 
 /// `H[3]` as `H` and 3.
 fn split(key: &str) -> Option<(&str, Vec<usize>)> {
-    let key = key.trim();
-    let Some((name, rest)) = key.split_once('[') else {
-        return Some((key, vec![]));
-    };
-    let subscripts = rest.strip_suffix(']')?.split(',');
-    let numbers = subscripts.map(|subscript| subscript.trim().parse().ok());
-    Some((name.trim(), numbers.collect::<Option<Vec<usize>>>()?))
+    match key.trim().split_once('[') {
+        None => Some((key.trim(), vec![])),
+        // one pair of brackets
+        Some((_, rest)) if rest.contains('[') => None,
+        Some(_) => literal_subscripts(key.trim()),
+    }
 }
 
 fn offset(subscripts: &[usize], dims: &[usize]) -> Option<usize> {

@@ -120,7 +120,10 @@ impl<'a> Evaluator<'a> {
         match &expression.kind {
             Kind::Integer(value) => Ok(Scalar::Integer(*value).into()),
             Kind::Real(value) => Ok(Scalar::Real(self.graph.constant(*value).node()).into()),
-            Kind::Boolean(value) => Ok(self.truth(*value).into()),
+            Kind::Boolean(value) => {
+                let truth = self.graph.constant(f64::from(*value));
+                Ok(Scalar::Boolean(truth.node()).into())
+            }
             Kind::Text => {
                 Err(Problem::new(span, "a string here is not supported").hint("use numbers"))
             }
@@ -198,15 +201,9 @@ impl<'a> Evaluator<'a> {
         Err(Problem::new(self.span(id), message).maybe_hint(hint.map(str::to_owned)))
     }
 
-    pub(super) fn truth(&self, value: bool) -> Scalar {
-        Scalar::Boolean(self.graph.constant(f64::from(u8::from(value))).node())
-    }
-
     fn end(&self, span: Span) -> Result<Value> {
-        let size = self.ends.last().and_then(|&size| i64::try_from(size).ok());
-        let outside = || Problem::new(span, "`end` stands only in subscripts");
-        size.map(|size| Scalar::Integer(size).into())
-            .ok_or_else(outside)
+        let size = self.ends.last().map(|&size| Scalar::of_size(size).into());
+        size.ok_or_else(|| Problem::new(span, "`end` stands only in subscripts"))
     }
 
     pub(super) fn varying(&self, span: Span) -> Problem {

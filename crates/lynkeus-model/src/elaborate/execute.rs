@@ -56,7 +56,9 @@ impl<'a> Evaluator<'a> {
         let span = statement.span;
         match &statement.kind {
             StatementKind::Assign(targets, value) => self.assign_all(targets, *value, span)?,
-            StatementKind::For(iterators, body) => return self.repeated(iterators, body),
+            StatementKind::For(iterators, body) => {
+                return self.repeated(iterators, Self::value, &mut |e| e.execute(body));
+            }
             StatementKind::While(condition, body) => return self.repeated_while(*condition, body),
             StatementKind::If(branches, otherwise) => {
                 return self.branched(branches, otherwise, span);
@@ -98,15 +100,21 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    fn repeated(&mut self, iterators: &'a [ForIndex], body: &'a [Statement]) -> Result<Ended> {
+    /// Runs a body for all values of the iterators; `range` evaluates what they go over.
+    pub(super) fn repeated(
+        &mut self,
+        iterators: &'a [ForIndex],
+        range: fn(&mut Self, ExprId) -> Result<Value>,
+        body: &mut dyn FnMut(&mut Self) -> Result<Ended>,
+    ) -> Result<Ended> {
         let Some((first, rest)) = iterators.split_first() else {
-            return self.execute(body);
+            return body(self);
         };
-        let value = self.value(first.range)?;
+        let value = range(self, first.range)?;
         for turn in self.range_elements(value, self.span(first.range))? {
             self.budget.charge(1, first.name)?;
             self.loops.push((self.text(first.name), turn));
-            let ended = self.repeated(rest, body);
+            let ended = self.repeated(rest, range, body);
             self.loops.pop();
             match ended? {
                 Ended::AtItsEnd => {}

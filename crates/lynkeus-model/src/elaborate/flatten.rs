@@ -3,7 +3,7 @@
 use lynkeus_expr::{Binary, Node};
 
 use super::evaluate::Evaluator;
-use super::execute;
+use super::execute::{Ended, targets};
 use super::scope::{Frame, Local, Mode, Named};
 use super::symbols::Symbols;
 use super::value::{
@@ -12,7 +12,7 @@ use super::value::{
 use crate::Assertion;
 use crate::balance::FlatEquation;
 use crate::diagnostic::{Problem, Result, Span};
-use crate::syntax::ast::{Equation, EquationKind, ExprId, ForIndex, Kind, Statement, Variability};
+use crate::syntax::ast::{Equation, EquationKind, ExprId, Kind, Statement, Variability};
 use crate::syntax::plain;
 
 /// A model written out.
@@ -79,7 +79,7 @@ impl<'a> Evaluator<'a> {
     /// The variables that an algorithm assigns, each with an equation of its own.
     fn algorithm(&mut self, statements: &'a [Statement]) -> Result<()> {
         let mut names = vec![];
-        execute::targets(self.source, self.ast, statements, &mut names);
+        targets(self.source, self.ast, statements, &mut names);
         names.sort_unstable();
         names.dedup();
         let mut frame = Frame::default();
@@ -134,7 +134,11 @@ impl<'a> Evaluator<'a> {
             }
             EquationKind::Several(targets, call) => self.several(targets, *call, equation.span),
             EquationKind::Assert(assert) => self.claim(assert, equation.span),
-            EquationKind::For(iterators, body) => self.repeat(iterators, body),
+            EquationKind::For(iterators, body) => {
+                let mut body = |e: &mut Self| e.write_out(body).map(|()| Ended::AtItsEnd);
+                let ended = self.repeated(iterators, Self::structural, &mut body);
+                ended.map(|_| ())
+            }
             EquationKind::If(branches, otherwise) => {
                 self.choose(branches, otherwise, equation.span)
             }
@@ -173,20 +177,6 @@ impl<'a> Evaluator<'a> {
                 }
                 Err(record) => self.equate_members(record, target, span)?,
             }
-        }
-        Ok(())
-    }
-
-    fn repeat(&mut self, iterators: &'a [ForIndex], body: &'a [Equation]) -> Result<()> {
-        let Some((first, rest)) = iterators.split_first() else {
-            return self.write_out(body);
-        };
-        for turn in self.turns(first)? {
-            self.budget.charge(1, first.name)?;
-            self.loops.push((self.text(first.name), turn));
-            let done = self.repeat(rest, body);
-            self.loops.pop();
-            done?;
         }
         Ok(())
     }

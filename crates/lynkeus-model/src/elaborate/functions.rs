@@ -5,12 +5,12 @@ use lynkeus_expr::{Binary, Expr, Node, Unary};
 
 use super::arithmetic::overflow;
 use super::arrays::{matrix_dims, scalar_dims, vector_dims};
-use super::evaluate::Evaluator;
+use super::evaluate::{Evaluator, reference};
 use super::value::{Scalar, Value, expected_number};
 use crate::balance::total_derivative;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{Call, ExprId, Kind};
+use crate::syntax::ast::{Call, ExprId};
 use crate::syntax::shortened;
 
 /// Where the library has functions that are known without it.
@@ -23,30 +23,32 @@ type Function = for<'e, 'a> fn(&'e mut Evaluator<'a>, &'a Call, Span) -> Result<
 
 /// By name: what an evaluator `e` makes of a call `c` at the span `s`.
 const FUNCTIONS: [(&str, Function); 47] = [
-    ("sqrt", |e, c, s| e.math(c, s, Unary::Sqrt)),
-    ("exp", |e, c, s| e.math(c, s, Unary::Exp)),
-    ("log", |e, c, s| e.math(c, s, Unary::Ln)),
-    ("log10", |e, c, s| e.each(c, s, Evaluator::log10)),
-    ("sin", |e, c, s| e.math(c, s, Unary::Sin)),
-    ("cos", |e, c, s| e.math(c, s, Unary::Cos)),
-    ("tan", |e, c, s| e.math(c, s, Unary::Tan)),
-    ("asin", |e, c, s| e.math(c, s, Unary::Asin)),
-    ("acos", |e, c, s| e.math(c, s, Unary::Acos)),
-    ("atan", |e, c, s| e.math(c, s, Unary::Atan)),
-    ("atan2", |e, c, s| e.pairs(c, s, Evaluator::atan2)),
-    ("sinh", |e, c, s| e.math(c, s, Unary::Sinh)),
-    ("cosh", |e, c, s| e.math(c, s, Unary::Cosh)),
-    ("tanh", |e, c, s| e.math(c, s, Unary::Tanh)),
-    ("abs", |e, c, s| e.math(c, s, Unary::Abs)),
-    ("sign", |e, c, s| e.math(c, s, Unary::Sign)),
-    ("floor", |e, c, s| e.each(c, s, Evaluator::floor)),
-    ("ceil", |e, c, s| e.each(c, s, Evaluator::ceil)),
-    ("integer", |e, c, s| e.each(c, s, Evaluator::integer)),
+    ("sqrt", |e, c, s| e.each(c, s, |x| x.sqrt())),
+    ("exp", |e, c, s| e.each(c, s, |x| x.exp())),
+    ("log", |e, c, s| e.each(c, s, |x| x.ln())),
+    ("log10", |e, c, s| e.each(c, s, |x| x.log10())),
+    ("sin", |e, c, s| e.each(c, s, |x| x.sin())),
+    ("cos", |e, c, s| e.each(c, s, |x| x.cos())),
+    ("tan", |e, c, s| e.each(c, s, |x| x.tan())),
+    ("asin", |e, c, s| e.each(c, s, |x| x.asin())),
+    ("acos", |e, c, s| e.each(c, s, |x| x.acos())),
+    ("atan", |e, c, s| e.each(c, s, |x| x.atan())),
+    ("atan2", |e, c, s| e.atan2(c, s)),
+    ("sinh", |e, c, s| e.each(c, s, |x| x.sinh())),
+    ("cosh", |e, c, s| e.each(c, s, |x| x.cosh())),
+    ("tanh", |e, c, s| e.each(c, s, |x| x.tanh())),
+    ("abs", |e, c, s| {
+        e.exact(c, s, i64::checked_abs, |x| x.abs())
+    }),
+    ("sign", |e, c, s| e.exact(c, s, signum, |x| x.sign())),
+    ("floor", |e, c, s| e.each(c, s, |x| x.floor())),
+    ("ceil", |e, c, s| e.each(c, s, |x| -(-x).floor())),
+    ("integer", |e, c, s| e.integer(c, s)),
     ("div", |e, c, s| e.divided(c, s, i64::checked_div, quotient)),
     ("rem", |e, c, s| e.divided(c, s, i64::checked_rem, rest)),
     ("mod", |e, c, s| e.divided(c, s, exact_modulus, modulus)),
-    ("min", |e, c, s| e.extreme(c, s, Binary::Min, i64::min)),
-    ("max", |e, c, s| e.extreme(c, s, Binary::Max, i64::max)),
+    ("min", |e, c, s| e.extreme(c, s, i64::min, |a, b| a.min(b))),
+    ("max", |e, c, s| e.extreme(c, s, i64::max, |a, b| a.max(b))),
     ("der", |e, c, _| e.der(c)),
     ("noEvent", |e, c, _| e.only_argument(c)),
     ("smooth", |e, c, _| Ok(e.two_arguments(c)?.1)),
@@ -54,8 +56,8 @@ const FUNCTIONS: [(&str, Function); 47] = [
     ("semiLinear", |e, c, s| e.semi_linear(c, s)),
     ("cross", |e, c, s| e.cross(c, s)),
     (INTERPOLATE, |e, c, s| e.interpolate(c, s)),
-    ("sum", |e, c, s| e.sum(c, s)),
-    ("product", |e, c, s| e.product_of_all(c, s)),
+    ("sum", |e, c, s| e.fold(c, s, Binary::Add, 0)),
+    ("product", |e, c, s| e.fold(c, s, Binary::Mul, 1)),
     ("array", |e, c, s| e.array_of(c, s)),
     ("size", |e, c, _| e.size(c)),
     ("ndims", |e, c, _| e.ndims(c)),
@@ -153,15 +155,52 @@ impl<'a> Evaluator<'a> {
         Ok((self.value(left)?, self.value(right)?))
     }
 
-    /// A function of every element of the only argument.
+    /// A function of every element of the only argument, as a Real.
     fn each(
         &mut self,
         call: &Call,
         span: Span,
-        function: impl Fn(&Self, Scalar, Span) -> Result<Scalar>,
+        function: impl for<'g> Fn(Expr<'g>) -> Expr<'g>,
     ) -> Result<Value> {
         let value = self.only_argument(call)?;
-        self.map(value, span, function)
+        self.map(value, span, |evaluator, scalar, span| {
+            let argument = evaluator.graph.expr(evaluator.real(scalar, span)?);
+            Ok(Scalar::Real(function(argument).node()))
+        })
+    }
+
+    /// The same, but that Integers are taken exactly.
+    fn exact(
+        &mut self,
+        call: &Call,
+        span: Span,
+        exact: impl Fn(i64) -> Option<i64>,
+        real: impl for<'g> Fn(Expr<'g>) -> Expr<'g>,
+    ) -> Result<Value> {
+        let value = self.only_argument(call)?;
+        self.map(value, span, |evaluator, scalar, span| {
+            evaluator.of_one(scalar, span, &exact, &real)
+        })
+    }
+
+    fn integer(&mut self, call: &Call, span: Span) -> Result<Value> {
+        let value = self.only_argument(call)?;
+        self.map(value, span, |evaluator, scalar, span| {
+            let node = evaluator.real(scalar, span)?;
+            let floor = evaluator.graph.unary(Unary::Floor, node);
+            match evaluator.graph.constant_value(floor) {
+                Some(value) if value.abs() > 2f64.powi(53) => Err(overflow(span)),
+                Some(value) => Ok(Scalar::Integer(value as i64)),
+                None => Ok(Scalar::Real(floor)),
+            }
+        })
+    }
+
+    fn atan2(&mut self, call: &Call, span: Span) -> Result<Value> {
+        self.pairs(call, span, |evaluator, a, b, span| {
+            let (a, b) = (evaluator.real(a, span)?, evaluator.real(b, span)?);
+            Ok(Scalar::Real(evaluator.graph.binary(Binary::Atan2, a, b)))
+        })
     }
 
     /// A function of the elements of two arguments.
@@ -175,49 +214,6 @@ impl<'a> Evaluator<'a> {
         self.elementwise(left, right, span, function)
     }
 
-    fn math(&mut self, call: &Call, span: Span, operation: Unary) -> Result<Value> {
-        self.each(call, span, |evaluator, scalar, span| {
-            let exact = match (scalar, operation) {
-                (Scalar::Integer(value), Unary::Abs) => value.checked_abs(),
-                (Scalar::Integer(value), Unary::Sign) => Some(value.signum()),
-                _ => {
-                    let node = evaluator.real(scalar, span)?;
-                    return Ok(Scalar::Real(evaluator.graph.unary(operation, node)));
-                }
-            };
-            exact.map(Scalar::Integer).ok_or_else(|| overflow(span))
-        })
-    }
-
-    fn log10(&self, scalar: Scalar, span: Span) -> Result<Scalar> {
-        let node = self.real(scalar, span)?;
-        Ok(Scalar::Real(self.graph.expr(node).log10().node()))
-    }
-
-    fn floor(&self, scalar: Scalar, span: Span) -> Result<Scalar> {
-        let node = self.real(scalar, span)?;
-        Ok(Scalar::Real(self.graph.unary(Unary::Floor, node)))
-    }
-
-    fn ceil(&self, scalar: Scalar, span: Span) -> Result<Scalar> {
-        let node = self.graph.expr(self.real(scalar, span)?);
-        Ok(Scalar::Real((-(-node).floor()).node()))
-    }
-
-    fn integer(&self, scalar: Scalar, span: Span) -> Result<Scalar> {
-        let floor = self.floor(scalar, span)?;
-        match floor.number(self.graph) {
-            Some(value) if value.abs() > 2f64.powi(53) => Err(overflow(span)),
-            Some(value) => Ok(Scalar::Integer(value as i64)),
-            None => Ok(floor),
-        }
-    }
-
-    fn atan2(&self, a: Scalar, b: Scalar, span: Span) -> Result<Scalar> {
-        let (a, b) = (self.real(a, span)?, self.real(b, span)?);
-        Ok(Scalar::Real(self.graph.binary(Binary::Atan2, a, b)))
-    }
-
     /// What is left of a division: of Integers `exact`, where it fits.
     fn divided(
         &mut self,
@@ -227,16 +223,10 @@ impl<'a> Evaluator<'a> {
         real: impl for<'g> Fn(Expr<'g>, Expr<'g>) -> Expr<'g>,
     ) -> Result<Value> {
         self.pairs(call, span, |evaluator, a, b, span| {
-            let graph = evaluator.graph;
-            if b.number(graph) == Some(0.0) {
-                return Err(Problem::new(span, "division by zero"));
+            match b.number(evaluator.graph) {
+                Some(0.0) => Err(Problem::new(span, "division by zero")),
+                _ => evaluator.of_two(a, b, span, &exact, &real),
             }
-            if let (Scalar::Integer(a), Scalar::Integer(b)) = (a, b) {
-                let exact = exact(a, b).map(Scalar::Integer);
-                return exact.ok_or_else(|| overflow(span));
-            }
-            let (a, b) = (evaluator.real(a, span)?, evaluator.real(b, span)?);
-            Ok(Scalar::Real(real(graph.expr(a), graph.expr(b)).node()))
         })
     }
 
@@ -245,15 +235,11 @@ impl<'a> Evaluator<'a> {
         &mut self,
         call: &'a Call,
         span: Span,
-        operation: Binary,
         exact: impl Fn(i64, i64) -> i64,
+        real: impl for<'g> Fn(Expr<'g>, Expr<'g>) -> Expr<'g>,
     ) -> Result<Value> {
-        let of_two = |evaluator: &Self, a: Scalar, b: Scalar, span: Span| {
-            if let (Scalar::Integer(a), Scalar::Integer(b)) = (a, b) {
-                return Ok(Scalar::Integer(exact(a, b)));
-            }
-            let (a, b) = (evaluator.real(a, span)?, evaluator.real(b, span)?);
-            Ok(Scalar::Real(evaluator.graph.binary(operation, a, b)))
+        let of_two = |evaluator: &Self, a, b, span| {
+            evaluator.of_two(a, b, span, |a, b| Some(exact(a, b)), &real)
         };
         if call.arguments.len() == 2 {
             return self.pairs(call, span, of_two);
@@ -267,6 +253,10 @@ impl<'a> Evaluator<'a> {
         let better = |best, &next| of_two(self, best, next, span);
         rest.iter().try_fold(first, better).map(Value::from)
     }
+}
+
+fn signum(number: i64) -> Option<i64> {
+    Some(number.signum())
 }
 
 /// The quotient without its fraction.
@@ -296,21 +286,16 @@ impl<'a> Evaluator<'a> {
     pub(super) fn der(&mut self, call: &'a Call) -> Result<Value> {
         let [argument] = self.arguments(call)?;
         let span = self.span(argument);
-        let kind = &self.ast.expression(argument).kind;
-        let is_variable = matches!(kind, Kind::Name | Kind::Index(..) | Kind::Path(_));
+        let is_variable = reference(self.source, self.ast, argument).is_some();
         let value = self.value(argument)?;
         self.map(value, span, |evaluator, scalar, span| {
-            let node = match scalar {
-                Scalar::Real(node) => node,
-                _ => return Err(evaluator.no_derivative(span)),
+            let derivative = match scalar {
+                Scalar::Real(node) if is_variable => evaluator.symbols.derivative(node),
+                Scalar::Real(node) => Some(evaluator.total_derivative(node, span)?),
+                _ => None,
             };
-            if is_variable {
-                let derivative = evaluator.symbols.derivative(node);
-                return derivative
-                    .map(Scalar::Real)
-                    .ok_or_else(|| evaluator.no_derivative(span));
-            }
-            evaluator.total_derivative(node, span).map(Scalar::Real)
+            let derivative = derivative.map(Scalar::Real);
+            derivative.ok_or_else(|| evaluator.no_derivative(span))
         })
     }
 

@@ -236,11 +236,11 @@ pub(super) fn gathered(
 }
 
 /// `x` and 1, 2 of `x[1,2]`.
-fn literal_subscripts(name: &str) -> Option<(&str, Vec<usize>)> {
+pub(super) fn literal_subscripts(name: &str) -> Option<(&str, Vec<usize>)> {
     let (base, inside) = name.strip_suffix(']')?.rsplit_once('[')?;
-    let numbers = inside.split(',').map(|number| number.parse().ok());
+    let numbers = inside.split(',').map(|number| number.trim().parse().ok());
     let numbers: Vec<usize> = numbers.collect::<Option<_>>()?;
-    (numbers.len() <= MAX_RANK).then_some((base, numbers))
+    (numbers.len() <= MAX_RANK).then_some((base.trim(), numbers))
 }
 
 /// The array of all elements; `None` where some are missing.

@@ -25,17 +25,16 @@ impl<'a> Evaluator<'a> {
         let x = self.points(abscissas)?;
         let y = self.points(ordinates)?;
         if x.is_empty() || x.len() != y.len() {
+            let (points, values) = (x.len(), y.len());
             let message = format!(
-                "a table needs as many values as points, at least one: found {} points and {} values",
-                x.len(),
-                y.len()
+                "a table needs as many values as points, at least one: found {points} points and \
+                 {values} values"
             );
             return Err(Problem::new(span, message));
         }
         self.increasing(&x, abscissas)?;
-        let mut points = self.symbols.table_points.borrow_mut();
-        points.extend(self.graph.symbols_of(&x));
-        drop(points);
+        let made_of = self.graph.symbols_of(&x);
+        self.symbols.table_points.borrow_mut().extend(made_of);
         self.budget.charge(x.len() as u64, span)?;
         let at = self.value(at)?;
         self.map(at, span, |evaluator, at, span| {
@@ -121,60 +120,38 @@ impl<'a> Evaluator<'a> {
     }
 }
 
-/// A point of the table with the slope there.
-#[derive(Clone, Copy)]
-struct End<'g> {
-    x: Expr<'g>,
-    y: Expr<'g>,
-    slope: Expr<'g>,
-}
-
-impl<'g> End<'g> {
-    fn tangent(&self, u: Expr<'g>) -> Expr<'g> {
-        self.y + self.slope * (u - self.x)
-    }
-}
-
-/// Hermite's cubic between two points; `rise` is added to the left value for the right one. Written
-/// so that at both ends the value, and what the rules of differentiation make of the slope, are
-/// those of the ends to the bit: neighbours meet without a jump, and what looks for jumps sees
-/// that they do.
-fn cubic<'g>(left: End<'g>, right: End<'g>, rise: Expr<'g>, u: Expr<'g>) -> Expr<'g> {
-    let (from, to) = (u - left.x, right.x - u);
-    let width = right.x - left.x;
-    let (share, rest) = (from / width, to / width);
-    let rise = rise * (share * share * (3.0 - 2.0 * share));
-    let at_left = left.slope * (from * (rest * rest));
-    let at_right = right.slope * (to * (share * share));
-    left.y + rise + (at_left - at_right)
-}
-
-/// The cubic through the points (x[i], y[i]) at u, and along its tangents outside of them.
+/// The cubic through the points (x[i], y[i]) at u, and along its tangents outside of them. Hermite's
+/// cubics between two points are written so that at both ends the value, and what the rules of
+/// differentiation make of the slope, are those of the ends to the bit: neighbours meet without a
+/// jump, and what looks for jumps sees that they do.
 pub(super) fn monotone_cubic(graph: &Graph, x: &[Node], y: &[Node], u: Node) -> Node {
     let of = |nodes: &[Node]| nodes.iter().map(|&n| graph.expr(n)).collect::<Vec<_>>();
     let (x, y, u) = (of(x), of(y), graph.expr(u));
+    let last = x.len() - 1;
+    if last == 0 {
+        // a single point is a constant
+        return y[0].node();
+    }
     let (values, rises) = met(&y);
     let widths: Vec<Expr<'_>> = x.windows(2).map(|x| x[1] - x[0]).collect();
     let slopes = slopes(&widths, &rises);
-    let ends = x.into_iter().zip(values).zip(slopes);
-    let ends: Vec<End<'_>> = ends.map(|((x, y), slope)| End { x, y, slope }).collect();
-    let (first, last) = match ends[..] {
-        [first, .., last] => (first, last),
-        // a single point is a constant
-        _ => return y.first().map_or(u, |y| *y).node(),
-    };
-    if rises.len() == 1 {
-        return first.tangent(u).node();
+    let tangent = |i: usize| values[i] + slopes[i] * (u - x[i]);
+    if last == 1 {
+        return tangent(0).node();
     }
+    let cubic = |i: usize| {
+        let (from, to) = (u - x[i], x[i + 1] - u);
+        let width = x[i + 1] - x[i];
+        let (share, rest) = (from / width, to / width);
+        let rise = rises[i] * (share * share * (3.0 - 2.0 * share));
+        let at_left = slopes[i] * (from * (rest * rest));
+        let at_right = slopes[i + 1] * (to * (share * share));
+        values[i] + rise + (at_left - at_right)
+    };
     // the pieces from −∞ to ∞, each with where it ends
-    let inner = ends.windows(2).zip(&rises).map(|(pair, &rise)| {
-        let [left, right] = [pair[0], pair[1]];
-        (cubic(left, right, rise, u), right.x)
-    });
-    let pieces: Vec<(Expr<'_>, Expr<'_>)> = std::iter::once((first.tangent(u), first.x))
-        .chain(inner)
-        .collect();
-    chosen(&pieces, last.tangent(u), u).node()
+    let mut pieces = vec![(tangent(0), x[0])];
+    pieces.extend((0..last).map(|i| (cubic(i), x[i + 1])));
+    chosen(&pieces, tangent(last), u).node()
 }
 
 /// The piece that holds u, by halves: a chain of choices would be as deep as the table is long.

@@ -13,6 +13,11 @@ pub(crate) enum Scalar {
 }
 
 impl Scalar {
+    /// Sizes fit an Integer: every one of them is below the limit on elements.
+    pub(crate) fn of_size(size: usize) -> Self {
+        Scalar::Integer(i64::try_from(size).unwrap_or(i64::MAX))
+    }
+
     /// As a Real expression; `None` for a Boolean.
     pub(crate) fn real(self, graph: &Graph) -> Option<Node> {
         match self {
