@@ -1,6 +1,6 @@
 //! Plants written in Rust: functions over expressions with overloaded operators.
 
-use std::cell::{Ref, RefCell};
+use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 use lynkeus_expr::{Expr, Graph, Node};
@@ -158,10 +158,8 @@ impl Model {
     fn is_own(&self, expression: Expr<'_>, what: &str) -> bool {
         let is_own = std::ptr::eq(expression.graph(), &self.graph);
         if !is_own {
-            self.parts
-                .borrow_mut()
-                .foreign
-                .get_or_insert_with(|| what.to_owned());
+            let foreign = &mut self.parts.borrow_mut().foreign;
+            foreign.get_or_insert_with(|| what.to_owned());
         }
         is_own
     }
@@ -172,25 +170,21 @@ impl Model {
     /// A name is used twice or is reserved, a range is empty, a state has no derivative or two,
     /// or an expression reads a symbol that is not declared.
     pub fn finish(self) -> Result<Plant, ModelError> {
-        let derivatives = {
-            let parts = self.parts.borrow();
-            if let Some(what) = &parts.foreign {
-                return Err(ModelError::Foreign(what.clone()));
-            }
-            check_names(&parts)?;
-            check_ranges(&parts)?;
-            let derivatives = self.match_derivatives(&parts)?;
-            self.check_symbols(&parts, &derivatives)?;
-            derivatives
-        };
-        let time = self.time().node();
-        let parts = self.parts.into_inner();
+        let Self { name, graph, parts } = self;
+        let parts = parts.into_inner();
+        if let Some(what) = parts.foreign {
+            return Err(ModelError::Foreign(what));
+        }
+        parts.check_declared()?;
+        let derivatives = parts.derivatives(&graph)?;
+        let time = graph.symbol("time").node();
+        parts.check_symbols(&graph, time, &derivatives)?;
         Ok(Plant {
             table_points: BTreeSet::new(),
             assertions: vec![],
             warnings: vec![],
-            name: self.name,
-            graph: self.graph,
+            name,
+            graph,
             time,
             states: parts.states,
             derivatives,
@@ -200,57 +194,69 @@ impl Model {
             parameters: parts.parameters,
         })
     }
+}
 
-    fn match_derivatives(&self, parts: &Ref<'_, Parts>) -> Result<Vec<Node>, ModelError> {
-        let states: HashSet<Node> = parts.states.iter().map(|state| state.node).collect();
+impl Parts {
+    /// What an expression may read.
+    fn readable(&self) -> impl Iterator<Item = &Variable> {
+        let parameters = self.parameters.iter().map(|parameter| &parameter.variable);
+        self.states.iter().chain(&self.inputs).chain(parameters)
+    }
+
+    fn check_declared(&self) -> Result<(), ModelError> {
+        let all = || self.readable().chain(&self.outputs);
+        let mut names = HashSet::new();
+        for Variable { name, .. } in all() {
+            if name == "time" || name.is_empty() {
+                return Err(ModelError::Reserved(name.clone()));
+            }
+            if !names.insert(name) {
+                return Err(ModelError::Duplicate(name.clone()));
+            }
+        }
+        let is_range = |variable: &&Variable| variable.min <= variable.max;
+        match all().find(|variable| !is_range(variable)) {
+            Some(variable) => Err(ModelError::EmptyRange(variable.name.clone())),
+            None => Ok(()),
+        }
+    }
+
+    /// The derivatives in the order of the states.
+    fn derivatives(&self, graph: &Graph) -> Result<Vec<Node>, ModelError> {
+        let states: HashSet<Node> = self.states.iter().map(|state| state.node).collect();
         let mut found = HashMap::new();
-        for &(state, derivative) in &parts.derivatives {
-            let name = || self.graph.symbol_name(state);
+        for &(state, derivative) in &self.derivatives {
+            let name = graph.symbol_name(state);
             if !states.contains(&state) {
-                let what = name().map_or("an expression".to_owned(), |name| format!("`{name}`"));
+                let what = name.map_or("an expression".to_owned(), |name| format!("`{name}`"));
                 return Err(ModelError::NotAState(what));
             }
             if found.insert(state, derivative).is_some() {
-                return Err(ModelError::TwoDerivatives(name().unwrap_or_default()));
+                return Err(ModelError::TwoDerivatives(name.unwrap_or_default()));
             }
         }
         let derivative = |state: &Variable| {
             let missing = || ModelError::MissingDerivative(state.name.clone());
             found.get(&state.node).copied().ok_or_else(missing)
         };
-        parts.states.iter().map(derivative).collect()
+        self.states.iter().map(derivative).collect()
     }
 
-    fn check_symbols(&self, parts: &Ref<'_, Parts>, slopes: &[Node]) -> Result<(), ModelError> {
-        let mut known: HashSet<Node> = [self.time().node()].into();
-        known.extend(parts.states.iter().map(|state| state.node));
-        known.extend(parts.inputs.iter().map(|input| input.node));
-        known.extend(
-            parts
-                .parameters
-                .iter()
-                .map(|parameter| parameter.variable.node),
-        );
-        let states = parts.states.iter().zip(slopes);
+    fn check_symbols(&self, graph: &Graph, time: Node, slopes: &[Node]) -> Result<(), ModelError> {
+        let known = self.readable().map(|variable| variable.node);
+        let known: HashSet<Node> = known.chain([time]).collect();
+        let states = self.states.iter().zip(slopes);
         let slopes = states.map(|(state, &slope)| (format!("der({})", state.name), slope));
-        let outputs = parts
-            .outputs
-            .iter()
-            .map(|output| (output.name.clone(), output.node));
-        let expressions: Vec<(String, Node)> = slopes.chain(outputs).collect();
-        let roots: Vec<Node> = expressions.iter().map(|(_, node)| *node).collect();
-        let read = self.graph.symbols_of(&roots);
-        let Some(stranger) = read.into_iter().find(|symbol| !known.contains(symbol)) else {
-            return Ok(());
-        };
-        let reads =
-            |(_, node): &(String, Node)| self.graph.symbols_of(&[*node]).contains(&stranger);
-        let place = expressions.into_iter().find(reads).map(|(place, _)| place);
-        let name = self.graph.symbol_name(stranger).unwrap_or_default();
-        Err(ModelError::Undeclared {
-            place: place.unwrap_or_default(),
-            name,
-        })
+        let outputs = self.outputs.iter();
+        let outputs = outputs.map(|output| (output.name.clone(), output.node));
+        for (place, node) in slopes.chain(outputs) {
+            let mut read = graph.symbols_of(&[node]).into_iter();
+            if let Some(stranger) = read.find(|symbol| !known.contains(symbol)) {
+                let name = graph.symbol_name(stranger).unwrap_or_default();
+                return Err(ModelError::Undeclared { place, name });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -267,37 +273,6 @@ fn variable(name: &str, node: Node, attributes: Attributes) -> Variable {
         nominal: attributes.nominal,
         integer: false,
         fixed: attributes.fixed,
-    }
-}
-
-fn all(parts: &Parts) -> impl Iterator<Item = &Variable> {
-    let parameters = parts.parameters.iter().map(|parameter| &parameter.variable);
-    let variables = parts
-        .states
-        .iter()
-        .chain(&parts.inputs)
-        .chain(&parts.outputs);
-    variables.chain(parameters)
-}
-
-fn check_names(parts: &Parts) -> Result<(), ModelError> {
-    let mut names = HashSet::new();
-    for variable in all(parts) {
-        if variable.name == "time" || variable.name.is_empty() {
-            return Err(ModelError::Reserved(variable.name.clone()));
-        }
-        if !names.insert(variable.name.as_str()) {
-            return Err(ModelError::Duplicate(variable.name.clone()));
-        }
-    }
-    Ok(())
-}
-
-fn check_ranges(parts: &Parts) -> Result<(), ModelError> {
-    let is_range = |variable: &&Variable| variable.min <= variable.max;
-    match all(parts).find(|variable| !is_range(variable)) {
-        Some(variable) => Err(ModelError::EmptyRange(variable.name.clone())),
-        None => Ok(()),
     }
 }
 

@@ -44,53 +44,43 @@ impl Span {
     }
 }
 
-/// What is wrong and where, before it is tied to a file. Boxed, so that the results of the
-/// recursive parts of the reader stay small.
+/// What is wrong and where, before it is tied to a file.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Problem(Box<Details>);
-
-/// The parts of a [`Problem`].
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Details {
+pub(crate) struct Problem {
     pub span: Span,
     pub message: String,
     pub label: Option<String>,
     pub hint: Option<String>,
 }
 
-pub(crate) type Result<T> = std::result::Result<T, Problem>;
+/// Boxed, so that the results of the recursive parts of the reader stay small.
+pub(crate) type Result<T> = std::result::Result<T, Box<Problem>>;
 
 impl Problem {
-    pub(crate) fn new(span: Span, message: impl Into<String>) -> Self {
-        let message = message.into();
-        Self(Box::new(Details {
+    pub(crate) fn new(span: Span, message: impl Into<String>) -> Box<Self> {
+        Box::new(Self {
             span,
-            message,
+            message: message.into(),
             label: None,
             hint: None,
-        }))
+        })
     }
 
     /// Text beside the caret.
-    pub(crate) fn label(mut self, label: impl Into<String>) -> Self {
-        self.0.label = Some(label.into());
+    pub(crate) fn label(mut self: Box<Self>, label: impl Into<String>) -> Box<Self> {
+        self.label = Some(label.into());
         self
     }
 
     /// What to do about it.
-    pub(crate) fn hint(mut self, hint: impl Into<String>) -> Self {
-        self.0.hint = Some(hint.into());
-        self
+    pub(crate) fn hint(self: Box<Self>, hint: impl Into<String>) -> Box<Self> {
+        self.maybe_hint(Some(hint))
     }
 
     /// A hint where there is one.
-    pub(crate) fn maybe_hint(mut self, hint: Option<String>) -> Self {
-        self.0.hint = hint;
+    pub(crate) fn maybe_hint(mut self: Box<Self>, hint: Option<impl Into<String>>) -> Box<Self> {
+        self.hint = hint.map(Into::into);
         self
-    }
-
-    pub(crate) fn into_details(self) -> Details {
-        *self.0
     }
 }
 
@@ -142,14 +132,12 @@ struct Excerpt {
 }
 
 impl Diagnostic {
-    pub(crate) fn new(problem: Problem, file: &str, source: &str) -> Self {
-        let problem = problem.into_details();
-        let start = floor_boundary(source, problem.span.start as usize);
-        let end = floor_boundary(source, problem.span.end as usize).max(start);
+    pub(crate) fn new(problem: Box<Problem>, file: &str, source: &str) -> Self {
+        let start = source.floor_char_boundary(problem.span.start as usize);
+        let end = source.floor_char_boundary(problem.span.end as usize);
         let line_start = source[..start].rfind('\n').map_or(0, |i| i + 1);
-        let line_end = source[start..]
-            .find('\n')
-            .map_or(source.len(), |i| start + i);
+        let rest = source[start..].find('\n');
+        let line_end = rest.map_or(source.len(), |length| start + length);
         let line = problem.span.line(source);
         let column = 1 + source[line_start..start].chars().count();
         Self {
@@ -160,12 +148,16 @@ impl Diagnostic {
             message: problem.message,
             label: problem.label,
             hint: problem.hint,
-            excerpt: Box::new(Excerpt::new(source, line_start..line_end, start..end)),
+            excerpt: Box::new(Excerpt::new(
+                source,
+                line_start..line_end,
+                start..end.max(start),
+            )),
         }
     }
 
     /// What looks wrong but is taken.
-    pub(crate) fn warning(problem: Problem, file: &str, source: &str) -> Self {
+    pub(crate) fn warning(problem: Box<Problem>, file: &str, source: &str) -> Self {
         let mut warning = Self::new(problem, file, source);
         warning.excerpt.is_warning = true;
         warning
@@ -174,15 +166,16 @@ impl Diagnostic {
     /// `file:line:column: message (hint)` on one line.
     pub fn one_line(&self) -> String {
         let hint = self.hint.as_deref().map(|hint| format!(" ({hint})"));
-        format!(
-            "{}:{}:{}: {}{}",
-            self.file,
-            self.line,
-            self.column,
-            self.message,
-            hint.unwrap_or_default()
-        )
-        .replace('\n', " ")
+        let Self {
+            file,
+            line,
+            column,
+            message,
+            ..
+        } = self;
+        let hint = hint.unwrap_or_default();
+        let text = format!("{file}:{line}:{column}: {message}{hint}");
+        text.replace('\n', " ")
     }
 
     /// The rendered form with terminal colours.
@@ -210,10 +203,8 @@ impl Diagnostic {
         } else {
             title.element(snippet.path(self.file.as_str()))
         };
-        let hint = self
-            .hint
-            .as_deref()
-            .map(|hint| Group::with_title(Level::HELP.secondary_title(hint)));
+        let hint = self.hint.as_deref();
+        let hint = hint.map(|hint| Group::with_title(Level::HELP.secondary_title(hint)));
         let report: Vec<Group<'_>> = std::iter::once(group).chain(hint).collect();
         renderer.render(&report)
     }
@@ -231,9 +222,9 @@ impl Excerpt {
     /// The line, or a window of it around the marked bytes where it is long.
     fn new(source: &str, line: std::ops::Range<usize>, marked: std::ops::Range<usize>) -> Self {
         let marked_end = marked.end.min(line.end).min(marked.start + WINDOW);
-        let from = floor_boundary(source, marked.start.saturating_sub(WINDOW).max(line.start));
-        let to = floor_boundary(source, (marked_end + WINDOW).min(line.end));
-        let marked_end = floor_boundary(source, marked_end).max(marked.start);
+        let from = source.floor_char_boundary(marked.start.saturating_sub(WINDOW).max(line.start));
+        let to = source.floor_char_boundary((marked_end + WINDOW).min(line.end));
+        let marked_end = source.floor_char_boundary(marked_end).max(marked.start);
         Self {
             // A carriage return would move the caret; it takes one byte, as a space does.
             text: source[from..to].replace('\r', " "),
@@ -242,11 +233,6 @@ impl Excerpt {
             is_warning: false,
         }
     }
-}
-
-/// The last character boundary at or before `index`.
-fn floor_boundary(source: &str, index: usize) -> usize {
-    source.floor_char_boundary(index.min(source.len()))
 }
 
 /// Why a model file could not be loaded.

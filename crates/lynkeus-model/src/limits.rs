@@ -55,16 +55,10 @@ impl Budget {
     /// Takes `amount` from the budget.
     pub(crate) fn charge(&self, amount: u64, span: Span) -> Result<()> {
         let Some(left) = self.left.get().checked_sub(amount) else {
-            return Err(Problem::new(
-                span,
-                format!(
-                    "the model needs more than {} {}",
-                    grouped(self.limit),
-                    self.what
-                ),
-            )
-            .label("the limit is passed here")
-            .hint("use fewer loop turns or smaller arrays"));
+            let (limit, what) = (grouped(self.limit), self.what);
+            let problem = Problem::new(span, format!("the model needs more than {limit} {what}"));
+            let problem = problem.label("the limit is passed here");
+            return Err(problem.hint("use fewer loop turns or smaller arrays"));
         };
         self.left.set(left);
         Ok(())

@@ -93,22 +93,16 @@ impl Plant {
         let bytes = std::fs::read(path).map_err(read_error)?;
         let source = std::str::from_utf8(&bytes).map_err(|error| {
             let offset = error.valid_up_to();
-            let line = 1 + bytes
-                .iter()
-                .take(offset)
-                .filter(|&&byte| byte == b'\n')
-                .count();
+            let before = bytes.iter().take(offset);
+            let line = 1 + before.filter(|&&byte| byte == b'\n').count();
             LoadError::NotUtf8 {
                 path: path.to_owned(),
                 line,
                 offset,
             }
         })?;
-        Ok(Self::from_text(
-            source,
-            &path.display().to_string(),
-            options,
-        )?)
+        let name = path.display().to_string();
+        Ok(Self::from_text(source, &name, options)?)
     }
 
     /// Reads a text in the language that `file_name` tells: the notation of `@ODEmodel` where it
@@ -148,7 +142,8 @@ fn is_ode_model(file_name: &str) -> bool {
 pub fn model_names(source: &str, file_name: &str) -> Result<Vec<String>, Diagnostic> {
     let names = match is_ode_model(file_name) {
         false => elaborate::names(source),
-        true => ode_model::names(source, file_name),
+        true => ode_model::models(source, file_name)
+            .map(|models| models.iter().map(|(name, _)| (*name).to_owned()).collect()),
     };
     names.map_err(|problem| Diagnostic::new(problem, file_name, source))
 }
@@ -193,11 +188,6 @@ pub fn parse_expression(
     let value = elaborate::evaluated(source, &ast, graph, names, |e| e.value(root));
     let scalar = value.map_err(refused)?.as_scalar();
     let node = scalar.and_then(|scalar| scalar.real(graph));
-    node.ok_or_else(|| {
-        let span = ast.expression(root).span;
-        refused(Problem::new(
-            span,
-            "expected a number, found an array or a condition",
-        ))
-    })
+    let message = "expected a number, found an array or a condition";
+    node.ok_or_else(|| refused(Problem::new(ast.expression(root).span, message)))
 }

@@ -49,7 +49,7 @@ const LISTED: usize = 12;
 pub(crate) fn choose(
     models: &[(&str, Span)],
     wanted: Option<&str>,
-    none: impl FnOnce() -> Problem,
+    none: impl FnOnce() -> Box<Problem>,
 ) -> Result<usize> {
     let names: Vec<&str> = models.iter().map(|(name, _)| *name).collect();
     let Some(wanted) = wanted else {

@@ -255,7 +255,7 @@ impl<'a> Analysis<'a> {
             about: about.collect(),
             partial: vec![],
             symmetries: self.symmetries(&found),
-            order: order + found.search.succession().order,
+            order: found.search.outputs_order(),
             rank: found.search.rank(),
             unknowns: named + self.model.unknown_inputs * order,
             notes: self.notes(&found),

@@ -7,9 +7,6 @@ use crate::model::{First, Model, Role};
 use crate::series::{Functions, Run, Stop};
 use lynkeus_expr::modular::{Modular, Random};
 
-/// Bytes of a series where nothing limits the memory.
-const ROOM: usize = 1 << 30;
-
 /// The unknowns with respect to which a series is differentiated, as columns: the named
 /// quantities, the derivatives of unknown inputs, directions in which known starts move.
 #[derive(Clone, Debug)]
@@ -87,14 +84,12 @@ pub(crate) struct Expansion<'a> {
 
 impl<'a> Expansion<'a> {
     pub fn new(model: &'a Model, start: &'a Start, columns: Columns) -> Self {
-        let budget = &model.budget;
-        let room = budget.room().unwrap_or(ROOM) / size_of::<Modular>();
         let functions = Functions::new(start.seed, &start.turned);
         let width = columns.width();
         let none = Functions::new(start.seed, &Default::default());
         Self {
-            run: Run::new(&model.program, width, functions, budget.clone(), room),
-            computed: Run::new(&model.starts, width, none, budget.clone(), room),
+            run: Run::new(&model.program, width, functions, &model.budget),
+            computed: Run::new(&model.starts, width, none, &model.budget),
             coefficients: vec![(Modular::ZERO, vec![]); model.symbols.len()],
             point: vec![Modular::ZERO; columns.named],
             random: Random::new(start.seed.wrapping_mul(0x1000_0000_01b3) + 7),
@@ -108,27 +103,19 @@ impl<'a> Expansion<'a> {
     /// Computes the next coefficient of everything.
     pub fn advance(&mut self) -> Result<(), Stop> {
         self.next_coefficients()?;
-        let coefficients = std::mem::take(&mut self.coefficients);
-        let advanced = self.run.advance(&|place| coefficients[place].clone());
-        self.coefficients = coefficients;
-        advanced
+        self.run.advance(&|place| self.coefficients[place].clone())
     }
 
     /// The first coefficients without sensitivities: whether the start is a good one.
     pub fn first(&mut self) -> Result<(), Stop> {
         self.next_coefficients()?;
-        let coefficients = std::mem::take(&mut self.coefficients);
-        self.run.advance(&|place| (coefficients[place].0, vec![]))
+        self.run
+            .advance(&|place| (self.coefficients[place].0, vec![]))
     }
 
     /// The latest coefficient of a state's derivative with its sensitivities.
     pub fn derivative(&self, state: usize) -> (Modular, Vec<Modular>) {
         self.run.root(state)
-    }
-
-    /// How far a first value is from the known start.
-    pub fn moved_by(&self, place: usize) -> Modular {
-        self.start.moved_by(self.model, place)
     }
 
     /// Sensitivities of the latest coefficient of a root.
@@ -190,9 +177,9 @@ impl<'a> Expansion<'a> {
 
     fn first_coefficients(&mut self) -> Result<(), Stop> {
         self.constants();
-        let coefficients = std::mem::take(&mut self.coefficients);
-        let computed = self.computed.advance(&|place| coefficients[place].clone());
-        self.coefficients = coefficients;
+        let computed = self
+            .computed
+            .advance(&|place| self.coefficients[place].clone());
         // no number of the search can mend a start that is not defined
         computed.map_err(|stop| match stop {
             Stop::Point(_) => Stop::Point(usize::MAX),

@@ -110,7 +110,7 @@ impl Place {
         let mut expansion = Expansion::new(model, start, columns);
         expansion.advance()?;
         let mut values = expansion.point.clone();
-        values.extend(known.iter().map(|&place| expansion.moved_by(place)));
+        values.extend(known.iter().map(|&place| start.moved_by(model, place)));
         let mut flow = vec![Modular::ZERO; values.len()];
         let mut gradients = vec![None; values.len()];
         let places = model.symbols.iter().enumerate();

@@ -19,8 +19,8 @@ pub(crate) struct Search<'a> {
     signals: Echelon,
     /// gradients of the expressions asked about, at the start
     about: Vec<Vec<Modular>>,
-    /// what counts as measured beside the outputs
-    succession: Succession,
+    /// what counts as measured beside the outputs; nothing where the ranks cost little
+    succession: Option<Succession<'a>>,
     /// coefficients taken so far
     taken: usize,
 }
@@ -33,7 +33,7 @@ impl<'a> Search<'a> {
             rows: Echelon::new(width),
             signals: Echelon::new(width),
             about: vec![],
-            succession: Succession::default(),
+            succession: None,
             taken: 0,
             model,
         }
@@ -47,11 +47,12 @@ impl<'a> Search<'a> {
             let expressions = 0..self.model.about;
             self.about = expressions.map(|i| self.expansion.about(i)).collect();
             if self.is_large() {
-                self.succession = self.follow();
+                self.succession = Some(self.follow());
             }
         }
         self.add_outputs();
-        for place in self.succession.places.clone() {
+        let places = self.succession.as_ref().map(|s| s.places.clone());
+        for place in places.into_iter().flatten() {
             let row = self.expansion.symbol(place).to_vec();
             self.add(row);
         }
@@ -91,13 +92,13 @@ impl<'a> Search<'a> {
     }
 
     /// What follows one after another from the coefficients taken last, the first ones.
-    fn follow(&self) -> Succession {
-        succession(self.model, &|root| self.expansion.root(root))
+    fn follow(&self) -> Succession<'a> {
+        Succession::new(self.model, &|root| self.expansion.root(root))
     }
 
-    /// What counts as measured; nothing where the ranks cost little.
-    pub fn succession(&self) -> &Succession {
-        &self.succession
+    /// Derivatives of the outputs from which all is known.
+    pub fn outputs_order(&self) -> usize {
+        self.order() + self.succession.as_ref().map_or(0, |s| s.order)
     }
 
     /// Derivatives of the outputs, and of what counts as measured, that were taken.
@@ -185,37 +186,13 @@ impl<'a> Search<'a> {
     }
 }
 
-/// What follows, and from how much.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Succession {
+/// What follows one after another from the outputs, and from how much.
+pub(crate) struct Succession<'a> {
+    model: &'a Model,
     /// places of the symbols, in the order in which they are found
     pub places: Vec<usize>,
     /// derivatives of the outputs that they are found from
     pub order: usize,
-}
-
-/// What follows at a start, where `gradient` has the sensitivities of a root's first
-/// coefficient.
-pub(crate) fn succession(model: &Model, gradient: &dyn Fn(usize) -> Vec<Modular>) -> Succession {
-    let mut followed = Followed::new(model);
-    for output in model.states..model.states + model.outputs {
-        followed.know(output, 0);
-    }
-    while let Some(root) = followed.ready.pop_front() {
-        let Some(place) = followed.missing[root].first().copied() else {
-            continue;
-        };
-        let column = model.symbols[place].column;
-        let gives = |column: usize| gradient(root).get(column).is_some_and(|x| !x.is_zero());
-        if column.is_some_and(gives) {
-            followed.find(place, root);
-        }
-    }
-    followed.found
-}
-
-struct Followed<'a> {
-    model: &'a Model,
     /// of each root the places of symbols that are not known so far
     missing: Vec<BTreeSet<usize>>,
     /// of each place the roots that depend on it
@@ -224,11 +201,30 @@ struct Followed<'a> {
     known: Vec<Option<usize>>,
     /// known roots that miss one symbol
     ready: VecDeque<usize>,
-    found: Succession,
 }
 
-impl<'a> Followed<'a> {
-    fn new(model: &'a Model) -> Self {
+impl<'a> Succession<'a> {
+    /// What follows at a start, where `gradient` has the sensitivities of a root's first
+    /// coefficient.
+    fn new(model: &'a Model, gradient: &dyn Fn(usize) -> Vec<Modular>) -> Self {
+        let mut all = Self::unsought(model);
+        for output in model.states..model.states + model.outputs {
+            all.know(output, 0);
+        }
+        while let Some(root) = all.ready.pop_front() {
+            let Some(place) = all.missing[root].first().copied() else {
+                continue;
+            };
+            let column = model.symbols[place].column;
+            let gives = |column: usize| gradient(root).get(column).is_some_and(|x| !x.is_zero());
+            if column.is_some_and(gives) {
+                all.find(place, root);
+            }
+        }
+        all
+    }
+
+    fn unsought(model: &'a Model) -> Self {
         let is_unknown = |place: &usize| {
             let symbol = &model.symbols[*place];
             // a given start says nothing of later values
@@ -252,7 +248,8 @@ impl<'a> Followed<'a> {
         Self {
             known: vec![None; roots],
             ready: VecDeque::new(),
-            found: Succession::default(),
+            places: vec![],
+            order: 0,
             missing,
             readers,
             model,
@@ -273,9 +270,9 @@ impl<'a> Followed<'a> {
 
     /// A symbol is known from a root.
     fn find(&mut self, place: usize, root: usize) {
-        self.found.places.push(place);
+        self.places.push(place);
         let order = self.known[root].unwrap_or_default();
-        self.found.order = self.found.order.max(order);
+        self.order = self.order.max(order);
         for reader in std::mem::take(&mut self.readers[place]) {
             self.missing[reader].remove(&place);
             // what it is found from next is known no earlier than this
@@ -315,7 +312,7 @@ mod tests {
         search.advance().unwrap();
         let found = search.follow();
         search.until(None, model.depth).unwrap();
-        assert_eq!(search.succession, Succession::default());
+        assert!(search.succession.is_none());
         let name = |place: &usize| {
             let column = model.symbols[*place].column.unwrap();
             let name = model.named[column].0.clone();

@@ -195,6 +195,8 @@ pub struct Constant {
     pub value: f64,
     /// what it is, in a few words
     pub meaning: String,
+    /// numbers that stand in the place of `{}` in the meaning
+    pub numbers: Vec<f64>,
 }
 
 impl Constant {
@@ -204,6 +206,7 @@ impl Constant {
             name: name.into(),
             value,
             meaning: meaning.into(),
+            numbers: vec![],
         }
     }
 }

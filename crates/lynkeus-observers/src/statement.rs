@@ -175,6 +175,12 @@ pub enum Reason {
     DriftObservable(SaidOfDriftObservable),
 }
 
+impl From<lynkeus_structure::Misfit> for Reason {
+    fn from(misfit: lynkeus_structure::Misfit) -> Self {
+        Self::Structure(misfit.into())
+    }
+}
+
 impl From<lynkeus_structure::Reason> for Reason {
     fn from(reason: lynkeus_structure::Reason) -> Self {
         Self::Structure(reason)

@@ -96,6 +96,7 @@ impl Estimator {
             Ok(()) => self.refused.store(0, Ordering::Relaxed),
             Err(
                 run::Error::Diverged { .. }
+                | run::Error::DeviationDiverged { .. }
                 | run::Error::NotFinite { .. }
                 | run::Error::StepUnderflow { .. }
                 | run::Error::Singular { .. }

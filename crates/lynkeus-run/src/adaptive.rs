@@ -3,15 +3,17 @@
 
 mod dop853;
 mod factors;
+mod one_step;
 mod radau;
 
 use crate::error::state_text;
 use crate::events::{Ahead, Filippov, Span};
-use crate::method::resolution;
+use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Method, Tolerances, spectral_radius};
 
 use dop853::Dop853;
+use one_step::OneStep;
 use radau::Radau;
 
 /// Accepted steps between two looks at the spectral radius.
@@ -46,21 +48,16 @@ pub(crate) struct Adaptive {
     tolerances: Tolerances,
     /// both methods may be used
     may_change: bool,
-    implicit: bool,
+    is_implicit: bool,
     explicit: Option<Box<Dop853>>,
-    radau: Option<Radau>,
+    implicit: Option<Box<Radau>>,
     /// step proposed for the next step; 0 before the first
     next: f64,
     /// accepted steps since the last look
     since_look: usize,
     /// looks in a row that spoke for a change
     agreeing: usize,
-    budget: Budget,
-}
-
-/// Steps of the interval under way, and of the run.
-#[derive(Clone, Copy, Debug)]
-struct Budget {
+    /// steps granted for the interval under way, and left of them
     granted: usize,
     left: usize,
     /// steps of the run before this interval, where its end is what ends the budget
@@ -71,13 +68,12 @@ struct Budget {
     spent: usize,
 }
 
-/// Progress of one call: where it is and what it may still spend.
-#[derive(Debug)]
-struct Leg<'a> {
+/// Progress of one call.
+struct Leg<'a, 'f, D: Dynamics> {
+    f: &'a mut Filippov<'f, D>,
     t: f64,
     to: f64,
     x: &'a mut [f64],
-    budget: Budget,
 }
 
 /// A step, where it ends, and how far the surfaces are there.
@@ -93,34 +89,31 @@ impl Adaptive {
         Self {
             tolerances,
             may_change: matches!(method, Method::Adaptive(_)),
-            implicit: matches!(method, Method::Stiff(_)),
+            is_implicit: matches!(method, Method::Stiff(_)),
             explicit: None,
-            radau: None,
+            implicit: None,
             next: 0.0,
             since_look: 0,
             agreeing: 0,
-            budget: Budget {
-                granted: 0,
-                left: 0,
-                before: 0,
-                of_run: STEPS_PER_RUN,
-                spent: 0,
-            },
+            granted: 0,
+            left: 0,
+            before: 0,
+            of_run: STEPS_PER_RUN,
+            spent: 0,
         }
     }
 
     /// Grants the budget of an interval with `stops` switches in it.
     pub(crate) fn grant(&mut self, stops: usize) {
-        let budget = &mut self.budget;
-        budget.spent += budget.granted.saturating_sub(budget.left);
+        self.spent += self.granted.saturating_sub(self.left);
         let for_stops = stops.saturating_mul(STEPS_PER_STOP);
         let more = for_stops.saturating_add(STEPS_PER_INTERVAL);
-        budget.of_run = budget.of_run.saturating_add(more);
-        let left = budget.of_run.saturating_sub(budget.spent);
+        self.of_run = self.of_run.saturating_add(more);
+        let left = self.of_run.saturating_sub(self.spent);
         let own = for_stops.saturating_add(self.tolerances.budget);
-        budget.granted = own.min(left);
-        budget.left = budget.granted;
-        budget.before = if left < own { budget.spent } else { 0 };
+        self.granted = own.min(left);
+        self.left = self.granted;
+        self.before = if left < own { self.spent } else { 0 };
     }
 
     /// Takes `x` from `from` to `to`, over which `f` is smooth, on what is left of
@@ -132,42 +125,31 @@ impl Adaptive {
         to: f64,
         x: &mut [f64],
     ) -> Result<(), Error> {
-        let mut leg = Leg {
-            t: from,
-            to,
-            x,
-            budget: self.budget,
-        };
+        let mut leg = Leg { f, t: from, to, x };
+        if leg.at_the_end() || leg.x.is_empty() {
+            return leg.check_start();
+        }
         loop {
-            let is_done = if self.implicit {
-                leg.check_start(f)?;
-                self.run_implicit(f, &mut leg)?
-            } else {
-                self.run_explicit(f, &mut leg)?
+            let is_done = match self.is_implicit {
+                true => self.run(&mut leg, |own| &mut own.implicit)?,
+                false => self.run(&mut leg, |own| &mut own.explicit)?,
             };
-            self.budget = leg.budget;
             if is_done {
                 return Ok(());
             }
-            self.implicit = !self.implicit;
+            self.is_implicit = !self.is_implicit;
         }
     }
 
     /// True every so often, where the other method is the better one.
-    fn should_change(
-        &mut self,
-        f: &mut Filippov<'_, impl Dynamics>,
-        t: f64,
-        x: &[f64],
-        step: f64,
-    ) -> bool {
+    fn should_change(&mut self, leg: &mut Leg<'_, '_, impl Dynamics>, step: f64) -> bool {
         self.since_look += 1;
         if !self.may_change || self.since_look < LOOK_EVERY {
             return false;
         }
         self.since_look = 0;
-        let product = spectral_radius(f, t, x) * step;
-        let speaks_for_change = if self.implicit {
+        let product = spectral_radius(leg.f, leg.t, leg.x) * step;
+        let speaks_for_change = if self.is_implicit {
             product < STIFF_BELOW
         } else {
             product > STIFF_ABOVE
@@ -184,55 +166,49 @@ impl Adaptive {
         change
     }
 
-    /// Steps of the explicit method; false where the other one fits better from there.
-    fn run_explicit(
+    /// Steps of one of the methods; false where the other one fits better from there.
+    fn run<M: OneStep>(
         &mut self,
-        f: &mut Filippov<'_, impl Dynamics>,
-        leg: &mut Leg<'_>,
+        leg: &mut Leg<'_, '_, impl Dynamics>,
+        of: fn(&mut Self) -> &mut Option<Box<M>>,
     ) -> Result<bool, Error> {
-        if leg.at_the_end() || leg.x.is_empty() {
-            leg.check_start(f)?;
-            return Ok(true);
-        }
-        let mut method = match self.explicit.take() {
+        let mut method = match of(self).take() {
             Some(method) => method,
-            None => Box::new(Dop853::new(leg.x.len())),
+            None => Box::new(M::new(leg.x.len())),
         };
-        let is_done = self.explicit_steps(&mut method, f, leg);
-        self.explicit = Some(method);
+        method.restart(true);
+        let is_done = self.steps(&mut *method, leg);
+        *of(self) = Some(method);
         is_done
     }
 
-    fn explicit_steps(
+    fn steps(
         &mut self,
-        method: &mut Dop853,
-        f: &mut Filippov<'_, impl Dynamics>,
-        leg: &mut Leg<'_>,
+        method: &mut impl OneStep,
+        leg: &mut Leg<'_, '_, impl Dynamics>,
     ) -> Result<bool, Error> {
         let tolerances = self.tolerances;
-        self.next = self.next.min(leg.to - leg.t);
+        if !self.is_implicit {
+            self.next = self.next.min(leg.to - leg.t);
+        }
         loop {
-            method.bad = None;
-            if !method.begin(f, leg.t, leg.x) {
-                return Err(f.not_finite(leg.t, leg.x));
+            if !method.begin(leg.f, leg.t, leg.x) {
+                return Err(leg.f.not_finite(leg.t, leg.x));
             }
             if self.next == 0.0 {
                 let span = leg.to - leg.t;
-                let first = method.first_step(f, (leg.t, leg.x), span, &tolerances);
-                // a guess that time does not resolve is too careful: it may be longer all the same
-                self.next = first.max(2.0 * resolution(leg.t)).min(span);
+                self.next = method.first_step(leg.f, (leg.t, leg.x), span, &tolerances);
             }
-            let mut step = self.accepted_step(method, f, leg)?;
-            if f.is_unwatched() {
-                leg.x.copy_from_slice(method.reached());
-            } else {
-                step = leg.explicit_to_event(method, f, step, &tolerances)?;
+            let mut step = self.accepted_step(method, leg)?;
+            match leg.f.is_unwatched() {
+                true => leg.x.copy_from_slice(method.reached()),
+                false => step = self.to_event(method, leg, step)?,
             }
             leg.pass(step);
             if leg.at_the_end() {
                 return Ok(true);
             }
-            if self.should_change(f, leg.t, leg.x, step) {
+            if self.should_change(leg, step) {
                 return Ok(false);
             }
         }
@@ -241,16 +217,15 @@ impl Adaptive {
     /// Shortens the proposed step until it is accepted, and proposes the next one.
     fn accepted_step(
         &mut self,
-        method: &mut Dop853,
-        f: &mut Filippov<'_, impl Dynamics>,
-        leg: &mut Leg<'_>,
+        method: &mut impl OneStep,
+        leg: &mut Leg<'_, '_, impl Dynamics>,
     ) -> Result<f64, Error> {
         loop {
             let proposed = self.next;
             let step = leg.step(proposed);
-            leg.check_step(f, step, method.bad.as_ref())?;
-            leg.spend(f)?;
-            match method.attempt(f, (leg.t, &*leg.x), step, &self.tolerances) {
+            leg.check_step(step, method.bad())?;
+            self.spend(leg)?;
+            match method.attempt(leg.f, (leg.t, &*leg.x), step, &self.tolerances) {
                 Err(shorter) => self.next = shorter,
                 Ok(next) => {
                     // a step cut short by a stop says nothing about the next one
@@ -265,86 +240,156 @@ impl Adaptive {
         }
     }
 
-    /// Steps of the implicit method; false where the other one fits better from there.
-    fn run_implicit(
+    /// Takes the step that was just accepted, or a shorter one up to the first surface or bend in it:
+    /// the step up to there.
+    fn to_event(
         &mut self,
-        f: &mut Filippov<'_, impl Dynamics>,
-        leg: &mut Leg<'_>,
-    ) -> Result<bool, Error> {
-        if leg.at_the_end() || leg.x.is_empty() {
-            return Ok(true);
+        method: &mut impl OneStep,
+        leg: &mut Leg<'_, '_, impl Dynamics>,
+        step: f64,
+    ) -> Result<f64, Error> {
+        let (t, start, reached) = (leg.t, leg.x.to_vec(), method.reached().to_vec());
+        let span = Span {
+            from: (t, &start),
+            step,
+            to: &reached,
+        };
+        let ahead = method.ahead(leg.f, &span);
+        let (tolerances, mut has_tried) = (self.tolerances, false);
+        let attempt = |f: &mut Filippov<'_, _>, step: f64| {
+            has_tried = true;
+            method.restart(true);
+            let tried = method.begin(f, t, &start)
+                && method.attempt(f, (t, &start), step, &tolerances).is_ok();
+            tried.then(|| method.reached().to_vec())
+        };
+        let event = match ahead.is_some() || leg.f.has_bound() {
+            true => self.crossing(leg, &span, ahead.unwrap_or(Ahead::Nothing), attempt)?,
+            false => None,
+        };
+        if has_tried || event.is_some() {
+            // what it keeps is of the steps tried, or of the other side
+            method.restart(false);
         }
-        let n = leg.x.len();
-        let mut radau = self.radau.take().unwrap_or_else(|| Radau::new(n));
-        radau.restart(f, leg.t, leg.x);
-        let is_done = self.implicit_steps(&mut radau, f, leg);
-        self.radau = Some(radau);
-        is_done
+        let Some(event) = event else {
+            leg.x.copy_from_slice(&reached);
+            return Ok(step);
+        };
+        leg.x.copy_from_slice(&event.x);
+        leg.f.pass(t + event.step, &event.x, &event.margins);
+        Ok(event.step)
     }
 
-    fn implicit_steps(
+    /// Pays for one step.
+    fn spend(&mut self, leg: &mut Leg<'_, '_, impl Dynamics>) -> Result<(), Error> {
+        if leg.f.is_over() {
+            return Err(Error::Cancelled { time: leg.t });
+        }
+        if self.left == 0 {
+            return Err(Error::StepBudget {
+                time: leg.t,
+                until: leg.to,
+                steps: self.before + self.granted,
+                chatters: leg.f.busiest().unwrap_or_default(),
+                state: state_text(&leg.f.names(), leg.x),
+            });
+        }
+        self.left -= 1;
+        Ok(())
+    }
+
+    /// The shortest step found that crosses a surface, where the step taken does; `attempt`
+    /// makes a step of another length from the same start, and `ahead` is what comes first in it.
+    /// None where nothing comes. A step that leads up to it where something bends, or where none
+    /// across the surface is accurate.
+    fn crossing<D: Dynamics>(
         &mut self,
-        radau: &mut Radau,
-        f: &mut Filippov<'_, impl Dynamics>,
-        leg: &mut Leg<'_>,
-    ) -> Result<bool, Error> {
-        if self.next <= 0.0 {
-            self.next = radau.first_step(leg.x, leg.to - leg.t, &self.tolerances);
-        }
-        let mut rejected = true;
-        loop {
-            let proposed = self.next;
-            let step = leg.step(proposed);
-            leg.check_step(f, step, radau.bad.as_ref())?;
-            leg.spend(f)?;
-            let start = leg.x.to_vec();
-            let next = match radau.attempt(f, (leg.t, leg.x), step, rejected, &self.tolerances) {
-                Ok(next) => next,
-                Err(shorter) => {
-                    self.next = shorter;
-                    rejected = true;
-                    continue;
+        leg: &mut Leg<'_, '_, D>,
+        span: &Span<'_>,
+        ahead: Ahead,
+        mut attempt: impl FnMut(&mut Filippov<'_, D>, f64) -> Option<Vec<f64>>,
+    ) -> Result<Option<Reach>, Error> {
+        let (t, step) = (span.from.0, span.step);
+        let reach = |f: &mut Filippov<'_, D>, step: f64, x: Vec<f64>| {
+            let margins = f.margins(t + step, &x);
+            Reach { step, x, margins }
+        };
+        let fine = 4.0 * resolution(t + step).max(1e-14 * step);
+        let mut end = reach(leg.f, step, span.to.to_vec());
+        // the end of the step is across; or another one before it is, or leads up to what comes
+        let shorter = match ahead {
+            Ahead::Nothing if !end.crosses() => return Ok(None),
+            Ahead::Jump { beyond, .. } if beyond < 1.0 || !end.crosses() => Some(beyond),
+            Ahead::Stop { at } => Some(at),
+            Ahead::Nothing | Ahead::Jump { .. } => None,
+        };
+        if let Some(part) = shorter {
+            let mut shorter = (part * step).max(fine);
+            for _ in 0..HALVINGS {
+                self.spend(leg)?;
+                if let Some(x) = attempt(leg.f, shorter) {
+                    end = reach(leg.f, shorter, x);
+                    break;
                 }
-            };
-            // after a rejection the step must not grow at once
-            self.next = if rejected { next.min(step) } else { next };
-            // a step cut short by a stop says nothing about the next one
-            if step < proposed {
-                self.next = self.next.max(proposed);
+                shorter *= 0.5;
             }
-            rejected = false;
-            let step = match f.is_unwatched() {
-                true => step,
-                false => leg.implicit_to_event(radau, f, &start, step, &self.tolerances)?,
-            };
-            leg.pass(step);
-            if leg.at_the_end() {
-                return Ok(true);
-            }
-            radau.bad = None;
-            if self.should_change(f, leg.t, leg.x, step) {
-                return Ok(false);
+            if !end.crosses() {
+                return Ok((end.step < step).then_some(end));
             }
         }
+        let mut told = match ahead {
+            Ahead::Jump { at, .. } => Some(at * step + 0.5 * fine),
+            Ahead::Nothing | Ahead::Stop { .. } => None,
+        };
+        let mut begin = reach(leg.f, 0.0, span.from.1.to_vec());
+        let mut rejected = None;
+        for turn in 0..TRIES {
+            let width = end.step - begin.step;
+            if width <= fine {
+                break;
+            }
+            let guess = match turn % 3 {
+                _ if let Some(longest) = rejected => begin.step + 0.5 * (longest - begin.step),
+                0 if let Some(told) = told.take().filter(|told| *told < end.step) => told,
+                2 => begin.step + 0.5 * width,
+                _ => between(&begin, &end, fine),
+            };
+            self.spend(leg)?;
+            let Some(x) = attempt(leg.f, guess) else {
+                // the step that crosses may be accurate and this one not, where what is not
+                // held bends on the surface: shorter ones lead up to it
+                rejected = Some(guess);
+                continue;
+            };
+            let tried = reach(leg.f, guess, x);
+            match tried.crosses() {
+                true => (end, rejected) = (tried, None),
+                false => begin = tried,
+            }
+            if rejected.is_some() && begin.step > fine {
+                return Ok(Some(begin));
+            }
+        }
+        Ok(Some(end))
     }
 }
 
 /// Both methods start anew on every leg: between two of them only pace and budget stay.
 impl Persist for Adaptive {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        walk.flag(&mut self.implicit)?;
+        walk.flag(&mut self.is_implicit)?;
         walk.number(&mut self.next)?;
         walk.count(&mut self.since_look)?;
         walk.count(&mut self.agreeing)?;
-        walk.count(&mut self.budget.granted)?;
-        walk.count(&mut self.budget.left)?;
-        walk.count(&mut self.budget.before)?;
-        walk.count(&mut self.budget.of_run)?;
-        walk.count(&mut self.budget.spent)
+        walk.count(&mut self.granted)?;
+        walk.count(&mut self.left)?;
+        walk.count(&mut self.before)?;
+        walk.count(&mut self.of_run)?;
+        walk.count(&mut self.spent)
     }
 }
 
-impl Leg<'_> {
+impl<D: Dynamics> Leg<'_, '_, D> {
     /// Steps end here: what is left is below the resolution of time.
     fn at_the_end(&self) -> bool {
         self.to - self.t <= resolution(self.to)
@@ -372,209 +417,27 @@ impl Leg<'_> {
         };
     }
 
-    /// Takes the step that was just accepted, or a shorter one up to the first surface or bend in it: the
-    /// step up to there.
-    fn explicit_to_event(
-        &mut self,
-        method: &mut Dop853,
-        f: &mut Filippov<'_, impl Dynamics>,
-        step: f64,
-        tolerances: &Tolerances,
-    ) -> Result<f64, Error> {
-        let span = Span {
-            from: (self.t, self.x),
-            step,
-            to: method.reached(),
-        };
-        let is_near = f.is_near(&span, |state| method.fastest(state));
-        if !is_near && !f.has_bound() {
-            self.x.copy_from_slice(method.reached());
-            return Ok(step);
-        }
-        let (t, start, reached) = (self.t, self.x.to_vec(), method.reached().to_vec());
-        let span = Span {
-            from: (t, &start),
-            step,
-            to: &reached,
-        };
-        let ahead = match is_near && method.look_inside(f, (t, &start), step) {
-            true => f.ahead(&span, |state| method.between(state, start[state], step)),
-            false => Ahead::Nothing,
-        };
-        let attempt = |f: &mut Filippov<'_, _>, step: f64| {
-            let tried = method.attempt(f, (t, &start), step, tolerances);
-            tried.is_ok().then(|| method.reached().to_vec())
-        };
-        let Some(event) = self.crossing(f, &span, ahead, attempt)? else {
-            self.x.copy_from_slice(&reached);
-            return Ok(step);
-        };
-        self.x.copy_from_slice(&event.x);
-        f.pass(t + event.step, &event.x, &event.margins);
-        Ok(event.step)
-    }
-
-    /// Where the step that was just taken meets a surface or a bend, goes back to the first: the
-    /// step up to there.
-    fn implicit_to_event(
-        &mut self,
-        radau: &mut Radau,
-        f: &mut Filippov<'_, impl Dynamics>,
-        start: &[f64],
-        step: f64,
-        tolerances: &Tolerances,
-    ) -> Result<f64, Error> {
-        let (reached, t) = (self.x.to_vec(), self.t);
-        let span = Span {
-            from: (t, start),
-            step,
-            to: &reached,
-        };
-        let ahead = f.ahead(&span, |state| radau.between(state, start[state]));
-        if ahead == Ahead::Nothing && !f.has_bound() {
-            return Ok(step);
-        }
-        let mut has_tried = false;
-        let attempt = |f: &mut Filippov<'_, _>, step: f64| {
-            has_tried = true;
-            let mut x = start.to_vec();
-            radau.restart(f, t, &x);
-            let tried = radau.attempt(f, (t, &mut x), step, true, tolerances);
-            tried.is_ok().then_some(x)
-        };
-        let Some(event) = self.crossing(f, &span, ahead, attempt)? else {
-            if has_tried {
-                // what it keeps is of the steps tried
-                radau.restart(f, t + step, self.x);
-            }
-            return Ok(step);
-        };
-        self.x.copy_from_slice(&event.x);
-        f.pass(t + event.step, &event.x, &event.margins);
-        radau.restart(f, t + event.step, &event.x);
-        Ok(event.step)
-    }
-
-    fn check_start(&self, f: &mut Filippov<'_, impl Dynamics>) -> Result<(), Error> {
+    fn check_start(&mut self) -> Result<(), Error> {
         let mut dx = vec![0.0; self.x.len()];
-        f.derivatives(self.t, self.x, &mut dx);
-        if dx.iter().all(|v| v.is_finite()) {
+        self.f.derivatives(self.t, self.x, &mut dx);
+        if are_finite(&dx) {
             return Ok(());
         }
-        Err(f.not_finite(self.t, self.x))
+        Err(self.f.not_finite(self.t, self.x))
     }
 
-    /// Pays for one step.
-    fn spend(&mut self, f: &mut Filippov<'_, impl Dynamics>) -> Result<(), Error> {
-        if f.is_over() {
-            return Err(Error::Cancelled { time: self.t });
-        }
-        if self.budget.left == 0 {
-            return Err(Error::StepBudget {
-                time: self.t,
-                until: self.to,
-                steps: self.budget.before + self.budget.granted,
-                chatters: f.busiest().unwrap_or_default(),
-                state: state_text(&f.names(), self.x),
-            });
-        }
-        self.budget.left -= 1;
-        Ok(())
-    }
-
-    fn check_step(
-        &self,
-        f: &mut Filippov<'_, impl Dynamics>,
-        step: f64,
-        bad: Option<&(f64, Vec<f64>)>,
-    ) -> Result<(), Error> {
+    fn check_step(&mut self, step: f64, bad: Option<&(f64, Vec<f64>)>) -> Result<(), Error> {
         if step > resolution(self.t) {
             return Ok(());
         }
         Err(match bad {
-            Some((t, x)) => f.not_finite(*t, x),
+            Some((t, x)) => self.f.not_finite(*t, x),
             None => Error::StepUnderflow {
                 time: self.t,
                 step,
-                state: state_text(&f.names(), self.x),
+                state: state_text(&self.f.names(), self.x),
             },
         })
-    }
-
-    /// The shortest step found that crosses a surface, where the step taken does; `attempt`
-    /// makes a step of another length from the same start, and `ahead` is what comes first in it.
-    /// None where nothing comes. A step that leads up to it where something bends, or where none
-    /// across the surface is accurate.
-    fn crossing<D: Dynamics>(
-        &mut self,
-        f: &mut Filippov<'_, D>,
-        span: &Span<'_>,
-        ahead: Ahead,
-        mut attempt: impl FnMut(&mut Filippov<'_, D>, f64) -> Option<Vec<f64>>,
-    ) -> Result<Option<Reach>, Error> {
-        let (t, step) = (span.from.0, span.step);
-        let reach = |f: &mut Filippov<'_, D>, step: f64, x: Vec<f64>| {
-            let mut margins = vec![];
-            f.margins(t + step, &x, &mut margins);
-            Reach { step, x, margins }
-        };
-        let fine = 4.0 * resolution(t + step).max(1e-14 * step);
-        let mut end = reach(f, step, span.to.to_vec());
-        // the end of the step is across; or another one before it is, or leads up to what comes
-        let shorter = match ahead {
-            Ahead::Nothing if !end.crosses() => return Ok(None),
-            Ahead::Jump { beyond, .. } if beyond < 1.0 || !end.crosses() => Some(beyond),
-            Ahead::Stop { at } => Some(at),
-            Ahead::Nothing | Ahead::Jump { .. } => None,
-        };
-        if let Some(part) = shorter {
-            let mut shorter = (part * step).max(fine);
-            for _ in 0..HALVINGS {
-                self.spend(f)?;
-                if let Some(x) = attempt(f, shorter) {
-                    end = reach(f, shorter, x);
-                    break;
-                }
-                shorter *= 0.5;
-            }
-            if !end.crosses() {
-                return Ok((end.step < step).then_some(end));
-            }
-        }
-        let mut told = match ahead {
-            Ahead::Jump { at, .. } => Some(at * step + 0.5 * fine),
-            Ahead::Nothing | Ahead::Stop { .. } => None,
-        };
-        let mut begin = reach(f, 0.0, span.from.1.to_vec());
-        let mut rejected = None;
-        for turn in 0..TRIES {
-            let width = end.step - begin.step;
-            if width <= fine {
-                break;
-            }
-            let guess = match turn % 3 {
-                _ if let Some(longest) = rejected => begin.step + 0.5 * (longest - begin.step),
-                0 if let Some(told) = told.take().filter(|told| *told < end.step) => told,
-                2 => begin.step + 0.5 * width,
-                _ => between(&begin, &end, fine),
-            };
-            self.spend(f)?;
-            let Some(x) = attempt(f, guess) else {
-                // the step that crosses may be accurate and this one not, where what is not
-                // held bends on the surface: shorter ones lead up to it
-                rejected = Some(guess);
-                continue;
-            };
-            let tried = reach(f, guess, x);
-            match tried.crosses() {
-                true => (end, rejected) = (tried, None),
-                false => begin = tried,
-            }
-            if rejected.is_some() && begin.step > fine {
-                return Ok(Some(begin));
-            }
-        }
-        Ok(Some(end))
     }
 }
 

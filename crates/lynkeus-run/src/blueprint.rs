@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::filter::{FilterSettings, NoisyModel};
 use crate::integrator::AUTO_PRODUCT;
-use crate::jacobian::fastest;
+use crate::jacobian::{Fastest, fastest};
 use crate::snapshot::Digest;
 use crate::system::Evaluation;
 use crate::{EstimatorSettings, Events, Method, System};
@@ -178,25 +178,22 @@ impl Blueprint {
     }
 }
 
-/// A step that a system needs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NeededStep {
-    /// the longest that is short enough; infinite where nothing moves
-    pub length: f64,
-    /// a slope at the start is infinite, as that of a root at 0: that over a hundredth of the states' sizes
-    /// counts instead
-    pub is_steep: bool,
+impl Fastest {
+    /// The longest fixed step that is short enough (|λ|·h ≤ ½); infinite where nothing moves.
+    #[must_use]
+    pub fn step(&self) -> f64 {
+        AUTO_PRODUCT / self.radius
+    }
 }
 
-/// The longest fixed step that is short enough for the fastest mode at the start (|λ|·h ≤ ½), for
-/// known inputs at these values, the others at 0; none where the equations have no slopes there.
-/// `sizes` of the states count where a slope is infinite.
+/// The fastest mode at the start, for known inputs at these values, the others at 0; none where the
+/// equations have no slopes there. `sizes` of the states count where a slope is infinite.
 #[must_use]
-pub fn needed_step(
+pub fn fastest_mode(
     blueprint: &Blueprint,
     inputs: &[(&str, f64)],
     sizes: &[f64],
-) -> Option<NeededStep> {
+) -> Option<Fastest> {
     let system = &blueprint.flow;
     let mut evaluation = system.evaluation();
     for (name, signal) in system.signals().iter().zip(evaluation.signals_mut()) {
@@ -208,20 +205,16 @@ pub fn needed_step(
     for (signal, value) in signals.rev().zip(tuned.into_iter().rev()) {
         *signal = value;
     }
-    step_of(&mut evaluation, system.start(), sizes)
+    fastest_at(&mut evaluation, system.start(), sizes)
 }
 
-/// The longest fixed step of a system under the signals that are set, as [`needed_step`] of an
+/// The fastest mode of a system under the signals that are set, as [`fastest_mode`] of an
 /// estimator.
 #[must_use]
-pub fn step_of(evaluation: &mut Evaluation, start: &[f64], sizes: &[f64]) -> Option<NeededStep> {
+pub fn fastest_at(evaluation: &mut Evaluation, start: &[f64], sizes: &[f64]) -> Option<Fastest> {
     evaluation.enter(0.0);
     let seen = fastest(evaluation, 0.0, start, sizes);
-    let length = AUTO_PRODUCT / seen.radius;
-    (length > 0.0).then_some(NeededStep {
-        length,
-        is_steep: seen.is_steep,
-    })
+    (seen.step() > 0.0).then_some(seen)
 }
 
 #[cfg(test)]
@@ -237,8 +230,8 @@ mod tests {
         let states = [("x".to_owned(), x.node(), 0.0)];
         let system = System::new(&g, t, &states, &[], &[(-x.sqrt()).node()], &[]).unwrap();
         let step = |start: f64, sizes: &[f64]| {
-            let found = step_of(&mut system.evaluation(), &[start], sizes).unwrap();
-            (found.length, found.is_steep)
+            let found = fastest_at(&mut system.evaluation(), &[start], sizes).unwrap();
+            (found.step(), found.is_steep)
         };
         assert_eq!(step(1.0, &[4.0]), (1.0, false));
         let near = |(length, is_steep): (f64, bool), expected: f64| {

@@ -56,7 +56,7 @@ impl Bound {
 }
 
 /// # Errors
-/// [`Error::Diverged`] of a covariance that has grown beyond every number.
+/// [`Error::DeviationDiverged`] of a covariance that has grown beyond every number.
 pub(crate) fn check_deviations(
     time: f64,
     names: &[String],
@@ -64,14 +64,10 @@ pub(crate) fn check_deviations(
 ) -> Result<(), Error> {
     match deviations.iter().position(|d| !d.is_finite()) {
         None => Ok(()),
-        Some(i) => Err(Error::Diverged {
+        Some(i) => Err(Error::DeviationDiverged {
             time,
-            name: format!(
-                "standard deviation of {}",
-                names.get(i).map_or("", String::as_str)
-            ),
+            name: names.get(i).cloned().unwrap_or_default(),
             value: deviations[i],
-            hint: "; give smaller values in initial_variance or [process_noise]".to_owned(),
         }),
     }
 }

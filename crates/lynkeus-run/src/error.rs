@@ -69,7 +69,7 @@ pub enum Error {
 
     /// The integrator used up its steps.
     #[error(
-        "{steps} steps took the integration only to t = {time}, on the way to {until}: {chatters}a gain is too high or a relay or a threshold of the state chatters; lower the gain, smooth what jumps, loosen `rtol`, or set method = \"stiff\" or \"rk4\"; the state is {state}"
+        "{steps} steps took the integration only to t = {time}, on the way to {until}: {chatters}a gain is too high or a relay or a threshold of the state chatters; the state is {state}"
     )]
     StepBudget {
         /// time reached
@@ -132,6 +132,17 @@ pub enum Error {
         value: f64,
         /// what to try, starting with "; ", or empty
         hint: String,
+    },
+
+    /// The covariance of an estimate has grown beyond every number.
+    #[error("the estimate diverged: 'standard deviation of {name}' is {value:e} at t = {time}")]
+    DeviationDiverged {
+        /// when
+        time: f64,
+        /// what is estimated
+        name: String,
+        /// its standard deviation
+        value: f64,
     },
 
     /// Too many instants at which an expression of time jumps or has a kink.
@@ -205,6 +216,16 @@ impl Error {
             | Self::Diverged { time, .. } => Some(*time),
             _ => None,
         }
+    }
+
+    /// The same of a switch that reads so.
+    pub(crate) fn about(mut self, switch: &str) -> Self {
+        if let Self::TooManySwitches { expression, .. }
+        | Self::UnresolvedSwitches { expression, .. } = &mut self
+        {
+            switch.clone_into(expression);
+        }
+        self
     }
 
     pub(crate) fn setting(

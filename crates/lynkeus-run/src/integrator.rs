@@ -3,7 +3,7 @@
 
 use crate::adaptive::Adaptive;
 use crate::events::{Filippov, Sides};
-use crate::method::resolution;
+use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Method, Step, spectral_radius};
 
@@ -375,11 +375,6 @@ pub(crate) fn instant(from: f64, to: f64, steps: usize, i: usize) -> f64 {
     from + (to - from) * (i as f64 / steps as f64)
 }
 
-/// Without a branch for each value.
-fn are_finite(values: &[f64]) -> bool {
-    values.iter().fold(true, |all, v| all & v.is_finite())
-}
-
 /// (time of the stage as a fraction of the step, factor of the stage before)
 const STAGES: [(f64, f64); 4] = [(0.0, 0.0), (0.5, 0.5), (0.5, 0.5), (1.0, 1.0)];
 
@@ -462,7 +457,7 @@ impl Rk4 {
 
     /// Finds the stage whose derivative is not finite.
     fn blame(&mut self, f: &mut impl Dynamics, t: f64, h: f64, x: &[f64]) -> Error {
-        let bad = |k: &Vec<f64>| k.iter().any(|v| !v.is_finite());
+        let bad = |k: &Vec<f64>| !are_finite(k);
         let stage = self.k.iter().position(bad).unwrap_or(0);
         self.place(stage, h, x);
         f.not_finite(t + STAGES[stage].0 * h, &self.stage)

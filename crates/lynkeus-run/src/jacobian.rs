@@ -86,10 +86,13 @@ pub fn spectral_radius(f: &mut impl Dynamics, t: f64, x: &[f64]) -> f64 {
     seen(f, t, x, None).radius
 }
 
-/// The fastest mode at (t, x), and how it was seen.
-pub(crate) struct Fastest {
+/// The fastest mode of a system at a point, and how it was seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fastest {
+    /// the spectral radius
     pub radius: f64,
-    /// by secants, since a slope at x itself is infinite
+    /// a slope there is infinite, as that of a root at 0: that over a hundredth of the states' sizes
+    /// counts instead
     pub is_steep: bool,
 }
 

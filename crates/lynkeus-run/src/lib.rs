@@ -117,14 +117,14 @@ mod system;
 mod trajectory;
 
 pub use batch::{Batch, Ended, Member};
-pub use blueprint::{Blueprint, NeededStep, Tuned, Updates, needed_step, step_of};
+pub use blueprint::{Blueprint, Tuned, Updates, fastest_at, fastest_mode};
 pub use divergence::Margin;
 pub use dynamics::{Dynamics, Events, Function};
 pub use error::{Error, Interrupted};
 pub use estimator::Estimator;
 pub use events::{Guards, first_jump};
 pub use integrator::{Integrator, Rk4, StepAdvice};
-pub use jacobian::spectral_radius;
+pub use jacobian::{Fastest, spectral_radius};
 pub use linearised::{Jacobian, Jacobians, Linearised};
 pub use method::{Method, Step, Tolerances};
 pub use noise::{Level, Noise, ProcessDraws, deviate, process_draws};

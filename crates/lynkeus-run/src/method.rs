@@ -118,6 +118,11 @@ impl Step {
     }
 }
 
+/// Whether all are finite numbers, without a branch for each of them.
+pub(crate) fn are_finite(values: &[f64]) -> bool {
+    values.iter().fold(true, |all, v| all & v.is_finite())
+}
+
 /// Steps shorter than this do not move time reliably.
 pub(crate) fn resolution(t: f64) -> f64 {
     (16.0 * f64::EPSILON * t.abs()).max(f64::MIN_POSITIVE)

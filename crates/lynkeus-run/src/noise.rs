@@ -259,16 +259,10 @@ impl Sensors {
         sensors.chain(self.moved().map(|state| self.drive(state)))
     }
 
-    /// Draws what moves the states from here on.
-    pub(crate) fn stir(&mut self) {
-        let drawn = self.process.iter_mut().flatten();
-        drawn.for_each(Channel::draw);
-    }
-
-    /// Draws the next sample of every channel, and what moves the states.
-    pub(crate) fn draw(&mut self) {
-        self.stir();
-        let drawn = self.channels.iter_mut().flatten();
+    /// Draws what moves the states from here on, and the next sample of every channel, if it is time.
+    pub(crate) fn draw(&mut self, is_sample: bool) {
+        let channels = self.channels.iter_mut().filter(|_| is_sample);
+        let drawn = self.process.iter_mut().chain(channels).flatten();
         drawn.for_each(Channel::draw);
     }
 

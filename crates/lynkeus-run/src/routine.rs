@@ -60,8 +60,16 @@ pub(crate) struct Routine {
     tape: Tape,
     native: OnceLock<Option<Function<1>>>,
     step: OnceLock<Option<Function<1>>>,
-    slopes: OnceLock<Option<Differentiated>>,
+    slopes: OnceLock<Option<Arc<Routine>>>,
+    /// where its values stand in a Jacobian, if they do
+    places: Arc<[Place]>,
 }
+
+/// Derivatives that are written down without asking whether they pay.
+const FEW: usize = 50_000;
+
+/// More than these are written down where differences would take so many times as many operations.
+const SAVED: usize = 20;
 
 impl Routine {
     /// `outputs` as functions of so many inputs.
@@ -73,6 +81,15 @@ impl Routine {
         inputs: usize,
         outputs: Vec<Node>,
     ) -> Result<Arc<Self>, MissingInput> {
+        Self::placed(equations, inputs, outputs, vec![])
+    }
+
+    fn placed(
+        equations: &Arc<Equations>,
+        inputs: usize,
+        outputs: Vec<Node>,
+        places: Vec<Place>,
+    ) -> Result<Arc<Self>, MissingInput> {
         let tape = Tape::new(&equations.graph(), &equations.inputs[..inputs], &outputs)?;
         Ok(Arc::new(Self {
             equations: equations.clone(),
@@ -81,6 +98,7 @@ impl Routine {
             native: OnceLock::new(),
             step: OnceLock::new(),
             slopes: OnceLock::new(),
+            places: places.into(),
         }))
     }
 
@@ -122,10 +140,21 @@ impl Routine {
         self.step.get_or_init(compile).as_ref()
     }
 
-    /// The derivatives by the states, which follow time among the inputs. They are found when
-    /// they are first asked for.
-    fn slopes(&self, states: usize) -> Option<&Differentiated> {
-        let find = || Differentiated::new(self, states);
+    /// The derivatives by so many states, which follow time among the inputs, found when they are first
+    /// asked for. None where those written down would be too many for what they save.
+    fn slopes(&self, states: usize) -> Option<&Arc<Self>> {
+        let find = || {
+            let x = &self.inputs()[1..=states];
+            let most = FEW.max(self.tape.len().saturating_mul(states) / SAVED);
+            let graph = self.equations.graph();
+            jacobian::size(&graph, &self.outputs, x, most)?;
+            let entries = jacobian::forward(&graph, &self.outputs, x).entries;
+            drop(graph);
+            let entries = entries.into_iter();
+            let placed = entries.map(|(row, column, node)| (node, Place { row, column }));
+            let (nodes, places) = placed.unzip();
+            Self::placed(&self.equations, self.tape.inputs(), nodes, places).ok()
+        };
         self.slopes.get_or_init(find).as_ref()
     }
 
@@ -232,9 +261,7 @@ impl Runner {
         let Some(known) = self.routine.slopes(states) else {
             return false;
         };
-        let runner = self
-            .slopes
-            .get_or_insert_with(|| Box::new(known.routine.runner()));
+        let runner = self.slopes.get_or_insert_with(|| Box::new(known.runner()));
         runner.eval(inputs, slopes.at(&known.places));
         true
     }
@@ -250,41 +277,6 @@ impl Runner {
         step.eval(inputs.as_chunks().0, next.as_chunks_mut().0);
         inputs.pop();
         true
-    }
-}
-
-/// Derivatives that are written down without asking whether they pay.
-const FEW: usize = 50_000;
-
-/// More than these are written down where differences would take so many times as many operations.
-const SAVED: usize = 20;
-
-/// The derivatives of a routine by its states.
-#[derive(Debug)]
-pub(crate) struct Differentiated {
-    pub places: Arc<[Place]>,
-    /// of the same inputs, the values at the places
-    pub routine: Arc<Routine>,
-}
-
-impl Differentiated {
-    /// Of a routine whose inputs are time, so many states, and what is constant. None where the
-    /// derivatives written down would be too many for what they save.
-    pub fn new(of: &Routine, states: usize) -> Option<Self> {
-        let x = &of.inputs()[1..=states];
-        let most = FEW.max(of.tape.len().saturating_mul(states) / SAVED);
-        let graph = of.equations.graph();
-        jacobian::size(&graph, &of.outputs, x, most)?;
-        let entries = jacobian::forward(&graph, &of.outputs, x).entries;
-        drop(graph);
-        let nodes = entries.iter().map(|&(.., node)| node).collect();
-        let places = entries
-            .iter()
-            .map(|&(row, column, _)| Place { row, column });
-        Some(Self {
-            places: places.collect(),
-            routine: Routine::new(&of.equations, of.tape.inputs(), nodes).ok()?,
-        })
     }
 }
 
@@ -307,9 +299,9 @@ mod tests {
                 .collect();
             let symbols: Vec<Node> = [t].into_iter().chain(x.iter().map(|x| x.node())).collect();
             let equations = Arc::new(Equations::new(&g, &symbols, &dx, &[]).unwrap());
-            let dx = equations.roots.derivatives.clone();
+            let dx = equations.roots.free.derivatives.clone();
             let routine = Routine::new(&equations, symbols.len(), dx).unwrap();
-            Differentiated::new(&routine, n).map(|known| known.places.len())
+            routine.slopes(n).map(|known| known.places.len())
         };
         assert_eq!(known(400, false), Some(799));
         assert!(known(400, true).is_none());

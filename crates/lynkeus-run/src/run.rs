@@ -1,12 +1,13 @@
 //! A plant and its observer, simulated together.
 
-use std::collections::VecDeque;
 use std::ops::ControlFlow;
 
-use crate::closed_loop::{Loop, table};
+use crate::closed_loop::Loop;
 use crate::divergence::Bound;
 use crate::noise::Sensors;
-use crate::{Error, Events, Integrator, Interrupted, Simulation, Trajectory, process_draws};
+use crate::{
+    Error, Events, Integrator, Interrupted, Role, Simulation, System, Trajectory, process_draws,
+};
 
 impl Simulation {
     /// Runs to the end.
@@ -56,7 +57,17 @@ impl Simulation {
 
     /// The table of a run before its first row.
     pub fn table(&self) -> Trajectory {
-        table(&self.plant, self.observer.as_ref(), self.record_outputs)
+        let Self { plant, .. } = self;
+        let mut table = Trajectory::default()
+            .with(Role::State, plant.states())
+            .with(Role::Input, plant.signals());
+        if self.record_outputs {
+            table = table
+                .with(Role::Output, plant.outputs())
+                .with(Role::Measured, plant.outputs());
+        }
+        let observer = self.observer.as_ref();
+        table.with(Role::Estimate, observer.map_or(&[], System::estimates))
     }
 }
 
@@ -80,8 +91,8 @@ impl Run {
             plant.states(),
             itinerary.hold(),
         )?;
-        let system = Loop::new(simulation, sensors)?;
-        let x = system.system().start().to_vec();
+        let mut system = Loop::new(simulation, sensors)?;
+        let x = system.joined().system().start().to_vec();
         Ok(Self {
             itinerary: itinerary.exact(system.is_exact()),
             integrator: Integrator::new(simulation.method, x.len())?,
@@ -101,8 +112,7 @@ impl Run {
         let mut made = 0_usize;
         while let Some(stop) = self.itinerary.next() {
             match stop {
-                Stop::Draw => self.system.draw(),
-                Stop::Stir => self.system.stir(),
+                Stop::Draw { is_sample } => self.system.draw(is_sample),
                 Stop::Advance { from, to } => {
                     let done = self
                         .integrator
@@ -124,7 +134,7 @@ impl Run {
 
     fn record(&mut self, t: f64) -> Result<&[f64], Error> {
         self.row.clear();
-        self.system.enter(t);
+        self.system.joined().enter(t);
         self.system.row(t, &self.x, &mut self.row)?;
         let (names, estimate) = self.system.estimate(&self.x);
         self.bound.see(&self.row[..self.system.known_columns()]);
@@ -143,10 +153,8 @@ const MOST_CELLS: f64 = 4e8;
 /// What a simulation does next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Stop {
-    /// the next noise sample is drawn
-    Draw,
-    /// what moves the states is drawn anew, between two samples
-    Stir,
+    /// what moves the states is drawn anew, and at a sample all noise
+    Draw { is_sample: bool },
     /// time goes on
     Advance { from: f64, to: f64 },
     /// a row is recorded
@@ -170,7 +178,8 @@ pub(crate) struct Itinerary {
     row: usize,
     /// the time of the last stop
     reached: f64,
-    planned: VecDeque<Stop>,
+    /// what comes at that time
+    planned: Option<Stop>,
 }
 
 impl Itinerary {
@@ -192,7 +201,7 @@ impl Itinerary {
             drawn: 0,
             row: 0,
             reached: simulation.start,
-            planned: VecDeque::new(),
+            planned: None,
         })
     }
 
@@ -221,59 +230,54 @@ impl Itinerary {
         }
     }
 
-    /// Plans up to the next draw or row; a draw due at a row is made there.
-    fn plan(&mut self) {
-        let Some(before) = self.row.checked_sub(1) else {
-            self.draw();
-            return self.arrive(self.start);
-        };
-        let (from, to) = (self.time(before), self.time(self.row));
-        // a draw and a row at the same time may differ by rounding
-        let same = 1e-9 * (to - from).min(self.hold());
-        let due = self.start + self.due();
-        if self.is_exact || due > to + same {
-            self.advance(to);
-            return self.arrive(to);
-        }
-        self.advance(if due > to - same { to } else { due });
-        self.draw();
-    }
-
     /// How long after the start the next draw is.
     fn due(&self) -> f64 {
         let (samples, rest) = (self.drawn / self.draws, self.drawn % self.draws);
         (samples as f64 + rest as f64 / self.draws as f64) * self.sample_step
     }
 
-    fn draw(&mut self) {
+    fn draw(&mut self) -> Stop {
         let is_sample = self.drawn.is_multiple_of(self.draws);
-        let stop = if is_sample { Stop::Draw } else { Stop::Stir };
-        self.planned.push_back(stop);
         self.drawn += 1;
+        Stop::Draw { is_sample }
     }
 
-    fn arrive(&mut self, t: f64) {
-        self.planned.push_back(Stop::Row(t));
+    fn arrive(&mut self, t: f64) -> Stop {
         self.row += 1;
-    }
-
-    fn advance(&mut self, to: f64) {
-        let from = self.reached;
-        if to > from {
-            self.planned.push_back(Stop::Advance { from, to });
-            self.reached = to;
-        }
+        Stop::Row(t)
     }
 }
 
 impl Iterator for Itinerary {
     type Item = Stop;
 
+    /// A draw that is due at a row is made there.
     fn next(&mut self) -> Option<Stop> {
-        if self.planned.is_empty() && self.row <= self.intervals {
-            self.plan();
+        if self.planned.is_some() || self.row > self.intervals {
+            return self.planned.take();
         }
-        self.planned.pop_front()
+        let Some(before) = self.row.checked_sub(1) else {
+            let is_drawn = self.drawn > 0;
+            return Some(if is_drawn {
+                self.arrive(self.start)
+            } else {
+                self.draw()
+            });
+        };
+        let (from, to) = (self.time(before), self.time(self.row));
+        // a draw and a row at the same time may differ by rounding
+        let same = 1e-9 * (to - from).min(self.hold());
+        let due = self.start + self.due();
+        let (at, stop) = match self.is_exact || due > to + same {
+            true => (to, self.arrive(to)),
+            false => (if due > to - same { to } else { due }, self.draw()),
+        };
+        if at <= self.reached {
+            return Some(stop);
+        }
+        self.planned = Some(stop);
+        let from = std::mem::replace(&mut self.reached, at);
+        Some(Stop::Advance { from, to: at })
     }
 }
 
@@ -346,47 +350,38 @@ const DECIMALS: i32 = 15;
 /// The times start + k·step. Where both are decimal numbers, as 0.05, each time is the number
 /// nearest to the decimal one: the third is 0.15 and not 0.15000000000000002.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Grid {
-    start: f64,
-    step: f64,
-    decimal: Option<Decimal>,
-}
-
-/// Start and step in units of 1/scale.
-#[derive(Clone, Copy, Debug)]
-struct Decimal {
-    start: i64,
-    step: i64,
-    scale: i64,
+pub(crate) enum Grid {
+    /// start and step in units of 1/scale
+    Decimal { start: i64, step: i64, scale: i64 },
+    /// no decimal numbers
+    Binary { start: f64, step: f64 },
 }
 
 impl Grid {
     pub(crate) fn new(start: f64, step: f64) -> Self {
-        let scales = (0..=DECIMALS).map(|e| 10_i64.pow(e.unsigned_abs()));
-        let units = |scale: i64| {
-            Some(Decimal {
-                start: whole(start, scale)?,
-                step: whole(step, scale)?,
-                scale,
-            })
-        };
-        Self {
-            start,
-            step,
-            decimal: scales.into_iter().find_map(units),
-        }
+        let mut scales = (0..=DECIMALS).map(|e| 10_i64.pow(e.unsigned_abs()));
+        let decimal = scales.find_map(|scale| {
+            let (start, step) = (whole(start, scale)?, whole(step, scale)?);
+            Some(Self::Decimal { start, step, scale })
+        });
+        decimal.unwrap_or(Self::Binary { start, step })
     }
 
     /// Time `k`.
     pub(crate) fn time(&self, k: usize) -> f64 {
-        let decimal = |d: Decimal| {
-            let steps = i64::try_from(k).ok()?.checked_mul(d.step)?;
-            let units = steps.checked_add(d.start)?;
-            // both are exact, so the quotient is rounded once
-            (units.abs() < EXACT).then(|| units as f64 / d.scale as f64)
+        let (start, step) = match *self {
+            Self::Binary { start, step } => (start, step),
+            Self::Decimal { start, step, scale } => {
+                let steps = i64::try_from(k).ok().and_then(|k| k.checked_mul(step));
+                let units = steps.and_then(|steps| steps.checked_add(start));
+                // both are exact, so the quotient is rounded once
+                if let Some(units) = units.filter(|units| units.abs() < EXACT) {
+                    return units as f64 / scale as f64;
+                }
+                (start as f64 / scale as f64, step as f64 / scale as f64)
+            }
         };
-        let exact = self.decimal.and_then(decimal);
-        exact.unwrap_or(self.start + k as f64 * self.step)
+        start + k as f64 * step
     }
 }
 

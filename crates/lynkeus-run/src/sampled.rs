@@ -1,18 +1,18 @@
 //! Observers whose sensors report when they do.
 
+use crate::Evaluation;
 use crate::blueprint::Tuned;
 use crate::divergence::{Bound, check_deviations};
 use crate::filter::{Health, Innovation, NoisyModel};
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::spread::Spread;
-use crate::system::Driven;
 use crate::{Blueprint, Dynamics, Error, Events, Integrator, StepAdvice};
 
 /// An observer whose readings [jump](crate::Updates::Jumps), under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Sampled {
-    driven: Driven,
+    driven: Evaluation,
     integrator: Integrator,
     x: Vec<f64>,
     outputs: Vec<f64>,
@@ -58,7 +58,7 @@ impl Sampled {
         signals.extend(tuned);
         let spread = errors.map(|model| Spread::new(model, *judges, *run));
         Ok(Self {
-            driven: Driven::new(system, run.between),
+            driven: system.driven(run.between),
             integrator: Integrator::new(run.method, system.states().len())?,
             x: system.start().to_vec(),
             outputs: vec![0.0; system.estimates().len()],
@@ -85,7 +85,7 @@ impl Sampled {
     }
 
     fn evaluate(&mut self, t: f64) -> Result<(), Error> {
-        let evaluation = &mut self.driven.evaluation;
+        let evaluation = &mut self.driven;
         evaluation.enter(t);
         evaluation.estimates(t, &self.x, &mut self.outputs);
         match self.outputs.iter().all(|v| v.is_finite()) {
@@ -118,7 +118,7 @@ impl Runner for Sampled {
                 .advance(&mut self.driven, from, sample.t, &mut self.x),
         };
         let scale = self.bound.scale();
-        let evaluation = &mut self.driven.evaluation;
+        let evaluation = &mut self.driven;
         done.map_err(|error| evaluation.explained(error, &self.x, scale))?;
         self.driven.arrive();
         Ok(())
@@ -154,19 +154,19 @@ impl Runner for Sampled {
 
     fn report(&mut self, t: f64) -> Result<(), Error> {
         let own = self.x.len() - self.sensors;
-        let names = self.driven.evaluation.system().states();
+        let names = self.driven.system().states();
         let inside = self
             .bound
             .check(t, names, &self.x[..own], || self.integrator.hint());
         let scale = self.bound.scale();
-        let evaluation = &mut self.driven.evaluation;
+        let evaluation = &mut self.driven;
         inside.map_err(|error| evaluation.explained(error, &self.x, scale))?;
         self.evaluate(t)?;
         let Some(spread) = &mut self.spread else {
             return Ok(());
         };
         spread.measure(t, &self.x);
-        let told = self.driven.evaluation.system().outputs();
+        let told = self.driven.system().outputs();
         check_deviations(t, told, &spread.deviations)
     }
 
@@ -286,7 +286,7 @@ mod tests {
         // a snapshot is of these numbers
         let mut other = self::tuned(3.0).estimator().unwrap();
         assert!(other.restore(&pair[1].snapshot()).is_err());
-        let step = |of: &Blueprint| crate::needed_step(of, &[], &[]).unwrap().length;
+        let step = |of: &Blueprint| crate::fastest_mode(of, &[], &[]).unwrap().step();
         assert!((step(&fixed) - step(&tuned)).abs() < 1e-12 * step(&fixed));
     }
 

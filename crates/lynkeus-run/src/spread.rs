@@ -220,12 +220,17 @@ impl Spread {
         Ok(())
     }
 
+    /// The flow's outputs, the entries of the Jacobians.
+    fn evaluate(&mut self, t: f64, z: &[f64]) {
+        let evaluation = &mut self.propagation.driven;
+        evaluation.enter(t);
+        evaluation.outputs(t, z, &mut self.values);
+    }
+
     /// The measurements of the sensors that report are new readings, with errors of their own; z is
     /// after them.
     pub fn reset(&mut self, t: f64, z: &[f64], readings: &[f64]) {
-        let evaluation = &mut self.propagation.driven.evaluation;
-        evaluation.enter(t);
-        evaluation.outputs(t, z, &mut self.values);
+        self.evaluate(t, z);
         for (sensor, reading) in readings.iter().enumerate() {
             if !reading.is_finite() {
                 continue;
@@ -277,9 +282,7 @@ impl Spread {
 
     /// The standard deviations of the estimates at (t, z).
     pub fn measure(&mut self, t: f64, z: &[f64]) {
-        let evaluation = &mut self.propagation.driven.evaluation;
-        evaluation.enter(t);
-        evaluation.outputs(t, z, &mut self.values);
+        self.evaluate(t, z);
         let n = self.belief.root.n;
         let (mut row, mut projected) = (vec![0.0; n], vec![0.0; n]);
         for (i, deviation) in self.deviations.iter_mut().enumerate() {

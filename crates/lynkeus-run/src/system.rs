@@ -3,10 +3,10 @@
 use std::fmt::Write;
 use std::sync::Arc;
 
-use lynkeus_expr::{Evaluator, Graph, Node, Tape};
+use lynkeus_expr::{Evaluator, Graph, MissingInput, Node, Tape};
 
 use crate::divergence::explained;
-use crate::equations::Equations;
+use crate::equations::{Both, Equations};
 use crate::error::state_text;
 use crate::events::{Guards, TimeEvents};
 use crate::routine::{Routine, Runner};
@@ -29,21 +29,13 @@ pub struct System {
 #[derive(Debug)]
 struct Code {
     equations: Arc<Equations>,
-    derivatives_at: Arc<Routine>,
-    outputs_at: Arc<Routine>,
+    free: Both<Arc<Routine>>,
     /// the same with what jumps with the state held; none where nothing does
-    held: Option<HeldCode>,
-    /// where it jumps and bends with the state, over all inputs
-    guards: Option<Arc<Guards>>,
-}
-
-/// Code whose last inputs are the values of the operations that jump with the state.
-#[derive(Debug)]
-struct HeldCode {
-    derivatives_at: Arc<Routine>,
-    outputs_at: Arc<Routine>,
+    held: Option<Both<Arc<Routine>>>,
     /// the event indicators: what vanishes on the surfaces
     indicators: Tape,
+    /// where it jumps and bends with the state, over all inputs
+    guards: Option<Arc<Guards>>,
 }
 
 impl System {
@@ -94,31 +86,33 @@ impl System {
     pub(crate) fn compiled(equations: Equations, start: Vec<f64>) -> Result<Self, Error> {
         let equations = Arc::new(equations);
         let Equations { roots, inputs, .. } = &*equations;
-        let guards = {
-            let graph = equations.graph();
-            let states = equations.states.len();
-            Guards::new(&graph, inputs, states, equations.surfaces(), &roots.bends)?
+        let both = |roots: &Both<Vec<Node>>, inputs: usize| -> Result<_, MissingInput> {
+            Ok(Both {
+                derivatives: Routine::new(&equations, inputs, roots.derivatives.clone())?,
+                outputs: Routine::new(&equations, inputs, roots.outputs.clone())?,
+            })
         };
-        let held = match equations.held.is_empty() {
-            true => None,
-            false => Some(HeldCode {
-                derivatives_at: Routine::new(
-                    &equations,
-                    inputs.len(),
-                    roots.held_derivatives.clone(),
-                )?,
-                outputs_at: Routine::new(&equations, inputs.len(), roots.held_outputs.clone())?,
-                indicators: Tape::new(&equations.graph(), inputs, &roots.surfaces)?,
-            }),
-        };
-        let smooth = equations.smooth_inputs();
+        let held = (!equations.jumps.is_empty()).then(|| both(&roots.held, inputs.len()));
+        let (held, free) = (
+            held.transpose()?,
+            both(&roots.free, equations.smooth_inputs())?,
+        );
+        let graph = equations.graph();
+        let surfaces: Vec<Node> = roots.surfaces.iter().map(|surface| surface.node).collect();
         let code = Code {
-            derivatives_at: Routine::new(&equations, smooth, roots.derivatives.clone())?,
-            outputs_at: Routine::new(&equations, smooth, roots.outputs.clone())?,
+            free,
             held,
-            guards,
+            indicators: Tape::new(&graph, inputs, &surfaces)?,
+            guards: Guards::new(
+                &graph,
+                inputs,
+                equations.states.len(),
+                &roots.surfaces,
+                &roots.bends,
+            )?,
             equations: equations.clone(),
         };
+        drop(graph);
         Self {
             code: Arc::new(code),
             start: vec![],
@@ -193,21 +187,18 @@ impl System {
             signals,
             outputs,
             switches,
-            held,
+            jumps,
+            roots,
             ..
         } = &*code.equations;
+        let told = (states, signals, outputs, switches, jumps, &roots.surfaces);
         // a digest takes any text
-        let _ = write!(digest, "{:?}", (states, signals, outputs, switches, held));
-        let held = code.held.iter();
-        let held = held.flat_map(|held| [&held.derivatives_at, &held.outputs_at]);
-        for routine in [&code.derivatives_at, &code.outputs_at]
-            .into_iter()
-            .chain(held)
-        {
-            let _ = write!(digest, "{:?}", routine.tape());
+        let _ = write!(digest, "{told:?}");
+        for both in [&code.free].into_iter().chain(&code.held) {
+            let tapes = (both.derivatives.tape(), both.outputs.tape());
+            let _ = write!(digest, "{tapes:?}");
         }
-        let indicators = code.held.as_ref().map(|held| &held.indicators);
-        let _ = write!(digest, "{indicators:?}");
+        let _ = write!(digest, "{:?}", code.indicators);
         digest.numbers(&self.start);
     }
 
@@ -218,23 +209,23 @@ impl System {
 
     /// The code of x'.
     pub(crate) fn derivatives_at(&self) -> &Routine {
-        &self.code.derivatives_at
+        &self.code.free.derivatives
     }
 
     /// (t, x, w, [modes](System::modes)) → x'.
     pub fn derivative_tape(&self) -> &Tape {
-        self.code.derivatives_at.tape()
+        self.code.free.derivatives.tape()
     }
 
     /// (t, x, w, [modes](System::modes)) → y.
     pub fn output_tape(&self) -> &Tape {
-        self.code.outputs_at.tape()
+        self.code.free.outputs.tape()
     }
 
     /// How many values the switches in time have: what jumps with time alone is an input of the
     /// tapes.
     pub fn modes(&self) -> usize {
-        self.code.equations.modes.iter().sum()
+        self.code.equations.modes()
     }
 
     /// Whether it jumps or bends (as max does) with time alone, at instants that are found and at
@@ -246,27 +237,35 @@ impl System {
 
     /// An evaluator with its own working memory, signals at zero.
     pub fn evaluation(&self) -> Evaluation {
-        Evaluation::new(self)
+        let code = &self.code;
+        let runners = |both: &Both<Arc<Routine>>| Both {
+            derivatives: both.derivatives.runner(),
+            outputs: both.outputs.runner(),
+        };
+        Evaluation {
+            free: runners(&code.free),
+            held: code.held.as_ref().map(runners),
+            is_held: false,
+            indicators: code.indicators.evaluator(),
+            switches: code.equations.switches.clone(),
+            inputs: vec![0.0; code.equations.smooth_inputs()],
+            follows: false,
+            line: None,
+            last: vec![],
+            next: vec![],
+            system: self.clone(),
+        }
     }
-}
 
-/// Evaluates a system on known sides of the surfaces on which it jumps.
-#[derive(Clone, Debug)]
-struct HeldEvaluation {
-    derivatives: Runner,
-    outputs: Runner,
-    indicators: Evaluator,
-    modes: Vec<f64>,
-    /// those of the system, then the modes
-    inputs: Vec<f64>,
-    is_held: bool,
-}
-
-impl HeldEvaluation {
-    fn place(&mut self, inputs: &[f64]) {
-        self.inputs.clear();
-        self.inputs.extend_from_slice(inputs);
-        self.inputs.extend_from_slice(&self.modes);
+    /// An evaluator whose signals are known at samples.
+    pub(crate) fn driven(&self, between: BetweenSamples) -> Evaluation {
+        let signals = vec![0.0; self.signals().len()];
+        Evaluation {
+            follows: between == BetweenSamples::Linear,
+            last: signals.clone(),
+            next: signals,
+            ..self.evaluation()
+        }
     }
 }
 
@@ -274,77 +273,80 @@ impl HeldEvaluation {
 #[derive(Clone, Debug)]
 pub struct Evaluation {
     system: System,
-    derivatives: Runner,
-    outputs: Runner,
+    free: Both<Runner>,
+    held: Option<Both<Runner>>,
+    /// it is on known sides of the surfaces on which it jumps
+    is_held: bool,
+    indicators: Evaluator,
     /// of each part of the system
     switches: Vec<TimeEvents>,
-    /// t, x, w, modes
+    /// t, x, w, modes; while they are held, the values of what jumps with the state as well
     inputs: Vec<f64>,
-    held: Option<HeldEvaluation>,
+    /// signals are straight lines between two samples
+    follows: bool,
+    /// the interval under way, where they do
+    line: Option<(f64, f64)>,
+    /// signals at the samples around, where it is driven by samples
+    last: Vec<f64>,
+    next: Vec<f64>,
 }
 
 impl Evaluation {
-    fn new(system: &System) -> Self {
-        let code = &system.code;
-        Self {
-            derivatives: code.derivatives_at.runner(),
-            outputs: code.outputs_at.runner(),
-            switches: code.equations.switches.clone(),
-            inputs: vec![0.0; code.equations.smooth_inputs()],
-            held: code.held.as_ref().map(|held| HeldEvaluation {
-                derivatives: held.derivatives_at.runner(),
-                outputs: held.outputs_at.runner(),
-                indicators: held.indicators.evaluator(),
-                modes: vec![0.0; code.equations.held_modes()],
-                inputs: vec![],
-                is_held: false,
-            }),
-            system: system.clone(),
-        }
-    }
-
     /// The system.
     pub fn system(&self) -> &System {
         &self.system
     }
 
+    /// The place of the first mode among the inputs.
+    fn first_mode(&self) -> usize {
+        1 + self.system.states().len() + self.system.signals().len()
+    }
+
     /// The signals' values, in the order of [`System::signals`], to write to.
     pub fn signals_mut(&mut self) -> &mut [f64] {
         let from = 1 + self.system.states().len();
-        let to = from + self.system.signals().len();
+        let to = self.first_mode();
         &mut self.inputs[from..to]
     }
 
     /// The signals' values.
     pub fn signals(&self) -> &[f64] {
-        let from = 1 + self.system.states().len();
-        &self.inputs[from..from + self.system.signals().len()]
+        &self.inputs[1 + self.system.states().len()..self.first_mode()]
+    }
+
+    /// The first sample.
+    pub(crate) fn start(&mut self, signals: &[f64]) {
+        self.next.copy_from_slice(signals);
+        self.arrive();
+    }
+
+    /// The sample at the end of the interval to come, of the first signals; others stay.
+    pub(crate) fn aim(&mut self, from: f64, to: f64, signals: &[f64]) {
+        self.line = self.follows.then_some((from, to));
+        self.next.copy_from_slice(&self.last);
+        self.next[..signals.len()].copy_from_slice(signals);
+    }
+
+    /// The interval is over: its last sample is the present one.
+    pub(crate) fn arrive(&mut self) {
+        self.line = None;
+        self.last.copy_from_slice(&self.next);
+        let place = 1 + self.system.states().len();
+        self.inputs[place..place + self.last.len()].copy_from_slice(&self.last);
     }
 
     /// Writes the outputs at (t, x) to `y`, in the order of [`System::outputs`].
     ///
     /// Modes are those of the last [`Events::enter`].
     pub fn outputs(&mut self, t: f64, x: &[f64], y: &mut [f64]) {
-        self.place(t, x);
-        match &mut self.held {
-            Some(held) if held.is_held => {
-                held.place(&self.inputs);
-                held.outputs.eval(&held.inputs, y);
-            }
-            _ => self.outputs.eval(&self.inputs, y),
-        }
+        let (both, inputs) = self.at(t, x);
+        both.outputs.eval(inputs, y);
     }
 
     /// Writes the derivatives of the outputs by the states at (t, x), where they are known.
     pub(crate) fn output_slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
-        self.place(t, x);
-        match &mut self.held {
-            Some(held) if held.is_held => {
-                held.place(&self.inputs);
-                held.outputs.slopes(&held.inputs, x.len(), slopes)
-            }
-            _ => self.outputs.slopes(&self.inputs, x.len(), slopes),
-        }
+        let (both, inputs) = self.at(t, x);
+        both.outputs.slopes(inputs, x.len(), slopes)
     }
 
     /// Writes what an observer reports at (t, x), in the order of
@@ -374,38 +376,51 @@ impl Evaluation {
         explained(error, system.states(), x, scale, &margins)
     }
 
-    /// Values of the switches at the last [`Events::enter`].
+    /// Values of the switches at the last [`Events::enter`]; then, while it is held, those of the
+    /// operations that jump with the state.
     pub(crate) fn modes(&self) -> &[f64] {
-        &self.inputs[self.inputs.len() - self.system.modes()..]
+        &self.inputs[self.first_mode()..]
     }
 
-    /// Values of the operations that jump with the state, on the sides that are held.
-    pub(crate) fn held_modes(&self) -> &[f64] {
-        self.held.as_ref().map_or(&[], |held| &held.modes)
+    /// Whether it is on known sides of the surfaces on which it jumps.
+    pub(crate) fn is_held(&self) -> bool {
+        self.is_held
     }
 
     /// Goes to these values of the switches, and to these of what is held.
-    pub(crate) fn enter_modes(&mut self, modes: &[f64], held_modes: Option<&[f64]>) {
-        let first = self.inputs.len() - modes.len();
-        self.inputs[first..].copy_from_slice(modes);
-        if let Some(held) = &mut self.held {
-            held.is_held = held_modes.is_some();
-            if let Some(modes) = held_modes {
-                held.modes.copy_from_slice(modes);
-            }
-        }
+    pub(crate) fn enter_modes(&mut self, modes: &[f64], held_modes: &[f64]) {
+        self.inputs.truncate(self.first_mode());
+        self.inputs.extend_from_slice(modes);
+        self.inputs.extend_from_slice(held_modes);
+        self.is_held = !held_modes.is_empty();
     }
 
-    fn place(&mut self, t: f64, x: &[f64]) {
+    /// Goes to (t, x): the code that is in force there, and what it reads.
+    fn at(&mut self, t: f64, x: &[f64]) -> (&mut Both<Runner>, &mut Vec<f64>) {
         self.inputs[0] = t;
         self.inputs[1..=x.len()].copy_from_slice(x);
+        if let Some((from, to)) = self.line {
+            let s = (t - from) / (to - from);
+            let ends = self.last.iter().zip(&self.next);
+            for (signal, (last, next)) in self.inputs[1 + x.len()..].iter_mut().zip(ends) {
+                *signal = last + s * (next - last);
+            }
+        }
+        match &mut self.held {
+            Some(held) if self.is_held => (held, &mut self.inputs),
+            _ => (&mut self.free, &mut self.inputs),
+        }
     }
 }
 
 impl Persist for Evaluation {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        // between two calls no interval is under way
+        self.line = None;
         walk.numbers(self.signals_mut())?;
-        self.switches.iter_mut().try_for_each(|s| s.walk(walk))
+        self.switches.iter_mut().try_for_each(|s| s.walk(walk))?;
+        walk.numbers(&mut self.last)?;
+        walk.numbers(&mut self.next)
     }
 }
 
@@ -415,33 +430,21 @@ impl Dynamics for Evaluation {
     }
 
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
-        self.place(t, x);
-        match &mut self.held {
-            Some(held) if held.is_held => {
-                held.place(&self.inputs);
-                held.derivatives.eval(&held.inputs, dx);
-            }
-            _ => self.derivatives.eval(&self.inputs, dx),
-        }
+        let (both, inputs) = self.at(t, x);
+        both.derivatives.eval(inputs, dx);
     }
 
     fn slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
-        self.place(t, x);
-        match &mut self.held {
-            Some(held) if held.is_held => {
-                held.place(&self.inputs);
-                held.derivatives.slopes(&held.inputs, x.len(), slopes)
-            }
-            _ => self.derivatives.slopes(&self.inputs, x.len(), slopes),
-        }
+        let (both, inputs) = self.at(t, x);
+        both.derivatives.slopes(inputs, x.len(), slopes)
     }
 
     fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
-        if self.held.as_ref().is_some_and(|held| held.is_held) {
+        if self.is_held || self.line.is_some() {
             return false;
         }
-        self.place(t, x);
-        self.derivatives.step(&mut self.inputs, h, next)
+        let (both, inputs) = self.at(t, x);
+        both.derivatives.step(inputs, h, next)
     }
 
     fn events(&mut self) -> Option<&mut dyn Events> {
@@ -453,12 +456,13 @@ impl Dynamics for Evaluation {
     }
 
     fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
-        self.place(t, x);
-        let code = &self.system.code;
-        let named = code
-            .derivatives_at
-            .first_nonfinite(&self.inputs)
-            .or_else(|| code.outputs_at.first_nonfinite(&self.inputs));
+        self.at(t, x);
+        let Code {
+            equations, free, ..
+        } = &*self.system.code;
+        let inputs = &self.inputs[..equations.smooth_inputs()];
+        let mut all = [&free.derivatives, &free.outputs].into_iter();
+        let named = all.find_map(|routine| routine.first_nonfinite(inputs));
         Error::NotFinite {
             time: t,
             operation: named.unwrap_or_else(|| "a value overflows".to_owned()),
@@ -474,14 +478,10 @@ impl Events for Evaluation {
     }
 
     fn enter(&mut self, t: f64) {
-        let first = self.inputs.len() - self.system.modes();
+        let first = self.first_mode();
         let mut modes = &mut self.inputs[first..];
-        for (switches, &count) in self
-            .switches
-            .iter_mut()
-            .zip(&self.system.code.equations.modes)
-        {
-            let (own, rest) = modes.split_at_mut(count);
+        for switches in &mut self.switches {
+            let (own, rest) = modes.split_at_mut(switches.modes());
             switches.modes_at(t, own);
             modes = rest;
         }
@@ -492,168 +492,32 @@ impl Events for Evaluation {
     }
 
     fn indicators(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
-        self.place(t, &x[..self.dimension()]);
-        if let Some(held) = &mut self.held {
-            held.place(&self.inputs);
-            held.indicators.eval(&held.inputs, values);
+        self.at(t, &x[..self.dimension()]);
+        if self.is_held {
+            self.indicators.eval(&self.inputs, values);
         }
     }
 
     fn hold(&mut self, sides: Option<&[f64]>) {
-        let Some(evaluation) = &mut self.held else {
-            return;
-        };
-        evaluation.is_held = sides.is_some();
-        let Some(mut sides) = sides else {
-            return;
-        };
-        let mut modes = &mut evaluation.modes[..];
-        for jumps in &self.system.code.equations.held {
-            let (own, rest) = sides.split_at(jumps.names.len());
-            modes = jumps.modes(own, modes);
-            sides = rest;
-        }
-    }
-
-    fn beside(&mut self, _t: f64, values: &mut Vec<[f64; 2]>) {
-        let first = 1 + self.system.states().len();
-        let held = self.held_modes();
-        values.clear();
-        values.extend(self.inputs[first..].iter().chain(held).map(|&v| [v, 0.0]));
-    }
-}
-
-/// A system with its signals between two samples.
-#[derive(Clone, Debug)]
-pub(crate) struct Driven {
-    pub(crate) evaluation: Evaluation,
-    between: BetweenSamples,
-    from: f64,
-    to: f64,
-    last: Vec<f64>,
-    next: Vec<f64>,
-}
-
-impl Driven {
-    pub(crate) fn new(system: &System, between: BetweenSamples) -> Self {
-        let count = system.signals().len();
-        Self {
-            evaluation: system.evaluation(),
-            between,
-            from: 0.0,
-            to: 1.0,
-            last: vec![0.0; count],
-            next: vec![0.0; count],
-        }
-    }
-
-    /// The first sample.
-    pub(crate) fn start(&mut self, signals: &[f64]) {
-        self.next.copy_from_slice(signals);
-        self.arrive();
-    }
-
-    /// The sample at the end of the interval to come, of the first signals; others stay.
-    pub(crate) fn aim(&mut self, from: f64, to: f64, signals: &[f64]) {
-        (self.from, self.to) = (from, to);
-        self.next.copy_from_slice(&self.last);
-        self.next[..signals.len()].copy_from_slice(signals);
-    }
-
-    /// The signals at t.
-    fn read_signals(&mut self, t: f64) {
-        if self.between == BetweenSamples::Linear {
-            let s = (t - self.from) / (self.to - self.from);
-            let ends = self.last.iter().zip(&self.next);
-            for (signal, (last, next)) in self.evaluation.signals_mut().iter_mut().zip(ends) {
-                *signal = last + s * (next - last);
-            }
-        }
-    }
-
-    /// Writes the derivatives of the outputs by the states at (t, x), where they are known.
-    pub(crate) fn output_slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
-        self.read_signals(t);
-        self.evaluation.output_slopes(t, x, slopes)
-    }
-
-    /// The interval is over: its last sample is the present one.
-    pub(crate) fn arrive(&mut self) {
-        self.last.copy_from_slice(&self.next);
-        self.evaluation.signals_mut().copy_from_slice(&self.last);
-    }
-}
-
-impl Persist for Driven {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        self.evaluation.walk(walk)?;
-        walk.numbers(&mut self.last)?;
-        walk.numbers(&mut self.next)
-    }
-}
-
-impl Dynamics for Driven {
-    fn dimension(&self) -> usize {
-        self.evaluation.dimension()
-    }
-
-    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
-        self.read_signals(t);
-        self.evaluation.derivatives(t, x, dx);
-    }
-
-    fn slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
-        self.read_signals(t);
-        self.evaluation.slopes(t, x, slopes)
-    }
-
-    fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
-        self.between == BetweenSamples::Hold && self.evaluation.step(t, h, x, next)
-    }
-
-    fn events(&mut self) -> Option<&mut dyn Events> {
-        Some(self)
-    }
-
-    fn names(&self) -> Vec<String> {
-        self.evaluation.names()
-    }
-
-    fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
-        self.evaluation.not_finite(t, x)
-    }
-}
-
-impl Events for Driven {
-    fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
-        self.evaluation.instants(from, to, times)
-    }
-
-    fn enter(&mut self, t: f64) {
-        self.evaluation.enter(t);
-    }
-
-    fn guards(&self) -> Option<Arc<Guards>> {
-        self.evaluation.guards()
-    }
-
-    fn indicators(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
-        self.read_signals(t);
-        self.evaluation.indicators(t, x, values);
-    }
-
-    fn hold(&mut self, sides: Option<&[f64]>) {
-        self.evaluation.hold(sides);
+        let equations = &self.system.code.equations;
+        self.inputs.truncate(equations.smooth_inputs());
+        let jumps = equations.jumps.iter();
+        let values = sides.map(|sides| jumps.map(|jump| jump.value(sides)));
+        self.inputs.extend(values.into_iter().flatten());
+        self.is_held = sides.is_some() && self.held.is_some();
     }
 
     fn beside(&mut self, t: f64, values: &mut Vec<[f64; 2]>) {
-        self.read_signals(t);
-        self.evaluation.beside(t, values);
-        if self.between == BetweenSamples::Linear {
-            let ends = self.last.iter().zip(&self.next);
-            for ([_, speed], (last, next)) in values.iter_mut().zip(ends) {
-                *speed = (next - last) / (self.to - self.from);
-            }
+        let first = 1 + self.dimension();
+        values.clear();
+        values.extend(self.inputs[first..].iter().map(|&v| [v, 0.0]));
+        let Some((from, to)) = self.line else {
+            return;
+        };
+        let s = (t - from) / (to - from);
+        let ends = self.last.iter().zip(&self.next);
+        for (value, (last, next)) in values.iter_mut().zip(ends) {
+            *value = [last + s * (next - last), (next - last) / (to - from)];
         }
     }
 }

@@ -47,13 +47,6 @@ struct Series {
 }
 
 impl Trajectory {
-    /// Keeps the first rows only.
-    pub fn truncate(&mut self, rows: usize) {
-        self.times.truncate(rows);
-        let series = self.series.iter_mut();
-        series.for_each(|series| series.values.truncate(rows));
-    }
-
     /// The same table with further columns of a role, in the order of `names`; to be called
     /// before the first row.
     #[must_use]

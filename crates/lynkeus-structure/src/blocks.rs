@@ -9,8 +9,8 @@
 
 use std::collections::HashSet;
 
-use crate::chains::{ChainRequest, describe_chains, heads, names};
-use crate::{AugmentedPlant, Chain};
+use crate::chains::{ChainRequest, grown, heads, imbalance, names};
+use crate::{AugmentedPlant, Chain, Misfit};
 
 /// Chains in the order in which the observer uses them.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,7 +24,7 @@ impl Blocks {
     pub fn lengths(&self) -> Vec<usize> {
         let mut lengths = vec![0; self.order.len()];
         for (output, chain) in &self.order {
-            lengths[*output] = chain.states.len();
+            lengths[*output] = chain.len();
         }
         lengths
     }
@@ -33,16 +33,15 @@ impl Blocks {
     pub fn names(&self, augmented: &AugmentedPlant<'_>) -> Vec<Vec<String>> {
         let mut all = vec![vec![]; self.order.len()];
         for (output, chain) in &self.order {
-            let state = |&i: &usize| augmented.states[i].name.clone();
-            all[*output] = chain.states.iter().map(state).collect();
+            all[*output] = names(augmented, chain.clone());
         }
         all
     }
 
-    /// In words: `(x1 → x2), then (x3 → x4)`.
-    pub fn describe(&self, augmented: &AugmentedPlant<'_>) -> String {
-        let chains: Vec<Chain> = self.order.iter().map(|(_, c)| c.clone()).collect();
-        describe_chains(augmented, &chains, ", then ")
+    /// Names of the states of each chain, first block first.
+    pub fn named(&self, augmented: &AugmentedPlant<'_>) -> Vec<Vec<String>> {
+        let chains = self.order.iter();
+        chains.map(|(_, c)| names(augmented, c.clone())).collect()
     }
 }
 
@@ -60,7 +59,7 @@ pub fn find(
     augmented: &AugmentedPlant<'_>,
     request: &ChainRequest,
     order: Option<&[usize]>,
-) -> Result<Vec<Blocks>, String> {
+) -> Result<Vec<Blocks>, Misfit> {
     let heads = heads(augmented)?;
     let mut search = Search {
         augmented,
@@ -73,41 +72,27 @@ pub fn find(
     };
     search.extend(&mut vec![], &mut vec![false; augmented.states.len()]);
     let Search {
-        mut found,
+        found,
         furthest,
         steps,
         ..
     } = search;
     if found.is_empty() {
-        let why = furthest.map_or_else(
-            || "no chain starts at a measured state".into(),
-            |(_, why)| why,
-        );
+        let why = furthest.map_or(Misfit::NoChain, |(_, why)| why);
         return Err(match steps < STEPS {
             true => why,
-            false => format!("{why}; not every order of the outputs was tried: give it"),
+            false => Misfit::OrdersLeft(Box::new(why)),
         });
     }
-    let fits = |blocks: &Blocks| {
-        let lengths = request.lengths.as_ref();
-        let names = request.names.as_ref();
-        lengths.is_none_or(|l| *l == blocks.lengths())
-            && names.is_none_or(|n| *n == blocks.names(augmented))
-    };
-    if !found.iter().any(fits) {
-        let mut all: Vec<String> = found.iter().map(|b| b.describe(augmented)).collect();
-        all.truncate(SHOWN);
-        return Err(format!(
-            "no arrangement has the chains asked for; the equations allow {}",
-            all.join(" or ")
-        ));
+    let (mut fits, other): (Vec<Blocks>, Vec<_>) = found
+        .into_iter()
+        .partition(|b| request.is_met(&b.lengths(), || b.names(augmented)));
+    if fits.is_empty() {
+        let shown = other.iter().take(SHOWN).map(|b| b.named(augmented));
+        return Err(Misfit::OtherBlocks(shown.collect()));
     }
-    found.retain(fits);
-    found.sort_by_key(|blocks| {
-        let lengths = blocks.lengths();
-        lengths.iter().max().copied().unwrap_or(0) - lengths.iter().min().copied().unwrap_or(0)
-    });
-    Ok(found)
+    fits.sort_by_key(|blocks| imbalance(&blocks.lengths()));
+    Ok(fits)
 }
 
 /// Arrangements that an error message shows.
@@ -122,7 +107,7 @@ struct Search<'e, 'p> {
     dead: HashSet<(Vec<bool>, Vec<usize>)>,
     found: Vec<Blocks>,
     /// states covered by the best attempt, and why it stopped
-    furthest: Option<(usize, String)>,
+    furthest: Option<(usize, Misfit)>,
 }
 
 impl Search<'_, '_> {
@@ -144,11 +129,11 @@ impl Search<'_, '_> {
             self.steps += 1;
             match self.grow(self.heads[output], taken) {
                 Ok(chain) => {
-                    chain.states.iter().for_each(|&i| taken[i] = true);
+                    chain.iter().for_each(|&i| taken[i] = true);
                     order.push((output, chain));
                     self.extend(order, taken);
                     if let Some((_, chain)) = order.pop() {
-                        chain.states.iter().for_each(|&i| taken[i] = false);
+                        chain.iter().for_each(|&i| taken[i] = false);
                     }
                 }
                 Err(why) => self.stopped(taken, why),
@@ -175,14 +160,10 @@ impl Search<'_, '_> {
             });
         }
         let left = (0..taken.len()).filter(|&i| !taken[i]);
-        let why = format!(
-            "no chain reaches {}; measure another output",
-            names(self.augmented, left)
-        );
-        self.stopped(taken, why);
+        self.stopped(taken, Misfit::OutOfReach(names(self.augmented, left)));
     }
 
-    fn stopped(&mut self, taken: &[bool], why: String) {
+    fn stopped(&mut self, taken: &[bool], why: Misfit) {
         let covered = taken.iter().filter(|&&t| t).count();
         if self
             .furthest
@@ -194,26 +175,16 @@ impl Search<'_, '_> {
     }
 
     /// The chain from `head` given that the states `taken` belong to earlier chains.
-    fn grow(&self, head: usize, taken: &[bool]) -> Result<Chain, String> {
-        let mut states = vec![head];
-        loop {
-            let last = states[states.len() - 1];
-            let new: Vec<usize> = self.augmented.pattern[last]
-                .iter()
-                .copied()
-                .filter(|i| !taken[*i] && !states.contains(i) && !self.heads.contains(i))
-                .collect();
-            match new[..] {
-                [] => return Ok(Chain { states }),
-                [next] => states.push(next),
-                _ => {
-                    return Err(format!(
-                        "the equation of {} depends on {} at once, beside measured states and earlier chains; a block has one new state per equation",
-                        self.augmented.states[last].name,
-                        names(self.augmented, new)
-                    ));
-                }
-            }
+    fn grow(&self, head: usize, taken: &[bool]) -> Result<Chain, Misfit> {
+        let is_known = |i: usize| taken[i] || self.heads.contains(&i);
+        let (chain, new) = grown(self.augmented, head, is_known);
+        if new.is_empty() {
+            return Ok(chain);
         }
+        let last = &self.augmented.states[chain[chain.len() - 1]];
+        Err(Misfit::BlockBreaks {
+            of: last.name.clone(),
+            new: names(self.augmented, new),
+        })
     }
 }

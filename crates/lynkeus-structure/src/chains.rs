@@ -11,9 +11,7 @@
 //!   whole leading chain, and the last rows are free.
 //! * More outputs: the same with several following chains, each tied to the leading one.
 
-use std::collections::BTreeSet;
-
-use crate::AugmentedPlant;
+use crate::{AugmentedPlant, Misfit};
 
 /// Following chains that are tried, in all cuts together.
 const TRIED: usize = 100_000;
@@ -22,12 +20,8 @@ const MOST: usize = 64;
 /// Assignments that a refusal names.
 const NAMED: usize = 8;
 
-/// States of one chain, as indices into the augmented states; the first is measured.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Chain {
-    /// x_1, x_2, …
-    pub states: Vec<usize>,
-}
+/// States of one chain x_1, x_2, …, as indices into the augmented states; the first is measured.
+pub type Chain = Vec<usize>;
 
 /// An assignment of every augmented state to a chain.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,15 +37,14 @@ pub struct Assignment {
 impl Assignment {
     /// Lengths of the chains, in the order of the measured outputs.
     pub fn lengths(&self) -> Vec<usize> {
-        self.chains.iter().map(|c| c.states.len()).collect()
+        self.chains.iter().map(Vec::len).collect()
     }
+}
 
-    /// Difference between the longest and the shortest chain.
-    fn imbalance(&self) -> usize {
-        let lengths = self.lengths();
-        let longest = lengths.iter().max().copied().unwrap_or(0);
-        longest - lengths.iter().min().copied().unwrap_or(0)
-    }
+/// Difference between the longest and the shortest.
+pub(crate) fn imbalance(lengths: &[usize]) -> usize {
+    let longest = lengths.iter().max().copied().unwrap_or(0);
+    longest - lengths.iter().min().copied().unwrap_or(0)
 }
 
 /// What the user asks of the assignment.
@@ -63,121 +56,85 @@ pub struct ChainRequest {
     pub names: Option<Vec<Vec<String>>>,
 }
 
+impl ChainRequest {
+    /// Whether chains of these lengths and of states with these names are what is asked for.
+    pub(crate) fn is_met(
+        &self,
+        lengths: &[usize],
+        names: impl FnOnce() -> Vec<Vec<String>>,
+    ) -> bool {
+        let are = |asked: &Vec<usize>| asked == lengths;
+        let named = |asked: &Vec<Vec<String>>| *asked == names();
+        self.lengths.as_ref().is_none_or(are) && self.names.as_ref().is_none_or(named)
+    }
+}
+
 /// Every assignment that gives the triangular form, the most balanced first
 /// (of equally balanced ones, the one whose leading chain comes first).
 ///
 /// # Errors
-/// Where there is none: one line that says which equation breaks the form.
+/// Where there is none: which equation breaks the form.
 pub fn find(
     augmented: &AugmentedPlant<'_>,
     request: &ChainRequest,
-) -> Result<Vec<Assignment>, String> {
+) -> Result<Vec<Assignment>, Misfit> {
     let heads = heads(augmented)?;
-    let mut found = match heads[..] {
+    let found = match heads[..] {
         [head] => vec![single(augmented, head)?],
         _ => cuts(augmented, &heads)?,
     };
-    let all = found.clone();
-    found.retain(|assignment| fits(augmented, assignment, request));
-    if found.is_empty() {
-        let options: Vec<String> = all
-            .iter()
-            .take(NAMED)
-            .map(|a| describe(augmented, a))
-            .collect();
-        return Err(format!(
-            "no assignment has the chains asked for; the equations allow {}",
-            options.join(" or ")
-        ));
-    }
-    found.sort_by_key(|a| (a.imbalance(), a.leading));
-    found.truncate(MOST);
-    Ok(found)
-}
-
-/// The chains in words: `(lower → upper → pump)`.
-pub fn describe(augmented: &AugmentedPlant<'_>, assignment: &Assignment) -> String {
-    describe_chains(augmented, &assignment.chains, " and ")
-}
-
-pub(crate) fn describe_chains(
-    augmented: &AugmentedPlant<'_>,
-    chains: &[Chain],
-    between: &str,
-) -> String {
-    let chain = |c: &Chain| {
-        let names: Vec<&str> = c
-            .states
-            .iter()
-            .map(|&i| augmented.states[i].name.as_str())
-            .collect();
-        format!("({})", names.join(" → "))
-    };
-    let chains: Vec<String> = chains.iter().map(chain).collect();
-    chains.join(between)
-}
-
-fn fits(augmented: &AugmentedPlant<'_>, assignment: &Assignment, request: &ChainRequest) -> bool {
-    let names = |c: &Chain| {
-        c.states
-            .iter()
-            .map(|&i| augmented.states[i].name.clone())
+    let named = |a: &Assignment| -> Vec<Vec<String>> {
+        let chains = a.chains.iter();
+        chains
+            .map(|chain| names(augmented, chain.clone()))
             .collect()
     };
-    let lengths = request
-        .lengths
-        .as_ref()
-        .is_none_or(|l| *l == assignment.lengths());
-    let chains = || {
-        assignment
-            .chains
-            .iter()
-            .map(names)
-            .collect::<Vec<Vec<String>>>()
-    };
-    lengths && request.names.as_ref().is_none_or(|n| *n == chains())
+    let (mut fits, other): (Vec<Assignment>, Vec<_>) = found
+        .into_iter()
+        .partition(|a| request.is_met(&a.lengths(), || named(a)));
+    if fits.is_empty() {
+        let allowed = other.iter().take(NAMED).map(named);
+        return Err(Misfit::OtherChains(allowed.collect()));
+    }
+    fits.sort_by_key(|a| (imbalance(&a.lengths()), a.leading));
+    fits.truncate(MOST);
+    Ok(fits)
 }
 
 /// The measured states, in order.
-pub(crate) fn heads(augmented: &AugmentedPlant<'_>) -> Result<Vec<usize>, String> {
+pub(crate) fn heads(augmented: &AugmentedPlant<'_>) -> Result<Vec<usize>, Misfit> {
     let mut heads: Vec<usize> = vec![];
     for output in &augmented.outputs {
         let Some((state, ..)) = output.state else {
-            return Err(format!(
-                "the output {} = {} is not a state times a factor; a chain has to start at a measured state",
-                output.variable.name,
-                augmented.graph().render(output.variable.node, 60)
-            ));
+            return Err(Misfit::NoState {
+                output: output.variable.name.clone(),
+                expression: augmented.graph().render(output.variable.node, 60),
+            });
         };
         if heads.contains(&state) {
-            return Err(format!(
-                "two outputs measure the same state {}; leave one out of 'measured'",
-                augmented.states[state].name
-            ));
+            return Err(Misfit::MeasuredTwice(augmented.states[state].name.clone()));
         }
         heads.push(state);
     }
     Ok(heads)
 }
 
-/// The longest chain from `head` whose rows are all strict but the last, and the
+/// The longest chain from `head` whose rows are all strict but the last, where some states are known, and the
 /// new states in the last row: none or several.
-fn strict_path(augmented: &AugmentedPlant<'_>, head: usize) -> (Vec<usize>, Vec<usize>) {
-    let mut path = vec![head];
-    let mut inside = BTreeSet::from([head]);
+pub(crate) fn grown(
+    augmented: &AugmentedPlant<'_>,
+    head: usize,
+    is_known: impl Fn(usize) -> bool,
+) -> (Chain, Vec<usize>) {
+    let mut chain = vec![head];
     loop {
-        let last = path[path.len() - 1];
-        let new: Vec<usize> = augmented.pattern[last]
-            .iter()
-            .copied()
-            .filter(|state| !inside.contains(state))
+        let row = augmented.pattern[chain[chain.len() - 1]].iter().copied();
+        let new: Vec<usize> = row
+            .filter(|state| !chain.contains(state) && !is_known(*state))
             .collect();
         match new[..] {
-            [next] => {
-                path.push(next);
-                inside.insert(next);
-            }
-            _ => return (path, new),
+            [next] => chain.push(next),
+            _ => return (chain, new),
         }
     }
 }
@@ -185,47 +142,43 @@ fn strict_path(augmented: &AugmentedPlant<'_>, head: usize) -> (Vec<usize>, Vec<
 pub(crate) fn names(
     augmented: &AugmentedPlant<'_>,
     states: impl IntoIterator<Item = usize>,
-) -> String {
-    let names: Vec<&str> = states
-        .into_iter()
-        .map(|i| augmented.states[i].name.as_str())
-        .collect();
-    names.join(", ")
+) -> Vec<String> {
+    let names = states.into_iter().map(|i| augmented.states[i].name.clone());
+    names.collect()
 }
 
-fn single(augmented: &AugmentedPlant<'_>, head: usize) -> Result<Assignment, String> {
-    let (path, new) = strict_path(augmented, head);
-    if path.len() == augmented.states.len() {
-        return Ok(Assignment {
-            chains: vec![Chain { states: path }],
-            leading: 0,
-            leads: vec![0],
-        });
+fn single(augmented: &AugmentedPlant<'_>, head: usize) -> Result<Assignment, Misfit> {
+    let (chain, new) = grown(augmented, head, |_| false);
+    if chain.len() < augmented.states.len() {
+        return Err(stuck(augmented, &chain, new));
     }
-    Err(stuck(augmented, &path, &new))
+    Ok(Assignment {
+        chains: vec![chain],
+        leading: 0,
+        leads: vec![0],
+    })
 }
 
-/// Why a path does not reach every state.
-fn stuck(augmented: &AugmentedPlant<'_>, path: &[usize], new: &[usize]) -> String {
-    let last = &augmented.states[path[path.len() - 1]].name;
-    let states = path.to_vec();
-    let chain = describe_chains(augmented, &[Chain { states }], "");
-    if new.is_empty() {
-        let left = (0..augmented.states.len()).filter(|i| !path.contains(i));
-        return format!(
-            "the chain {chain} ends at {last}: no equation in it depends on {}; measure another output",
-            names(augmented, left)
-        );
+/// Why a chain does not reach every state.
+fn stuck(augmented: &AugmentedPlant<'_>, chain: &[usize], new: Vec<usize>) -> Misfit {
+    let names = |states: Vec<usize>| names(augmented, states);
+    let left = (0..augmented.states.len()).filter(|i| !chain.contains(i));
+    match new.is_empty() {
+        true => Misfit::ChainEnds {
+            chain: names(chain.to_vec()),
+            left: names(left.collect()),
+        },
+        false => Misfit::ChainBreaks {
+            chain: names(chain.to_vec()),
+            new: names(new),
+        },
     }
-    format!(
-        "the chain {chain} breaks at the equation of {last}: it depends on {} at once, where a triangular form has one new state per equation",
-        names(augmented, new.iter().copied())
-    )
 }
 
 /// Every cut into a leading chain and following ones.
-fn cuts(augmented: &AugmentedPlant<'_>, heads: &[usize]) -> Result<Vec<Assignment>, String> {
-    let paths: Vec<_> = heads.iter().map(|&h| strict_path(augmented, h)).collect();
+fn cuts(augmented: &AugmentedPlant<'_>, heads: &[usize]) -> Result<Vec<Assignment>, Misfit> {
+    let grown = |&head: &usize| grown(augmented, head, |_| false);
+    let paths: Vec<_> = heads.iter().map(grown).collect();
     let n = augmented.states.len();
     let mut found: Vec<Assignment> = vec![];
     let mut left = TRIED;
@@ -246,10 +199,7 @@ fn cuts(augmented: &AugmentedPlant<'_>, heads: &[usize]) -> Result<Vec<Assignmen
             cut.go();
             left = cut.left;
             for mut chains in cut.found {
-                let leader = Chain {
-                    states: lead[..n1].to_vec(),
-                };
-                chains.insert(leading, leader);
+                chains.insert(leading, lead[..n1].to_vec());
                 match found.iter_mut().find(|a| a.chains == chains) {
                     Some(known) => known.leads.push(leading),
                     None => found.push(Assignment {
@@ -262,18 +212,9 @@ fn cuts(augmented: &AugmentedPlant<'_>, heads: &[usize]) -> Result<Vec<Assignmen
         }
     }
     if found.is_empty() {
-        let reasons: Vec<String> = paths
-            .iter()
-            .map(|(path, new)| stuck(augmented, path, new))
-            .collect();
-        let count = match heads.len() {
-            2 => "two".to_owned(),
-            count => count.to_string(),
-        };
-        return Err(format!(
-            "no cut into {count} chains covers every state: {}",
-            reasons.join("; ")
-        ));
+        let reasons = paths.into_iter();
+        let reasons = reasons.map(|(chain, new)| stuck(augmented, &chain, new));
+        return Err(Misfit::NoCut(reasons.collect()));
     }
     Ok(found)
 }
@@ -325,9 +266,7 @@ impl Cut<'_> {
                 continue;
             };
             if self.take(&states) {
-                self.chains.push(Chain {
-                    states: states.clone(),
-                });
+                self.chains.push(states.clone());
                 self.go();
                 self.chains.pop();
                 states.iter().for_each(|&i| self.taken[i] = false);
@@ -370,9 +309,16 @@ mod tests {
         then(&AugmentedPlant::new(&plant, &sensors).unwrap())
     }
 
+    /// The chains, one behind the other.
+    fn named(augmented: &AugmentedPlant<'_>, assignment: &Assignment) -> String {
+        let chains = assignment.chains.iter();
+        let chains = chains.map(|chain| names(augmented, chain.clone()).join(" "));
+        chains.collect::<Vec<_>>().join(", ")
+    }
+
     fn described(augmented: &AugmentedPlant<'_>) -> Vec<String> {
         let found = find(augmented, &ChainRequest::default()).unwrap();
-        found.iter().map(|a| describe(augmented, a)).collect()
+        found.iter().map(|a| named(augmented, a)).collect()
     }
 
     /// States in any order: the chain comes from the equations.
@@ -381,7 +327,7 @@ mod tests {
         let text = "model T input Real pump; Real upper; Real lower; output Real level = lower;
           equation der(upper) = -sqrt(upper) + pump; der(lower) = sqrt(upper) - sqrt(lower); end T;";
         let chains = with(text, &["pump"], described);
-        assert_eq!(chains, ["(lower → upper → pump)"]);
+        assert_eq!(chains, ["lower upper pump"]);
     }
 
     fn trays(n: usize, feed: usize) -> String {
@@ -404,10 +350,10 @@ mod tests {
         let chains = with(&trays(12, 8), &["Zf"], described);
         assert_eq!(
             chains[0],
-            "(x[1] → x[2] → x[3] → x[4] → x[5] → x[6] → x[7]) and (x[12] → x[11] → x[10] → x[9] → x[8] → Zf)"
+            "x[1] x[2] x[3] x[4] x[5] x[6] x[7], x[12] x[11] x[10] x[9] x[8] Zf"
         );
         assert_eq!(chains.len(), 2, "{chains:?}");
-        assert!(chains[1].ends_with("x[8] → Zf) and (x[12] → x[11] → x[10] → x[9])"));
+        assert!(chains[1].ends_with("x[8] Zf, x[12] x[11] x[10] x[9]"));
     }
 
     #[test]
@@ -422,8 +368,8 @@ mod tests {
                 lengths: Some(vec![5, 8]),
                 names: None,
             };
-            let text = find(augmented, &wrong).unwrap_err();
-            assert!(text.contains("the equations allow"), "{text}");
+            let why = find(augmented, &wrong).unwrap_err();
+            assert!(matches!(why, Misfit::OtherChains(allowed) if allowed.len() == 2));
         });
     }
 
@@ -431,17 +377,16 @@ mod tests {
     fn what_breaks_the_form_is_said() {
         let unreached = "model U Real a; Real b; output Real y = a;
           equation der(a) = -a; der(b) = a; end U;";
-        let text = with(unreached, &[], |e| {
+        let why = with(unreached, &[], |e| {
             find(e, &ChainRequest::default()).unwrap_err()
         });
-        assert!(text.contains("no equation in it depends on b"), "{text}");
+        assert!(matches!(why, Misfit::ChainEnds { left, .. } if left == ["b"]));
         let two = "model U Real a; Real b; Real c; output Real y = a;
           equation der(a) = b + c; der(b) = a; der(c) = b; end U;";
-        let text = with(two, &[], |e| find(e, &ChainRequest::default()).unwrap_err());
-        assert!(
-            text.contains("equation of a: it depends on b, c at once"),
-            "{text}"
-        );
+        let why = with(two, &[], |e| find(e, &ChainRequest::default()).unwrap_err());
+        let [chain, new] =
+            [&["a"][..], &["b", "c"]].map(|of| of.iter().map(|&s| s.to_owned()).collect());
+        assert_eq!(why, Misfit::ChainBreaks { chain, new });
     }
 
     /// Three sensors: the chain of a may be read before the others' ends, those of b and c not.
@@ -458,10 +403,7 @@ mod tests {
         with(&text("b3 + a2"), &[], |augmented| {
             let found = find(augmented, &ChainRequest::default()).unwrap();
             assert_eq!(found.len(), 1, "{found:?}");
-            assert_eq!(
-                describe(augmented, &found[0]),
-                "(a1 → a2) and (b1 → b2 → b3) and (c1)"
-            );
+            assert_eq!(named(augmented, &found[0]), "a1 a2, b1 b2 b3, c1");
             assert_eq!((found[0].leading, &found[0].leads), (0, &vec![0]));
         });
         let leads = with(&text("b3"), &[], |augmented| {
@@ -474,13 +416,13 @@ mod tests {
         let refused = with(&text("b3 + a2 + c1"), &[], |augmented| {
             find(augmented, &ChainRequest::default()).unwrap_err()
         });
-        assert!(refused.contains("no cut into 3 chains"), "{refused}");
+        assert!(matches!(refused, Misfit::NoCut(why) if why.len() == 3));
     }
 
     #[test]
     fn two_measured_states_need_no_chain_between_them() {
         let text = "model M Real a; Real b; output Real y = a; output Real z = b;
           equation der(a) = b; der(b) = -a*b; end M;";
-        assert_eq!(with(text, &[], described), ["(a) and (b)"]);
+        assert_eq!(with(text, &[], described), ["a, b"]);
     }
 }

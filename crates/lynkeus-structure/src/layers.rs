@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use lynkeus_expr::{Node, jacobian};
 
 use crate::chains::{heads, names};
-use crate::{AugmentedPlant, Matrix};
+use crate::{AugmentedPlant, Matrix, Misfit};
 
 /// A plant in layers.
 #[derive(Clone, Debug)]
@@ -27,18 +27,15 @@ pub struct Layers<'p> {
 ///
 /// # Errors
 /// The first equation that breaks the form, or what is missing.
-pub fn find<'p>(augmented: &AugmentedPlant<'p>) -> Result<Layers<'p>, String> {
+pub fn find<'p>(augmented: &AugmentedPlant<'p>) -> Result<Layers<'p>, Misfit> {
     let n = augmented.plant_states();
     let m = augmented.states.len() - n;
     if m == 0 {
-        return Err("no input is unknown; name those that nobody measures under 'unknown'".into());
+        return Err(Misfit::NothingUnknown);
     }
     let heads = heads(augmented)?;
     if let Some(&v) = heads.iter().find(|&&head| head >= n) {
-        let name = &augmented.states[v].name;
-        return Err(format!(
-            "the unknown input {name} is measured itself; leave it out of 'unknown'"
-        ));
+        return Err(Misfit::UnknownMeasured(augmented.states[v].name.clone()));
     }
     let factors = factors(augmented, &heads)?;
     let zero = augmented.graph().constant(0.0).node();
@@ -47,18 +44,15 @@ pub fn find<'p>(augmented: &AugmentedPlant<'p>) -> Result<Layers<'p>, String> {
         .graph()
         .substitute(&augmented.derivatives[..n], &silent);
     let layers = layers(augmented, &drift, heads)?;
-    let (p, n2) = (layers[0].len(), layers.get(1).map_or(0, Vec::len));
-    if p < m + n2.max(1) {
-        return Err(format!(
-            "{p} measured outputs are too few: (H4) needs at least {}, one for each unknown input ({}) and each state that the measured equations reveal ({}); measure another output",
-            m + n2.max(1),
-            names(augmented, n..n + m),
-            if n2 == 0 {
-                "at least one".into()
-            } else {
-                names(augmented, layers[1].iter().copied())
-            },
-        ));
+    let (count, revealed) = (layers[0].len(), layers.get(1).cloned().unwrap_or_default());
+    let needed = m + revealed.len().max(1);
+    if count < needed {
+        return Err(Misfit::FewOutputs {
+            count,
+            needed,
+            unknown: names(augmented, n..n + m),
+            revealed: names(augmented, revealed),
+        });
     }
     Ok(Layers {
         layers,
@@ -73,13 +67,13 @@ fn unknown(augmented: &AugmentedPlant<'_>) -> Vec<Node> {
 
 /// G = ∂f/∂v, which must be known: no unknown input and no state that is not
 /// measured may enter it.
-fn factors<'p>(augmented: &AugmentedPlant<'p>, heads: &[usize]) -> Result<Matrix<'p>, String> {
+fn factors<'p>(augmented: &AugmentedPlant<'p>, heads: &[usize]) -> Result<Matrix<'p>, Misfit> {
     let (graph, n) = (augmented.graph(), augmented.plant_states());
     let v = unknown(augmented);
     let factors = Matrix::jacobian(graph, &augmented.derivatives[..n], &v);
     let symbols = augmented.symbols();
     for row in 0..n {
-        let equation = &augmented.states[row].name;
+        let of = || augmented.states[row].name.clone();
         for (column, input) in augmented.states[n..].iter().enumerate() {
             let factor = factors.get(row, column);
             let reads = factor.map_or(vec![], |g| {
@@ -87,19 +81,17 @@ fn factors<'p>(augmented: &AugmentedPlant<'p>, heads: &[usize]) -> Result<Matrix
             });
             let step = factor.is_none() && augmented.pattern[row].contains(&(n + column));
             if step || reads.iter().any(|&i| i >= n) {
-                return Err(format!(
-                    "the equation of {equation} is not affine in the unknown input {}; (H3) asks for f̃ + G v",
-                    input.name
-                ));
+                let (of, input) = (of(), input.name.clone());
+                return Err(Misfit::Unaffine { of, input });
             }
             let hidden = reads.iter().copied().filter(|i| !heads.contains(i));
             let hidden: Vec<usize> = hidden.collect();
             if !hidden.is_empty() {
-                return Err(format!(
-                    "in the equation of {equation} the factor of {} depends on {}, which is not measured; (H3) asks for a factor that is known",
-                    input.name,
-                    names(augmented, hidden)
-                ));
+                return Err(Misfit::HiddenFactor {
+                    of: of(),
+                    input: input.name.clone(),
+                    reads: names(augmented, hidden),
+                });
             }
         }
     }
@@ -110,7 +102,7 @@ fn layers(
     augmented: &AugmentedPlant<'_>,
     drift: &[Node],
     heads: Vec<usize>,
-) -> Result<Vec<Vec<usize>>, String> {
+) -> Result<Vec<Vec<usize>>, Misfit> {
     let n = drift.len();
     let pattern = jacobian::pattern(augmented.graph(), drift, &augmented.symbols()[..n]);
     let mut taken = vec![false; n];
@@ -124,11 +116,10 @@ fn layers(
             break;
         }
         if next.len() > last.len() {
-            return Err(format!(
-                "the equations of {} depend on {} at once; the form (1) asks that each layer has no more states than the one before",
-                names(augmented, last.iter().copied()),
-                names(augmented, next.iter().copied())
-            ));
+            return Err(Misfit::LayerGrows {
+                layer: names(augmented, last.iter().copied()),
+                next: names(augmented, next),
+            });
         }
         next.iter().for_each(|&i| taken[i] = true);
         layers.push(next);
@@ -136,10 +127,7 @@ fn layers(
     let left: Vec<usize> = (0..n).filter(|&i| !taken[i]).collect();
     match left.is_empty() {
         true => Ok(layers),
-        false => Err(format!(
-            "no equation on the way from the measured states reads {}; measure another output",
-            names(augmented, left)
-        )),
+        false => Err(Misfit::NotRead(names(augmented, left))),
     }
 }
 
@@ -149,7 +137,7 @@ mod tests {
     use crate::Sensors;
     use lynkeus_model::{LoadOptions, Plant};
 
-    fn found(equations: &str, measured: &[&str]) -> Result<Vec<Vec<usize>>, String> {
+    fn found(equations: &str, measured: &[&str]) -> Result<Vec<Vec<usize>>, Misfit> {
         let text = format!(
             "model P input Real v; Real a; Real b; Real c; Real d;
              output Real ya = a; output Real yb = 2*b; output Real yc = c; output Real yd = d;
@@ -178,34 +166,46 @@ mod tests {
 
     #[test]
     fn what_breaks_the_form_is_named() {
-        let few = "too few: (H4) needs at least 3, one for each unknown input (v) and each state that the measured equations reveal (c, d)";
+        let all = |of: &[&str]| -> Vec<String> { of.iter().map(|&s| s.to_owned()).collect() };
+        let (of, input) = ("a".to_owned(), "v".to_owned());
         let cases = [
             (
                 "der(a) = v^2 + c; der(b) = v; der(c) = d; der(d) = 0;",
-                "equation of a is not affine in the unknown input v",
+                Misfit::Unaffine {
+                    of: of.clone(),
+                    input: input.clone(),
+                },
             ),
             (
                 "der(a) = c*v; der(b) = v + c; der(c) = d; der(d) = 0;",
-                "factor of v depends on c, which is not measured",
+                Misfit::HiddenFactor {
+                    of,
+                    input,
+                    reads: all(&["c"]),
+                },
             ),
             (
                 "der(a) = v + c; der(b) = -b; der(c) = -c; der(d) = c;",
-                "reads d; measure another output",
+                Misfit::NotRead(all(&["d"])),
             ),
             (
                 "der(a) = v + c; der(b) = -b + d; der(c) = -c; der(d) = c;",
-                few,
+                Misfit::FewOutputs {
+                    count: 2,
+                    needed: 3,
+                    unknown: all(&["v"]),
+                    revealed: all(&["c", "d"]),
+                },
             ),
         ];
         for (equations, expected) in cases {
-            let text = found(equations, &["ya", "yb"]).unwrap_err();
-            assert!(text.contains(expected), "{text}");
+            assert_eq!(found(equations, &["ya", "yb"]), Err(expected));
         }
         let wide = "der(a) = v + c + d; der(b) = v; der(c) = 0; der(d) = 0;";
-        let text = found(wide, &["ya"]).unwrap_err();
-        assert!(
-            text.contains("equations of a depend on c, d at once"),
-            "{text}"
+        let (layer, next) = (all(&["a"]), all(&["c", "d"]));
+        assert_eq!(
+            found(wide, &["ya"]),
+            Err(Misfit::LayerGrows { layer, next })
         );
     }
 }

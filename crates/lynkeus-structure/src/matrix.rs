@@ -4,7 +4,7 @@ use std::collections::{HashMap, VecDeque};
 
 use lynkeus_expr::{Binary, Expr, Graph, Node, Unary, components, jacobian};
 
-use crate::zero::is_zero;
+use crate::exact::is_zero;
 
 /// A matrix of expressions, row by row; entries that vanish everywhere are left out.
 #[derive(Clone)]

@@ -24,7 +24,7 @@ use nalgebra::{DMatrix, DVector};
 pub use crate::matrix::Rows;
 pub use crate::matrix::jacobian_rows;
 use crate::region::{inside, spread};
-use crate::{AugmentedPlant, Region, Verdict, vanishes};
+use crate::{AugmentedPlant, Misfit, Region, Verdict, Witness, vanishes};
 
 /// f and g of x' = f(x) + g(x)u.
 #[derive(Clone, Debug)]
@@ -38,10 +38,10 @@ pub struct AffineForm {
 /// Writes the plant as x' = f(x) + g(x)u, y = h(x).
 ///
 /// # Errors
-/// Inside: the first equation that breaks the form, in words.
+/// Inside: the first equation that breaks the form.
 pub fn affine_form(
     augmented: &AugmentedPlant<'_>,
-) -> Result<Result<AffineForm, String>, MissingInput> {
+) -> Result<Result<AffineForm, Misfit>, MissingInput> {
     let graph = augmented.graph();
     let region = augmented.region();
     let u: Vec<Node> = augmented.inputs.iter().map(|i| i.node).collect();
@@ -50,24 +50,18 @@ pub fn affine_form(
     let second = jacobian::forward(graph, &slopes, &u);
     for (entry, j, node) in second.entries {
         if vanishes(graph, node, &region)? != Verdict::Proved {
-            let (state, input) = (g.entries[entry].0, &augmented.inputs[j].name);
-            return Ok(Err(format!(
-                "the equation of {} is not affine in the input {input}; the form is x' = f(x) + g(x)u",
-                augmented.states[state].name
-            )));
+            return Ok(Err(Misfit::InputNotAffine {
+                of: augmented.states[g.entries[entry].0].name.clone(),
+                input: augmented.inputs[j].name.clone(),
+            }));
         }
     }
-    let of_u = |node: Node| {
-        jacobian::pattern(graph, &[node], &u)[0]
-            .first()
-            .map(|&j| &augmented.inputs[j].name)
-    };
     for output in &augmented.outputs {
-        if let Some(input) = of_u(output.variable.node) {
-            return Ok(Err(format!(
-                "the output {} reads the input {input}; the form is y = h(x)",
-                output.variable.name
-            )));
+        if let Some(&j) = jacobian::pattern(graph, &[output.variable.node], &u)[0].first() {
+            return Ok(Err(Misfit::OutputReadsInput {
+                output: output.variable.name.clone(),
+                input: augmented.inputs[j].name.clone(),
+            }));
         }
     }
     let zero = graph.constant(0.0).node();
@@ -164,8 +158,10 @@ pub struct Degree {
     pub r: usize,
     /// the L_g L_f^k h taken as zero are zero by proof
     pub proved: bool,
-    /// what was found, in words
-    pub detail: String,
+    /// name of the input
+    pub input: String,
+    /// where ∂y^(r)/∂u is not zero; none where the input does not appear before
+    pub witness: Option<Witness>,
 }
 
 /// The relative degree with respect to input j of an output whose derivatives have
@@ -195,15 +191,11 @@ pub fn relative_degree(
             Verdict::Proved => {}
             Verdict::Undecided(_) => proved = false,
             Verdict::Refuted(witness) => {
-                let order = k + 1;
-                let detail = format!(
-                    "{input} appears in y^({order}): ∂y^({order})/∂{input} is {}",
-                    crate::words::told(&witness)
-                );
                 return Ok(Degree {
                     r: k + 1,
                     proved,
-                    detail,
+                    input: input.clone(),
+                    witness: Some(witness),
                 });
             }
         }
@@ -211,7 +203,8 @@ pub fn relative_degree(
     Ok(Degree {
         r: rows.len(),
         proved,
-        detail: format!("{input} does not appear before y^({})", rows.len()),
+        input: input.clone(),
+        witness: None,
     })
 }
 
@@ -429,10 +422,8 @@ mod tests {
         let plant = Plant::from_modelica(text, "p.mo", &LoadOptions::default()).unwrap();
         let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
         let why = affine_form(&augmented).unwrap().unwrap_err();
-        assert!(
-            why.contains("equation of b is not affine in the input u"),
-            "{why}"
-        );
+        let (of, input) = ("b".to_owned(), "u".to_owned());
+        assert_eq!(why, Misfit::InputNotAffine { of, input });
     }
 
     fn codistribution(text: &str) -> Codistribution {

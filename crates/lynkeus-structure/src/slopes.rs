@@ -96,30 +96,22 @@ impl Slopes {
             .chain(innovations.iter().map(|i| i.symbol))
             .collect();
         let inputs = vertex_inputs(graph, derivatives, &moving, region)?;
-        let mut found: Option<Self> = None;
+        let sides = inputs.iter().map(|&i| region.dimensions[i].clone());
+        let mut all = Self {
+            models: vec![],
+            inputs: sides.collect(),
+            slopes: vec![],
+        };
         for vertex in 0..1_usize << inputs.len() {
             let fixed = at_vertex(region, &inputs, vertex);
             let (model, slopes) = model(graph, derivatives, states, innovations, &fixed)?;
-            match &mut found {
-                None => {
-                    found = Some(Self {
-                        models: vec![model],
-                        inputs: named(region, &inputs),
-                        slopes,
-                    });
-                }
-                Some(all) => {
-                    all.models.push(model);
-                    slopes.into_iter().for_each(|slope| all.include(slope));
-                }
+            match all.models.is_empty() {
+                true => all.slopes = slopes,
+                false => slopes.into_iter().for_each(|slope| all.include(slope)),
             }
+            all.models.push(model);
         }
-        // there is always the vertex 0
-        Ok(found.unwrap_or(Self {
-            models: vec![],
-            inputs: vec![],
-            slopes: vec![],
-        }))
+        Ok(all)
     }
 
     /// Adds a slope of another vertex to what is told about slopes.
@@ -200,11 +192,6 @@ fn at_vertex(region: &Region, inputs: &[usize], vertex: usize) -> Region {
     fixed
 }
 
-fn named(region: &Region, inputs: &[usize]) -> Place {
-    let sides = inputs.iter().map(|&i| region.dimensions[i].clone());
-    sides.collect()
-}
-
 /// Cells examined per end of a slope's range.
 const BUDGET: usize = 1500;
 /// Cells examined to see whether a slope has a bound at all.
@@ -228,38 +215,25 @@ fn model(
     region: &Region,
 ) -> Result<(ErrorModel, Vec<Slope>), MissingInput> {
     let n = derivatives.len();
-    let mut model = ErrorModel {
+    let model = ErrorModel {
         constant: vec![vec![Interval::ZERO; n]; n],
         sectors: vec![],
     };
-    let mut slopes = vec![];
-    let right = at_rest(region, innovations);
+    let mut found = (model, vec![]);
     let columns: Vec<Column> = states.iter().copied().zip(0..).collect();
-    let vanishing: Vec<Node> = innovations.iter().map(|i| i.symbol).collect();
-    for split in [
-        Part::of(graph, derivatives, &columns, &vanishing, &right)?,
-        Part::of(graph, derivatives, &columns_of(innovations), &[], region)?,
-    ] {
-        for (row, state, coefficient) in split.constant {
-            let entry = &mut model.constant[row][state];
-            *entry = *entry + coefficient;
-        }
-        for (sector, slope) in split.sectors {
-            add(&mut model.sectors, &mut slopes, sector, slope);
-        }
-    }
-    Ok((model, slopes))
+    let read: Vec<Column> = innovations.iter().map(|i| (i.symbol, i.state)).collect();
+    let vanishing: Vec<Node> = read.iter().map(|column| column.0).collect();
+    let right = at_rest(region, &vanishing);
+    contribute(graph, derivatives, &columns, &vanishing, &right, &mut found)?;
+    contribute(graph, derivatives, &read, &[], region, &mut found)?;
+    Ok(found)
 }
 
-fn columns_of(innovations: &[Innovation]) -> Vec<Column> {
-    innovations.iter().map(|i| (i.symbol, i.state)).collect()
-}
-
-/// The region where every innovation is 0.
-fn at_rest(region: &Region, innovations: &[Innovation]) -> Region {
+/// The region where these symbols are 0.
+fn at_rest(region: &Region, vanishing: &[Node]) -> Region {
     let mut right = region.clone();
     for side in &mut right.dimensions {
-        if innovations.iter().any(|i| i.symbol == side.symbol) {
+        if vanishing.contains(&side.symbol) {
             (side.min, side.max) = (0.0, 0.0);
         }
     }
@@ -287,61 +261,54 @@ fn add(sectors: &mut Vec<Sector>, slopes: &mut Vec<Slope>, sector: Sector, slope
     }
 }
 
-/// What some columns contribute to an error system.
-#[derive(Default)]
-struct Part {
-    /// (row, state, number)
-    constant: Vec<(usize, usize, Interval)>,
-    sectors: Vec<(Sector, Slope)>,
-}
-
-impl Part {
-    /// `vanishing`: symbols that are 0 in the region; a term that they make 0 everywhere
-    /// has no slope.
-    fn of(
-        graph: &Graph,
-        derivatives: &[Node],
-        columns: &[Column],
-        vanishing: &[Node],
-        region: &Region,
-    ) -> Result<Self, MissingInput> {
-        let mut part = Self::default();
-        if columns.is_empty() {
-            return Ok(part);
-        }
-        let n = derivatives.len();
-        let mut splitter = Splitter::new(graph, region);
-        let mut weights: BTreeMap<Node, Vec<Interval>> = BTreeMap::new();
-        for (row, &f) in derivatives.iter().enumerate() {
-            for (term, coefficient) in splitter.split(f)?.terms {
-                match columns.iter().find(|(symbol, _)| *symbol == term) {
-                    Some(&(_, state)) => part.constant.push((row, state, coefficient)),
-                    None => {
-                        let weight = weights.entry(term);
-                        weight.or_insert_with(|| vec![Interval::ZERO; n])[row] = coefficient;
-                    }
+/// Adds what some columns contribute to an error system. `vanishing`: symbols that are 0 in the region; a term that they
+/// make 0 everywhere has no slope.
+fn contribute(
+    graph: &Graph,
+    derivatives: &[Node],
+    columns: &[Column],
+    vanishing: &[Node],
+    region: &Region,
+    (model, slopes): &mut (ErrorModel, Vec<Slope>),
+) -> Result<(), MissingInput> {
+    if columns.is_empty() {
+        return Ok(());
+    }
+    let mut splitter = Splitter::new(graph, region);
+    let mut weights: BTreeMap<Node, Vec<Interval>> = BTreeMap::new();
+    for (row, &f) in derivatives.iter().enumerate() {
+        for (term, coefficient) in splitter.split(f)?.terms {
+            match columns.iter().find(|(symbol, _)| *symbol == term) {
+                Some(&(_, state)) => {
+                    let entry = &mut model.constant[row][state];
+                    *entry = *entry + coefficient;
+                }
+                None => {
+                    let none = || vec![Interval::ZERO; derivatives.len()];
+                    weights.entry(term).or_insert_with(none)[row] = coefficient;
                 }
             }
         }
-        let mut idle = vec![];
-        for (&term, weight) in &weights {
-            let unused = weight.iter().all(|w| *w == Interval::ZERO);
-            if unused || is_idle(graph, term, vanishing, region)? {
-                idle.push(term);
-            }
-        }
-        weights.retain(|term, _| !idle.contains(term));
-        let moving: Vec<Node> = columns.iter().map(|c| c.0).collect();
-        for group in groups(weights) {
-            let terms: Vec<Node> = group.terms.iter().map(|t| t.0).collect();
-            let regular = regularity(graph, &terms, &moving, region)?.is_proved();
-            for &column in columns {
-                let found = sector(graph, &group, column, regular, region)?;
-                part.sectors.extend(found);
-            }
-        }
-        Ok(part)
     }
+    let mut idle = vec![];
+    for (&term, weight) in &weights {
+        let unused = weight.iter().all(|w| *w == Interval::ZERO);
+        if unused || is_idle(graph, term, vanishing, region)? {
+            idle.push(term);
+        }
+    }
+    weights.retain(|term, _| !idle.contains(term));
+    let moving: Vec<Node> = columns.iter().map(|c| c.0).collect();
+    for group in groups(weights) {
+        let terms: Vec<Node> = group.terms.iter().map(|t| t.0).collect();
+        let regular = regularity(graph, &terms, &moving, region)?.is_proved();
+        for &column in columns {
+            if let Some((sector, slope)) = sector(graph, &group, column, regular, region)? {
+                add(&mut model.sectors, slopes, sector, slope);
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Whether the term is 0 on the whole region because some symbols are.

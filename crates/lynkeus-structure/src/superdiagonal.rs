@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 use crate::chains::names;
 use crate::rank::gram;
 use crate::region::{inside, spread};
-use crate::{AugmentedPlant, Finding, Point, Reason, Region, Shown, Verdict, sign};
+use crate::{AugmentedPlant, Finding, Misfit, Point, Reason, Region, Shown, Verdict, sign};
 
 /// One rectangular block: F_k.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,12 +42,6 @@ impl Superdiagonal {
         self.factors.iter().map(|factor| &factor.columns[..])
     }
 
-    /// In words: `(x1) → (x2, x3)`.
-    pub fn describe(&self, augmented: &AugmentedPlant<'_>) -> String {
-        let block = |states: Vec<usize>| format!("({})", names(augmented, states));
-        self.declared().map(block).collect::<Vec<_>>().join(" → ")
-    }
-
     /// The blocks with their states in the order of declaration, for people.
     pub fn declared(&self) -> impl Iterator<Item = Vec<usize>> {
         self.blocks().map(|block| {
@@ -62,9 +56,9 @@ impl Superdiagonal {
 ///
 /// # Errors
 /// The first output or equation that breaks the form; the states that no block reaches.
-pub fn find(augmented: &AugmentedPlant<'_>) -> Result<Superdiagonal, String> {
+pub fn find(augmented: &AugmentedPlant<'_>) -> Result<Superdiagonal, Misfit> {
     let outputs = augmented.output_nodes();
-    let output = |i: usize| format!("the output {}", augmented.outputs[i].variable.name);
+    let output = |i: usize| (augmented.outputs[i].variable.name.clone(), true);
     let all: Vec<usize> = (0..augmented.states.len()).collect();
     let rows: Vec<usize> = (0..outputs.len()).collect();
     let mut factors = vec![factor(augmented, rows, &outputs, &all, output)?];
@@ -77,13 +71,10 @@ pub fn find(augmented: &AugmentedPlant<'_>) -> Result<Superdiagonal, String> {
             return Ok(Superdiagonal { factors });
         }
         let derivatives: Vec<Node> = block.iter().map(|&i| augmented.derivatives[i]).collect();
-        let equation = |i: usize| format!("the equation of {}", augmented.states[block[i]].name);
+        let equation = |i: usize| (augmented.states[block[i]].name.clone(), false);
         let next = factor(augmented, block.clone(), &derivatives, &left, equation)?;
         if next.columns.is_empty() {
-            return Err(format!(
-                "no equation on the way from the outputs depends on {}; measure another output",
-                names(augmented, left)
-            ));
+            return Err(Misfit::NoWay(names(augmented, left)));
         }
         factors.push(next);
     }
@@ -145,8 +136,8 @@ fn factor(
     rows: Vec<usize>,
     functions: &[Node],
     candidates: &[usize],
-    title: impl Fn(usize) -> String,
-) -> Result<Factor, String> {
+    title: impl Fn(usize) -> (String, bool),
+) -> Result<Factor, Misfit> {
     let graph = augmented.graph();
     let symbol = |&i: &usize| augmented.states[i].node;
     let symbols: Vec<Node> = candidates.iter().map(symbol).collect();
@@ -155,13 +146,15 @@ fn factor(
     let columns: Vec<usize> = new.map(|j| candidates[j]).collect();
     let symbols: Vec<Node> = columns.iter().map(symbol).collect();
     for (i, &function) in functions.iter().enumerate() {
-        if let Some(culprit) = not_affine(graph, function, &symbols) {
-            return Err(format!(
-                "{} is not affine in {}: {}",
-                title(i),
-                names(augmented, columns.iter().copied()),
-                culprit
-            ));
+        if let Some((by, expression)) = not_affine(graph, function, &symbols) {
+            let (of, is_output) = title(i);
+            return Err(Misfit::NotAffine {
+                of,
+                is_output,
+                states: names(augmented, columns),
+                by,
+                expression,
+            });
         }
     }
     let jacobian = jacobian::forward(graph, functions, &symbols);
@@ -172,20 +165,17 @@ fn factor(
     })
 }
 
-/// What keeps a function from being affine in `symbols`.
-fn not_affine(graph: &Graph, function: Node, symbols: &[Node]) -> Option<String> {
+/// What keeps a function from being affine in `symbols`: a slope, behind the symbol that it is by, or a step.
+fn not_affine(graph: &Graph, function: Node, symbols: &[Node]) -> Option<(Option<String>, String)> {
     let depends = |node: Node| !jacobian::pattern(graph, &[node], symbols)[0].is_empty();
     let step = |node: &Node| graph.jumps(*node) && depends(*node);
     if let Some(step) = graph.reachable(&[function]).into_iter().find(step) {
-        return Some(format!("it switches with {}", graph.render(step, 60)));
+        return Some((None, graph.render(step, 60)));
     }
     let slopes = jacobian::forward(graph, &[function], symbols).entries;
     let (_, column, slope) = slopes.into_iter().find(|&(.., slope)| depends(slope))?;
-    Some(format!(
-        "∂/∂{} = {}",
-        graph.symbol_name(symbols[column]).unwrap_or_default(),
-        graph.render(slope, 60)
-    ))
+    let by = graph.symbol_name(symbols[column]).unwrap_or_default();
+    Some((Some(by), graph.render(slope, 60)))
 }
 
 impl Factor {
@@ -379,8 +369,11 @@ mod tests {
         look(&AugmentedPlant::new(&plant, &Sensors::default()).unwrap())
     }
 
-    fn words(text: &str) -> Result<String, String> {
-        examined(text, |e| Ok(find(e)?.describe(e)))
+    fn blocks(text: &str) -> Result<Vec<Vec<String>>, Misfit> {
+        examined(text, |e| {
+            let form = find(e)?;
+            Ok(form.declared().map(|block| names(e, block)).collect())
+        })
     }
 
     fn verdicts(text: &str) -> Vec<Verdict> {
@@ -396,32 +389,36 @@ mod tests {
     fn blocks_are_found_in_any_order() {
         let text = "model P input Real u; Real d; Real a; Real c; Real b; output Real y = 2*a + u;
       equation der(a) = u*b + a^2*c + sin(a); der(b) = b*c*d - c^3; der(c) = d - b; der(d) = d^2; end P;";
-        assert_eq!(words(text).unwrap(), "(a) → (c, b) → (d)");
+        assert_eq!(blocks(text).unwrap(), [&["a"][..], &["c", "b"], &["d"]]);
     }
 
     #[test]
     fn what_breaks_the_form_is_named() {
         let square =
             "model P Real a; Real b; output Real y = a; equation der(a) = b^2; der(b) = 1; end P;";
-        let text = words(square).unwrap_err();
-        assert!(
-            text.contains("equation of a is not affine in b: ∂/∂b = b*2"),
-            "{text}"
-        );
+        let not_affine = |of: &str, is_output: bool, states: &[&str], by: &str, slope: &str| {
+            Err(Misfit::NotAffine {
+                of: of.to_owned(),
+                is_output,
+                states: states.iter().map(|&s| s.to_owned()).collect(),
+                by: Some(by.to_owned()),
+                expression: slope.to_owned(),
+            })
+        };
+        assert_eq!(blocks(square), not_affine("a", false, &["b"], "b", "b*2"));
         let product = "model P Real a; Real b; Real c; output Real y = a; equation der(a) = b*c; der(b) = 1; der(c) = 1; end P;";
-        assert!(words(product).unwrap_err().contains("∂/∂b = c"));
+        let found = not_affine("a", false, &["b", "c"], "b", "c");
+        assert_eq!(blocks(product), found);
         let output = "model P Real a; output Real y = a^2; equation der(a) = 1; end P;";
-        assert!(
-            words(output)
-                .unwrap_err()
-                .contains("output y is not affine in a")
-        );
+        assert_eq!(blocks(output), not_affine("y", true, &["a"], "a", "a*2"));
         let unseen =
             "model P Real a; Real b; output Real y = a; equation der(a) = 1; der(b) = a; end P;";
-        assert!(words(unseen).unwrap_err().contains("depends on b; measure"));
+        assert_eq!(blocks(unseen), Err(Misfit::NoWay(vec!["b".into()])));
         let switch = "model P Real a; Real b; output Real y = a; equation der(a) = b + (if b > 0 then 1 else 2); der(b) = 1; end P;";
-        let text = words(switch).unwrap_err();
-        assert!(text.contains("switches with"), "{text}");
+        assert!(matches!(
+            blocks(switch),
+            Err(Misfit::NotAffine { by: None, .. })
+        ));
     }
 
     #[test]

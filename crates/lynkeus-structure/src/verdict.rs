@@ -1,6 +1,6 @@
 //! Verdicts.
 
-use crate::Dimension;
+use crate::{Dimension, Misfit};
 
 /// Where a variable is.
 #[derive(Clone, Debug, PartialEq)]
@@ -118,8 +118,6 @@ impl Standing {
 /// What decides a verdict, as data: `lynkeus-words` has the sentences.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Reason {
-    /// a sentence that is not data yet
-    Text(String),
     /// every operation has a value everywhere on the box, and none jumps
     Regular,
     /// an operation has no value on a part of the box, or may have none
@@ -197,6 +195,14 @@ pub enum Reason {
     Alike(bool),
     /// whether points far apart are told apart is not decided
     FarApart,
+    /// what breaks a form
+    Misfit(Misfit),
+}
+
+impl From<Misfit> for Reason {
+    fn from(misfit: Misfit) -> Self {
+        Self::Misfit(misfit)
+    }
 }
 
 /// What a factor of the form that is affine block by block shows of the states behind it.
@@ -227,31 +233,31 @@ pub struct Finding {
 
 impl Finding {
     /// It holds.
-    pub fn proved(reason: impl Into<Reason>) -> Self {
+    pub fn proved(reason: Reason) -> Self {
         Self {
             verdict: Verdict::Proved,
-            reason: reason.into(),
+            reason,
         }
     }
 
     /// It is not known to hold; nor where it might fail.
-    pub fn undecided(reason: impl Into<Reason>) -> Self {
+    pub fn undecided(reason: Reason) -> Self {
         Self {
             verdict: Verdict::open(),
-            reason: reason.into(),
+            reason,
         }
     }
 
     /// It fails.
-    pub fn refuted(witness: impl Into<Witness>, reason: impl Into<Reason>) -> Self {
+    pub fn refuted(witness: impl Into<Witness>, reason: Reason) -> Self {
         Self {
             verdict: Verdict::Refuted(witness.into()),
-            reason: reason.into(),
+            reason,
         }
     }
 
     /// By a condition that is sufficient, not necessary: that it fails refutes nothing.
-    pub fn sufficient(holds: bool, reason: impl Into<Reason>) -> Self {
+    pub fn sufficient(holds: bool, reason: Reason) -> Self {
         if holds {
             Self::proved(reason)
         } else {

@@ -1,8 +1,8 @@
 //! The family `block-triangular`, after Lee, Yee and Park.
 
+use crate::short;
 use lynkeus_observers::Lee;
 use lynkeus_observers::block_triangular::{Correction, Said};
-use lynkeus_structure::short;
 
 use crate::Words;
 use crate::chains::{chains, eigenvalues};

@@ -1,6 +1,6 @@
 //! Chains of states and their eigenvalues.
 
-use lynkeus_structure::short;
+use crate::short;
 
 /// `(x1 → x2) and (x3)`
 pub(crate) fn chains(all: &[Vec<String>], between: &str) -> String {

@@ -1,8 +1,8 @@
 //! Conditions of families and hypotheses of theorems, with what was found of them.
 
+use crate::short;
 use lynkeus_expr::Interval;
-use lynkeus_observers::{Check, DesignError, Examination, Reason, Statement};
-use lynkeus_structure::short;
+use lynkeus_observers::{Check, Constant, DesignError, Examination, Reason, Statement};
 
 use crate::Words;
 
@@ -101,10 +101,17 @@ impl Words for Reason {
     }
 }
 
+impl Words for Constant {
+    fn words(&self) -> String {
+        let numbers: Vec<String> = self.numbers.iter().map(|x| short(*x)).collect();
+        self.meaning.replace("{}", &numbers.join(", "))
+    }
+}
+
 impl Words for Check {
     fn words(&self) -> String {
         let (statement, reason) = (self.statement.words(), self.reason.words());
-        format!("{statement}: {} ({reason})", self.verdict)
+        format!("{statement}: {} ({reason})", self.verdict.words())
     }
 }
 

@@ -1,8 +1,10 @@
 //! The family `drift-observable`, after Germani and Manes.
 
+use crate::short;
 use lynkeus_observers::drift_observable::{Known, Said};
 use lynkeus_observers::{Germani, fit_word};
-use lynkeus_structure::{Standing, short};
+use lynkeus_structure::Standing;
+use lynkeus_structure::output_map::Degree;
 
 use crate::Words;
 
@@ -94,7 +96,7 @@ impl Words for Said {
                     open.join(", ")
                 ),
             },
-            Self::OnlyOfTheProof(found) => format!("{} ({})", found.reason.words(), found.verdict),
+            Self::OnlyOfTheProof(found) => format!("{} ({})", found.reason.words(), found.verdict.words()),
             Self::Map { map, inverse } => {
                 format!("γ_Φ = {}, γ_Φ⁻¹ = {}", short(*map), short(*inverse))
             }
@@ -170,8 +172,18 @@ fn told(chosen: &[usize], others: &[(Vec<usize>, Known)]) -> String {
     format!("; indices {chosen:?} (others: {})", shown.join(", "))
 }
 
-fn degree_of(output: &str, degree: &lynkeus_structure::output_map::Degree) -> String {
-    format!("{output}: r = {}, {}", degree.r, degree.detail)
+fn degree_of(output: &str, degree: &Degree) -> String {
+    let Degree {
+        r, input, witness, ..
+    } = degree;
+    let found = match witness {
+        Some(witness) => format!(
+            "{input} appears in y^({r}): ∂y^({r})/∂{input} is {}",
+            witness.words()
+        ),
+        None => format!("{input} does not appear before y^({r})"),
+    };
+    format!("{output}: r = {r}, {found}")
 }
 
 /// What has no bound, or what else there is to say.

@@ -1,8 +1,8 @@
 //! The certificate by linear matrix inequalities.
 
+use crate::{counted, short};
 use lynkeus_observers::Inequality;
 use lynkeus_observers::guarantee::{Obstacle, Said};
-use lynkeus_structure::{counted, short};
 
 use crate::Words;
 
@@ -39,7 +39,8 @@ impl Words for Said {
                 for_slopes(*slopes)
             ),
             Self::Unstable(point) => format!(
-                "there is none in these coordinates: the largest real part of an eigenvalue of the error's Jacobian is {point}. This refutes no convergence: the plant is not seen to rest at such a point, and while it moves the Jacobian changes"
+                "there is none in these coordinates: the largest real part of an eigenvalue of the error's Jacobian is {}. This refutes no convergence: the plant is not seen to rest at such a point, and while it moves the Jacobian changes",
+                point.words()
             ),
             Self::NotFound { slopes } => format!("none was found{}", for_slopes(*slopes)),
             Self::StableEverywhere { slowest } => format!(

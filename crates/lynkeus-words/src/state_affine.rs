@@ -1,7 +1,7 @@
 //! The family `state-affine`, after Ltaief, Maatoug, Farza, Ménard, M'Saad and Koubaa.
 
+use crate::short;
 use lynkeus_observers::state_affine::{Ltaief, Said};
-use lynkeus_structure::short;
 
 use crate::{Words, arrows};
 

@@ -1,8 +1,8 @@
 //! The family `triangular`, after Hammouri, Targui and Armanet.
 
+use crate::short;
 use lynkeus_observers::Hammouri;
 use lynkeus_observers::triangular::{Loose, Said};
-use lynkeus_structure::short;
 
 use crate::Words;
 use crate::chains::{chains, eigenvalues};

@@ -1,7 +1,8 @@
 //! The family `unknown-input`, after Farza, M'Saad, Liu and Targui.
 
+use crate::{counted, short};
 use lynkeus_observers::unknown_input::{Farza, Said, Shape};
-use lynkeus_structure::{Standing, counted, short};
+use lynkeus_structure::Standing;
 
 use crate::{Words, arrows};
 
@@ -79,7 +80,7 @@ impl Words for Said {
             } => blocks((*shape, *bends), sizes, partition.as_deref()),
             Self::FullColumnRank => "each block has full column rank on the box".into(),
             Self::Block(k, found) => {
-                format!("block {k}: {} ({})", found.reason.words(), found.verdict)
+                format!("block {k}: {} ({})", found.reason.words(), found.verdict.words())
             }
             Self::Constants => "bounds of f, G and their derivatives on the box".into(),
             Self::NoConstants { open, left } => no_constants(open, *left),

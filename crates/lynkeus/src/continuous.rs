@@ -3,7 +3,7 @@
 mod settable;
 
 use lynkeus_model::Plant;
-use lynkeus_run::{Method, Step, System, step_of};
+use lynkeus_run::{Method, Step, System, fastest_at};
 
 use crate::export::{Export, ExportOptions, Target, designed, origin};
 use crate::fixed_steps::{Unsaid, bends, sound, steps};
@@ -166,7 +166,7 @@ impl Component<'_> {
             point: "communication point",
             section: self.section,
         };
-        let needed = step_of(&mut evaluation, system.start(), &self.equations.sizes());
+        let needed = fastest_at(&mut evaluation, system.start(), &self.equations.sizes());
         unsaid.method(needed, notes)
     }
 }

@@ -2,7 +2,7 @@
 
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
-use lynkeus_run::{Blueprint, Method, NeededStep, Step, System, first_jump, needed_step};
+use lynkeus_run::{Blueprint, Fastest, Method, Step, System, fastest_mode, first_jump};
 use lynkeus_words::short;
 
 use crate::prepare::Prepared;
@@ -76,7 +76,7 @@ pub(crate) fn stepped(
         point: "sample",
         section: Some("estimate"),
     };
-    let method = unsaid.method(needed(prepared, &made), notes)?;
+    let method = unsaid.method(fastest(prepared, &made), notes)?;
     Ok(made.with_method(method))
 }
 
@@ -98,14 +98,14 @@ impl Unsaid<'_> {
     /// Nothing is needed that is known.
     pub fn method(
         &self,
-        needed: Option<NeededStep>,
+        fastest: Option<Fastest>,
         notes: &mut Vec<String>,
     ) -> Result<Method, Error> {
         let Self { within, point, .. } = self;
         let written = self.section.map(|section| {
             format!("write method = \"rk4\" and step = … under [{section}], or give --step")
         });
-        let Some(NeededStep { length, is_steep }) = needed else {
+        let Some(fastest) = fastest else {
             let message = format!(
                 "{within}the step cannot be chosen: the equations have no slopes at the start"
             );
@@ -113,12 +113,12 @@ impl Unsaid<'_> {
                 .at(&self.study.file)
                 .hint(written.unwrap_or_else(|| "give --step".to_owned())));
         };
-        if length.is_infinite() {
+        if fastest.step().is_infinite() {
             notes.push(format!("{within}one step from each {point} to the next: at the start nothing moves by itself; --step takes a longest step"));
             return Ok(Method::Rk4(Step::Substeps(1)));
         }
-        let step = rounded(length);
-        let place = match is_steep {
+        let step = rounded(fastest.step());
+        let place = match fastest.is_steep {
             true => {
                 "a hundredth of the ranges off the start needs (at the start a slope is infinite)"
             }
@@ -168,7 +168,7 @@ pub(crate) fn hasty(prepared: &Prepared<'_>, made: &Blueprint) -> Option<String>
     let Method::Rk4(Step::AtMost(step)) = made.run.method else {
         return None;
     };
-    let longest = LONGEST * needed(prepared, made)?.length;
+    let longest = LONGEST * fastest(prepared, made)?.step();
     (step > longest).then(|| {
         format!(
             "not for these steps: they are {} at most, and beyond about {} the fastest mode at the start makes the method itself grow",
@@ -178,8 +178,8 @@ pub(crate) fn hasty(prepared: &Prepared<'_>, made: &Blueprint) -> Option<String>
     })
 }
 
-/// The step that the fastest mode at the start needs.
-fn needed(prepared: &Prepared<'_>, made: &Blueprint) -> Option<NeededStep> {
+/// The fastest mode at the start.
+fn fastest(prepared: &Prepared<'_>, made: &Blueprint) -> Option<Fastest> {
     let plant = prepared.plant();
     let known = plant.inputs.iter();
     let known: Vec<(&str, f64)> = known.map(|i| (i.name.as_str(), typical(i))).collect();
@@ -191,7 +191,7 @@ fn needed(prepared: &Prepared<'_>, made: &Blueprint) -> Option<NeededStep> {
             .chain(&plant.outputs);
         all.find(|v| v.name == *state).map_or(1.0, size)
     });
-    needed_step(made, &known, &sizes.collect::<Vec<f64>>())
+    fastest_mode(made, &known, &sizes.collect::<Vec<f64>>())
 }
 
 /// Fixed steps in words.

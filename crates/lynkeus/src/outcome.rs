@@ -11,6 +11,7 @@ use crate::accuracy::{self, Accuracy};
 use crate::assertions;
 use crate::course::Course;
 use crate::declared::{Account, Declared};
+use crate::error::in_words;
 use crate::frozen::Frozen;
 use crate::headers::{Headers, log_time};
 use crate::interval::Intervals;
@@ -292,7 +293,7 @@ impl Raw<'_> {
         };
         let mut doubts = sight.doubts(&bare);
         doubts.splice(0..0, std::mem::take(&mut course.doubts));
-        let ended = course.ended.as_ref().map(|e| Doubt::ended(e.to_string()));
+        let ended = course.ended.as_ref().map(|e| Doubt::ended(in_words(e)));
         doubts.splice(0..0, ended);
         let told = doubts.iter().filter(|d| d.is_told());
         notes.extend(told.map(|d| d.text.clone()));
@@ -313,7 +314,7 @@ impl Raw<'_> {
             ended: course.ended.map(|error| Ended {
                 message: match course.limit {
                     Some(spent) => not_whole(spent, &error),
-                    None => error.to_string(),
+                    None => in_words(&error),
                 },
                 file: prepared.study().file.clone(),
                 by_limit: course.limit.is_some(),
@@ -563,6 +564,7 @@ pub(crate) fn is_answer(error: &RunError) -> bool {
     matches!(
         error,
         RunError::Diverged { .. }
+            | RunError::DeviationDiverged { .. }
             | RunError::NotFinite { .. }
             | RunError::StepUnderflow { .. }
             | RunError::Singular { .. }
@@ -578,7 +580,7 @@ pub(crate) fn interrupted_on(error: RunError, log: &str, study: &str) -> Error {
 /// A run that ended early: no result; an estimate that left every bound is an
 /// answer, everything else is a fault of the input.
 pub(crate) fn interrupted(error: RunError, place: &str) -> Error {
-    let text = error.to_string();
+    let text = in_words(&error);
     let told = match is_answer(&error) {
         true => Error::refused(text),
         false => Error::input(text),

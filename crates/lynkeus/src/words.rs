@@ -54,7 +54,7 @@ pub(crate) fn conditions<'a>(
             check.reason.words()
         )?;
         if let Verdict::Refuted(_) = check.verdict {
-            writeln!(f, "             {}", check.verdict)?;
+            writeln!(f, "             {}", check.verdict.words())?;
         }
     }
     Ok(())

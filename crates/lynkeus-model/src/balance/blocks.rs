@@ -219,7 +219,7 @@ impl Solver<'_> {
         }
     }
 
-    fn too_many_torn(&self, block: &[(usize, usize)]) -> Problem {
+    fn too_many_torn(&self, block: &[(usize, usize)]) -> Box<Problem> {
         let message = format!(
             "{} unknowns need each other: {}; at most {MAX_COUPLED} may be left when equations \
              like `v = R*i` are used",
@@ -230,7 +230,7 @@ impl Solver<'_> {
             .hint("write more of the equations solved for a variable, as `a = …`")
     }
 
-    fn too_many_coupled(&self, block: &[(usize, usize)], left: usize) -> Problem {
+    fn too_many_coupled(&self, block: &[(usize, usize)], left: usize) -> Box<Problem> {
         let n = block.len();
         let message = format!(
             "{n} unknowns share their equations, {left} of them with factors that vary; at most \
@@ -246,7 +246,7 @@ impl Solver<'_> {
     }
 
     /// One equation of a linear loop follows from the others, or contradicts them.
-    fn dependent(&self, block: &[(usize, usize)], place: usize) -> Problem {
+    fn dependent(&self, block: &[(usize, usize)], place: usize) -> Box<Problem> {
         let names = self.system.listed(block.iter().map(|pair| pair.1));
         let lines = self.system.lines(block.iter().map(|pair| pair.0));
         let message = format!("these equations do not determine {names}");
@@ -260,7 +260,7 @@ impl Solver<'_> {
     }
 }
 
-fn undetermined(equation: &FlatEquation, unknown: &Unknown) -> Problem {
+fn undetermined(equation: &FlatEquation, unknown: &Unknown) -> Box<Problem> {
     let message = format!(
         "this equation{} cannot be solved for {}: its terms in it cancel",
         equation.which_element(),

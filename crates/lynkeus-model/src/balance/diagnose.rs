@@ -31,7 +31,7 @@ impl System<'_> {
     }
 
     /// The unknowns and equations that share the lack, by alternating paths.
-    fn missing(&self, place: usize) -> Problem {
+    fn missing(&self, place: usize) -> Box<Problem> {
         let mut of_unknown = vec![vec![]; self.unknowns.len()];
         for (equation, unknowns) in self.pattern.iter().enumerate() {
             for &unknown in unknowns {
@@ -60,7 +60,7 @@ impl System<'_> {
         ))
     }
 
-    fn surplus(&self, place: usize, missing: Option<usize>) -> Problem {
+    fn surplus(&self, place: usize, missing: Option<usize>) -> Box<Problem> {
         let equation = &self.equations[place];
         let message = format!("one equation too many{}", equation.which_element());
         let problem = Problem::new(equation.span, message).label(self.count());

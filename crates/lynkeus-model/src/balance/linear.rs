@@ -84,8 +84,8 @@ impl System<'_> {
         };
         match op {
             Op::Unary(Unary::Neg, a) => Some(form(a)?.map(|part| self.negated(part))),
-            Op::Binary(Binary::Add, a, b) => Some(self.sum(form(a)?, form(b)?)),
-            Op::Binary(Binary::Sub, a, b) => Some(self.difference(form(a)?, form(b)?)),
+            Op::Binary(Binary::Add, a, b) => Some(form(a)?.with(form(b)?, |a, b| self.plus(a, b))),
+            Op::Binary(Binary::Sub, a, b) => Some(form(a)?.with(form(b)?, |a, b| self.minus(a, b))),
             Op::Binary(Binary::Mul, a, b) | Op::Binary(Binary::Mul, b, a) if is_free(b) => {
                 Some(form(a)?.map(|part| self.graph.binary(Binary::Mul, part, b)))
             }
@@ -93,16 +93,12 @@ impl System<'_> {
                 Some(form(a)?.map(|part| self.graph.binary(Binary::Div, part, b)))
             }
             Op::Select(c, a, b) if is_free(c) => {
-                let (a, b) = (form(a)?, form(b)?);
                 let zero = self.graph.constant(0.0).node();
                 let choose = |a: Option<Node>, b: Option<Node>| {
                     let either = a.or(b).is_some();
                     either.then(|| self.graph.select(c, a.unwrap_or(zero), b.unwrap_or(zero)))
                 };
-                Some(Form {
-                    coefficient: choose(a.coefficient, b.coefficient),
-                    rest: choose(a.rest, b.rest),
-                })
+                Some(form(a)?.with(form(b)?, choose))
             }
             _ => None,
         }
@@ -112,22 +108,10 @@ impl System<'_> {
         self.graph.unary(Unary::Neg, node)
     }
 
-    fn sum(&self, a: Form, b: Form) -> Form {
-        let add = |a: Option<Node>, b: Option<Node>| match (a, b) {
+    fn plus(&self, a: Option<Node>, b: Option<Node>) -> Option<Node> {
+        match (a, b) {
             (Some(a), Some(b)) => self.nonzero(self.graph.binary(Binary::Add, a, b)),
             (one, other) => one.or(other),
-        };
-        Form {
-            coefficient: add(a.coefficient, b.coefficient),
-            rest: add(a.rest, b.rest),
-        }
-    }
-
-    /// a − b
-    fn difference(&self, a: Form, b: Form) -> Form {
-        Form {
-            coefficient: self.minus(a.coefficient, b.coefficient),
-            rest: self.minus(a.rest, b.rest),
         }
     }
 
@@ -155,9 +139,14 @@ impl System<'_> {
 
 impl Form {
     fn map(self, part: impl Fn(Node) -> Node) -> Self {
+        self.with(self, |a, _| a.map(&part))
+    }
+
+    /// Both parts joined with those of another form.
+    fn with(self, other: Self, join: impl Fn(Option<Node>, Option<Node>) -> Option<Node>) -> Self {
         Self {
-            coefficient: self.coefficient.map(&part),
-            rest: self.rest.map(&part),
+            coefficient: join(self.coefficient, other.coefficient),
+            rest: join(self.rest, other.rest),
         }
     }
 }

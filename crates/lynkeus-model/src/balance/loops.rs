@@ -2,6 +2,7 @@
 //! them that gives a variable, as `v = R*i` does, is used for it; and whether that determines its
 //! unknowns.
 
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 
 use lynkeus_expr::{Binary, Node, Reals, Tape, jacobian};
@@ -27,7 +28,6 @@ pub(super) struct Torn<'a> {
     left: HashMap<usize, Vec<usize>>,
     /// equations of the block with each of its unknowns
     readers: BTreeMap<usize, Vec<usize>>,
-    determined: BTreeSet<usize>,
     /// equations with a single unknown left
     ready: VecDeque<usize>,
 }
@@ -82,7 +82,6 @@ impl<'a> Torn<'a> {
             explicit: HashMap::new(),
             left,
             readers,
-            determined: BTreeSet::new(),
             ready: VecDeque::new(),
         }
     }
@@ -131,22 +130,19 @@ impl<'a> Torn<'a> {
     /// The unknown that stands in most equations; those of which something is declared first,
     /// for that is where a search begins.
     fn most_read(&self) -> Option<usize> {
-        let rest = self
-            .readers
-            .iter()
-            .filter(|(unknown, _)| !self.determined.contains(unknown));
-        let key = |(&unknown, equations): (&usize, &Vec<usize>)| {
-            let declared = self.system.unknowns[unknown].is_declared();
-            let open = equations
-                .iter()
-                .filter(|equation| self.equations.contains(equation));
-            (declared, open.count(), std::cmp::Reverse(unknown))
+        let key = |(&place, equations): (&usize, &Vec<usize>)| {
+            let unknown = &self.system.unknowns[place];
+            let follows = self.explicit.contains_key(&unknown.symbol);
+            let is_open = |equation: &&usize| self.equations.contains(equation);
+            let open = equations.iter().filter(is_open).count();
+            let key = (unknown.is_declared(), open, Reverse(place));
+            (!follows && !self.unknowns.contains(&place)).then_some(key)
         };
-        rest.map(key).max().map(|(.., unknown)| unknown.0)
+        let most = self.readers.iter().filter_map(key).max();
+        most.map(|(.., Reverse(place))| place)
     }
 
     fn settle(&mut self, unknown: usize) {
-        self.determined.insert(unknown);
         for equation in &self.readers[&unknown] {
             let left = self.left.entry(*equation).or_default();
             left.retain(|&other| other != unknown);
@@ -238,7 +234,7 @@ impl Torn<'_> {
     }
 
     /// `only_near_starts`: on this side of a threshold, beyond which they are regular.
-    fn undetermined(&self, rows: &[usize], only_near_starts: bool) -> Problem {
+    fn undetermined(&self, rows: &[usize], only_near_starts: bool) -> Box<Problem> {
         let start = |equation: &usize| self.system.equations[*equation].span.start;
         let left: Vec<usize> = self.equations.iter().copied().collect();
         let dependent = rows.iter().map(|&row| left[row]);

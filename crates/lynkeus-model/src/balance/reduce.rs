@@ -174,7 +174,7 @@ impl Reduction<'_> {
         })
     }
 
-    fn input_bound(&self, input: Node, equation: &FlatEquation) -> Problem {
+    fn input_bound(&self, input: Node, equation: &FlatEquation) -> Box<Problem> {
         let name = self.system.graph.symbol_name(input).unwrap_or_default();
         let message = format!("this equation binds states to the input `{name}`");
         Problem::new(equation.span, message)

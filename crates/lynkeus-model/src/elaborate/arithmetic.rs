@@ -5,7 +5,6 @@ use lynkeus_expr::{Binary, Node, Unary};
 use super::evaluate::Evaluator;
 use super::value::{Scalar, Value, describe_dims, expected_number, unequal_sizes};
 use crate::diagnostic::{Problem, Result, Span};
-use crate::syntax::ast::{BinaryOperator, Relation};
 
 impl Evaluator<'_> {
     /// A number as a Real expression.
@@ -68,60 +67,50 @@ impl Evaluator<'_> {
 
     pub(super) fn binary(
         &self,
-        operator: BinaryOperator,
+        operation: Binary,
+        elementwise: bool,
         left: Value,
         right: Value,
         span: Span,
     ) -> Result<Value> {
-        use BinaryOperator as B;
-        match operator {
-            B::And | B::Or => {
+        match operation {
+            Binary::And | Binary::Or => {
                 let (left, right) = (self.boolean(&left, span)?, self.boolean(&right, span)?);
-                let operation = match operator {
-                    B::And => Binary::And,
-                    _ => Binary::Or,
-                };
                 let node = self.graph.binary(operation, left, right);
                 return Ok(Scalar::Boolean(node).into());
             }
-            B::Add | B::Subtract if left.dims != right.dims => {
+            _ if elementwise => {}
+            Binary::Add | Binary::Sub if left.dims != right.dims => {
                 let problem = unequal_sizes(&left.dims, &right.dims, span);
                 return Err(match left.dims.is_empty() || right.dims.is_empty() {
                     true => problem.hint("`.+` and `.-` take a scalar with every element"),
                     false => problem,
                 });
             }
-            B::Multiply if !left.dims.is_empty() && !right.dims.is_empty() => {
+            Binary::Mul if !left.dims.is_empty() && !right.dims.is_empty() => {
                 return self.product(&left, &right, span);
             }
-            B::Divide if !right.dims.is_empty() => {
+            Binary::Div if !right.dims.is_empty() => {
                 return Err(Problem::new(span, "division by an array")
                     .hint("`./` divides by every element"));
             }
             _ => {}
         }
         if let (Some(a), Some(b)) = (left.as_scalar(), right.as_scalar()) {
-            return Ok(self.scalar_binary(operator, a, b, span)?.into());
+            return Ok(self.scalar_binary(operation, a, b, span)?.into());
         }
         self.elementwise(left, right, span, |evaluator, a, b, span| {
-            evaluator.scalar_binary(operator, a, b, span)
+            evaluator.scalar_binary(operation, a, b, span)
         })
     }
 
     pub(super) fn scalar_binary(
         &self,
-        operator: BinaryOperator,
+        operation: Binary,
         left: Scalar,
         right: Scalar,
         span: Span,
     ) -> Result<Scalar> {
-        use BinaryOperator as B;
-        let operation = match operator {
-            B::Add | B::ElementAdd => Binary::Add,
-            B::Subtract | B::ElementSubtract => Binary::Sub,
-            B::Multiply | B::ElementMultiply => Binary::Mul,
-            _ => Binary::Div,
-        };
         if let (Scalar::Integer(a), Scalar::Integer(b)) = (left, right) {
             let exact = match operation {
                 Binary::Add => Some(a.checked_add(b)),
@@ -181,41 +170,24 @@ impl Evaluator<'_> {
 
     pub(super) fn compare(
         &self,
-        relation: Relation,
+        relation: &str,
         left: Scalar,
         right: Scalar,
         span: Span,
-    ) -> Result<Scalar> {
-        let (left, right) = match (left, right) {
-            (Scalar::Boolean(a), Scalar::Boolean(b)) => (a, b),
-            _ => (self.real(left, span)?, self.real(right, span)?),
-        };
-        let node = match relation {
-            Relation::Less => self.graph.binary(Binary::Less, left, right),
-            Relation::LessEqual => self.graph.binary(Binary::LessEq, left, right),
-            Relation::Greater => self.graph.binary(Binary::Less, right, left),
-            Relation::GreaterEqual => self.graph.binary(Binary::LessEq, right, left),
-            Relation::Equal => self.graph.binary(Binary::Equal, left, right),
-            Relation::NotEqual => {
+    ) -> Result<Node> {
+        let sides = left.with(right, self.graph);
+        let (left, right) = sides.ok_or_else(|| expected_number(span))?;
+        Ok(match relation {
+            "<" => self.graph.binary(Binary::Less, left, right),
+            "<=" => self.graph.binary(Binary::LessEq, left, right),
+            ">" => self.graph.binary(Binary::Less, right, left),
+            ">=" => self.graph.binary(Binary::LessEq, right, left),
+            "==" => self.graph.binary(Binary::Equal, left, right),
+            _ => {
                 let equal = self.graph.binary(Binary::Equal, left, right);
                 self.graph.unary(Unary::Not, equal)
             }
-        };
-        Ok(Scalar::Boolean(node))
-    }
-
-    pub(super) fn select(
-        &self,
-        condition: Node,
-        left: Scalar,
-        right: Scalar,
-        span: Span,
-    ) -> Result<Scalar> {
-        if let (Scalar::Boolean(a), Scalar::Boolean(b)) = (left, right) {
-            return Ok(Scalar::Boolean(self.graph.select(condition, a, b)));
-        }
-        let (left, right) = (self.real(left, span)?, self.real(right, span)?);
-        Ok(Scalar::Real(self.graph.select(condition, left, right)))
+        })
     }
 
     /// Scalar product, or product of matrices and vectors.
@@ -259,9 +231,9 @@ impl Evaluator<'_> {
             if a.number(self.graph) == Some(0.0) || b.number(self.graph) == Some(0.0) {
                 continue;
             }
-            let term = self.scalar_binary(BinaryOperator::Multiply, a, b, span)?;
+            let term = self.scalar_binary(Binary::Mul, a, b, span)?;
             sum = Some(match sum {
-                Some(sum) => self.scalar_binary(BinaryOperator::Add, sum, term, span)?,
+                Some(sum) => self.scalar_binary(Binary::Add, sum, term, span)?,
                 None => term,
             });
         }
@@ -269,11 +241,11 @@ impl Evaluator<'_> {
     }
 }
 
-pub(super) fn overflow(span: Span) -> Problem {
+pub(super) fn overflow(span: Span) -> Box<Problem> {
     Problem::new(span, "this Integer does not fit in 64 bits").hint("use Real numbers")
 }
 
-fn no_product(left: &[usize], right: &[usize], span: Span) -> Problem {
+fn no_product(left: &[usize], right: &[usize], span: Span) -> Box<Problem> {
     let (left, right) = (describe_dims(left), describe_dims(right));
     Problem::new(span, format!("no product of sizes {left} and {right}"))
         .hint("the inner sizes of a matrix product must agree; `.*` multiplies element by element")

@@ -1,13 +1,14 @@
 //! Arrays: constructors (`{…}`, `[…; …]`, ranges, comprehensions), subscripts (`x[2:end]`), and the
 //! functions that make, measure and reduce them.
 
-use super::arithmetic::overflow;
+use lynkeus_expr::Binary;
+
 use super::evaluate::{Evaluator, HOW_TO_BE_WHOLE};
 use super::scope::Named;
 use super::value::{Scalar, Value, describe_dims, element_count, unequal_sizes};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_RANK;
-use crate::syntax::ast::{BinaryOperator, Call, ExprId, ForIndex, Kind};
+use crate::syntax::ast::{Call, ExprId, ForIndex, Kind};
 use crate::syntax::{plain, too_many_dimensions};
 
 impl<'a> Evaluator<'a> {
@@ -27,8 +28,7 @@ impl<'a> Evaluator<'a> {
             let message = format!("the elements differ in size: {one} and {two}");
             return Err(Problem::new(span, message));
         }
-        let mut dims = vec![values.len()];
-        dims.extend(&first.dims);
+        let dims = [&[values.len()], &first.dims[..]].concat();
         let mut elements = Vec::with_capacity(values.len());
         for value in &values {
             self.budget.charge(value.elements.len() as u64, span)?;
@@ -59,18 +59,15 @@ impl<'a> Evaluator<'a> {
         let Some(first) = parts.first() else {
             return Ok(Value::vector(vec![]));
         };
+        // matrices, or arrays that have this axis
         let mut dims = first.dims.clone();
-        let without_axis = |dims: &[usize]| {
-            let mut dims = dims.to_vec();
-            if let Some(dim) = dims.get_mut(axis) {
-                *dim = 0;
+        for part in &parts[1..] {
+            dims[axis] = part.dims.get(axis).copied().unwrap_or_default();
+            if part.dims != dims {
+                return Err(unequal_sizes(&first.dims, &part.dims, span));
             }
-            dims
-        };
-        let differs = |part: &&Value| without_axis(&part.dims) != without_axis(&dims);
-        if let Some(other) = parts.iter().find(differs) {
-            return Err(unequal_sizes(&dims, &other.dims, span));
         }
+        dims[axis] = parts.iter().map(|part| part.dims[axis]).sum();
         let total: usize = parts.iter().map(|part| part.elements.len()).sum();
         self.budget.charge(total as u64, span)?;
         let outer: usize = dims.iter().take(axis).product();
@@ -80,9 +77,6 @@ impl<'a> Evaluator<'a> {
                 let chunk: usize = part.dims.iter().skip(axis).product();
                 elements.extend(part.elements.iter().skip(row * chunk).take(chunk));
             }
-        }
-        if let Some(dim) = dims.get_mut(axis) {
-            *dim = parts.iter().filter_map(|part| part.dims.get(axis)).sum();
         }
         Ok(Value { dims, elements })
     }
@@ -148,34 +142,20 @@ impl<'a> Evaluator<'a> {
     }
 
     fn integer_range(&self, start: i64, step: i64, stop: i64, span: Span) -> Result<Value> {
-        let turns = (i128::from(stop) - i128::from(start)) / i128::from(step) + 1;
-        let forward = if step > 0 {
-            start <= stop
-        } else {
-            start >= stop
-        };
-        let count = if forward {
-            u64::try_from(turns).unwrap_or(u64::MAX)
-        } else {
-            0
-        };
+        let [start, step, stop] = [start, step, stop].map(i128::from);
+        let turns = ((stop - start) * step.signum()).div_euclid(step.abs()) + 1;
+        let count = u64::try_from(turns.max(0)).unwrap_or(u64::MAX);
         self.budget.charge(count, span)?;
-        let mut elements = vec![];
-        for turn in 0..count as i64 {
-            let value = turn
-                .checked_mul(step)
-                .and_then(|offset| start.checked_add(offset));
-            elements.push(Scalar::Integer(value.ok_or_else(|| overflow(span))?));
-        }
-        Ok(Value::vector(elements))
+        // between the bounds, and so in 64 bits
+        let value = |turn: u64| Scalar::Integer((start + i128::from(turn) * step) as i64);
+        Ok(Value::vector((0..count).map(value).collect()))
     }
 
     fn real_range(&self, start: Scalar, step: Scalar, stop: Scalar, span: Span) -> Result<Value> {
         let known = |scalar: Scalar| {
             let message = "the bounds of a range must be known numbers";
-            scalar
-                .number(self.graph)
-                .ok_or_else(|| Problem::new(span, message))
+            let number = scalar.number(self.graph);
+            number.ok_or_else(|| Problem::new(span, message))
         };
         let (start, step, stop) = (known(start)?, known(step)?, known(stop)?);
         let turns = ((stop - start) / step).floor() + 1.0;
@@ -185,20 +165,13 @@ impl<'a> Evaluator<'a> {
         // A saturating cast: anything too large is refused by the budget.
         let count = turns.max(0.0) as u64;
         self.budget.charge(count, span)?;
-        let value = |turn: u64| self.graph.constant(start + turn as f64 * step).node();
-        Ok(Value::vector(
-            (0..count).map(|turn| Scalar::Real(value(turn))).collect(),
-        ))
+        let value = |turn: u64| self.graph.constant(start + turn as f64 * step);
+        let values = (0..count).map(|turn| Scalar::Real(value(turn).node()));
+        Ok(Value::vector(values.collect()))
     }
 
     /// The elements joined by an operator; `empty` where there are none.
-    fn fold(
-        &self,
-        operator: BinaryOperator,
-        elements: &[Scalar],
-        empty: i64,
-        span: Span,
-    ) -> Result<Value> {
+    fn fold(&self, operator: Binary, elements: &[Scalar], empty: i64, span: Span) -> Result<Value> {
         self.budget.charge(elements.len() as u64, span)?;
         let Some((&first, rest)) = elements.split_first() else {
             return Ok(Scalar::Integer(empty).into());
@@ -211,12 +184,12 @@ impl<'a> Evaluator<'a> {
 impl<'a> Evaluator<'a> {
     pub(super) fn sum(&mut self, call: &'a Call, span: Span) -> Result<Value> {
         let elements = self.reduced(call, span)?;
-        self.fold(BinaryOperator::Add, &elements, 0, span)
+        self.fold(Binary::Add, &elements, 0, span)
     }
 
     pub(super) fn product_of_all(&mut self, call: &'a Call, span: Span) -> Result<Value> {
         let elements = self.reduced(call, span)?;
-        self.fold(BinaryOperator::Multiply, &elements, 1, span)
+        self.fold(Binary::Mul, &elements, 1, span)
     }
 
     /// `array(a, b)` or `array(e for i in r)`
@@ -252,10 +225,9 @@ impl<'a> Evaluator<'a> {
     fn dims_of(&mut self, argument: ExprId) -> Result<Vec<usize>> {
         if matches!(self.ast.expression(argument).kind, Kind::Name) {
             let name = plain(self.text(self.span(argument)));
-            let known = match self.local(&name) {
-                Some(local) => local.ok().map(|local| local.dims.as_slice()),
-                None => self.symbols.dims(&name),
-            };
+            let declared = || self.symbols.dims(&name).filter(|_| !self.is_closed());
+            let local = self.local(&name).map(|local| local.dims.as_slice());
+            let known = local.or_else(declared);
             if let Some(dims) = known.filter(|_| self.iterator(&name).is_none()) {
                 return Ok(dims.to_vec());
             }
@@ -285,10 +257,10 @@ impl<'a> Evaluator<'a> {
                 let value = self.scalar(value)?;
                 self.with_all(value, sizes, span)
             }
-            _ => Err(Problem::new(
-                span,
-                "`fill` takes a value and at least one size",
-            )),
+            _ => {
+                let message = "`fill` takes a value and at least one size";
+                Err(Problem::new(span, message))
+            }
         }
     }
 
@@ -318,10 +290,8 @@ impl<'a> Evaluator<'a> {
     pub(crate) fn length(&mut self, id: ExprId) -> Result<usize> {
         let value = self.known_integer(id, "a size")?;
         usize::try_from(value).map_err(|_| {
-            Problem::new(
-                self.span(id),
-                format!("a size must not be negative, this is {value}"),
-            )
+            let message = format!("a size must not be negative, this is {value}");
+            Problem::new(self.span(id), message)
         })
     }
 
@@ -396,7 +366,7 @@ impl<'a> Evaluator<'a> {
         self.concatenate(axis.saturating_sub(1), arrays, span)
     }
 
-    fn no_dimension(&self, axis: i64, dims: &[usize], at: ExprId) -> Problem {
+    fn no_dimension(&self, axis: i64, dims: &[usize], at: ExprId) -> Box<Problem> {
         let found = describe_dims(dims);
         let message = format!("there is no dimension {axis}: the size is {found}");
         Problem::new(self.span(at), message)
@@ -470,11 +440,11 @@ impl<'a> Evaluator<'a> {
         name: Span,
         span: Span,
     ) -> Result<Value> {
-        if let Some(Ok(local)) = self.local(text) {
+        if let Some(local) = self.local(text) {
             let dims = local.dims.clone();
             let (dims, offsets) = self.selected(text, &dims, subscripts, span)?;
-            let local = self.local(text).and_then(std::result::Result::ok);
-            let element = |&offset: &usize| local?.elements.get(offset).copied()?;
+            let local = self.local(text);
+            let element = |&offset: &usize| local?.elements[offset];
             let elements: Option<Vec<Scalar>> = offsets.iter().map(element).collect();
             let elements = elements.ok_or_else(|| self.unassigned(text, name))?;
             return Ok(Value { dims, elements });
@@ -494,14 +464,11 @@ impl<'a> Evaluator<'a> {
         name: Span,
         subscripts: &[ExprId],
     ) -> Result<Value> {
-        let mut numbers = vec![];
-        for &subscript in subscripts {
-            if matches!(self.ast.expression(subscript).kind, Kind::All | Kind::End) {
-                return Err(self.unknown_name(name));
-            }
-            numbers.push(self.known_integer(subscript, "a subscript")?.to_string());
+        let is_open = |&id: &ExprId| matches!(self.ast.expression(id).kind, Kind::All | Kind::End);
+        if subscripts.iter().any(is_open) {
+            return Err(self.unknown_name(name));
         }
-        let full = format!("{text}[{}]", numbers.join(","));
+        let full = format!("{text}[{}]", self.numbers(subscripts)?);
         self.meant(self.named(&full), name)
     }
 
@@ -590,22 +557,17 @@ fn within(text: &str, dim: usize, value: i64, span: Span) -> Result<usize> {
         .ok()
         .filter(|place| (1..=dim).contains(place));
     place.map(|place| place - 1).ok_or_else(|| {
-        Problem::new(
-            span,
-            format!("subscript {value} of `{text}` is outside 1..{dim}"),
-        )
-        .label(format!("this is {value}"))
+        let message = format!("subscript {value} of `{text}` is outside 1..{dim}");
+        Problem::new(span, message).label(format!("this is {value}"))
     })
 }
 
-fn not_an_array(text: &str, span: Span) -> Problem {
-    Problem::new(
-        span,
-        format!("`{text}` is a scalar and takes no subscripts"),
-    )
+fn not_an_array(text: &str, span: Span) -> Box<Problem> {
+    let message = format!("`{text}` is a scalar and takes no subscripts");
+    Problem::new(span, message)
 }
 
-fn not_whole(span: Span) -> Problem {
+fn not_whole(span: Span) -> Box<Problem> {
     let message = "a subscript must be an Integer or a range of Integers";
     Problem::new(span, message).hint(HOW_TO_BE_WHOLE)
 }

@@ -17,7 +17,7 @@ use crate::syntax::{plain, unquoted};
 use crate::{Assertion, Parameter, Plant, Variable, balance};
 
 /// The plant, with what looks wrong in it. Its graph is still the caller's: this one is empty.
-pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec<Problem>)> {
+pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec<Box<Problem>>)> {
     let (graph, model) = (symbols.graph, symbols.model);
     let (unknowns, inputs) = unknowns(symbols, &flat.equations)?;
     let equations = std::mem::take(&mut flat.equations);
@@ -44,8 +44,8 @@ pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec
             continue;
         }
         let elements = elements(symbols, declaration, component)?;
-        if declaration.prefix.variability == Variability::Continuous {
-            let is_output = declaration.prefix.causality == Causality::Output;
+        if declaration.variability == Variability::Continuous {
+            let is_output = declaration.causality == Causality::Output;
             for element in elements {
                 variable(symbols, element, is_output, &inputs, &solution, &mut plant);
             }
@@ -55,8 +55,7 @@ pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec
     }
     let mut warnings = fix_starts(symbols, &flat, &solution, &mut plant.states);
     let found = assertions(graph, flat.claims, &solution);
-    let variables: Vec<&Variable> = plant.states.iter().chain(&plant.inputs).collect();
-    warnings.extend(failing_at_start(symbols, &found, &variables));
+    warnings.extend(failing_at_start(symbols, &found, &plant));
     plant.table_points = symbols.table_points.take();
     plant.assertions = found.into_iter().map(|(assertion, _)| assertion).collect();
     Ok((plant, warnings))
@@ -71,7 +70,7 @@ fn unknowns(
     let sides = equations.iter().flat_map(|e| [e.left, e.right]);
     let equated: HashSet<Node> = sides.collect();
     for (_, declaration, component) in symbols.all().filter(|(.., c)| !c.is_known) {
-        let is_input = declaration.prefix.causality == Causality::Input;
+        let is_input = declaration.causality == Causality::Input;
         for element in elements(symbols, declaration, component)? {
             let node = element.node;
             let is_open = declaration.binding.is_none() && !equated.contains(&node);
@@ -166,9 +165,8 @@ fn parameters(
     elements: Vec<Variable>,
     plant: &mut Plant,
 ) {
-    let prefix = &declaration.prefix;
-    let is_fixed = prefix.variability == Variability::Constant || prefix.is_final;
-    if is_fixed || prefix.type_name == TypeName::Boolean {
+    let is_fixed = declaration.variability == Variability::Constant || declaration.is_final;
+    if is_fixed || declaration.type_name == TypeName::Boolean {
         return;
     }
     for (offset, mut variable) in elements.into_iter().enumerate() {
@@ -205,7 +203,7 @@ fn elements(
             .unwrap_or(f64::NEG_INFINITY),
         max: f64::INFINITY,
         nominal: None,
-        integer: declaration.prefix.is_integer(),
+        integer: declaration.is_integer(),
         fixed: false,
     };
     let elements = component.elements.iter().enumerate().map(element);
@@ -214,10 +212,8 @@ fn elements(
     for attribute in &declaration.attributes {
         let name = attribute.name.text(symbols.source);
         if given.contains(&name) {
-            return Err(Problem::new(
-                attribute.name,
-                "this attribute is given twice",
-            ));
+            let message = "this attribute is given twice";
+            return Err(Problem::new(attribute.name, message));
         }
         given.push(name);
         set(symbols, declaration, component, attribute, &mut elements)?;
@@ -317,13 +313,11 @@ fn numbers(
     id: ExprId,
 ) -> Result<Vec<f64>> {
     let is_truth = name == "fixed";
-    let is_boolean = declaration.prefix.type_name == TypeName::Boolean;
+    let is_boolean = declaration.type_name == TypeName::Boolean;
     let mut evaluator = Evaluator::new(symbols, Mode::Structural);
     let span = evaluator.span(id);
-    let value = match evaluator.value(id) {
-        Ok(value) => value,
-        Err(_) if evaluator.valueless && symbols.options.symbolic_parameters => return Ok(vec![]),
-        Err(problem) => return Err(problem),
+    let Some(value) = evaluator.value_if_known(id)? else {
+        return Ok(vec![]);
     };
     let graph = symbols.graph;
     let number = |&scalar: &Scalar| {
@@ -350,7 +344,7 @@ fn fix_starts(
     flat: &Flat,
     solution: &HashMap<Node, Node>,
     states: &mut [Variable],
-) -> Vec<Problem> {
+) -> Vec<Box<Problem>> {
     let graph = symbols.graph;
     let mut at_start = solution.clone();
     at_start.insert(symbols.time(), graph.constant(0.0).node());
@@ -360,7 +354,8 @@ fn fix_starts(
         states: states.iter().map(|state| state.node).zip(0..).collect(),
     };
     let unread = flat.initial_unread.iter();
-    let mut warnings: Vec<Problem> = unread.map(|&span| without_effect(span, UNREAD)).collect();
+    let mut warnings: Vec<Box<Problem>> =
+        unread.map(|&span| without_effect(span, UNREAD)).collect();
     for equation in &flat.initial {
         let sides = graph.substitute(&[equation.left, equation.right], &at_start);
         let (left, right) = (sides[0], sides[1]);
@@ -451,7 +446,7 @@ const UNREAD: &str = "an initial equation of a derivative has no effect";
 const FIXES_NONE: &str =
     "this initial equation fixes the start of no state by itself: it has no effect";
 
-fn without_effect(span: Span, message: &str) -> Problem {
+fn without_effect(span: Span, message: &str) -> Box<Problem> {
     Problem::new(span, message)
         .hint("starts are taken from `start = …` and from initial equations as `x = …`")
 }
@@ -474,15 +469,12 @@ fn assertions(
 fn failing_at_start(
     symbols: &Symbols<'_>,
     assertions: &[(Assertion, Span)],
-    variables: &[&Variable],
-) -> Vec<Problem> {
+    plant: &Plant,
+) -> Vec<Box<Problem>> {
     let mut known = symbols.parameter_values();
     known.insert(symbols.time(), Some(0.0));
-    known.extend(
-        variables
-            .iter()
-            .map(|variable| (variable.node, variable.start)),
-    );
+    let variables = plant.states.iter().chain(&plant.inputs);
+    known.extend(variables.map(|variable| (variable.node, variable.start)));
     let fails = |assertion: &Assertion| {
         let value = |symbol| known.get(&symbol).copied()?;
         computed(symbols.graph, assertion.condition, value) == Some(0.0)

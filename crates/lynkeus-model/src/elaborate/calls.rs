@@ -1,6 +1,6 @@
 //! Functions and records of the text, written out where they are called.
 
-use super::evaluate::{Evaluator, joined};
+use super::evaluate::{Evaluator, reference};
 use super::scope::{Frame, Local};
 use super::value::{Members, Value, check_size, element_count, member, member_name, number};
 use crate::diagnostic::{Problem, Result, Span};
@@ -12,22 +12,26 @@ use crate::syntax::{plain, shortened};
 const MAX_CALLS: usize = 40;
 
 impl<'a> Evaluator<'a> {
-    /// The class of the text that a call names.
-    pub(super) fn class_called(&self, call: &Call) -> Option<(usize, &'a Class)> {
-        let name = plain(self.text(call.function));
-        let place = self.symbols.classes.class(&name, &self.scopes)?;
-        Some((place, self.ast.classes.get(place)?))
+    /// The class of the text that a name means.
+    fn class(&self, name: Span, scopes: &[&str]) -> Option<&'a Class> {
+        let place = self
+            .symbols
+            .classes
+            .class(&plain(self.text(name)), scopes)?;
+        self.ast.classes.get(place)
+    }
+
+    fn class_called(&self, call: &Call) -> Option<&'a Class> {
+        self.class(call.function, &self.scopes)
     }
 
     /// The value of a call of a function of the text; `None` where there is no such function.
     pub(super) fn own_function(&mut self, call: &'a Call, span: Span) -> Result<Option<Value>> {
-        let Some((place, class)) = self.class_called(call) else {
+        let class = self.class_called(call);
+        let Some(class) = class.filter(|class| class.kind == ClassKind::Function) else {
             return Ok(None);
         };
-        if class.kind != ClassKind::Function {
-            return Ok(None);
-        }
-        let mut outcomes = self.inlined(place, call, span)?.into_iter();
+        let mut outcomes = self.inlined(class, call, span)?.into_iter();
         let first = outcomes.next().ok_or_else(|| {
             let message = format!("function `{}` has no output", class.path);
             Problem::new(span, message).hint("declare one: `output Real y;`")
@@ -43,12 +47,12 @@ impl<'a> Evaluator<'a> {
         let Kind::Call(call) = &self.ast.expression(id).kind else {
             return Err(Problem::new(span, "expected a call of a function"));
         };
-        let Some((place, class)) = self.class_called(call) else {
+        let Some(class) = self.class_called(call) else {
             let name = shortened(self.text(call.function));
             let message = format!("the text has no function `{name}` with several outputs");
             return Err(Problem::new(call.function, message));
         };
-        let outcomes = self.inlined(place, call, span)?;
+        let outcomes = self.inlined(class, call, span)?;
         if outcomes.len() < wanted {
             let (name, has) = (&class.path, outcomes.len());
             let message = format!("function `{name}` has {has} outputs, {wanted} are taken here");
@@ -58,32 +62,25 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Declarations of a class and of its bases, those of the bases first.
-    pub(super) fn declarations_of(&self, place: usize) -> Result<Vec<&'a Declaration>> {
-        let classes = self.with_bases(place)?;
-        Ok(classes
-            .into_iter()
-            .flat_map(|class| &class.declarations)
-            .collect())
+    fn declarations_of(&self, class: &'a Class) -> Result<Vec<&'a Declaration>> {
+        let classes = self.with_bases(class)?.into_iter();
+        Ok(classes.flat_map(|class| &class.declarations).collect())
     }
 
     /// A class behind its bases.
-    fn with_bases(&self, place: usize) -> Result<Vec<&'a Class>> {
-        let (mut found, mut open) = (vec![], vec![place]);
-        while let Some(place) = open.pop() {
-            let Some(class) = self.ast.classes.get(place) else {
-                continue;
-            };
+    fn with_bases(&self, class: &'a Class) -> Result<Vec<&'a Class>> {
+        let (mut found, mut open) = (vec![], vec![class]);
+        while let Some(class) = open.pop() {
             found.push(class);
             if found.len() > MAX_CALLS {
                 let message = format!("`{}` is made from itself", class.path);
                 return Err(Problem::new(class.name, message).hint("remove the `extends`"));
             }
             for base in &class.bases {
-                let name = plain(self.text(base.name));
-                let known = self.symbols.classes.class(&name, &[&class.path]);
+                let known = self.class(base.name, &[&class.path]);
                 open.push(known.ok_or_else(|| {
-                    let message = format!("`extends {name}` of another file");
-                    Problem::new(base.name, message)
+                    let name = plain(self.text(base.name));
+                    Problem::new(base.name, format!("`extends {name}` of another file"))
                 })?);
             }
         }
@@ -92,43 +89,40 @@ impl<'a> Evaluator<'a> {
     }
 
     /// True where the first output of a function is a record.
-    pub(super) fn gives_record(&self, place: usize) -> bool {
-        let declarations = self.declarations_of(place).unwrap_or_default();
-        let first = declarations
-            .into_iter()
-            .find(|d| d.prefix.causality == Causality::Output);
-        let path = self
-            .ast
-            .classes
-            .get(place)
-            .map_or("", |class| class.path.as_str());
-        first.is_some_and(|first| self.record_type(first, path).is_some())
+    fn gives_record(&self, class: &'a Class) -> bool {
+        let declarations = self.declarations_of(class).unwrap_or_default();
+        let first = with_causality(&declarations, Causality::Output).next();
+        first.is_some_and(|first| self.record_type(first, class).is_some())
     }
 
     /// Carries out a function for the arguments of a call; gives its outputs in order.
-    pub(super) fn inlined(
-        &mut self,
-        place: usize,
-        call: &'a Call,
-        span: Span,
-    ) -> Result<Vec<Members>> {
-        let Some(class) = self.ast.classes.get(place) else {
-            return Ok(vec![]);
-        };
-        self.check_callable(place, class, span)?;
-        let parts = self.with_bases(place)?;
-        let declarations = self.declarations_of(place)?;
-        let given = self.given(&declarations, class, call, span)?;
-        self.calls.push(place);
+    fn inlined(&mut self, class: &'a Class, call: &'a Call, span: Span) -> Result<Vec<Members>> {
+        self.check_callable(class, span)?;
+        let parts = self.with_bases(class)?;
+        let declarations = self.declarations_of(class)?;
+        let mut given = self.given(&declarations, class, call, span)?.into_iter();
+        self.calls.push(&class.path);
         let done = self.inside(class, |evaluator| {
-            evaluator.carried_out(class, &parts, &declarations, given, span)
+            for declaration in &declarations {
+                let value = match declaration.causality {
+                    Causality::Input => given.next().flatten(),
+                    _ => None,
+                };
+                evaluator.introduce(class, declaration, value, span)?;
+            }
+            for algorithm in parts.iter().flat_map(|part| &part.algorithms) {
+                evaluator.execute(algorithm)?;
+            }
+            let outputs = with_causality(&declarations, Causality::Output);
+            let outcomes = outputs.map(|output| evaluator.outcome(class, output));
+            outcomes.collect()
         });
         self.calls.pop();
         done
     }
 
     /// What stands in a class that knows nothing of what is around it but constants.
-    pub(super) fn inside<T>(
+    fn inside<T>(
         &mut self,
         class: &'a Class,
         run: impl FnOnce(&mut Self) -> Result<T>,
@@ -143,9 +137,9 @@ impl<'a> Evaluator<'a> {
         done
     }
 
-    fn check_callable(&self, place: usize, class: &Class, span: Span) -> Result<()> {
-        let name = &class.path;
-        if self.calls.contains(&place) {
+    fn check_callable(&self, class: &Class, span: Span) -> Result<()> {
+        let name = class.path.as_str();
+        if self.calls.contains(&name) {
             let message = format!("function `{name}` calls itself");
             return Err(Problem::new(span, message)
                 .hint("a recursion has no end when it is written out: use a `for` loop"));
@@ -171,31 +165,22 @@ impl<'a> Evaluator<'a> {
         call: &'a Call,
         span: Span,
     ) -> Result<Vec<Option<Members>>> {
-        let inputs = declarations
-            .iter()
-            .filter(|d| d.prefix.causality == Causality::Input);
-        let inputs: Vec<&Declaration> = inputs.copied().collect();
+        let inputs: Vec<_> = with_causality(declarations, Causality::Input).collect();
         let mut found = vec![];
-        for (input, id) in inputs
-            .iter()
-            .zip(self.arguments_of(class, &inputs, call, span)?)
-        {
-            let Some(id) = id else {
-                found.push(None);
-                continue;
-            };
-            let is_record = self.record_type(input, &class.path).is_some();
-            found.push(Some(match self.record(id)?.filter(|_| is_record) {
-                Some(record) => record,
-                None => number_of(self.value(id)?),
-            }));
+        let arguments = self.arguments_of(class, &inputs, call, span)?;
+        for (input, id) in inputs.into_iter().zip(arguments) {
+            found.push(match (id, self.record_type(input, class)) {
+                (Some(id), Some(_)) => Some(self.members(id)?),
+                (Some(id), None) => Some(number_of(self.value(id)?)),
+                (None, _) => None,
+            });
         }
         Ok(found)
     }
 
     /// The expressions that a call gives to each input of a function or member of a record, in
     /// order or by name.
-    pub(super) fn arguments_of(
+    fn arguments_of(
         &self,
         class: &Class,
         declarations: &[&Declaration],
@@ -229,37 +214,6 @@ impl<'a> Evaluator<'a> {
         Ok(found)
     }
 
-    fn carried_out(
-        &mut self,
-        class: &'a Class,
-        parts: &[&'a Class],
-        declarations: &[&'a Declaration],
-        given: Vec<Option<Members>>,
-        span: Span,
-    ) -> Result<Vec<Members>> {
-        let mut given = given.into_iter();
-        for declaration in declarations {
-            let value = match declaration.prefix.causality {
-                Causality::Input => given.next().flatten(),
-                _ => None,
-            };
-            self.introduce(class, declaration, value, span)?;
-        }
-        for part in parts {
-            for algorithm in &part.algorithms {
-                self.execute(algorithm)?;
-            }
-        }
-        let outputs = declarations
-            .iter()
-            .filter(|d| d.prefix.causality == Causality::Output);
-        let mut outcomes = vec![];
-        for output in outputs {
-            outcomes.push(self.outcome(class, output)?);
-        }
-        Ok(outcomes)
-    }
-
     fn outcome(&self, class: &Class, output: &Declaration) -> Result<Members> {
         let label = &output.label;
         let frame = self.frame.as_ref();
@@ -283,16 +237,13 @@ impl<'a> Evaluator<'a> {
 }
 
 impl<'a> Evaluator<'a> {
-    /// The record that a variable is declared as.
-    pub(super) fn record_type(&self, declaration: &Declaration, path: &str) -> Option<usize> {
-        let TypeName::Named(name) = declaration.prefix.type_name else {
+    /// The record that a variable of a class is declared as.
+    fn record_type(&self, declaration: &Declaration, of: &Class) -> Option<&'a Class> {
+        let TypeName::Named(name) = declaration.type_name else {
             return None;
         };
-        let place = self
-            .symbols
-            .classes
-            .class(&plain(self.text(name)), &[path])?;
-        (self.ast.classes.get(place)?.kind == ClassKind::Record).then_some(place)
+        let class = self.class(name, &[&of.path]);
+        class.filter(|class| class.kind == ClassKind::Record)
     }
 
     /// A variable of a function with its argument, or with the value it is declared with; without a
@@ -304,11 +255,11 @@ impl<'a> Evaluator<'a> {
         given: Option<Members>,
         span: Span,
     ) -> Result<()> {
-        if let Some(record) = self.record_type(declaration, &class.path) {
+        if let Some(record) = self.record_type(declaration, class) {
             return self.introduce_record(class, declaration, record, given, span);
         }
         let name = &declaration.label;
-        if let TypeName::Named(type_name) = declaration.prefix.type_name {
+        if let TypeName::Named(type_name) = declaration.type_name {
             self.check_number(class, type_name)?;
         }
         let value = match (given.map(number), declaration.binding) {
@@ -324,7 +275,7 @@ impl<'a> Evaluator<'a> {
             }
         };
         let dims = self.dims_declared(declaration, value.as_ref(), span)?;
-        let mut local = Local::without_value(dims, declaration.prefix.is_integer());
+        let mut local = Local::without_value(dims, declaration.is_integer());
         if let Some(value) = value {
             check_size(name, &local.dims, &value.dims, span)?;
             let elements = value.elements.into_iter();
@@ -341,12 +292,13 @@ impl<'a> Evaluator<'a> {
 
     /// Refuses variables of functions that are no numbers.
     fn check_number(&self, class: &Class, type_name: Span) -> Result<()> {
-        let name = plain(self.text(type_name));
-        let place = self.symbols.classes.class(&name, &[&class.path]);
-        let kind = place.and_then(|place| Some(self.ast.classes.get(place)?.kind));
-        match kind {
+        match self
+            .class(type_name, &[&class.path])
+            .map(|class| class.kind)
+        {
             None | Some(ClassKind::Type) => Ok(()),
             Some(_) => {
+                let name = plain(self.text(type_name));
                 let message = format!("`{name}` is not a type of numbers");
                 Err(Problem::new(type_name, message).hint("write the formula where it is used"))
             }
@@ -357,7 +309,7 @@ impl<'a> Evaluator<'a> {
         &mut self,
         class: &'a Class,
         declaration: &'a Declaration,
-        record: usize,
+        record: &'a Class,
         given: Option<Members>,
         span: Span,
     ) -> Result<()> {
@@ -380,11 +332,11 @@ impl<'a> Evaluator<'a> {
     }
 
     /// A record of which no member has a value yet.
-    fn open_record(&mut self, record: usize, name: &str) -> Result<()> {
+    fn open_record(&mut self, record: &'a Class, name: &str) -> Result<()> {
         let mut members = vec![];
         for declaration in self.declarations_of(record)? {
             let dims = self.dims_declared(declaration, None, declaration.name)?;
-            let local = Local::without_value(dims, declaration.prefix.is_integer());
+            let local = Local::without_value(dims, declaration.is_integer());
             members.push((declaration.label.clone(), local));
         }
         self.insert_record(name, members);
@@ -429,7 +381,7 @@ impl<'a> Evaluator<'a> {
 
 /// Refuses an input that has no value; other variables are given theirs by statements.
 fn check_given(class: &Class, declaration: &Declaration, span: Span) -> Result<()> {
-    if declaration.prefix.causality != Causality::Input {
+    if declaration.causality != Causality::Input {
         return Ok(());
     }
     let (name, function) = (&declaration.label, &class.path);
@@ -446,28 +398,24 @@ impl<'a> Evaluator<'a> {
     fn record_here(&mut self, id: ExprId) -> Result<Option<Members>> {
         let expression = self.ast.expression(id);
         let span = expression.span;
-        let (subscripts, name) = match &expression.kind {
-            Kind::Name => return self.record_named(&plain(self.text(span)), &[], span),
-            Kind::Index(base, subscripts)
-                if matches!(self.ast.expression(*base).kind, Kind::Name) =>
-            {
-                let name = plain(self.text(self.span(*base)));
-                (subscripts.clone(), name.into_owned())
-            }
-            Kind::Path(parts) => joined(parts, self.source),
+        match &expression.kind {
             Kind::Member(record, name) => {
-                return Ok(self
-                    .record(*record)?
-                    .and_then(|record| inner(&record, name)));
+                let record = self.record(*record)?;
+                Ok(record.and_then(|record| inner(&record, name)))
             }
-            Kind::Call(call) => return self.record_of_call(call, span),
-            Kind::Array(elements) => return self.array_of_records(elements, span),
-            _ => return Ok(None),
-        };
-        if let Some(record) = self.record_named(&plain(self.text(span)), &[], span)? {
-            return Ok(Some(record));
+            Kind::Call(call) => self.record_of_call(call, span),
+            Kind::Array(elements) => self.array_of_records(elements, span),
+            _ => {
+                let Some((name, subscripts)) = reference(self.source, self.ast, id) else {
+                    return Ok(None);
+                };
+                let whole = plain(self.text(span));
+                match self.record_named(&whole, &[], span)? {
+                    None if whole != name => self.record_named(&name, &subscripts, span),
+                    found => Ok(found),
+                }
+            }
         }
-        self.record_named(&name, &subscripts, span)
     }
 
     /// The record that an expression is, or its value.
@@ -557,27 +505,19 @@ impl<'a> Evaluator<'a> {
     /// `R(1, 2)`, or a function whose first output is a record.
     fn record_of_call(&mut self, call: &'a Call, span: Span) -> Result<Option<Members>> {
         match self.class_called(call) {
-            Some((place, class)) if class.kind == ClassKind::Record => {
-                self.constructed(place, class, call, span).map(Some)
+            Some(class) if class.kind == ClassKind::Record => {
+                self.constructed(class, call, span).map(Some)
             }
-            Some((place, class))
-                if class.kind == ClassKind::Function && self.gives_record(place) =>
-            {
-                let mut outcomes = self.inlined(place, call, span)?.into_iter();
+            Some(class) if class.kind == ClassKind::Function && self.gives_record(class) => {
+                let mut outcomes = self.inlined(class, call, span)?.into_iter();
                 Ok(outcomes.next().and_then(|first| number(first).err()))
             }
             _ => Ok(None),
         }
     }
 
-    fn constructed(
-        &mut self,
-        place: usize,
-        class: &'a Class,
-        call: &'a Call,
-        span: Span,
-    ) -> Result<Members> {
-        let declarations = self.declarations_of(place)?;
+    fn constructed(&mut self, class: &'a Class, call: &'a Call, span: Span) -> Result<Members> {
+        let declarations = self.declarations_of(class)?;
         let given = self.arguments_of(class, &declarations, call, span)?;
         let mut found = vec![];
         for (declaration, id) in declarations.iter().zip(&given) {
@@ -586,36 +526,31 @@ impl<'a> Evaluator<'a> {
         }
         // what is not given may be made from what is
         self.inside(class, |evaluator| {
-            found
-                .iter()
-                .flatten()
-                .for_each(|value| evaluator.know(value));
+            let given = found.iter().flatten();
+            given.for_each(|value| evaluator.know(value));
             let mut members = vec![];
             for (declaration, value) in declarations.iter().zip(found) {
-                members.extend(match value {
-                    Some(value) => value,
-                    None => evaluator.default(declaration, span)?,
+                members.extend(match (value, declaration.binding) {
+                    (Some(value), _) => value,
+                    (None, Some(id)) => {
+                        let value = evaluator.member_value(declaration, id)?;
+                        evaluator.know(&value);
+                        value
+                    }
+                    (None, None) => {
+                        let label = &declaration.label;
+                        let message = format!("the member `{label}` of the record is not given");
+                        return Err(Problem::new(span, message));
+                    }
                 });
             }
             Ok(members)
         })
     }
 
-    /// What a member is where nothing is given to it.
-    fn default(&mut self, declaration: &'a Declaration, span: Span) -> Result<Members> {
-        let Some(id) = declaration.binding else {
-            let label = &declaration.label;
-            let message = format!("the member `{label}` of the record is not given");
-            return Err(Problem::new(span, message));
-        };
-        let value = self.member_value(declaration, id)?;
-        self.know(&value);
-        Ok(value)
-    }
-
     /// A member of a record with its value, or those of the record that it is.
     fn member_value(&mut self, declaration: &Declaration, id: ExprId) -> Result<Members> {
-        let members = match declaration.prefix.type_name {
+        let members = match declaration.type_name {
             TypeName::Named(_) => self.members(id)?,
             _ => number_of(self.value(id)?),
         };
@@ -633,6 +568,14 @@ impl<'a> Evaluator<'a> {
             frame.locals.insert(name.clone(), Local::of(value.clone()));
         }
     }
+}
+
+fn with_causality<'a>(
+    declarations: &[&'a Declaration],
+    causality: Causality,
+) -> impl Iterator<Item = &'a Declaration> {
+    let declarations = declarations.iter().copied();
+    declarations.filter(move |declaration| declaration.causality == causality)
 }
 
 /// A number or an array as the one member without a name.

@@ -48,7 +48,7 @@ impl<'a> Symbols<'a> {
     fn component(&self, place: usize, given: &[Given]) -> Result<Component> {
         let declaration = &self.model.declarations[place];
         let name = declaration.label.as_str();
-        if declaration.prefix.variability != Variability::Continuous {
+        if declaration.variability != Variability::Continuous {
             return self.parameter(declaration, self.dependent[place], given);
         }
         let dims = self.dims_of(declaration, |_| {
@@ -57,13 +57,13 @@ impl<'a> Symbols<'a> {
                 .hint("write a number or a parameter instead of `:`"))
         })?;
         self.charge(&dims, declaration)?;
-        let is_boolean = declaration.prefix.type_name == TypeName::Boolean;
-        if is_boolean && declaration.prefix.causality == Causality::Input {
+        let is_boolean = declaration.type_name == TypeName::Boolean;
+        if is_boolean && declaration.causality == Causality::Input {
             let problem = Problem::new(declaration.name, "a Boolean input is not supported");
             return Err(problem.hint("use a Real and compare it, as in `if u > 0.5 then …`"));
         }
         let may_have_derivative =
-            declaration.prefix.type_name == TypeName::Real && !is_outer_input(declaration);
+            declaration.type_name == TypeName::Real && !is_outer_input(declaration);
         let mut derivatives = self.derivatives.borrow_mut();
         let symbol = |offset: usize| {
             let symbol = self.graph.symbol(&element_name(name, &dims, offset)).node();
@@ -123,6 +123,11 @@ fn index_names<'a>(
     source: &'a str,
     declarations: &'a [Declaration],
 ) -> Result<HashMap<&'a str, usize>> {
+    let twice = |declaration: &Declaration, earlier: usize, how: &str| {
+        let line = declarations[earlier].name.line(source);
+        let message = format!("`{}` is declared twice", declaration.label);
+        Problem::new(declaration.name, message).hint(format!("{how} on line {line}"))
+    };
     let mut by_name: HashMap<&str, usize> = HashMap::with_capacity(declarations.len());
     for (place, declaration) in declarations.iter().enumerate() {
         let name = declaration.label.as_str();
@@ -131,25 +136,17 @@ fn index_names<'a>(
             return Err(Problem::new(declaration.name, message).hint("choose another name"));
         }
         if let Some(earlier) = by_name.insert(name, place) {
-            let line = declarations[earlier].name.line(source);
-            let message = format!("`{name}` is declared twice");
-            return Err(Problem::new(declaration.name, message)
-                .hint(format!("it is first declared on line {line}")));
+            return Err(twice(declaration, earlier, "it is first declared"));
         }
     }
     for declaration in declarations {
         // an element by itself beside the whole array would be two variables of one name
-        let base = declaration
-            .label
-            .strip_suffix(']')
-            .and_then(|name| name.rsplit_once('['));
-        if let Some((base, _)) = base
+        let element = declaration.label.strip_suffix(']');
+        if let Some((base, _)) = element.and_then(|name| name.rsplit_once('['))
             && let Some(&whole) = by_name.get(base)
         {
-            let message = format!("`{}` is declared twice", declaration.label);
-            let line = declarations[whole].name.line(source);
-            return Err(Problem::new(declaration.name, message)
-                .hint(format!("`{base}` is declared as a whole on line {line}")));
+            let how = format!("`{base}` is declared as a whole");
+            return Err(twice(declaration, whole, &how));
         }
     }
     Ok(by_name)
@@ -161,9 +158,8 @@ fn dependent(declarations: &[Declaration], needs: &[Vec<usize>], sequence: &[usi
     let mut dependent = vec![false; declarations.len()];
     for &place in sequence {
         let depends = |&need: &usize| {
-            let prefix = &declarations[need].prefix;
-            let settable = prefix.variability == Variability::Parameter && !prefix.is_final;
-            dependent[need] || (settable && !prefix.is_integer())
+            let needed = &declarations[need];
+            dependent[need] || (needed.is_settable() && !needed.is_integer())
         };
         dependent[place] = needs[place].iter().any(depends);
     }
@@ -173,7 +169,7 @@ fn dependent(declarations: &[Declaration], needs: &[Vec<usize>], sequence: &[usi
 impl<'a> Symbols<'a> {
     /// Declarations whose size or value this one reads.
     fn needs(&self, declaration: &Declaration) -> Vec<usize> {
-        let is_known = declaration.prefix.variability != Variability::Continuous;
+        let is_known = declaration.variability != Variability::Continuous;
         let binding = declaration.binding.filter(|_| is_known);
         let own: Vec<&str> = self.model.scopes.iter().map(String::as_str).collect();
         let package = declaration.package.as_deref();
@@ -264,22 +260,19 @@ fn sort(declarations: &[Declaration], needs: &[Vec<usize>]) -> Result<Vec<usize>
     Ok(sequence)
 }
 
-fn cycle(declarations: &[Declaration], path: &[(usize, usize)], closing: usize) -> Problem {
-    let name = |place: usize| declarations[place].label.as_str();
-    let start = path
-        .iter()
-        .position(|(place, _)| *place == closing)
-        .unwrap_or(0);
-    let cycle = &path[start..];
+fn cycle(declarations: &[Declaration], path: &[(usize, usize)], closing: usize) -> Box<Problem> {
+    let start = path.iter().position(|(place, _)| *place == closing);
+    let cycle = &path[start.unwrap_or(0)..];
+    let name = |place: usize| format!("`{}`", declarations[place].label);
     let mut names: Vec<String> = cycle
         .iter()
         .take(8)
-        .map(|(place, _)| format!("`{}`", name(*place)))
+        .map(|&(place, _)| name(place))
         .collect();
     if cycle.len() > 8 {
         names.push(format!("… {} more …", cycle.len() - 8));
     }
-    names.push(format!("`{}`", name(closing)));
+    names.push(name(closing));
     let message = format!("these declarations need each other: {}", names.join(" → "));
     Problem::new(declarations[closing].name, message).hint("give one of them a number")
 }
@@ -294,8 +287,7 @@ impl<'a> Symbols<'a> {
     ) -> Result<Component> {
         let label = declaration.label.as_str();
         let name = label.strip_prefix('.').unwrap_or(label);
-        let prefix = &declaration.prefix;
-        if prefix.causality == Causality::Input {
+        if declaration.causality == Causality::Input {
             let message = format!("`{name}` is both a parameter and an input");
             return Err(Problem::new(declaration.name, message).hint("choose one of the two"));
         }
@@ -315,12 +307,14 @@ impl<'a> Symbols<'a> {
             given: &by_offset(given, name, &dims, declaration.name)?,
             dims: &dims,
         };
-        let values = parts.values(known)?;
-        let is_parameter = prefix.variability == Variability::Parameter;
-        let keeps_symbols = is_parameter && !prefix.is_final && prefix.type_name == TypeName::Real;
+        let values = parts.elements(known, true)?;
+        let is_parameter = declaration.variability == Variability::Parameter;
+        let keeps_symbols = declaration.is_settable() && declaration.type_name == TypeName::Real;
         let elements = match &values {
             _ if dependent && self.options.symbolic_parameters => {
-                parts.symbolic(self.binding(declaration, Mode::Parametric)?)?
+                let symbolic = self.binding(declaration, Mode::Parametric)?;
+                let elements = parts.elements(symbolic, false)?;
+                elements.unwrap_or_else(|| parts.all_symbols())
             }
             Some(values) if keeps_symbols && self.options.symbolic_parameters => {
                 parts.symbols_but(values)
@@ -344,11 +338,8 @@ impl<'a> Symbols<'a> {
             return Ok(None);
         };
         let mut evaluator = Evaluator::of(self, declaration, mode);
-        match evaluator.value(id) {
-            Ok(value) => Ok(Some((value, evaluator.span(id)))),
-            Err(_) if evaluator.valueless && self.options.symbolic_parameters => Ok(None),
-            Err(problem) => Err(problem),
-        }
+        let value = evaluator.value_if_known(id)?;
+        Ok(value.map(|value| (value, evaluator.span(id))))
     }
 }
 
@@ -362,45 +353,27 @@ struct Parts<'p> {
 }
 
 impl Parts<'_> {
-    /// Known values of all elements; `None` where some have none.
-    fn values(&self, binding: Option<(Value, Span)>) -> Result<Option<Vec<Scalar>>> {
-        let mut values = vec![None; self.dims.iter().product()];
+    /// What the declaration and the caller say of all elements; `None` where some are left open.
+    fn elements(
+        &self,
+        binding: Option<(Value, Span)>,
+        must_be_known: bool,
+    ) -> Result<Option<Vec<Scalar>>> {
+        let mut elements = vec![None; self.dims.iter().product()];
         if let Some((value, span)) = binding {
-            self.check_size(&value, span)?;
-            for (slot, element) in values.iter_mut().zip(value.elements) {
-                *slot = Some(self.known(element, span)?);
+            let checked = check_size(self.name, self.dims, &value.dims, span);
+            checked.map_err(|problem| match value.dims.is_empty() {
+                true => problem.hint("use `fill(value, size)`"),
+                false => problem,
+            })?;
+            for (slot, element) in elements.iter_mut().zip(value.elements) {
+                *slot = Some(self.typed(element, must_be_known, span)?);
             }
         }
         for &(offset, value) in self.given {
-            values[offset] = Some(self.converted(value)?);
+            elements[offset] = Some(self.converted(value)?);
         }
-        Ok(values.into_iter().collect())
-    }
-
-    /// Expressions over other parameters, but for elements set from outside.
-    fn symbolic(&self, binding: Option<(Value, Span)>) -> Result<Vec<Scalar>> {
-        let Some((value, span)) = binding else {
-            return Ok(self.all_symbols());
-        };
-        self.check_size(&value, span)?;
-        let is_boolean = self.declaration.prefix.type_name == TypeName::Boolean;
-        let typed = |element: Scalar| match (is_boolean, element) {
-            (true, Scalar::Boolean(_)) => Ok(element),
-            (true, _) => Err(expected_truth(span)),
-            (false, _) => {
-                let node = element.real(self.symbols.graph);
-                node.map(Scalar::Real).ok_or_else(|| expected_number(span))
-            }
-        };
-        let elements = value.elements.into_iter().map(typed);
-        let mut elements: Vec<Scalar> = elements.collect::<Result<_>>()?;
-        for &(offset, value) in self.given {
-            elements[offset] = match is_boolean {
-                true => self.converted(value)?,
-                false => Scalar::Real(self.symbols.graph.constant(value).node()),
-            };
-        }
-        Ok(elements)
+        Ok(elements.into_iter().collect())
     }
 
     fn element_name(&self, offset: usize) -> String {
@@ -427,31 +400,25 @@ impl Parts<'_> {
         elements
     }
 
-    fn check_size(&self, value: &Value, span: Span) -> Result<()> {
-        let checked = check_size(self.name, self.dims, &value.dims, span);
-        checked.map_err(|problem| match value.dims.is_empty() {
-            true => problem.hint("use `fill(value, size)`"),
-            false => problem,
-        })
-    }
-
-    /// A value of the declared type.
-    fn known(&self, element: Scalar, span: Span) -> Result<Scalar> {
+    /// A value of the declared type, or an expression over other parameters.
+    fn typed(&self, element: Scalar, must_be_known: bool, span: Span) -> Result<Scalar> {
         let graph = self.symbols.graph;
-        if self.declaration.prefix.type_name == TypeName::Boolean {
+        let is_known = |node| !must_be_known || graph.constant_value(node).is_some();
+        if self.declaration.type_name == TypeName::Boolean {
             return match element {
-                Scalar::Boolean(node) if graph.constant_value(node).is_some() => Ok(element),
-                _ => Err(expected_truth(span)),
+                Scalar::Boolean(node) if is_known(node) => Ok(element),
+                _ => Err(Problem::new(span, "expected `true` or `false`")),
             };
         }
         let node = element.real(graph).ok_or_else(|| expected_number(span))?;
-        match (element, self.declaration.prefix.is_integer()) {
-            (Scalar::Integer(_), true) => Ok(element),
-            (_, true) => {
+        let is_integer = must_be_known && self.declaration.is_integer();
+        match element {
+            Scalar::Integer(_) if is_integer => Ok(element),
+            _ if is_integer => {
                 let message = format!("`{}` is an Integer, its value is a Real", self.name);
                 Err(Problem::new(span, message).hint("use `div(a, b)` or `integer(a)`"))
             }
-            _ if graph.constant_value(node).is_some() => Ok(Scalar::Real(node)),
+            _ if is_known(node) => Ok(Scalar::Real(node)),
             _ => {
                 let message = format!("the value of `{}` is not a finite number", self.name);
                 Err(Problem::new(span, message))
@@ -462,7 +429,7 @@ impl Parts<'_> {
     /// A number from outside as a value of the declared type.
     fn converted(&self, value: f64) -> Result<Scalar> {
         let constant = |value: f64| self.symbols.graph.constant(value).node();
-        match self.declaration.prefix.type_name {
+        match self.declaration.type_name {
             TypeName::Boolean => Ok(Scalar::Boolean(constant(f64::from(value != 0.0)))),
             TypeName::Integer if value.fract() != 0.0 || value.abs() > 2f64.powi(53) => {
                 let name = self.name;
@@ -474,20 +441,12 @@ impl Parts<'_> {
         }
     }
 
-    fn no_value(&self) -> Problem {
+    fn no_value(&self) -> Box<Problem> {
         let name = self.name;
-        Problem::new(
-            self.declaration.name,
-            format!("parameter `{name}` has no value"),
-        )
-        .hint(format!(
-            "write `{name} = …` here, or give the value on loading"
-        ))
+        let hint = format!("write `{name} = …` here, or give the value on loading");
+        let message = format!("parameter `{name}` has no value");
+        Problem::new(self.declaration.name, message).hint(hint)
     }
-}
-
-fn expected_truth(span: Span) -> Problem {
-    Problem::new(span, "expected `true` or `false`")
 }
 
 /// What the caller gives to a parameter, or to an element of one: its subscripts, and the value.
@@ -539,9 +498,8 @@ fn by_offset(given: &[Given], name: &str, dims: &[usize], span: Span) -> Result<
 }
 
 fn check_settable(name: &str, declaration: &Declaration) -> Result<()> {
-    let prefix = &declaration.prefix;
-    let what = match prefix.variability {
-        Variability::Parameter if prefix.is_final => "a final parameter",
+    let what = match declaration.variability {
+        Variability::Parameter if declaration.is_final => "a final parameter",
         Variability::Parameter => return Ok(()),
         Variability::Constant => "a constant",
         Variability::Continuous => "a variable",
@@ -550,14 +508,10 @@ fn check_settable(name: &str, declaration: &Declaration) -> Result<()> {
     Err(Problem::new(declaration.name, message).hint("only parameters can be set"))
 }
 
-fn unknown(model: &FlatModel, name: &str) -> Problem {
-    let settable = model.declarations.iter().filter(|declaration| {
-        let prefix = &declaration.prefix;
-        prefix.variability == Variability::Parameter && !prefix.is_final
-    });
-    let names: Vec<&str> = settable
-        .map(|declaration| declaration.label.as_str())
-        .collect();
+fn unknown(model: &FlatModel, name: &str) -> Box<Problem> {
+    let declarations = model.declarations.iter();
+    let settable = declarations.filter(|d| d.is_settable());
+    let names: Vec<&str> = settable.map(|d| d.label.as_str()).collect();
     let model_name = &model.title;
     let hint =
         did_you_mean(name, names.iter().copied()).unwrap_or_else(|| match names.is_empty() {
@@ -574,24 +528,20 @@ fn split(key: &str) -> Option<(&str, Vec<usize>)> {
     let Some((name, rest)) = key.split_once('[') else {
         return Some((key, vec![]));
     };
-    let inside = rest.strip_suffix(']')?;
-    let subscripts = inside
-        .split(',')
-        .map(|subscript| subscript.trim().parse().ok());
-    Some((name.trim(), subscripts.collect::<Option<Vec<usize>>>()?))
+    let subscripts = rest.strip_suffix(']')?.split(',');
+    let numbers = subscripts.map(|subscript| subscript.trim().parse().ok());
+    Some((name.trim(), numbers.collect::<Option<Vec<usize>>>()?))
 }
 
 fn offset(subscripts: &[usize], dims: &[usize]) -> Option<usize> {
     if subscripts.len() != dims.len() {
         return None;
     }
-    subscripts
-        .iter()
-        .zip(dims)
-        .try_fold(0usize, |offset, (&subscript, &dim)| {
-            let place = subscript.checked_sub(1).filter(|place| *place < dim)?;
-            Some(offset * dim + place)
-        })
+    let mut pairs = subscripts.iter().zip(dims);
+    pairs.try_fold(0usize, |offset, (&subscript, &dim)| {
+        let place = subscript.checked_sub(1).filter(|place| *place < dim)?;
+        Some(offset * dim + place)
+    })
 }
 
 #[cfg(test)]

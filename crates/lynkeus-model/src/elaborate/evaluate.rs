@@ -4,16 +4,14 @@ use lynkeus_expr::{Graph, Node, Unary};
 
 use super::scope::{Frame, Local, Mode, Named};
 use super::symbols::Symbols;
-use super::value::{Scalar, Value, describe_dims, unequal_sizes};
+use super::value::{Scalar, Value, describe_dims, expected_number, unequal_sizes};
 use crate::Assertion;
 use crate::balance::FlatEquation;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::flat::constant;
 use crate::limits::{Budget, MAX_CALL_DEPTH};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{
-    Ast, BinaryOperator, Declaration, ExprId, Kind, PathPart, Relation, UnaryOperator,
-};
+use crate::syntax::ast::{Ast, Declaration, ExprId, Kind, PathPart, Term};
 use crate::syntax::{plain, shortened};
 
 /// What to do about a Real where an Integer is needed.
@@ -39,8 +37,8 @@ pub(crate) struct Evaluator<'a> {
     pub(super) scopes: Vec<&'a str>,
     /// variables of the function or algorithm around
     pub(super) frame: Option<Frame>,
-    /// functions around, innermost last
-    pub(super) calls: Vec<usize>,
+    /// names of the functions around, innermost last
+    pub(super) calls: Vec<&'a str>,
     /// expressions and statements around, those of the callers included
     pub(super) depth: usize,
     /// conditions of the `if`s around, each with whether it holds in the branch that is taken
@@ -119,38 +117,44 @@ impl<'a> Evaluator<'a> {
         let expression = self.ast.expression(id);
         let span = expression.span;
         self.budget.charge(1, span)?;
-        let scalar = match &expression.kind {
-            Kind::Integer(value) => Scalar::Integer(*value),
-            Kind::Real(value) => Scalar::Real(self.graph.constant(*value).node()),
-            Kind::Boolean(value) => self.truth(*value),
+        match &expression.kind {
+            Kind::Integer(value) => Ok(Scalar::Integer(*value).into()),
+            Kind::Real(value) => Ok(Scalar::Real(self.graph.constant(*value).node()).into()),
+            Kind::Boolean(value) => Ok(self.truth(*value).into()),
             Kind::Text => {
-                return Err(
-                    Problem::new(span, "a string here is not supported").hint("use numbers")
-                );
+                Err(Problem::new(span, "a string here is not supported").hint("use numbers"))
             }
-            Kind::Path(parts) => return self.path(parts, span),
-            Kind::Member(record, name) => return self.member(*record, name, span),
-            Kind::All => return Err(Problem::new(span, "`:` stands only in subscripts")),
-            Kind::End => self.end(span)?,
-            Kind::Name => return self.name(span),
-            Kind::Index(base, subscripts) => return self.index(*base, subscripts, span),
-            Kind::Call(call) => return self.call(call, span),
-            Kind::Array(elements) => return self.array(elements, span),
-            Kind::Matrix(rows) => return self.matrix(rows, span),
-            Kind::Comprehension(body, iterators) => {
-                return self.comprehension(*body, iterators, span);
+            Kind::Path(parts) => self.path(id, parts, span),
+            Kind::Member(record, name) => self.member(*record, name, span),
+            Kind::All => Err(Problem::new(span, "`:` stands only in subscripts")),
+            Kind::End => self.end(span),
+            Kind::Name => self.name(span),
+            Kind::Index(base, subscripts) => self.index(*base, subscripts, span),
+            Kind::Call(call) => self.call(call, span),
+            Kind::Array(elements) => self.array(elements, span),
+            Kind::Matrix(rows) => self.matrix(rows, span),
+            Kind::Comprehension(body, iterators) => self.comprehension(*body, iterators, span),
+            Kind::Not(operand) => {
+                let node = self.condition(*operand)?;
+                Ok(Scalar::Boolean(self.graph.unary(Unary::Not, node)).into())
             }
-            Kind::Unary(operator, operand) => return self.unary(*operator, *operand),
-            Kind::Chain(head, rest) => return self.chain(*head, rest),
+            Kind::Plus(operand) => {
+                let value = self.value(*operand)?;
+                self.map(value, self.span(*operand), |_, scalar, _| Ok(scalar))
+            }
+            Kind::Minus(operand) => {
+                let value = self.value(*operand)?;
+                self.map(value, self.span(*operand), Self::negated)
+            }
+            Kind::Chain(head, rest) => self.chain(*head, rest),
             Kind::Power(base, exponent, elementwise) => {
                 let (base, exponent) = (self.value(*base)?, self.value(*exponent)?);
-                return self.power(base, exponent, *elementwise, span);
+                self.power(base, exponent, *elementwise, span)
             }
-            Kind::Relation(relation, left, right) => self.relation(*relation, *left, *right)?,
-            Kind::If(branches, otherwise) => return self.conditional(branches, *otherwise),
-            Kind::Range(start, step, stop) => return self.range(*start, *step, *stop, span),
-        };
-        Ok(scalar.into())
+            Kind::Relation(relation, left, right) => self.relation(relation, *left, *right),
+            Kind::If(branches, otherwise) => self.conditional(branches, *otherwise),
+            Kind::Range(start, step, stop) => self.range(*start, *step, *stop, span),
+        }
     }
 
     /// The value of an expression that must be scalar.
@@ -171,6 +175,16 @@ impl<'a> Evaluator<'a> {
         value
     }
 
+    /// The value of an expression; `None` where it needs a parameter without value and these are
+    /// allowed.
+    pub(super) fn value_if_known(&mut self, id: ExprId) -> Result<Option<Value>> {
+        match self.value(id) {
+            Ok(value) => Ok(Some(value)),
+            Err(_) if self.valueless && self.symbols.options.symbolic_parameters => Ok(None),
+            Err(problem) => Err(problem),
+        }
+    }
+
     /// An Integer that must be known; `what` names it in the refusal.
     pub(super) fn known_integer(&mut self, id: ExprId, what: &str) -> Result<i64> {
         let value = self.structural(id)?;
@@ -188,34 +202,30 @@ impl<'a> Evaluator<'a> {
         Scalar::Boolean(self.graph.constant(f64::from(u8::from(value))).node())
     }
 
-    fn end(&self, span: Span) -> Result<Scalar> {
+    fn end(&self, span: Span) -> Result<Value> {
         let size = self.ends.last().and_then(|&size| i64::try_from(size).ok());
         let outside = || Problem::new(span, "`end` stands only in subscripts");
-        size.map(Scalar::Integer).ok_or_else(outside)
+        size.map(|size| Scalar::Integer(size).into())
+            .ok_or_else(outside)
     }
 
-    pub(super) fn varying(&self, span: Span) -> Problem {
+    pub(super) fn varying(&self, span: Span) -> Box<Problem> {
         let name = self.text(span);
-        Problem::new(
-            span,
-            format!("`{name}` is a variable, but a known value is needed here"),
-        )
-        .hint("sizes, loop bounds, subscripts, attributes and parameters use parameters only")
+        let message = format!("`{name}` is a variable, but a known value is needed here");
+        Problem::new(span, message)
+            .hint("sizes, loop bounds, subscripts, attributes and parameters use parameters only")
     }
 
-    pub(super) fn without_value(&mut self, span: Span) -> Problem {
+    pub(super) fn without_value(&mut self, span: Span) -> Box<Problem> {
         self.valueless = true;
         let name = self.text(span);
-        Problem::new(
-            span,
-            format!("parameter `{name}` has no value, but one is needed here"),
-        )
-        .hint(format!(
+        let message = format!("parameter `{name}` has no value, but one is needed here");
+        Problem::new(span, message).hint(format!(
             "write `{name} = …` in its declaration, or give the value on loading"
         ))
     }
 
-    pub(super) fn unknown_name(&self, span: Span) -> Problem {
+    pub(super) fn unknown_name(&self, span: Span) -> Box<Problem> {
         let name = self.text(span);
         if name == "time" {
             return self.varying(span);
@@ -238,34 +248,22 @@ impl<'a> Evaluator<'a> {
         Problem::new(span, message).maybe_hint(for_pi.or(suggestion))
     }
 
-    fn unary(&mut self, operator: UnaryOperator, operand: ExprId) -> Result<Value> {
-        let value = self.value(operand)?;
-        let span = self.span(operand);
-        match operator {
-            UnaryOperator::Not => {
-                let node = self.boolean(&value, span)?;
-                Ok(Scalar::Boolean(self.graph.unary(Unary::Not, node)).into())
-            }
-            UnaryOperator::Plus => self.map(value, span, |_, scalar, _| Ok(scalar)),
-            UnaryOperator::Minus => self.map(value, span, Self::negated),
-        }
-    }
-
-    fn chain(&mut self, head: ExprId, rest: &'a [(BinaryOperator, ExprId)]) -> Result<Value> {
+    fn chain(&mut self, head: ExprId, rest: &'a [Term]) -> Result<Value> {
         let mut value = self.value(head)?;
         let start = self.span(head);
-        for &(operator, operand) in rest {
+        for &(operation, elementwise, operand) in rest {
             let right = self.value(operand)?;
             let span = start.to(self.span(operand));
-            value = self.binary(operator, value, right, span)?;
+            value = self.binary(operation, elementwise, value, right, span)?;
         }
         Ok(value)
     }
 
-    fn relation(&mut self, relation: Relation, left: ExprId, right: ExprId) -> Result<Scalar> {
+    fn relation(&mut self, relation: &str, left: ExprId, right: ExprId) -> Result<Value> {
         let span = self.span(left).to(self.span(right));
         let (left, right) = (self.scalar(left)?, self.scalar(right)?);
-        self.compare(relation, left, right, span)
+        let holds = self.compare(relation, left, right, span)?;
+        Ok(Scalar::Boolean(holds).into())
     }
 
     /// The truth value of a condition.
@@ -279,15 +277,17 @@ impl<'a> Evaluator<'a> {
         branches: &'a [(ExprId, ExprId)],
         otherwise: ExprId,
     ) -> Result<Value> {
-        let take = |evaluator: &mut Self, id: ExprId| Ok((evaluator.value(id)?, id));
-        let join = |evaluator: &mut Self, condition: Node, yes: (Value, ExprId), no: (Value, _)| {
-            let ((yes, id), (no, _)) = (yes, no);
-            let span = evaluator.span(id);
+        let take = |evaluator: &mut Self, id| Ok((evaluator.value(id)?, evaluator.span(id)));
+        let join = |evaluator: &mut Self, condition, (yes, span): (Value, Span), no| {
+            let (no, _): (Value, Span) = no;
             if yes.dims != no.dims {
                 return Err(unequal_sizes(&yes.dims, &no.dims, span));
             }
-            let select = |evaluator: &Self, a, b, span| evaluator.select(condition, a, b, span);
-            Ok((evaluator.elementwise(yes, no, span, select)?, id))
+            let select = |evaluator: &Self, a: Scalar, b, span| {
+                let chosen = a.select(condition, b, evaluator.graph);
+                chosen.ok_or_else(|| expected_number(span))
+            };
+            Ok((evaluator.elementwise(yes, no, span, select)?, span))
         };
         let chosen = self.chosen(branches.iter().copied(), otherwise, take, join);
         chosen.map(|(value, _)| value)
@@ -339,25 +339,35 @@ impl<'a> Evaluator<'a> {
         if let Some(scalar) = self.iterator(&name) {
             return Ok(scalar.into());
         }
-        match self.local(&name) {
-            Some(Ok(local)) => {
-                self.budget.charge(local.elements.len() as u64, span)?;
-                return local.value().ok_or_else(|| self.unassigned(&name, span));
-            }
-            Some(Err(())) => return self.outside_of_function(&name, span),
-            None => {}
+        if let Some(local) = self.local(&name) {
+            self.budget.charge(local.elements.len() as u64, span)?;
+            return local.value().ok_or_else(|| self.unassigned(&name, span));
         }
-        let found = self.named(&name);
+        // names in a function lead to its own variables, and to constants
+        let is_closed = self.is_closed();
+        let mode = if is_closed {
+            Mode::Structural
+        } else {
+            self.mode
+        };
+        let found = self.named_in(mode, &name);
         if let Named::Array([_, ..], elements) = found {
             self.budget.charge(elements.len() as u64, span)?;
         }
         match found {
-            Named::Unknown => match self.builtin(&name) {
-                Some(scalar) => Ok(scalar.into()),
-                None => Err(self.unknown_name(span)),
-            },
-            found => self.meant(found, span),
+            Named::Array(..) | Named::Scalar(_) => return self.meant(found, span),
+            Named::Varying | Named::Valueless if !is_closed => return self.meant(found, span),
+            _ => {}
         }
+        let builtin = self.builtin(&name).map(Value::from);
+        builtin.ok_or_else(|| match is_closed && self.symbols.dims(&name).is_some() {
+            true => {
+                let message = format!("`{name}` is not a variable of this function");
+                Problem::new(span, message)
+                    .hint("functions read their own variables and constants: add an input")
+            }
+            false => self.unknown_name(span),
+        })
     }
 
     /// The value that a name means.
@@ -383,16 +393,20 @@ impl<'a> Evaluator<'a> {
 
     /// What the declarations say of a name, in full or as an import shortens it.
     pub(super) fn named(&self, name: &str) -> Named<'a> {
+        self.named_in(self.mode, name)
+    }
+
+    fn named_in(&self, mode: Mode, name: &str) -> Named<'a> {
         // The symbols outlive this evaluator.
         let symbols = self.symbols;
         if !self.is_closed() {
-            match symbols.named(name, self.mode) {
+            match symbols.named(name, mode) {
                 Named::Unknown => {}
                 found => return found,
             }
         }
         let full = self.full_names(name).into_iter();
-        let mut found = full.map(|full| symbols.constant(&full, self.mode));
+        let mut found = full.map(|full| symbols.constant(&full, mode));
         found
             .find(|found| !matches!(found, Named::Unknown))
             .unwrap_or(Named::Unknown)
@@ -410,25 +424,6 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// Names in a function lead to its own variables, and to constants.
-    fn outside_of_function(&mut self, name: &str, span: Span) -> Result<Value> {
-        let mode = std::mem::replace(&mut self.mode, Mode::Structural);
-        let found = self.named(name);
-        self.mode = mode;
-        match found {
-            found @ (Named::Array(..) | Named::Scalar(_)) => self.meant(found, span),
-            _ => match self.builtin(name) {
-                Some(scalar) => Ok(scalar.into()),
-                None if self.symbols.dims(name).is_some() => {
-                    let message = format!("`{name}` is not a variable of this function");
-                    Err(Problem::new(span, message)
-                        .hint("functions read their own variables and constants: add an input"))
-                }
-                None => Err(self.unknown_name(span)),
-            },
-        }
-    }
-
     fn builtin(&self, name: &str) -> Option<Scalar> {
         if name == "time" {
             let is_known = self.mode == Mode::Continuous;
@@ -442,79 +437,79 @@ impl<'a> Evaluator<'a> {
         Some(Scalar::Real(self.graph.constant(known?).node()))
     }
 
-    pub(super) fn unassigned(&self, name: &str, span: Span) -> Problem {
-        Problem::new(
-            span,
-            format!("`{name}` is read before it has a value in every case"),
-        )
-        .hint("assign it first, in each branch of an `if`")
+    pub(super) fn unassigned(&self, name: &str, span: Span) -> Box<Problem> {
+        let message = format!("`{name}` is read before it has a value in every case");
+        Problem::new(span, message).hint("assign it first, in each branch of an `if`")
     }
 
     /// `a[1].b[2].c`: a name as it is written, or the member `a.b.c` with all subscripts.
-    pub(super) fn path(&mut self, parts: &'a [PathPart], span: Span) -> Result<Value> {
+    fn path(&mut self, id: ExprId, parts: &'a [PathPart], span: Span) -> Result<Value> {
         let whole = plain(self.text(span));
         if self.is_known(&whole) {
             return self.name(span);
         }
-        let (subscripts, named) = joined(parts, self.source);
         let literal = self.with_numbers(parts);
         if let Some(literal) = literal.filter(|literal| self.is_known(literal)) {
             return self.value_named(&literal, span);
         }
-        self.index_named(&named, &subscripts, span, span)
+        let (name, subscripts) = reference(self.source, self.ast, id).unwrap_or_default();
+        self.index_named(&name, &subscripts, span, span)
     }
 
     fn is_known(&self, name: &str) -> bool {
-        matches!(self.local(name), Some(Ok(_))) || !matches!(self.named(name), Named::Unknown)
+        self.local(name).is_some() || !matches!(self.named(name), Named::Unknown)
     }
 
     /// `c[2].x` for `c[i].x` with i = 2; `None` where a subscript is a range.
     fn with_numbers(&mut self, parts: &'a [PathPart]) -> Option<String> {
-        let mut name = String::new();
+        let mut names = vec![];
         for part in parts {
-            if !name.is_empty() {
-                name.push('.');
+            let mut name = plain(self.text(part.name)).into_owned();
+            if !part.subscripts.is_empty() {
+                let numbers = self.numbers(&part.subscripts).ok()?;
+                name.push_str(&format!("[{numbers}]"));
             }
-            name.push_str(&plain(self.text(part.name)));
-            let mut numbers = vec![];
-            for &subscript in &part.subscripts {
-                numbers.push(
-                    self.known_integer(subscript, "a subscript")
-                        .ok()?
-                        .to_string(),
-                );
-            }
-            if !numbers.is_empty() {
-                name.push_str(&format!("[{}]", numbers.join(",")));
-            }
+            names.push(name);
         }
-        Some(name)
+        Some(names.join("."))
+    }
+
+    /// Subscripts that are known, as `1,2`.
+    pub(super) fn numbers(&mut self, subscripts: &[ExprId]) -> Result<String> {
+        let mut numbers = vec![];
+        for &subscript in subscripts {
+            numbers.push(self.known_integer(subscript, "a subscript")?.to_string());
+        }
+        Ok(numbers.join(","))
     }
 
     pub(super) fn value_named(&mut self, name: &str, span: Span) -> Result<Value> {
-        if let Some(Ok(local)) = self.local(name) {
+        if let Some(local) = self.local(name) {
             return local.value().ok_or_else(|| self.unassigned(name, span));
         }
         self.meant(self.named(name), span)
     }
 
-    /// A variable of the function or algorithm around; `Err` where a function has none of that
-    /// name.
-    pub(super) fn local(&self, name: &str) -> Option<std::result::Result<&Local, ()>> {
-        let frame = self.frame.as_ref()?;
-        match frame.locals.get(name) {
-            Some(local) => Some(Ok(local)),
-            None if frame.is_function => Some(Err(())),
-            None => None,
-        }
+    /// A variable of the function or algorithm around.
+    pub(super) fn local(&self, name: &str) -> Option<&Local> {
+        self.frame.as_ref()?.locals.get(name)
     }
 }
 
-/// The subscripts of all parts, and their names joined.
-pub(super) fn joined(parts: &[PathPart], source: &str) -> (Vec<ExprId>, String) {
-    let subscripts = parts
-        .iter()
-        .flat_map(|part| part.subscripts.iter().copied());
-    let names = parts.iter().map(|part| plain(part.name.text(source)));
-    (subscripts.collect(), names.collect::<Vec<_>>().join("."))
+/// The name that an expression is, and its subscripts: `a.b` of `a[1].b[2]`.
+pub(super) fn reference(source: &str, ast: &Ast, id: ExprId) -> Option<(String, Vec<ExprId>)> {
+    let name = |span: Span| plain(span.text(source));
+    match &ast.expression(id).kind {
+        Kind::Name => Some((name(ast.expression(id).span).into_owned(), vec![])),
+        Kind::Index(base, subscripts) => {
+            let base = name(ast.expression(*base).span);
+            Some((base.into_owned(), subscripts.clone()))
+        }
+        Kind::Path(parts) => {
+            let names: Vec<_> = parts.iter().map(|part| name(part.name)).collect();
+            let subscripts = parts.iter().flat_map(|part| &part.subscripts);
+            Some((names.join("."), subscripts.copied().collect()))
+        }
+        _ => None,
+    }
 }

@@ -2,13 +2,12 @@
 
 use lynkeus_expr::{Binary, Node, Unary};
 
-use super::evaluate::{Evaluator, joined};
+use super::evaluate::{Evaluator, reference};
 use super::scope::Frame;
 use super::value::{Value, describe_dims, member_name};
 use crate::Assertion;
 use crate::diagnostic::{Problem, Result, Span};
-use crate::syntax::ast::{Assert, Ast, ExprId, ForIndex, Kind, Statement, StatementKind};
-use crate::syntax::plain;
+use crate::syntax::ast::{Assert, Ast, ExprId, ForIndex, Statement, StatementKind};
 
 /// How a list of statements ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,9 +22,9 @@ pub(super) fn targets(source: &str, ast: &Ast, statements: &[Statement], into: &
     for statement in statements {
         match &statement.kind {
             StatementKind::Assign(targets, _) => {
-                for &id in targets.iter().flatten() {
-                    into.push(target_name(source, ast, id));
-                }
+                let targets = targets.iter().flatten();
+                let names = targets.filter_map(|&id| Some(reference(source, ast, id)?.0));
+                into.extend(names);
             }
             StatementKind::For(_, body) | StatementKind::While(_, body) => {
                 self::targets(source, ast, body, into);
@@ -38,15 +37,6 @@ pub(super) fn targets(source: &str, ast: &Ast, statements: &[Statement], into: &
             }
             _ => {}
         }
-    }
-}
-
-fn target_name(source: &str, ast: &Ast, id: ExprId) -> String {
-    let expression = ast.expression(id);
-    match &expression.kind {
-        Kind::Index(base, _) => target_name(source, ast, *base),
-        Kind::Path(parts) => joined(parts, source).1,
-        _ => plain(expression.span.text(source)).into_owned(),
     }
 }
 
@@ -207,32 +197,19 @@ impl<'a> Evaluator<'a> {
             let Some(target) = *target else {
                 continue;
             };
+            let (name, subscripts) = reference(self.source, self.ast, target).ok_or_else(|| {
+                let message = "expected a variable before `:=`";
+                Problem::new(self.span(target), message)
+            })?;
             for (member, value) in outcome {
-                match member.as_str() {
-                    "" => self.assign(target, value, span)?,
-                    _ => {
-                        let name = target_name(self.source, self.ast, target);
-                        self.assign_to(&member_name(&name, &member), &[], value, span)?;
-                    }
-                }
+                let subscripts = match member.as_str() {
+                    "" => &subscripts[..],
+                    _ => &[],
+                };
+                self.assign_to(&member_name(&name, &member), subscripts, value, span)?;
             }
         }
         Ok(())
-    }
-
-    fn assign(&mut self, target: ExprId, value: Value, span: Span) -> Result<()> {
-        let expression = self.ast.expression(target);
-        let name = target_name(self.source, self.ast, target);
-        let subscripts = match &expression.kind {
-            Kind::Name => vec![],
-            Kind::Index(_, subscripts) => subscripts.clone(),
-            Kind::Path(parts) => joined(parts, self.source).0,
-            _ => {
-                let message = "expected a variable before `:=`";
-                return Err(Problem::new(expression.span, message));
-            }
-        };
-        self.assign_to(&name, &subscripts, value, span)
     }
 
     fn assign_to(
@@ -247,10 +224,7 @@ impl<'a> Evaluator<'a> {
             Problem::new(span, message)
                 .hint("an algorithm assigns its own variables: outputs and protected ones")
         };
-        let dims = match self.local(name) {
-            Some(Ok(local)) => local.dims.clone(),
-            _ => return Err(unknown()),
-        };
+        let dims = self.local(name).ok_or_else(unknown)?.dims.clone();
         let (kept, offsets) = self.selected(name, &dims, subscripts, span)?;
         let Value { dims, elements } = value;
         if kept != dims {

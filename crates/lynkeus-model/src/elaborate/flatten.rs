@@ -30,7 +30,7 @@ pub(super) fn flatten(symbols: &Symbols<'_>) -> Result<Flat> {
     let model = symbols.model;
     let mut evaluator = Evaluator::new(symbols, Mode::Continuous);
     for (_, declaration, component) in symbols.all() {
-        if declaration.prefix.variability == Variability::Continuous
+        if declaration.variability == Variability::Continuous
             && let Some(binding) = declaration.binding
         {
             let value = evaluator.value(binding)?;
@@ -199,10 +199,10 @@ impl<'a> Evaluator<'a> {
         }
         self.budget.charge(left.elements.len() as u64, span)?;
         for (offset, (&a, &b)) in left.elements.iter().zip(&right.elements).enumerate() {
-            let (a, b) = match (a, b) {
-                (Scalar::Boolean(a), Scalar::Boolean(b)) => (a, b),
-                _ => (self.side(a, span)?, self.side(b, span)?),
-            };
+            let (a, b) = a.with(b, self.graph).ok_or_else(|| {
+                Problem::new(span, "an equation between a Boolean and a number")
+                    .hint("write `if a then 1 else 0` for the number of a condition")
+            })?;
             let is_array = !left.dims.is_empty();
             let element = is_array.then(|| element_name("", &left.dims, offset));
             self.equations.push(FlatEquation {
@@ -213,13 +213,6 @@ impl<'a> Evaluator<'a> {
             });
         }
         Ok(())
-    }
-
-    fn side(&self, scalar: Scalar, span: Span) -> Result<Node> {
-        scalar.real(self.graph).ok_or_else(|| {
-            Problem::new(span, "an equation between a Boolean and a number")
-                .hint("write `if a then 1 else 0` for the number of a condition")
-        })
     }
 
     /// A known condition takes its branch; otherwise the branches are joined equation by

@@ -6,11 +6,11 @@ use lynkeus_expr::{Binary, Expr, Node, Unary};
 use super::arithmetic::overflow;
 use super::arrays::{matrix_dims, scalar_dims, vector_dims};
 use super::evaluate::Evaluator;
-use super::value::{Scalar, Value};
+use super::value::{Scalar, Value, expected_number};
 use crate::balance::total_derivative;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{BinaryOperator, Call, ExprId, Kind, Relation};
+use crate::syntax::ast::{Call, ExprId, Kind};
 use crate::syntax::shortened;
 
 /// Where the library has functions that are known without it.
@@ -114,7 +114,7 @@ impl<'a> Evaluator<'a> {
         name.strip_prefix(LIBRARY).unwrap_or(name)
     }
 
-    fn unknown_function(&self, span: Span, name: &str) -> Problem {
+    fn unknown_function(&self, span: Span, name: &str) -> Box<Problem> {
         if let Some((_, hint)) = REFUSED.iter().find(|(refused, _)| *refused == name) {
             return Problem::new(span, format!("`{name}` is not supported")).hint(*hint);
         }
@@ -314,7 +314,7 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    fn no_derivative(&self, span: Span) -> Problem {
+    fn no_derivative(&self, span: Span) -> Box<Problem> {
         let name = self.text(span);
         let message = format!("`der({name})`: `{name}` is not a Real variable");
         Problem::new(span, message)
@@ -345,11 +345,10 @@ impl<'a> Evaluator<'a> {
         let x = self.scalar(x)?;
         let (above, below) = (self.scalar(above)?, self.scalar(below)?);
         let zero = Scalar::Integer(0);
-        let Scalar::Boolean(positive) = self.compare(Relation::GreaterEqual, x, zero, span)? else {
-            return Err(Problem::new(span, "expected a number"));
-        };
-        let slope = self.select(positive, above, below, span)?;
-        let product = self.scalar_binary(BinaryOperator::Multiply, slope, x, span)?;
+        let positive = self.compare(">=", x, zero, span)?;
+        let slope = above.select(positive, below, self.graph);
+        let slope = slope.ok_or_else(|| expected_number(span))?;
+        let product = self.scalar_binary(Binary::Mul, slope, x, span)?;
         Ok(product.into())
     }
 
@@ -357,15 +356,13 @@ impl<'a> Evaluator<'a> {
     pub(super) fn cross(&mut self, call: &'a Call, span: Span) -> Result<Value> {
         let (a, b) = self.two_arguments(call)?;
         let ([a1, a2, a3], [b1, b2, b3]) = (&a.elements[..], &b.elements[..]) else {
-            return Err(Problem::new(
-                span,
-                "`cross` takes two vectors of three elements",
-            ));
+            let message = "`cross` takes two vectors of three elements";
+            return Err(Problem::new(span, message));
         };
         let term = |p: &Scalar, q: &Scalar, r: &Scalar, s: &Scalar| {
-            let first = self.scalar_binary(BinaryOperator::Multiply, *p, *q, span)?;
-            let second = self.scalar_binary(BinaryOperator::Multiply, *r, *s, span)?;
-            self.scalar_binary(BinaryOperator::Subtract, first, second, span)
+            let first = self.scalar_binary(Binary::Mul, *p, *q, span)?;
+            let second = self.scalar_binary(Binary::Mul, *r, *s, span)?;
+            self.scalar_binary(Binary::Sub, first, second, span)
         };
         let elements = vec![
             term(a2, b3, a3, b2)?,

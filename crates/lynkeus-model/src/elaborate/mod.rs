@@ -31,7 +31,7 @@ use symbols::{Names, Symbols};
 pub(crate) use evaluate::Evaluator;
 
 /// The plant of a Modelica text, with what looks wrong in it.
-pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<Problem>)> {
+pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<Box<Problem>>)> {
     let mut ast = parse_file(source)?;
     let place = choose_model(&ast, options)?;
     let model = flat_model(source, &mut ast, place)?;
@@ -65,7 +65,7 @@ pub(crate) fn evaluated<T>(
 }
 
 /// A limit ended the reading.
-fn ended(model: &FlatModel, spent: Spent) -> Problem {
+fn ended(model: &FlatModel, spent: Spent) -> Box<Problem> {
     Problem::new(model.name, format!("the model was not read: {spent}"))
 }
 
@@ -77,43 +77,39 @@ fn choose_model(ast: &Ast, options: &LoadOptions) -> Result<usize> {
     };
     let places: Vec<usize> = models(ast).collect();
     let classes = places.iter().filter_map(|&place| ast.classes.get(place));
-    let mut names: Vec<(&str, Span)> = classes.map(|c| (title(&c.path), c.name)).collect();
-    let wanted = options.model.as_deref();
-    let last = |name: &str| name.rsplit('.').next().map(str::to_owned);
-    if let Some(wanted) = wanted
-        && names.iter().all(|(name, _)| *name != wanted)
-    {
+    let names: Vec<(&str, Span)> = classes.map(|c| (title(&c.path), c.name)).collect();
+    let wanted = options.model.as_deref().map(|wanted| {
         // the last part of a name is enough where it says which
-        let matching = names.iter_mut();
-        let mut matching = matching.filter(|(name, _)| last(name).as_deref() == Some(wanted));
-        if let (Some((name, _)), None) = (matching.next(), matching.next()) {
-            *name = wanted;
+        let is_exact = names.iter().any(|(name, _)| *name == wanted);
+        let names = names.iter().map(|(name, _)| *name);
+        let mut ends = names.filter(|name| name.rsplit('.').next() == Some(wanted));
+        match (ends.next(), ends.next()) {
+            (Some(name), None) if !is_exact => name,
+            _ => wanted,
         }
-    }
+    });
     let place = choose(&names, wanted, none)?;
     places.get(place).copied().ok_or_else(none)
 }
 
 /// Places of the classes that may be a plant.
 fn models(ast: &Ast) -> impl Iterator<Item = usize> {
-    let models: HashSet<&str> = ast
+    let is_model = |class: &&Class| class.kind == ClassKind::Model;
+    let paths = ast
         .classes
         .iter()
-        .filter(|class| class.kind == ClassKind::Model)
-        .map(|class| class.path.as_str())
-        .collect();
+        .filter(is_model)
+        .map(|class| class.path.as_str());
+    let paths: HashSet<&str> = paths.collect();
     // a class inside of a model is a part of it
     let is_inside = move |class: &Class| {
         let around = class.path.rsplit_once('.');
-        around.is_some_and(|(above, _)| models.contains(above))
-    };
-    let is_model = move |class: &Class| {
-        class.kind == ClassKind::Model && !class.is_partial && !is_inside(class)
+        around.is_some_and(|(above, _)| paths.contains(above))
     };
     let classes = ast.classes.iter().enumerate();
-    classes
-        .filter(move |(_, class)| is_model(class))
-        .map(|(place, _)| place)
+    let whole =
+        classes.filter(move |(_, class)| is_model(class) && !class.is_partial && !is_inside(class));
+    whole.map(|(place, _)| place)
 }
 
 /// The names of the models of a Modelica text.

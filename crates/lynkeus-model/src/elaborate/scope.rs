@@ -1,7 +1,7 @@
 //! What names mean where an expression stands: in a model, and in a function or an algorithm whose
 //! statements are carried out.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use lynkeus_expr::{Graph, Node};
 
@@ -33,7 +33,7 @@ pub(crate) enum Named<'a> {
 /// What the statements have given values to so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Frame {
-    pub locals: HashMap<String, Local>,
+    pub locals: BTreeMap<String, Local>,
     /// names of the members of its records
     pub records: HashMap<String, Vec<String>>,
     /// names outside of it are constants only
@@ -118,12 +118,8 @@ impl Frame {
 
 fn either(condition: Node, a: Option<Scalar>, b: Option<Scalar>, graph: &Graph) -> Option<Scalar> {
     let (a, b) = (a?, b?);
-    if a == b {
-        return Some(a);
+    match a == b {
+        true => Some(a),
+        false => a.select(condition, b, graph),
     }
-    if let (Scalar::Boolean(a), Scalar::Boolean(b)) = (a, b) {
-        return Some(Scalar::Boolean(graph.select(condition, a, b)));
-    }
-    let (a, b) = (a.real(graph)?, b.real(graph)?);
-    Some(Scalar::Real(graph.select(condition, a, b)))
 }

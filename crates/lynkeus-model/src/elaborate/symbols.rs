@@ -107,10 +107,7 @@ impl<'a> Symbols<'a> {
         let mut found = HashMap::new();
         for component in self.components.iter().flatten().filter(|c| c.is_known) {
             for (offset, element) in component.elements.iter().enumerate() {
-                let value = component
-                    .values
-                    .as_ref()
-                    .and_then(|values| values.get(offset));
+                let value = component.values.as_ref().map(|values| values[offset]);
                 let value = value.and_then(|value| value.number(self.graph));
                 if let Some(node) = element.real(self.graph) {
                     found.insert(node, value);
@@ -174,7 +171,7 @@ impl Symbols<'_> {
         let is_constant = |name: &&str| {
             let place = self.by_name.get(name);
             let declaration = place.and_then(|&place| self.model.declarations.get(place));
-            declaration.is_some_and(|d| d.prefix.variability == Variability::Constant)
+            declaration.is_some_and(|d| d.variability == Variability::Constant)
         };
         let name = own.filter(is_constant);
         name.map_or(Named::Unknown, |name| self.named(name, mode))
@@ -211,7 +208,7 @@ impl Symbols<'_> {
 /// True for an input that nothing in the model can determine: one of a part, as `r1.u`, may be
 /// equated with another variable.
 pub(super) fn is_outer_input(declaration: &Declaration) -> bool {
-    declaration.prefix.causality == Causality::Input
+    declaration.causality == Causality::Input
         && declaration.binding.is_none()
         && !declaration.label.contains('.')
 }
@@ -224,20 +221,17 @@ pub(super) fn gathered(
     let mut groups: HashMap<&str, Vec<(Vec<usize>, &Component)>> = HashMap::new();
     for (&name, &place) in by_name {
         if let Some((base, subscripts)) = literal_subscripts(name)
-            && let Some(Some(component)) = components.get(place)
+            && !by_name.contains_key(base)
+            && let Some(component) = &components[place]
             && component.dims.is_empty()
         {
-            groups
-                .entry(base)
-                .or_default()
-                .push((subscripts, component));
+            let group = groups.entry(base).or_default();
+            group.push((subscripts, component));
         }
     }
-    let whole = groups
-        .into_iter()
-        .filter_map(|(base, elements)| Some((base.to_owned(), gather(elements)?)));
-    whole
-        .filter(|(base, _)| !by_name.contains_key(base.as_str()))
+    let groups = groups.into_iter();
+    groups
+        .filter_map(|(base, elements)| Some((base.to_owned(), gather(elements)?)))
         .collect()
 }
 
@@ -255,24 +249,19 @@ fn gather(mut elements: Vec<(Vec<usize>, &Component)>) -> Option<Component> {
     let dims = elements.last()?.0.clone();
     let count = dims.iter().try_fold(1usize, |n, &dim| n.checked_mul(dim))?;
     let fits = |(subscripts, _): &(Vec<usize>, &Component)| {
-        let within = subscripts
-            .iter()
-            .zip(&dims)
-            .all(|(s, dim)| (1..=*dim).contains(s));
-        subscripts.len() == dims.len() && within
+        let mut pairs = subscripts.iter().zip(&dims);
+        subscripts.len() == dims.len() && pairs.all(|(s, dim)| (1..=*dim).contains(s))
     };
     if count != elements.len() || !elements.iter().all(fits) {
         return None;
     }
-    let values = elements
-        .iter()
-        .map(|(_, c)| c.values.as_ref()?.first().copied());
+    let components = || elements.iter().map(|(_, component)| *component);
+    let values = components().map(|c| Some(c.values.as_ref()?[0]));
     Some(Component {
         values: values.collect(),
-        is_known: elements.iter().all(|(_, component)| component.is_known),
-        elements: elements
-            .iter()
-            .filter_map(|(_, c)| c.elements.first().copied())
+        is_known: components().all(|component| component.is_known),
+        elements: components()
+            .map(|component| component.elements[0])
             .collect(),
         dims,
     })

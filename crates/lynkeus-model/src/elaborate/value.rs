@@ -23,6 +23,24 @@ impl Scalar {
         }
     }
 
+    /// Both as expressions, of Booleans those of their truth; `None` of a Boolean and a number.
+    pub(crate) fn with(self, other: Self, graph: &Graph) -> Option<(Node, Node)> {
+        match (self, other) {
+            (Scalar::Boolean(a), Scalar::Boolean(b)) => Some((a, b)),
+            _ => Some((self.real(graph)?, other.real(graph)?)),
+        }
+    }
+
+    /// `if condition then self else other`
+    pub(crate) fn select(self, condition: Node, other: Self, graph: &Graph) -> Option<Self> {
+        let (a, b) = self.with(other, graph)?;
+        let node = graph.select(condition, a, b);
+        Some(match self {
+            Scalar::Boolean(_) => Scalar::Boolean(node),
+            _ => Scalar::Real(node),
+        })
+    }
+
     /// The number, where it is known.
     pub(crate) fn number(self, graph: &Graph) -> Option<f64> {
         match self {
@@ -93,12 +111,10 @@ pub(crate) fn element_name(name: &str, dims: &[usize], offset: usize) -> String 
     format!("{name}[{}]", subscripts.join(","))
 }
 
-pub(super) fn unequal_sizes(left: &[usize], right: &[usize], span: Span) -> Problem {
+pub(super) fn unequal_sizes(left: &[usize], right: &[usize], span: Span) -> Box<Problem> {
     let (left, right) = (describe_dims(left), describe_dims(right));
-    Problem::new(
-        span,
-        format!("the sizes differ: left is {left}, right is {right}"),
-    )
+    let message = format!("the sizes differ: left is {left}, right is {right}");
+    Problem::new(span, message)
 }
 
 /// The members of a record, those of inner records by their names in full, as `z.re`; a number or
@@ -142,7 +158,7 @@ pub(super) fn check_size(name: &str, has: &[usize], found: &[usize], span: Span)
 }
 
 /// Refuses a truth value where a number must stand.
-pub(super) fn expected_number(span: Span) -> Problem {
+pub(super) fn expected_number(span: Span) -> Box<Problem> {
     Problem::new(span, "expected a number, found a Boolean").hint("write `if a then 1 else 0`")
 }
 

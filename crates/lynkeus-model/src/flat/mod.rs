@@ -27,7 +27,7 @@ pub(crate) struct FlatModel {
     pub scopes: Vec<String>,
     pub declarations: Vec<Declaration>,
     /// of declarations, by label: what the library's type says of them
-    pub library: HashMap<String, &'static LibraryType>,
+    pub library: HashMap<String, LibraryType>,
     /// names of the members of each record, by its label
     pub records: HashMap<String, Vec<String>>,
     /// labels of constants that the text may not mean
@@ -40,38 +40,31 @@ pub(crate) struct FlatModel {
 /// The flat model of a class.
 pub(crate) fn flat_model(source: &str, ast: &mut Ast, place: usize) -> Result<FlatModel> {
     let classes = std::mem::take(&mut ast.classes);
-    let index = Classes::new(source, &classes);
     let mut flattening = Flattening {
         source,
-        classes: &classes,
-        index: &index,
+        classes: Classes::new(source, &classes),
         ast,
         model: FlatModel::default(),
         declared: HashSet::new(),
-        depth: 0,
     };
     let done = flattening.whole(place);
     let model = flattening.model;
-    drop(index);
     ast.classes = classes;
     done.map(|()| model)
 }
 
 struct Flattening<'a> {
     source: &'a str,
-    classes: &'a [Class],
-    index: &'a Classes<'a>,
+    classes: Classes<'a>,
     ast: &'a mut Ast,
     model: FlatModel,
     /// labels of the declarations so far
     declared: HashSet<String>,
-    /// records around the one that is written out
-    depth: usize,
 }
 
 impl<'a> Flattening<'a> {
     fn whole(&mut self, place: usize) -> Result<()> {
-        let Some(class) = self.classes.get(place) else {
+        let Some(class) = self.classes.list.get(place) else {
             return Ok(());
         };
         self.model.name = class.name;
@@ -79,52 +72,51 @@ impl<'a> Flattening<'a> {
         let own = |declaration: &Declaration| declaration.label.clone();
         self.declared = class.declarations.iter().map(own).collect();
         self.constants()?;
-        self.contents(class, &[], &mut vec![])?;
+        let mut scopes = vec![];
+        let parts = self.parts(class, vec![], &[], &mut scopes)?;
+        self.model.scopes = scopes;
+        for (class, modification) in parts {
+            for declaration in &class.declarations {
+                let declaration = modified(self.source, declaration, &modification);
+                self.declaration(declaration, &class.path)?;
+            }
+            let model = &mut self.model;
+            model.equations.extend(class.equations.iter().cloned());
+            model.initial.extend(class.initial.iter().cloned());
+            model.algorithms.extend(class.algorithms.iter().cloned());
+        }
         elements_by_themselves(self.source, self.ast, &mut self.model.declarations);
         Ok(())
     }
 
-    /// Declarations and equations of a class, those of its bases first.
-    fn contents(
-        &mut self,
-        class: &Class,
-        modification: &[Attribute],
-        above: &mut Vec<String>,
-    ) -> Result<()> {
-        if above.contains(&class.path) || self.model.scopes.len() > MAX_BASES {
+    /// What a class is made of: its bases before itself, each with what modifies its declarations,
+    /// outer modifications first.
+    fn parts(
+        &self,
+        class: &'a Class,
+        modification: Vec<Attribute>,
+        above: &[&str],
+        scopes: &mut Vec<String>,
+    ) -> Result<Vec<(&'a Class, Vec<Attribute>)>> {
+        if above.contains(&class.path.as_str()) || scopes.len() > MAX_BASES {
             let message = format!("`{}` is made from itself", class.path);
             return Err(Problem::new(class.name, message).hint("remove the `extends`"));
         }
-        above.push(class.path.clone());
-        self.model.scopes.push(class.path.clone());
+        let above = [above, &[&class.path]].concat();
+        scopes.push(class.path.clone());
+        let mut parts = vec![];
         for base in &class.bases {
-            let found = self.base(class, base.name)?;
-            let both: Vec<Attribute> = modification
-                .iter()
-                .chain(&base.modification)
-                .cloned()
-                .collect();
-            self.contents(found, &both, above)?;
+            let both = [&modification[..], &base.nested].concat();
+            let base = self.base(class, base.name)?;
+            parts.extend(self.parts(base, both, &above, scopes)?);
         }
-        for declaration in &class.declarations {
-            let mut declaration = declaration.clone();
-            modify(self.source, &mut declaration, modification);
-            self.declaration(declaration, &class.path)?;
-        }
-        self.model.equations.extend(class.equations.iter().cloned());
-        self.model.initial.extend(class.initial.iter().cloned());
-        self.model
-            .algorithms
-            .extend(class.algorithms.iter().cloned());
-        above.pop();
-        Ok(())
+        parts.push((class, modification));
+        Ok(parts)
     }
 
     fn base(&self, class: &Class, name: Span) -> Result<&'a Class> {
-        let classes = self.classes;
         let text = plain(name.text(self.source));
-        let found = self.index.class(&text, &[&class.path]);
-        match found.and_then(|place| classes.get(place)) {
+        match self.classes.of_name(&text, &[&class.path]) {
             Some(found) if found.kind != ClassKind::Function => Ok(found),
             _ => {
                 let message = format!("the model is not flat: `extends {text}` of another file");
@@ -135,40 +127,29 @@ impl<'a> Flattening<'a> {
 
     /// A declaration of numbers as it is, one of a record as those of its members.
     fn declaration(&mut self, mut declaration: Declaration, path: &str) -> Result<()> {
-        if let Some(span) = declaration.prefix.of_connector {
-            return Err(
-                Problem::new(span, "the model is not flat: it has a connector variable")
-                    .hint(HOW_TO_FLATTEN),
-            );
+        if let Some(span) = declaration.of_connector {
+            let message = "the model is not flat: it has a connector variable";
+            return Err(Problem::new(span, message).hint(HOW_TO_FLATTEN));
         }
         let mut path = path.to_owned();
         for _ in 0..MAX_BASES {
-            let TypeName::Named(name) = declaration.prefix.type_name else {
+            let TypeName::Named(name) = declaration.type_name else {
                 return self.scalar_or_array(declaration);
             };
             let text = plain(name.text(self.source));
-            let Some(place) = self.index.class(&text, &[&path]) else {
+            let Some(class) = self.classes.of_name(&text, &[&path]) else {
                 return self.of_library(declaration, &text, name, &path);
             };
-            let classes = self.classes;
-            let class = &classes[place];
             match (class.kind, &class.alias) {
                 (_, Some(alias)) => {
-                    declaration.prefix.type_name = alias.of;
+                    declaration.type_name = alias.type_name;
                     declaration.dimensions.extend(&alias.dimensions);
-                    inherit(
-                        self.source,
-                        &mut declaration.attributes,
-                        &alias.modification,
-                    );
-                    path = class
-                        .path
-                        .rsplit_once('.')
-                        .map_or("", |(above, _)| above)
-                        .to_owned();
+                    inherit(self.source, &mut declaration.attributes, &alias.attributes);
+                    let around = class.path.rsplit_once('.');
+                    path = around.map_or("", |(above, _)| above).to_owned();
                 }
                 (ClassKind::Type, None) if !class.literals.is_empty() => {
-                    declaration.prefix.type_name = TypeName::Integer;
+                    declaration.type_name = TypeName::Integer;
                 }
                 (ClassKind::Record, None) => return self.record(declaration, class),
                 _ => {
@@ -180,10 +161,8 @@ impl<'a> Flattening<'a> {
                 }
             }
         }
-        Err(Problem::new(
-            declaration.name,
-            "the type of this variable is made from itself",
-        ))
+        let message = "the type of this variable is made from itself";
+        Err(Problem::new(declaration.name, message))
     }
 
     fn of_library(
@@ -193,42 +172,39 @@ impl<'a> Flattening<'a> {
         name: Span,
         path: &str,
     ) -> Result<()> {
-        let full = self.index.full_names(text, &[path]);
+        let full = self.classes.full_names(text, &[path]);
         if let Some(found) = full.iter().find_map(|full| library::type_named(full)) {
-            declaration.prefix.type_name = TypeName::Real;
+            declaration.type_name = TypeName::Real;
             self.model.library.insert(declaration.label.clone(), found);
             return self.scalar_or_array(declaration);
         }
         if matches!(text, "StateSelect" | "AssertionLevel") {
-            declaration.prefix.type_name = TypeName::String;
+            declaration.type_name = TypeName::String;
             return self.scalar_or_array(declaration);
         }
         let shown = shortened(text);
-        let library = full.iter().any(|full| full.starts_with("Modelica."));
-        let message = match library {
-            true => format!("the library type `{shown}` is not known here"),
-            false => format!("unknown type `{shown}`"),
+        let (message, hint) = match full.iter().any(|full| full.starts_with("Modelica.")) {
+            true => (
+                format!("the library type `{shown}` is not known here"),
+                "write `Real` with `unit = \"…\"`; a component of the library makes a model \
+                 that is not flat: ",
+            ),
+            false => (
+                format!("unknown type `{shown}`"),
+                "components of other models are not supported: ",
+            ),
         };
-        let hint = match library {
-            true => "write `Real` with `unit = \"…\"`; a component of the library makes a model \
-                     that is not flat: "
-                .to_owned(),
-            false => "components of other models are not supported: ".to_owned(),
-        };
-        Err(Problem::new(name, message).hint(hint + HOW_TO_FLATTEN))
+        Err(Problem::new(name, message).hint(hint.to_owned() + HOW_TO_FLATTEN))
     }
 
     fn scalar_or_array(&mut self, declaration: Declaration) -> Result<()> {
-        if declaration.prefix.type_name == TypeName::String {
+        if declaration.type_name == TypeName::String {
             // a text takes no part in equations, nor does a choice of the library
-            return match declaration.prefix.variability {
-                Variability::Continuous => Err(Problem::new(
-                    declaration.name,
-                    "String variables are not supported",
-                )
-                .hint("remove it")),
-                _ => Ok(()),
-            };
+            if declaration.variability != Variability::Continuous {
+                return Ok(());
+            }
+            let message = "String variables are not supported";
+            return Err(Problem::new(declaration.name, message).hint("remove it"));
         }
         check_attributes(self.source, &declaration.attributes)?;
         if self.model.declarations.len() as u64 >= MAX_SCALARS {
@@ -245,17 +221,11 @@ impl<'a> Flattening<'a> {
 
 /// What a class is called: its path, but once where a package of the same name holds it.
 pub(crate) fn title(path: &str) -> &str {
-    match path.split_once('.') {
+    let halves = path.split_at_checked(path.len() / 2);
+    let halves = halves.and_then(|(package, rest)| Some((package, rest.strip_prefix('.')?)));
+    match halves {
         Some((package, model)) if package == model => model,
-        Some(_) => {
-            let half = path.len() / 2;
-            let (package, model) = (path.get(..half), path.get(half + 1..));
-            match (package, model) {
-                (Some(package), Some(model)) if package == model => model,
-                _ => path,
-            }
-        }
-        None => path,
+        _ => path,
     }
 }
 
@@ -268,85 +238,62 @@ fn elements_by_themselves(source: &str, ast: &Ast, declarations: &mut [Declarati
     let literal = |id: &ExprId| matches!(ast.expression(*id).kind, Kind::Integer(_));
     for declaration in declarations {
         let dimensions = &declaration.dimensions;
-        let repeated = count
-            .get(&declaration.label)
-            .is_some_and(|&count| count > 1);
+        let repeated = count.get(&declaration.label) > Some(&1);
         if !repeated || dimensions.is_empty() || !dimensions.iter().all(literal) {
             continue;
         }
-        let subscripts = dimensions
-            .iter()
-            .map(|id| ast.expression(*id).span.text(source));
-        let subscripts: Vec<&str> = subscripts.collect();
+        let subscript = |id: &ExprId| ast.expression(*id).span.text(source);
+        let subscripts: Vec<&str> = dimensions.iter().map(subscript).collect();
         declaration.label = format!("{}[{}]", declaration.label, subscripts.join(","));
         declaration.dimensions.clear();
     }
 }
 
 /// Attributes that a number may have.
-const KNOWN: [&str; 10] = [
-    "start",
-    "min",
-    "max",
-    "nominal",
-    "unit",
-    "displayUnit",
-    "quantity",
-    "fixed",
-    "stateSelect",
-    "unbounded",
-];
+const KNOWN: &str = "start min max nominal unit displayUnit quantity fixed stateSelect unbounded";
 
 /// Most members of members of records.
 const MAX_DEPTH: usize = 20;
 
-impl Flattening<'_> {
+impl<'a> Flattening<'a> {
     /// The members of a record, each declared under its full name.
-    pub(super) fn record(&mut self, record: Declaration, class: &Class) -> Result<()> {
-        self.depth += 1;
-        let done = self.record_here(record, class);
-        self.depth -= 1;
-        done
-    }
-
-    fn record_here(&mut self, record: Declaration, class: &Class) -> Result<()> {
-        if self.depth > MAX_DEPTH {
+    fn record(&mut self, record: Declaration, class: &'a Class) -> Result<()> {
+        if record.label.matches('.').count() > MAX_DEPTH {
             let message = format!("the record `{}` holds itself", class.path);
             return Err(Problem::new(record.name, message));
         }
-        let mut members: Vec<(Declaration, String)> = vec![];
-        self.members(class, &mut members, 0)?;
-        let names = members
-            .iter()
-            .map(|(member, _)| member.label.clone())
-            .collect();
+        let parts = self.parts(class, vec![], &[], &mut vec![])?;
+        let members = parts.iter().flat_map(|(class, modification)| {
+            let declarations = class.declarations.iter();
+            declarations.map(move |member| (member, modification, &class.path))
+        });
+        let names = members.clone().map(|(member, ..)| member.label.clone());
+        let names = names.collect();
         self.model.records.insert(record.label.clone(), names);
-        for (mut member, path) in members {
+        for (member, modification, path) in members {
             let name = member.label.clone();
+            let member = modified(self.source, member, modification);
             let default = member.binding;
-            modify(self.source, &mut member, &record.attributes);
+            let mut member = modified(self.source, &member, &record.attributes);
             if record.binding.is_none() && member.binding == default {
                 self.check_default(&member, class)?;
             }
             member.label = format!("{}.{name}", record.label);
-            let sized = !record.dimensions.is_empty();
-            let mut dimensions = record.dimensions.clone();
-            dimensions.append(&mut member.dimensions);
-            member.dimensions = dimensions;
+            member.dimensions.splice(0..0, record.dimensions.clone());
             if let Some(value) = record.binding {
                 member.binding = Some(self.ast.member(value, name));
-            } else if sized {
+            } else if !record.dimensions.is_empty() {
                 member.binding = None;
             }
-            if member.prefix.variability == Variability::Continuous {
-                member.prefix.variability = record.prefix.variability;
+            if member.variability == Variability::Continuous {
+                member.variability = record.variability;
             }
-            member.prefix.is_final |= record.prefix.is_final;
-            member.prefix.causality = record.prefix.causality;
+            member.is_final |= record.is_final;
+            member.causality = record.causality;
             member.name = record.name;
             member.package.clone_from(&record.package);
             if !self.declared.contains(&member.label) {
-                self.declaration(member, &path)?;
+                self.declaration(member, path)?;
             }
         }
         Ok(())
@@ -357,13 +304,14 @@ impl Flattening<'_> {
         let Some(default) = member.binding else {
             return Ok(());
         };
-        let is_sibling = |name: &str| class.declarations.iter().any(|d| d.label == name);
+        let is_known = |name: &str| {
+            let mut siblings = class.declarations.iter();
+            siblings.any(|d| d.label == name) || self.declared.contains(name)
+        };
         for part in self.ast.parts(default) {
             let name = plain(part.span.text(self.source));
             let first = name.split(['.', '[']).next().unwrap_or_default();
-            if matches!(part.kind, Kind::Name)
-                && (is_sibling(first) || self.declared.contains(first))
-            {
+            if matches!(part.kind, Kind::Name) && is_known(first) {
                 let (label, record) = (&member.label, &class.path);
                 let message = format!("the default of `{label}` in `{record}` needs `{first}`");
                 return Err(Problem::new(part.span, message).hint(format!(
@@ -373,70 +321,40 @@ impl Flattening<'_> {
         }
         Ok(())
     }
-
-    /// Members of a record and of its bases, each with the class it stands in.
-    fn members(
-        &self,
-        class: &Class,
-        into: &mut Vec<(Declaration, String)>,
-        depth: usize,
-    ) -> Result<()> {
-        if depth > MAX_DEPTH {
-            let message = format!("`{}` is made from itself", class.path);
-            return Err(Problem::new(class.name, message).hint("remove the `extends`"));
-        }
-        for base in &class.bases {
-            let from = into.len();
-            self.members(self.base(class, base.name)?, into, depth + 1)?;
-            for (member, _) in into.iter_mut().skip(from) {
-                modify(self.source, member, &base.modification);
-            }
-        }
-        let own = class.declarations.iter().cloned();
-        into.extend(own.map(|member| (member, class.path.clone())));
-        Ok(())
-    }
 }
 
-/// Applies what modifications say of a declaration, if they do; outer ones stand first and win.
-pub(super) fn modify(source: &str, declaration: &mut Declaration, modification: &[Attribute]) {
-    for given in modification.iter().rev() {
-        if plain(given.name.text(source)) != declaration.label {
-            continue;
-        }
-        if given.value.is_some() {
-            declaration.binding = given.value;
-        }
-        let own = std::mem::replace(&mut declaration.attributes, given.nested.clone());
-        inherit(source, &mut declaration.attributes, &own);
+/// A declaration with what modifications say of it; outer ones stand first and win.
+fn modified(source: &str, declaration: &Declaration, modification: &[Attribute]) -> Declaration {
+    let mut changed = declaration.clone();
+    let is_meant = |given: &&Attribute| plain(given.name.text(source)) == declaration.label;
+    for given in modification.iter().rev().filter(is_meant) {
+        changed.binding = given.value.or(changed.binding);
+        let own = std::mem::replace(&mut changed.attributes, given.nested.clone());
+        inherit(source, &mut changed.attributes, &own);
     }
+    changed
 }
 
 /// Adds attributes that are not given yet.
-pub(super) fn inherit(source: &str, attributes: &mut Vec<Attribute>, from: &[Attribute]) {
+fn inherit(source: &str, attributes: &mut Vec<Attribute>, from: &[Attribute]) {
     for attribute in from {
-        let name = attribute.name.text(source);
-        if attributes
-            .iter()
-            .all(|given| given.name.text(source) != name)
-        {
+        let is_other = |given: &Attribute| given.name.text(source) != attribute.name.text(source);
+        if attributes.iter().all(is_other) {
             attributes.push(attribute.clone());
         }
     }
 }
 
 /// Refuses attributes that numbers do not have.
-pub(super) fn check_attributes(source: &str, attributes: &[Attribute]) -> Result<()> {
-    let stranger = |attribute: &&Attribute| !KNOWN.contains(&attribute.name.text(source));
-    match attributes.iter().find(stranger) {
-        None => Ok(()),
-        Some(found) => {
-            let text = shortened(found.name.text(source));
-            let message = format!("unknown attribute `{text}`");
-            let hint = format!("the attributes are {}", KNOWN.join(", "));
-            Err(Problem::new(found.name, message).hint(hint))
-        }
-    }
+fn check_attributes(source: &str, attributes: &[Attribute]) -> Result<()> {
+    let is_known = |name: &str| KNOWN.split(' ').any(|known| known == name);
+    let mut names = attributes.iter().map(|attribute| attribute.name);
+    let Some(name) = names.find(|name| !is_known(name.text(source))) else {
+        return Ok(());
+    };
+    let message = format!("unknown attribute `{}`", shortened(name.text(source)));
+    let hint = format!("the attributes are {}", KNOWN.replace(' ', ", "));
+    Err(Problem::new(name, message).hint(hint))
 }
 
 /// The label of the constant of a package: its name in full behind a dot, as no name of a model
@@ -446,17 +364,14 @@ pub(crate) fn constant_label(full: &str) -> String {
 }
 
 impl Flattening<'_> {
-    pub(super) fn constants(&mut self) -> Result<()> {
+    fn constants(&mut self) -> Result<()> {
         let named = self.names();
-        let classes = self.classes;
-        let packages = classes
-            .iter()
-            .filter(|class| class.kind == ClassKind::Package);
-        for package in packages {
+        let classes = self.classes.list.iter();
+        for package in classes.filter(|class| class.kind == ClassKind::Package) {
             for constant in &package.declarations {
                 let full = format!("{}.{}", package.path, constant.label);
                 let label = constant_label(&full);
-                let is_constant = constant.prefix.variability != Variability::Continuous;
+                let is_constant = constant.variability != Variability::Continuous;
                 let is_meant = is_meant(&named, &full);
                 // its last part alone may be the name of a variable
                 let may_be_meant = is_meant || named.contains(last(&full));
@@ -466,7 +381,7 @@ impl Flattening<'_> {
                 let mut copy = constant.clone();
                 copy.label.clone_from(&label);
                 copy.package = Some(package.path.clone());
-                copy.prefix.variability = Variability::Constant;
+                copy.variability = Variability::Constant;
                 let declared = self.declaration(copy, &package.path);
                 // what nobody may mean must not end the reading
                 if is_meant {
@@ -483,7 +398,7 @@ impl Flattening<'_> {
     /// full; with those of what they may be members of.
     fn names(&self) -> HashSet<String> {
         let mut imported: HashMap<&str, Vec<&str>> = HashMap::new();
-        for import in self.classes.iter().flat_map(|class| &class.imports) {
+        for import in self.classes.list.iter().flat_map(|class| &class.imports) {
             if let Some(short) = &import.short {
                 imported.entry(short).or_default().push(&import.full);
             }
@@ -495,41 +410,36 @@ impl Flattening<'_> {
             }
             let name = plain(expression.span.text(self.source));
             let first = name.split('.').next().unwrap_or_default();
-            for full in imported.get(first).into_iter().flatten() {
-                insert(&mut found, &format!("{full}{}", &name[first.len()..]));
+            let imported = imported.get(first).into_iter().flatten();
+            let mut names: Vec<String> = imported
+                .map(|full| format!("{full}{}", &name[first.len()..]))
+                .collect();
+            names.push(name.into_owned());
+            for name in &names {
+                // what encloses a name that is known is known as well
+                enclosing(name).all(|name| found.insert(name.to_owned()));
             }
-            insert(&mut found, &name);
         }
         found
     }
 }
 
-/// A name and the names before each of its dots.
-fn insert(names: &mut HashSet<String>, name: &str) {
-    let mut rest = Some(name);
-    while let Some(name) = rest {
-        if !names.insert(name.to_owned()) {
-            return;
-        }
-        rest = name.rsplit_once('.').map(|(above, _)| above);
-    }
+/// A name and the names before each of its dots, the longest first.
+fn enclosing(name: &str) -> impl Iterator<Item = &str> {
+    std::iter::successors(Some(name), |name| Some(name.rsplit_once('.')?.0))
 }
 
 /// Whether a name in full stands in the text as it is, or behind one of its dots.
 fn is_meant(names: &HashSet<String>, full: &str) -> bool {
-    let mut rest = full;
-    while let Some((_, below)) = rest.split_once('.') {
-        if names.contains(rest) {
-            return true;
-        }
-        rest = below;
-    }
-    false
+    let behind = std::iter::successors(Some(full), |name| Some(name.split_once('.')?.1));
+    let mut behind = behind.filter(|name| name.contains('.'));
+    behind.any(|name| names.contains(name))
 }
 
 /// The classes of a text by their names in full.
 #[derive(Debug, Default)]
 pub(crate) struct Classes<'a> {
+    list: &'a [Class],
     by_path: HashMap<&'a str, usize>,
     imports: HashMap<&'a str, &'a [Import]>,
     /// last parts of the names that lead to classes
@@ -540,7 +450,10 @@ pub(crate) struct Classes<'a> {
 
 impl<'a> Classes<'a> {
     pub(crate) fn new(source: &str, classes: &'a [Class]) -> Self {
-        let mut index = Self::default();
+        let mut index = Self {
+            list: classes,
+            ..Self::default()
+        };
         for (place, class) in classes.iter().enumerate() {
             index.by_path.entry(&class.path).or_insert(place);
             index.last.insert(last(&class.path));
@@ -558,16 +471,17 @@ impl<'a> Classes<'a> {
         index
     }
 
+    fn of_name(&self, name: &str, scopes: &[&str]) -> Option<&'a Class> {
+        self.list.get(self.class(name, scopes)?)
+    }
+
     /// The class that a name means in the first of some scopes that know it.
     pub(crate) fn class(&self, name: &str, scopes: &[&str]) -> Option<usize> {
         if !self.last.contains(last(name)) {
             return None;
         }
-        let candidates = self.full_names(name, scopes);
-        let mut found = candidates
-            .iter()
-            .map(|full| self.by_path.get(full.as_str()));
-        found.find_map(|place| place.copied())
+        let mut candidates = self.full_names(name, scopes).into_iter();
+        candidates.find_map(|full| self.by_path.get(full.as_str()).copied())
     }
 
     /// The ordinal of a literal of an enumeration.
@@ -575,34 +489,26 @@ impl<'a> Classes<'a> {
         if self.literals.is_empty() || !name.contains('.') {
             return None;
         }
-        let candidates = self.full_names(name, scopes);
-        candidates
-            .iter()
-            .find_map(|full| self.literals.get(full).copied())
+        let mut candidates = self.full_names(name, scopes).into_iter();
+        candidates.find_map(|full| self.literals.get(&full).copied())
     }
 
     /// What a name may be in full, nearest first.
     pub(crate) fn full_names(&self, name: &str, scopes: &[&str]) -> Vec<String> {
         let mut found = vec![];
-        let (first, rest) = match name.split_once('.') {
-            Some((first, rest)) => (first, Some(rest)),
-            None => (name, None),
-        };
-        for scope in scopes {
-            let mut around = Some(*scope).filter(|scope| !scope.is_empty());
-            while let Some(path) = around {
-                found.push(format!("{path}.{name}"));
-                for import in self.imports.get(path).copied().unwrap_or_default() {
-                    match &import.short {
-                        Some(short) if short == first => found.push(match rest {
-                            Some(rest) => format!("{}.{rest}", import.full),
-                            None => import.full.clone(),
-                        }),
-                        None => found.push(format!("{}.{name}", import.full)),
-                        _ => {}
+        let first = name.split('.').next().unwrap_or_default();
+        let behind = &name[first.len()..];
+        let scopes = scopes.iter().filter(|scope| !scope.is_empty());
+        for path in scopes.flat_map(|scope| enclosing(scope)) {
+            found.push(format!("{path}.{name}"));
+            for import in self.imports.get(path).copied().unwrap_or_default() {
+                match &import.short {
+                    Some(short) if short == first => {
+                        found.push(format!("{}{behind}", import.full));
                     }
+                    None => found.push(format!("{}.{name}", import.full)),
+                    _ => {}
                 }
-                around = path.rsplit_once('.').map(|(above, _)| above);
             }
         }
         found.push(name.to_owned());

@@ -14,14 +14,10 @@ use crate::diagnostic::{Problem, Result, Span};
 use crate::names::choose;
 use crate::syntax::check_length;
 use crate::{LoadOptions, Plant};
-use lexer::Head;
 
 /// The plant of a text.
 pub(crate) fn plant(source: &str, file_name: &str, options: &LoadOptions) -> Result<Plant> {
-    let heads = heads(source)?;
-    let stem = stem(file_name);
-    let name = |head: &Head| head.name.map_or(stem, |name| name.text(source));
-    let models: Vec<(&str, Span)> = heads.iter().map(|head| (name(head), head.place)).collect();
+    let models = models(source, file_name)?;
     let none = || {
         Problem::new(Span::default(), "the text holds no `@ODEmodel`")
             .hint("a model reads `name = @ODEmodel(x'(t) = …, y(t) = …)`")
@@ -34,25 +30,17 @@ pub(crate) fn plant(source: &str, file_name: &str, options: &LoadOptions) -> Res
         let hint = "give each a name of its own: `name = @ODEmodel(…)`";
         return Err(Problem::new(*other, message).hint(hint));
     }
-    let model = parser::parse(source, head)?;
-    let roles = build::roles(source, &model)?;
-    build::plant(source, chosen, &model, &roles, options)
+    let (model, ast) = parser::parse(source, head)?;
+    build::plant(source, chosen, &model, &ast, options)
 }
 
-/// The names of the models of a text.
-pub(crate) fn names(source: &str, file_name: &str) -> Result<Vec<String>> {
-    let name = |head: Head| head.name.map_or(stem(file_name), |name| name.text(source));
-    let heads = heads(source)?.into_iter();
-    Ok(heads.map(|head| name(head).to_owned()).collect())
-}
-
-fn heads(source: &str) -> Result<Vec<Head>> {
+/// The models of a text, in its order: their names, and where they begin. One that is assigned to
+/// no variable is called as the file is.
+pub(crate) fn models<'s>(source: &'s str, file_name: &'s str) -> Result<Vec<(&'s str, Span)>> {
     check_length(source)?;
-    lexer::heads(source)
-}
-
-/// What a model without a name is called.
-fn stem(file_name: &str) -> &str {
     let stem = Path::new(file_name).file_stem();
-    stem.and_then(|stem| stem.to_str()).unwrap_or("model")
+    lexer::heads(
+        source,
+        stem.and_then(|stem| stem.to_str()).unwrap_or("model"),
+    )
 }

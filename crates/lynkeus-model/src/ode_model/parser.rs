@@ -1,48 +1,86 @@
 //! A model's equations to a syntax tree; expressions have the precedence they have in Julia.
 
-use super::lexer::{Lexer, Mention};
+use lynkeus_expr::Binary;
+
+use super::lexer::token;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{Ast, BinaryOperator, Call, ExprId, Kind, UnaryOperator};
-use crate::syntax::{Parser, Symbol, Token, shortened};
+use crate::syntax::ast::{Ast, Call, ExprId, Kind};
+use crate::syntax::{Language, Lexer, PRODUCT, Parser, SUM, Token, shortened};
 
-/// A parsed model.
-pub(super) struct ParsedModel {
-    /// the word `@ODEmodel`
-    pub head: Span,
-    pub equations: Vec<Equation>,
-    /// names on the right sides, in order
-    pub mentions: Vec<Mention>,
-    pub ast: Ast,
+/// What a name is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    State,
+    Output,
+    Input,
+    Parameter,
 }
 
-/// `x'(t) = right` or `y(t) = right`.
-pub(super) struct Equation {
-    pub name: Span,
-    pub is_derivative: bool,
-    pub right: ExprId,
+/// A model while it is read, and what was found so far.
+pub(super) struct ParsedModel<'s> {
+    lexer: Lexer<'s>,
+    /// the word `@ODEmodel`
+    pub head: Span,
+    /// names on the left sides with what is on the right
+    pub equations: Vec<(Span, Role, ExprId)>,
+    /// names on the right sides, in order
+    pub mentions: Vec<(Span, Role)>,
 }
 
 /// Parses the model that begins with the word at `head`.
-pub(super) fn parse(source: &str, head: Span) -> Result<ParsedModel> {
-    let mut parser = Parser::behind(head, source, Lexer::new(source, head));
-    parser.opening()?;
-    let equations = parser.equations(head)?;
-    Ok(ParsedModel {
+pub(super) fn parse(source: &str, head: Span) -> Result<(ParsedModel<'_>, Ast)> {
+    let mut lexer = Lexer::new(source);
+    lexer.position = head.end as usize;
+    let model = ParsedModel {
+        lexer,
         head,
-        equations,
-        mentions: parser.lexer.mentions,
-        ast: parser.ast,
-    })
+        equations: vec![],
+        mentions: vec![],
+    };
+    let mut parser = Parser::behind(head, source, model);
+    parser.opening()?;
+    parser.equations(head)?;
+    Ok((parser.language, parser.ast))
 }
 
-impl Parser<'_, Lexer<'_>> {
+impl<'s> Language<'s> for ParsedModel<'s> {
+    const NESTED: &'static str = "write it with fewer parentheses";
+
+    fn next(&mut self) -> Result<(Token, Span)> {
+        token(&mut self.lexer)
+    }
+
+    fn level(operator: &str) -> Option<u8> {
+        Some(match operator {
+            "+" | "-" => SUM,
+            "*" | "/" => PRODUCT,
+            // `1/2//3` is `1/(2//3)`
+            "//" => PRODUCT + 1,
+            _ => return None,
+        })
+    }
+
+    fn operand(parser: &mut Parser<'s, Self>, _least: u8) -> Result<ExprId> {
+        parser.operand()
+    }
+
+    fn too_large(&self, limit: &str, span: Span) -> Box<Problem> {
+        let message = format!("the model has more than {limit} operands and operators");
+        Problem::new(span, message)
+    }
+
+    fn hint_at_end(&self) -> Option<String> {
+        let line = self.head.line(self.lexer.source);
+        Some(format!("close the model of line {line} with `)`"))
+    }
+}
+
+impl<'s> Parser<'s, ParsedModel<'s>> {
     /// The parenthesis behind `@ODEmodel`.
     fn opening(&mut self) -> Result<()> {
-        let rest = self
-            .source
-            .get(self.span.end as usize..)
-            .unwrap_or_default();
+        let rest = self.source.get(self.span.end as usize..);
+        let rest = rest.unwrap_or_default();
         if !rest.starts_with('(') {
             let problem = Problem::new(self.span, "expected `(` directly behind `@ODEmodel`");
             return Err(problem.hint("a model reads `@ODEmodel(x'(t) = …, y(t) = …)`"));
@@ -52,11 +90,10 @@ impl Parser<'_, Lexer<'_>> {
         Ok(())
     }
 
-    fn equations(&mut self, head: Span) -> Result<Vec<Equation>> {
-        let mut equations = vec![];
-        while !self.at(Symbol::CloseParen) {
-            equations.push(self.equation()?);
-            if self.at(Symbol::CloseParen) || self.accept(Symbol::Comma)? {
+    fn equations(&mut self, head: Span) -> Result<()> {
+        while !self.at(")") {
+            self.equation()?;
+            if self.at(")") || self.accept(",")? {
                 continue;
             }
             let between = Span::new(self.last.end as usize, self.span.start as usize);
@@ -65,41 +102,42 @@ impl Parser<'_, Lexer<'_>> {
                 return Err(self.unexpected("an operator, `,` or `)`"));
             }
         }
-        if equations.is_empty() {
+        if self.language.equations.is_empty() {
             let problem = Problem::new(head, "the model has no equations");
             return Err(problem.hint("write `x'(t) = …` for states and `y(t) = …` for outputs"));
         }
-        Ok(equations)
+        Ok(())
     }
 
-    fn equation(&mut self) -> Result<Equation> {
+    fn equation(&mut self) -> Result<()> {
         let name = self.left_name()?;
-        let is_derivative = self.accept(Symbol::Prime)?;
-        if is_derivative && self.at(Symbol::Prime) {
+        let is_derivative = self.accept("'")?;
+        if is_derivative && self.at("'") {
             return Err(self.second_derivative(name));
         }
-        if self.at(Symbol::Equal) {
+        if self.at("=") {
             let text = name.text(self.source);
             let prime = if is_derivative { "'" } else { "" };
             let problem = self.unexpected(&format!("`(t)` behind `{text}{prime}`"));
             let hint = format!("write `{text}'(t) = …` for a state, `{text}(t) = …` for an output");
             return Err(problem.hint(hint));
         }
-        self.expect(Symbol::OpenParen)?;
+        self.expect("(")?;
         self.time_argument(name)?;
-        if self.at(Symbol::Prime) {
+        if self.at("'") {
             let text = name.text(self.source);
             let problem = self.unexpected("`=`");
             return Err(problem.hint(format!("a derivative reads `{text}'(t)`")));
         }
-        self.expect(Symbol::Equal)?;
+        self.expect("=")?;
         let right = self.expression()?;
         self.count(1)?;
-        Ok(Equation {
-            name,
-            is_derivative,
-            right,
-        })
+        let role = match is_derivative {
+            true => Role::State,
+            false => Role::Output,
+        };
+        self.language.equations.push((name, role, right));
+        Ok(())
     }
 
     fn left_name(&mut self) -> Result<Span> {
@@ -114,7 +152,7 @@ impl Parser<'_, Lexer<'_>> {
         })
     }
 
-    fn second_derivative(&self, name: Span) -> Problem {
+    fn second_derivative(&self, name: Span) -> Box<Problem> {
         let text = name.text(self.source);
         let span = name.to(self.span);
         Problem::new(span, "derivatives of higher order are not supported").hint(format!(
@@ -126,7 +164,7 @@ impl Parser<'_, Lexer<'_>> {
     pub(super) fn time_argument(&mut self, name: Span) -> Result<()> {
         if self.at_time() {
             self.advance()?;
-            if self.accept(Symbol::CloseParen)? {
+            if self.accept(")")? {
                 return Ok(());
             }
         }
@@ -141,11 +179,6 @@ impl Parser<'_, Lexer<'_>> {
     }
 }
 
-/// How tightly operators bind, loosest first. `1/2//3` is `1/(2//3)`.
-const SUM: u8 = 0;
-const PRODUCT: u8 = 1;
-const RATIONAL: u8 = 2;
-
 /// Functions of numbers. The original takes rational right sides only.
 const FUNCTIONS: [&str; 17] = [
     "exp", "log", "log10", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh",
@@ -157,44 +190,22 @@ pub(super) fn is_elementary(name: &str) -> bool {
     FUNCTIONS.contains(&name)
 }
 
-impl Parser<'_, Lexer<'_>> {
+impl<'s> Parser<'s, ParsedModel<'s>> {
     /// Any expression.
     pub(super) fn expression(&mut self) -> Result<ExprId> {
         self.operators(SUM)
     }
 
-    /// Operands joined by operators that bind at least as tightly as `least`.
-    fn operators(&mut self, least: u8) -> Result<ExprId> {
-        self.nested(|parser| parser.operators_here(least))
-    }
-
-    /// Operators of one level make one flat chain, so that the depth of the tree does not grow
-    /// with its length.
-    fn operators_here(&mut self, least: u8) -> Result<ExprId> {
-        let (start, first) = (self.span, self.next_id());
-        let mut left = self.operand()?;
-        while let Some((_, level)) = infix(self.token).filter(|(_, level)| *level >= least) {
-            let mut rest = vec![];
-            while let Some((operator, _)) = infix(self.token).filter(|(_, next)| *next == level) {
-                self.advance()?;
-                self.count(1)?;
-                rest.push((operator, self.operators(level + 1)?));
-            }
-            left = self.push(Kind::Chain(left, rest), start, first)?;
-        }
-        Ok(left)
-    }
-
     /// A power with signs before it: `-x^2` is −(x²).
     fn operand(&mut self) -> Result<ExprId> {
-        let operator = match self.token {
-            Token::Symbol(Symbol::Minus) => UnaryOperator::Minus,
-            Token::Symbol(Symbol::Plus) => UnaryOperator::Plus,
+        let kind = match self.token {
+            Token::Fixed("-") => Kind::Minus,
+            Token::Fixed("+") => Kind::Plus,
             _ => return self.power(),
         };
         let (start, first) = (self.advance()?, self.next_id());
         let operand = self.nested(Self::operand)?;
-        self.push(Kind::Unary(operator, operand), start, first)
+        self.push(kind(operand), start, first)
     }
 
     /// `a^b`, from the right; or a number directly before its factor, which binds tighter than
@@ -204,15 +215,12 @@ impl Parser<'_, Lexer<'_>> {
         let is_number = self.token == Token::Real;
         let base = self.primary()?;
         let is_adjacent = self.last.end == self.span.start;
-        if is_number
-            && is_adjacent
-            && (self.token == Token::Identifier || self.at(Symbol::OpenParen))
-        {
+        if is_number && is_adjacent && (self.token == Token::Identifier || self.at("(")) {
             let factor = self.nested(Self::power)?;
-            let product = vec![(BinaryOperator::Multiply, factor)];
+            let product = vec![(Binary::Mul, false, factor)];
             return self.push(Kind::Chain(base, product), start, first);
         }
-        if !self.accept(Symbol::Power)? {
+        if !self.accept("^")? {
             return Ok(base);
         }
         let exponent = self.nested(Self::operand)?;
@@ -223,13 +231,13 @@ impl Parser<'_, Lexer<'_>> {
         match self.token {
             Token::Real => self.number(),
             Token::Identifier => self.name(),
-            Token::Symbol(Symbol::OpenParen) => {
+            Token::Fixed("(") => {
                 self.advance()?;
                 let inner = self.expression()?;
-                self.expect(Symbol::CloseParen)?;
+                self.expect(")")?;
                 Ok(inner)
             }
-            Token::Symbol(Symbol::Equal) => {
+            Token::Fixed("=") => {
                 let problem = self.unexpected("an operand");
                 Err(problem.hint("an equation has one `=`"))
             }
@@ -249,10 +257,10 @@ impl Parser<'_, Lexer<'_>> {
         let first = self.next_id();
         let is_time = self.at_time();
         let name = self.advance()?;
-        if self.at(Symbol::Prime) {
+        if self.at("'") {
             return Err(self.derivative(name));
         }
-        let is_function = self.at(Symbol::OpenParen);
+        let is_function = self.at("(");
         if is_function && is_elementary(name.text(self.source)) {
             return self.call(name, first);
         }
@@ -262,13 +270,12 @@ impl Parser<'_, Lexer<'_>> {
                 return Err(self.unknown_function(name));
             }
             self.time_argument(name)?;
-            if self.at(Symbol::Prime) {
+            if self.at("'") {
                 return Err(self.derivative(name));
             }
-        }
-        if is_function || !is_time {
-            let mention = Mention { name, is_function };
-            self.lexer.mentions.push(mention);
+            self.language.mentions.push((name, Role::Input));
+        } else if !is_time {
+            self.language.mentions.push((name, Role::Parameter));
         }
         self.push_at(Kind::Name, name, first)
     }
@@ -276,23 +283,22 @@ impl Parser<'_, Lexer<'_>> {
     fn call(&mut self, function: Span, first: ExprId) -> Result<ExprId> {
         self.advance()?;
         let mut arguments = vec![];
-        while !self.at(Symbol::CloseParen) {
+        while !self.at(")") {
             arguments.push(self.expression()?);
-            if !self.accept(Symbol::Comma)? {
+            if !self.accept(",")? {
                 break;
             }
         }
-        self.expect(Symbol::CloseParen)?;
+        self.expect(")")?;
         let call = Call {
-            named: vec![],
             function,
             arguments,
-            iterators: vec![],
+            ..Call::default()
         };
         self.push(Kind::Call(call), function, first)
     }
 
-    fn derivative(&self, name: Span) -> Problem {
+    fn derivative(&self, name: Span) -> Box<Problem> {
         let text = name.text(self.source);
         let span = name.to(self.span);
         Problem::new(span, "a derivative on a right side is not supported").hint(format!(
@@ -300,7 +306,7 @@ impl Parser<'_, Lexer<'_>> {
         ))
     }
 
-    fn unknown_function(&self, name: Span) -> Problem {
+    fn unknown_function(&self, name: Span) -> Box<Problem> {
         let text = name.text(self.source);
         let hint = did_you_mean(text, FUNCTIONS.into_iter()).unwrap_or_else(|| {
             let known = FUNCTIONS.join(" ");
@@ -308,19 +314,5 @@ impl Parser<'_, Lexer<'_>> {
         });
         let message = format!("unknown function `{}`", shortened(text));
         Problem::new(name, message).hint(hint)
-    }
-}
-
-fn infix(token: Token) -> Option<(BinaryOperator, u8)> {
-    let Token::Symbol(symbol) = token else {
-        return None;
-    };
-    match symbol {
-        Symbol::Plus => Some((BinaryOperator::Add, SUM)),
-        Symbol::Minus => Some((BinaryOperator::Subtract, SUM)),
-        Symbol::Times => Some((BinaryOperator::Multiply, PRODUCT)),
-        Symbol::Over => Some((BinaryOperator::Divide, PRODUCT)),
-        Symbol::Rational => Some((BinaryOperator::Divide, RATIONAL)),
-        _ => None,
     }
 }

@@ -1,6 +1,8 @@
 //! The syntax tree. Expressions live in one arena: a chain of a million terms is flat,
 //! and nothing here needs deep recursion to be read or dropped.
 
+use lynkeus_expr::Binary;
+
 use crate::diagnostic::Span;
 
 /// Index of an expression in [`Ast::expressions`]; operands come before their users.
@@ -79,17 +81,23 @@ pub(crate) enum Kind {
     Matrix(Vec<Vec<ExprId>>),
     /// `{e for i in r}`
     Comprehension(ExprId, Vec<ForIndex>),
-    Unary(UnaryOperator, ExprId),
+    Plus(ExprId),
+    Minus(ExprId),
+    Not(ExprId),
     /// operators of one precedence, from the left
-    Chain(ExprId, Vec<(BinaryOperator, ExprId)>),
+    Chain(ExprId, Vec<Term>),
     /// base, exponent, elementwise
     Power(ExprId, ExprId, bool),
-    Relation(Relation, ExprId, ExprId),
+    /// `<` and its like, as it is written
+    Relation(&'static str, ExprId, ExprId),
     /// conditions with values, and the value of `else`
     If(Vec<(ExprId, ExprId)>, ExprId),
     /// start, step, stop
     Range(ExprId, Option<ExprId>, ExprId),
 }
+
+/// An operator, whether it is applied element by element, and the operand behind it.
+pub(crate) type Term = (Binary, bool, ExprId);
 
 /// One part of a dotted name.
 #[derive(Debug)]
@@ -98,7 +106,7 @@ pub(crate) struct PathPart {
     pub subscripts: Vec<ExprId>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Call {
     pub function: Span,
     pub arguments: Vec<ExprId>,
@@ -106,37 +114,6 @@ pub(crate) struct Call {
     pub named: Vec<(Span, ExprId)>,
     /// of `sum(e for i in r)`
     pub iterators: Vec<ForIndex>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum UnaryOperator {
-    Plus,
-    Minus,
-    Not,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum BinaryOperator {
-    Add,
-    Subtract,
-    Multiply,
-    Divide,
-    ElementAdd,
-    ElementSubtract,
-    ElementMultiply,
-    ElementDivide,
-    And,
-    Or,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Relation {
-    Less,
-    LessEqual,
-    Greater,
-    GreaterEqual,
-    Equal,
-    NotEqual,
 }
 
 /// `name in range`
@@ -147,9 +124,10 @@ pub(crate) struct ForIndex {
 }
 
 /// What kind of class it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum ClassKind {
     /// `model`, `class` and `block`
+    #[default]
     Model,
     Package,
     Record,
@@ -159,7 +137,7 @@ pub(crate) enum ClassKind {
 }
 
 /// A class with its contents as they are written.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Class {
     pub kind: ClassKind,
     pub is_partial: bool,
@@ -170,20 +148,14 @@ pub(crate) struct Class {
     pub equations: Vec<Equation>,
     pub initial: Vec<Equation>,
     pub algorithms: Vec<Vec<Statement>>,
-    pub bases: Vec<Base>,
+    /// `extends Name(k = 2);`
+    pub bases: Vec<Attribute>,
     pub imports: Vec<Import>,
-    /// of `type Angle = Real(unit = "rad")`
-    pub alias: Option<Alias>,
+    /// of `type Angle = Real(unit = "rad")`: what its variables are declared as
+    pub alias: Option<Declaration>,
     /// of `type Kind = enumeration(one, two)`
     pub literals: Vec<Span>,
     pub is_external: bool,
-}
-
-/// `extends Name(k = 2);`
-#[derive(Clone, Debug)]
-pub(crate) struct Base {
-    pub name: Span,
-    pub modification: Vec<Attribute>,
 }
 
 /// `import Name;`, `import Short = Name;` or `import Name.*;`
@@ -194,31 +166,26 @@ pub(crate) struct Import {
     pub full: String,
 }
 
-/// The class that a short definition stands for.
-#[derive(Clone, Debug)]
-pub(crate) struct Alias {
-    pub of: TypeName,
-    pub dimensions: Vec<ExprId>,
-    pub modification: Vec<Attribute>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Variability {
     Parameter,
     Constant,
+    #[default]
     Continuous,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Causality {
     Input,
     Output,
+    #[default]
     Local,
 }
 
 /// The types that are built in, or the name of another.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum TypeName {
+    #[default]
     Real,
     Integer,
     Boolean,
@@ -226,32 +193,18 @@ pub(crate) enum TypeName {
     Named(Span),
 }
 
-/// What stands before the names of a declaration.
-#[derive(Clone, Debug)]
-pub(crate) struct Prefix {
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Declaration {
     pub is_final: bool,
     pub variability: Variability,
     pub causality: Causality,
     /// `flow` or `stream`, where it is written
     pub of_connector: Option<Span>,
     pub type_name: TypeName,
-    /// of `Real[N] x`
-    pub dimensions: Vec<ExprId>,
-}
-
-impl Prefix {
-    pub(crate) fn is_integer(&self) -> bool {
-        self.type_name == TypeName::Integer
-    }
-}
-
-#[derive(Clone, Debug)]
-pub(crate) struct Declaration {
-    pub prefix: Prefix,
     pub name: Span,
     /// the name without quotes, members of records in full: `r1.p.v`, `x[3]`
     pub label: String,
-    /// of `Real x[N]`, with those of the prefix behind them
+    /// of `Real x[N]`, with those of the type behind them, as in `Real[N] x`
     pub dimensions: Vec<ExprId>,
     pub attributes: Vec<Attribute>,
     pub binding: Option<ExprId>,
@@ -260,7 +213,18 @@ pub(crate) struct Declaration {
     pub package: Option<String>,
 }
 
-/// `start = 1` in a declaration, or `x(start = 1) = 2` where it is a record.
+impl Declaration {
+    pub(crate) fn is_integer(&self) -> bool {
+        self.type_name == TypeName::Integer
+    }
+
+    /// Whether its value may come from outside.
+    pub(crate) fn is_settable(&self) -> bool {
+        self.variability == Variability::Parameter && !self.is_final
+    }
+}
+
+/// `start = 1` in a declaration, `x(start = 1) = 2` where it is a record, or a base class.
 #[derive(Clone, Debug)]
 pub(crate) struct Attribute {
     pub name: Span,

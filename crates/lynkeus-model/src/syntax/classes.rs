@@ -1,30 +1,21 @@
 //! Classes: their heads, their sections, and the declarations in them.
 
 use super::ast::{
-    Alias, Attribute, Base, Causality, Class, ClassKind, Declaration, ExprId, Import, Kind, Prefix,
-    TypeName, Variability,
+    Attribute, Causality, Class, ClassKind, Declaration, ExprId, Import, Kind, TypeName,
+    Variability,
 };
-use super::lexer::{Keyword, Symbol, Token, plain, shortened};
+use super::lexer::{Token, plain, shortened};
 use super::parser::Parser;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::{MAX_IMPORTS, MAX_NAME, grouped};
 
-/// The section of a class that is being read.
-#[derive(Clone, Copy, PartialEq)]
-enum Section {
-    Elements,
-    Equations,
-    Initial,
-    Algorithm,
-}
-
 impl Parser<'_> {
     pub(super) fn within_clause(&mut self) -> Result<()> {
-        if self.accept_word(Keyword::Within)? {
-            while self.token == Token::Identifier || self.at(Symbol::Dot) {
+        if self.accept("within")? {
+            while self.token == Token::Identifier || self.at(".") {
                 self.advance()?;
             }
-            self.expect(Symbol::Semicolon)?;
+            self.expect(";")?;
         }
         Ok(())
     }
@@ -35,11 +26,11 @@ impl Parser<'_> {
     }
 
     fn class_here(&mut self, around: &str) -> Result<()> {
-        self.accept_word(Keyword::Final)?;
-        self.accept_word(Keyword::Encapsulated)?;
-        let is_partial = self.accept_word(Keyword::Partial)?;
+        self.accept("final")?;
+        self.accept("encapsulated")?;
+        let is_partial = self.accept("partial")?;
         let kind = self.class_kind()?;
-        if self.at_word(Keyword::Extends) {
+        if self.at("extends") {
             return Err(self.refuse(
                 "a model made from another one",
                 "write `extends Base;` among its declarations",
@@ -51,26 +42,17 @@ impl Parser<'_> {
             is_partial,
             name,
             path: self.path(around, name)?,
-            declarations: vec![],
-            equations: vec![],
-            initial: vec![],
-            algorithms: vec![],
-            bases: vec![],
-            imports: vec![],
-            alias: None,
-            literals: vec![],
-            is_external: false,
+            ..Class::default()
         };
         self.count(4)?;
-        if self.accept(Symbol::Equal)? {
+        if self.accept("=")? {
             self.short_definition(&mut class)?;
         } else {
             self.description()?;
             self.class_body(&mut class)?;
             self.class_end(name)?;
         }
-        self.comment()?;
-        self.expect(Symbol::Semicolon)?;
+        self.ending()?;
         self.ast.classes.push(class);
         Ok(())
     }
@@ -78,10 +60,7 @@ impl Parser<'_> {
     /// A name; compilers write those of inner classes in full.
     fn class_name(&mut self, what: &str) -> Result<Span> {
         let start = self.identifier(what)?;
-        while self.accept(Symbol::Dot)? {
-            self.identifier("a name after `.`")?;
-        }
-        Ok(start.to(self.last))
+        self.members(start)
     }
 
     fn path(&self, around: &str, name: Span) -> Result<String> {
@@ -96,56 +75,19 @@ impl Parser<'_> {
         Ok(format!("{around}.{own}"))
     }
 
-    /// True at a word that begins a class.
-    fn at_class(&self) -> bool {
-        use Keyword::*;
-        matches!(
-            self.token,
-            Token::Keyword(
-                Model
-                    | Class
-                    | Block
-                    | Package
-                    | Record
-                    | Function
-                    | Type
-                    | Connector
-                    | Partial
-                    | Encapsulated
-                    | Expandable
-                    | Operator
-                    | Pure
-                    | Impure
-            )
-        )
-    }
-
+    /// The kind of class that begins here; the words before it are read.
     fn class_kind(&mut self) -> Result<ClassKind> {
-        use Keyword::*;
-        let Token::Keyword(word) = self.token else {
-            return Err(self
-                .unexpected("`model`")
-                .hint("a file holds one or more `model`s"));
-        };
-        if matches!(word, Expandable | Operator | Pure | Impure) {
+        const BEFORE: [&str; 4] = ["expandable", "operator", "pure", "impure"];
+        while BEFORE.iter().any(|word| self.at(word)) {
+            let is_operator = self.at("operator");
             self.advance()?;
-            if word == Operator && self.token == Token::Identifier {
+            if is_operator && self.token == Token::Identifier {
                 return Err(self.refuse("an operator", "write the formula where it is used"));
             }
-            return self.class_kind();
         }
-        let kind = match word {
-            Model | Class | Block => ClassKind::Model,
-            Package => ClassKind::Package,
-            Record => ClassKind::Record,
-            Function => ClassKind::Function,
-            Type => ClassKind::Type,
-            Connector => ClassKind::Connector,
-            _ => {
-                return Err(self
-                    .unexpected("`model`")
-                    .hint("a file holds one or more `model`s"));
-            }
+        let Some(kind) = kind_of_class(self.token) else {
+            let problem = self.unexpected("`model`");
+            return Err(problem.hint("a file holds one or more `model`s"));
         };
         self.advance()?;
         Ok(kind)
@@ -153,33 +95,26 @@ impl Parser<'_> {
 
     /// `= Real(unit = "V")` or `= enumeration(one, two)`, behind the `=`.
     fn short_definition(&mut self, class: &mut Class) -> Result<()> {
-        if self.accept_word(Keyword::Enumeration)? {
-            self.expect(Symbol::OpenParen)?;
-            while !self.at(Symbol::CloseParen) {
+        if self.accept("enumeration")? {
+            self.expect("(")?;
+            while !self.at(")") {
                 class.literals.push(self.identifier("a literal")?);
                 self.comment()?;
-                if !self.accept(Symbol::Comma)? {
+                if !self.accept(",")? {
                     break;
                 }
             }
-            self.expect(Symbol::CloseParen)?;
+            self.expect(")")?;
             return Ok(());
         }
-        let mut prefix = Prefix::plain();
-        self.causality(&mut prefix)?;
-        let of = self.type_name()?;
-        let dimensions = self.maybe_subscripts()?;
-        let modification = self.modification()?;
-        class.alias = Some(Alias {
-            of,
-            dimensions,
-            modification,
-        });
+        let mut alias = self.typed(Declaration::default())?;
+        alias.attributes = self.modification()?;
+        class.alias = Some(alias);
         Ok(())
     }
 
     fn class_end(&mut self, name: Span) -> Result<()> {
-        self.expect_word(Keyword::End)?;
+        self.expect("end")?;
         let end = self.class_name("the name of the model after `end`")?;
         let (opened, closed) = (name.text(self.source), end.text(self.source));
         if plain(opened) == plain(closed) {
@@ -192,17 +127,17 @@ impl Parser<'_> {
     }
 
     fn class_body(&mut self, class: &mut Class) -> Result<()> {
-        let mut section = Section::Elements;
+        let mut section = "public";
         loop {
             match self.token {
-                Token::Keyword(Keyword::End) => return Ok(()),
-                Token::Keyword(Keyword::Public | Keyword::Protected) => {
-                    section = Section::Elements;
+                Token::Fixed("end") => return Ok(()),
+                Token::Fixed("public" | "protected") => {
+                    section = "public";
                     self.advance()?;
                 }
-                Token::Keyword(Keyword::Initial | Keyword::Equation | Keyword::Algorithm) => {
+                Token::Fixed("initial" | "equation" | "algorithm") => {
                     section = self.section()?;
-                    if section == Section::Algorithm {
+                    if section == "algorithm" {
                         class.algorithms.push(vec![]);
                     }
                 }
@@ -210,80 +145,63 @@ impl Parser<'_> {
                     let name = class.name.text(self.source);
                     return Err(self.unexpected(&format!("`end {name};`")));
                 }
-                Token::Keyword(Keyword::Annotation) => {
+                Token::Fixed("annotation") => {
                     self.annotation()?;
-                    self.expect(Symbol::Semicolon)?;
+                    self.expect(";")?;
                 }
-                Token::Keyword(Keyword::External) => {
+                Token::Fixed("external") => {
                     class.is_external = true;
                     self.skip_to_semicolon()?;
                 }
-                _ => self.content(section, class)?,
+                _ => match (section, class.algorithms.last_mut()) {
+                    ("equation", _) => class.equations.push(self.equation()?),
+                    ("initial", _) => class.initial.push(self.equation()?),
+                    ("algorithm", Some(last)) => last.push(self.statement()?),
+                    _ => self.element(class)?,
+                },
             }
         }
     }
 
-    /// `equation`, `algorithm`, or `initial` before one of them.
-    fn section(&mut self) -> Result<Section> {
+    /// `equation`, `algorithm`, or `initial` before one of them: the first of these words.
+    fn section(&mut self) -> Result<&'static str> {
         let initial = self.span;
-        let is_initial = self.accept_word(Keyword::Initial)?;
-        if self.accept_word(Keyword::Equation)? {
-            return Ok(match is_initial {
-                true => Section::Initial,
-                false => Section::Equations,
-            });
+        let is_initial = self.accept("initial")?;
+        if self.accept("equation")? {
+            return Ok(if is_initial { "initial" } else { "equation" });
         }
-        if is_initial && self.at_word(Keyword::Algorithm) {
+        if is_initial && self.at("algorithm") {
             let problem = Problem::new(initial, "an `initial algorithm` is not supported");
             return Err(problem.hint(
                 "give the starting values with `start = …` in the declarations, or in an \
                  `initial equation`",
             ));
         }
-        self.expect_word(Keyword::Algorithm)?;
-        Ok(Section::Algorithm)
-    }
-
-    fn content(&mut self, section: Section, class: &mut Class) -> Result<()> {
-        match section {
-            Section::Elements => self.element(class),
-            Section::Equations => {
-                let equation = self.equation()?;
-                class.equations.push(equation);
-                Ok(())
-            }
-            Section::Initial => {
-                let equation = self.equation()?;
-                class.initial.push(equation);
-                Ok(())
-            }
-            Section::Algorithm => {
-                let statement = self.statement()?;
-                if let Some(last) = class.algorithms.last_mut() {
-                    last.push(statement);
-                }
-                Ok(())
-            }
-        }
+        self.expect("algorithm")?;
+        Ok("algorithm")
     }
 
     fn element(&mut self, class: &mut Class) -> Result<()> {
-        if self.at_class() {
+        let before = "partial encapsulated expandable operator pure impure";
+        let is_before = |word| before.split(' ').any(|other| word == Token::Fixed(other));
+        if is_before(self.token) || kind_of_class(self.token).is_some() {
             let path = class.path.clone();
             return self.class(&path);
         }
-        if self.accept_word(Keyword::Extends)? {
-            let base = self.base()?;
-            class.bases.push(base);
-            return Ok(());
+        if self.accept("extends")? {
+            let (name, nested) = (self.dotted_name()?, self.modification()?);
+            class.bases.push(Attribute {
+                name,
+                value: None,
+                nested,
+            });
+            return self.ending();
         }
-        if self.accept_word(Keyword::Import)? {
+        if self.accept("import")? {
             let import = self.import()?;
             if class.imports.len() >= MAX_IMPORTS {
-                let message = format!(
-                    "a class with more than {} imports",
-                    grouped(MAX_IMPORTS as u64)
-                );
+                let limit = grouped(MAX_IMPORTS as u64);
+                let message = format!("a class with more than {limit} imports");
                 return Err(Problem::new(self.last, message).hint("write names in full"));
             }
             class.imports.push(import);
@@ -292,52 +210,37 @@ impl Parser<'_> {
         self.declarations(&mut class.declarations)
     }
 
-    fn base(&mut self) -> Result<Base> {
-        let name = self.dotted_name()?;
-        let modification = self.modification()?;
-        self.comment()?;
-        self.expect(Symbol::Semicolon)?;
-        Ok(Base { name, modification })
-    }
-
     fn import(&mut self) -> Result<Import> {
         let start = self.span;
         let mut full = self.dotted_import()?;
         let mut short = None;
-        if self.accept(Symbol::Equal)? {
+        if self.accept("=")? {
             short = Some(full);
             full = self.dotted_import()?;
         }
-        let whole = self.accept(Symbol::ElementTimes)?;
-        if self.at(Symbol::OpenBrace) || self.at(Symbol::Dot) {
+        let whole = self.accept(".*")?;
+        if self.at("{") || self.at(".") {
             let problem = Problem::new(start, "an import of several names is not supported");
             return Err(problem.hint("write one `import` for each"));
         }
-        self.comment()?;
-        self.expect(Symbol::Semicolon)?;
+        self.ending()?;
         if short.is_none() && !whole {
-            let last = full.rsplit('.').next().unwrap_or_default();
-            short = Some(last.to_owned());
+            short = full.rsplit('.').next().map(str::to_owned);
         }
         Ok(Import { short, full })
     }
 
     /// A name that ends before `.{` and before `.*`.
     fn dotted_import(&mut self) -> Result<String> {
-        let mut name = plain(self.identifier("a name")?.text(self.source)).into_owned();
-        while self.accept(Symbol::Dot)? {
-            if self.at(Symbol::OpenBrace) {
-                break;
-            }
-            let part = self.identifier("a name after `.`")?;
-            name.push('.');
-            name.push_str(&plain(part.text(self.source)));
+        let start = self.identifier("a name")?;
+        while self.accept(".")? && !self.at("{") {
+            self.identifier("a name after `.`")?;
         }
-        Ok(name)
+        Ok(plain(start.to(self.last).text(self.source)).into_owned())
     }
 
     fn skip_to_semicolon(&mut self) -> Result<()> {
-        while !self.at(Symbol::Semicolon) {
+        while !self.at(";") {
             if self.token == Token::End {
                 return Err(self.unexpected("`;`"));
             }
@@ -350,84 +253,65 @@ impl Parser<'_> {
 
 impl Parser<'_> {
     /// `parameter Real a = 1, b[3];`
-    pub(super) fn declarations(&mut self, into: &mut Vec<Declaration>) -> Result<()> {
+    fn declarations(&mut self, into: &mut Vec<Declaration>) -> Result<()> {
         self.refuse_unsupported_element()?;
-        let prefix = self.prefix()?;
-        loop {
-            let declaration = self.declarator(prefix.clone())?;
-            into.push(declaration);
-            if !self.accept(Symbol::Comma)? {
-                break;
-            }
-        }
-        self.expect(Symbol::Semicolon)?;
-        Ok(())
+        let is_final = self.accept("final")?;
+        let common = self.typed(Declaration {
+            is_final,
+            ..Declaration::default()
+        })?;
+        into.extend(self.list(|parser| parser.declarator(common.clone()))?);
+        self.expect(";").map(|_| ())
     }
 
     fn refuse_unsupported_element(&self) -> Result<()> {
-        use Keyword::*;
-        let Token::Keyword(word) = self.token else {
-            return match self.token {
-                Token::Identifier | Token::Symbol(Symbol::Dot) => Ok(()),
-                _ => Err(self.unexpected("a declaration, `equation` or `end`")),
-            };
-        };
-        let (what, hint) = match word {
-            Final | Parameter | Constant | Input | Output | Flow | Stream | Enumeration => {
-                return Ok(());
+        const TAKEN: &str = ". final parameter constant input output flow stream enumeration";
+        Err(match self.token {
+            Token::Identifier => return Ok(()),
+            Token::Fixed(word) if TAKEN.split(' ').any(|taken| taken == word) => return Ok(()),
+            Token::Fixed("discrete") => {
+                let hint = "only continuous variables are supported";
+                self.refuse("a `discrete` variable", hint)
             }
-            Discrete => (
-                "a `discrete` variable",
-                "only continuous variables are supported",
-            ),
-            Inner | Outer => ("`inner`/`outer`", HOW_TO_FLATTEN),
-            Redeclare | Replaceable => ("a replaceable element", HOW_TO_FLATTEN),
-            Connect | When | If | For => {
-                let found = format!("expected a declaration, found `{}`", word.text());
-                return Err(Problem::new(self.span, found)
-                    .hint("equations follow after the word `equation`"));
+            Token::Fixed("inner" | "outer") => self.refuse("`inner`/`outer`", HOW_TO_FLATTEN),
+            Token::Fixed("redeclare" | "replaceable") => {
+                self.refuse("a replaceable element", HOW_TO_FLATTEN)
             }
-            _ => return Err(self.unexpected("a declaration, `equation` or `end`")),
-        };
-        Err(self.refuse(what, hint))
+            Token::Fixed("connect" | "when" | "if" | "for") => {
+                let problem = self.unexpected("a declaration");
+                problem.hint("equations follow after the word `equation`")
+            }
+            _ => self.unexpected("a declaration, `equation` or `end`"),
+        })
     }
 
-    fn prefix(&mut self) -> Result<Prefix> {
-        let mut prefix = Prefix::plain();
-        prefix.is_final = self.accept_word(Keyword::Final)?;
-        self.causality(&mut prefix)?;
-        prefix.type_name = self.type_name()?;
-        prefix.dimensions = self.maybe_subscripts()?;
-        Ok(prefix)
-    }
-
-    /// `parameter`, `input`, `flow` and their like.
-    pub(super) fn causality(&mut self, prefix: &mut Prefix) -> Result<()> {
-        loop {
-            match self.token {
-                Token::Keyword(Keyword::Parameter) => prefix.variability = Variability::Parameter,
-                Token::Keyword(Keyword::Constant) => prefix.variability = Variability::Constant,
-                Token::Keyword(Keyword::Input) => prefix.causality = Causality::Input,
-                Token::Keyword(Keyword::Output) => prefix.causality = Causality::Output,
-                Token::Keyword(Keyword::Flow | Keyword::Stream) => {
-                    prefix.of_connector = Some(self.span);
-                }
-                Token::Keyword(Keyword::Enumeration) => return Ok(()),
-                Token::Keyword(_) => {
+    /// `parameter`, `input`, `flow` and their like, and the type.
+    fn typed(&mut self, mut declaration: Declaration) -> Result<Declaration> {
+        while let Token::Fixed(word) = self.token {
+            match word {
+                "parameter" => declaration.variability = Variability::Parameter,
+                "constant" => declaration.variability = Variability::Constant,
+                "input" => declaration.causality = Causality::Input,
+                "output" => declaration.causality = Causality::Output,
+                "flow" | "stream" => declaration.of_connector = Some(self.span),
+                _ if word == "enumeration" || !word.starts_with(char::is_alphabetic) => break,
+                _ => {
                     self.refuse_unsupported_element()?;
                     return Err(self.unexpected("a type"));
                 }
-                _ => return Ok(()),
             }
             self.advance()?;
         }
+        declaration.type_name = self.type_name()?;
+        declaration.dimensions = self.maybe_subscripts()?;
+        Ok(declaration)
     }
 
-    pub(super) fn type_name(&mut self) -> Result<TypeName> {
-        if self.at_word(Keyword::Enumeration) {
+    fn type_name(&mut self) -> Result<TypeName> {
+        if self.at("enumeration") {
             // a choice that the compiler has made already
             let start = self.advance()?;
-            if !self.at(Symbol::OpenParen) || !self.skip_brackets()? {
+            if !self.at("(") || !self.skip_brackets()? {
                 let message = "expected the literals of the enumeration in parentheses";
                 return Err(Problem::new(start, message));
             }
@@ -443,9 +327,7 @@ impl Parser<'_> {
         };
         if matches!(
             self.token,
-            Token::Identifier
-                | Token::Symbol(Symbol::OpenBracket | Symbol::OpenParen | Symbol::Semicolon)
-                | Token::Text
+            Token::Identifier | Token::Fixed("[" | "(" | ";") | Token::Text
         ) && name != "der"
         {
             return Ok(TypeName::Named(span));
@@ -455,92 +337,73 @@ impl Parser<'_> {
             .hint("a declaration reads `Real x;`; equations follow after the word `equation`"))
     }
 
-    fn declarator(&mut self, prefix: Prefix) -> Result<Declaration> {
+    fn declarator(&mut self, mut declaration: Declaration) -> Result<Declaration> {
         self.count(8)?;
-        let name = self.variable_name()?;
-        let label = plain(name.text(self.source)).into_owned();
+        declaration.name = self.variable_name()?;
+        declaration.label = plain(declaration.name.text(self.source)).into_owned();
         let mut dimensions = self.maybe_subscripts()?;
-        dimensions.extend(&prefix.dimensions);
-        let attributes = self.modification()?;
-        let mut binding = None;
-        if self.accept(Symbol::Equal)? {
-            binding = Some(self.expression()?);
-        } else if self.at(Symbol::Assign) {
-            return Err(self
-                .unexpected("`=`")
-                .hint("a declaration equation is written with `=`"));
+        dimensions.append(&mut declaration.dimensions);
+        declaration.dimensions = dimensions;
+        declaration.attributes = self.modification()?;
+        if self.accept("=")? {
+            declaration.binding = Some(self.expression()?);
+        } else if self.at(":=") {
+            let problem = self.unexpected("`=`");
+            return Err(problem.hint("a declaration equation is written with `=`"));
         }
-        if self.at_word(Keyword::If) {
+        if self.at("if") {
             return Err(self.refuse("a conditional component", "declare it always"));
         }
-        let description = self.comment()?;
-        Ok(Declaration {
-            prefix,
-            name,
-            label,
-            dimensions,
-            attributes,
-            binding,
-            description,
-            package: None,
-        })
+        declaration.description = self.comment()?;
+        Ok(declaration)
     }
 
     /// `x`, `r1.p.v` or `c[2].x`: compilers write the names of parts in full.
     fn variable_name(&mut self) -> Result<Span> {
         let start = self.identifier("the name of a variable")?;
         loop {
-            if self.at(Symbol::Dot) {
-                self.advance()?;
-                self.identifier("a name after `.`")?;
-            } else if self.at(Symbol::OpenBracket) && self.is_inner_subscript() {
-                self.subscripts()?;
-            } else {
-                return Ok(start.to(self.last));
+            let name = self.members(start)?;
+            if !self.at("[") || !self.is_inner_subscript() {
+                return Ok(name);
             }
+            self.subscripts()?;
         }
     }
 
     /// `(start = 1, each min = 0)`, where it stands here.
     fn modification(&mut self) -> Result<Vec<Attribute>> {
-        let mut given = vec![];
-        if self.accept(Symbol::OpenParen)? {
-            self.nested(|parser| parser.attributes(&mut given))?;
+        if !self.accept("(")? {
+            return Ok(vec![]);
         }
-        Ok(given)
+        self.nested(|parser| {
+            if parser.accept(")")? {
+                return Ok(vec![]);
+            }
+            let given = parser.list(Self::attribute)?;
+            parser.expect(")")?;
+            Ok(given)
+        })
     }
 
-    fn attributes(&mut self, into: &mut Vec<Attribute>) -> Result<()> {
-        if self.accept(Symbol::CloseParen)? {
-            return Ok(());
+    fn attribute(&mut self) -> Result<Attribute> {
+        if self.at("redeclare") || self.at("replaceable") {
+            return Err(self.refuse("a redeclaration", HOW_TO_FLATTEN));
         }
-        loop {
-            if self.at_word(Keyword::Redeclare) || self.at_word(Keyword::Replaceable) {
-                return Err(self.refuse("a redeclaration", HOW_TO_FLATTEN));
-            }
-            self.accept_word(Keyword::Each)?;
-            self.accept_word(Keyword::Final)?;
-            let name = self.identifier("the name of an attribute")?;
-            let nested = self.modification()?;
-            let mut value = None;
-            if nested.is_empty() {
-                self.expect(Symbol::Equal)?;
-                value = Some(self.attribute_value()?);
-            } else if self.accept(Symbol::Equal)? {
-                value = Some(self.attribute_value()?);
-            }
-            self.comment()?;
-            into.push(Attribute {
-                name,
-                value,
-                nested,
-            });
-            if !self.accept(Symbol::Comma)? {
-                break;
-            }
+        self.accept("each")?;
+        self.accept("final")?;
+        let name = self.identifier("the name of an attribute")?;
+        let nested = self.modification()?;
+        let mut value = None;
+        if nested.is_empty() || self.at("=") {
+            self.expect("=")?;
+            value = Some(self.attribute_value()?);
         }
-        self.expect(Symbol::CloseParen)?;
-        Ok(())
+        self.comment()?;
+        Ok(Attribute {
+            name,
+            value,
+            nested,
+        })
     }
 
     fn attribute_value(&mut self) -> Result<ExprId> {
@@ -553,21 +416,19 @@ impl Parser<'_> {
     }
 }
 
-impl Prefix {
-    /// A Real variable, with nothing before it.
-    pub(super) fn plain() -> Self {
-        Self {
-            is_final: false,
-            variability: Variability::Continuous,
-            causality: Causality::Local,
-            of_connector: None,
-            type_name: TypeName::Real,
-            dimensions: vec![],
-        }
-    }
-}
-
 /// What to do with a model that has connectors or components.
 pub(crate) const HOW_TO_FLATTEN: &str = "flatten it first: `omc -f -i=MODEL FILE.mo > flat.mo` \
      (OpenModelica), or `python -c 'import rumoca; print(rumoca.Session().load(\"FILE.mo\", \
      model=\"MODEL\").render(\"base-modelica\"))' > flat.mo`";
+
+fn kind_of_class(token: Token) -> Option<ClassKind> {
+    Some(match token {
+        Token::Fixed("model" | "class" | "block") => ClassKind::Model,
+        Token::Fixed("package") => ClassKind::Package,
+        Token::Fixed("record") => ClassKind::Record,
+        Token::Fixed("function") => ClassKind::Function,
+        Token::Fixed("type") => ClassKind::Type,
+        Token::Fixed("connector") => ClassKind::Connector,
+        _ => return None,
+    })
+}

@@ -1,65 +1,57 @@
 //! What stands in the sections `equation` and `algorithm`.
 
-use super::ast::{Assert, Equation, EquationKind, ExprId, ForIndex, Statement, StatementKind};
+use super::ast::{
+    Assert, Equation, EquationKind, ExprId, ForIndex, Placed, Statement, StatementKind,
+};
 use super::classes::HOW_TO_FLATTEN;
-use super::lexer::{Keyword, Symbol, Token};
+use super::lexer::Token;
 use super::parser::Parser;
 use super::unquoted;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_ITERATORS;
 
-/// Conditions with what holds under them, and what holds under none.
-type Cases<T> = (Vec<(ExprId, Vec<T>)>, Vec<T>);
+const NO_EVENTS: &str = "an observer needs continuous equations: use `if` expressions";
+const WHERE_DECLARATIONS_STAND: &str =
+    "declarations come before the word `equation`, or after `public`";
 
 impl Parser<'_> {
     pub(super) fn equation(&mut self) -> Result<Equation> {
-        self.nested(|parser| parser.equation_here())
+        self.placed(|parser| {
+            parser.refuse_unsupported_equation()?;
+            match parser.token {
+                Token::Fixed("for") => parser.repeated(Self::equation, EquationKind::For),
+                Token::Fixed("if") => parser.branches(Self::equation, EquationKind::If),
+                _ => parser.equality(),
+            }
+        })
     }
 
-    fn equation_here(&mut self) -> Result<Equation> {
-        self.count(2)?;
-        let start = self.span;
-        self.refuse_unsupported_equation()?;
-        let kind = match self.token {
-            Token::Keyword(Keyword::For) => {
-                let (iterators, body) = self.repeated(Self::equation)?;
-                EquationKind::For(iterators, body)
-            }
-            Token::Keyword(Keyword::If) => {
-                let (branches, otherwise) = self.branches(Self::equation)?;
-                EquationKind::If(branches, otherwise)
-            }
-            _ => self.equality()?,
-        };
-        let span = start.to(self.last);
-        self.comment()?;
-        self.expect(Symbol::Semicolon)?;
-        Ok(Equation { kind, span })
+    /// An equation or a statement up to its semicolon.
+    fn placed<K>(&mut self, kind: impl FnOnce(&mut Self) -> Result<K>) -> Result<Placed<K>> {
+        self.nested(|parser| {
+            parser.count(2)?;
+            let start = parser.span;
+            let kind = kind(parser)?;
+            let span = start.to(parser.last);
+            parser.ending()?;
+            Ok(Placed { kind, span })
+        })
     }
 
     fn refuse_unsupported_equation(&self) -> Result<()> {
-        let (what, hint) = match self.token {
-            Token::Keyword(Keyword::When | Keyword::Elsewhen) => (
-                "a `when` equation",
-                "an observer needs continuous equations: use `if` expressions",
-            ),
-            Token::Keyword(Keyword::Connect) => {
-                return Err(
-                    Problem::new(self.span, "the model is not flat: it has `connect`")
-                        .hint(HOW_TO_FLATTEN),
-                );
+        Err(match self.token {
+            Token::Fixed("when" | "elsewhen") => self.refuse("a `when` equation", NO_EVENTS),
+            Token::Fixed("while") => self.refuse("`while`", "use a `for` loop"),
+            Token::Fixed("connect") => {
+                let message = "the model is not flat: it has `connect`";
+                Problem::new(self.span, message).hint(HOW_TO_FLATTEN)
             }
-            Token::Keyword(Keyword::While) => ("`while`", "use a `for` loop"),
-            Token::Keyword(
-                Keyword::Parameter | Keyword::Constant | Keyword::Input | Keyword::Output,
-            ) => {
-                return Err(self
-                    .unexpected("an equation")
-                    .hint("declarations come before the word `equation`, or after `public`"));
+            Token::Fixed("parameter" | "constant" | "input" | "output") => {
+                let problem = self.unexpected("an equation");
+                problem.hint(WHERE_DECLARATIONS_STAND)
             }
             _ => return Ok(()),
-        };
-        Err(self.refuse(what, hint))
+        })
     }
 
     fn equality(&mut self) -> Result<EquationKind> {
@@ -67,32 +59,30 @@ impl Parser<'_> {
         if let Some(assert) = self.assert_call()? {
             return Ok(EquationKind::Assert(assert));
         }
-        if self.at(Symbol::OpenParen) && self.is_list() {
+        if self.at("(") && self.is_list() {
             let targets = self.targets()?;
-            self.expect(Symbol::Equal)?;
+            self.expect("=")?;
             return Ok(EquationKind::Several(targets, self.expression()?));
         }
         let left = self.expression()?;
-        if self.at(Symbol::Equal) {
-            self.advance()?;
-            let right = self.expression()?;
-            return Ok(EquationKind::Equality(left, right));
+        if self.accept("=")? {
+            return Ok(EquationKind::Equality(left, self.expression()?));
         }
         let text = start.text(self.source);
         if matches!(text, "Real" | "Integer") && self.token == Token::Identifier {
-            return Err(Problem::new(start, "a declaration among the equations")
-                .hint("declarations come before the word `equation`, or after `public`"));
+            let problem = Problem::new(start, "a declaration among the equations");
+            return Err(problem.hint(WHERE_DECLARATIONS_STAND));
         }
         if matches!(text, "terminate" | "reinit") {
             return Err(Problem::new(start, format!("`{text}` is not supported"))
                 .hint("models with events are not supported: use `if` expressions"));
         }
         let hint = match self.token {
-            Token::Symbol(Symbol::Assign) => Some("`:=` assigns in algorithms; write `=`"),
-            Token::Symbol(Symbol::EqualEqual) => Some("an equation is written with one `=`"),
+            Token::Fixed(":=") => Some("`:=` assigns in algorithms; write `=`"),
+            Token::Fixed("==") => Some("an equation is written with one `=`"),
             _ => None,
         };
-        Err(self.unexpected("`=`").maybe_hint(hint.map(str::to_owned)))
+        Err(self.unexpected("`=`").maybe_hint(hint))
     }
 
     /// `assert(condition, "message", level)`, where one stands here.
@@ -101,9 +91,9 @@ impl Parser<'_> {
             return Ok(None);
         }
         self.advance()?;
-        self.expect(Symbol::OpenParen)?;
+        self.expect("(")?;
         let condition = self.expression()?;
-        self.expect(Symbol::Comma)?;
+        self.expect(",")?;
         let message = match self.token {
             Token::Text => unquoted(self.span.text(self.source)),
             _ => String::new(),
@@ -113,10 +103,10 @@ impl Parser<'_> {
         let mut open = 1usize;
         while open > 0 {
             match self.token {
-                Token::Symbol(Symbol::OpenParen) => open += 1,
-                Token::Symbol(Symbol::CloseParen) => open -= 1,
+                Token::Fixed("(") => open += 1,
+                Token::Fixed(")") => open -= 1,
                 Token::Identifier => is_warning |= self.span.text(self.source) == "warning",
-                Token::End | Token::Symbol(Symbol::Semicolon) => {
+                Token::End | Token::Fixed(";") => {
                     return Err(self.unexpected("`)` after the message of the `assert`"));
                 }
                 _ => {}
@@ -131,45 +121,62 @@ impl Parser<'_> {
     }
 
     /// Equations or statements behind `if`.
-    fn branches<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<Cases<T>> {
+    fn branches<T, K>(
+        &mut self,
+        one: fn(&mut Self) -> Result<T>,
+        kind: fn(Vec<(ExprId, Vec<T>)>, Vec<T>) -> K,
+    ) -> Result<K> {
         self.advance()?;
         let branches = self.cases(|parser| parser.until_end(one))?;
         let mut otherwise = vec![];
-        if self.accept_word(Keyword::Else)? {
+        if self.accept("else")? {
             otherwise = self.until_end(one)?;
         }
-        self.end_of(Keyword::If)?;
-        Ok((branches, otherwise))
+        self.end_of("if")?;
+        Ok(kind(branches, otherwise))
     }
 
-    /// The iterators and the body of a loop, behind `for`.
-    fn repeated<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<(Vec<ForIndex>, Vec<T>)> {
+    /// Equations or statements behind `for`.
+    fn repeated<T, K>(
+        &mut self,
+        one: fn(&mut Self) -> Result<T>,
+        kind: fn(Vec<ForIndex>, Vec<T>) -> K,
+    ) -> Result<K> {
         self.advance()?;
         let iterators = self.iterators()?;
-        self.expect_word(Keyword::Loop)?;
+        Ok(kind(iterators, self.looped("for", one)?))
+    }
+
+    /// What stands between `loop` and its end.
+    fn looped<T>(&mut self, of: &'static str, one: fn(&mut Self) -> Result<T>) -> Result<Vec<T>> {
+        self.expect("loop")?;
         let body = self.until_end(one)?;
-        self.end_of(Keyword::For)?;
-        Ok((iterators, body))
+        self.end_of(of)?;
+        Ok(body)
     }
 
     /// Equations or statements up to `end` or `else`.
     fn until_end<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<Vec<T>> {
         let mut found = vec![];
-        while !matches!(
-            self.token,
-            Token::Keyword(Keyword::End | Keyword::Else | Keyword::Elseif) | Token::End
-        ) {
+        let end = Token::Fixed("end");
+        while ![
+            end,
+            Token::Fixed("else"),
+            Token::Fixed("elseif"),
+            Token::End,
+        ]
+        .contains(&self.token)
+        {
             found.push(one(self)?);
         }
         Ok(found)
     }
 
-    pub(super) fn end_of(&mut self, keyword: Keyword) -> Result<()> {
-        if !self.accept_word(Keyword::End)? {
-            return Err(self.unexpected(&format!("`end {}`", keyword.text())));
+    fn end_of(&mut self, word: &'static str) -> Result<()> {
+        if !self.accept("end")? {
+            return Err(self.unexpected(&format!("`end {word}`")));
         }
-        self.expect_word(keyword)?;
-        Ok(())
+        self.expect(word).map(|_| ())
     }
 
     /// `i in 1:N, j in 1:M`
@@ -178,20 +185,18 @@ impl Parser<'_> {
         loop {
             let name = self.identifier("the name of an iterator")?;
             if iterators.len() >= MAX_ITERATORS {
-                return Err(Problem::new(
-                    name,
-                    format!("more than {MAX_ITERATORS} iterators"),
-                ));
+                let message = format!("more than {MAX_ITERATORS} iterators");
+                return Err(Problem::new(name, message));
             }
             self.refuse_repeated(&iterators, name)?;
-            if !self.at_word(Keyword::In) {
+            if !self.at("in") {
                 let problem = self.unexpected("`in` and a range");
                 return Err(problem.hint("write `for i in 1:N`"));
             }
             self.advance()?;
             let range = self.expression()?;
             iterators.push(ForIndex { name, range });
-            if !self.accept(Symbol::Comma)? {
+            if !self.accept(",")? {
                 return Ok(iterators);
             }
         }
@@ -199,14 +204,10 @@ impl Parser<'_> {
 
     fn refuse_repeated(&self, iterators: &[ForIndex], name: Span) -> Result<()> {
         let text = name.text(self.source);
-        if iterators
-            .iter()
-            .any(|other| other.name.text(self.source) == text)
-        {
-            return Err(Problem::new(
-                name,
-                format!("iterator `{text}` is used twice"),
-            ));
+        let mut names = iterators.iter().map(|other| other.name.text(self.source));
+        if names.any(|other| other == text) {
+            let message = format!("iterator `{text}` is used twice");
+            return Err(Problem::new(name, message));
         }
         Ok(())
     }
@@ -214,60 +215,31 @@ impl Parser<'_> {
 
 impl Parser<'_> {
     pub(super) fn statement(&mut self) -> Result<Statement> {
-        self.nested(|parser| parser.statement_here())
-    }
-
-    fn statement_here(&mut self) -> Result<Statement> {
-        self.count(2)?;
-        let start = self.span;
-        let kind = match self.token {
-            Token::Keyword(Keyword::For) => {
-                let (iterators, body) = self.repeated(Self::statement)?;
-                StatementKind::For(iterators, body)
+        self.placed(|parser| match parser.token {
+            Token::Fixed("for") => parser.repeated(Self::statement, StatementKind::For),
+            Token::Fixed("while") => {
+                parser.advance()?;
+                let condition = parser.expression()?;
+                let body = parser.looped("while", Self::statement)?;
+                Ok(StatementKind::While(condition, body))
             }
-            Token::Keyword(Keyword::While) => {
-                self.advance()?;
-                let condition = self.expression()?;
-                self.expect_word(Keyword::Loop)?;
-                let body = self.until_end(Self::statement)?;
-                self.end_of(Keyword::While)?;
-                StatementKind::While(condition, body)
-            }
-            Token::Keyword(Keyword::If) => {
-                let (branches, otherwise) = self.branches(Self::statement)?;
-                StatementKind::If(branches, otherwise)
-            }
-            Token::Keyword(Keyword::Break) => {
-                self.advance()?;
-                StatementKind::Break
-            }
-            Token::Keyword(Keyword::Return) => {
-                self.advance()?;
-                StatementKind::Return
-            }
-            Token::Keyword(Keyword::When) => {
-                return Err(self.refuse(
-                    "a `when` statement",
-                    "an observer needs continuous equations: use `if` expressions",
-                ));
-            }
-            _ => self.assignment()?,
-        };
-        let span = start.to(self.last);
-        self.comment()?;
-        self.expect(Symbol::Semicolon)?;
-        Ok(Statement { kind, span })
+            Token::Fixed("if") => parser.branches(Self::statement, StatementKind::If),
+            Token::Fixed("break") => parser.advance().map(|_| StatementKind::Break),
+            Token::Fixed("return") => parser.advance().map(|_| StatementKind::Return),
+            Token::Fixed("when") => Err(parser.refuse("a `when` statement", NO_EVENTS)),
+            _ => parser.assignment(),
+        })
     }
 
     fn assignment(&mut self) -> Result<StatementKind> {
         if let Some(assert) = self.assert_call()? {
             return Ok(StatementKind::Assert(assert));
         }
-        let targets = match self.at(Symbol::OpenParen) {
+        let targets = match self.at("(") {
             true => self.targets()?,
             false => vec![Some(self.expression()?)],
         };
-        if !self.at(Symbol::Assign) {
+        if !self.at(":=") {
             let hint = "a statement of an algorithm reads `x := …;`";
             return Err(self.unexpected("`:=`").hint(hint));
         }
@@ -278,19 +250,12 @@ impl Parser<'_> {
 
     /// `(a, , b)` on the left of what gives several values.
     pub(super) fn targets(&mut self) -> Result<Vec<Option<ExprId>>> {
-        let start = self.expect(Symbol::OpenParen)?;
-        let mut targets = vec![];
-        loop {
-            let is_left_out = self.at(Symbol::Comma) || self.at(Symbol::CloseParen);
-            targets.push(match is_left_out {
-                true => None,
-                false => Some(self.expression()?),
-            });
-            if !self.accept(Symbol::Comma)? {
-                break;
-            }
-        }
-        self.expect(Symbol::CloseParen)?;
+        let start = self.expect("(")?;
+        let targets = self.list(|parser| match parser.at(",") || parser.at(")") {
+            true => Ok(None),
+            false => parser.expression().map(Some),
+        })?;
+        self.expect(")")?;
         if targets.iter().all(Option::is_none) {
             let message = "expected variables between the parentheses";
             return Err(Problem::new(start, message));

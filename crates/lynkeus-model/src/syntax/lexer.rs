@@ -2,6 +2,8 @@
 //! of a token means.
 
 use std::borrow::Cow;
+use std::collections::HashSet;
+use std::sync::LazyLock;
 
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_NAME;
@@ -13,75 +15,10 @@ pub(crate) enum Token {
     Integer,
     Real,
     Text,
-    Keyword(Keyword),
-    Symbol(Symbol),
+    /// a reserved word, an operator or a bracket: what is always written so
+    Fixed(&'static str),
     /// the end of the text
     End,
-}
-
-macro_rules! words {
-    ($(#[$doc:meta])* $kind:ident, $($name:ident = $text:literal),* $(,)?) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub(crate) enum $kind { $($name),* }
-
-        impl $kind {
-            /// How it is written.
-            pub(crate) fn text(self) -> &'static str {
-                match self { $(Self::$name => $text),* }
-            }
-
-            /// Every one, with how it is written.
-            pub(crate) const ALL: &[(&'static str, Self)] = &[$(($text, Self::$name)),*];
-        }
-    };
-}
-
-words! {
-    /// Reserved words.
-    Keyword,
-    Algorithm = "algorithm", And = "and", Annotation = "annotation", Block = "block",
-    Break = "break", Class = "class", Connect = "connect", Connector = "connector",
-    Constant = "constant", Constrainedby = "constrainedby", Der = "der", Discrete = "discrete",
-    Each = "each", Else = "else", Elseif = "elseif", Elsewhen = "elsewhen",
-    Encapsulated = "encapsulated", End = "end", Enumeration = "enumeration",
-    Equation = "equation", Expandable = "expandable", Extends = "extends",
-    External = "external", False = "false", Final = "final", Flow = "flow", For = "for",
-    Function = "function", If = "if", Import = "import", Impure = "impure", In = "in",
-    Initial = "initial", Inner = "inner", Input = "input", Loop = "loop", Model = "model",
-    Not = "not", Operator = "operator", Or = "or", Outer = "outer", Output = "output",
-    Package = "package", Parameter = "parameter", Partial = "partial", Protected = "protected",
-    Public = "public", Pure = "pure", Record = "record", Redeclare = "redeclare",
-    Replaceable = "replaceable", Return = "return", Stream = "stream", Then = "then",
-    True = "true", Type = "type", When = "when", While = "while", Within = "within",
-}
-
-words! {
-    /// Operators and punctuation; longer ones first.
-    Symbol,
-    ElementPlus = ".+", ElementMinus = ".-", ElementTimes = ".*", ElementOver = "./",
-    ElementPower = ".^", Assign = ":=", NotEqual = "<>", LessEqual = "<=",
-    GreaterEqual = ">=", EqualEqual = "==", Plus = "+", Minus = "-", Times = "*", Over = "/",
-    Power = "^", Equal = "=", Less = "<", Greater = ">", OpenParen = "(", CloseParen = ")",
-    OpenBracket = "[", CloseBracket = "]", OpenBrace = "{", CloseBrace = "}", Comma = ",",
-    Semicolon = ";", Colon = ":", Dot = ".",
-    // of `@ODEmodel` texts alone; in Modelica they begin comments and quoted names
-    Rational = "//", Prime = "'",
-}
-
-/// What the parser asks of a language.
-pub(crate) trait Language {
-    /// What to do about parts that are nested too deep.
-    const NESTED: &'static str;
-
-    /// The next token; `Token::End` from the end of the text on.
-    fn next(&mut self) -> Result<(Token, Span)>;
-
-    /// The refusal of more than so many parts.
-    fn too_large(&self, limit: &str, span: Span) -> Problem;
-
-    /// What to do where the text ends too early.
-    fn hint_at_end(&self) -> Option<String>;
 }
 
 impl Token {
@@ -90,12 +27,28 @@ impl Token {
         match self {
             Token::Identifier | Token::Integer | Token::Real => format!("`{}`", shortened(text)),
             Token::Text => "a string".to_owned(),
-            Token::Keyword(keyword) => format!("`{}`", keyword.text()),
-            Token::Symbol(symbol) => format!("`{}`", symbol.text()),
+            Token::Fixed(text) => format!("`{text}`"),
             Token::End => "the end of the text".to_owned(),
         }
     }
 }
+
+/// Words of Modelica that cannot be names.
+static RESERVED: LazyLock<HashSet<&str>> = LazyLock::new(|| {
+    "algorithm and annotation block break class connect connector constant constrainedby der \
+     discrete each else elseif elsewhen encapsulated end enumeration equation expandable extends \
+     external false final flow for function if import impure in initial inner input loop model \
+     not operator or outer output package parameter partial protected public pure record \
+     redeclare replaceable return stream then true type when while within"
+        .split_whitespace()
+        .collect()
+});
+
+/// Operators and punctuation; longer ones first.
+const SYMBOLS: [&str; 28] = [
+    ".+", ".-", ".*", "./", ".^", ":=", "<>", "<=", ">=", "==", "+", "-", "*", "/", "^", "=", "<",
+    ">", "(", ")", "[", "]", "{", "}", ",", ";", ":", ".",
+];
 
 /// At most 40 characters of a text.
 pub(crate) fn shortened(text: &str) -> String {
@@ -136,10 +89,71 @@ pub(crate) fn unquoted(token: &str) -> String {
 /// Reads tokens from a text.
 #[derive(Clone)]
 pub(crate) struct Lexer<'s> {
-    source: &'s str,
-    position: usize,
+    pub(crate) source: &'s str,
+    pub(crate) position: usize,
 }
 
+/// What all languages have.
+impl<'s> Lexer<'s> {
+    pub(crate) fn rest(&self) -> &'s str {
+        self.source.get(self.position..).unwrap_or_default()
+    }
+
+    pub(crate) fn byte(&self, ahead: usize) -> Option<u8> {
+        self.source.as_bytes().get(self.position + ahead).copied()
+    }
+
+    pub(crate) fn digit_at(&self, ahead: usize) -> bool {
+        self.byte(ahead).is_some_and(|byte| byte.is_ascii_digit())
+    }
+
+    /// Digits, with what may separate them.
+    fn digits(&mut self, separators: &[char]) {
+        while self.digit_at(0) || (self.rest().starts_with(separators) && self.digit_at(1)) {
+            self.position += 1;
+        }
+    }
+
+    /// Digits, with a point and an exponent behind one of these letters.
+    pub(crate) fn number(&mut self, exponents: &[char], separators: &[char]) -> Token {
+        let mut token = Token::Integer;
+        self.digits(separators);
+        // `2.*x` is the elementwise product `2 .* x`, not `2.` times `x`.
+        let elementwise = matches!(self.byte(1), Some(b'*' | b'/' | b'^' | b'+' | b'-'));
+        if self.byte(0) == Some(b'.') && !elementwise {
+            token = Token::Real;
+            self.position += 1;
+            self.digits(separators);
+        }
+        let sign = usize::from(matches!(self.byte(1), Some(b'+' | b'-')));
+        if self.rest().starts_with(exponents) && self.digit_at(1 + sign) {
+            token = Token::Real;
+            self.position += 1 + sign;
+            self.digits(separators);
+        }
+        token
+    }
+
+    /// One of the operators; for other characters a refusal with what to write instead.
+    pub(crate) fn symbol(
+        &mut self,
+        known: &[&'static str],
+        hint: fn(char) -> Option<&'static str>,
+    ) -> Result<Token> {
+        let rest = self.rest();
+        if let Some(text) = known.iter().find(|text| rest.starts_with(**text)) {
+            self.position += text.len();
+            return Ok(Token::Fixed(text));
+        }
+        let found = rest.chars().next().unwrap_or_default();
+        let span = Span::new(self.position, self.position + found.len_utf8());
+        let zero = (found == '\0').then_some("the text holds a zero byte: is this a text file?");
+        let problem = Problem::new(span, format!("unexpected character {found:?}"));
+        Err(problem.maybe_hint(hint(found).or(zero)))
+    }
+}
+
+/// Those of Modelica.
 impl<'s> Lexer<'s> {
     pub(crate) fn new(source: &'s str) -> Self {
         // A byte order mark is not part of the text.
@@ -147,12 +161,8 @@ impl<'s> Lexer<'s> {
         Self { source, position }
     }
 
-    fn peek(&self, ahead: usize) -> Option<u8> {
-        self.source.as_bytes().get(self.position + ahead).copied()
-    }
-
     fn take_while(&mut self, accept: impl Fn(u8) -> bool) {
-        while self.peek(0).is_some_and(&accept) {
+        while self.byte(0).is_some_and(&accept) {
             self.position += 1;
         }
     }
@@ -160,108 +170,30 @@ impl<'s> Lexer<'s> {
     fn skip_blank(&mut self) -> Result<()> {
         loop {
             self.take_while(|byte| byte.is_ascii_whitespace() || byte == 0x0b);
-            match (self.peek(0), self.peek(1)) {
-                (Some(b'/'), Some(b'/')) => self.take_while(|byte| byte != b'\n'),
-                (Some(b'/'), Some(b'*')) => self.skip_comment()?,
-                _ => return Ok(()),
+            if self.rest().starts_with("//") {
+                self.take_while(|byte| byte != b'\n');
+            } else if self.rest().starts_with("/*") {
+                let behind = self.position + 2;
+                let length = self.source[behind..].find("*/");
+                let length = length.ok_or_else(|| no_end("comment", self.position, "/*", "*/"))?;
+                self.position = behind + length + 2;
+            } else {
+                return Ok(());
             }
         }
     }
 
-    fn skip_comment(&mut self) -> Result<()> {
-        let start = self.position;
-        let Some(length) = self.source[start + 2..].find("*/") else {
-            return Err(
-                Problem::new(Span::new(start, start + 2), "this comment has no end")
-                    .hint("close it with `*/`"),
-            );
-        };
-        self.position = start + 2 + length + 2;
-        Ok(())
-    }
-
-    fn word(&mut self) -> Token {
-        let start = self.position;
-        self.take_while(is_name_part);
-        let word = &self.source[start..self.position];
-        let keyword = Keyword::ALL.iter().find(|(text, _)| *text == word);
-        keyword.map_or(Token::Identifier, |&(_, keyword)| Token::Keyword(keyword))
-    }
-
-    fn number(&mut self) -> Result<Token> {
-        let start = self.position;
-        let mut token = Token::Integer;
-        self.take_while(|byte| byte.is_ascii_digit());
-        // `2.*x` is the elementwise product `2 .* x`, not `2.` times `x`.
-        let elementwise = matches!(self.peek(1), Some(b'*' | b'/' | b'^' | b'+' | b'-'));
-        if self.peek(0) == Some(b'.') && !elementwise {
-            token = Token::Real;
-            self.position += 1;
-            self.take_while(|byte| byte.is_ascii_digit());
-        }
-        if matches!(self.peek(0), Some(b'e' | b'E')) {
-            let sign = usize::from(matches!(self.peek(1), Some(b'+' | b'-')));
-            if self
-                .peek(1 + sign)
-                .is_some_and(|byte| byte.is_ascii_digit())
-            {
-                token = Token::Real;
-                self.position += 1 + sign;
-                self.take_while(|byte| byte.is_ascii_digit());
-            }
-        }
-        if self.peek(0).is_some_and(is_name_part) {
-            self.take_while(is_name_part);
-            let span = Span::new(start, self.position);
-            return Err(Problem::new(span, "a number runs into a name")
-                .hint("write a product with `*`; a name starts with a letter"));
-        }
-        Ok(token)
-    }
-
-    fn quoted(&mut self, quote: u8, what: &str, token: Token) -> Result<Token> {
-        let start = self.position;
-        self.position += 1;
-        while let Some(byte) = self.peek(0) {
-            self.position += 1;
-            match byte {
-                b'\\' => self.position = self.source.len().min(self.position + 1),
-                _ if byte == quote => return Ok(token),
-                _ => {}
-            }
-        }
-        let span = Span::new(start, start + 1);
-        Err(Problem::new(span, format!("this {what} has no end"))
-            .hint(format!("close it with `{}`", char::from(quote))))
-    }
-
-    fn symbol(&mut self) -> Result<Token> {
-        let rest = &self.source[self.position..];
-        let known = Symbol::ALL.iter().find(|(text, _)| rest.starts_with(text));
-        if let Some(&(text, symbol)) = known {
-            self.position += text.len();
-            return Ok(Token::Symbol(symbol));
-        }
-        let found = rest.chars().next().unwrap_or_default();
-        let span = Span::new(self.position, self.position + found.len_utf8());
-        let problem = Problem::new(span, format!("unexpected character {found:?}"));
-        Err(problem.maybe_hint(character_hint(found)))
-    }
-}
-
-impl Language for Lexer<'_> {
-    const NESTED: &'static str = "name the inner parts with variables of their own";
-
-    fn next(&mut self) -> Result<(Token, Span)> {
+    /// The next token; `Token::End` from the end of the text on.
+    pub(crate) fn token(&mut self) -> Result<(Token, Span)> {
         self.skip_blank()?;
         let start = self.position;
-        let token = match self.peek(0) {
+        let token = match self.byte(0) {
             None => Token::End,
             Some(byte) if is_name_start(byte) => self.word(),
-            Some(byte) if byte.is_ascii_digit() => self.number()?,
-            Some(b'"') => self.quoted(b'"', "string", Token::Text)?,
-            Some(b'\'') => self.quoted(b'\'', "quoted name", Token::Identifier)?,
-            Some(_) => self.symbol()?,
+            Some(byte) if byte.is_ascii_digit() => self.number_alone()?,
+            Some(b'"') => self.quoted("\"", "string", Token::Text)?,
+            Some(b'\'') => self.quoted("'", "quoted name", Token::Identifier)?,
+            Some(_) => self.symbol(&SYMBOLS, character_hint)?,
         };
         let span = Span::new(start, self.position);
         if token == Token::Identifier {
@@ -270,29 +202,58 @@ impl Language for Lexer<'_> {
         Ok((token, span))
     }
 
-    fn too_large(&self, limit: &str, span: Span) -> Problem {
-        let message = format!("the text has more than {limit} operands and operators");
-        Problem::new(span, message).hint("write repetition as `for` loops")
+    fn word(&mut self) -> Token {
+        let start = self.position;
+        self.take_while(is_name_part);
+        let reserved = RESERVED.get(&self.source[start..self.position]);
+        reserved.map_or(Token::Identifier, |text| Token::Fixed(text))
     }
 
-    fn hint_at_end(&self) -> Option<String> {
-        None
+    fn number_alone(&mut self) -> Result<Token> {
+        let start = self.position;
+        let token = self.number(&['e', 'E'], &[]);
+        let end = self.position;
+        self.take_while(is_name_part);
+        if self.position == end {
+            return Ok(token);
+        }
+        let span = Span::new(start, self.position);
+        Err(Problem::new(span, "a number runs into a name")
+            .hint("write a product with `*`; a name starts with a letter"))
+    }
+
+    fn quoted(&mut self, quote: &str, what: &str, token: Token) -> Result<Token> {
+        let start = self.position;
+        self.position += 1;
+        while let Some(byte) = self.byte(0) {
+            self.position += 1;
+            match byte {
+                b'\\' => self.position = self.source.len().min(self.position + 1),
+                _ if quote.as_bytes() == [byte] => return Ok(token),
+                _ => {}
+            }
+        }
+        Err(no_end(what, start, quote, quote))
     }
 }
 
-fn character_hint(found: char) -> Option<String> {
-    let hint = match found {
+/// The refusal of what begins somewhere and does not end.
+pub(crate) fn no_end(what: &str, start: usize, opening: &str, closing: &str) -> Box<Problem> {
+    let span = Span::new(start, start + opening.len());
+    Problem::new(span, format!("this {what} has no end")).hint(format!("close it with `{closing}`"))
+}
+
+fn character_hint(found: char) -> Option<&'static str> {
+    Some(match found {
         '!' => "write `not a`, or `<>` for \"not equal\"",
         '&' => "write `and`",
         '|' => "write `or`",
         '%' => "write `mod(a, b)` or `rem(a, b)`",
-        '\0' => "the text holds a zero byte: is this a text file?",
         _ if found.is_alphabetic() => {
             "names are ASCII letters, digits and `_`; put other names in single quotes"
         }
         _ => return None,
-    };
-    Some(hint.to_owned())
+    })
 }
 
 fn is_name_start(byte: u8) -> bool {
@@ -311,11 +272,6 @@ pub(crate) fn plain(text: &str) -> Cow<'_, str> {
     let text = text.strip_prefix('.').unwrap_or(text);
     if text.bytes().all(is_plain) {
         return Cow::Borrowed(text);
-    }
-    if let Some(inner) = text.strip_prefix('\'').and_then(|t| t.strip_suffix('\''))
-        && !inner.contains('\'')
-    {
-        return Cow::Borrowed(inner);
     }
     Cow::Owned(without_quotes(text))
 }
@@ -348,7 +304,7 @@ mod tests {
         let mut lexer = Lexer::new(text);
         let mut all = vec![];
         loop {
-            let (token, span) = lexer.next().unwrap();
+            let (token, span) = lexer.token().unwrap();
             if token == Token::End {
                 return all;
             }
@@ -372,8 +328,8 @@ mod tests {
 
     #[test]
     fn elementwise_after_a_number() {
-        assert_eq!(tokens("2.*x")[1].0, Token::Symbol(Symbol::ElementTimes));
-        assert_eq!(tokens("1:N")[1].0, Token::Symbol(Symbol::Colon));
+        assert_eq!(tokens("2.*x")[1].0, Token::Fixed(".*"));
+        assert_eq!(tokens("1:N")[1].0, Token::Fixed(":"));
     }
 
     #[test]
@@ -393,9 +349,8 @@ mod tests {
         for text in ["/* x", "\"x", "'x", "\"x\\"] {
             assert!(
                 Lexer::new(text)
-                    .next()
+                    .token()
                     .unwrap_err()
-                    .into_details()
                     .message
                     .contains("no end")
             );
@@ -405,7 +360,7 @@ mod tests {
     #[test]
     fn refuses_strange_characters() {
         for text in ["\0", "θ", "#", "2x"] {
-            assert!(Lexer::new(text).next().is_err(), "{text:?}");
+            assert!(Lexer::new(text).token().is_err(), "{text:?}");
         }
     }
 

@@ -1,14 +1,45 @@
 //! The parser's hands: the current token, what may come next, and the limits.
 
-use super::ast::{Ast, ExprId, Expression, Kind};
-use super::lexer::{Keyword, Language, Lexer, Symbol, Token, shortened, unquoted};
+use lynkeus_expr::Binary;
+
+use super::ast::{Ast, ExprId, Expression, Kind, Term};
+use super::lexer::{Lexer, Token, shortened, unquoted};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::{MAX_NESTING, MAX_SOURCE_BYTES, MAX_SYNTAX_NODES, grouped};
+
+/// How tightly operators bind that languages share, loosest first.
+pub(crate) const RELATION: u8 = 3;
+pub(crate) const SUM: u8 = 4;
+pub(crate) const PRODUCT: u8 = 5;
+pub(crate) const POWER: u8 = 7;
+
+/// What the parser asks of a language.
+pub(crate) trait Language<'s>: Sized {
+    /// What to do about parts that are nested too deep.
+    const NESTED: &'static str;
+
+    /// The next token; `Token::End` from the end of the text on.
+    fn next(&mut self) -> Result<(Token, Span)>;
+
+    /// How tightly an operator between two operands binds.
+    fn level(operator: &str) -> Option<u8>;
+
+    /// What stands before an operator, behind one of the level `least`.
+    fn operand(parser: &mut Parser<'s, Self>, least: u8) -> Result<ExprId>;
+
+    /// The refusal of more than so many parts.
+    fn too_large(&self, limit: &str, span: Span) -> Box<Problem>;
+
+    /// What to do where the text ends too early.
+    fn hint_at_end(&self) -> Option<String> {
+        None
+    }
+}
 
 /// Recursive-descent parser with one token of lookahead.
 pub(crate) struct Parser<'s, L = Lexer<'s>> {
     pub(crate) source: &'s str,
-    pub(crate) lexer: L,
+    pub(crate) language: L,
     pub(crate) token: Token,
     pub(crate) span: Span,
     /// the token before the current one
@@ -55,12 +86,12 @@ fn modelica(source: &str) -> Result<Parser<'_>> {
     Ok(parser)
 }
 
-impl<'s, L: Language> Parser<'s, L> {
+impl<'s, L: Language<'s>> Parser<'s, L> {
     /// A parser whose first token is behind `place`.
-    pub(crate) fn behind(place: Span, source: &'s str, lexer: L) -> Self {
+    pub(crate) fn behind(place: Span, source: &'s str, language: L) -> Self {
         Self {
             source,
-            lexer,
+            language,
             token: Token::End,
             span: place,
             last: place,
@@ -73,35 +104,40 @@ impl<'s, L: Language> Parser<'s, L> {
     /// Moves to the next token; returns the span of the one left behind.
     pub(crate) fn advance(&mut self) -> Result<Span> {
         self.last = self.span;
-        (self.token, self.span) = self.lexer.next()?;
+        (self.token, self.span) = self.language.next()?;
         Ok(self.last)
     }
 
-    pub(crate) fn at(&self, symbol: Symbol) -> bool {
-        self.token == Token::Symbol(symbol)
+    /// True at what is always written so.
+    pub(crate) fn at(&self, text: &'static str) -> bool {
+        self.token == Token::Fixed(text)
     }
 
-    pub(crate) fn accept(&mut self, symbol: Symbol) -> Result<bool> {
-        self.accept_token(Token::Symbol(symbol))
-    }
-
-    fn accept_token(&mut self, token: Token) -> Result<bool> {
-        let found = self.token == token;
+    pub(crate) fn accept(&mut self, text: &'static str) -> Result<bool> {
+        let found = self.at(text);
         if found {
             self.advance()?;
         }
         Ok(found)
     }
 
-    pub(crate) fn expect(&mut self, symbol: Symbol) -> Result<Span> {
-        if self.at(symbol) {
+    pub(crate) fn expect(&mut self, text: &'static str) -> Result<Span> {
+        if self.at(text) {
             return self.advance();
         }
-        let expected = format!("`{}`", symbol.text());
-        Err(match symbol {
-            Symbol::Semicolon => self.missing_semicolon(),
-            _ => self.unexpected(&expected),
+        Err(match text {
+            ";" => self.missing_semicolon(),
+            _ => self.unexpected(&format!("`{text}`")),
         })
+    }
+
+    /// One or more of something, with commas between them.
+    pub(crate) fn list<T>(&mut self, one: impl Fn(&mut Self) -> Result<T>) -> Result<Vec<T>> {
+        let mut items = vec![one(self)?];
+        while self.accept(",")? {
+            items.push(one(self)?);
+        }
+        Ok(items)
     }
 
     pub(crate) fn identifier(&mut self, what: &str) -> Result<Span> {
@@ -112,25 +148,106 @@ impl<'s, L: Language> Parser<'s, L> {
     }
 
     /// Points behind the last token when `;` is missing at the end of its line.
-    fn missing_semicolon(&self) -> Problem {
+    fn missing_semicolon(&self) -> Box<Problem> {
         let between = Span::new(self.last.end as usize, self.span.start as usize);
         if !between.text(self.source).contains('\n') && self.token != Token::End {
             return self.unexpected("`;`");
         }
         let end = self.last.end as usize;
-        Problem::new(
-            Span::new(end.saturating_sub(1), end),
-            "expected `;` after this",
-        )
-        .hint("every declaration and every equation ends with `;`")
+        let place = Span::new(end.saturating_sub(1), end);
+        Problem::new(place, "expected `;` after this")
+            .hint("every declaration and every equation ends with `;`")
     }
 
     /// "expected …, found …" at the current token.
-    pub(crate) fn unexpected(&self, expected: &str) -> Problem {
+    pub(crate) fn unexpected(&self, expected: &str) -> Box<Problem> {
         let found = self.token.describe(self.span.text(self.source));
         let problem = Problem::new(self.span, format!("expected {expected}, found {found}"));
         let is_end = self.token == Token::End;
-        problem.maybe_hint(is_end.then(|| self.lexer.hint_at_end()).flatten())
+        problem.maybe_hint(is_end.then(|| self.language.hint_at_end()).flatten())
+    }
+
+    /// Operands joined by operators that bind at least as tightly as `least`.
+    pub(crate) fn operators(&mut self, least: u8) -> Result<ExprId> {
+        self.nested(|parser| parser.operators_here(least))
+    }
+
+    /// The operator that stands here, and how tightly it binds.
+    fn operator(&self) -> Option<(&'static str, u8)> {
+        match self.token {
+            Token::Fixed(text) => Some((text, L::level(text)?)),
+            _ => None,
+        }
+    }
+
+    /// Precedence climbing. Operators of one level make one flat chain, so that the depth of
+    /// the tree does not grow with its length.
+    fn operators_here(&mut self, least: u8) -> Result<ExprId> {
+        let (start, first) = (self.span, self.next_id());
+        let mut left = L::operand(self, least)?;
+        while let Some((text, level)) = self.operator().filter(|(_, level)| *level >= least) {
+            let kind = match level {
+                RELATION => {
+                    let right =
+                        self.only_operand(RELATION, "comparison", "join comparisons with `and`")?;
+                    Kind::Relation(text, left, right)
+                }
+                POWER => {
+                    let hint = "write `(a^b)^c` or `a^(b^c)`: `^` has no order of its own";
+                    let right = self.only_operand(POWER, "`^`", hint)?;
+                    Kind::Power(left, right, text == ".^")
+                }
+                _ => Kind::Chain(left, self.chain(level)?),
+            };
+            left = self.push(kind, start, first)?;
+        }
+        Ok(left)
+    }
+
+    /// Operators of one level, each with the operand behind it.
+    fn chain(&mut self, level: u8) -> Result<Vec<Term>> {
+        let mut rest = vec![];
+        while let Some((text, _)) = self.operator().filter(|(_, next)| *next == level) {
+            self.advance()?;
+            let operation = match text.trim_start_matches('.') {
+                "+" => Binary::Add,
+                "-" => Binary::Sub,
+                "*" => Binary::Mul,
+                "and" => Binary::And,
+                "or" => Binary::Or,
+                _ => Binary::Div,
+            };
+            let operand = self.operators(level + 1)?;
+            self.count(1)?;
+            rest.push((operation, text.starts_with('.'), operand));
+        }
+        Ok(rest)
+    }
+
+    /// The operand behind an operator that may not stand twice: comparisons and powers have no
+    /// order among themselves.
+    fn only_operand(&mut self, level: u8, what: &str, hint: &str) -> Result<ExprId> {
+        self.advance()?;
+        if level == POWER {
+            self.refuse_sign("an exponent without sign", "as in `2^(-1)`")?;
+        }
+        let operand = self.operators(level + 1)?;
+        match self.operator() {
+            Some((_, next)) if next == level => {
+                Err(self.unexpected(&format!("one {what}")).hint(hint))
+            }
+            _ => Ok(operand),
+        }
+    }
+
+    /// Modelica has no sign behind `^` or behind another sign.
+    pub(super) fn refuse_sign(&self, expected: &str, example: &str) -> Result<()> {
+        match self.token {
+            Token::Fixed("-" | ".-" | "+" | ".+") => Err(self.unexpected(expected).hint(format!(
+                "Modelica takes no sign here: put it in parentheses, {example}"
+            ))),
+            _ => Ok(()),
+        }
     }
 
     /// Runs a part of the grammar one level deeper.
@@ -150,7 +267,7 @@ impl<'s, L: Language> Parser<'s, L> {
         self.nodes += weight;
         if self.nodes > MAX_SYNTAX_NODES {
             let limit = grouped(MAX_SYNTAX_NODES as u64);
-            return Err(self.lexer.too_large(&limit, self.span));
+            return Err(self.language.too_large(&limit, self.span));
         }
         Ok(())
     }
@@ -187,26 +304,24 @@ impl<'s, L: Language> Parser<'s, L> {
 }
 
 impl Parser<'_> {
+    /// So many tokens behind the current one.
+    fn ahead(&self, count: usize) -> impl Iterator<Item = Token> {
+        let mut lexer = self.language.clone();
+        let tokens = std::iter::from_fn(move || Some(lexer.token().ok()?.0));
+        tokens.take(count).take_while(|token| *token != Token::End)
+    }
+
     /// At an opening parenthesis: true where a comma stands between it and the one that closes
     /// it, outside of other brackets. Looks at a line's worth of tokens at most.
     pub(super) fn is_list(&self) -> bool {
-        const AHEAD: usize = 400;
-        let mut lexer = self.lexer.clone();
         let mut open = 1usize;
-        for _ in 0..AHEAD {
-            match lexer.next() {
-                Ok((Token::Symbol(Symbol::Comma), _)) if open == 1 => return true,
-                Ok((Token::Symbol(symbol), _)) => match symbol {
-                    Symbol::OpenParen | Symbol::OpenBracket | Symbol::OpenBrace => open += 1,
-                    Symbol::CloseParen | Symbol::CloseBracket | Symbol::CloseBrace => open -= 1,
-                    Symbol::Semicolon => return false,
-                    _ => {}
-                },
-                Ok((Token::End, _)) | Err(_) => return false,
+        for token in self.ahead(400) {
+            match token {
+                Token::Fixed(",") if open == 1 => return true,
+                Token::Fixed("(" | "[" | "{") => open += 1,
+                Token::Fixed(")" | "]" | "}") if open > 1 => open -= 1,
+                Token::Fixed(")" | "]" | "}" | ";") => return false,
                 _ => {}
-            }
-            if open == 0 {
-                return false;
             }
         }
         false
@@ -214,37 +329,14 @@ impl Parser<'_> {
 
     /// At an opening bracket: true where a dot follows the one that closes it.
     pub(super) fn is_inner_subscript(&self) -> bool {
-        const AHEAD: usize = 40;
-        let mut lexer = self.lexer.clone();
-        for _ in 0..AHEAD {
-            match lexer.next() {
-                Ok((Token::Symbol(Symbol::CloseBracket), _)) => {
-                    return matches!(lexer.next(), Ok((Token::Symbol(Symbol::Dot), _)));
-                }
-                Ok((Token::End, _)) | Err(_) => return false,
-                _ => {}
-            }
-        }
-        false
-    }
-
-    pub(super) fn at_word(&self, keyword: Keyword) -> bool {
-        self.token == Token::Keyword(keyword)
-    }
-
-    pub(super) fn accept_word(&mut self, keyword: Keyword) -> Result<bool> {
-        self.accept_token(Token::Keyword(keyword))
-    }
-
-    pub(super) fn expect_word(&mut self, keyword: Keyword) -> Result<Span> {
-        if self.at_word(keyword) {
-            return self.advance();
-        }
-        Err(self.unexpected(&format!("`{}`", keyword.text())))
+        let mut behind = self
+            .ahead(41)
+            .skip_while(|token| *token != Token::Fixed("]"));
+        behind.nth(1) == Some(Token::Fixed("."))
     }
 
     /// "… is not supported" at the current token.
-    pub(super) fn refuse(&self, what: &str, hint: &str) -> Problem {
+    pub(super) fn refuse(&self, what: &str, hint: &str) -> Box<Problem> {
         Problem::new(self.span, format!("{what} is not supported")).hint(hint)
     }
 
@@ -253,15 +345,12 @@ impl Parser<'_> {
         if self.token != Token::Text {
             return Ok(None);
         }
-        let mut text = unquoted(self.span.text(self.source));
-        self.advance()?;
-        while self.at(Symbol::Plus) {
-            self.advance()?;
+        let mut text = unquoted(self.advance()?.text(self.source));
+        while self.accept("+")? {
             if self.token != Token::Text {
                 return Err(self.unexpected("a string"));
             }
-            text.push_str(&unquoted(self.span.text(self.source)));
-            self.advance()?;
+            text.push_str(&unquoted(self.advance()?.text(self.source)));
         }
         Ok(Some(text))
     }
@@ -269,16 +358,22 @@ impl Parser<'_> {
     /// A description and an annotation, as after every declaration and equation.
     pub(super) fn comment(&mut self) -> Result<Option<String>> {
         let description = self.description()?;
-        if self.at_word(Keyword::Annotation) {
+        if self.at("annotation") {
             self.annotation()?;
         }
         Ok(description)
     }
 
+    /// The comment behind something, and its semicolon.
+    pub(super) fn ending(&mut self) -> Result<()> {
+        self.comment()?;
+        self.expect(";").map(|_| ())
+    }
+
     /// `annotation(…)`: skipped by counting brackets.
     pub(super) fn annotation(&mut self) -> Result<()> {
         let start = self.advance()?;
-        if !self.at(Symbol::OpenParen) {
+        if !self.at("(") {
             return Err(self.unexpected("`(` after `annotation`"));
         }
         if self.skip_brackets()? {
@@ -292,8 +387,8 @@ impl Parser<'_> {
         let mut open = 0usize;
         loop {
             match self.token {
-                Token::Symbol(Symbol::OpenParen) => open += 1,
-                Token::Symbol(Symbol::CloseParen) => open = open.saturating_sub(1),
+                Token::Fixed("(") => open += 1,
+                Token::Fixed(")") => open = open.saturating_sub(1),
                 Token::End => return Ok(false),
                 _ => {}
             }

@@ -78,7 +78,7 @@ pub(super) fn of(
 ) -> Option<Judged> {
     let count = scales.len();
     let (factor, lengths, accuracy) = balance(information, accuracy);
-    let Singular { values, directions } = singular(factor, budget)?;
+    let (values, directions) = singular(factor, budget)?;
     let rank = decide(&values, accuracy);
     // errors in units of the scales, one column per direction
     let start = DMatrix::from_fn(count, count, |i, j| directions[(i, j)] / lengths[i]);
@@ -188,7 +188,6 @@ const BLOCK: usize = 2;
 /// A triangle R with RᵀR = Σ rowᵀ·row, gathered by orthogonal transformations.
 #[derive(Clone, Debug)]
 pub(super) struct Information {
-    columns: usize,
     triangle: DMatrix<f64>,
     /// rows not yet worked in, one after the other
     pending: Vec<f64>,
@@ -199,7 +198,6 @@ pub(super) struct Information {
 impl Information {
     pub fn new(columns: usize) -> Self {
         Self {
-            columns,
             triangle: DMatrix::zeros(0, columns),
             pending: vec![],
             gross: vec![0.0; columns],
@@ -228,21 +226,23 @@ impl Information {
         for (sum, entry) in self.gross.iter_mut().zip(gross) {
             *sum += entry * entry;
         }
-        if self.pending.len() >= BLOCK * self.columns * self.columns.max(1) {
+        let columns = self.gross.len();
+        if self.pending.len() >= BLOCK * columns * columns.max(1) {
             self.settle();
         }
     }
 
     /// Works all rows into the triangle.
     pub fn settle(&mut self) {
-        if self.pending.is_empty() || self.columns == 0 {
+        let columns = self.gross.len();
+        if self.pending.is_empty() || columns == 0 {
             return;
         }
         let old = self.triangle.nrows();
-        let rows = old + self.pending.len() / self.columns;
-        let stacked = DMatrix::from_fn(rows, self.columns, |i, j| match i.checked_sub(old) {
+        let rows = old + self.pending.len() / columns;
+        let stacked = DMatrix::from_fn(rows, columns, |i, j| match i.checked_sub(old) {
             None => self.triangle[(i, j)],
-            Some(i) => self.pending[i * self.columns + j],
+            Some(i) => self.pending[i * columns + j],
         });
         self.triangle = stacked.qr().r();
         self.pending.clear();
@@ -265,16 +265,9 @@ const SWEEPS: usize = 60;
 /// Columns count as orthogonal below this cosine.
 const COSINE: f64 = 4.0 * f64::EPSILON;
 
-/// A·V has orthogonal columns whose norms are the singular values.
-pub(super) struct Singular {
-    /// not sorted
-    pub values: Vec<f64>,
-    /// the directions V, one per column
-    pub directions: DMatrix<f64>,
-}
-
-/// The singular values and right singular vectors of `a`; none where the budget is spent.
-pub(super) fn singular(mut a: DMatrix<f64>, budget: &Budget) -> Option<Singular> {
+/// The singular values of A, not sorted, and its right singular vectors, one per column of V: AV has orthogonal columns
+/// of these norms. None where the budget is spent.
+pub(super) fn singular(mut a: DMatrix<f64>, budget: &Budget) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let columns = a.ncols();
     let mut v = DMatrix::identity(columns, columns);
     for _ in 0..SWEEPS {
@@ -295,10 +288,7 @@ pub(super) fn singular(mut a: DMatrix<f64>, budget: &Budget) -> Option<Singular>
             break;
         }
     }
-    Some(Singular {
-        values: a.column_iter().map(|column| column.norm()).collect(),
-        directions: v,
-    })
+    Some((a.column_iter().map(|column| column.norm()).collect(), v))
 }
 
 /// Cosine and sine that make two columns orthogonal; none where they are.
@@ -331,7 +321,7 @@ mod tests {
         // columns nearly parallel: singular values √2 and ε/√2
         let epsilon = 1e-9;
         let a = DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 0.0, epsilon]);
-        let mut found = singular(a, &Budget::default()).unwrap().values;
+        let (mut found, _) = singular(a, &Budget::default()).unwrap();
         found.sort_by(f64::total_cmp);
         assert!(
             (found[0] / (epsilon / 2.0_f64.sqrt()) - 1.0).abs() < 1e-6,
@@ -344,7 +334,7 @@ mod tests {
     fn fewer_rows_than_columns_leave_zeros() {
         let a = DMatrix::from_row_slice(1, 3, &[3.0, 0.0, 4.0]);
         let found = singular(a.clone(), &Budget::default());
-        let Singular { values, directions } = found.unwrap();
+        let (values, directions) = found.unwrap();
         assert!((values.iter().copied().fold(0.0, f64::max) - 5.0).abs() < 1e-12);
         assert_eq!(values.iter().filter(|s| **s < 1e-12).count(), 2);
         assert!((&directions * directions.transpose() - DMatrix::identity(3, 3)).norm() < 1e-12);

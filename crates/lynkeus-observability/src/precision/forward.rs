@@ -9,7 +9,7 @@
 use lynkeus_expr::Budget;
 use nalgebra::DMatrix;
 
-use super::deviations::{Singular, singular};
+use super::deviations::singular;
 
 /// What is seen must stand out from errors by this factor.
 const MARGIN: f64 = 10.0;
@@ -77,7 +77,7 @@ impl Forward {
                 factor.column_mut(j).unscale_mut(own);
             }
         }
-        let Singular { values, directions } = singular(factor, budget)?;
+        let (values, directions) = singular(factor, budget)?;
         let present = DMatrix::from_fn(wide, wide, |i, j| directions[(i, j)] / lengths[i]);
         let doubt = &self.errors * &present;
         let doubt: Vec<f64> = doubt.column_iter().map(|c| c.norm()).collect();

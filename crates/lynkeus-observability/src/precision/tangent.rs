@@ -298,7 +298,7 @@ fn transition(tangent: &Tangent, batches: &[Batch<'_>]) -> DMatrix<f64> {
     let wide = tangent.scales.len();
     let mut matrix = DMatrix::zeros(wide, wide);
     for batch in batches {
-        for (place, &j) in batch.columns.iter().enumerate() {
+        for (place, &j) in batch.dynamics.columns.iter().enumerate() {
             let column = batch.column(place);
             for (i, value) in column.enumerate() {
                 matrix[(i, j)] = value;
@@ -313,8 +313,6 @@ fn transition(tangent: &Tangent, batches: &[Batch<'_>]) -> DMatrix<f64> {
 
 /// Some columns of S·diag(scales) on their way.
 struct Batch<'t> {
-    /// the quantities whose columns these are
-    pub columns: Vec<usize>,
     dynamics: Variation<'t>,
     sight: Evaluation,
     integrator: Integrator,
@@ -357,13 +355,12 @@ impl<'t> Batch<'t> {
         let mut batch = Self {
             dynamics: Variation {
                 tangent,
-                columns: columns.clone(),
+                columns,
                 flow: tangent.flow.system().evaluation(),
                 slopes: vec![0.0; tangent.flow.jacobians().state.places().len()],
                 states: vec![0.0; n],
                 budget: tangent.budget.clone(),
             },
-            columns,
             sight: tangent.sight.system().evaluation(),
             integrator: Integrator::new(experiment.method, x.len())?,
             x,
@@ -379,7 +376,12 @@ impl<'t> Batch<'t> {
         let tangent = self.dynamics.tangent;
         let n = tangent.states;
         self.x[n..].fill(0.0);
-        let own = self.columns.iter().enumerate().filter(|(_, j)| **j < n);
+        let own = self
+            .dynamics
+            .columns
+            .iter()
+            .enumerate()
+            .filter(|(_, j)| **j < n);
         for (place, &j) in own {
             self.x[n + place * n + j] = tangent.scales[j] / tangent.units[j];
         }
@@ -399,7 +401,7 @@ impl<'t> Batch<'t> {
             values: vec![],
             slopes: vec![],
             gross: vec![],
-            width: self.columns.len(),
+            width: self.dynamics.columns.len(),
         };
         for &to in instants {
             if to > self.t {
@@ -413,7 +415,7 @@ impl<'t> Batch<'t> {
     }
 
     fn look(&mut self, piece: &mut Piece) -> Result<(), Error> {
-        let tangent = self.dynamics.tangent;
+        let (tangent, own) = (self.dynamics.tangent, &self.dynamics.columns);
         let (states, columns) = self.x.split_at(tangent.states);
         tangent.in_own_units(states, &mut self.states);
         let states = &self.states;
@@ -426,16 +428,13 @@ impl<'t> Batch<'t> {
         let jacobian = &tangent.sight.jacobians().output;
         let sensors = jacobian.outputs().start;
         let (values, views) = seen.split_at(sensors);
-        let first = piece.slopes.len();
+        let (first, width) = (piece.slopes.len(), own.len());
         piece.values.extend(values);
-        piece
-            .slopes
-            .resize(first + sensors * self.columns.len(), 0.0);
-        piece
-            .gross
-            .resize(first + sensors * self.columns.len(), 0.0);
+        for all in [&mut piece.slopes, &mut piece.gross] {
+            all.resize(first + sensors * width, 0.0);
+        }
         for (&(c, i), &slope) in jacobian.places().iter().zip(views) {
-            for (place, &j) in self.columns.iter().enumerate() {
+            for (place, &j) in own.iter().enumerate() {
                 let (sensitivity, floor) = match i < tangent.states {
                     true => {
                         let unit = tangent.units[i];
@@ -447,7 +446,7 @@ impl<'t> Batch<'t> {
                     false if i == j => (tangent.scales[j], 0.0),
                     false => continue,
                 };
-                let at = first + c * self.columns.len() + place;
+                let at = first + c * width + place;
                 piece.slopes[at] += slope * sensitivity;
                 piece.gross[at] += slope.abs() * (sensitivity.abs() + floor);
             }
@@ -459,6 +458,7 @@ impl<'t> Batch<'t> {
 /// States and sensitivities as one system.
 struct Variation<'t> {
     tangent: &'t Tangent,
+    /// the quantities whose columns these are
     columns: Vec<usize>,
     flow: Evaluation,
     /// entries of ∂f/∂z

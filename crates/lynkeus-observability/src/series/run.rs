@@ -40,6 +40,9 @@ impl Stop {
     }
 }
 
+/// Bytes of a series where nothing limits the memory.
+const ROOM: usize = 1 << 30;
+
 /// A program under evaluation.
 pub(crate) struct Run<'a> {
     program: &'a Program,
@@ -52,20 +55,14 @@ pub(crate) struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    pub fn new(
-        program: &'a Program,
-        width: usize,
-        functions: Functions,
-        budget: Budget,
-        room: usize,
-    ) -> Self {
+    pub fn new(program: &'a Program, width: usize, functions: Functions, budget: &Budget) -> Self {
         Self {
             program,
             width,
             slots: vec![Series::default(); program.steps.len()],
             functions,
-            budget,
-            room,
+            budget: budget.clone(),
+            room: budget.room().unwrap_or(ROOM) / size_of::<Modular>(),
         }
     }
 

@@ -44,7 +44,7 @@ pub(super) fn form(
     }
     let arrangements = match blocks::find(augmented, &settings.request, settings.order.as_deref()) {
         Ok(arrangements) => arrangements,
-        Err(summary) => return refusal(Reason::Structure(summary.into())),
+        Err(summary) => return refusal(summary.into()),
     };
     let choices = distinct(augmented, settings, &arrangements)?;
     first_fit(choices.into_iter().take(EXAMINED), |choice| {
@@ -97,15 +97,9 @@ fn examined(
     let (mut checks, mut all): (Vec<Check>, Vec<Vec<Partial>>) = (vec![], vec![]);
     for (output, chain) in &blocks.order {
         checks.extend(output_slope(augmented, *output, region)?);
-        let (found, signs) = partials(augmented, &chain.states, region)?;
+        let (found, signs) = partials(augmented, chain, region)?;
         checks.extend(signs);
-        checks.extend(stable(
-            augmented,
-            settings,
-            &chain.states,
-            &K[*output],
-            &found,
-        ));
+        checks.extend(stable(augmented, settings, chain, &K[*output], &found));
         all.push(found);
     }
     checks.push(lipschitz(augmented, region)?);
@@ -115,7 +109,7 @@ fn examined(
         .map(|partial| graph.constant_value(partial.node));
     let ordered = blocks.order.iter();
     let summary = Said::Form {
-        chains: ordered.map(|(_, c)| names(augmented, &c.states)).collect(),
+        chains: ordered.map(|(_, c)| names(augmented, c)).collect(),
         correction: settings.correction,
         ones: numbers.clone().all(|a| a == Some(1.0)),
         // which are 1 in other units
@@ -212,7 +206,7 @@ fn decay(K: &[f64], a: &[f64], ranges: &[(f64, f64)]) -> Option<f64> {
 pub(super) fn chain_rule(blocks: &Blocks, θ: &[f64]) -> Option<Reason> {
     blocks.order.windows(2).find_map(|pair| {
         let ((before, chain), (after, _)) = (&pair[0], &pair[1]);
-        let count = chain.states.len();
+        let count = chain.len();
         let (before, later) = (θ[*before], θ[*after]);
         let needed = before.powi(count as i32);
         let said = Said::BreaksRule {

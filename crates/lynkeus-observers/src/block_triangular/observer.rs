@@ -55,19 +55,15 @@ pub(super) fn observer(
             Correction::Lee => lee(augmented, chain, &timed),
         };
         let gain = copy.at_estimate(&graph.substitute(&gain, &injected));
-        let f: Vec<Node> = chain
-            .states
-            .iter()
-            .map(|&i| augmented.derivatives[i])
-            .collect();
+        let f: Vec<Node> = chain.iter().map(|&i| augmented.derivatives[i]).collect();
         let f = copy.at_estimate(&graph.substitute(&f, &injected));
-        for ((&state, f), gain) in chain.states.iter().zip(f).zip(&gain) {
+        for ((&state, f), gain) in chain.iter().zip(f).zip(&gain) {
             derivatives[state] =
                 (graph.expr(f) - graph.expr(*gain) * graph.expr(innovation)).node();
         }
         let printed = printed::ChainCorrection {
             output: *output,
-            states: &chain.states,
+            states: chain,
             factors: &gain,
             limited: remedies.limit.is_some(),
         };
@@ -87,7 +83,7 @@ pub(super) fn observer(
         }
     }
     for ((_, chain), partials) in blocks.order.iter().zip(&form.partials) {
-        prolong(&copy, &chain.states, partials, &mut derivatives)?;
+        prolong(&copy, chain, partials, &mut derivatives)?;
     }
     Ok(Design {
         observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
@@ -119,7 +115,7 @@ pub(super) fn low_power(
     let θ = settings.θ()?;
     let part = |place: usize| Part {
         output: blocks.order[place].0,
-        states: &blocks.order[place].1.states,
+        states: &blocks.order[place].1,
         partials: &form.partials[place],
         δ: 1.0,
     };
@@ -146,8 +142,8 @@ pub(super) struct Steps {
 impl Steps {
     pub fn new(augmented: &AugmentedPlant<'_>, chain: &Chain) -> Self {
         let graph = augmented.graph();
-        let n = chain.states.len();
-        let F = slopes(augmented, &chain.states, &chain.states);
+        let n = chain.len();
+        let F = slopes(augmented, chain, chain);
         // Step 1: M̄ = (C; CF; …; CF^{n−1}), lower triangular, and the next power CFⁿ
         let mut rows = vec![unit(graph, n)];
         for k in 0..n {

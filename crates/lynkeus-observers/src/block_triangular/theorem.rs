@@ -11,7 +11,7 @@ use lynkeus_proof::magnitude::{plus, product, times};
 use lynkeus_proof::matrix::{square, sum};
 use lynkeus_proof::search::{first, lightest};
 use lynkeus_proof::{lyapunov, metzler};
-use lynkeus_structure::{AugmentedPlant, Blocks, Standing, short};
+use lynkeus_structure::{AugmentedPlant, Blocks, Standing};
 use nalgebra::DMatrix;
 
 use super::form::chain_rule;
@@ -106,7 +106,7 @@ impl Study<'_> {
         let (augmented, classical) = (self.plant.augmented, self.classical);
         let region = &self.plant.assumptions.region;
         let order = &self.blocks().order;
-        let places = order.iter().map(|(output, c)| (*output, &c.states[..]));
+        let places = order.iter().map(|(output, c)| (*output, &c[..]));
         let (partials, mut checks) = along(augmented, places, region)?;
         let range = |partial: &Partial| match classical {
             // M takes the partials out: a chain of integrators is left
@@ -136,10 +136,10 @@ impl Study<'_> {
     /// The partial along a chain, which is in A, and measured heads of later chains.
     fn skipped(&self, row: usize, column: usize) -> bool {
         let order = &self.blocks().order;
-        let place = |state: usize| order.iter().position(|(_, c)| c.states.contains(&state));
+        let place = |state: usize| order.iter().position(|(_, c)| c.contains(&state));
         let along = order
             .iter()
-            .any(|(_, c)| c.states.windows(2).any(|p| p == [row, column]));
+            .any(|(_, c)| c.windows(2).any(|p| p == [row, column]));
         along || place(column) > place(row)
     }
 
@@ -147,7 +147,7 @@ impl Study<'_> {
     fn first_inequality(&self, checks: &mut Vec<Check>) -> Option<(Vec<DMatrix<f64>>, Vec<f64>)> {
         let (mut all, mut decays) = (vec![], vec![]);
         for (i, (_, chain)) in self.blocks().order.iter().enumerate() {
-            let states = names(self.plant.augmented, &chain.states);
+            let states = names(self.plant.augmented, chain);
             let name = Lee::Lyapunov { states };
             let gained = GainedChain {
                 K: &self.plant.K[i],
@@ -173,7 +173,7 @@ impl Study<'_> {
     }
 
     fn chain(&self, i: usize, P: &DMatrix<f64>, θ: f64, c: f64) -> Chain {
-        let states = self.blocks().order[i].1.states.clone();
+        let states = self.blocks().order[i].1.clone();
         let speed = Interval::point(θ);
         let weighed = |i, j| Interval::point(c) * Interval::point(P[(i, j)]);
         let error = Interval::new(1.0 - 1e-12, 1.0 + 1e-12).unwrap_or(Interval::ONE);
@@ -231,12 +231,13 @@ impl Study<'_> {
             ));
         }
         if let Some(θ0) = θ0 {
-            let exponents: Vec<String> = ν.iter().map(|&ν| short(ν)).collect();
-            let meaning = format!(
-                "the decay is proved for θ_i = θ^ν_i, ν = ({}), and every θ from here on",
-                exponents.join(", ")
-            );
-            constants.push(Constant::new("θ0", θ0, meaning));
+            constants.push(Constant {
+                name: "θ0".to_owned(),
+                value: θ0,
+                meaning: "the decay is proved for θ_i = θ^ν_i, ν = ({}), and every θ from here on"
+                    .to_owned(),
+                numbers: ν.to_vec(),
+            });
         }
         let name = Lee::Theta {
             θ: self.θ.clone()
@@ -253,7 +254,7 @@ impl Study<'_> {
     fn falls(&self, ν: &[f64]) -> bool {
         let place = |state: usize| {
             let mut chains = self.blocks().order.iter().enumerate();
-            chains.find_map(|(i, (_, c))| Some((i, c.states.iter().position(|s| *s == state)? + 1)))
+            chains.find_map(|(i, (_, c))| Some((i, c.iter().position(|s| *s == state)? + 1)))
         };
         self.terms.iter().all(|term| {
             let (Some((i, l)), Some((k, m))) = (place(term.row), place(term.column)) else {
@@ -343,10 +344,7 @@ impl Study<'_> {
 
     /// ‖Δ_i H_ij Δ_j⁻¹‖ at the study's θ.
     fn scaled_norm(&self, i: usize, j: usize) -> f64 {
-        let (rows, columns) = (
-            &self.blocks().order[i].1.states,
-            &self.blocks().order[j].1.states,
-        );
+        let (rows, columns) = (&self.blocks().order[i].1, &self.blocks().order[j].1);
         let mut H = vec![vec![0.0; columns.len()]; rows.len()];
         for term in &self.terms {
             let l = rows.iter().position(|s| *s == term.row);
@@ -420,12 +418,9 @@ impl Study<'_> {
             let Some(similar) = self.similar.get(i) else {
                 continue;
             };
-            let count = Interval::point(chain.states.len() as f64);
-            for (&state, row) in chain.states.iter().zip(&similar.M) {
-                let terms = row
-                    .iter()
-                    .zip(&chain.states)
-                    .filter(|(_, k)| given[**k] > 0.0);
+            let count = Interval::point(chain.len() as f64);
+            for (&state, row) in chain.iter().zip(&similar.M) {
+                let terms = row.iter().zip(chain).filter(|(_, k)| given[**k] > 0.0);
                 let terms =
                     terms.map(|(m, k)| Interval::point(*m).powi(2) * Interval::point(given[*k]));
                 found[state] = (count * sum(terms)).hi();
@@ -442,10 +437,10 @@ impl Study<'_> {
         let mut drift = vec![0.0; self.plant.augmented.states.len()];
         for (i, (_, chain)) in order.iter().enumerate() {
             let mut column: Table = vec![];
-            for &state in &chain.states {
+            for &state in chain {
                 let mut d = Interval::point(given.get(state).copied().unwrap_or(f64::INFINITY));
                 for (k, (_, later)) in order.iter().enumerate().skip(i + 1) {
-                    let slope = self.plant.jacobian(&[state], &later.states[..1])?[0][0];
+                    let slope = self.plant.jacobian(&[state], &later[..1])?[0][0];
                     if slope != 0.0 && self.plant.noise[k] != 0.0 {
                         d = d + Interval::point(slope) * Interval::point(self.plant.noise[k]);
                     }
@@ -454,9 +449,9 @@ impl Study<'_> {
             }
             let (column, L) = match self.similar.get(i) {
                 Some(similar) => (product(&similar.M, &column), similar.L.clone()),
-                None => (column, vec![0.0; chain.states.len()]),
+                None => (column, vec![0.0; chain.len()]),
             };
-            for ((&state, d), l) in chain.states.iter().zip(column).zip(L) {
+            for ((&state, d), l) in chain.iter().zip(column).zip(L) {
                 let noisy = times(l, self.plant.noise[i]);
                 drift[state] = plus(d[0], noisy);
             }

@@ -114,7 +114,7 @@ impl Plant<'_> {
     }
 
     fn entries(&self, i: usize, j: usize, table: &Table) -> Vec<Term> {
-        let (rows, columns) = (&self.chain(i).states, &self.chain(j).states);
+        let (rows, columns) = (self.chain(i), self.chain(j));
         let pairs = table.iter().zip(rows).flat_map(|(entries, &row)| {
             let columns = entries.iter().zip(columns);
             columns.map(move |(&size, &column)| Term {
@@ -143,13 +143,13 @@ impl Plant<'_> {
             })
         };
         let row = |row: &Vec<Sparse>| row.iter().map(width).collect();
-        let own = &self.chain(i).states;
+        let own = self.chain(i);
         slopes(self.augmented, own, own).iter().map(row).collect()
     }
 
     /// |∂f_i/∂x_j|
     fn coupling(&self, i: usize, j: usize) -> Result<Table, DesignError> {
-        self.jacobian(&self.chain(i).states, &self.chain(j).states)
+        self.jacobian(self.chain(i), self.chain(j))
     }
 
     /// |∂f/∂x| for the equations of `rows` and the states `columns`.
@@ -159,9 +159,9 @@ impl Plant<'_> {
 
     /// Adds Ṁ M⁻¹ to the terms of chain i.
     fn moving(&self, i: usize, similar: &[Similar], terms: &mut [Term]) -> Result<(), DesignError> {
-        let n = self.chain(i).states.len();
+        let n = self.chain(i).len();
         for (c, (_, chain)) in self.blocks.order.iter().enumerate() {
-            for (place, &state) in chain.states.iter().enumerate() {
+            for (place, &state) in chain.iter().enumerate() {
                 let slope = self.slope_of_M(&similar[i], self.augmented.states[state].node)?;
                 let product = product(&slope, &similar[i].inverse);
                 if product.iter().flatten().all(|x| *x == 0.0) {
@@ -211,7 +211,7 @@ impl Plant<'_> {
         i: usize,
         similar: &[Similar],
     ) -> Result<(f64, Vec<(usize, f64)>), DesignError> {
-        let state = self.chain(c).states[place];
+        let state = self.chain(c)[place];
         let f = self.size(Some(self.augmented.derivatives[state]))?;
         if c > i {
             let drift = self
@@ -229,7 +229,7 @@ impl Plant<'_> {
                 vec![],
             ));
         }
-        let head = &self.augmented.states[self.chain(c).states[0]];
+        let head = &self.augmented.states[self.chain(c)[0]];
         let side = self
             .assumptions
             .region

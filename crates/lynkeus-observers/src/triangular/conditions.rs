@@ -25,7 +25,7 @@ pub(super) fn form(
     let refusal = |summary: Reason| Err(Examination::unfit(NAME, summary, vec![]).into());
     let mut assignments = match chains::find(augmented, &settings.request) {
         Ok(assignments) => assignments,
-        Err(summary) => return refusal(Reason::Structure(summary.into())),
+        Err(summary) => return refusal(summary.into()),
     };
     if let Some(leading) = settings.leading {
         assignments.retain(|a| a.leads.contains(&leading));
@@ -63,11 +63,11 @@ fn examined(
     assignment: Assignment,
     choices: usize,
 ) -> Result<Found<Form>, DesignError> {
-    let places = assignment.chains.iter().map(|c| &c.states[..]);
+    let places = assignment.chains.iter().map(|c| &c[..]);
     let (partials, mut checks) = along(augmented, places.enumerate(), region)?;
     checks.push(lipschitz(augmented, region)?);
     let chains = assignment.chains.iter();
-    let chains: Vec<Vec<String>> = chains.map(|c| names(augmented, &c.states)).collect();
+    let chains: Vec<Vec<String>> = chains.map(|c| names(augmented, c)).collect();
     let leads = assignment.leads.len();
     let leading = augmented.outputs[assignment.leading].variable.name.clone();
     let form = Form {
@@ -149,7 +149,7 @@ impl Form {
                 K: &K,
                 partials: &bounds.collect::<Vec<_>>(),
             };
-            loose.extend(loose_by(&gained, &names(augmented, &chain.states)));
+            loose.extend(loose_by(&gained, &names(augmented, chain)));
         }
         loose
     }
@@ -179,14 +179,14 @@ impl Form {
         }
         for (i, chain) in self.assignment.chains.iter().enumerate() {
             // the signs of Remark 2, or divided by the partials
-            let along = chain.states.windows(2).map(|pair| A[(pair[0], pair[1])]);
+            let along = chain.windows(2).map(|pair| A[(pair[0], pair[1])]);
             let factors: Vec<f64> = along
                 .map(|a| if gains.divided { 1.0 / a } else { a.signum() })
                 .collect();
             let mut product = 1.0;
-            for (j, (&state, k)) in chain.states.iter().zip(gains.chain(i)).enumerate() {
+            for (j, (&state, k)) in chain.iter().zip(gains.chain(i)).enumerate() {
                 product *= if j == 0 { 1.0 } else { factors[j - 1] };
-                A[(state, chain.states[0])] -= product * k;
+                A[(state, chain[0])] -= product * k;
             }
         }
         Ok(spectrum::abscissa(A).is_some_and(|largest| largest < 0.0))

@@ -37,13 +37,13 @@ pub(super) fn observer(
         };
         let timed = gains.timed(&copy, i, θ);
         let scaled = scaled(graph, &copy, &form.partials[i], &timed, gains.divided);
-        for (&state, gain) in chain.states.iter().zip(&scaled) {
+        for (&state, gain) in chain.iter().zip(&scaled) {
             let correction = graph.expr(*gain) * graph.expr(innovation);
             derivatives[state] = (graph.expr(derivatives[state]) - correction).node();
         }
         let printed = ChainCorrection {
             output: i,
-            states: &chain.states,
+            states: chain,
             factors: &scaled,
             limited: remedies.limit.is_some(),
         };
@@ -56,7 +56,7 @@ pub(super) fn observer(
         }
     }
     for (chain, partials) in form.assignment.chains.iter().zip(&form.partials) {
-        prolong(&copy, &chain.states, partials, &mut derivatives)?;
+        prolong(&copy, chain, partials, &mut derivatives)?;
     }
     Ok(Design {
         observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
@@ -106,7 +106,7 @@ pub(super) fn low_power(
     let copy = PlantCopy::new(augmented, &settings.common);
     let part = |i: usize| Part {
         output: i,
-        states: &form.assignment.chains[i].states,
+        states: &form.assignment.chains[i],
         partials: &form.partials[i],
         δ: δ[i],
     };

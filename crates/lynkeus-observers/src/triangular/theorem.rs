@@ -44,7 +44,7 @@ pub(super) fn certificate(
 ) -> Result<Certificate, DesignError> {
     let region = &assumptions.region;
     let chains = &form.assignment.chains;
-    let places = chains.iter().map(|c| &c.states[..]);
+    let places = chains.iter().map(|c| &c[..]);
     let (partials, mut checks) = along(augmented, places.enumerate(), region)?;
     let bounds = partials
         .iter()
@@ -52,7 +52,7 @@ pub(super) fn certificate(
     let bounds: Vec<Vec<(f64, f64)>> = bounds.collect();
     let skip = |a: usize, b: usize| {
         let mut chains = chains.iter();
-        chains.any(|c| c.states.windows(2).any(|p| p == [a, b]))
+        chains.any(|c| c.windows(2).any(|p| p == [a, b]))
     };
     let (slopes, check) = slopes(augmented, region, skip)?;
     checks.push(check);
@@ -115,7 +115,7 @@ impl Study<'_> {
         checks.extend(self.constant_gain());
         let count = self.form.assignment.chains.len();
         for i in 0..count {
-            let states = names(self.augmented, &self.form.assignment.chains[i].states);
+            let states = names(self.augmented, &self.form.assignment.chains[i]);
             let suffix = match count {
                 1 => String::new(),
                 _ => format!(" of chain {}", i + 1),
@@ -160,7 +160,7 @@ impl Study<'_> {
 
     /// Chain i at θ, in the coordinates x̃ = T x; c weighs its V.
     fn chain(&self, i: usize, θ: f64, c: f64) -> Chain {
-        let states = self.form.assignment.chains[i].states.clone();
+        let states = self.form.assignment.chains[i].clone();
         let gains = self.gains;
         let speed = Interval::point(θ).pow(Interval::point(gains.δ[i]));
         let bounds = &self.bounds[i];

@@ -158,7 +158,7 @@ fn the_printed_matrix_is_refuted_with_its_direction() {
     let point = &witness.points[0];
     assert!(
         (point.value - 8.747_348_170_830_902).abs() < 1e-9,
-        "{point}"
+        "{point:?}"
     );
     assert_eq!(point.coordinates.len(), 6);
     assert!(

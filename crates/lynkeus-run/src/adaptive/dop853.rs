@@ -3,7 +3,9 @@
 //! section II.10), with the interpolant of order 7 of the same book. Its three further stages are for
 //! steps that may cross something: runs stop at every row.
 
-use crate::events::{COEFFICIENTS, Poly};
+use super::one_step::OneStep;
+use crate::events::{Ahead, COEFFICIENTS, Filippov, Poly, Span};
+use crate::method::{are_finite, resolution};
 use crate::{Dynamics, Tolerances};
 
 const STAGES: usize = 12;
@@ -249,11 +251,11 @@ pub(super) struct Dop853 {
     /// a step before this one was rejected
     is_retry: bool,
     /// the last point at which a stage had no finite derivative
-    pub bad: Option<(f64, Vec<f64>)>,
+    bad: Option<(f64, Vec<f64>)>,
 }
 
-impl Dop853 {
-    pub fn new(dimension: usize) -> Self {
+impl OneStep for Dop853 {
+    fn new(dimension: usize) -> Self {
         Self {
             slopes: std::array::from_fn(|_| vec![0.0; dimension]),
             stage: vec![0.0; dimension],
@@ -265,25 +267,24 @@ impl Dop853 {
         }
     }
 
-    /// Takes the derivative at the start of a step; false where it is not finite.
-    pub fn begin(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) -> bool {
-        self.is_retry = false;
+    /// Every step begins with nothing but its state.
+    fn restart(&mut self, _careful: bool) {}
+
+    fn begin(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) -> bool {
+        (self.is_retry, self.bad) = (false, None);
         f.derivatives(t, x, &mut self.slopes[0]);
-        finite(&self.slopes[0])
+        are_finite(&self.slopes[0])
     }
 
-    /// The state after an accepted step.
-    pub fn reached(&self) -> &[f64] {
+    fn reached(&self) -> &[f64] {
         &self.reached
     }
 
-    /// Tries a step from where [`Dop853::begin`] was called. Where it is accepted the new state is
-    /// in [`Dop853::reached`].
-    ///
-    /// # Errors
-    /// The step to retry with, for a step with too large an error or a stage without finite
-    /// derivative; else the step to go on with.
-    pub fn attempt(
+    fn bad(&self) -> Option<&(f64, Vec<f64>)> {
+        self.bad.as_ref()
+    }
+
+    fn attempt(
         &mut self,
         f: &mut impl Dynamics,
         (t, x): (f64, &[f64]),
@@ -297,7 +298,7 @@ impl Dop853 {
             }
             let at = t + c * h;
             f.derivatives(at, &self.stage, &mut self.slopes[i + 1]);
-            if !finite(&self.slopes[i + 1]) {
+            if !are_finite(&self.slopes[i + 1]) {
                 self.bad = Some((at, self.stage.clone()));
                 return self.rejected(h * LEAST);
             }
@@ -305,7 +306,7 @@ impl Dop853 {
         combine(&mut self.segment, B, &self.slopes);
         self.reached.copy_from_slice(x);
         add(&mut self.reached, h, &self.segment);
-        if !finite(&self.reached) {
+        if !are_finite(&self.reached) {
             return self.rejected(h * FAR);
         }
         let error = self.error(x, h, tolerances);
@@ -321,29 +322,8 @@ impl Dop853 {
         Ok(h * factor.min(limit))
     }
 
-    fn rejected(&mut self, shorter: f64) -> Result<f64, f64> {
-        self.is_retry = true;
-        Err(shorter)
-    }
-
-    /// The estimate of the error over the step, in tolerances: 1 is just allowed.
-    fn error(&mut self, x: &[f64], h: f64, tolerances: &Tolerances) -> f64 {
-        let difference = &mut self.stage;
-        combine(difference, FIFTH, &self.slopes);
-        let fifth = squares(x, &self.reached, difference, tolerances);
-        difference.copy_from_slice(&self.segment);
-        for &(j, b) in THIRD {
-            add(difference, -b, &self.slopes[j]);
-        }
-        let third = squares(x, &self.reached, difference, tolerances);
-        let both = fifth + 0.01 * third;
-        let both = if both <= 0.0 { 1.0 } else { both };
-        h.abs() * fifth * (1.0 / (both * x.len() as f64)).sqrt()
-    }
-
-    /// A first step for an interval of length `span` (section II.4 of the book), after
-    /// [`Dop853::begin`].
-    pub fn first_step(
+    /// Section II.4 of the book.
+    fn first_step(
         &mut self,
         f: &mut impl Dynamics,
         (t, x): (f64, &[f64]),
@@ -373,17 +353,52 @@ impl Dop853 {
         } else {
             (0.01 / fastest).powf(1.0 / ORDER)
         };
-        (h * 100.0).min(wanted).min(span)
+        // a guess that time does not resolve is too careful: it may be longer all the same
+        let first = (h * 100.0).min(wanted).min(span);
+        first.max(2.0 * resolution(t)).min(span)
+    }
+
+    fn ahead<D: Dynamics>(&mut self, f: &mut Filippov<'_, D>, span: &Span<'_>) -> Option<Ahead> {
+        if !f.is_near(span, |state| self.fastest(state)) {
+            return None;
+        }
+        let ((t, x), h) = (span.from, span.step);
+        Some(match self.look_inside(f, (t, x), h) {
+            true => f.ahead(span, |state| self.between(state, x[state], h)),
+            false => Ahead::Nothing,
+        })
+    }
+}
+
+impl Dop853 {
+    fn rejected(&mut self, shorter: f64) -> Result<f64, f64> {
+        self.is_retry = true;
+        Err(shorter)
+    }
+
+    /// The estimate of the error over the step, in tolerances: 1 is just allowed.
+    fn error(&mut self, x: &[f64], h: f64, tolerances: &Tolerances) -> f64 {
+        let difference = &mut self.stage;
+        combine(difference, FIFTH, &self.slopes);
+        let fifth = squares(x, &self.reached, difference, tolerances);
+        difference.copy_from_slice(&self.segment);
+        for &(j, b) in THIRD {
+            add(difference, -b, &self.slopes[j]);
+        }
+        let third = squares(x, &self.reached, difference, tolerances);
+        let both = fifth + 0.01 * third;
+        let both = if both <= 0.0 { 1.0 } else { both };
+        h.abs() * fifth * (1.0 / (both * x.len() as f64)).sqrt()
     }
 
     /// The largest derivative of a state at any stage of the step tried last.
-    pub fn fastest(&self, state: usize) -> f64 {
+    fn fastest(&self, state: usize) -> f64 {
         let slopes = self.slopes.iter().map(|slope| slope[state].abs());
         slopes.fold(0.0, f64::max)
     }
 
     /// Finds what is between the ends of the step tried last; false where a derivative is not finite.
-    pub fn look_inside(&mut self, f: &mut impl Dynamics, (t, x): (f64, &[f64]), h: f64) -> bool {
+    fn look_inside(&mut self, f: &mut impl Dynamics, (t, x): (f64, &[f64]), h: f64) -> bool {
         for slope in &mut self.further {
             slope.resize(x.len(), 0.0);
         }
@@ -400,11 +415,11 @@ impl Dop853 {
             }
             f.derivatives(t + c * h, &self.stage, &mut self.further[i + 1]);
         }
-        self.further.iter().all(|slope| finite(slope))
+        self.further.iter().all(|slope| are_finite(slope))
     }
 
     /// What a state is between the ends of a step, after [`Dop853::look_inside`].
-    pub fn between(&self, state: usize, from: f64, h: f64) -> Poly {
+    fn between(&self, state: usize, from: f64, h: f64) -> Poly {
         let slope = |j: usize| match self.slopes.get(j) {
             Some(slope) => slope[state],
             None => self.further[j - STAGES][state],
@@ -436,10 +451,6 @@ impl Dop853 {
         c[0] += from;
         Poly(c)
     }
-}
-
-fn finite(values: &[f64]) -> bool {
-    values.iter().all(|v| v.is_finite())
 }
 
 fn add(to: &mut [f64], factor: f64, values: &[f64]) {

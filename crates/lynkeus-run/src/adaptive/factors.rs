@@ -22,20 +22,15 @@ const FULL: f64 = 0.25;
 pub(super) struct Shifted {
     n: usize,
     places: Arc<[Place]>,
-    /// none where it is dense
-    pattern: Option<Pattern>,
-}
-
-#[derive(Clone, Debug)]
-struct Pattern {
-    order: Vec<usize>,
+    /// in which columns are eliminated; none where it is dense
+    order: Option<Vec<usize>>,
     /// column by column, the rows with the numbers of the entries
     entries: Columns<usize>,
 }
 
 /// Factors of one matrix.
 #[derive(Clone, Debug)]
-pub(super) enum Factors<T: Number> {
+pub(super) enum Factors<T: ComplexField> {
     Dense(LU<T, Dyn, Dyn>),
     Sparse(Sparse<T>),
 }
@@ -45,22 +40,43 @@ impl Shifted {
         Self {
             n,
             places: Arc::new([]),
-            pattern: None,
+            order: None,
+            entries: Columns::default(),
         }
     }
 
-    /// Knows the pattern from here on.
+    /// Knows the pattern from here on. It is dense where the factors are, or zeros too few to matter.
     pub fn fit(&mut self, slopes: &Slopes) {
-        if !Arc::ptr_eq(&self.places, slopes.places()) {
-            self.places = slopes.places().clone();
-            self.pattern = Pattern::of(self.n, &self.places);
+        if Arc::ptr_eq(&self.places, slopes.places()) {
+            return;
+        }
+        self.places = slopes.places().clone();
+        let (n, places) = (self.n, &self.places);
+        let most = (FULL * (n * n) as f64) as usize;
+        let may_be_sparse = n > SMALL && places.len() <= most;
+        self.order = may_be_sparse
+            .then(|| least_degree(n, places, most / 2))
+            .flatten();
+        self.entries = Columns::default();
+        let mut numbered: Vec<(usize, Place)> = places.iter().copied().enumerate().collect();
+        numbered.sort_by_key(|(_, at)| at.column);
+        let mut rest = numbered.into_iter().peekable();
+        for c in 0..n {
+            while let Some((k, at)) = rest.next_if(|(_, at)| at.column == c) {
+                self.entries.push(at.row, k);
+            }
+            self.entries.close();
         }
     }
 
     /// Factors of σI − J, whose pattern is known; none where it is singular.
-    pub fn factors<T: Number>(&self, σ: T, slopes: &Slopes) -> Option<Factors<T>> {
+    pub fn factors<T: ComplexField<RealField = f64> + Copy>(
+        &self,
+        σ: T,
+        slopes: &Slopes,
+    ) -> Option<Factors<T>> {
         let n = self.n;
-        let Some(pattern) = &self.pattern else {
+        let Some(order) = &self.order else {
             let mut matrix = slopes.dense(n).map(|v| T::from_real(-v));
             for i in 0..n {
                 matrix[(i, i)] += σ;
@@ -70,39 +86,17 @@ impl Shifted {
         };
         let mut matrix = Columns::default();
         for c in 0..n {
-            for &(row, k) in pattern.entries.column(c) {
+            for &(row, k) in self.entries.column(c) {
                 matrix.push(row, T::from_real(-slopes.values()[k]));
             }
             matrix.push(c, σ);
             matrix.close();
         }
-        Some(Factors::Sparse(Sparse::new(&matrix, &pattern.order)?))
+        Some(Factors::Sparse(Sparse::new(&matrix, order)?))
     }
 }
 
-impl Pattern {
-    /// None where the factors are dense, or zeros too few to matter.
-    fn of(n: usize, places: &[Place]) -> Option<Self> {
-        let most = (FULL * (n * n) as f64) as usize;
-        if n <= SMALL || places.len() > most {
-            return None;
-        }
-        let order = least_degree(n, places, most / 2)?;
-        let mut numbered: Vec<(usize, Place)> = places.iter().copied().enumerate().collect();
-        numbered.sort_by_key(|(_, at)| at.column);
-        let mut entries = Columns::default();
-        let mut rest = numbered.into_iter().peekable();
-        for c in 0..n {
-            while let Some((k, at)) = rest.next_if(|(_, at)| at.column == c) {
-                entries.push(at.row, k);
-            }
-            entries.close();
-        }
-        Some(Self { order, entries })
-    }
-}
-
-impl<T: Number> Factors<T> {
+impl<T: ComplexField<RealField = f64> + Copy> Factors<T> {
     /// b becomes the solution; false where there is none.
     pub fn solve(&self, b: &mut DVector<T>) -> bool {
         match self {
@@ -150,11 +144,6 @@ fn least_degree(n: usize, places: &[Place], most: usize) -> Option<Vec<usize>> {
 /// The diagonal is taken as pivot, which keeps what the order of the columns was chosen for,
 /// unless it is smaller than this share of the largest entry.
 const DIAGONAL: f64 = 0.1;
-
-/// Real or complex numbers.
-pub(super) trait Number: ComplexField<RealField = f64> + Copy {}
-
-impl<T: ComplexField<RealField = f64> + Copy> Number for T {}
 
 /// Entries of a matrix, column by column.
 #[derive(Clone, Debug)]
@@ -215,7 +204,7 @@ struct Column<T> {
     free: Vec<usize>,
 }
 
-impl<T: Number> Column<T> {
+impl<T: ComplexField<RealField = f64> + Copy> Column<T> {
     fn add(&mut self, step: usize, row: usize, value: T) {
         if self.met[row] != step + 1 {
             self.met[row] = step + 1;
@@ -248,7 +237,7 @@ impl<T: Number> Column<T> {
     }
 }
 
-impl<T: Number> Sparse<T> {
+impl<T: ComplexField<RealField = f64> + Copy> Sparse<T> {
     /// Factors of the matrix with these columns, eliminated in this order; none where it is
     /// singular or not finite.
     fn new(matrix: &Columns<T>, order: &[usize]) -> Option<Self> {
@@ -347,10 +336,15 @@ mod tests {
     }
 
     /// What is left of A x = b for the factors' x.
-    fn residual<T: Number>(n: usize, slopes: &Slopes, σ: T, sparse: bool) -> f64 {
+    fn residual<T: ComplexField<RealField = f64> + Copy>(
+        n: usize,
+        slopes: &Slopes,
+        σ: T,
+        sparse: bool,
+    ) -> f64 {
         let mut shifted = Shifted::new(n);
         shifted.fit(slopes);
-        assert_eq!(shifted.pattern.is_some(), sparse);
+        assert_eq!(shifted.order.is_some(), sparse);
         let factors = shifted.factors(σ, slopes).unwrap();
         let b = DVector::from_fn(n, |i, _| T::from_real((i as f64).cos()));
         let mut x = b.clone();

@@ -7,7 +7,9 @@
 use nalgebra::{Complex, DVector};
 
 use super::factors::{Factors, Shifted};
-use crate::events::Poly;
+use super::one_step::OneStep;
+use crate::events::{Ahead, Filippov, Poly, Span};
+use crate::method::are_finite;
 use crate::{Dynamics, Slopes, Tolerances};
 
 const SQRT_6: f64 = 2.449_489_742_783_178;
@@ -68,8 +70,11 @@ const T_INVERSE: [[f64; 3]; 3] = [
 /// Working memory and what is kept from step to step.
 #[derive(Clone, Debug)]
 pub(super) struct Radau {
-    /// derivative at the present state
+    /// derivative at the present state, where it is known
     f0: DVector<f64>,
+    has_begun: bool,
+    /// nothing tells how long a step may be
+    careful: bool,
     z: [DVector<f64>; 3],
     w: [DVector<f64>; 3],
     stage: DVector<f64>,
@@ -85,7 +90,7 @@ pub(super) struct Radau {
     /// contraction of the last Newton iteration
     θ: f64,
     /// a point where the derivative is not finite
-    pub bad: Option<(f64, Vec<f64>)>,
+    bad: Option<(f64, Vec<f64>)>,
 }
 
 /// Factors of E₁ and E₂ for a step.
@@ -96,12 +101,14 @@ struct StageFactors {
     e2: Factors<Complex<f64>>,
 }
 
-impl Radau {
-    pub fn new(n: usize) -> Self {
+impl OneStep for Radau {
+    fn new(n: usize) -> Self {
         let zero = || DVector::zeros(n);
         let three = || [zero(), zero(), zero()];
         Self {
             f0: zero(),
+            has_begun: false,
+            careful: true,
             z: three(),
             w: three(),
             stage: zero(),
@@ -117,17 +124,32 @@ impl Radau {
         }
     }
 
-    /// Forgets what a jump of f makes wrong.
-    pub fn restart(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) {
-        f.derivatives(t, x, self.f0.as_mut_slice());
+    /// A jump of f makes all of it wrong.
+    fn restart(&mut self, careful: bool) {
+        self.careful = careful;
+        self.has_begun = false;
         self.is_known = false;
         self.factors = None;
         self.last = None;
-        self.bad = None;
     }
 
-    /// A first step for an interval of this length, from the size of the derivative.
-    pub fn first_step(&mut self, x: &[f64], length: f64, tolerances: &Tolerances) -> f64 {
+    fn begin(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) -> bool {
+        self.bad = None;
+        if !self.has_begun {
+            f.derivatives(t, x, self.f0.as_mut_slice());
+            self.has_begun = true;
+        }
+        are_finite(self.f0.as_slice())
+    }
+
+    /// From the size of the derivative.
+    fn first_step(
+        &mut self,
+        _f: &mut impl Dynamics,
+        (_t, x): (f64, &[f64]),
+        span: f64,
+        tolerances: &Tolerances,
+    ) -> f64 {
         self.set_scale(x, tolerances);
         let speed = rms(&self.f0, &self.scale);
         let guess = if speed > 0.0 {
@@ -135,9 +157,39 @@ impl Radau {
         } else {
             f64::MAX
         };
-        guess.min(0.01 * length)
+        guess.min(0.01 * span)
     }
 
+    fn attempt(
+        &mut self,
+        f: &mut impl Dynamics,
+        at: (f64, &[f64]),
+        h: f64,
+        tolerances: &Tolerances,
+    ) -> Result<f64, f64> {
+        self.set_scale(at.1, tolerances);
+        let tried = self.tried(f, at, h, transformed(tolerances.relative));
+        // after a rejection the step must not grow at once
+        let most = if self.careful { h } else { f64::INFINITY };
+        self.careful = tried.is_err();
+        tried.map(|next| next.min(most))
+    }
+
+    fn reached(&self) -> &[f64] {
+        self.stage.as_slice()
+    }
+
+    fn bad(&self) -> Option<&(f64, Vec<f64>)> {
+        self.bad.as_ref()
+    }
+
+    fn ahead<D: Dynamics>(&mut self, f: &mut Filippov<'_, D>, span: &Span<'_>) -> Option<Ahead> {
+        let ahead = f.ahead(span, |state| self.between(state, span.from.1[state]));
+        (ahead != Ahead::Nothing).then_some(ahead)
+    }
+}
+
+impl Radau {
     /// Scales of the error norm.
     fn set_scale(&mut self, x: &[f64], tolerances: &Tolerances) {
         let relative = transformed(tolerances.relative);
@@ -147,23 +199,21 @@ impl Radau {
         }
     }
 
-    /// Tries a step, and moves `x` to its end where it is accepted.
+    /// Tries a step: the one to go on with.
     ///
     /// # Errors
-    /// The step to retry with; else the step to go on with.
-    pub fn attempt(
+    /// The step to retry with.
+    fn tried(
         &mut self,
         f: &mut impl Dynamics,
-        (t, x): (f64, &mut [f64]),
+        (t, x): (f64, &[f64]),
         h: f64,
-        careful: bool,
-        tolerances: &Tolerances,
+        relative: f64,
     ) -> Result<f64, f64> {
-        self.set_scale(x, tolerances);
         let fresh = !self.is_known;
         let factors = self.factors_for(f, t, x, h).ok_or(0.25 * h)?;
         self.extrapolate(h);
-        let newton = self.newton(f, (t, x), &factors, transformed(tolerances.relative));
+        let newton = self.newton(f, (t, x), &factors, relative);
         let iterations = newton.map_err(|shrink| {
             // an old Jacobian may be the cause: a new one for the next try
             if !fresh {
@@ -172,7 +222,7 @@ impl Radau {
             self.last = None;
             shrink * h
         })?;
-        let error = self.error(f, (t, x), &factors, careful);
+        let error = self.error(f, (t, x), &factors);
         if !error.is_finite() {
             self.factors = Some(factors);
             return Err(0.25 * h);
@@ -192,7 +242,7 @@ impl Radau {
 
     /// What a state is between the ends of the step accepted last, which began at `from`: the polynomial
     /// of the collocation.
-    pub fn between(&self, state: usize, from: f64) -> Poly {
+    fn between(&self, state: usize, from: f64) -> Poly {
         let [a, b] = [C[0], C[1]];
         let [z1, z2, z3] = [0, 1, 2].map(|k| self.z[k][state]);
         // divided differences over 0, c₁, c₂, 1
@@ -241,14 +291,13 @@ impl Radau {
         f: &mut impl Dynamics,
         (t, x): (f64, &[f64]),
         factors: &StageFactors,
-        careful: bool,
     ) -> f64 {
         let [z1, z2, z3] = &self.z;
         let from_stages = (ERROR[0] * z1 + ERROR[1] * z2 + ERROR[2] * z3) / factors.h;
         let mut estimate = &from_stages + &self.f0;
         factors.e1.solve(&mut estimate);
         let error = rms(&estimate, &self.scale);
-        if error < 1.0 || !careful {
+        if error < 1.0 || !self.careful {
             return error.max(1e-10);
         }
         // at the first step and after a rejection: a sharper estimate for stiff parts
@@ -280,21 +329,14 @@ impl Radau {
     }
 
     /// Moves to the end of the step; false where the derivative there is not finite.
-    fn accept(
-        &mut self,
-        f: &mut impl Dynamics,
-        (t, x): (f64, &mut [f64]),
-        h: f64,
-        error: f64,
-    ) -> bool {
+    fn accept(&mut self, f: &mut impl Dynamics, (t, x): (f64, &[f64]), h: f64, error: f64) -> bool {
         self.place(x, 2);
         f.derivatives(t + h, self.stage.as_slice(), self.f0.as_mut_slice());
-        if self.f0.iter().any(|v| !v.is_finite()) {
+        if !are_finite(self.f0.as_slice()) {
             self.bad = Some((t + h, self.stage.as_slice().to_vec()));
             f.derivatives(t, x, self.f0.as_mut_slice());
             return false;
         }
-        x.copy_from_slice(self.stage.as_slice());
         self.last = Some((h, self.z.clone(), error.max(1e-2)));
         if self.θ >= KEEP_JACOBIAN {
             self.is_known = false;
@@ -374,7 +416,7 @@ impl Radau {
             self.place(x, stage);
             let t = t + c * h;
             f.derivatives(t, self.stage.as_slice(), self.k[stage].as_mut_slice());
-            if self.k[stage].iter().any(|v| !v.is_finite()) {
+            if !are_finite(self.k[stage].as_slice()) {
                 self.bad = Some((t, self.stage.as_slice().to_vec()));
                 return false;
             }

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use lynkeus_native::Buffer;
 
-use super::plan::{Event, LANES, Lane, Leg, Program, Runner};
+use super::plan::{Divided, Event, LANES, Lane, Leg, Program};
 use crate::Error;
 use crate::divergence::Bound;
 use crate::error::state_text;
@@ -55,8 +55,8 @@ pub struct Ended {
 /// The working memory of a thread.
 pub(crate) struct Desk<'p> {
     program: &'p Program,
-    step: Runner,
-    row: Runner,
+    step: Divided,
+    row: Divided,
     /// arguments of what is shared, at four instants
     arguments: Vec<Lane>,
     shared: Buffer<LANES>,
@@ -70,11 +70,11 @@ pub(crate) struct Desk<'p> {
 impl<'p> Desk<'p> {
     pub fn new(program: &'p Program, is_over: &'p IsOver<'p>) -> Self {
         Self {
-            step: program.step.runner(),
-            row: program.row.runner(),
+            step: program.step.clone(),
+            row: program.row.clone(),
             arguments: vec![],
-            shared: Buffer::new(AHEAD * program.step.shared()),
-            shared_row: Buffer::new(LANES * program.row.shared()),
+            shared: Buffer::new(AHEAD * program.step.shared),
+            shared_row: Buffer::new(LANES * program.row.shared),
             rows: Buffer::new(most_groups(program) * program.columns),
             program,
             is_over,
@@ -99,7 +99,7 @@ impl<'p> Desk<'p> {
     /// What the steps from `first` on share; how many steps.
     fn share(&mut self, leg: &Leg, first: usize) -> usize {
         let count = AHEAD.min(leg.steps - first);
-        let size = self.program.step.shared();
+        let size = self.program.step.shared;
         for (k, table) in (0..count).step_by(LANES).zip(
             self.shared
                 .values_mut()
@@ -122,7 +122,7 @@ impl<'p> Desk<'p> {
 
     /// The values of a row of every group.
     fn read(&mut self, time: f64, modes: &[f64], groups: usize, x: &[Lane]) -> &[Lane] {
-        let size = self.program.row.shared();
+        let size = self.program.row.shared;
         self.arguments.clear();
         self.arguments.push([time; LANES]);
         self.arguments.extend(modes.iter().map(|&m| [m; LANES]));
@@ -202,8 +202,7 @@ impl Block {
         self.recorded.clear();
         for event in events {
             match event {
-                Event::Draw => self.draw(desk.program, Sensors::draw),
-                Event::Stir => self.draw(desk.program, Sensors::stir),
+                Event::Draw { is_sample } => self.draw(desk.program, *is_sample),
                 Event::Leg(leg) => self.advance(desk, leg)?,
                 Event::Row { time, modes } => self.record(desk, *time, modes, columns),
             }
@@ -211,10 +210,10 @@ impl Block {
         ControlFlow::Continue(())
     }
 
-    fn draw(&mut self, program: &Program, draw: fn(&mut Sensors)) {
+    fn draw(&mut self, program: &Program, is_sample: bool) {
         let own = program.states + program.disturbances;
         for run in &mut self.runs {
-            draw(&mut run.sensors);
+            run.sensors.draw(is_sample);
         }
         for place in 0..self.groups * LANES {
             let run = &self.runs[place.min(self.runs.len() - 1)];
@@ -228,7 +227,7 @@ impl Block {
     }
 
     fn advance(&mut self, desk: &mut Desk<'_>, leg: &Leg) -> ControlFlow<()> {
-        let size = desk.program.step.shared();
+        let size = desk.program.step.shared;
         let mut done = 0;
         while done < leg.steps {
             let count = desk.share(leg, done);

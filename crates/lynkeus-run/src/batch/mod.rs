@@ -60,8 +60,9 @@ impl Batch {
         let Some((plan, program)) = Plan::new(simulation)? else {
             return Ok(None);
         };
+        let table = simulation.table();
         let place = |column: &Column| {
-            plan.place(*column).ok_or_else(|| {
+            table.place(*column).ok_or_else(|| {
                 let found = format!("{:?} {}", column.role, column.index);
                 Error::setting("recorded column", "one of the run", found)
             })
@@ -100,7 +101,7 @@ impl Batch {
     /// in their own way.
     #[must_use]
     pub fn is_exact(&self) -> bool {
-        !self.program.step.has_functions() && !self.program.row.has_functions()
+        !self.program.step.has_functions && !self.program.row.has_functions
     }
 
     /// Number of rows of every run.

@@ -1,6 +1,6 @@
 //! What a batch does, worked out once for all trajectories, and the code that they share.
 
-use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 
 use lynkeus_expr::lanes::{self, Lanes, Portable};
 use lynkeus_expr::{Evaluator, Graph, MissingInput, Node, Op, Tape};
@@ -11,15 +11,13 @@ use crate::integrator::{check_interval, fixed_steps, pieces};
 use crate::noise::Sensors;
 use crate::routine::Backend;
 use crate::run::{Itinerary, Stop};
-use crate::{Column, Dynamics, Error, Events, Method, Simulation, Step};
+use crate::{Error, Events, Method, Simulation, Step};
 
 /// What all trajectories do next.
 #[derive(Debug)]
 pub(crate) enum Event {
-    /// each draws its next noise sample
-    Draw,
-    /// each draws what moves its states, between two samples
-    Stir,
+    /// each draws what moves its states, and at a sample all noise
+    Draw { is_sample: bool },
     /// equal steps in which nothing jumps with time
     Leg(Leg),
     /// a row is recorded
@@ -51,8 +49,8 @@ pub(crate) struct Plan {
 /// The code that every trajectory of a batch runs.
 #[derive(Debug)]
 pub(crate) struct Program {
-    pub step: Code,
-    pub row: Code,
+    pub step: Divided,
+    pub row: Divided,
     pub states: usize,
     /// what disturbs sensors and states
     pub disturbances: usize,
@@ -78,8 +76,8 @@ impl Plan {
             return Ok(None);
         };
         let itinerary = Itinerary::new(simulation)?;
-        let clock = Loop::new(simulation, sensors(simulation, itinerary.hold(), 0)?)?;
-        let Some(program) = program(&clock)? else {
+        let mut clock = Loop::new(simulation, sensors(simulation, itinerary.hold(), 0)?)?;
+        let Some(program) = program(&mut clock)? else {
             return Ok(None);
         };
         let plan = Self {
@@ -94,11 +92,6 @@ impl Plan {
     /// The sensors of the run of a seed.
     pub fn sensors(&self, simulation: &Simulation, seed: u64) -> Result<Sensors, Error> {
         sensors(simulation, self.itinerary.hold(), seed)
-    }
-
-    /// The place of a column among the values of a row.
-    pub fn place(&self, column: Column) -> Option<usize> {
-        self.clock.table().place(column)
     }
 
     /// Number of rows in all.
@@ -116,12 +109,10 @@ impl Plan {
         while recorded < rows && events.len() < AHEAD {
             match self.itinerary.next() {
                 None => break,
-                Some(Stop::Draw) => events.push(Event::Draw),
-                Some(Stop::Stir) => events.push(Event::Stir),
+                Some(Stop::Draw { is_sample }) => events.push(Event::Draw { is_sample }),
                 Some(Stop::Advance { from, to }) => self.legs(from, to, &mut events)?,
                 Some(Stop::Row(time)) => {
-                    self.clock.enter(time);
-                    let modes = self.clock.modes().to_vec();
+                    let modes = self.modes(time);
                     events.push(Event::Row { time, modes });
                     recorded += 1;
                 }
@@ -133,18 +124,26 @@ impl Plan {
     fn legs(&mut self, from: f64, to: f64, events: &mut Vec<Event>) -> Result<(), Error> {
         check_interval(from, to)?;
         self.instants.clear();
-        self.clock.instants(from, to, &mut self.instants)?;
+        let clock = self.clock.joined();
+        clock.instants(from, to, &mut self.instants)?;
         let length = self.step.length(to - from).unwrap_or(to - from);
         for (start, end) in pieces(from, to, &mut self.instants) {
-            self.clock.enter(start + 0.5 * (end - start));
+            clock.enter(start + 0.5 * (end - start));
             events.push(Event::Leg(Leg {
                 from: start,
                 to: end,
                 steps: fixed_steps(start, end, length)?,
-                modes: self.clock.modes().to_vec(),
+                modes: clock.modes().to_vec(),
             }));
         }
         Ok(())
+    }
+
+    /// The values of what jumps with time.
+    fn modes(&mut self, t: f64) -> Vec<f64> {
+        let clock = self.clock.joined();
+        clock.enter(t);
+        clock.modes().to_vec()
     }
 }
 
@@ -157,37 +156,30 @@ fn sensors(simulation: &Simulation, hold: f64, seed: u64) -> Result<Sensors, Err
     Sensors::new(&noise, plant.outputs(), plant.states(), hold)
 }
 
-/// The tapes of a step and of a row, divided into what all trajectories share (time, the step,
-/// what jumps with time) and what is their own.
-fn program(clock: &Loop) -> Result<Option<Program>, Error> {
-    let states = clock.dimension();
-    let equations = clock.system().equations();
-    let disturbances = equations.signals.len();
+/// The code of a step and of a row.
+fn program(clock: &mut Loop) -> Result<Option<Program>, Error> {
+    let system = clock.joined().system().clone();
+    let equations = system.equations();
+    let (states, disturbances) = (equations.states.len(), equations.signals.len());
     let own = 1..1 + states + disturbances;
-    let row = &equations.roots.outputs;
+    let inputs = &equations.inputs[..equations.smooth_inputs()];
+    let row = &equations.roots.free.outputs;
     let columns = row.len();
     let graph = equations.graph();
-    let Some((inputs, next)) = clock.system().derivatives_at().step_in(&graph) else {
+    let Some((of_step, next)) = system.derivatives_at().step_in(&graph) else {
         return Ok(None);
     };
-    let divided = |inputs: &[Node], outputs: &[Node]| {
-        Divided::new(&graph, inputs, outputs, |input| !own.contains(&input))
-    };
-    let step = divided(&inputs, &next)?;
-    let row = divided(&equations.inputs[..equations.smooth_inputs()], row)?;
-    drop(graph);
-    let start = vec![0.0; states];
-    let (observer_names, estimates) = clock.estimate(&start);
+    let (observer_names, estimates) = clock.estimate(system.start());
     Ok(Some(Program {
-        step: Code::new(step, states + disturbances),
-        row: Code::new(row, columns),
+        step: Divided::new(&graph, &of_step, &next, own.clone(), states + disturbances)?,
+        row: Divided::new(&graph, inputs, row, own, columns)?,
         states,
         disturbances,
         columns,
         known: clock.known_columns(),
         plant_states: states - estimates.len(),
         observer_names: observer_names.to_vec(),
-        names: clock.names(),
+        names: equations.states.clone(),
     }))
 }
 
@@ -199,78 +191,82 @@ pub(crate) type Lane = [f64; LANES];
 /// Largest tape that is compiled for a batch.
 const LARGEST: usize = 200_000;
 
-/// A divided tape with its machine code, shared by all threads. Interpreter and machine code give
-/// the same values to the bit.
-#[derive(Debug)]
-pub(crate) struct Code {
-    tapes: Divided,
-    common: Option<Function<LANES>>,
-    own: Option<Function<LANES>>,
-    /// from the outputs of one group of lanes to those of the next
-    spacing: usize,
-}
-
-impl Code {
-    pub fn new(tapes: Divided, spacing: usize) -> Self {
-        let is_wanted = |tape: &Tape| Backend::compiles_at_once() && tape.len() <= LARGEST;
-        let compiled = is_wanted(&tapes.common).then(|| Function::compile(&tapes.common));
-        let shared = tapes.common.outputs();
-        let sweep = is_wanted(&tapes.own).then(|| Function::sweeping(&tapes.own, shared, spacing));
-        Self {
-            common: compiled.flatten(),
-            own: sweep.flatten(),
-            tapes,
-            spacing,
-        }
-    }
-
-    /// Number of values that all trajectories share.
-    pub fn shared(&self) -> usize {
-        self.tapes.common.outputs()
-    }
-
-    /// Whether there is a function that lanes round in their own way.
-    pub fn has_functions(&self) -> bool {
-        self.tapes.has_functions
-    }
-
-    pub fn runner(&self) -> Runner {
-        let engine = |tape: &Tape, compiled: &Option<Function<LANES>>| match compiled {
-            Some(function) => Engine::Native(function.clone()),
-            None => Engine::Interpreted(Box::new(tape.evaluator_in(Lanes))),
-        };
-        Runner {
-            spacing: self.spacing,
-            own_inputs: self.tapes.own.inputs() - self.shared(),
-            outputs: self.tapes.own.outputs(),
-            scratch: vec![[0.0; LANES]; self.tapes.own.inputs()],
-            common: engine(&self.tapes.common, &self.common),
-            own: engine(&self.tapes.own, &self.own),
-        }
-    }
-}
-
-/// Runs one [`Code`] again and again, without allocating.
-#[derive(Debug)]
-pub(crate) struct Runner {
+/// Functions in two parts, what all trajectories share (time, the step, what jumps with time) and what
+/// is their own; each thread has a copy. Interpreter and machine code give the same values to the bit.
+#[derive(Clone, Debug)]
+pub(crate) struct Divided {
+    /// shared inputs → the values that the rest reads
     common: Engine,
+    /// these values, then all other inputs → the outputs
     own: Engine,
-    spacing: usize,
+    /// number of values that all trajectories share
+    pub shared: usize,
+    /// whether there is a function that lanes round in their own way
+    pub has_functions: bool,
     own_inputs: usize,
     outputs: usize,
+    /// from the outputs of one group of lanes to those of the next
+    spacing: usize,
     scratch: Vec<Lane>,
 }
 
 /// Machine code, or a tape.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 enum Engine {
     Native(Function<LANES>),
     Interpreted(Box<Evaluator<Lanes<LANES>>>),
 }
 
-impl Runner {
+impl Engine {
+    fn new(tape: &Tape, compile: impl FnOnce(&Tape) -> Option<Function<LANES>>) -> Self {
+        let is_wanted = Backend::compiles_at_once() && tape.len() <= LARGEST;
+        match is_wanted.then(|| compile(tape)).flatten() {
+            Some(function) => Self::Native(function),
+            None => Self::Interpreted(Box::new(tape.evaluator_in(Lanes))),
+        }
+    }
+}
+
+impl Divided {
+    /// Of `outputs`, functions of `inputs`, of which some are a trajectory's own.
+    ///
+    /// # Errors
+    /// None with outputs that read the inputs alone.
+    pub fn new(
+        g: &Graph,
+        inputs: &[Node],
+        outputs: &[Node],
+        own: Range<usize>,
+        spacing: usize,
+    ) -> Result<Self, MissingInput> {
+        let common = [&inputs[..own.start], &inputs[own.end..]].concat();
+        let divided = g.hoisted(outputs, &common);
+        let parts = divided.parts.iter();
+        let (read, values): (Vec<Node>, Vec<Node>) = parts.map(|p| (p.symbol, p.value)).unzip();
+        let shared = values.len();
+        let rounds = |node: &Node| match g.op(*node) {
+            Op::Unary(op, _) => lanes::unary::<Portable<1>>(op).is_some(),
+            Op::Binary(op, ..) => lanes::binary::<Portable<1>>(op).is_some(),
+            _ => false,
+        };
+        let common = Tape::new(g, &common, &values)?;
+        let own_inputs = own.len();
+        let own = Tape::new(g, &[&read, &inputs[own]].concat(), &divided.roots)?;
+        let sweeping = |own: &Tape| Function::sweeping(own, shared, spacing);
+        Ok(Self {
+            common: Engine::new(&common, Function::compile),
+            own: Engine::new(&own, sweeping),
+            shared,
+            has_functions: g.reachable(outputs).iter().any(rounds),
+            own_inputs,
+            outputs: outputs.len(),
+            spacing,
+            scratch: vec![[0.0; LANES]; own.inputs()],
+        })
+    }
+
     /// What all trajectories share at four instants: the lanes of `inputs`. Each instant has its
-    /// place in `table`, of [`Code::shared`] values that have one number in all lanes.
+    /// place in `table`, of [`Divided::shared`] values that have one number in all lanes.
     pub fn share(&mut self, inputs: &[Lane], table: &mut [Lane]) {
         let count = table.len() / LANES;
         let values = &mut self.scratch[..count];
@@ -303,72 +299,6 @@ impl Runner {
     }
 }
 
-/// A tape in two: what follows from the shared inputs alone, and the rest.
-#[derive(Debug)]
-pub(crate) struct Divided {
-    /// shared inputs → the values that the rest reads
-    pub common: Tape,
-    /// these values, then all other inputs → the outputs
-    pub own: Tape,
-    /// whether there is a function that lanes round in their own way
-    pub has_functions: bool,
-}
-
-impl Divided {
-    /// Divides `outputs`, functions of `inputs`; `is_shared` says of each input whether all
-    /// trajectories have the same.
-    ///
-    /// # Errors
-    /// None with outputs that read the inputs alone.
-    pub fn new(
-        g: &Graph,
-        inputs: &[Node],
-        outputs: &[Node],
-        is_shared: impl Fn(usize) -> bool,
-    ) -> Result<Self, MissingInput> {
-        let (shared, own): (Vec<usize>, Vec<usize>) =
-            (0..inputs.len()).partition(|&i| is_shared(i));
-        let [shared, own] =
-            [shared, own].map(|of| of.iter().map(|&i| inputs[i]).collect::<Vec<_>>());
-        let values = frontier(g, &own, outputs);
-        let symbols = values.iter().map(|_| g.fresh("shared").node());
-        let symbols: Vec<Node> = symbols.collect();
-        let read: HashMap<Node, Node> = (values.iter().copied())
-            .zip(symbols.iter().copied())
-            .collect();
-        let rounds = |node: &Node| match g.op(*node) {
-            Op::Unary(op, _) => lanes::unary::<Portable<1>>(op).is_some(),
-            Op::Binary(op, ..) => lanes::binary::<Portable<1>>(op).is_some(),
-            _ => false,
-        };
-        Ok(Self {
-            common: Tape::new(g, &shared, &values)?,
-            own: Tape::new(g, &[symbols, own].concat(), &g.substitute(outputs, &read))?,
-            has_functions: g.reachable(outputs).iter().any(rounds),
-        })
-    }
-}
-
-/// The values that do not follow from `own`, the inputs in which trajectories differ, and are read
-/// by what does.
-fn frontier(g: &Graph, own: &[Node], outputs: &[Node]) -> Vec<Node> {
-    let mut own: HashSet<Node> = own.iter().copied().collect();
-    let mut read = vec![];
-    for node in g.reachable(outputs) {
-        let arguments = g.arguments(node);
-        if arguments.iter().any(|argument| own.contains(argument)) {
-            own.insert(node);
-            read.extend(arguments);
-        }
-    }
-    read.extend(outputs);
-    let mut seen = HashSet::new();
-    read.retain(|&value| {
-        !own.contains(&value) && g.constant_value(value).is_none() && seen.insert(value)
-    });
-    read
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -381,14 +311,21 @@ mod tests {
         let dx = x * u + u.exp() * p - x.sin();
         let (inputs, outputs) = ([t, x, p].map(|e| e.node()), [dx.node(), u.node()]);
         let tape = Tape::new(&g, &inputs, &outputs).unwrap();
-        let divided = Divided::new(&g, &inputs, &outputs, |i| i == 0).unwrap();
+        let mut code = Divided::new(&g, &inputs, &outputs, 1..3, 2).unwrap();
         // u and eᵘ
-        assert_eq!((divided.common.inputs(), divided.common.outputs()), (1, 2));
-        assert_eq!((divided.own.inputs(), divided.own.len()), (4, 5));
-        let common = divided.common.eval_in(&lynkeus_expr::Reals, &[0.7]);
-        let inputs = [&common[..], &[0.3, -1.5]].concat();
-        let mut expected = [0.0; 2];
-        tape.evaluator().eval(&[0.7, 0.3, -1.5], &mut expected);
-        assert_eq!(divided.own.eval_in(&lynkeus_expr::Reals, &inputs), expected);
+        assert!(code.shared == 2 && code.has_functions);
+        let mut table = [[0.0; LANES]; 2 * LANES];
+        code.share(&[[0.7, 0.8, 0.9, 1.0]], &mut table);
+        let own = [[0.3, 0.4, 0.5, 0.6], [-1.5; LANES]];
+        let mut found = [[0.0; LANES]; 2];
+        // of the second instant
+        code.sweep(1, &table[2..4], &own, &mut found);
+        for (lane, &x) in own[0].iter().enumerate() {
+            let mut expected = [0.0; 2];
+            tape.evaluator().eval(&[0.8, x, -1.5], &mut expected);
+            for (found, expected) in found.iter().zip(expected) {
+                assert!((found[lane] - expected).abs() < 1e-14);
+            }
+        }
     }
 }

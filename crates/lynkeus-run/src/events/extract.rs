@@ -10,8 +10,8 @@ use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::{Binary, Graph, MissingInput, Node, Op, Tape, Unary};
 
-use super::filippov::{Jump, Jumps};
-use super::guards::Surfaces;
+use super::filippov::Jump;
+use super::guards::Surface;
 use super::time::{Indicator, TimeEvents};
 
 /// Characters of an expression in the label of a mode that changes with time,
@@ -20,180 +20,121 @@ const SHOWN: usize = 80;
 /// and of one that changes with the state.
 const SHOWN_OF_STATE: usize = 60;
 
-/// Expressions in which each jump is an input of its own, and when these change.
-pub(crate) struct Taken<E> {
-    pub roots: Vec<Node>,
-    /// the symbols of these inputs
-    pub modes: Vec<Node>,
-    pub events: E,
-}
-
-/// The events of a system.
-pub(crate) struct Extracted {
-    /// what jumps with time taken out
-    pub time: Taken<TimeEvents>,
-    /// then what jumps with the state, over the inputs and the modes of time; none where nothing does
-    pub state: Option<Taken<Jumps>>,
-    /// what vanishes on the surfaces on which it jumps, over the inputs and both kinds of modes
-    pub surfaces: Vec<Node>,
-    /// what vanishes where it bends, over the same
-    pub bends: Vec<Node>,
-}
-
-/// Takes what jumps out of `roots`, derivatives of so many `states` first. The inputs are time, the
-/// states, and what else the roots read.
-pub(crate) fn extract(
-    graph: &Graph,
-    inputs: &[Node],
-    roots: &[Node],
-    states: usize,
-) -> Result<Extracted, MissingInput> {
-    let time = time_events(graph, inputs[0], roots)?;
-    let (state, surfaces) = state_events(graph, inputs, &time.roots, states).unzip();
-    let smooth = state.as_ref().map_or(&time.roots, |taken| &taken.roots);
-    Ok(Extracted {
-        bends: bends(graph, &inputs[1..], &smooth[..states]),
-        surfaces: surfaces.unwrap_or_default(),
-        time,
-        state,
-    })
-}
-
 /// The first operation of the roots that jumps with one of `inputs`, as it reads.
 pub fn first_jump(graph: &Graph, inputs: &[Node], roots: &[Node]) -> Option<String> {
-    let jumps = |node: &Node| {
-        let operation = Operation::of(graph, *node);
-        operation.is_some_and(Operation::has_sides) && depends(graph, *node, inputs)
-    };
+    let jumps = |node: &Node| has_sides(graph.op(*node)) && depends(graph, *node, inputs);
     let found = graph.reachable(roots).into_iter().find(jumps)?;
     Some(graph.render(found, SHOWN_OF_STATE))
 }
 
+/// Whether it jumps from one side of a surface to the other: what is equal is so on the surface alone.
+fn has_sides(op: Op) -> bool {
+    matches!(
+        op,
+        Op::Unary(Unary::Floor | Unary::Sign, _) | Op::Binary(Binary::Less | Binary::LessEq, ..)
+    )
+}
+
 /// An operation that jumps or bends where a quantity passes zero; a `floor`, a whole number.
-#[derive(Clone, Copy, Debug)]
-enum Operation {
-    Floor(Node),
-    Sign(Node),
-    Relation(Binary, Node, Node),
-    Abs(Node),
-    /// `Min` or `Max`
-    Extreme(Binary, Node, Node),
+struct Operation {
+    /// the smooth function whose passing zero (`Floor`: an integer) changes it; a relation holds where it
+    /// is positive
+    quantity: Node,
+    /// what is constant between two instants at which it jumps or bends with time
+    mode: Node,
+    /// what it is where the quantity is positive and where it is negative, if it bends
+    branches: Option<[Node; 2]>,
+    /// its values below, on and above the surface; none for a `floor`, whose value is held. What bends
+    /// is told by whether it is above: both branches are the same on the surface
+    values: Option<[f64; 3]>,
 }
 
 impl Operation {
-    fn of(graph: &Graph, node: Node) -> Option<Self> {
+    /// Of a node, with what jumps inside replaced.
+    fn of(graph: &Graph, node: Node, map: &HashMap<Node, Node>) -> Option<Self> {
+        let within = |a: Node| graph.substitute(&[a], map).first().copied().unwrap_or(a);
+        let [strict, loose, sign] = [[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [-1.0, 0.0, 1.0]];
         Some(match graph.op(node) {
-            Op::Unary(Unary::Floor, a) => Self::Floor(a),
-            Op::Unary(Unary::Sign, a) => Self::Sign(a),
-            Op::Unary(Unary::Abs, a) => Self::Abs(a),
-            Op::Binary(op @ (Binary::Less | Binary::LessEq | Binary::Equal), a, b) => {
-                Self::Relation(op, a, b)
+            Op::Unary(op @ (Unary::Floor | Unary::Sign), a) => {
+                let a = within(a);
+                Self {
+                    quantity: a,
+                    mode: graph.unary(op, a),
+                    branches: None,
+                    values: (op == Unary::Sign).then_some(sign),
+                }
             }
-            Op::Binary(op @ (Binary::Min | Binary::Max), a, b) => Self::Extreme(op, a, b),
+            Op::Unary(Unary::Abs, a) => {
+                let a = within(a);
+                Self {
+                    quantity: a,
+                    mode: graph.unary(Unary::Sign, a),
+                    branches: Some([a, graph.unary(Unary::Neg, a)]),
+                    values: Some(loose),
+                }
+            }
+            Op::Binary(op @ (Binary::Less | Binary::LessEq | Binary::Equal), a, b) => {
+                let (a, b) = (within(a), within(b));
+                Self {
+                    quantity: graph.binary(Binary::Sub, b, a),
+                    mode: graph.binary(op, a, b),
+                    branches: None,
+                    values: Some(if op == Binary::Less { strict } else { loose }),
+                }
+            }
+            Op::Binary(op @ (Binary::Min | Binary::Max), a, b) => {
+                let (a, b) = (within(a), within(b));
+                Self {
+                    quantity: graph.binary(Binary::Sub, a, b),
+                    mode: graph.binary(Binary::Less, a, b),
+                    branches: Some(if op == Binary::Min { [b, a] } else { [a, b] }),
+                    values: Some(loose),
+                }
+            }
             _ => return None,
         })
     }
 
     /// Whether it jumps and does not only bend.
-    fn jumps(self) -> bool {
-        matches!(self, Self::Floor(_) | Self::Sign(_) | Self::Relation(..))
+    fn jumps(&self) -> bool {
+        self.branches.is_none()
     }
 
-    /// Whether it jumps from one side of a surface to the other: what is equal is so on the surface alone.
-    fn has_sides(self) -> bool {
-        self.jumps() && !matches!(self, Self::Relation(Binary::Equal, ..))
-    }
-
-    /// The same with what jumps inside replaced.
-    fn within(self, graph: &Graph, map: &HashMap<Node, Node>) -> Self {
-        let one = |a: Node| graph.substitute(&[a], map).first().copied().unwrap_or(a);
-        match self {
-            Self::Floor(a) => Self::Floor(one(a)),
-            Self::Sign(a) => Self::Sign(one(a)),
-            Self::Abs(a) => Self::Abs(one(a)),
-            Self::Relation(op, a, b) => Self::Relation(op, one(a), one(b)),
-            Self::Extreme(op, a, b) => Self::Extreme(op, one(a), one(b)),
-        }
-    }
-
-    /// The smooth function whose passing zero (`Floor`: an integer) changes it. A relation holds
-    /// where it is positive.
-    fn quantity(self, graph: &Graph) -> Node {
-        match self {
-            Self::Floor(a) | Self::Sign(a) | Self::Abs(a) => a,
-            Self::Relation(_, a, b) => graph.binary(Binary::Sub, b, a),
-            Self::Extreme(_, a, b) => graph.binary(Binary::Sub, a, b),
-        }
-    }
-
-    /// What it is where the quantity is positive and where it is negative, if it bends.
-    fn branches(self, graph: &Graph) -> Option<[Node; 2]> {
-        match self {
-            Self::Abs(a) => Some([a, graph.unary(Unary::Neg, a)]),
-            Self::Extreme(Binary::Min, a, b) => Some([b, a]),
-            Self::Extreme(_, a, b) => Some([a, b]),
-            Self::Floor(_) | Self::Sign(_) | Self::Relation(..) => None,
-        }
-    }
-
-    /// Its values below, on and above the surface; none for a `floor`, whose value is held. What bends
-    /// is told by whether it is above: both branches are the same on the surface.
-    fn values(self) -> Option<[f64; 3]> {
-        match self {
-            Self::Floor(_) => None,
-            Self::Sign(_) => Some([-1.0, 0.0, 1.0]),
-            Self::Relation(Binary::Less, ..) => Some([0.0, 0.0, 1.0]),
-            Self::Relation(..) | Self::Abs(_) | Self::Extreme(..) => Some([0.0, 1.0, 1.0]),
-        }
-    }
-
-    /// What is constant between two instants at which it jumps or bends with time.
-    fn mode(self, graph: &Graph) -> Node {
-        match self {
-            Self::Floor(a) => graph.unary(Unary::Floor, a),
-            Self::Sign(a) | Self::Abs(a) => graph.unary(Unary::Sign, a),
-            Self::Relation(op, a, b) => graph.binary(op, a, b),
-            Self::Extreme(_, a, b) => graph.binary(Binary::Less, a, b),
-        }
-    }
-
-    /// The operation over this mode, smooth where the mode stays.
-    fn over_mode(self, graph: &Graph, mode: Node) -> Node {
-        match self {
-            Self::Floor(_) | Self::Sign(_) | Self::Relation(..) => mode,
-            Self::Abs(a) => graph.binary(Binary::Mul, mode, a),
-            Self::Extreme(Binary::Min, a, b) => graph.select(mode, a, b),
-            Self::Extreme(_, a, b) => graph.select(mode, b, a),
+    /// The node over its mode, smooth where the mode stays.
+    fn over_mode(&self, graph: &Graph, node: Node, mode: Node) -> Node {
+        match (self.branches, graph.op(node)) {
+            (None, _) => mode,
+            (Some(_), Op::Unary(..)) => graph.binary(Binary::Mul, mode, self.quantity),
+            (Some([above, below]), _) => graph.select(mode, below, above),
         }
     }
 }
 
-/// Replaces what jumps with `time` alone in `roots` by modes.
-fn time_events(
+/// Replaces what jumps with `time` alone in `roots` by modes: their symbols.
+pub(crate) fn time_events(
     graph: &Graph,
     time: Node,
-    roots: &[Node],
-) -> Result<Taken<TimeEvents>, MissingInput> {
-    let of_time = functions_of_time(graph, time, roots);
+    roots: &mut Vec<Node>,
+) -> Result<(Vec<Node>, TimeEvents), MissingInput> {
     let (mut outer, mut inner) = (HashMap::new(), HashMap::new());
     let (mut jumps, mut modes, mut found, mut indicators) = (vec![], vec![], vec![], vec![]);
     for node in graph.reachable(roots) {
-        let known = of_time.get(&node) == Some(&true);
-        let Some(operation) = known.then(|| Operation::of(graph, node)).flatten() else {
+        let operation = Operation::of(graph, node, &inner);
+        let of_time = operation.filter(|_| graph.symbols_of(&[node]) == [time]);
+        let Some(operation) = of_time else {
             continue;
         };
         let expression = graph.render(node, SHOWN);
         let symbol = graph.fresh(format!("({expression})")).node();
-        let operation = operation.within(graph, &inner);
         indicators.push(Indicator::new(
             graph,
             time,
             &found,
-            [operation.mode(graph), operation.quantity(graph)],
+            [operation.mode, operation.quantity],
             expression,
-            matches!(operation, Operation::Floor(_)),
+            operation.values.is_none(),
         )?);
-        inner.insert(node, operation.over_mode(graph, symbol));
+        inner.insert(node, operation.over_mode(graph, node, symbol));
         found.push(symbol);
         if operation.jumps() {
             outer.insert(node, symbol);
@@ -202,109 +143,74 @@ fn time_events(
         }
     }
     let values = Tape::new(graph, &[time], &jumps)?;
-    Ok(Taken {
-        roots: graph.substitute(roots, &outer),
-        modes,
-        events: TimeEvents::new(indicators, &values),
-    })
-}
-
-/// Nodes whose value is a function of time alone: true where time is used,
-/// false for constants.
-fn functions_of_time(graph: &Graph, time: Node, roots: &[Node]) -> HashMap<Node, bool> {
-    let mut uses: HashMap<Node, bool> = HashMap::new();
-    for node in graph.reachable(roots) {
-        if node == time {
-            uses.insert(node, true);
-            continue;
-        }
-        if let Op::Symbol(_) = graph.op(node) {
-            continue;
-        }
-        let arguments = graph.arguments(node);
-        let known: Option<Vec<bool>> = arguments.iter().map(|a| uses.get(a).copied()).collect();
-        if let Some(known) = known {
-            uses.insert(node, known.contains(&true));
-        }
-    }
-    uses
+    *roots = graph.substitute(roots, &outer);
+    Ok((modes, TimeEvents::new(indicators, &values)))
 }
 
 /// Takes every `sign`, `<` and `≤` that depends on one of `inputs` out of the roots, and every `floor`
-/// that one of the first `moving` roots reads; none where there is none. Several that change on one
-/// surface change together. Returns what vanishes on the surfaces, too.
-fn state_events(
+/// that one of the first `moving` roots reads, over the surfaces on which they jump, and replaces them by
+/// modes. Several that change on one surface change together. The symbols of the modes come first.
+pub(crate) fn state_events(
     graph: &Graph,
     inputs: &[Node],
-    roots: &[Node],
+    roots: &mut Vec<Node>,
     moving: usize,
-) -> Option<(Taken<Jumps>, Vec<Node>)> {
+) -> (Vec<Node>, Vec<Jump>, Vec<Surface>) {
     let mut replaced: HashMap<Node, Node> = HashMap::new();
-    let (mut jumps, mut modes) = (vec![], vec![]);
-    let mut surfaces = Surfaces::default();
+    let (mut jumps, mut modes, mut surfaces) = (vec![], vec![], vec![]);
     let moves: HashSet<Node> = graph.reachable(&roots[..moving]).into_iter().collect();
     for node in graph.reachable(roots) {
-        let Some(operation) = Operation::of(graph, node).filter(|o| o.has_sides()) else {
-            continue;
-        };
-        let is_floor = matches!(operation, Operation::Floor(_));
+        let op = graph.op(node);
         // the steps of a reading do not stop the state
-        if is_floor && !moves.contains(&node) || !depends(graph, node, inputs) {
+        let is_still = matches!(op, Op::Unary(Unary::Floor, _)) && !moves.contains(&node);
+        if !has_sides(op) || is_still || !depends(graph, node, inputs) {
             continue;
         }
-        let quantity = operation.within(graph, &replaced).quantity(graph);
-        let mode = graph.fresh(graph.render(node, SHOWN_OF_STATE)).node();
-        let place = match is_floor {
-            true => surfaces.counting(quantity),
-            false => surfaces.place(graph, quantity),
+        let Some(Operation {
+            quantity, values, ..
+        }) = Operation::of(graph, node, &replaced)
+        else {
+            continue;
         };
-        jumps.push(Jump::new(place, operation.values()));
+        let mode = graph.fresh(graph.render(node, SHOWN_OF_STATE)).node();
+        let place = place_of(graph, &mut surfaces, quantity, values.is_none());
+        jumps.push(Jump::new(place, values));
         modes.push(mode);
         replaced.insert(node, mode);
     }
-    if jumps.is_empty() {
-        return None;
-    }
     // a kink on a surface that is located is smooth on each side, and no step is rejected for it
     for node in graph.reachable(roots) {
-        let Some(operation) = Operation::of(graph, node) else {
+        let operation = Operation::of(graph, node, &replaced).filter(|_| !surfaces.is_empty());
+        let Some(Operation {
+            quantity,
+            branches: Some([above, below]),
+            values,
+            ..
+        }) = operation
+        else {
             continue;
         };
-        let operation = operation.within(graph, &replaced);
-        let Some([above, below]) = operation.branches(graph) else {
-            continue;
-        };
-        let Some(place) = surfaces.known(graph, operation.quantity(graph)) else {
+        let Some(place) = known_place(graph, &surfaces, quantity) else {
             continue;
         };
         let mode = graph.fresh(graph.render(node, SHOWN_OF_STATE)).node();
-        jumps.push(Jump::new(place, operation.values()));
+        jumps.push(Jump::new(place, values));
         modes.push(mode);
         replaced.insert(node, graph.select(mode, above, below));
     }
-    let names = surfaces.nodes.iter().zip(&surfaces.counts);
-    let name = |(&quantity, &counts): (&Node, &bool)| {
-        let level = if counts { "a whole number" } else { "0" };
-        format!("{} = {level}", graph.render(quantity, SHOWN_OF_STATE))
-    };
-    let names = names.map(name).collect();
-    let taken = Taken {
-        roots: graph.substitute(roots, &replaced),
-        modes,
-        events: Jumps::new(jumps, names, surfaces.counts),
-    };
-    Some((taken, surfaces.nodes))
+    *roots = graph.substitute(roots, &replaced);
+    (modes, jumps, surfaces)
 }
 
 /// What vanishes where one of the roots bends with one of `inputs`, each once.
-fn bends(graph: &Graph, inputs: &[Node], roots: &[Node]) -> Vec<Node> {
+pub(crate) fn bends(graph: &Graph, inputs: &[Node], roots: &[Node]) -> Vec<Node> {
     let mut found = vec![];
     for node in graph.reachable(roots) {
-        let bends = Operation::of(graph, node).filter(|o| !o.jumps());
+        let bends = Operation::of(graph, node, &HashMap::new()).filter(|o| !o.jumps());
         let Some(operation) = bends.filter(|_| depends(graph, node, inputs)) else {
             continue;
         };
-        let (quantity, _) = bare(graph, operation.quantity(graph));
+        let (quantity, _) = bare(graph, operation.quantity);
         if !found.contains(&quantity) {
             found.push(quantity);
         }
@@ -316,40 +222,46 @@ fn depends(graph: &Graph, node: Node, inputs: &[Node]) -> bool {
     graph.symbols_of(&[node]).iter().any(|s| inputs.contains(s))
 }
 
-impl Surfaces {
-    /// The place of a surface, and whether it stands there with the other sign; a new one where it
-    /// is none yet.
-    fn place(&mut self, graph: &Graph, quantity: Node) -> (usize, bool) {
-        self.known(graph, quantity).unwrap_or_else(|| {
-            let (quantity, is_reversed) = bare(graph, quantity);
-            self.nodes.push(quantity);
-            self.counts.push(false);
-            (self.nodes.len() - 1, is_reversed)
-        })
+/// The place of a surface, and whether it stands there with the other sign; a new one where it is none
+/// yet. Where the quantity counts two new ones, for the whole numbers that it meets next: the first.
+fn place_of(
+    graph: &Graph,
+    surfaces: &mut Vec<Surface>,
+    quantity: Node,
+    counts: bool,
+) -> (usize, bool) {
+    if let Some(known) = known_place(graph, surfaces, quantity).filter(|_| !counts) {
+        return known;
     }
+    let (node, is_reversed) = match counts {
+        true => (quantity, false),
+        false => bare(graph, quantity),
+    };
+    let level = if counts { "a whole number" } else { "0" };
+    let surface = Surface {
+        node,
+        name: format!("{} = {level}", graph.render(node, SHOWN_OF_STATE)),
+        counts,
+    };
+    let place = surfaces.len();
+    surfaces.resize(place + if counts { 2 } else { 1 }, surface);
+    (place, is_reversed)
+}
 
-    /// Two new ones, for the whole numbers that a quantity meets next; the place of the first.
-    fn counting(&mut self, quantity: Node) -> (usize, bool) {
-        self.nodes.extend([quantity, quantity]);
-        self.counts.extend([true, true]);
-        (self.nodes.len() - 2, false)
-    }
-
-    fn known(&self, graph: &Graph, quantity: Node) -> Option<(usize, bool)> {
-        let (quantity, is_reversed) = bare(graph, quantity);
-        let known = |sought: Node| {
-            let mut all = self.nodes.iter().zip(&self.counts);
-            all.position(|(&known, counts)| known == sought && !counts)
-        };
-        let same = known(quantity).map(|surface| (surface, is_reversed));
-        same.or_else(|| match graph.op(quantity) {
-            Op::Binary(Binary::Sub, a, b) => {
-                let opposite = graph.binary(Binary::Sub, b, a);
-                known(opposite).map(|surface| (surface, !is_reversed))
-            }
-            _ => None,
-        })
-    }
+fn known_place(graph: &Graph, surfaces: &[Surface], quantity: Node) -> Option<(usize, bool)> {
+    let (quantity, is_reversed) = bare(graph, quantity);
+    let known = |sought: Node| {
+        let mut all = surfaces.iter();
+        all.position(|surface| surface.node == sought && !surface.counts)
+    };
+    let same = known(quantity).map(|surface| (surface, is_reversed));
+    same.or_else(|| match graph.op(quantity) {
+        Op::Binary(Binary::Sub, a, b) => {
+            let opposite = graph.binary(Binary::Sub, b, a);
+            known(opposite).map(|surface| (surface, !is_reversed))
+        }
+        _ => None,
+    })
 }
 
 /// A quantity without its constant factors, and whether they change its sign: multiples of one
@@ -389,9 +301,9 @@ mod tests {
         let g = Graph::new();
         let time = g.symbol("time");
         let root = build(time).node();
-        let mut extracted = time_events(&g, time.node(), &[root]).unwrap();
+        let (_, mut events) = time_events(&g, time.node(), &mut vec![root]).unwrap();
         let mut times = vec![];
-        extracted.events.instants(from, to, &mut times).unwrap();
+        events.instants(from, to, &mut times).unwrap();
         times.sort_unstable_by(f64::total_cmp);
         times
     }
@@ -440,8 +352,9 @@ mod tests {
         let g = Graph::new();
         let [time, x] = ["time", "x"].map(|name| g.symbol(name));
         let root = (x.less(time) + x.floor()).node();
-        let extracted = time_events(&g, time.node(), &[root]).unwrap();
-        assert_eq!((extracted.modes.len(), extracted.roots), (0, vec![root]));
+        let mut roots = vec![root];
+        let (modes, _) = time_events(&g, time.node(), &mut roots).unwrap();
+        assert_eq!((modes.len(), roots), (0, vec![root]));
     }
 
     #[test]
@@ -450,9 +363,10 @@ mod tests {
         let time = g.symbol("time");
         let relation = time.less(g.constant(2.0));
         let taken = g.symbol("(time < 2)");
-        let extracted = time_events(&g, time.node(), &[(taken + relation).node()]).unwrap();
-        assert_ne!(extracted.modes[0], taken.node());
-        let expected = (taken + g.expr(extracted.modes[0])).node();
-        assert_eq!(extracted.roots, [expected]);
+        let mut roots = vec![(taken + relation).node()];
+        let (modes, _) = time_events(&g, time.node(), &mut roots).unwrap();
+        assert_ne!(modes[0], taken.node());
+        let expected = (taken + g.expr(modes[0])).node();
+        assert_eq!(roots, [expected]);
     }
 }

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::guards::{Ahead, Guard, Guards, Poly, SHORTEST};
-use crate::method::resolution;
+use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Slopes};
 
@@ -34,7 +34,7 @@ const FASTER: f64 = 1.5;
 
 /// One operation that jumps on a surface.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Jump {
+pub(crate) struct Jump {
     surface: usize,
     /// its values where the function of the surface is negative, zero and positive; none for a
     /// `floor`, whose value is held
@@ -50,41 +50,22 @@ impl Jump {
         }
         Self { surface, values }
     }
-}
 
-/// The operations of a system that jump with its state.
-#[derive(Clone, Debug)]
-pub(crate) struct Jumps {
-    jumps: Vec<Jump>,
-    /// how the surfaces read
-    pub names: Vec<String>,
-    /// as of [`Surfaces`](super::Surfaces)
-    pub counts: Vec<bool>,
-}
-
-impl Jumps {
-    pub(super) fn new(jumps: Vec<Jump>, names: Vec<String>, counts: Vec<bool>) -> Self {
-        Self {
-            jumps,
-            names,
-            counts,
-        }
+    /// The same where its surfaces come after so many others.
+    pub fn after(self, surfaces: usize) -> Self {
+        let surface = self.surface + surfaces;
+        Self { surface, ..self }
     }
 
-    /// Writes the values of the operations on the given sides of the surfaces; of a `floor` its value
-    /// stands for the side. Returns the modes that are not theirs.
-    pub fn modes<'m>(&self, sides: &[f64], modes: &'m mut [f64]) -> &'m mut [f64] {
-        let (own, others) = modes.split_at_mut(self.jumps.len());
-        for (mode, jump) in own.iter_mut().zip(&self.jumps) {
-            let side = sides[jump.surface];
-            *mode = match jump.values {
-                None => side,
-                Some([below, ..]) if side < 0.0 => below,
-                Some([.., above]) if side > 0.0 => above,
-                Some([_, on, _]) => on,
-            };
+    /// Its value on the given sides of the surfaces; of a `floor` its value stands for the side.
+    pub fn value(&self, sides: &[f64]) -> f64 {
+        let side = sides[self.surface];
+        match self.values {
+            None => side,
+            Some([below, ..]) if side < 0.0 => below,
+            Some([.., above]) if side > 0.0 => above,
+            Some([_, on, _]) => on,
         }
-        others
     }
 }
 
@@ -148,6 +129,8 @@ pub(crate) struct Filippov<'a, D: Dynamics> {
     /// parts of the other side's right-hand side, of each surface that is slid along
     parts: Vec<f64>,
     values: Vec<f64>,
+    /// the first of the two surfaces of each `floor`
+    pairs: Vec<usize>,
     /// what is watched over a step
     guards: Option<Arc<Guards>>,
 }
@@ -156,9 +139,12 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     /// At the start of an interval of the given length; decides on which sides it starts.
     pub fn new(inner: &'a mut D, at: &'a mut Sides, (t, x): (f64, &[f64]), length: f64) -> Self {
         let guards = inner.events().and_then(|events| events.guards());
-        let count = guards.as_ref().map_or(0, |guards| guards.surfaces());
+        let surfaces = guards.iter().flat_map(|guards| &guards.surfaces);
+        let counting = surfaces.clone().enumerate().filter(|(_, s)| s.counts);
+        let count = surfaces.count();
         at.fit(count);
         let mut system = Self {
+            pairs: counting.map(|(i, _)| i).step_by(2).collect(),
             guards,
             inner,
             at,
@@ -175,20 +161,6 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     /// Whether nothing jumps with the state.
     pub fn is_plain(&self) -> bool {
         self.values.is_empty()
-    }
-
-    /// Whether the surface is one of two of a `floor`: the first one of them.
-    fn pair(&self, i: usize) -> Option<usize> {
-        let counts = &self.guards.as_ref()?.counts;
-        let is_second = |i: usize| counts[..i].iter().filter(|&&c| c).count() % 2 == 1;
-        counts.get(i)?.then(|| i - usize::from(is_second(i)))
-    }
-
-    /// The first surface of each `floor`.
-    fn pairs(&self) -> Vec<usize> {
-        (0..self.values.len())
-            .filter(|&i| self.pair(i) == Some(i))
-            .collect()
     }
 
     /// What a `floor` is on the sides of its two surfaces.
@@ -215,7 +187,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
 
     /// Carries the surfaces of a `floor` along where both were passed.
     fn carry(&mut self) {
-        for first in self.pairs() {
+        for first in self.pairs.clone() {
             let (levels, sides) = (&mut self.at.levels, &mut self.at.sides);
             let (low, high) = match levels[first] < levels[first + 1] {
                 true => (first, first + 1),
@@ -231,60 +203,56 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
 
     /// Tells the system on which sides it is.
     fn hold(&mut self) {
-        let pairs = self.pairs();
-        if pairs.is_empty() {
+        if self.pairs.is_empty() {
             return tell(self.inner, Some(&self.at.sides));
         }
         let mut sides = self.at.sides.clone();
-        for first in pairs {
+        for &first in &self.pairs {
             sides[first..first + 2].fill(self.floor(first));
         }
         tell(self.inner, Some(&sides));
     }
 
-    /// Reads the functions of the surfaces, against what they are there.
-    fn read(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+    /// The functions of the surfaces, against what they are there.
+    fn read(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
+        let mut values = vec![0.0; self.parts.len()];
         if let Some(events) = self.inner.events() {
-            events.indicators(t, x, values);
+            events.indicators(t, x, &mut values);
         }
         for (value, level) in values.iter_mut().zip(&self.at.levels) {
             *value -= level;
         }
+        values
     }
 
     /// Reads the functions of the surfaces, and remembers how large they were.
     fn look(&mut self, t: f64, x: &[f64]) {
-        let mut values = std::mem::take(&mut self.values);
-        self.read(t, x, &mut values);
-        self.values = values;
+        self.values = self.read(t, x);
         for (largest, value) in self.at.largest.iter_mut().zip(&self.values) {
             *largest = largest.max(value.abs());
         }
     }
 
     /// How far each surface is from changing what holds; negative beyond.
-    pub fn margins(&mut self, t: f64, x: &[f64], margins: &mut Vec<f64>) {
-        margins.clear();
-        if self.is_plain() {
-            return;
-        }
+    pub fn margins(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
         if self.at.sliding.contains(&true) {
             let mut dx = vec![0.0; x.len()];
             self.derivatives(t, x, &mut dx);
         }
         self.look(t, x);
-        for (i, value) in self.values.iter().enumerate() {
-            margins.push(match self.at.sliding[i] {
-                true => self.parts[i].min(1.0 - self.parts[i]),
-                false if self.at.sides[i] == 0.0 => -value.abs(),
-                false => self.at.sides[i] * value,
-            });
-        }
+        let margin = |(i, value): (usize, &f64)| match self.at.sliding[i] {
+            true => self.parts[i].min(1.0 - self.parts[i]),
+            false if self.at.sides[i] == 0.0 => -value.abs(),
+            false => self.at.sides[i] * value,
+        };
+        self.values.iter().enumerate().map(margin).collect()
     }
 
-    /// A branch need have no value beyond its side: f as the state says, then.
-    fn mend(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
-        if !self.is_plain() && !dx.iter().all(|v| v.is_finite()) {
+    /// f on the sides that are held. A branch need have no value beyond its side: as the state says,
+    /// then.
+    fn on_sides(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
+        self.inner.derivatives(t, x, dx);
+        if !self.is_plain() && !are_finite(dx) {
             tell(self.inner, None);
             self.inner.derivatives(t, x, dx);
             self.hold();
@@ -295,7 +263,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     pub fn busiest(&self) -> Option<String> {
         let passes = self.at.passes.iter().enumerate();
         let (i, count) = passes.max_by_key(|(_, count)| **count)?;
-        let name = self.guards.as_ref()?.names.get(i)?;
+        let name = &self.guards.as_ref()?.surfaces.get(i)?.name;
         (*count >= OFTEN).then(|| format!("{name} was passed {count} times; "))
     }
 
@@ -335,7 +303,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
 
     /// Puts the surfaces of each `floor` around where the state is: one may be within another.
     fn encounter(&mut self, t: f64, x: &[f64]) {
-        for first in self.pairs() {
+        for first in self.pairs.clone() {
             self.hold();
             self.look(t, x);
             let value = self.values[first] + self.at.levels[first];
@@ -386,7 +354,8 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
             let mut changed = false;
             for i in off.into_iter().filter(|&i| !reached[i]) {
                 self.at.sliding[i] = false;
-                match self.pair(i) {
+                let mut pairs = self.pairs.iter().copied();
+                match pairs.find(|&first| i == first || i == first + 1) {
                     Some(first) => {
                         let value = self.values[i] + self.at.levels[i];
                         self.surround(first, value);
@@ -489,7 +458,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
             let over = guard.over(boxes);
             over.is_some_and(|[low, high]| !(low > 0.0 || high < 0.0))
         };
-        let surfaces = guards.surfaces.iter().enumerate();
+        let surfaces = guards.at_surfaces.iter().enumerate();
         let mut free = surfaces.filter(|(i, _)| !self.is_bound(*i));
         free.any(passes) || guards.bends.iter().any(bends)
     }
@@ -506,7 +475,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         let path: Vec<Poly> = path.collect();
         let shortest = SHORTEST.max(resolution(t + h) / h);
         let mut first = Ahead::Nothing;
-        for (i, guard) in guards.surfaces.iter().enumerate() {
+        for (i, guard) in guards.at_surfaces.iter().enumerate() {
             if self.is_bound(i) {
                 continue;
             }
@@ -550,9 +519,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         let step = (1e-5 * self.length).min(stays);
         let mut at = |step: f64| {
             let moved: Vec<f64> = x.iter().zip(dx).map(|(x, dx)| x + step * dx).collect();
-            let mut values = vec![0.0; self.parts.len()];
-            self.read(t + step, &moved, &mut values);
-            values
+            self.read(t + step, &moved)
         };
         let (after, before) = (at(step), at(-step));
         let speed = |(after, before): (&f64, &f64)| (after - before) / (2.0 * step);
@@ -565,8 +532,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         let along: Vec<usize> = (0..self.parts.len())
             .filter(|&i| self.at.sliding[i])
             .collect();
-        self.inner.derivatives(t, x, dx);
-        self.mend(t, x, dx);
+        self.on_sides(t, x, dx);
         let here = self.speeds(t, x, dx);
         let mut others = vec![];
         let mut matrix = DMatrix::zeros(along.len(), along.len());
@@ -574,8 +540,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
             let mut other = vec![0.0; x.len()];
             let sides = self.at.sides.clone();
             self.turn(i, t, x);
-            self.inner.derivatives(t, x, &mut other);
-            self.mend(t, x, &mut other);
+            self.on_sides(t, x, &mut other);
             let there = self.speeds(t, x, &other);
             self.at.sides.copy_from_slice(&sides);
             self.hold();
@@ -603,17 +568,14 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     /// The other side of a surface that is slid along, and of those that jump with it.
     fn turn(&mut self, i: usize, t: f64, x: &[f64]) {
         let count = self.parts.len();
-        let [mut before, mut after] = [vec![0.0; count], vec![0.0; count]];
-        let is_alone = count == 1;
-        if !is_alone {
-            self.read(t, x, &mut before);
-        }
+        // surfaces jump with another one only where there is one
+        let before = (count > 1).then(|| self.read(t, x));
         self.at.sides[i] = -self.at.sides[i];
         self.hold();
-        if is_alone {
+        let Some(before) = before else {
             return;
-        }
-        self.read(t, x, &mut after);
+        };
+        let after = self.read(t, x);
         for j in (0..count).filter(|&j| !self.at.sliding[j]) {
             if before[j] * after[j] < 0.0 {
                 self.at.sides[j] = -self.at.sides[j];
@@ -640,8 +602,7 @@ impl<D: Dynamics> Dynamics for Filippov<'_, D> {
         if self.at.sliding.contains(&true) {
             return self.slide(t, x, dx);
         }
-        self.inner.derivatives(t, x, dx);
-        self.mend(t, x, dx);
+        self.on_sides(t, x, dx);
     }
 
     /// How the parts of both sides change along a surface is not known.

@@ -25,6 +25,17 @@ pub(super) const SHORTEST: f64 = 1e-13;
 /// A bend this near to an end of a step is at the end.
 const AT_THE_END: f64 = 1e-9;
 
+/// A surface on which a right-hand side jumps.
+#[derive(Clone, Debug)]
+pub(crate) struct Surface {
+    /// what vanishes there
+    pub node: Node,
+    /// how it reads
+    pub name: String,
+    /// whether it is one of two on which a `floor` jumps: at even integers and, next, at odd ones
+    pub counts: bool,
+}
+
 /// Everything that is watched of a system, over the inputs of its code: time, states, and what
 /// [`Events::beside`](crate::Events::beside) tells of.
 #[derive(Debug, Default)]
@@ -33,23 +44,11 @@ pub struct Guards {
     states: usize,
     /// which inputs are read, in order
     reads: Vec<usize>,
+    pub(super) surfaces: Vec<Surface>,
     /// one for each surface
-    pub(super) surfaces: Vec<Guard>,
-    /// as of [`Surfaces`]
-    pub(super) names: Vec<String>,
-    pub(super) counts: Vec<bool>,
+    pub(super) at_surfaces: Vec<Guard>,
     /// where something bends and does not jump
     pub(super) bends: Vec<Guard>,
-}
-
-/// The surfaces on which a right-hand side jumps, by the nodes that vanish there.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Surfaces {
-    pub nodes: Vec<Node>,
-    /// how they read
-    pub names: Vec<String>,
-    /// the ones that are one of two on which a `floor` jumps: at even integers and, next, at odd ones
-    pub counts: Vec<bool>,
 }
 
 impl Guards {
@@ -59,13 +58,14 @@ impl Guards {
         graph: &Graph,
         inputs: &[Node],
         states: usize,
-        surfaces: Surfaces,
+        surfaces: &[Surface],
         bends: &[Node],
     ) -> Result<Option<Arc<Self>>, MissingInput> {
-        if surfaces.nodes.is_empty() && bends.is_empty() {
+        let at_surfaces: Vec<Node> = surfaces.iter().map(|surface| surface.node).collect();
+        let all = [&at_surfaces, bends].concat();
+        if all.is_empty() {
             return Ok(None);
         }
-        let all = [&surfaces.nodes, bends].concat();
         let symbols = graph.symbols_of(&all);
         let reads: Vec<usize> = (0..inputs.len())
             .filter(|&i| symbols.contains(&inputs[i]))
@@ -73,18 +73,12 @@ impl Guards {
         let guard = |&node: &Node| Guard::new(graph, inputs, &reads, node);
         let guards = |nodes: &[Node]| nodes.iter().map(guard).collect::<Result<_, _>>();
         Ok(Some(Arc::new(Self {
-            surfaces: guards(&surfaces.nodes)?,
-            names: surfaces.names,
-            counts: surfaces.counts,
+            at_surfaces: guards(&at_surfaces)?,
+            surfaces: surfaces.to_vec(),
             bends: guards(bends)?,
             states,
             reads,
         })))
-    }
-
-    /// How many surfaces there are.
-    pub fn surfaces(&self) -> usize {
-        self.surfaces.len()
     }
 
     /// What there is for each input that is read: for time, for a state, or for what is read beside
@@ -109,17 +103,11 @@ impl Guards {
 pub(super) struct Guard {
     /// places among what is read
     reads: Vec<usize>,
-    form: Form,
-}
-
-#[derive(Debug)]
-enum Form {
-    /// a constant and the weights of what is read
-    Affine(f64, Vec<f64>),
-    /// has slopes everywhere, but for bends
-    Smooth(Tape),
-    /// may jump
-    Any(Tape),
+    tape: Tape,
+    /// a constant and the weights of what is read, where that is all
+    affine: Option<(f64, Vec<f64>)>,
+    /// nothing in it jumps: it has slopes everywhere, but for bends
+    has_slopes: bool,
 }
 
 impl Guard {
@@ -151,56 +139,55 @@ impl Guard {
                     | Op::Binary(Binary::And | Binary::Or, ..)
             )
         };
-        let operations: Vec<Op> = graph
-            .reachable(&[node])
-            .iter()
-            .map(|&n| graph.op(n))
-            .collect();
-        let form = match () {
-            () if operations.iter().any(|&op| jumps(op)) => Form::Any(tape),
-            () if operations.iter().any(|&op| chooses(op)) => Form::Smooth(tape),
-            () => match weights(graph, &read, node) {
-                Some(weights) => Form::Affine(point(&tape, &vec![0.0; read.len()]), weights),
-                None => Form::Smooth(tape),
-            },
-        };
-        Ok(Self { reads, form })
+        let operations = graph.reachable(&[node]).into_iter().map(|n| graph.op(n));
+        let operations: Vec<Op> = operations.collect();
+        let has_slopes = !operations.iter().any(|&op| jumps(op));
+        let is_plain = has_slopes && !operations.iter().any(|&op| chooses(op));
+        let weights = is_plain.then(|| weights(graph, &read, node)).flatten();
+        Ok(Self {
+            affine: weights.map(|weights| (point(&tape, &vec![0.0; read.len()]), weights)),
+            reads,
+            tape,
+            has_slopes,
+        })
     }
 
     /// An enclosure for what is read in such boxes (centre and radius of each).
     pub fn over(&self, boxes: &[[f64; 2]]) -> Option<[f64; 2]> {
-        match &self.form {
-            Form::Affine(constant, weights) => {
-                let (mut middle, mut radius, mut size) = (*constant, 0.0, constant.abs());
-                for (&i, weight) in self.reads.iter().zip(weights) {
-                    let [centre, reach] = boxes[i];
-                    middle += weight * centre;
-                    radius += weight.abs() * reach;
-                    size += (weight * centre).abs();
-                }
-                let radius = radius + 8.0 * f64::EPSILON * size;
-                Some([middle - radius, middle + radius])
-            }
-            Form::Smooth(tape) | Form::Any(tape) => {
-                let read = self.reads.iter().map(|&i| {
-                    let [centre, reach] = boxes[i];
-                    interval(centre - reach, centre + reach)
-                });
-                let read: Vec<Interval> = read.collect();
-                bounds(tape.eval_in(&Intervals, &read)[0])
-            }
+        let Some((constant, weights)) = &self.affine else {
+            let read = self.reads.iter().map(|&i| {
+                let [centre, reach] = boxes[i];
+                interval(centre - reach, centre + reach)
+            });
+            let read: Vec<Interval> = read.collect();
+            return bounds(self.tape.eval_in(&Intervals, &read)[0]);
+        };
+        let (mut middle, mut radius, mut size) = (*constant, 0.0, constant.abs());
+        for (&i, weight) in self.reads.iter().zip(weights) {
+            let [centre, reach] = boxes[i];
+            middle += weight * centre;
+            radius += weight.abs() * reach;
+            size += (weight * centre).abs();
         }
+        let radius = radius + 8.0 * f64::EPSILON * size;
+        Some([middle - radius, middle + radius])
     }
 
-    /// The function along a path, what the guards read as polynomials.
-    fn along<'a>(&'a self, path: &'a [Poly]) -> Along<'a> {
-        match &self.form {
-            Form::Affine(constant, weights) => {
-                let parts = self.reads.iter().map(|&i| &path[i]).zip(weights);
-                Along::Polynomial(Poly::combined(*constant, parts))
-            }
-            Form::Smooth(tape) => Along::Code(self, tape, path, true),
-            Form::Any(tape) => Along::Code(self, tape, path, false),
+    /// The function along a path, what the guards read as polynomials: for the search for where it
+    /// leaves a side.
+    fn along<'a>(&'a self, path: &'a [Poly], shortest: f64) -> Search<'a> {
+        let polynomial = self.affine.as_ref().map(|(constant, weights)| {
+            let parts = self.reads.iter().map(|&i| &path[i]).zip(weights);
+            Poly::combined(*constant, parts)
+        });
+        Search {
+            guard: self,
+            path,
+            polynomial,
+            side: 1.0,
+            level: 0.0,
+            band: 0.0,
+            shortest,
         }
     }
 
@@ -215,19 +202,18 @@ impl Guard {
         limit: f64,
     ) -> Ahead {
         let search = Search {
-            along: self.along(path),
             side,
             level,
             band,
-            shortest,
+            ..self.along(path, shortest)
         };
         search.first(0.0, limit)
     }
 
     /// Where something bends first, before `limit`.
     pub fn bend(&self, path: &[Poly], shortest: f64, limit: f64) -> Option<f64> {
-        let along = self.along(path);
-        let [a, b] = [0.0, 1.0].map(|s| along.at(s).abs());
+        let along = self.along(path, shortest);
+        let [a, b] = [0.0, 1.0].map(|s| along.value(s).abs());
         let band = 1e-13 * a.max(b);
         // where a step begins at a bend what follows tells the side
         let from = if a <= 1e-10 * a.max(b) {
@@ -235,13 +221,11 @@ impl Guard {
         } else {
             0.0
         };
-        let side = if along.at(from) < 0.0 { -1.0 } else { 1.0 };
+        let side = if along.value(from) < 0.0 { -1.0 } else { 1.0 };
         let search = Search {
-            along,
             side,
-            level: 0.0,
             band,
-            shortest,
+            ..along
         };
         let at = search.first(from, limit).at();
         (at > AT_THE_END && at < 1.0 - AT_THE_END).then_some(at)
@@ -262,68 +246,13 @@ fn point(tape: &Tape, read: &[f64]) -> f64 {
 }
 
 /// [a, b], or every number where that is none.
-fn interval(a: f64, b: f64) -> Interval {
+pub(super) fn interval(a: f64, b: f64) -> Interval {
     Interval::new(a, b).unwrap_or(Interval::ENTIRE)
 }
 
 /// The ends of an enclosure of the values that there are; none where there is no value.
 fn bounds(value: Interval) -> Option<[f64; 2]> {
     (!value.is_empty()).then(|| [value.lo(), value.hi()])
-}
-
-/// A function along a path, of the part of it that is done.
-enum Along<'a> {
-    Polynomial(Poly),
-    /// the last: slopes are those of the function
-    Code(&'a Guard, &'a Tape, &'a [Poly], bool),
-}
-
-impl Along<'_> {
-    /// The value where a part of the path is done.
-    fn at(&self, part: f64) -> f64 {
-        match self {
-            Self::Polynomial(p) => p.at(part),
-            Self::Code(guard, tape, path, _) => {
-                let read: Vec<f64> = guard.reads.iter().map(|&i| path[i].at(part)).collect();
-                point(tape, &read)
-            }
-        }
-    }
-
-    /// An enclosure of the values over a stretch.
-    fn range(&self, stretch: Stretch) -> Option<[f64; 2]> {
-        match self {
-            Self::Polynomial(p) => Some(p.range(stretch)),
-            Self::Code(guard, tape, path, _) => {
-                let read = guard.reads.iter().map(|&i| path[i].range(stretch));
-                let read: Vec<Interval> = read.map(|[a, b]| interval(a, b)).collect();
-                bounds(tape.eval_in(&Intervals, &read)[0])
-            }
-        }
-    }
-
-    /// An enclosure of the slopes over a stretch, where there are some.
-    fn slope(&self, stretch: Stretch) -> Option<[f64; 2]> {
-        match self {
-            Self::Polynomial(p) => Some(p.slope(stretch)),
-            Self::Code(_, _, _, false) => None,
-            Self::Code(guard, tape, path, true) => {
-                let jet = |&i: &usize| {
-                    let (value, slope) = (path[i].range(stretch), path[i].slope(stretch));
-                    [value, slope].map(|[a, b]| interval(a, b)).to_vec()
-                };
-                let read: Vec<Vec<Interval>> = guard.reads.iter().map(jet).collect();
-                let jets = Jets {
-                    inner: &Intervals,
-                    order: 1,
-                };
-                let series = tape.eval_in(&jets, &read).swap_remove(0);
-                let slope = series.get(1).copied().unwrap_or(Interval::ZERO);
-                // one end of it where the function has no value everywhere
-                slope.is_defined().then(|| [slope.lo(), slope.hi()])
-            }
-        }
-    }
 }
 
 /// What comes first in a step, in parts of it.
@@ -350,9 +279,12 @@ impl Ahead {
     }
 }
 
-/// The search for where a function leaves its side.
+/// A function along a path, of the part of it that is done, and the search for where it leaves its side.
 struct Search<'a> {
-    along: Along<'a>,
+    guard: &'a Guard,
+    path: &'a [Poly],
+    /// the function, where it is affine
+    polynomial: Option<Poly>,
     side: f64,
     level: f64,
     /// nobody asks which side it is so close
@@ -361,8 +293,53 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// The value where a part of the path is done.
+    fn value(&self, part: f64) -> f64 {
+        if let Some(polynomial) = &self.polynomial {
+            return polynomial.at(part);
+        }
+        let read = self.guard.reads.iter().map(|&i| self.path[i].at(part));
+        point(&self.guard.tape, &read.collect::<Vec<f64>>())
+    }
+
+    /// An enclosure of the values over a stretch.
+    fn range(&self, from: f64, to: f64) -> Option<[f64; 2]> {
+        if let Some(polynomial) = &self.polynomial {
+            return Some(polynomial.range(from, to));
+        }
+        let read = self.guard.reads.iter();
+        let read = read.map(|&i| self.path[i].range(from, to));
+        let read: Vec<Interval> = read.map(|[a, b]| interval(a, b)).collect();
+        bounds(self.guard.tape.eval_in(&Intervals, &read)[0])
+    }
+
+    /// An enclosure of the slopes over a stretch, where there are some.
+    fn slope(&self, from: f64, to: f64) -> Option<[f64; 2]> {
+        if let Some(polynomial) = &self.polynomial {
+            return Some(polynomial.slope(from, to));
+        }
+        if !self.guard.has_slopes {
+            return None;
+        }
+        let jet = |&i: &usize| {
+            let state = &self.path[i];
+            [state.range(from, to), state.slope(from, to)]
+                .map(|[a, b]| interval(a, b))
+                .to_vec()
+        };
+        let read: Vec<Vec<Interval>> = self.guard.reads.iter().map(jet).collect();
+        let jets = Jets {
+            inner: &Intervals,
+            order: 1,
+        };
+        let series = self.guard.tape.eval_in(&jets, &read).swap_remove(0);
+        let slope = series.get(1).copied().unwrap_or(Interval::ZERO);
+        // one end of it where the function has no value everywhere
+        slope.is_defined().then(|| [slope.lo(), slope.hi()])
+    }
+
     fn margin(&self, s: f64) -> f64 {
-        self.side * (self.along.at(s) - self.level)
+        self.side * (self.value(s) - self.level)
     }
 
     /// Bounds of the margin, from those of the function.
@@ -385,13 +362,10 @@ impl Search<'_> {
             let Some((from, to)) = left.pop() else {
                 return Ahead::Nothing;
             };
-            match self.look(Stretch { from, to }) {
-                Look::Clear => {}
-                Look::Beyond(beyond) => {
-                    let at = self.root(0.0, beyond);
-                    return Ahead::Jump { at, beyond };
-                }
-                Look::Open => {
+            match self.look(from, to) {
+                Some(Ahead::Nothing) => {}
+                Some(found) => return found,
+                None => {
                     let middle = 0.5 * (from + to);
                     left.extend([(middle, to), (from, middle)]);
                 }
@@ -401,49 +375,55 @@ impl Search<'_> {
             None => Ahead::Nothing,
             // so far nothing is passed: the next step goes on from there
             Some((at, _)) if at - from > USEFUL * (limit - from) => Ahead::Stop { at },
-            Some((at, _)) => self.sampled(at, limit),
+            Some((from, _)) => self.sampled(from, limit),
         }
     }
 
     /// Of what cannot be enclosed, as an algebraic loop that is searched, samples tell.
     fn sampled(&self, from: f64, to: f64) -> Ahead {
         let samples = (1..=SAMPLES).map(|k| from + (to - from) * k as f64 / SAMPLES as f64);
-        let mut passed = samples.filter(|&s| self.margin(s) < -self.band);
-        passed.next().map_or(Ahead::Nothing, |beyond| Ahead::Jump {
-            at: self.root(0.0, beyond),
-            beyond,
-        })
+        let mut looks = samples.map(|s| self.at(s));
+        looks
+            .find(|at| *at != Ahead::Nothing)
+            .unwrap_or(Ahead::Nothing)
     }
 
-    fn look(&self, stretch: Stretch) -> Look {
-        let Stretch { from, to } = stretch;
+    /// What the value at one place tells.
+    fn at(&self, s: f64) -> Ahead {
+        match self.margin(s) < -self.band {
+            true => self.jump(s),
+            false => Ahead::Nothing,
+        }
+    }
+
+    /// The passage before `beyond`.
+    fn jump(&self, beyond: f64) -> Ahead {
+        let at = self.root(0.0, beyond);
+        Ahead::Jump { at, beyond }
+    }
+
+    /// What is passed over a stretch, the first such thing; none where that is open.
+    fn look(&self, from: f64, to: f64) -> Option<Ahead> {
+        let (middle, radius) = around(from, to);
         let is_short = to - from <= self.shortest;
-        let sampled = |s: f64| match self.margin(s) < -self.band {
-            true => Look::Beyond(s),
-            false => Look::Clear,
-        };
-        match self.along.range(stretch).map(|r| self.margins(r)) {
+        match self.range(from, to).map(|r| self.margins(r)) {
             // no value anywhere
-            None => return Look::Clear,
-            Some([low, _]) if low >= -self.band => return Look::Clear,
-            Some([_, high]) if high < -self.band => return Look::Beyond(to),
-            _ if is_short => return sampled(stretch.middle()),
+            None => return Some(Ahead::Nothing),
+            Some([low, _]) if low >= -self.band => return Some(Ahead::Nothing),
+            Some([_, high]) if high < -self.band => return Some(self.jump(to)),
+            _ if is_short => return Some(self.at(middle)),
             _ => {}
         }
-        let Some([least, most]) = self.along.slope(stretch) else {
-            return Look::Open;
-        };
+        let [least, most] = self.slope(from, to)?;
         if least >= 0.0 || most <= 0.0 {
-            return match (sampled(from), sampled(to)) {
-                (Look::Clear, at_end) => at_end,
-                (beyond, _) => beyond,
-            };
+            let ends = [from, to].map(|s| self.at(s));
+            return ends
+                .into_iter()
+                .find(|at| *at != Ahead::Nothing)
+                .or(Some(Ahead::Nothing));
         }
-        let reach = least.abs().max(most.abs()) * stretch.radius();
-        match self.margin(stretch.middle()) - reach >= -self.band {
-            true => Look::Clear,
-            false => Look::Open,
-        }
+        let reach = least.abs().max(most.abs()) * radius;
+        (self.margin(middle) - reach >= -self.band).then_some(Ahead::Nothing)
     }
 
     /// Where the margin ends before `beyond`, at which it is negative and up to which it ends once.
@@ -462,14 +442,6 @@ impl Search<'_> {
     }
 }
 
-enum Look {
-    /// nothing is passed
-    Clear,
-    /// it is passed before there
-    Beyond(f64),
-    Open,
-}
-
 /// Coefficients of the polynomials: the interpolant of the explicit method has degree 7.
 pub(crate) const COEFFICIENTS: usize = 8;
 
@@ -477,21 +449,9 @@ pub(crate) const COEFFICIENTS: usize = 8;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Poly(pub [f64; COEFFICIENTS]);
 
-/// A stretch of the step, in parts of it.
-#[derive(Clone, Copy, Debug)]
-struct Stretch {
-    from: f64,
-    to: f64,
-}
-
-impl Stretch {
-    fn middle(self) -> f64 {
-        0.5 * (self.from + self.to)
-    }
-
-    fn radius(self) -> f64 {
-        0.5 * (self.to - self.from)
-    }
+/// Middle and radius of a stretch of the step.
+fn around(from: f64, to: f64) -> (f64, f64) {
+    (0.5 * (from + to), 0.5 * (to - from))
 }
 
 impl Poly {
@@ -534,16 +494,18 @@ impl Poly {
     }
 
     /// An enclosure over a stretch.
-    fn range(&self, stretch: Stretch) -> [f64; 2] {
-        let (c, r) = (self.about(stretch.middle()), stretch.radius());
+    fn range(&self, from: f64, to: f64) -> [f64; 2] {
+        let (middle, r) = around(from, to);
+        let c = self.about(middle);
         let spread = c[1..].iter().rev().fold(0.0, |sum, c| (sum + c.abs()) * r);
         let spread = spread + self.rounding() + 4.0 * f64::EPSILON * c[0].abs();
         [c[0] - spread, c[0] + spread]
     }
 
     /// An enclosure of the slope over a stretch.
-    fn slope(&self, stretch: Stretch) -> [f64; 2] {
-        let (c, r) = (self.about(stretch.middle()), stretch.radius());
+    fn slope(&self, from: f64, to: f64) -> [f64; 2] {
+        let (middle, r) = around(from, to);
+        let c = self.about(middle);
         let mut spread = 0.0;
         for k in (2..COEFFICIENTS).rev() {
             spread = (spread + k as f64 * c[k].abs()) * r;
@@ -563,23 +525,16 @@ mod tests {
         let derivative = |s: f64| (p.at(s + 1e-6) - p.at(s - 1e-6)) / 2e-6;
         for i in 0..10 {
             for j in i + 1..=10 {
-                let stretch = Stretch {
-                    from: 0.1 * f64::from(i),
-                    to: 0.1 * f64::from(j),
-                };
-                let ([low, high], [least, most]) = (p.range(stretch), p.slope(stretch));
+                let (from, to) = (0.1 * f64::from(i), 0.1 * f64::from(j));
+                let ([low, high], [least, most]) = (p.range(from, to), p.slope(from, to));
                 for k in 0..=20 {
-                    let s = stretch.from + f64::from(k) / 20.0 * (stretch.to - stretch.from);
+                    let s = from + f64::from(k) / 20.0 * (to - from);
                     assert!((low..=high).contains(&p.at(s)));
                     assert!((least - 1e-6..=most + 1e-6).contains(&derivative(s)));
                 }
             }
         }
-        let short = Stretch {
-            from: 0.499,
-            to: 0.501,
-        };
-        let [low, high] = p.range(short);
+        let [low, high] = p.range(0.499, 0.501);
         assert!(high - low < 0.01, "{low} {high}");
     }
 }

@@ -9,9 +9,9 @@ mod filippov;
 mod guards;
 mod time;
 
-pub(crate) use extract::extract;
 pub use extract::first_jump;
-pub(crate) use filippov::{Filippov, Jumps, Sides, Span};
+pub(crate) use extract::{bends, state_events, time_events};
+pub(crate) use filippov::{Filippov, Jump, Sides, Span};
 pub use guards::Guards;
-pub(crate) use guards::{Ahead, COEFFICIENTS, Poly, Surfaces};
+pub(crate) use guards::{Ahead, COEFFICIENTS, Poly, Surface};
 pub(crate) use time::TimeEvents;

@@ -8,8 +8,9 @@
 //! too often, is refused by name.
 
 use lynkeus_expr::interval::Intervals;
-use lynkeus_expr::{Evaluator, Graph, Interval, Jets, MissingInput, Node, Reals, Tape};
+use lynkeus_expr::{Algebra, Evaluator, Graph, Interval, Jets, MissingInput, Node, Reals, Tape};
 
+use super::guards::interval;
 use crate::Error;
 use crate::snapshot::{Damaged, Persist, Walk};
 
@@ -40,21 +41,23 @@ pub(crate) struct TimeEvents {
     indicators: Vec<Indicator>,
     /// the modes as functions of time alone
     values: Evaluator,
-    /// what was found in the interval asked for last, as `indicators`
-    timelines: Vec<Timeline>,
-    /// what the intervals to come may cost
-    allowance: Allowance,
+    /// what finding them may still cost
+    effort: Effort,
 }
 
 impl TimeEvents {
     /// Of indicators, each after those that it reads, and of the modes as functions of time.
     pub(super) fn new(indicators: Vec<Indicator>, values: &Tape) -> Self {
         Self {
-            timelines: vec![Timeline::default(); indicators.len()],
             indicators,
             values: values.evaluator(),
-            allowance: Allowance::default(),
+            effort: Effort::default(),
         }
+    }
+
+    /// How many modes there are.
+    pub(crate) fn modes(&self) -> usize {
+        self.values.tape().outputs()
     }
 
     /// Writes the modes' values at `t`.
@@ -79,89 +82,37 @@ impl TimeEvents {
         if self.indicators.is_empty() {
             return Ok(());
         }
-        let mut effort = self.allowance.effort(from, to);
-        for (i, indicator) in self.indicators.iter_mut().enumerate() {
-            let (before, rest) = self.timelines.split_at_mut(i);
-            if let Some(timeline) = rest.first_mut() {
-                indicator.follow(&mut effort, before, timeline)?;
-                times.extend_from_slice(timeline.instants());
-            }
+        self.effort.begin(from, to);
+        for i in 0..self.indicators.len() {
+            let (before, rest) = self.indicators.split_at_mut(i);
+            let followed = rest[0].follow(&mut self.effort, before);
+            followed.map_err(|error| error.about(&rest[0].expression))?;
+            times.extend_from_slice(&rest[0].timeline.instants);
         }
-        self.allowance.pay(&effort);
+        self.effort.end();
         Ok(())
     }
 }
 
 impl Persist for TimeEvents {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        let Allowance {
-            since,
-            switches,
-            granted,
-            looks,
-        } = &mut self.allowance;
-        walk.optional(since, Walk::number)?;
-        walk.count(switches)?;
-        walk.count(granted)?;
-        walk.count(looks)
+        walk.optional(&mut self.effort.since, Walk::number)?;
+        walk.count(&mut self.effort.switches_of_run)?;
+        walk.count(&mut self.effort.granted)?;
+        walk.count(&mut self.effort.looks_of_run)
     }
 }
 
-/// What following the switches over all intervals of a run may still cost.
+/// What following the switches may still cost: in the run, and over the interval under way.
 #[derive(Clone, Debug)]
-struct Allowance {
+struct Effort {
     /// start of the first interval
     since: Option<f64>,
-    switches: usize,
+    switches_of_run: usize,
     /// switches found and left
     granted: usize,
-    looks: usize,
-}
-
-impl Default for Allowance {
-    fn default() -> Self {
-        Self {
-            since: None,
-            switches: INTERVALS * SWITCHES,
-            granted: INTERVALS * SWITCHES,
-            looks: INTERVALS * LOOKS,
-        }
-    }
-}
-
-impl Allowance {
-    /// What the interval may cost.
-    fn effort(&mut self, from: f64, to: f64) -> Effort {
-        let since = *self.since.get_or_insert(from);
-        self.switches = self.switches.saturating_add(MORE_SWITCHES);
-        self.granted = self.granted.saturating_add(MORE_SWITCHES);
-        self.looks = self.looks.saturating_add(MORE_LOOKS);
-        let (counted_from, limit) = match self.switches < SWITCHES {
-            true => (since, self.granted),
-            false => (from, SWITCHES),
-        };
-        Effort {
-            from,
-            to,
-            switches: self.switches.min(SWITCHES),
-            looks: self.looks.min(LOOKS),
-            counted_from,
-            limit,
-            doubtful: DOUBTFUL * (to - from),
-        }
-    }
-
-    /// Takes what the interval cost.
-    fn pay(&mut self, effort: &Effort) {
-        let spent = |left: usize, most: usize, now: usize| left - (left.min(most) - now);
-        self.switches = spent(self.switches, SWITCHES, effort.switches);
-        self.looks = spent(self.looks, LOOKS, effort.looks);
-    }
-}
-
-/// What following the switches over an interval may still cost.
-#[derive(Debug)]
-struct Effort {
+    looks_of_run: usize,
+    /// the interval
     from: f64,
     to: f64,
     switches: usize,
@@ -173,35 +124,72 @@ struct Effort {
     doubtful: f64,
 }
 
+impl Default for Effort {
+    fn default() -> Self {
+        Self {
+            since: None,
+            switches_of_run: INTERVALS * SWITCHES,
+            granted: INTERVALS * SWITCHES,
+            looks_of_run: INTERVALS * LOOKS,
+            from: 0.0,
+            to: 0.0,
+            switches: 0,
+            looks: 0,
+            counted_from: 0.0,
+            limit: 0,
+            doubtful: 0.0,
+        }
+    }
+}
+
 impl Effort {
+    /// An interval begins.
+    fn begin(&mut self, from: f64, to: f64) {
+        let since = *self.since.get_or_insert(from);
+        self.switches_of_run = self.switches_of_run.saturating_add(MORE_SWITCHES);
+        self.granted = self.granted.saturating_add(MORE_SWITCHES);
+        self.looks_of_run = self.looks_of_run.saturating_add(MORE_LOOKS);
+        (self.counted_from, self.limit) = match self.switches_of_run < SWITCHES {
+            true => (since, self.granted),
+            false => (from, SWITCHES),
+        };
+        (self.from, self.to) = (from, to);
+        self.switches = self.switches_of_run.min(SWITCHES);
+        self.looks = self.looks_of_run.min(LOOKS);
+        self.doubtful = DOUBTFUL * (to - from);
+    }
+
+    /// The run pays for the interval.
+    fn end(&mut self) {
+        self.switches_of_run -= self.switches_of_run.min(SWITCHES) - self.switches;
+        self.looks_of_run -= self.looks_of_run.min(LOOKS) - self.looks;
+    }
+
     /// Pays for one look.
-    fn look(&mut self, at: f64, expression: &str) -> Result<(), Error> {
-        self.looks = self
-            .looks
-            .checked_sub(1)
-            .ok_or_else(|| unresolved(at, expression))?;
+    fn look(&mut self, at: f64) -> Result<(), Error> {
+        self.looks = self.looks.checked_sub(1).ok_or_else(|| unresolved(at))?;
         Ok(())
     }
 
     /// Pays for a stretch at `at` on which the mode is not certain.
-    fn doubt(&mut self, at: f64, width: f64, expression: &str) -> Result<(), Error> {
+    fn doubt(&mut self, at: f64, width: f64) -> Result<(), Error> {
         // around a simple zero some last bits are always in doubt
         if width > 64.0 * apart(at) {
             self.doubtful -= width;
         }
         if self.doubtful < 0.0 {
-            return Err(unresolved(at, expression));
+            return Err(unresolved(at));
         }
         Ok(())
     }
 
     /// Refuses more than the switches that are left.
-    fn check(&self, count: f64, expression: &str) -> Result<(), Error> {
+    fn check(&self, count: f64) -> Result<(), Error> {
         if count <= self.switches as f64 {
             return Ok(());
         }
         Err(Error::TooManySwitches {
-            expression: expression.to_owned(),
+            expression: String::new(),
             from: self.counted_from,
             to: self.to,
             limit: self.limit,
@@ -209,16 +197,17 @@ impl Effort {
     }
 
     /// Pays for a switch.
-    fn switch(&mut self, expression: &str) -> Result<(), Error> {
-        self.check(1.0, expression)?;
+    fn switch(&mut self) -> Result<(), Error> {
+        self.check(1.0)?;
         self.switches -= 1;
         Ok(())
     }
 }
 
-fn unresolved(time: f64, expression: &str) -> Error {
+/// Of what it is said is filled in by whoever knows.
+fn unresolved(time: f64) -> Error {
     Error::UnresolvedSwitches {
-        expression: expression.to_owned(),
+        expression: String::new(),
         time,
     }
 }
@@ -233,16 +222,6 @@ struct Timeline {
 }
 
 impl Timeline {
-    fn clear(&mut self) {
-        self.instants.clear();
-        self.values.clear();
-    }
-
-    /// Where the value changes, increasing.
-    fn instants(&self) -> &[f64] {
-        &self.instants
-    }
-
     /// The mode is `value` from `t` on (from the start, for the first value).
     fn push(&mut self, t: f64, value: f64) {
         match self.values.last() {
@@ -287,6 +266,8 @@ pub(super) struct Indicator {
     evaluator: Evaluator,
     /// t, modes read
     inputs: Vec<f64>,
+    /// what was found in the interval asked for last
+    timeline: Timeline,
 }
 
 impl Indicator {
@@ -314,23 +295,19 @@ impl Indicator {
             mode,
             quantity: Tape::new(graph, &inputs, &[quantity])?,
             inputs: vec![0.0; inputs.len()],
+            timeline: Timeline::default(),
             reads,
         })
     }
 
-    /// Writes the mode over the interval of `effort` to `timeline`; `before` are the
-    /// timelines of the indicators before.
-    fn follow(
-        &mut self,
-        effort: &mut Effort,
-        before: &[Timeline],
-        timeline: &mut Timeline,
-    ) -> Result<(), Error> {
-        timeline.clear();
+    /// Finds the mode over the interval of `effort`; `before` are the indicators before.
+    fn follow(&mut self, effort: &mut Effort, before: &[Self]) -> Result<(), Error> {
+        self.timeline.instants.clear();
+        self.timeline.values.clear();
         let mut ends: Vec<f64> = self
             .reads
             .iter()
-            .flat_map(|&i| before[i].instants())
+            .flat_map(|&i| &before[i].timeline.instants)
             .copied()
             .collect();
         ends.sort_unstable_by(f64::total_cmp);
@@ -342,27 +319,29 @@ impl Indicator {
             }
             let middle = start + 0.5 * (end - start);
             for (input, &i) in self.inputs[1..].iter_mut().zip(&self.reads) {
-                *input = before[i].at(middle);
+                *input = before[i].timeline.at(middle);
             }
-            self.piece(start, end, effort, timeline)?;
+            self.piece(start, end, effort)?;
             start = end;
         }
         Ok(())
     }
 
     /// Over a piece on which the modes inside stay.
-    fn piece(
-        &mut self,
-        start: f64,
-        end: f64,
-        effort: &mut Effort,
-        timeline: &mut Timeline,
-    ) -> Result<(), Error> {
-        let instants = Isolation::new(self, start, end, effort).run()?;
+    fn piece(&mut self, start: f64, end: f64, effort: &mut Effort) -> Result<(), Error> {
+        let isolation = Isolation {
+            indicator: self,
+            effort,
+            start,
+            end,
+            certain: None,
+            instants: vec![],
+        };
+        let instants = isolation.run()?;
         let mut from = start;
         for to in instants.into_iter().chain([end]) {
             let value = self.value(from + 0.5 * (to - from));
-            timeline.push(from, value);
+            self.timeline.push(from, value);
             from = to;
         }
         Ok(())
@@ -397,35 +376,34 @@ impl Indicator {
         enclosure.is_defined() && image.is_point()
     }
 
+    /// The first Taylor coefficients of the quantity, over time and what reads of it.
+    fn taylor<A: Algebra>(
+        &self,
+        inner: &A,
+        mut time: Vec<A::Value>,
+        count: usize,
+        mode: impl Fn(f64) -> A::Value,
+    ) -> Vec<A::Value> {
+        time.truncate(count);
+        let modes = self.inputs[1..].iter().map(|&value| vec![mode(value)]);
+        let inputs: Vec<_> = std::iter::once(time).chain(modes).collect();
+        let jets = Jets {
+            inner,
+            order: count.saturating_sub(1),
+        };
+        self.quantity.eval_in(&jets, &inputs).swap_remove(0)
+    }
+
     /// The first Taylor coefficients of the quantity, enclosed over `stretch`.
     fn series<const N: usize>(&self, stretch: Interval) -> [Interval; N] {
-        let mut time = vec![stretch, Interval::ONE];
-        time.truncate(N);
-        let inputs: Vec<Vec<Interval>> = std::iter::once(time)
-            .chain(
-                self.inputs[1..]
-                    .iter()
-                    .map(|&mode| vec![Interval::point(mode)]),
-            )
-            .collect();
-        let jets = Jets {
-            inner: &Intervals,
-            order: N.saturating_sub(1),
-        };
-        let series = self.quantity.eval_in(&jets, &inputs).swap_remove(0);
+        let time = vec![stretch, Interval::ONE];
+        let series = self.taylor(&Intervals, time, N, Interval::point);
         std::array::from_fn(|k| series.get(k).copied().unwrap_or(Interval::ZERO))
     }
 
     /// The Taylor coefficient of power `k` at `t`.
     fn coefficient(&self, k: usize, t: f64) -> f64 {
-        let inputs: Vec<Vec<f64>> = std::iter::once(vec![t, 1.0])
-            .chain(self.inputs[1..].iter().map(|&mode| vec![mode]))
-            .collect();
-        let jets = Jets {
-            inner: &Reals,
-            order: k,
-        };
-        let series = self.quantity.eval_in(&jets, &inputs).swap_remove(0);
+        let series = self.taylor(&Reals, vec![t, 1.0], k + 1, |mode| mode);
         series.get(k).copied().unwrap_or(0.0)
     }
 }
@@ -441,45 +419,25 @@ struct Isolation<'a> {
     instants: Vec<f64>,
 }
 
-/// What is known of a cell.
-enum Cell {
-    /// the mode stays
-    Constant,
-    /// the quantity is monotone between these times, ends included
-    Monotone(Vec<f64>),
-    Unknown,
-}
-
-impl<'a> Isolation<'a> {
-    fn new(indicator: &'a mut Indicator, start: f64, end: f64, effort: &'a mut Effort) -> Self {
-        Self {
-            indicator,
-            effort,
-            start,
-            end,
-            certain: None,
-            instants: vec![],
-        }
-    }
-
+impl Isolation<'_> {
     /// The instants strictly inside, increasing.
     fn run(mut self) -> Result<Vec<f64>, Error> {
         let mut cells = vec![(self.start, self.end)];
         while let Some((a, b)) = cells.pop() {
-            self.effort.look(a, &self.indicator.expression)?;
+            self.effort.look(a)?;
             match self.cell(a, b) {
-                Cell::Constant => self.settle(a + 0.5 * (b - a), a)?,
-                Cell::Monotone(times) => {
+                Some(times) if times.is_empty() => self.settle(a + 0.5 * (b - a), a)?,
+                Some(times) => {
                     for pair in times.windows(2) {
                         self.monotone(pair[0], pair[1])?;
                     }
                 }
-                Cell::Unknown if self.is_hidden(a, b)? => {
+                None if self.is_hidden(a, b)? => {
                     if self.is_certain(b) {
                         self.arrive(b)?;
                     }
                 }
-                Cell::Unknown => {
+                None => {
                     let middle = a + 0.5 * (b - a);
                     cells.extend([(middle, b), (a, middle)]);
                 }
@@ -488,25 +446,27 @@ impl<'a> Isolation<'a> {
         Ok(self.instants)
     }
 
-    fn cell(&self, a: f64, b: f64) -> Cell {
+    /// The times between which the quantity is monotone, ends included; no time where the mode stays.
+    /// None where nothing is known.
+    fn cell(&self, a: f64, b: f64) -> Option<Vec<f64>> {
         let stretch = interval(a, b);
         if self.indicator.is_constant(stretch) {
-            return Cell::Constant;
+            return Some(vec![]);
         }
         let slope = self.indicator.series::<2>(stretch)[1];
         if slope == Interval::ZERO {
-            return Cell::Constant;
+            return Some(vec![]);
         }
         if slope.is_defined() && keeps_sign(slope) {
-            return Cell::Monotone(vec![a, b]);
+            return Some(vec![a, b]);
         }
         if slope.is_defined() && self.excluded(a, b, slope) {
-            return Cell::Constant;
+            return Some(vec![]);
         }
         let series = self.indicator.series::<{ ORDER + 1 }>(stretch);
         let defined = series.iter().take_while(|c| c.is_defined()).count();
         let order = (2..defined).find(|&k| keeps_sign(series[k]));
-        order.map_or(Cell::Unknown, |k| Cell::Monotone(self.parts(a, b, k)))
+        order.map(|k| self.parts(a, b, k))
     }
 
     /// Whether the mean value form, with the derivative enclosed in `slope`, shows
@@ -580,8 +540,7 @@ impl<'a> Isolation<'a> {
         {
             return Ok(false);
         }
-        let expression = &self.indicator.expression;
-        self.effort.doubt(a, width, expression)?;
+        self.effort.doubt(a, width)?;
         Ok(true)
     }
 
@@ -594,15 +553,13 @@ impl<'a> Isolation<'a> {
     fn monotone(&mut self, a: f64, b: f64) -> Result<(), Error> {
         if self.indicator.counts {
             let levels = (self.indicator.value(b) - self.indicator.value(a)).abs();
-            self.effort
-                .check(levels.max(0.0), &self.indicator.expression)?;
+            self.effort.check(levels.max(0.0))?;
         }
-        let expression = &self.indicator.expression;
         let (Some(first), Some(last)) = (self.probe(a, b), self.probe(b, a)) else {
-            return self.effort.doubt(a, b - a, expression);
+            return self.effort.doubt(a, b - a);
         };
-        self.effort.doubt(a, first - a, expression)?;
-        self.effort.doubt(b, b - last, expression)?;
+        self.effort.doubt(a, first - a)?;
+        self.effort.doubt(b, b - last)?;
         self.arrive(first)?;
         if first < last {
             self.arrive(last)?;
@@ -657,7 +614,7 @@ impl<'a> Isolation<'a> {
         if switch - last <= apart(switch) || self.end - switch <= apart(self.end) {
             return Ok(());
         }
-        self.effort.switch(&self.indicator.expression)?;
+        self.effort.switch()?;
         self.instants.push(switch);
         Ok(())
     }
@@ -682,11 +639,6 @@ fn keeps_sign(c: Interval) -> bool {
     c.lo() >= 0.0 || c.hi() <= 0.0
 }
 
-/// [a, b] for a ≤ b.
-fn interval(a: f64, b: f64) -> Interval {
-    Interval::new(a, b).unwrap_or(Interval::ENTIRE)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -698,7 +650,7 @@ mod tests {
             line.push(t, value);
         }
         line.push(4.0, 0.0);
-        assert_eq!(line.instants(), [2.0, 4.0]);
+        assert_eq!(line.instants, [2.0, 4.0]);
         assert_eq!((line.at(0.5), line.at(5.0)), (1.0, 0.0));
         assert!(line.at(2.5).is_nan() && Timeline::default().at(0.0).is_nan());
     }

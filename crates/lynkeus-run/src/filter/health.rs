@@ -145,10 +145,9 @@ impl Persist for Innovation {
         walk.number(&mut self.deviation)?;
         walk.number(&mut self.settled)?;
         walk.number(&mut self.predicted)?;
-        let mut place = Reading::ALL.iter().position(|r| *r == self.reading);
-        let place = place.get_or_insert_default();
-        walk.below(place, Reading::ALL.len())?;
-        self.reading = Reading::ALL[*place];
+        let mut place = self.reading as usize;
+        walk.below(&mut place, Reading::ALL.len())?;
+        self.reading = Reading::ALL[place];
         Ok(())
     }
 }

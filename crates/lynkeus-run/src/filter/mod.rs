@@ -191,7 +191,7 @@ impl Filter {
         let keep = self.keeps_transitions();
         let (propagation, belief) = (&mut self.propagation, &mut self.belief);
         if let Some(spare) = &mut self.spare {
-            spare.driven.start(propagation.driven.evaluation.signals());
+            spare.driven.start(propagation.driven.signals());
         }
         propagation.driven.aim(from, sample.t, sample.inputs);
         let result = match &mut self.engine {
@@ -256,7 +256,7 @@ impl Filter {
 
 impl Runner for Filter {
     fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
-        self.bound.see(self.propagation.driven.evaluation.signals());
+        self.bound.see(self.propagation.driven.signals());
         let transition = self.predict(from, sample)?;
         self.propagation.driven.arrive();
         self.keep_inside();
@@ -280,7 +280,7 @@ impl Runner for Filter {
     }
 
     fn report(&mut self, t: f64) -> Result<(), Error> {
-        let names = self.propagation.driven.evaluation.system().states();
+        let names = self.propagation.driven.system().states();
         self.bound.check(t, names, &self.belief.x, String::new)?;
         for (i, deviation) in self.deviations.iter_mut().enumerate() {
             *deviation = self.belief.root.deviation(i);

@@ -83,14 +83,6 @@ impl Believed {
     }
 }
 
-/// The readings of a sensor that were rejected in a row.
-#[derive(Clone, Copy, Debug, Default)]
-struct Lockout {
-    /// readings that differ from the one before
-    moved: usize,
-    last: f64,
-}
-
 #[derive(Clone, Debug)]
 pub(crate) struct Sensing {
     pub output_map: OutputMap,
@@ -98,7 +90,10 @@ pub(crate) struct Sensing {
     gate: Option<f64>,
     /// of readings that only stand for others ([`super::FilterSettings::foresees`])
     foresees: bool,
-    lockouts: Vec<Lockout>,
+    /// of the readings of each sensor that were rejected in a row, those that differ from the one before
+    moved: Vec<usize>,
+    /// the reading before
+    last: Vec<f64>,
     pub innovations: Vec<Innovation>,
     pub health: Health,
     /// of this sample, where a smoother asks for them
@@ -120,7 +115,8 @@ impl Sensing {
             sensors: model.sensors.clone(),
             gate: settings.gate,
             foresees: settings.foresees,
-            lockouts: vec![Lockout::default(); count],
+            moved: vec![0; count],
+            last: vec![0.0; count],
             innovations: vec![Innovation::default(); count],
             health: Health::of(count),
             corrections: keeps_corrections.then(Vec::new),
@@ -223,29 +219,25 @@ impl Sensing {
 
     fn is_outlier(&self, i: usize, innovation: f64, deviation: f64) -> bool {
         let Some(gate) = self.gate else { return false };
-        let relieved =
-            self.health.sensors[i].locked_out >= LOCKED_OUT && self.lockouts[i].moved >= MOVED;
+        let relieved = self.health.sensors[i].locked_out >= LOCKED_OUT && self.moved[i] >= MOVED;
         !relieved && innovation.abs() > gate * deviation
     }
 
     fn follow(&mut self, i: usize, reading: f64, became: Reading) {
-        let lockout = &mut self.lockouts[i];
         match became {
             Reading::Missing => return,
-            Reading::Rejected => lockout.moved += usize::from(reading != lockout.last),
-            Reading::Taken | Reading::AtLimit => lockout.moved = 0,
+            Reading::Rejected => self.moved[i] += usize::from(reading != self.last[i]),
+            Reading::Taken | Reading::AtLimit => self.moved[i] = 0,
         }
-        lockout.last = reading;
+        self.last[i] = reading;
     }
 }
 
 impl Persist for Sensing {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.output_map.walk(walk)?;
-        for lockout in &mut self.lockouts {
-            walk.count(&mut lockout.moved)?;
-            walk.number(&mut lockout.last)?;
-        }
+        self.moved.iter_mut().try_for_each(|m| walk.count(m))?;
+        walk.numbers(&mut self.last)?;
         for innovation in &mut self.innovations {
             innovation.walk(walk)?;
         }

@@ -15,7 +15,7 @@ fn draws_of(level: Level, seed: u64, outputs: &[&str], of: usize, count: usize) 
     };
     let mut sensors = Sensors::new(&noise, &outputs, &[], 1.0).unwrap();
     let draw = |_| {
-        sensors.draw();
+        sensors.draw(true);
         sensors.measured(of, 10.0)
     };
     (0..count).map(draw).collect()
@@ -113,7 +113,7 @@ fn a_sensor_shows_no_more_than_its_range() {
     let free = draws(0, &["y"], 0, 50);
     let mut inside = 0;
     for free in free {
-        sensors.draw();
+        sensors.draw(true);
         let shown = sensors.measured(0, 10.0);
         assert_eq!(shown, free.clamp(9.0, 10.5));
         inside += usize::from(shown == free);

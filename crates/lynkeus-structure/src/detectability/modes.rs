@@ -26,15 +26,6 @@ pub(super) struct Modes {
     pub gross: f64,
 }
 
-/// How far from where it is computed an eigenvalue may be.
-#[derive(Clone, Copy)]
-struct Doubt {
-    width: f64,
-    /// it stands alone, so that what does not move there stays as it is; a multiple one may
-    /// make errors grow with a power of time
-    is_simple: bool,
-}
-
 impl Modes {
     /// The slowest mode that shows in a row, undecided where rounding may carry it across the
     /// imaginary axis, or where it rests on how small a coupling counts as none; with the number of modes that
@@ -72,20 +63,21 @@ impl Modes {
         let modes = spectrum::eigenvalues(self.A.clone())?;
         let slowest = modes.iter().map(|λ| λ.re).reduce(f64::max)?;
         let doubts = (0..modes.len()).map(|k| self.doubt(&modes, k));
-        let doubts: Vec<Doubt> = doubts.collect();
-        let all = || modes.iter().map(|λ| λ.re).zip(&doubts);
-        let growing = all().filter(|(re, doubt)| *re > doubt.width);
+        let (width, is_simple): (Vec<f64>, Vec<bool>) = doubts.unzip();
+        let all = || modes.iter().map(|λ| λ.re).zip(&width);
+        let growing = all().filter(|(re, width)| *re > **width);
         if let Some(rate) = growing.map(|(re, _)| re).reduce(f64::max) {
             return Some(Detectability::Grows { rate });
         }
-        let mut slow = all().filter(|(re, doubt)| *re >= -doubt.width).peekable();
+        let slow = all().zip(is_simple);
+        let mut slow = slow.filter(|((re, width), _)| *re >= -**width).peekable();
         if slow.peek().is_none() {
             return Some(Detectability::Decays {
                 rate: -slowest,
                 is_proved: false,
             });
         }
-        Some(match slow.all(|(_, doubt)| doubt.is_simple) {
+        Some(match slow.all(|(_, is_simple)| is_simple) {
             true => Detectability::Stays,
             false => Detectability::Undecided,
         })
@@ -96,33 +88,26 @@ impl Modes {
         self.gross.max(self.A.norm())
     }
 
-    fn doubt(&self, modes: &DVector<Complex<f64>>, k: usize) -> Doubt {
+    /// How far from where it is computed an eigenvalue may be; and whether it stands alone, so that what does not move
+    /// there stays as it is: a multiple one may make errors grow with a power of time.
+    fn doubt(&self, modes: &DVector<Complex<f64>>, k: usize) -> (f64, bool) {
         let mode = modes[k];
         let spread = blur(modes, mode, self.scale());
         let broad = AXIS.max(spread) * self.scale();
         if mode.re.abs() > broad {
-            return Doubt {
-                width: broad,
-                is_simple: false,
-            };
+            return (broad, false);
         }
         let others = (0..modes.len()).filter(|&i| i != k);
         let gap = others
             .map(|i| (modes[i] - mode).norm())
             .fold(f64::INFINITY, f64::min);
-        let condition = self.condition(mode);
-        let width = condition * EIGENVALUES * self.scale();
+        let rounding = self.condition(mode) * EIGENVALUES;
+        let width = rounding * self.scale();
         // to first order, which counts where the next mode is far beyond
         match 4.0 * width < gap {
-            true => Doubt {
-                width,
-                // of its own block's numbers, too: a fast part elsewhere makes nothing stay
-                is_simple: mode.re.abs() <= condition * EIGENVALUES * self.A.norm(),
-            },
-            false => Doubt {
-                width: spread.max(radius(2)) * self.scale(),
-                is_simple: false,
-            },
+            // of its own block's numbers, too: a fast part elsewhere makes nothing stay
+            true => (width, mode.re.abs() <= rounding * self.A.norm()),
+            false => (spread.max(radius(2)) * self.scale(), false),
         }
     }
 

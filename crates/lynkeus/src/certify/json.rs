@@ -63,7 +63,7 @@ fn summary(certificate: &Certificate) -> Value {
     let constants = certificate
         .constants
         .iter()
-        .map(|c| json!({ "name": c.name, "value": c.value, "meaning": c.meaning }));
+        .map(|c| json!({ "name": c.name, "value": c.value, "meaning": c.words() }));
     json!({
         "basis": certificate.basis,
         "verdict": certificate.verdict().word(),

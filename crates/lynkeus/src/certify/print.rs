@@ -4,6 +4,7 @@ use std::fmt;
 
 use lynkeus_observers::{Certificate, UltimateBound};
 use lynkeus_structure::Standing;
+use lynkeus_words::Words;
 
 use super::CertifyReport;
 use crate::interval::Intervals;
@@ -210,7 +211,7 @@ fn certificate(
             "  {:<10} {:<12} {}",
             constant.name,
             number(constant.value),
-            constant.meaning
+            constant.words()
         )?;
     }
     if !certificate.ultimate.is_empty() && certificate.ultimate_bound.is_some_and(|b| b > 0.0) {

@@ -289,7 +289,8 @@ fn units<'q>(quantities: impl Iterator<Item = &'q Quantity>) -> Vec<Unit> {
 
 fn unit_of(name: &str) -> Unit {
     let base = BaseUnit::of(name).map(|unit| Base {
-        powers: unit.powers,
+        // products of whole numbers
+        powers: unit.powers.map(|power| power as i32),
         factor: unit.factor,
         offset: unit.offset,
     });

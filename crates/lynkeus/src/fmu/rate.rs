@@ -7,7 +7,8 @@ use lynkeus_model::BaseUnit;
 pub(super) fn rate(unit: &str, time: &str) -> Option<String> {
     let is_known = |text: &str| BaseUnit::of(text).is_some_and(|unit| unit.offset == 0.0);
     let is_time = time.chars().all(char::is_alphabetic)
-        && BaseUnit::of(time).is_some_and(|unit| unit.powers == [0, 0, 1, 0, 0, 0, 0]);
+        && BaseUnit::of(time)
+            .is_some_and(|unit| unit.powers == [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
     let divided = divided(unit, time);
     (is_time && is_known(unit) && is_known(&divided)).then_some(divided)
 }

@@ -10,6 +10,7 @@ use super::runs::{Again, Failure, Followed, Track, Whole};
 use super::statistics::of_runs;
 use super::together::{Figures, Screened};
 use crate::crew::{self, Watch};
+use crate::error::in_words;
 use crate::prepare::Prepared;
 use crate::simulate::{self, Rig};
 use crate::{Error, Study};
@@ -85,7 +86,7 @@ impl Job<'_> {
             return Ok(None);
         }
         if let Some(ended) = &ran.course.ended {
-            return Err(Error::refused(ended.to_string()).at(&study.file));
+            return Err(Error::refused(in_words(ended)).at(&study.file));
         }
         if ran.run.time.last() != Some(rig.simulation.until) {
             return Ok(None);

@@ -11,6 +11,7 @@ use super::ends::{Clipped, Sensor};
 use super::runs::{Again, Failure, Followed};
 use super::statistics::{Found, Keep, Scatter};
 use crate::crew::{self, Watch};
+use crate::error::in_words;
 use crate::judge::Screen;
 use crate::prepare::Prepared;
 use crate::simulate::Rig;
@@ -201,7 +202,7 @@ impl Together<'_> {
     pub fn errors(&self, seeds: &[u64], ended: &[Ended]) -> Vec<(u64, Error)> {
         let file = &self.prepared.study().file;
         let told = |ended: &Ended| {
-            let error = Error::refused(ended.error.to_string()).at(file);
+            let error = Error::refused(in_words(&ended.error)).at(file);
             Some((*seeds.get(ended.run)?, error))
         };
         let mut errors: Vec<(u64, Error)> = ended.iter().filter_map(told).collect();

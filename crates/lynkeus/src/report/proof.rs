@@ -59,7 +59,7 @@ fn one(html: &mut Html, report: &CertifyReport, certificate: &Certificate) {
         vec![
             Cell::from(c.name.as_str()),
             Cell::Number(number(c.value)),
-            Cell::from(c.meaning.as_str()),
+            Cell::from(c.words()),
         ]
     });
     html.table(&["constant", "value", "meaning"], constants.collect());
@@ -116,7 +116,7 @@ pub(super) fn conditions<'a>(html: &mut Html, checks: impl IntoIterator<Item = &
     let row = |check: &Check| {
         let mut detail = check.reason.words();
         if let Verdict::Refuted(_) = check.verdict {
-            detail = format!("{detail}; {}", check.verdict);
+            detail = format!("{detail}; {}", check.verdict.words());
         }
         vec![
             Cell::Verdict(check.verdict.word()),

@@ -9,6 +9,7 @@ use super::holdout::{FEWER, Plan};
 use crate::columns::Log;
 use crate::course::{Course, Samples};
 use crate::crew::Watch;
+use crate::error::in_words;
 use crate::estimate::{course_of, run_settings};
 use crate::inputs::{Source, are_logged};
 use crate::outcome::{interrupted_on, is_observers_answer};
@@ -196,7 +197,7 @@ pub(super) fn course(
     course.check()?;
     match course.ended.take() {
         None => Ok(Ok(course)),
-        Some(error) if is_observers_answer(&error) => Ok(Err(error.to_string())),
+        Some(error) if is_observers_answer(&error) => Ok(Err(in_words(&error))),
         Some(error) => Err(interrupted_on(error, place, &study.file)),
     }
 }

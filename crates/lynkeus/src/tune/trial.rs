@@ -10,6 +10,7 @@ use super::reference::Reference;
 use super::speed::{longest_step, transparent};
 use crate::Error;
 use crate::crew::Watch;
+use crate::error::in_words;
 use crate::outcome::{interrupted, is_observers_answer};
 use crate::prepare::Prepared;
 use crate::simulate::open_loop;
@@ -87,7 +88,7 @@ impl Runs for Trial<'_> {
         };
         match simulation.run_watched(watch) {
             Ok(run) => Ok(Ok(run)),
-            Err(error) if is_observers_answer(&error.error) => Ok(Err(error.error.to_string())),
+            Err(error) if is_observers_answer(&error.error) => Ok(Err(in_words(&error.error))),
             Err(error) => Err(interrupted(error.error, &study.file)),
         }
     }

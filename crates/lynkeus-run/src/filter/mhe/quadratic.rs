@@ -60,13 +60,9 @@ struct Side {
     /// how far the state is from it
     room: f64,
     force: f64,
-}
-
-/// What a step would change at a side.
-#[derive(Clone, Copy)]
-struct Change {
-    room: f64,
-    force: f64,
+    /// what the step in view would change of the two
+    room_change: f64,
+    force_change: f64,
 }
 
 impl Problem<'_> {
@@ -175,25 +171,25 @@ impl Problem<'_> {
                 break;
             }
             let towards = self.step(&x, &sides, |_| 0.0);
-            let aim: Vec<Change> = sides.iter().map(|s| s.change(&x, &towards, 0.0)).collect();
-            let share = longest(&sides, &aim);
+            sides.iter_mut().for_each(|s| s.aim(&x, &towards, 0.0));
+            let share = longest(&sides);
             let left = sides
                 .iter()
-                .zip(&aim)
-                .map(|(s, c)| (s.room + share * c.room) * (s.force + share * c.force));
+                .map(|s| (s.room + share * s.room_change) * (s.force + share * s.force_change));
             let centre = (left.sum::<f64>() / gap).clamp(0.0, 1.0).powi(3) * gap / count;
-            let product = |k: usize| centre - aim[k].room * aim[k].force;
+            let product = |s: &Side| centre - s.room_change * s.force_change;
             let towards = self.step(&x, &sides, product);
-            let change = |(k, s): (usize, &Side)| s.change(&x, &towards, product(k));
-            let changes: Vec<Change> = sides.iter().enumerate().map(change).collect();
-            let share = (SHORT * longest(&sides, &changes)).min(1.0);
+            for side in &mut sides {
+                side.aim(&x, &towards, product(side));
+            }
+            let share = (SHORT * longest(&sides)).min(1.0);
             off *= 1.0 - share;
             for (x, towards) in x.iter_mut().flatten().zip(towards.iter().flatten()) {
                 *x += share * (towards - *x);
             }
-            for (side, change) in sides.iter_mut().zip(&changes) {
-                side.room += share * change.room;
-                side.force += share * change.force;
+            for side in &mut sides {
+                side.room += share * side.room_change;
+                side.force += share * side.force_change;
             }
         }
         // what does not move may be outside
@@ -240,6 +236,8 @@ impl Problem<'_> {
                             unit,
                             room,
                             force: 1.0 / room,
+                            room_change: 0.0,
+                            force_change: 0.0,
                         });
                     }
                 }
@@ -253,7 +251,7 @@ impl Problem<'_> {
         &self,
         x: &[Vec<f64>],
         sides: &[Side],
-        product: impl Fn(usize) -> f64,
+        product: impl Fn(&Side) -> f64,
     ) -> Vec<Vec<f64>> {
         let mut all = self.single();
         let mut k = 0;
@@ -264,7 +262,7 @@ impl Problem<'_> {
             let (mut pull, mut weight) = (0.0, 0.0);
             for side in mine {
                 weight += side.force / side.room;
-                pull += side.sign * product(k) / side.room;
+                pull += side.sign * product(side) / side.room;
                 k += 1;
             }
             all[first.row].push(Pin {
@@ -278,24 +276,20 @@ impl Problem<'_> {
 }
 
 impl Side {
-    /// What becomes of it where the states become `towards`, and its room times its force
-    /// `product`.
-    fn change(&self, x: &[Vec<f64>], towards: &[Vec<f64>], product: f64) -> Change {
+    /// What a step to the states `towards` changes, after which its room times its force is `product`.
+    fn aim(&mut self, x: &[Vec<f64>], towards: &[Vec<f64>], product: f64) {
         let (row, state) = (self.row, self.state);
         let room = self.sign * (towards[row][state] - x[row][state]) / self.unit;
         let force = (product - self.force * room) / self.room;
-        Change {
-            room,
-            force: force - self.force,
-        }
+        (self.room_change, self.force_change) = (room, force - self.force);
     }
 }
 
 /// The share of a step up to which all room and forces stay positive; 1 at most.
-fn longest(sides: &[Side], changes: &[Change]) -> f64 {
+fn longest(sides: &[Side]) -> f64 {
     let mut share = 1.0_f64;
-    for (side, change) in sides.iter().zip(changes) {
-        for (value, change) in [(side.room, change.room), (side.force, change.force)] {
+    for s in sides {
+        for (value, change) in [(s.room, s.room_change), (s.force, s.force_change)] {
             if change < 0.0 {
                 share = share.min(-value / change);
             }

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::series::Transition;
+use crate::Evaluation;
 use crate::filter::profile::Profile;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::system::Driven;
 use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place, Slopes};
 
 /// x̂, Φ and W by one integration, for flows with few states.
@@ -38,7 +38,7 @@ impl Joint {
     /// Takes `x` to the next sample and writes Φ and W.
     pub fn advance(
         &mut self,
-        driven: &mut Driven,
+        driven: &mut Evaluation,
         from: f64,
         to: f64,
         x: &mut [f64],
@@ -79,7 +79,7 @@ impl Persist for Joint {
 /// rows of (Φ W); W is left out where Q = 0. q is the largest entry of Q: tolerances then see
 /// W in units of time.
 struct Variational<'a> {
-    driven: &'a mut Driven,
+    driven: &'a mut Evaluation,
     equation: &'a mut Equation,
 }
 
@@ -131,7 +131,7 @@ impl Dynamics for Variational<'_> {
         let (x, rows) = z.split_at(n);
         let (dx, drows) = dz.split_at_mut(n);
         self.driven.derivatives(t, x, dx);
-        self.driven.evaluation.outputs(t, x, slopes);
+        self.driven.outputs(t, x, slopes);
         drows.fill(0.0);
         for (&(i, j), slope) in entries.iter().zip(&*slopes) {
             let into = &mut drows[i * width..(i + 1) * width];
@@ -157,7 +157,7 @@ impl Dynamics for Variational<'_> {
         if !driven.output_slopes(t, x, &mut equation.second) {
             return false;
         }
-        driven.evaluation.outputs(t, x, &mut equation.slopes);
+        driven.outputs(t, x, &mut equation.slopes);
         equation.write_jacobian(z, slopes);
         true
     }
@@ -269,7 +269,7 @@ mod tests {
         let states = x.map(|x| ("x".to_owned(), x.node(), 0.0));
         let signals = [("w".to_owned(), w.node())];
         let flow = Linearised::flow(&g, time.node(), &states, &signals, &derivatives).unwrap();
-        let mut driven = Driven::new(flow.system(), BetweenSamples::Hold);
+        let mut driven = flow.system().driven(BetweenSamples::Hold);
         driven.start(&[0.7]);
         for noise in [vec![], vec![0.3, 1.0, 0.5]] {
             let mut linearised = Variational {

@@ -10,8 +10,8 @@ use std::sync::Arc;
 use super::belief::Belief;
 use super::profile::Profile;
 use super::root::{Factor, Root, dot};
+use crate::Evaluation;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::system::Driven;
 use crate::{Error, EstimatorSettings, Linearised, Method, Step};
 use joint::Joint;
 use piecewise::Piecewise;
@@ -25,7 +25,7 @@ const FEW: usize = 8;
 /// sample: the transition, and W = ∫ Φ(T,s) Q Φ(T,s)ᵀ ds, what the process noise comes to at the next sample.
 #[derive(Clone, Debug)]
 pub(crate) struct Propagation {
-    pub driven: Driven,
+    pub driven: Evaluation,
     scheme: Scheme,
     transition: Transition<Profile>,
     /// the estimate at the end of the last way
@@ -58,7 +58,7 @@ impl Propagation {
             false => Scheme::Piecewise(Box::new(Piecewise::new(flow, process_noise, method)?)),
         };
         Ok(Self {
-            driven: Driven::new(flow.system(), run.between),
+            driven: flow.system().driven(run.between),
             scheme,
             transition: Transition::start(n, process_noise.iter().any(|q| *q > 0.0)),
             end: vec![],

@@ -8,12 +8,12 @@
 
 use nalgebra::DMatrix;
 
-use super::series::{Series, Transition};
+use super::series::{Series, Transition, largest_row};
+use crate::Evaluation;
 use crate::filter::belief::Belief;
 use crate::filter::profile::Profile;
 use crate::method::resolution;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::system::Driven;
 use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place};
 
 /// Tolerance with fixed steps, whose error nobody states.
@@ -93,7 +93,7 @@ impl Piecewise {
     /// Takes `x` to the next sample and returns Φ and W.
     pub fn advance(
         &mut self,
-        driven: &mut Driven,
+        driven: &mut Evaluation,
         belief: &Belief,
         from: f64,
         to: f64,
@@ -133,7 +133,7 @@ impl Piecewise {
     /// What each state's error is about, here and after the flow has carried it on.
     fn choose_units(
         &mut self,
-        driven: &mut Driven,
+        driven: &mut Evaluation,
         belief: &Belief,
         interval: Piece,
         x: &[f64],
@@ -159,9 +159,9 @@ impl Piecewise {
     }
 
     /// F at (t, x), the values of its entries.
-    fn look(&mut self, driven: &mut Driven, t: f64, x: &[f64]) -> Result<(), Error> {
+    fn look(&mut self, driven: &mut Evaluation, t: f64, x: &[f64]) -> Result<(), Error> {
         driven.derivatives(t, x, &mut self.derivatives);
-        driven.evaluation.outputs(t, x, &mut self.slopes);
+        driven.outputs(t, x, &mut self.slopes);
         match self.slopes.iter().all(|s| s.is_finite()) {
             true => Ok(()),
             false => Err(driven.not_finite(t, x)),
@@ -171,7 +171,7 @@ impl Piecewise {
     /// F·h at (t, x) in the states' units.
     fn scaled(
         &mut self,
-        driven: &mut Driven,
+        driven: &mut Evaluation,
         t: f64,
         x: &[f64],
         h: f64,
@@ -195,7 +195,7 @@ impl Piecewise {
 
     fn segment(
         &mut self,
-        driven: &mut Driven,
+        driven: &mut Evaluation,
         segment: Piece,
         x: &mut Vec<f64>,
         transition: &mut Transition<Profile>,
@@ -242,20 +242,16 @@ impl Piecewise {
     }
 
     /// The largest row sum of F at the start of a segment, times its length.
-    fn rates(&mut self, driven: &mut Driven, segment: Piece, x: &[f64]) -> Result<f64, Error> {
+    fn rates(&mut self, driven: &mut Evaluation, segment: Piece, x: &[f64]) -> Result<f64, Error> {
         let values = self.scaled(driven, segment.from, x, segment.length())?;
-        let mut sums = vec![0.0; x.len()];
-        for (&(i, _), value) in self.entries.iter().zip(values) {
-            sums[i] += value.abs();
-        }
-        Ok(sums.into_iter().fold(0.0, f64::max))
+        Ok(largest_row(x.len(), &self.sparse(&values)))
     }
 
     /// Writes x̂ at the end of a piece; F·h as a polynomial in the share of the piece, none where F
     /// changes too much for one.
     fn polynomial(
         &mut self,
-        driven: &mut Driven,
+        driven: &mut Evaluation,
         piece: Piece,
         x: &[f64],
         end: &mut Vec<f64>,
@@ -321,7 +317,7 @@ impl Piecewise {
     /// The rest of a stiff segment.
     fn stiff(
         &mut self,
-        driven: &mut Driven,
+        driven: &mut Evaluation,
         piece: Piece,
         x: &mut Vec<f64>,
         transition: &mut Transition<Profile>,
@@ -339,7 +335,7 @@ impl Piecewise {
     /// A piece in halves until halving it changes nothing.
     fn refined(
         &mut self,
-        driven: &mut Driven,
+        driven: &mut Evaluation,
         piece: Piece,
         x: &[f64],
         coarse: Leaf,
@@ -380,7 +376,7 @@ impl Piecewise {
     }
 
     /// A piece with F as it is there on average (Simpson's rule).
-    fn leaf(&mut self, driven: &mut Driven, piece: Piece, x: &[f64]) -> Result<Leaf, Error> {
+    fn leaf(&mut self, driven: &mut Evaluation, piece: Piece, x: &[f64]) -> Result<Leaf, Error> {
         let h = piece.length();
         let half = piece.at(0.5);
         let first = self.scaled(driven, piece.from, x, h)?;

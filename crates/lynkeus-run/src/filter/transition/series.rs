@@ -159,6 +159,15 @@ impl Series {
     }
 }
 
+/// The largest sum of absolute values of a row.
+pub(crate) fn largest_row(n: usize, g: &[(Place, f64)]) -> f64 {
+    let mut sums = vec![0.0; n];
+    for (at, value) in g {
+        sums[at.row] += value.abs();
+    }
+    sums.into_iter().fold(0.0, f64::max)
+}
+
 /// Most doublings: rates of 2⁶⁰ per interval are no rates.
 const MOST_DOUBLINGS: u32 = 60;
 
@@ -175,12 +184,7 @@ impl Transition<DMatrix<f64>> {
         drive: &[f64],
         series: &mut Series,
     ) -> Option<Self> {
-        let mut sums = vec![0.0; n];
-        for (at, value) in g {
-            sums[at.row] += value.abs();
-        }
-        let norm = sums.into_iter().fold(0.0, f64::max);
-        let doublings = norm.max(1.0).log2().ceil() as u32;
+        let doublings = largest_row(n, g).max(1.0).log2().ceil() as u32;
         if doublings > MOST_DOUBLINGS {
             return None;
         }

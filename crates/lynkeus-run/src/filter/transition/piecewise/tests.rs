@@ -44,7 +44,7 @@ fn differ(chain: &Linearised, step: f64, ours: Method, reference: Method) -> f64
     let mut joint = Joint::new(chain, &noise, reference).unwrap();
     let mut worst = 0.0_f64;
     let mut x = chain.system().start().to_vec();
-    let mut driven = Driven::new(chain.system(), BetweenSamples::Linear);
+    let mut driven = chain.system().driven(BetweenSamples::Linear);
     driven.start(&[0.5]);
     for k in 0..3 {
         let (from, to) = (step * f64::from(k), step * f64::from(k + 1));
