@@ -44,7 +44,7 @@ pub(super) fn form(
     }
     let arrangements = match blocks::find(augmented, &settings.request, settings.order.as_deref()) {
         Ok(arrangements) => arrangements,
-        Err(summary) => return refusal(Reason::Structure(summary.into())),
+        Err(summary) => return refusal(summary.into()),
     };
     let choices = distinct(augmented, settings, &arrangements)?;
     first_fit(choices.into_iter().take(EXAMINED), |choice| {

@@ -54,7 +54,7 @@ impl<'s> Map<'s> {
     ) -> Result<Self, DesignError> {
         let affine = match output_map::affine_form(augmented)? {
             Ok(affine) => affine,
-            Err(why) => return Err(unfit(Reason::Structure(why.into())).into()),
+            Err(why) => return Err(unfit(Reason::from(why)).into()),
         };
         affordable(augmented, &affine)?;
         let order = augmented.states.len().saturating_sub(1);

@@ -62,7 +62,7 @@ pub(super) fn form(
     let form = match superdiagonal::find(augmented) {
         Ok(blocks) => Form::new(augmented, blocks),
         Err(why) => {
-            return Err(Examination::unfit(NAME, Reason::Structure(why.into()), vec![]).into());
+            return Err(Examination::unfit(NAME, Reason::from(why), vec![]).into());
         }
     };
     let mut checks = vec![];

@@ -25,7 +25,7 @@ pub(super) fn form(
     let refusal = |summary: Reason| Err(Examination::unfit(NAME, summary, vec![]).into());
     let mut assignments = match chains::find(augmented, &settings.request) {
         Ok(assignments) => assignments,
-        Err(summary) => return refusal(Reason::Structure(summary.into())),
+        Err(summary) => return refusal(summary.into()),
     };
     if let Some(leading) = settings.leading {
         assignments.retain(|a| a.leads.contains(&leading));

@@ -176,7 +176,7 @@ pub(super) fn search<'e, 'p>(
     let layers = match layers::find(augmented) {
         Ok(layers) => layers,
         Err(why) => {
-            return Err(Examination::unfit(NAME, Reason::Structure(why.into()), vec![]).into());
+            return Err(Examination::unfit(NAME, Reason::from(why), vec![]).into());
         }
     };
     let given = given(augmented, &layers, settings)?;
