@@ -75,12 +75,15 @@ fn coefficient(graph: &Graph, jet: &[Node], k: usize) -> Node {
         .unwrap_or_else(|| graph.constant(0.0).node())
 }
 
+/// The Taylor coefficients of some quantities, one list each.
+type Coefficients = Vec<Vec<Node>>;
+
 /// Functions along the flow: their Taylor coefficients up to an order, from those of the states.
 fn along<'a>(
     graph: &'a Graph,
     flow: &'a Flow<'_>,
     functions: &[Node],
-) -> Result<impl Fn(&[Vec<Node>], usize) -> Vec<Vec<Node>> + 'a, MissingInput> {
+) -> Result<impl Fn(&[Vec<Node>], usize) -> Coefficients + 'a, MissingInput> {
     let mut symbols = graph.symbols_of(functions);
     symbols.extend(flow.states);
     symbols.sort_unstable();

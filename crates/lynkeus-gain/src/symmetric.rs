@@ -21,14 +21,13 @@ impl Tridiagonal {
             });
         }
         // the pivots D of S = L D Lᵀ, from the first row down
-        let mut pivot = diagonal[0];
-        for size in 1..=diagonal.len() {
+        let mut left = 0.0;
+        for (i, &entry) in diagonal.iter().enumerate() {
+            let pivot = entry - left;
             if pivot.is_nan() || pivot <= 0.0 {
-                return Err(FactorError::Indefinite { size });
+                return Err(FactorError::Indefinite { size: i + 1 });
             }
-            if let Some(off) = off_diagonal.get(size - 1) {
-                pivot = diagonal[size] - off.powi(2) / pivot;
-            }
+            left = off_diagonal.get(i).map_or(0.0, |off| off.powi(2) / pivot);
         }
         Ok(Self {
             diagonal,

@@ -73,7 +73,7 @@ fn one(html: &mut Html, report: &CertifyReport, certificate: &Certificate) {
         });
         html.table(&["quantity", "from", "to"], sides.collect());
     });
-    html.list(&report.notes_of(certificate));
+    html.list(report.notes_of(certificate));
 }
 
 /// How the measurements enter.
