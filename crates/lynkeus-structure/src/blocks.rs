@@ -39,7 +39,7 @@ impl Blocks {
     }
 
     /// Names of the states of each chain, first block first.
-    pub fn named(&self, augmented: &AugmentedPlant<'_>) -> Vec<Vec<String>> {
+    fn named(&self, augmented: &AugmentedPlant<'_>) -> Vec<Vec<String>> {
         let chains = self.order.iter();
         chains.map(|(_, c)| names(augmented, c.clone())).collect()
     }
