@@ -196,12 +196,12 @@ pub enum Reason {
     /// whether points far apart are told apart is not decided
     FarApart,
     /// what breaks a form
-    Misfit(Misfit),
+    Misfit(Box<Misfit>),
 }
 
 impl From<Misfit> for Reason {
     fn from(misfit: Misfit) -> Self {
-        Self::Misfit(misfit)
+        Self::Misfit(Box::new(misfit))
     }
 }
 
