@@ -37,7 +37,7 @@ enum PlantFit {
     /// the form is another
     Unfit,
     /// it has the form; f and h have values and do not jump, or not
-    Form(Check),
+    Form(Box<Check>),
     /// any plant will do
     Any,
     /// a limit ended the examination before its end
@@ -62,7 +62,7 @@ impl Examination {
             summary: summary.into(),
             chains,
             checks,
-            plant: PlantFit::Form(regularity),
+            plant: PlantFit::Form(Box::new(regularity)),
         })
     }
 
@@ -126,7 +126,7 @@ impl Examination {
     /// Every condition: that the plant is regular on the box, then those of the family.
     pub fn conditions(&self) -> impl Iterator<Item = &Check> {
         let regularity = match &self.plant {
-            PlantFit::Form(regularity) => Some(regularity),
+            PlantFit::Form(regularity) => Some(&**regularity),
             PlantFit::Unfit | PlantFit::Any | PlantFit::Ended(_) => None,
         };
         regularity.into_iter().chain(&self.checks)
@@ -251,7 +251,7 @@ pub enum DesignError {
         /// the key that asks for too much
         key: &'static str,
         /// what blocks it
-        reason: Reason,
+        reason: Box<Reason>,
     },
     /// the plant has parameters without value
     #[error(transparent)]

@@ -100,12 +100,15 @@ fn candidates(
     Ok(found)
 }
 
+/// Index vectors that were not chosen, with what is known of each.
+type Others = Vec<(Vec<usize>, Known)>;
+
 /// The first of the candidates with which most is proved, and those that were not chosen.
 fn best(
     rows: &mut Codistribution,
     candidates: &[Vec<usize>],
     form: impl Fn(&[usize]) -> Result<Found<Form>, DesignError>,
-) -> Result<(Found<Form>, Vec<(Vec<usize>, Known)>), DesignError> {
+) -> Result<(Found<Form>, Others), DesignError> {
     let mut best = form(&candidates[0])?;
     let (mut others, mut examined) = (vec![], 0);
     for μ in &candidates[1..] {

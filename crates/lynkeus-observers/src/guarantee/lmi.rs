@@ -181,7 +181,7 @@ fn aim(tuning: &Tuning) -> Result<Aim, TuningError> {
 }
 
 fn none(key: &'static str, said: Said) -> DesignError {
-    let reason = said.into();
+    let reason = Box::new(said.into());
     DesignError::NoGain { key, reason }
 }
 
