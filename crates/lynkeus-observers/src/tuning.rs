@@ -131,7 +131,7 @@ pub struct Tuning {
     /// the model's functions see the estimate limited to [min, max]
     pub clamp: bool,
     /// θ is a symbol of the observer's expressions, to be changed while it runs, where the family
-    /// allows it ([`Tunables`](crate::Tunables)); no key of a study
+    /// allows it ([`Tunable`](crate::Tunable)); no key of a study
     pub tunable: bool,
     /// the family's own keys
     pub values: BTreeMap<String, Value>,

@@ -4,8 +4,6 @@ use std::hash::{Hash, Hasher};
 
 use lynkeus_expr::{Interval, Node};
 
-use crate::{Coordinate, Place};
-
 /// One side of the box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dimension {
@@ -20,6 +18,24 @@ pub struct Dimension {
     /// only whole numbers count
     pub integer: bool,
 }
+
+/// Where a variable is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coordinate {
+    /// name of the variable
+    pub name: String,
+    /// its value
+    pub value: f64,
+}
+
+impl From<(String, f64)> for Coordinate {
+    fn from((name, value): (String, f64)) -> Self {
+        Self { name, value }
+    }
+}
+
+/// A part of the box; without sides where none says more than the whole box.
+pub type Place = Vec<Dimension>;
 
 /// The box on which conditions are decided: the product of its dimensions.
 #[derive(Clone, Debug, Default, PartialEq)]

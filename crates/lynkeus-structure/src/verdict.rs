@@ -1,21 +1,6 @@
 //! Verdicts.
 
-use crate::{Dimension, Misfit};
-
-/// Where a variable is.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Coordinate {
-    /// name of the variable
-    pub name: String,
-    /// its value
-    pub value: f64,
-}
-
-impl From<(String, f64)> for Coordinate {
-    fn from((name, value): (String, f64)) -> Self {
-        Self { name, value }
-    }
-}
+use crate::{Coordinate, Misfit, Place};
 
 /// A point of the box and the value of the expression in question there.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,9 +37,6 @@ impl From<Point> for Witness {
         }
     }
 }
-
-/// A part of the box; without sides where none says more than the whole box.
-pub type Place = Vec<Dimension>;
 
 /// The verdict on a statement about the whole box.
 #[derive(Clone, Debug, PartialEq)]

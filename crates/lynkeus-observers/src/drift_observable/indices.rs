@@ -100,9 +100,6 @@ fn candidates(
     Ok(found)
 }
 
-/// Index vectors that were not chosen, with what is known of each.
-type Others = Vec<(Vec<usize>, Known)>;
-
 /// The first of the candidates with which most is proved, and those that were not chosen.
 fn best(
     rows: &mut Codistribution,
