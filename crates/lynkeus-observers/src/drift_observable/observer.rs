@@ -97,10 +97,10 @@ fn scale_of_poles(gains: &Gains) -> String {
 
 /// The filter of an input, empty where there is none.
 struct Filter<'g> {
+    u: Expr<'g>,
     /// x̂_a
     x_a: Vec<Signal>,
-    /// K₂(u − C x̂_a)
-    correction: Vec<Expr<'g>>,
+    K2: Vec<Expr<'g>>,
 }
 
 fn filters<'g>(augmented: &AugmentedPlant<'g>, gains: &Gains, speed: &Speed) -> Vec<Filter<'g>> {
@@ -112,26 +112,31 @@ fn filters<'g>(augmented: &AugmentedPlant<'g>, gains: &Gains, speed: &Speed) -> 
             let symbol = graph.fresh(&name).node();
             Signal { name, symbol }
         };
-        let x_a: Vec<Signal> = (0..K2.len()).map(state).collect();
-        let correction = |(k, &gain): (usize, &f64)| {
-            let gain = match gains.filter_follows[j] {
-                true => speed.scaled(graph, gain, (k + 1) as f64),
-                false => graph.constant(gain),
-            };
-            gain * (graph.expr(input.node) - graph.expr(x_a[0].symbol))
+        let gain = |(k, &gain): (usize, &f64)| match gains.filter_follows[j] {
+            true => speed.scaled(graph, gain, (k + 1) as f64),
+            false => graph.constant(gain),
         };
-        let correction = K2.iter().enumerate().map(correction).collect();
-        Filter { x_a, correction }
+        Filter {
+            u: graph.expr(input.node),
+            x_a: (0..K2.len()).map(state).collect(),
+            K2: K2.iter().enumerate().map(gain).collect(),
+        }
     };
     augmented.inputs.iter().enumerate().map(one).collect()
 }
 
 impl<'g> Filter<'g> {
+    /// K₂(u − C x̂_a)
+    fn correction(&self, graph: &'g Graph) -> Vec<Expr<'g>> {
+        let each = |&gain: &Expr<'g>| gain * (self.u - graph.expr(self.x_a[0].symbol));
+        self.K2.iter().map(each).collect()
+    }
+
     /// x̂_a' = A x̂_a + K₂(u − C x̂_a)
     fn derivatives(&self, graph: &'g Graph) -> Vec<Node> {
         let next = self.x_a.iter().skip(1).map(|x| Some(graph.expr(x.symbol)));
-        let pairs = self.correction.iter().zip(next.chain([None]));
-        let sum = |(&correction, next): (&Expr<'g>, Option<Expr<'g>>)| match next {
+        let pairs = self.correction(graph).into_iter().zip(next.chain([None]));
+        let sum = |(correction, next): (Expr<'g>, Option<Expr<'g>>)| match next {
             Some(next) => (next + correction).node(),
             None => correction.node(),
         };
@@ -168,7 +173,7 @@ fn innovations(
     // an entry per column of Q̄_a; none without a filter
     let e_a: Vec<Expr<'_>> = filters
         .iter()
-        .flat_map(|filter| filter.correction.clone())
+        .flat_map(|filter| filter.correction(graph))
         .collect();
     let Q_a = numbers(graph, &form.Q_a, at);
     let row = |(place, &(i, k)): (usize, &(usize, usize))| {
