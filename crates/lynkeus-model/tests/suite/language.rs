@@ -362,3 +362,10 @@ fn quoted_names_in_expressions() {
     assert_eq!(graph.symbols_of(&[node]).len(), 1);
     assert!(parse_expression("'γ'", &graph, &names).is_err());
 }
+
+#[test]
+fn a_range_reaches_the_largest_integer() {
+    let last_two = "9223372036854775806:9223372036854775807";
+    let expression = format!("sum({{i - 9223372036854775805 for i in {last_two}}})");
+    assert_eq!(value(&expression), 3.0);
+}
