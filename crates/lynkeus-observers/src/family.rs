@@ -37,7 +37,7 @@ pub(crate) trait Stages: Sync {
     ///
     /// # Errors
     /// The first wrong value.
-    fn late(_settings: &Self::Settings) -> Result<(), TuningError> {
+    fn deferred(_settings: &Self::Settings) -> Result<(), TuningError> {
         Ok(())
     }
 
@@ -91,7 +91,7 @@ impl<S: Stages> Family for S {
     }
 
     fn verify(&self, augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<(), TuningError> {
-        S::late(&S::read(augmented, tuning)?)
+        S::deferred(&S::read(augmented, tuning)?)
     }
 
     fn examine(

@@ -449,4 +449,4 @@ pub(crate) fn is_or_has(name: &str, variable: &str) -> bool {
 /// A key whose wrong value is told by the stage that needs it: another family may own a key
 /// of that name with another shape, and `auto` examines a plant for both. Where the study names
 /// the family, [`Family::verify`] tells it at once.
-pub(crate) type Late<T> = Result<T, TuningError>;
+pub(crate) type Deferred<T> = Result<T, TuningError>;

@@ -50,8 +50,8 @@ impl Stages for BlockTriangular {
         Settings::read(augmented, tuning)
     }
 
-    fn late(settings: &Settings) -> Result<(), TuningError> {
-        settings.late()
+    fn deferred(settings: &Settings) -> Result<(), TuningError> {
+        settings.deferred()
     }
 
     fn form(

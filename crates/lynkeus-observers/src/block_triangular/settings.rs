@@ -7,7 +7,7 @@ use crate::conditions::{CHAINS, chain_request};
 use crate::estimate::PROLONG;
 use crate::guarantee::{LMI, LMI_KEYS, Lmi};
 use crate::peaking::Remedies;
-use crate::tuning::Late;
+use crate::tuning::Deferred;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value, peaking};
 
 const THETA: KeySpec = KeySpec {
@@ -67,7 +67,7 @@ pub(super) const KEYS: &[&[KeySpec]] = &[&OWN, &LMI_KEYS, &peaking::KEYS];
 pub struct Settings {
     pub common: Tuning,
     /// per measured output, as in every list here
-    pub θ: Late<Option<Vec<f64>>>,
+    pub θ: Deferred<Option<Vec<f64>>>,
     pub K: Option<Vec<Vec<f64>>>,
     /// K comes from the study as it is, not by its poles
     pub given: bool,
@@ -75,7 +75,7 @@ pub struct Settings {
     /// the outputs, by place, in the order of the blocks
     pub order: Option<Vec<usize>>,
     pub request: ChainRequest,
-    pub lmi: Late<Option<Lmi>>,
+    pub lmi: Deferred<Option<Lmi>>,
     pub remedies: Remedies,
 }
 
@@ -100,7 +100,7 @@ impl Settings {
     }
 
     /// The first of the keys left for later that has a wrong value.
-    pub fn late(&self) -> Result<(), TuningError> {
+    pub fn deferred(&self) -> Result<(), TuningError> {
         self.θ.as_ref().map_err(TuningError::clone)?;
         self.lmi.as_ref().map_err(TuningError::clone)?;
         Ok(())

@@ -47,8 +47,8 @@ impl Stages for StateAffine {
         Settings::read(augmented, tuning)
     }
 
-    fn late(settings: &Settings) -> Result<(), TuningError> {
-        settings.late()
+    fn deferred(settings: &Settings) -> Result<(), TuningError> {
+        settings.deferred()
     }
 
     fn form(

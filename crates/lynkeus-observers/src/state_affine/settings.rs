@@ -5,7 +5,7 @@ use lynkeus_proof::matrix::square;
 use lynkeus_structure::AugmentedPlant;
 
 use crate::estimate::PROLONG;
-use crate::tuning::Late;
+use crate::tuning::Deferred;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 
 const THETA: KeySpec = KeySpec {
@@ -43,10 +43,10 @@ pub(super) const KEYS: [KeySpec; 4] = [THETA, START, ALARM, CONTINUED];
 /// The keys, read.
 pub struct Settings {
     pub common: Tuning,
-    θ: Late<Option<f64>>,
+    θ: Deferred<Option<f64>>,
     /// S(0) in the order of the plant's states
-    S0: Late<Given>,
-    pub alarm: Late<Option<f64>>,
+    S0: Deferred<Given>,
+    pub alarm: Deferred<Option<f64>>,
 }
 
 impl Settings {
@@ -60,7 +60,7 @@ impl Settings {
     }
 
     /// The first of the keys left for later that has a wrong value.
-    pub fn late(&self) -> Result<(), TuningError> {
+    pub fn deferred(&self) -> Result<(), TuningError> {
         self.θ.as_ref().map_err(TuningError::clone)?;
         self.S0.as_ref().map_err(TuningError::clone)?;
         self.alarm.as_ref().map_err(TuningError::clone)?;
@@ -101,7 +101,7 @@ enum Given {
 }
 
 /// S(0): s·I for a number s, or a matrix in the order of the plant's states.
-fn start(tuning: &Tuning, n: usize) -> Late<Given> {
+fn start(tuning: &Tuning, n: usize) -> Deferred<Given> {
     let expected = format!(
         "a positive number s for s·I, or a symmetric positive definite {n}×{n} matrix as a list of rows, one per estimated quantity"
     );

@@ -45,8 +45,8 @@ impl Stages for Triangular {
         Settings::read(augmented, tuning)
     }
 
-    fn late(settings: &Settings) -> Result<(), TuningError> {
-        settings.late()
+    fn deferred(settings: &Settings) -> Result<(), TuningError> {
+        settings.deferred()
     }
 
     fn form(

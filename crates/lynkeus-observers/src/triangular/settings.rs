@@ -7,7 +7,7 @@ use crate::conditions::{CHAINS, chain_request};
 use crate::estimate::PROLONG;
 use crate::guarantee::{LMI, LMI_KEYS, Lmi};
 use crate::peaking::Remedies;
-use crate::tuning::Late;
+use crate::tuning::Deferred;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, peaking};
 
 const THETA: KeySpec = KeySpec {
@@ -88,7 +88,7 @@ pub(super) const KEYS: &[&[KeySpec]] = &[&OWN, &LMI_KEYS, &peaking::KEYS];
 pub struct Settings {
     pub common: Tuning,
     /// per chain, as in every list here
-    θ: Late<Option<Vec<f64>>>,
+    θ: Deferred<Option<Vec<f64>>>,
     pub δ: Option<Vec<f64>>,
     pub r: Option<Vec<f64>>,
     pub S: Option<Vec<Tridiagonal>>,
@@ -128,7 +128,7 @@ impl Settings {
     }
 
     /// The first of the keys left for later that has a wrong value.
-    pub fn late(&self) -> Result<(), TuningError> {
+    pub fn deferred(&self) -> Result<(), TuningError> {
         self.θ.as_ref().map_err(TuningError::clone)?;
         Ok(())
     }

@@ -53,8 +53,8 @@ impl Stages for UnknownInput {
         Settings::read(augmented, tuning)
     }
 
-    fn late(settings: &Settings) -> Result<(), TuningError> {
-        settings.late()
+    fn deferred(settings: &Settings) -> Result<(), TuningError> {
+        settings.deferred()
     }
 
     fn form<'e, 'p>(

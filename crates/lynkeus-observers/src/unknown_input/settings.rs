@@ -2,7 +2,7 @@
 
 use lynkeus_structure::AugmentedPlant;
 
-use crate::tuning::Late;
+use crate::tuning::Deferred;
 use crate::{KeySpec, Shape, Tuning, TuningError, Value};
 
 const THETA: KeySpec = KeySpec {
@@ -30,7 +30,7 @@ pub struct Settings {
     pub common: Tuning,
     /// θ₁ and θ₂, none where the proof is to choose them; `theta` belongs to other families too,
     /// with another shape
-    pub thetas: Late<Option<[f64; 2]>>,
+    pub thetas: Deferred<Option<[f64; 2]>>,
     /// places of the measured outputs of x₁¹ in ascending order; none to search them
     pub partition: Option<Vec<usize>>,
 }
@@ -45,13 +45,13 @@ impl Settings {
     }
 
     /// The first of the keys left for later that has a wrong value.
-    pub fn late(&self) -> Result<(), TuningError> {
+    pub fn deferred(&self) -> Result<(), TuningError> {
         self.thetas.as_ref().map_err(TuningError::clone)?;
         Ok(())
     }
 }
 
-fn thetas(tuning: &Tuning) -> Late<Option<[f64; 2]>> {
+fn thetas(tuning: &Tuning) -> Deferred<Option<[f64; 2]>> {
     let Some(found) = tuning.numbers(THETA.name)? else {
         return Ok(None);
     };
