@@ -212,6 +212,11 @@ pub(crate) struct Declaration {
 }
 
 impl Declaration {
+    /// The label as a text has it: that of a constant of a package without the dot before it.
+    pub(crate) fn written(&self) -> &str {
+        self.label.strip_prefix('.').unwrap_or(&self.label)
+    }
+
     pub(crate) fn is_integer(&self) -> bool {
         self.type_name == TypeName::Integer
     }
