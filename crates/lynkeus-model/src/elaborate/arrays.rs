@@ -279,8 +279,7 @@ impl<'a> Evaluator<'a> {
         }
         // Sizes beside a size of zero count too: other functions walk along them.
         let walked: Vec<usize> = dims.iter().map(|&dim| dim.max(1)).collect();
-        self.budget
-            .charge(element_count(&walked).unwrap_or(u64::MAX), span)?;
+        self.budget.charge(element_count(&walked), span)?;
         let elements = vec![value; dims.iter().product()];
         Ok(Value { dims, elements })
     }
@@ -339,7 +338,7 @@ impl<'a> Evaluator<'a> {
 
     fn with_diagonal(&self, entries: Vec<Scalar>, span: Span) -> Result<Value> {
         let n = entries.len();
-        let count = element_count(&[n, n]).unwrap_or(u64::MAX);
+        let count = element_count(&[n, n]);
         self.budget.charge(count, span)?;
         let mut elements = vec![Scalar::Integer(0); count as usize];
         for (place, entry) in elements.iter_mut().step_by(n + 1).zip(entries) {
@@ -521,7 +520,7 @@ impl<'a> Evaluator<'a> {
                 None => self.all_places(dim, span)?,
             };
             kept.extend(size);
-            let count = element_count(&[offsets.len(), places.len()]).unwrap_or(u64::MAX);
+            let count = element_count(&[offsets.len(), places.len()]);
             self.budget.charge(count, span)?;
             let step = |&offset: &usize| places.iter().map(move |place| offset * dim + place);
             offsets = offsets.iter().flat_map(step).collect();

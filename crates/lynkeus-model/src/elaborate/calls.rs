@@ -356,8 +356,7 @@ impl<'a> Evaluator<'a> {
                 Problem::new(declaration.name, message)
             })
         })?;
-        let count = element_count(&dims).unwrap_or(u64::MAX);
-        self.budget.charge(count, span)?;
+        self.budget.charge(element_count(&dims), span)?;
         Ok(dims)
     }
 }

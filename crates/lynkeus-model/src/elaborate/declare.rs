@@ -88,7 +88,7 @@ impl<'a> Symbols<'a> {
     fn charge(&self, dims: &[usize], declaration: &Declaration) -> Result<()> {
         // A size beside a size of zero counts as well: slices walk along it.
         let walked: Vec<usize> = dims.iter().map(|&dim| dim.max(1)).collect();
-        let count = element_count(&walked).unwrap_or(u64::MAX);
+        let count = element_count(&walked);
         self.scalars.charge(count, declaration.name)?;
         let description = declaration.description.as_ref().map_or(0, String::len);
         let values = declaration.attributes.iter().filter_map(|a| a.value);

@@ -86,10 +86,11 @@ impl Value {
     }
 }
 
-/// Number of elements, where it fits.
-pub(crate) fn element_count(dims: &[usize]) -> Option<u64> {
-    dims.iter()
-        .try_fold(1u64, |count, &dim| count.checked_mul(dim as u64))
+/// Number of elements; the largest of all numbers where it does not fit.
+pub(crate) fn element_count(dims: &[usize]) -> u64 {
+    let mut dims = dims.iter();
+    let count = dims.try_fold(1u64, |count, &dim| count.checked_mul(dim as u64));
+    count.unwrap_or(u64::MAX)
 }
 
 /// "a scalar", "[3]" or "[2, 3]".
