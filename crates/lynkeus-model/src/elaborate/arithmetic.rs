@@ -27,11 +27,11 @@ impl Evaluator<'_> {
         &self,
         mut value: Value,
         span: Span,
-        operation: impl Fn(&Self, Scalar, Span) -> Result<Scalar>,
+        operation: impl Fn(Scalar) -> Result<Scalar>,
     ) -> Result<Value> {
         self.budget.charge(value.elements.len() as u64, span)?;
         for element in &mut value.elements {
-            *element = operation(self, *element, span)?;
+            *element = operation(*element)?;
         }
         Ok(value)
     }
@@ -43,7 +43,7 @@ impl Evaluator<'_> {
         left: Value,
         right: Value,
         span: Span,
-        operation: impl Fn(&Self, Scalar, Scalar, Span) -> Result<Scalar>,
+        operation: impl Fn(Scalar, Scalar) -> Result<Scalar>,
     ) -> Result<Value> {
         if !left.dims.is_empty() && !right.dims.is_empty() && left.dims != right.dims {
             return Err(unequal_sizes(&left.dims, &right.dims, span));
@@ -58,7 +58,7 @@ impl Evaluator<'_> {
             _ => value.elements[i],
         };
         let pairs = (0..count).map(|i| (at(&left, i), at(&right, i)));
-        let elements = pairs.map(|(a, b)| operation(self, a, b, span));
+        let elements = pairs.map(|(a, b)| operation(a, b));
         Ok(Value {
             elements: elements.collect::<Result<_>>()?,
             dims: dims.clone(),
@@ -99,9 +99,8 @@ impl Evaluator<'_> {
         if let (Some(a), Some(b)) = (left.as_scalar(), right.as_scalar()) {
             return Ok(self.scalar_binary(operation, a, b, span)?.into());
         }
-        self.elementwise(left, right, span, |evaluator, a, b, span| {
-            evaluator.scalar_binary(operation, a, b, span)
-        })
+        let of_two = |a, b| self.scalar_binary(operation, a, b, span);
+        self.elementwise(left, right, span, of_two)
     }
 
     pub(super) fn scalar_binary(
@@ -175,7 +174,8 @@ impl Evaluator<'_> {
             return Err(Problem::new(span, "powers of arrays are not supported")
                 .hint("`.^` takes the power of every element"));
         }
-        self.elementwise(base, exponent, span, Self::scalar_power)
+        let power = |base, exponent| self.scalar_power(base, exponent, span);
+        self.elementwise(base, exponent, span, power)
     }
 
     /// A known whole exponent gives an integer power, which takes any base.

@@ -173,27 +173,21 @@ impl<'a> Evaluator<'a> {
 
 impl<'a> Evaluator<'a> {
     /// `sum` and `product`: all elements joined by an operator; `empty` where there are none.
-    pub(super) fn fold(
-        &mut self,
-        call: &'a Call,
-        span: Span,
-        operator: Binary,
-        empty: i64,
-    ) -> Result<Value> {
-        let elements = self.reduced(call, span)?;
-        self.budget.charge(elements.len() as u64, span)?;
+    pub(super) fn fold(&mut self, call: &'a Call, operator: Binary, empty: i64) -> Result<Value> {
+        let elements = self.reduced(call)?;
+        self.budget.charge(elements.len() as u64, call.span)?;
         let Some((&first, rest)) = elements.split_first() else {
             return Ok(Scalar::Integer(empty).into());
         };
-        let join = |sum, &next| self.scalar_binary(operator, sum, next, span);
+        let join = |sum, &next| self.scalar_binary(operator, sum, next, call.span);
         rest.iter().try_fold(first, join).map(Value::from)
     }
 
     /// `array(a, b)` or `array(e for i in r)`
-    pub(super) fn array_of(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn array_of(&mut self, call: &'a Call) -> Result<Value> {
         match call.iterators.is_empty() {
-            true => self.array(&call.arguments, span),
-            false => self.iterated(call, span),
+            true => self.array(&call.arguments, call.span),
+            false => self.iterated(call),
         }
     }
 
@@ -203,18 +197,21 @@ impl<'a> Evaluator<'a> {
     }
 
     /// The elements that `sum(A)` or `sum(e for i in r)` goes over.
-    pub(super) fn reduced(&mut self, call: &'a Call, span: Span) -> Result<Vec<Scalar>> {
+    pub(super) fn reduced(&mut self, call: &'a Call) -> Result<Vec<Scalar>> {
         let value = match call.iterators.is_empty() {
             true => self.only_argument(call)?,
-            false => self.iterated(call, span)?,
+            false => self.iterated(call)?,
         };
         Ok(value.elements)
     }
 
-    fn iterated(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    fn iterated(&mut self, call: &'a Call) -> Result<Value> {
         match call.arguments.first() {
-            Some(&body) => self.comprehension(body, &call.iterators, span),
-            None => Err(Problem::new(span, "expected an expression before `for`")),
+            Some(&body) => self.comprehension(body, &call.iterators, call.span),
+            None => Err(Problem::new(
+                call.span,
+                "expected an expression before `for`",
+            )),
         }
     }
 
@@ -250,7 +247,8 @@ impl<'a> Evaluator<'a> {
         dim.ok_or_else(|| self.no_dimension(number, &dims, axis))
     }
 
-    pub(super) fn fill(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn fill(&mut self, call: &'a Call) -> Result<Value> {
+        let span = call.span;
         match call.arguments.split_first() {
             Some((&value, sizes)) if !sizes.is_empty() => {
                 let value = self.scalar(value)?;
@@ -264,8 +262,8 @@ impl<'a> Evaluator<'a> {
     }
 
     /// `zeros(2, 3)` and `ones(2, 3)`
-    pub(super) fn filled(&mut self, value: i64, call: &Call, span: Span) -> Result<Value> {
-        self.with_all(Scalar::Integer(value), &call.arguments, span)
+    pub(super) fn filled(&mut self, value: i64, call: &Call) -> Result<Value> {
+        self.with_all(Scalar::Integer(value), &call.arguments, call.span)
     }
 
     fn with_all(&mut self, value: Scalar, sizes: &[ExprId], span: Span) -> Result<Value> {
@@ -307,7 +305,8 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    pub(super) fn linspace(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn linspace(&mut self, call: &'a Call) -> Result<Value> {
+        let span = call.span;
         let [from, to, count] = self.arguments(call)?;
         let (from, to) = (self.scalar(from)?, self.scalar(to)?);
         let (from, to) = (self.real(from, span)?, self.real(to, span)?);
@@ -324,16 +323,16 @@ impl<'a> Evaluator<'a> {
         Ok(Value::vector((0..count).map(point).collect()))
     }
 
-    pub(super) fn identity(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn identity(&mut self, call: &'a Call) -> Result<Value> {
         let [argument] = self.arguments(call)?;
         let n = self.length(argument)?;
-        self.budget.charge(n as u64, span)?;
-        self.with_diagonal(vec![Scalar::Integer(1); n], span)
+        self.budget.charge(n as u64, call.span)?;
+        self.with_diagonal(vec![Scalar::Integer(1); n], call.span)
     }
 
-    pub(super) fn diagonal(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn diagonal(&mut self, call: &'a Call) -> Result<Value> {
         let entries = self.only_argument(call)?.elements;
-        self.with_diagonal(entries, span)
+        self.with_diagonal(entries, call.span)
     }
 
     fn with_diagonal(&self, entries: Vec<Scalar>, span: Span) -> Result<Value> {
@@ -348,7 +347,8 @@ impl<'a> Evaluator<'a> {
         Ok(Value { dims, elements })
     }
 
-    pub(super) fn transpose(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn transpose(&mut self, call: &'a Call) -> Result<Value> {
+        let span = call.span;
         let Value { dims, elements } = self.only_argument(call)?;
         let [rows, columns] = dims[..] else {
             let message = format!("`transpose` takes a matrix, found {}", describe_dims(&dims));
@@ -362,7 +362,8 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    pub(super) fn cat(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn cat(&mut self, call: &'a Call) -> Result<Value> {
+        let span = call.span;
         let Some((&axis, parts)) = call.arguments.split_first() else {
             return Err(Problem::new(span, "`cat` takes a dimension and arrays"));
         };
@@ -389,13 +390,12 @@ impl<'a> Evaluator<'a> {
     pub(super) fn reshaped(
         &mut self,
         call: &'a Call,
-        span: Span,
         reshape: impl Fn(&[usize]) -> Option<Vec<usize>>,
     ) -> Result<Value> {
         let mut value = self.only_argument(call)?;
         let dims = reshape(&value.dims).ok_or_else(|| {
             let (name, found) = (self.function_name(call), describe_dims(&value.dims));
-            Problem::new(span, format!("`{name}` of an array of size {found}"))
+            Problem::new(call.span, format!("`{name}` of an array of size {found}"))
         })?;
         value.dims = dims;
         Ok(value)

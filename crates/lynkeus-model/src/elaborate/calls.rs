@@ -23,17 +23,17 @@ impl<'a> Evaluator<'a> {
     }
 
     /// The value of a call of a function of the text; `None` where there is no such function.
-    pub(super) fn own_function(&mut self, call: &'a Call, span: Span) -> Result<Option<Value>> {
+    pub(super) fn own_function(&mut self, call: &'a Call) -> Result<Option<Value>> {
         let class = self.class_called(call);
         let Some(class) = class.filter(|class| class.kind == ClassKind::Function) else {
             return Ok(None);
         };
-        let mut outcomes = self.inlined(class, call, span)?.into_iter();
+        let mut outcomes = self.inlined(class, call)?.into_iter();
         let first = outcomes.next().ok_or_else(|| {
             let message = format!("function `{}` has no output", class.path);
-            Problem::new(span, message).hint("declare one: `output Real y;`")
+            Problem::new(call.span, message).hint("declare one: `output Real y;`")
         })?;
-        let no_number = |_| Problem::new(span, "expected a number, found a record");
+        let no_number = |_| Problem::new(call.span, "expected a number, found a record");
         number(first).map(Some).map_err(no_number)
     }
 
@@ -48,7 +48,7 @@ impl<'a> Evaluator<'a> {
             let message = format!("the text has no function `{name}` with several outputs");
             return Err(Problem::new(call.function, message));
         };
-        let outcomes = self.inlined(class, call, span)?;
+        let outcomes = self.inlined(class, call)?;
         if outcomes.len() < wanted {
             let (name, has) = (&class.path, outcomes.len());
             let message = format!("function `{name}` has {has} outputs, {wanted} are taken here");
@@ -92,11 +92,11 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Carries out a function for the arguments of a call; gives its outputs in order.
-    fn inlined(&mut self, class: &'a Class, call: &'a Call, span: Span) -> Result<Vec<Members>> {
-        self.check_callable(class, span)?;
+    fn inlined(&mut self, class: &'a Class, call: &'a Call) -> Result<Vec<Members>> {
+        self.check_callable(class, call.span)?;
         let parts = self.with_bases(class)?;
         let declarations = self.declarations_of(class)?;
-        let mut given = self.given(&declarations, class, call, span)?.into_iter();
+        let mut given = self.given(&declarations, class, call)?.into_iter();
         self.calls.push(&class.path);
         let done = self.inside(class, |evaluator| {
             for declaration in &declarations {
@@ -104,7 +104,7 @@ impl<'a> Evaluator<'a> {
                     Causality::Input => given.next().flatten(),
                     _ => None,
                 };
-                evaluator.introduce(class, declaration, value, span)?;
+                evaluator.introduce(class, declaration, value, call.span)?;
             }
             for algorithm in parts.iter().flat_map(|part| &part.algorithms) {
                 evaluator.execute(algorithm)?;
@@ -159,11 +159,10 @@ impl<'a> Evaluator<'a> {
         declarations: &[&'a Declaration],
         class: &'a Class,
         call: &'a Call,
-        span: Span,
     ) -> Result<Vec<Option<Members>>> {
         let inputs: Vec<_> = with_causality(declarations, Causality::Input).collect();
         let mut found = vec![];
-        let arguments = self.arguments_of(class, &inputs, call, span)?;
+        let arguments = self.arguments_of(class, &inputs, call)?;
         for (input, id) in inputs.into_iter().zip(arguments) {
             found.push(match (id, self.record_type(input, class)) {
                 (Some(id), Some(_)) => Some(self.members(id)?),
@@ -181,7 +180,6 @@ impl<'a> Evaluator<'a> {
         class: &Class,
         declarations: &[&Declaration],
         call: &Call,
-        span: Span,
     ) -> Result<Vec<Option<ExprId>>> {
         let (kind, part) = match class.kind {
             ClassKind::Function => ("function", "input"),
@@ -190,7 +188,7 @@ impl<'a> Evaluator<'a> {
         let (name, takes, given) = (&class.path, declarations.len(), call.arguments.len());
         if given > takes {
             let message = format!("{kind} `{name}` takes {takes} arguments, found {given}");
-            return Err(Problem::new(span, message));
+            return Err(Problem::new(call.span, message));
         }
         let positional = call.arguments.iter().map(|&id| Some(id));
         let mut found: Vec<Option<ExprId>> = positional.collect();
@@ -385,7 +383,7 @@ impl<'a> Evaluator<'a> {
                 let record = self.record(*record)?;
                 Ok(record.and_then(|record| inner(&record, name)))
             }
-            Kind::Call(call) => self.record_of_call(call, span),
+            Kind::Call(call) => self.record_of_call(call),
             Kind::Array(elements) => self.array_of_records(elements, span),
             _ => {
                 let Some((name, subscripts)) = reference(self.source, self.ast, id) else {
@@ -485,22 +483,22 @@ impl<'a> Evaluator<'a> {
     }
 
     /// `R(1, 2)`, or a function whose first output is a record.
-    fn record_of_call(&mut self, call: &'a Call, span: Span) -> Result<Option<Members>> {
+    fn record_of_call(&mut self, call: &'a Call) -> Result<Option<Members>> {
         match self.class_called(call) {
             Some(class) if class.kind == ClassKind::Record => {
-                self.constructed(class, call, span).map(Some)
+                self.constructed(class, call).map(Some)
             }
             Some(class) if class.kind == ClassKind::Function && self.gives_record(class) => {
-                let mut outcomes = self.inlined(class, call, span)?.into_iter();
+                let mut outcomes = self.inlined(class, call)?.into_iter();
                 Ok(outcomes.next().and_then(|first| number(first).err()))
             }
             _ => Ok(None),
         }
     }
 
-    fn constructed(&mut self, class: &'a Class, call: &'a Call, span: Span) -> Result<Members> {
+    fn constructed(&mut self, class: &'a Class, call: &'a Call) -> Result<Members> {
         let declarations = self.declarations_of(class)?;
-        let given = self.arguments_of(class, &declarations, call, span)?;
+        let given = self.arguments_of(class, &declarations, call)?;
         let mut found = vec![];
         for (declaration, id) in declarations.iter().zip(&given) {
             let value = id.map(|id| self.member_value(declaration, id));
@@ -522,7 +520,7 @@ impl<'a> Evaluator<'a> {
                     (None, None) => {
                         let label = &declaration.label;
                         let message = format!("the member `{label}` of the record is not given");
-                        return Err(Problem::new(span, message));
+                        return Err(Problem::new(call.span, message));
                     }
                 });
             }

@@ -133,7 +133,7 @@ impl<'a> Evaluator<'a> {
             Kind::End => self.end(span),
             Kind::Name => self.name(span),
             Kind::Index(base, subscripts) => self.index(*base, subscripts, span),
-            Kind::Call(call) => self.call(call, span),
+            Kind::Call(call) => self.call(call),
             Kind::Array(elements) => self.array(elements, span),
             Kind::Matrix(rows) => self.matrix(rows, span),
             Kind::Comprehension(body, iterators) => self.comprehension(*body, iterators, span),
@@ -143,11 +143,12 @@ impl<'a> Evaluator<'a> {
             }
             Kind::Plus(operand) => {
                 let value = self.value(*operand)?;
-                self.map(value, self.span(*operand), |_, scalar, _| Ok(scalar))
+                self.map(value, self.span(*operand), Ok)
             }
             Kind::Minus(operand) => {
                 let value = self.value(*operand)?;
-                self.map(value, self.span(*operand), Self::negated)
+                let span = self.span(*operand);
+                self.map(value, span, |scalar| self.negated(scalar, span))
             }
             Kind::Chain(head, rest) => self.chain(*head, rest),
             Kind::Power(base, exponent, elementwise) => {
@@ -280,7 +281,7 @@ impl<'a> Evaluator<'a> {
             if yes.dims != no.dims {
                 return Err(unequal_sizes(&yes.dims, &no.dims, span));
             }
-            let select = |evaluator: &Self, a: Scalar, b, span| {
+            let select = |a: Scalar, b| {
                 let chosen = a.select(condition, b, evaluator.graph);
                 chosen.ok_or_else(|| expected_number(span))
             };

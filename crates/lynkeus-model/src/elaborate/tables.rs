@@ -9,14 +9,15 @@ use lynkeus_expr::{Expr, Graph, Node};
 use super::evaluate::Evaluator;
 use super::value::{Scalar, Value};
 use crate::Tables;
-use crate::diagnostic::{Problem, Result, Span};
+use crate::diagnostic::{Problem, Result};
 use crate::syntax::ast::{Call, ExprId};
 
 impl<'a> Evaluator<'a> {
     /// `Vectors.interpolate(x, y, xi)`: linear between the points (x[i], y[i]) and, as the
     /// Modelica library has it, along the first and the last piece outside of them; or, where
     /// the options ask for it, the monotone cubic.
-    pub(super) fn interpolate(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn interpolate(&mut self, call: &'a Call) -> Result<Value> {
+        let span = call.span;
         let [abscissas, ordinates, at] = match call.arguments.len() {
             // the index of the piece found last is a hint for the library's search
             4 => [call.arguments[0], call.arguments[1], call.arguments[2]],
@@ -37,11 +38,11 @@ impl<'a> Evaluator<'a> {
         self.symbols.table_points.borrow_mut().extend(made_of);
         self.budget.charge(x.len() as u64, span)?;
         let at = self.value(at)?;
-        self.map(at, span, |evaluator, at, span| {
-            let at = evaluator.real(at, span)?;
-            Ok(Scalar::Real(match evaluator.symbols.options.tables {
-                Tables::Linear => evaluator.piecewise_linear(&x, &y, at),
-                Tables::Monotone => monotone_cubic(evaluator.graph, &x, &y, at),
+        self.map(at, span, |at| {
+            let at = self.real(at, span)?;
+            Ok(Scalar::Real(match self.symbols.options.tables {
+                Tables::Linear => self.piecewise_linear(&x, &y, at),
+                Tables::Monotone => monotone_cubic(self.graph, &x, &y, at),
             }))
         })
     }
