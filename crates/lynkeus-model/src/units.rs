@@ -396,7 +396,7 @@ impl Walk<'_> {
                 }
                 unit
             }
-            Kind::Call(call) => self.call(call),
+            Kind::Call(call) => self.call(call, expression.span),
             _ => None,
         }
     }
@@ -446,7 +446,7 @@ impl Walk<'_> {
         }
     }
 
-    fn call(&mut self, call: &Call) -> Option<BaseUnit> {
+    fn call(&mut self, call: &Call, span: Span) -> Option<BaseUnit> {
         let name = plain(call.function.text(self.source));
         let units: Vec<Option<BaseUnit>> = call.arguments.iter().map(|&id| self.unit(id)).collect();
         let first = units.first().cloned().flatten();
@@ -456,14 +456,14 @@ impl Walk<'_> {
             "smooth" => units.get(1).cloned().flatten(),
             "min" | "max" => {
                 let second = units.get(1).cloned().flatten();
-                self.compare(first, second, call.span, "the other")
+                self.compare(first, second, span, "the other")
             }
             "sqrt" => BaseUnit::one().times(&first?, 0.5),
             "exp" | "log" | "log10" | "sin" | "cos" | "tan" | "sinh" | "cosh" | "tanh" => {
                 if let Some(unit) = first.filter(|unit| !unit.is_pure_number()) {
                     let message = format!("`{name}` of a quantity in {}", unit.describe());
                     let hint = "divide it by a reference in the same unit";
-                    self.warn(Problem::new(call.span, message).hint(hint));
+                    self.warn(Problem::new(span, message).hint(hint));
                 }
                 None
             }

@@ -3,7 +3,6 @@
 
 use lynkeus_expr::{Binary, Expr, Node, Unary};
 
-use super::arithmetic::overflow;
 use super::arrays::{matrix_dims, scalar_dims, vector_dims};
 use super::evaluate::{Evaluator, reference};
 use super::value::{Scalar, Value, expected_number};
@@ -160,8 +159,8 @@ impl<'a> Evaluator<'a> {
         function: impl for<'g> Fn(Expr<'g>) -> Expr<'g>,
     ) -> Result<Value> {
         let value = self.only_argument(call)?;
-        self.map(value, call.span, |scalar| {
-            let argument = self.graph.expr(self.real(scalar, call.span)?);
+        self.map(value, |scalar| {
+            let argument = self.graph.expr(self.real(scalar)?);
             Ok(Scalar::Real(function(argument).node()))
         })
     }
@@ -174,17 +173,17 @@ impl<'a> Evaluator<'a> {
         real: impl for<'g> Fn(Expr<'g>) -> Expr<'g>,
     ) -> Result<Value> {
         let value = self.only_argument(call)?;
-        let of_one = |scalar| self.of_one(scalar, call.span, &exact, &real);
-        self.map(value, call.span, of_one)
+        let of_one = |scalar| self.of_one(scalar, &exact, &real);
+        self.map(value, of_one)
     }
 
     fn integer(&mut self, call: &Call) -> Result<Value> {
         let value = self.only_argument(call)?;
-        self.map(value, call.span, |scalar| {
-            let node = self.real(scalar, call.span)?;
+        self.map(value, |scalar| {
+            let node = self.real(scalar)?;
             let floor = self.graph.unary(Unary::Floor, node);
             match self.graph.constant_value(floor) {
-                Some(value) if value.abs() > 2f64.powi(53) => Err(overflow(call.span)),
+                Some(value) if value.abs() > 2f64.powi(53) => Err(self.overflow()),
                 Some(value) => Ok(Scalar::Integer(value as i64)),
                 None => Ok(Scalar::Real(floor)),
             }
@@ -193,8 +192,8 @@ impl<'a> Evaluator<'a> {
 
     fn atan2(&mut self, call: &Call) -> Result<Value> {
         let (left, right) = self.two_arguments(call)?;
-        self.elementwise(left, right, call.span, |a, b| {
-            let (a, b) = (self.real(a, call.span)?, self.real(b, call.span)?);
+        self.elementwise(left, right, |a, b| {
+            let (a, b) = (self.real(a)?, self.real(b)?);
             Ok(Scalar::Real(self.graph.binary(Binary::Atan2, a, b)))
         })
     }
@@ -207,9 +206,9 @@ impl<'a> Evaluator<'a> {
         real: impl for<'g> Fn(Expr<'g>, Expr<'g>) -> Expr<'g>,
     ) -> Result<Value> {
         let (left, right) = self.two_arguments(call)?;
-        self.elementwise(left, right, call.span, |a, b| match b.number(self.graph) {
-            Some(0.0) => Err(Problem::new(call.span, "division by zero")),
-            _ => self.of_two(a, b, call.span, &exact, &real),
+        self.elementwise(left, right, |a, b| match b.number(self.graph) {
+            Some(0.0) => Err(self.problem("division by zero")),
+            _ => self.of_two(a, b, &exact, &real),
         })
     }
 
@@ -223,16 +222,16 @@ impl<'a> Evaluator<'a> {
         let exact = |a, b| Some(exact(a, b));
         if call.arguments.len() == 2 {
             let (left, right) = self.two_arguments(call)?;
-            let of_two = |a, b| self.of_two(a, b, call.span, exact, &real);
-            return self.elementwise(left, right, call.span, of_two);
+            let of_two = |a, b| self.of_two(a, b, exact, &real);
+            return self.elementwise(left, right, of_two);
         }
         let elements = self.reduced(call)?;
-        self.budget.charge(elements.len() as u64, call.span)?;
+        self.charge(elements.len() as u64)?;
         let Some((&first, rest)) = elements.split_first() else {
             let name = self.function_name(call);
-            return Err(Problem::new(call.span, format!("`{name}` of no elements")));
+            return Err(self.problem(format!("`{name}` of no elements")));
         };
-        let better = |best, &next| self.of_two(best, next, call.span, exact, &real);
+        let better = |best, &next| self.of_two(best, next, exact, &real);
         rest.iter().try_fold(first, better).map(Value::from)
     }
 }
@@ -267,32 +266,32 @@ impl<'a> Evaluator<'a> {
     /// `der(x)` of a variable, an element or a slice, and of an expression by the chain rule.
     pub(super) fn der(&mut self, call: &'a Call) -> Result<Value> {
         let [argument] = self.arguments(call)?;
-        let span = self.span(argument);
         let is_variable = reference(self.source, self.ast, argument).is_some();
         let value = self.value(argument)?;
-        self.map(value, span, |scalar| {
+        self.at = self.span(argument);
+        self.map(value, |scalar| {
             let derivative = match scalar {
                 Scalar::Real(node) if is_variable => self.symbols.derivative(node),
-                Scalar::Real(node) => Some(self.total_derivative(node, span)?),
+                Scalar::Real(node) => Some(self.total_derivative(node)?),
                 _ => None,
             };
             let derivative = derivative.map(Scalar::Real);
-            derivative.ok_or_else(|| self.no_derivative(span))
+            derivative.ok_or_else(|| self.no_derivative())
         })
     }
 
-    fn no_derivative(&self, span: Span) -> Problem {
-        let name = self.text(span);
+    fn no_derivative(&self) -> Problem {
+        let name = self.text(self.at);
         let message = format!("`der({name})`: `{name}` is not a Real variable");
-        Problem::new(span, message)
+        self.problem(message)
             .hint("inputs and parameters have no derivative in the equations")
     }
 
     /// Σ ∂e/∂v der(v) over the variables of e, and ∂e/∂t.
-    fn total_derivative(&self, node: Node, span: Span) -> Result<Node> {
+    fn total_derivative(&self, node: Node) -> Result<Node> {
         let graph = self.graph;
         let symbols = graph.symbols_of(&[node]).len();
-        self.budget.charge(symbols as u64, span)?;
+        self.charge(symbols as u64)?;
         let time = self.symbols.time();
         total_derivative(graph, node, time, |symbol| {
             let derivative = self.symbols.derivative(symbol);
@@ -301,37 +300,36 @@ impl<'a> Evaluator<'a> {
             }
             let name = graph.symbol_name(symbol).unwrap_or_default();
             let message = format!("`der` of an expression with `{name}`, which has none");
-            Err(Problem::new(span, message)
+            Err(self
+                .problem(message)
                 .hint("inputs and parameters have no derivative in the equations"))
         })
     }
 
     /// `semiLinear(x, a, b)`: a x where x ≥ 0, else b x.
     pub(super) fn semi_linear(&mut self, call: &'a Call) -> Result<Value> {
-        let span = call.span;
         let [x, above, below] = self.arguments(call)?;
         let x = self.scalar(x)?;
         let (above, below) = (self.scalar(above)?, self.scalar(below)?);
         let zero = Scalar::Integer(0);
-        let positive = self.compare(">=", x, zero, span)?;
+        let positive = self.compare(">=", x, zero)?;
         let slope = above.select(positive, below, self.graph);
-        let slope = slope.ok_or_else(|| expected_number(span))?;
-        let product = self.scalar_binary(Binary::Mul, slope, x, span)?;
+        let slope = slope.ok_or_else(|| expected_number(self.at))?;
+        let product = self.scalar_binary(Binary::Mul, slope, x)?;
         Ok(product.into())
     }
 
     /// The cross product of two vectors of three elements.
     pub(super) fn cross(&mut self, call: &'a Call) -> Result<Value> {
-        let span = call.span;
         let (a, b) = self.two_arguments(call)?;
         let ([a1, a2, a3], [b1, b2, b3]) = (&a.elements[..], &b.elements[..]) else {
             let message = "`cross` takes two vectors of three elements";
-            return Err(Problem::new(span, message));
+            return Err(self.problem(message));
         };
         let term = |p: &Scalar, q: &Scalar, r: &Scalar, s: &Scalar| {
-            let first = self.scalar_binary(Binary::Mul, *p, *q, span)?;
-            let second = self.scalar_binary(Binary::Mul, *r, *s, span)?;
-            self.scalar_binary(Binary::Sub, first, second, span)
+            let first = self.scalar_binary(Binary::Mul, *p, *q)?;
+            let second = self.scalar_binary(Binary::Mul, *r, *s)?;
+            self.scalar_binary(Binary::Sub, first, second)
         };
         let elements = vec![
             term(a2, b3, a3, b2)?,

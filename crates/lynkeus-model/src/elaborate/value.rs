@@ -117,12 +117,6 @@ pub(crate) fn element_name(name: &str, dims: &[usize], offset: usize) -> String 
     format!("{name}[{}]", subscripts.join(","))
 }
 
-pub(super) fn unequal_sizes(left: &[usize], right: &[usize], span: Span) -> Problem {
-    let (left, right) = (describe_dims(left), describe_dims(right));
-    let message = format!("the sizes differ: left is {left}, right is {right}");
-    Problem::new(span, message)
-}
-
 /// The members of a record, those of inner records by their names in full, as `z.re`; a number or
 /// an array is the one member without a name.
 pub(super) type Members = Vec<(String, Value)>;

@@ -296,7 +296,6 @@ impl<'s> Parser<'s, ParsedModel<'s>> {
         self.expect(")")?;
         let call = Call {
             function,
-            span: function.to(self.last),
             arguments,
             ..Call::default()
         };

@@ -107,8 +107,6 @@ pub(crate) struct PathPart {
 #[derive(Debug, Default)]
 pub(crate) struct Call {
     pub function: Span,
-    /// the whole of it
-    pub span: Span,
     pub arguments: Vec<ExprId>,
     /// arguments given by name, behind the others
     pub named: Vec<(Span, ExprId)>,

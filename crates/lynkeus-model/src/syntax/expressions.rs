@@ -285,7 +285,6 @@ impl Parser<'_> {
             }
         }
         self.expect(")")?;
-        call.span = function.to(self.last);
         self.push(Kind::Call(call), function, first)
     }
 
