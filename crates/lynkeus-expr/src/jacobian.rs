@@ -20,6 +20,15 @@ impl Jacobian {
             .binary_search_by_key(&(row, column), |&(i, j, _)| (i, j));
         place.ok().map(|k| self.entries[k].2)
     }
+
+    /// The entries of one row: (column, expression).
+    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, Node)> + '_ {
+        let start = self.entries.partition_point(|&(i, ..)| i < row);
+        self.entries[start..]
+            .iter()
+            .take_while(move |&&(i, ..)| i == row)
+            .map(|&(_, j, node)| (j, node))
+    }
 }
 
 /// Derivative of one node with respect to each input it depends on.

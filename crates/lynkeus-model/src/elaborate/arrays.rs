@@ -243,16 +243,11 @@ impl<'a> Evaluator<'a> {
     }
 
     pub(super) fn fill(&mut self, call: &'a Call) -> Result<Value> {
-        match call.arguments.split_first() {
-            Some((&value, sizes)) if !sizes.is_empty() => {
-                let value = self.scalar(value)?;
-                self.with_all(value, sizes)
-            }
-            _ => {
-                let message = "`fill` takes a value and at least one size";
-                Err(self.problem(message))
-            }
-        }
+        let Some((&value, sizes @ [_, ..])) = call.arguments.split_first() else {
+            return Err(self.problem("`fill` takes a value and at least one size"));
+        };
+        let value = self.scalar(value)?;
+        self.with_all(value, sizes)
     }
 
     /// `zeros(2, 3)` and `ones(2, 3)`

@@ -125,7 +125,7 @@ impl<'a> Evaluator<'a> {
     ) -> Result<T> {
         let scopes = std::mem::replace(&mut self.scopes, vec![&class.path]);
         let loops = std::mem::take(&mut self.loops);
-        let outside = self.frame.replace(Frame::closed());
+        let outside = std::mem::replace(&mut self.frame, Frame::closed());
         let done = run(self);
         self.frame = outside;
         self.loops = loops;
@@ -212,13 +212,13 @@ impl<'a> Evaluator<'a> {
 
     fn outcome(&self, class: &Class, output: &Declaration) -> Result<Members> {
         let label = &output.label;
-        let frame = self.frame.as_ref();
+        let frame = &self.frame;
         let of_number = [String::new()];
-        let names = frame.and_then(|frame| frame.records.get(label));
+        let names = frame.records.get(label);
         let names = names.map_or(&of_number[..], Vec::as_slice);
         let member = |name: &String| {
             let full = member_name(label, name);
-            let local = frame.and_then(|frame| frame.locals.get(&full));
+            let local = frame.locals.get(&full);
             let value = local.and_then(Local::value).ok_or_else(|| {
                 let function = &class.path;
                 let message =
@@ -289,9 +289,7 @@ impl<'a> Evaluator<'a> {
                 .collect();
         }
         self.charge(local.elements.len() as u64)?;
-        if let Some(frame) = self.frame.as_mut() {
-            frame.locals.insert(name.clone(), local);
-        }
+        self.frame.locals.insert(name.clone(), local);
         Ok(())
     }
 
@@ -330,12 +328,10 @@ impl<'a> Evaluator<'a> {
                 }
             }
         }
-        if let Some(frame) = self.frame.as_mut() {
-            let names = members.iter().map(|(member, _)| member.clone());
-            frame.records.insert(name.clone(), names.collect());
-            let full = |(member, local)| (format!("{name}.{member}"), local);
-            frame.locals.extend(members.into_iter().map(full));
-        }
+        let names = members.iter().map(|(member, _)| member.clone()).collect();
+        self.frame.records.insert(name.clone(), names);
+        let full = |(member, local)| (format!("{name}.{member}"), local);
+        self.frame.locals.extend(members.into_iter().map(full));
         Ok(())
     }
 
@@ -416,10 +412,7 @@ impl<'a> Evaluator<'a> {
     }
 
     fn members_of(&self, name: &str) -> Option<Vec<String>> {
-        let of_frame = self
-            .frame
-            .as_ref()
-            .and_then(|frame| frame.records.get(name));
+        let of_frame = self.frame.records.get(name);
         let records = &self.symbols.model.records;
         let of_model = || records.get(name).filter(|_| !self.is_closed());
         let of_package = || {
@@ -536,11 +529,9 @@ impl<'a> Evaluator<'a> {
 
     /// Makes values known by their names to what is evaluated next.
     fn know(&mut self, members: &Members) {
-        let Some(frame) = &mut self.frame else {
-            return;
-        };
         for (name, value) in members {
-            frame.locals.insert(name.clone(), Local::of(value.clone()));
+            let local = Local::of(value.clone());
+            self.frame.locals.insert(name.clone(), local);
         }
     }
 }

@@ -38,7 +38,7 @@ pub(crate) struct Evaluator<'a> {
     /// where names of classes are looked up
     pub(super) scopes: Vec<&'a str>,
     /// variables of the function or algorithm around
-    pub(super) frame: Option<Frame>,
+    pub(super) frame: Frame,
     /// names of the functions around, innermost last
     pub(super) calls: Vec<&'a str>,
     /// expressions and statements around, those of the callers included
@@ -65,7 +65,7 @@ impl<'a> Evaluator<'a> {
             ends: vec![],
             valueless: false,
             scopes: scopes.map(String::as_str).collect(),
-            frame: None,
+            frame: Frame::default(),
             calls: vec![],
             depth: 0,
             conditions: vec![],
@@ -79,7 +79,7 @@ impl<'a> Evaluator<'a> {
         let mut evaluator = Self::new(symbols, mode);
         if let Some(package) = &declaration.package {
             evaluator.scopes = vec![package];
-            evaluator.frame = Some(Frame::closed());
+            evaluator.frame = Frame::closed();
         }
         evaluator
     }
@@ -440,7 +440,7 @@ impl<'a> Evaluator<'a> {
 
     /// In a function the model's own names mean nothing.
     pub(super) fn is_closed(&self) -> bool {
-        self.frame.as_ref().is_some_and(|frame| frame.is_function)
+        self.frame.is_function
     }
 
     pub(super) fn full_names(&self, name: &str) -> Vec<String> {
@@ -519,7 +519,7 @@ impl<'a> Evaluator<'a> {
 
     /// A variable of the function or algorithm around.
     pub(super) fn local(&self, name: &str) -> Option<&Local> {
-        self.frame.as_ref()?.locals.get(name)
+        self.frame.locals.get(name)
     }
 }
 

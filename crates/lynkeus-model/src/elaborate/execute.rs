@@ -159,20 +159,17 @@ impl<'a> Evaluator<'a> {
         let take = |evaluator: &mut Self, body: &'a [Statement]| {
             if evaluator.conditions.len() == around {
                 let ended = evaluator.execute(body)?;
-                return Ok((ended, evaluator.frame.take()));
+                return Ok((ended, std::mem::take(&mut evaluator.frame)));
             }
             let before = evaluator.frame.clone();
             evaluator.whole(body)?;
             let after = std::mem::replace(&mut evaluator.frame, before);
             Ok((Ended::AtItsEnd, after))
         };
-        let join = |evaluator: &mut Self, condition: Node, (_, yes): (_, Option<Frame>), no| {
-            let (ended, no): (Ended, Option<Frame>) = no;
-            let size = yes.as_ref().map_or(0, Frame::size);
-            evaluator.charge(size as u64)?;
-            let frames = yes.zip(no);
-            let joined = |(yes, no)| Frame::joined(condition, yes, no, evaluator.graph);
-            Ok((ended, frames.map(joined)))
+        let join = |evaluator: &mut Self, condition: Node, (_, yes): (_, Frame), no| {
+            let (ended, no): (Ended, Frame) = no;
+            evaluator.charge(yes.size() as u64)?;
+            Ok((ended, Frame::joined(condition, yes, no, evaluator.graph)))
         };
         let pairs = branches.iter().map(|(c, body)| (*c, body.as_slice()));
         let (ended, frame) = self.chosen(pairs, otherwise, take, join)?;
@@ -232,8 +229,7 @@ impl<'a> Evaluator<'a> {
         }
         self.charge(offsets.len() as u64)?;
         let graph = self.graph;
-        let frame = self.frame.as_mut();
-        let local = frame.and_then(|frame| frame.locals.get_mut(name));
+        let local = self.frame.locals.get_mut(name);
         let local = local.ok_or_else(unknown)?;
         for (offset, scalar) in offsets.into_iter().zip(elements) {
             local.elements[offset] = Some(local.converted(scalar, graph));

@@ -92,9 +92,9 @@ impl<'a> Evaluator<'a> {
                 frame.locals.insert(name.clone(), local);
             }
         }
-        self.frame = Some(frame);
+        self.frame = frame;
         let done = self.execute(statements);
-        let frame = self.frame.take().unwrap_or_default();
+        let frame = std::mem::take(&mut self.frame);
         done?;
         let spans = || statements.iter().map(|statement| statement.span);
         for name in names {

@@ -119,9 +119,8 @@ fn largest_difference(
     let slopes = jacobian::forward(graph, &[difference.node()], &inputs);
     let zero = graph.constant(0.0);
     let linear = slopes
-        .entries
-        .iter()
-        .map(|&(_, i, slope)| graph.expr(slope) * graph.expr(inputs[i]))
+        .row(0)
+        .map(|(i, slope)| graph.expr(slope) * graph.expr(inputs[i]))
         .fold(zero, |sum, term| sum + term);
     let rest = (difference - linear).node();
     let same = Matrix::from_fn(graph, (1, 1), |_, _| Some(rest));
