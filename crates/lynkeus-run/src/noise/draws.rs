@@ -108,7 +108,7 @@ fn halvings(
         }
         plant.enter(t);
         if n > SMALL {
-            let rate = fastest(&mut plant, t, &x, &[]).radius;
+            let rate = fastest(&mut plant, t, &x, Some(&[])).radius;
             let fits = |j: &usize| rate * sample / 2.0_f64.powi(*j as i32) <= TURN;
             if rate.is_finite() {
                 needed = needed.max((0..most).find(fits).unwrap_or(most));
