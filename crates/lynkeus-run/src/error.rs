@@ -102,21 +102,16 @@ pub enum Error {
 
     /// The integration cannot go on where a matrix of the observer is singular.
     #[error(
-        "the observer comes to where {matrix} is singular at t = {time} ({name} = {value:.3e}, its flag is raised below {below}) and cannot be integrated on: {meaning}; the estimate is {state}"
+        "the observer comes to where {} is singular at t = {time} ({} = {value:.3e}, its flag is raised below {}) and cannot be integrated on: {}; the estimate is {state}",
+        .margin.matrix, .margin.name, .margin.below, .margin.meaning
     )]
     Singular {
         /// when
         time: f64,
-        /// what the matrix is called
-        matrix: String,
-        /// the output that says how close it is to singular
-        name: String,
+        /// what says how close the matrix is to singular
+        margin: Box<Margin>,
         /// its value
         value: f64,
-        /// its limit
-        below: f64,
-        /// what that means, and what to do
-        meaning: String,
         /// names and values of the observer's state
         state: String,
     },
@@ -206,6 +201,22 @@ pub enum Error {
     },
 }
 
+/// An output of a system that says how far a matrix is from singular: its reciprocal condition
+/// number, which a run that cannot go on is judged by.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Margin {
+    /// its place among the outputs
+    pub output: usize,
+    /// what people call it
+    pub name: String,
+    /// what the matrix is called
+    pub matrix: String,
+    /// below this it is close to singular
+    pub below: f64,
+    /// what that means, and what to do
+    pub meaning: String,
+}
+
 impl Error {
     /// When a run ended, where it could not go on.
     pub(crate) fn time(&self) -> Option<f64> {
@@ -250,15 +261,6 @@ pub struct Interrupted {
     pub error: Error,
     /// the rows before the end
     pub partial: Trajectory,
-}
-
-impl From<Error> for Box<Interrupted> {
-    fn from(error: Error) -> Self {
-        Box::new(Interrupted {
-            error,
-            partial: Trajectory::default(),
-        })
-    }
 }
 
 /// How many states a message lists.

@@ -2,6 +2,7 @@
 //! method with fixed steps.
 
 use crate::adaptive::Adaptive;
+use crate::divergence::{diverged, largest};
 use crate::events::{Filippov, Sides};
 use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
@@ -133,20 +134,11 @@ impl Integrator {
 
     /// Blames a fixed step that is too large for a value that is not finite.
     fn explained(&self, error: Error, f: &impl Dynamics, x: &[f64]) -> Error {
-        let (Error::NotFinite { time, .. }, hint) = (&error, self.hint()) else {
-            return error;
-        };
-        if hint.is_empty() {
-            return error;
-        }
-        let largest = (0..x.len()).max_by(|&i, &j| x[i].abs().total_cmp(&x[j].abs()));
-        Error::Diverged {
-            time: *time,
-            name: largest
-                .and_then(|i| f.names().get(i).cloned())
-                .unwrap_or_default(),
-            value: largest.map_or(0.0, |i| x[i]),
-            hint,
+        match (error, self.hint()) {
+            (Error::NotFinite { time, .. }, hint) if !hint.is_empty() => {
+                diverged(time, &f.names(), x, largest(x), hint)
+            }
+            (error, _) => error,
         }
     }
 
@@ -236,15 +228,13 @@ impl Fixed {
             return self.auto(f, from, to, x);
         };
         if self.advice.is_none() {
-            self.look(f, from, x, used);
+            self.advice = Some(advice(f, from, x, used));
         }
         let steps = fixed_steps(from, to, used)?;
         self.begin.copy_from_slice(x);
         let result = self.rk4.advance(f, from, to, steps, x);
         if let Err(Error::NotFinite { .. }) = result {
-            let begin = std::mem::take(&mut self.begin);
-            self.look(f, from, &begin, used);
-            self.begin = begin;
+            self.advice = Some(advice(f, from, &self.begin, used));
         }
         result
     }
@@ -258,11 +248,12 @@ impl Fixed {
         to: f64,
         x: &mut [f64],
     ) -> Result<(), Error> {
-        if self.since_look == 0 {
-            self.look(f, from, x, to - from);
-        }
+        let known = self.advice.filter(|_| self.since_look > 0);
+        let mut seen = known.unwrap_or_else(|| advice(f, from, x, to - from));
+        let needed = seen.needed;
+        seen.used = seen.used.min(needed);
+        self.advice = Some(seen);
         self.since_look = (self.since_look + 1) % LOOK_EVERY;
-        let needed = self.advice.map_or(f64::INFINITY, |advice| advice.needed);
         let mut steps = count(from, to, needed).ok_or(Error::TooStiff {
             time: from,
             needed,
@@ -280,27 +271,21 @@ impl Fixed {
         }
         self.rk4.advance(f, from, to, steps, x)
     }
+}
 
-    /// Looks at the fastest mode at (t, x).
-    fn look(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64], used: f64) {
-        let spectral_radius = spectral_radius(f, t, x);
-        let needed = AUTO_PRODUCT / spectral_radius;
+/// A step beside the fastest mode at (t, x).
+fn advice(f: &mut impl Dynamics, t: f64, x: &[f64], used: f64) -> StepAdvice {
+    let spectral_radius = spectral_radius(f, t, x);
+    let needed = AUTO_PRODUCT / spectral_radius;
+    StepAdvice {
+        spectral_radius,
         // where the Jacobian is not defined there is nothing to go by
-        let needed = if needed.is_nan() {
+        needed: if needed.is_nan() {
             f64::INFINITY
         } else {
             needed
-        };
-        let used = if self.step == Step::Auto {
-            used.min(needed)
-        } else {
-            used
-        };
-        self.advice = Some(StepAdvice {
-            spectral_radius,
-            needed,
-            used,
-        });
+        },
+        used,
     }
 }
 
