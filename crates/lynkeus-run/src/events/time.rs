@@ -87,7 +87,7 @@ impl TimeEvents {
             let (before, rest) = self.indicators.split_at_mut(i);
             let followed = rest[0].follow(&mut self.effort, before);
             followed.map_err(|error| error.about(&rest[0].expression))?;
-            times.extend_from_slice(&rest[0].timeline.instants);
+            times.extend(rest[0].timeline.instants());
         }
         self.effort.end();
         Ok(())
@@ -204,30 +204,27 @@ fn unresolved(time: f64) -> Error {
     }
 }
 
-/// The values of one mode over an interval.
+/// The values of one mode over an interval, each with where it begins.
 #[derive(Clone, Debug, Default)]
-struct Timeline {
-    /// where the value changes, increasing
-    instants: Vec<f64>,
-    /// one more than instants
-    values: Vec<f64>,
-}
+struct Timeline(Vec<(f64, f64)>);
 
 impl Timeline {
-    /// The mode is `value` from `t` on (from the start, for the first value).
+    /// The mode is `value` from `t` on.
     fn push(&mut self, t: f64, value: f64) {
-        match self.values.last() {
-            Some(&last) if same(last, value) => return,
-            Some(_) => self.instants.push(t),
-            None => {}
+        if !self.0.last().is_some_and(|(_, last)| same(*last, value)) {
+            self.0.push((t, value));
         }
-        self.values.push(value);
+    }
+
+    /// Where the value changes, increasing.
+    fn instants(&self) -> impl Iterator<Item = f64> {
+        self.0.iter().skip(1).map(|(begin, _)| *begin)
     }
 
     /// The value at `t`, which is no instant; NaN before the first value is known.
     fn at(&self, t: f64) -> f64 {
-        let place = self.instants.partition_point(|&instant| instant <= t);
-        self.values.get(place).copied().unwrap_or(f64::NAN)
+        let begun = self.0.partition_point(|(begin, _)| *begin <= t);
+        self.0[..begun].last().map_or(f64::NAN, |(_, value)| *value)
     }
 }
 
@@ -250,12 +247,11 @@ pub(super) struct Indicator {
     /// true where passing any integer, not only zero, changes the mode
     counts: bool,
     /// the mode, over time and the modes read
-    mode: Tape,
+    mode: Evaluator,
     /// what decides it, over the same
     quantity: Tape,
     /// which of the indicators before are read
     reads: Vec<usize>,
-    evaluator: Evaluator,
     /// t, modes read
     inputs: Vec<f64>,
     /// what was found in the interval asked for last
@@ -279,12 +275,10 @@ impl Indicator {
             .collect();
         let mut inputs = vec![time];
         inputs.extend(reads.iter().map(|&i| found[i]));
-        let mode = Tape::new(graph, &inputs, &[mode])?;
         Ok(Self {
             expression,
             counts,
-            evaluator: mode.evaluator(),
-            mode,
+            mode: Tape::new(graph, &inputs, &[mode])?.evaluator(),
             quantity: Tape::new(graph, &inputs, &[quantity])?,
             inputs: vec![0.0; inputs.len()],
             timeline: Timeline::default(),
@@ -294,14 +288,9 @@ impl Indicator {
 
     /// Finds the mode over the interval of `effort`; `before` are the indicators before.
     fn follow(&mut self, effort: &mut Effort, before: &[Self]) -> Result<(), Error> {
-        self.timeline.instants.clear();
-        self.timeline.values.clear();
-        let mut ends: Vec<f64> = self
-            .reads
-            .iter()
-            .flat_map(|&i| &before[i].timeline.instants)
-            .copied()
-            .collect();
+        self.timeline.0.clear();
+        let read = self.reads.iter().map(|&i| &before[i].timeline);
+        let mut ends: Vec<f64> = read.flat_map(Timeline::instants).collect();
         ends.sort_unstable_by(f64::total_cmp);
         ends.push(effort.to);
         let mut start = effort.from;
@@ -329,9 +318,8 @@ impl Indicator {
             certain: None,
             instants: vec![],
         };
-        let instants = isolation.run()?;
         let mut from = start;
-        for to in instants.into_iter().chain([end]) {
+        for to in isolation.run()?.into_iter().chain([end]) {
             let value = self.value(from + 0.5 * (to - from));
             self.timeline.push(from, value);
             from = to;
@@ -343,27 +331,23 @@ impl Indicator {
     fn value(&mut self, t: f64) -> f64 {
         self.inputs[0] = t;
         let mut value = [0.0];
-        self.evaluator.eval(&self.inputs, &mut value);
+        self.mode.eval(&self.inputs, &mut value);
         value[0]
     }
 
     /// Whether the mode is certainly the same all over `stretch`.
     fn is_constant(&self, stretch: Interval) -> bool {
-        let inputs: Vec<Interval> = std::iter::once(stretch)
-            .chain(self.inputs[1..].iter().map(|&mode| Interval::point(mode)))
-            .collect();
-        let values = self.mode.eval_in(&Intervals, &inputs);
-        values
-            .iter()
-            .all(|v| v.is_empty() || (v.is_point() && v.is_defined()))
+        let mut inputs = vec![stretch];
+        inputs.extend(self.inputs[1..].iter().map(|&mode| Interval::point(mode)));
+        let value = self.mode.tape().eval_in(&Intervals, &inputs)[0];
+        value.is_empty() || (value.is_point() && value.is_defined())
     }
 
     /// Whether a mode decided by a quantity in `enclosure` can have one value only.
     fn decides(&self, enclosure: Interval) -> bool {
-        let image = if self.counts {
-            enclosure.floor()
-        } else {
-            enclosure.sign()
+        let image = match self.counts {
+            true => enclosure.floor(),
+            false => enclosure.sign(),
         };
         enclosure.is_defined() && image.is_point()
     }
@@ -476,10 +460,8 @@ impl Isolation<'_> {
         debug_assert!(order <= ORDER);
         let mut times = vec![a, b];
         for k in (1..order).rev() {
-            let zeros = times
-                .windows(2)
-                .filter_map(|pair| self.zero(k, pair[0], pair[1]));
-            let zeros: Vec<f64> = zeros.collect();
+            let pairs = times.windows(2);
+            let zeros: Vec<f64> = pairs.filter_map(|p| self.zero(k, p[0], p[1])).collect();
             times.extend(zeros);
             times.sort_unstable_by(f64::total_cmp);
             times.dedup();
@@ -501,10 +483,9 @@ impl Isolation<'_> {
             let middle = a + 0.5 * (b - a);
             let secant = (a * at_b - b * at_a) / (at_b - at_a);
             // every third cut in the middle, so that the end is in sight
-            let t = if round % 3 < 2 && a < secant && secant < b {
-                secant
-            } else {
-                middle
+            let t = match round % 3 < 2 && a < secant && secant < b {
+                true => secant,
+                false => middle,
             };
             let value = self.indicator.coefficient(k, t);
             if value == 0.0 || b - a <= close || middle <= a || middle >= b {
@@ -590,10 +571,9 @@ impl Isolation<'_> {
         {
             let switch = self.bisect(left, t, current);
             self.push(switch)?;
-            let next = if switch < t {
-                self.indicator.value(switch)
-            } else {
-                value
+            let next = match switch < t {
+                true => self.indicator.value(switch),
+                false => value,
             };
             self.certain = Some((switch, next));
         }
@@ -618,10 +598,9 @@ impl Isolation<'_> {
             if middle <= left || middle >= right {
                 return right;
             }
-            if same(self.indicator.value(middle), current) {
-                left = middle;
-            } else {
-                right = middle;
+            match same(self.indicator.value(middle), current) {
+                true => left = middle,
+                false => right = middle,
             }
         }
     }
@@ -642,7 +621,7 @@ mod tests {
             line.push(t, value);
         }
         line.push(4.0, 0.0);
-        assert_eq!(line.instants, [2.0, 4.0]);
+        assert_eq!(line.instants().collect::<Vec<_>>(), [2.0, 4.0]);
         assert_eq!((line.at(0.5), line.at(5.0)), (1.0, 0.0));
         assert!(line.at(2.5).is_nan() && Timeline::default().at(0.0).is_nan());
     }
