@@ -43,7 +43,7 @@ const TRIES: usize = 60;
 const HALVINGS: usize = 8;
 
 /// Error-controlled integrator; remembers its step and method between calls.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Adaptive {
     tolerances: Tolerances,
     /// both methods may be used
@@ -90,16 +90,8 @@ impl Adaptive {
             tolerances,
             may_change: matches!(method, Method::Adaptive(_)),
             is_implicit: matches!(method, Method::Stiff(_)),
-            explicit: None,
-            implicit: None,
-            next: 0.0,
-            since_look: 0,
-            agreeing: 0,
-            granted: 0,
-            left: 0,
-            before: 0,
             of_run: STEPS_PER_RUN,
-            spent: 0,
+            ..Self::default()
         }
     }
 
@@ -149,21 +141,14 @@ impl Adaptive {
         }
         self.since_look = 0;
         let product = spectral_radius(leg.f, leg.t, leg.x) * step;
-        let speaks_for_change = if self.is_implicit {
-            product < STIFF_BELOW
-        } else {
-            product > STIFF_ABOVE
+        self.agreeing = match self.is_implicit {
+            true if product < STIFF_BELOW => self.agreeing + 1,
+            false if product > STIFF_ABOVE => self.agreeing + 1,
+            _ => 0,
         };
-        self.agreeing = if speaks_for_change {
-            self.agreeing + 1
-        } else {
-            0
-        };
-        let change = self.agreeing >= LOOKS;
-        if change {
-            self.agreeing = 0;
-        }
-        change
+        let changes = self.agreeing >= LOOKS;
+        self.agreeing %= LOOKS;
+        changes
     }
 
     /// Steps of one of the methods; false where the other one fits better from there.
@@ -229,10 +214,9 @@ impl Adaptive {
                 Err(shorter) => self.next = shorter,
                 Ok(next) => {
                     // a step cut short by a stop says nothing about the next one
-                    self.next = if step < proposed {
-                        proposed.max(next)
-                    } else {
-                        next
+                    self.next = match step < proposed {
+                        true => proposed.max(next),
+                        false => next,
                     };
                     return Ok(step);
                 }
@@ -398,22 +382,18 @@ impl<D: Dynamics> Leg<'_, '_, D> {
     /// The step to take: the proposed one, or what ends the leg without a
     /// tiny step at its end.
     fn step(&self, proposed: f64) -> f64 {
-        let left = self.to - self.t;
-        if proposed >= left {
-            left
-        } else if proposed > 0.5 * left {
-            0.5 * left
-        } else {
-            proposed
+        match self.to - self.t {
+            left if proposed >= left => left,
+            left if proposed > 0.5 * left => 0.5 * left,
+            _ => proposed,
         }
     }
 
     /// Time goes on by a step.
     fn pass(&mut self, step: f64) {
-        self.t = if step == self.to - self.t {
-            self.to
-        } else {
-            self.t + step
+        self.t = match step == self.to - self.t {
+            true => self.to,
+            false => self.t + step,
         };
     }
 

@@ -213,7 +213,7 @@ pub fn fastest_mode(
 #[must_use]
 pub fn fastest_at(evaluation: &mut Evaluation, start: &[f64], sizes: &[f64]) -> Option<Fastest> {
     evaluation.enter(0.0);
-    let seen = fastest(evaluation, 0.0, start, sizes);
+    let seen = fastest(evaluation, 0.0, start, Some(sizes));
     (seen.step() > 0.0).then_some(seen)
 }
 

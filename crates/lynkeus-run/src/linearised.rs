@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use lynkeus_expr::{Graph, Node, jacobian};
 
+use crate::method::are_finite;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Evaluation, Events, System};
 
@@ -55,18 +56,13 @@ impl Linearised {
         outputs: &[(String, Node)],
         jacobians: &Jacobians<Entries>,
     ) -> Result<Self, Error> {
-        let Jacobians {
-            state,
-            estimate,
-            output,
-        } = jacobians;
         let mut all = vec![];
-        let state = Jacobian::among(&mut all, state);
+        let state = Jacobian::among(&mut all, &jacobians.state);
         all.extend_from_slice(outputs);
         let jacobians = Jacobians {
             state,
-            estimate: Jacobian::among(&mut all, estimate),
-            output: Jacobian::among(&mut all, output),
+            estimate: Jacobian::among(&mut all, &jacobians.estimate),
+            output: Jacobian::among(&mut all, &jacobians.output),
         };
         let system = System::new(graph, time, states, signals, derivatives, &all)?;
         Ok(Self { system, jacobians })
@@ -200,7 +196,7 @@ impl OutputMap {
         known.copy_from_slice(u);
         self.evaluation.enter(t);
         self.evaluation.outputs(t, &[], &mut self.values);
-        match self.values[..needed].iter().all(|v| v.is_finite()) {
+        match are_finite(&self.values[..needed]) {
             true => Ok(self.outputs()),
             false => Err(self.evaluation.not_finite(t, &[])),
         }

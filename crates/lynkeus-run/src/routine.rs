@@ -72,19 +72,11 @@ const FEW: usize = 50_000;
 const SAVED: usize = 20;
 
 impl Routine {
-    /// `outputs` as functions of so many inputs.
+    /// `outputs` as functions of so many inputs; their places where they are entries of a Jacobian.
     ///
     /// # Errors
     /// [`MissingInput`] where an output depends on another symbol.
     pub fn new(
-        equations: &Arc<Equations>,
-        inputs: usize,
-        outputs: Vec<Node>,
-    ) -> Result<Arc<Self>, MissingInput> {
-        Self::placed(equations, inputs, outputs, vec![])
-    }
-
-    fn placed(
         equations: &Arc<Equations>,
         inputs: usize,
         outputs: Vec<Node>,
@@ -153,7 +145,7 @@ impl Routine {
             let entries = entries.into_iter();
             let placed = entries.map(|(row, column, node)| (node, Place { row, column }));
             let (nodes, places) = placed.unzip();
-            Self::placed(&self.equations, self.tape.inputs(), nodes, places).ok()
+            Self::new(&self.equations, self.tape.inputs(), nodes, places).ok()
         };
         self.slopes.get_or_init(find).as_ref()
     }
@@ -300,7 +292,7 @@ mod tests {
             let symbols: Vec<Node> = [t].into_iter().chain(x.iter().map(|x| x.node())).collect();
             let equations = Arc::new(Equations::new(&g, &symbols, &dx, &[]).unwrap());
             let dx = equations.roots.free.derivatives.clone();
-            let routine = Routine::new(&equations, symbols.len(), dx).unwrap();
+            let routine = Routine::new(&equations, symbols.len(), dx, vec![]).unwrap();
             routine.slopes(n).map(|known| known.places.len())
         };
         assert_eq!(known(400, false), Some(799));

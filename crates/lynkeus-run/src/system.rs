@@ -87,9 +87,10 @@ impl System {
         let equations = Arc::new(equations);
         let Equations { roots, inputs, .. } = &*equations;
         let both = |roots: &Both<Vec<Node>>, inputs: usize| -> Result<_, MissingInput> {
+            let routine = |of: &Vec<Node>| Routine::new(&equations, inputs, of.clone(), vec![]);
             Ok(Both {
-                derivatives: Routine::new(&equations, inputs, roots.derivatives.clone())?,
-                outputs: Routine::new(&equations, inputs, roots.outputs.clone())?,
+                derivatives: routine(&roots.derivatives)?,
+                outputs: routine(&roots.outputs)?,
             })
         };
         let held = (!equations.jumps.is_empty()).then(|| both(&roots.held, inputs.len()));

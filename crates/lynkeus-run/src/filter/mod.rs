@@ -137,15 +137,11 @@ impl Filter {
         })
     }
 
-    /// Whether the smoother needs the transition between two updates; a window finds its own.
-    fn keeps_transitions(&self) -> bool {
-        self.history.is_some() && !matches!(self.engine, Engine::MovingHorizon(_))
-    }
-
     /// To the next sample; the transition is what the smoother needs of it. Where the plant has no
     /// value on the way, inside the declared ranges.
     fn predict(&mut self, from: f64, sample: &Sample<'_>) -> Result<Option<Profile>, Error> {
-        let keep = self.keeps_transitions();
+        // a window finds its own
+        let keep = self.sensing.corrections.is_some();
         let (propagation, belief) = (&mut self.propagation, &mut self.belief);
         if let Some(spare) = &mut self.spare {
             spare.driven.start(propagation.driven.signals());

@@ -1,5 +1,6 @@
 //! A plant with its sensors and noises, compiled for what follows a covariance.
 
+use std::cmp::Ordering;
 use std::fmt::Write;
 
 use lynkeus_expr::{Graph, Node};
@@ -92,26 +93,25 @@ impl NoisyModel {
         flow: Linearised,
         confined: Option<Linearised>,
     ) -> Result<Self, Error> {
-        let NoisyPlant {
-            graph,
-            time,
-            states,
-            inputs,
-            sensors,
-            ..
-        } = plant;
-        let outputs = sensors.iter().map(|s| (s.name.clone(), s.output));
+        let outputs = plant.sensors.iter().map(|s| (s.name.clone(), s.output));
         let outputs: Vec<(String, Node)> = outputs.collect();
+        let (graph, time) = (plant.graph, plant.time);
         Ok(Self {
             flow,
-            output_map: Linearised::output_map(graph, *time, states, inputs, &outputs)?,
-            sensors: sensors.clone(),
+            output_map: Linearised::output_map(
+                graph,
+                time,
+                &plant.states,
+                &plant.inputs,
+                &outputs,
+            )?,
+            sensors: plant.sensors.clone(),
             process_noise: plant.process_noise.clone(),
             initial_variance: plant.initial_variance.clone(),
             ranges: plant.ranges.clone(),
             confined,
             lag: None,
-            estimates: states.len(),
+            estimates: plant.states.len(),
         })
     }
 
@@ -157,18 +157,13 @@ fn check(plant: &NoisyPlant<'_>) -> Result<(), Error> {
             check_size(what, name, *value)?;
         }
     }
-    for Sensor {
-        name,
-        noise,
-        limits,
-        ..
-    } in &plant.sensors
-    {
-        check_size("noise", name, noise.size())?;
-        if let Some(Limits { low, high }) = limits
-            && (low.is_nan() || high.is_nan() || low >= high)
+    for sensor in &plant.sensors {
+        check_size("noise", &sensor.name, sensor.noise.size())?;
+        if let Some(Limits { low, high }) = sensor.limits
+            && low.partial_cmp(&high) != Some(Ordering::Less)
         {
-            let (what, found) = (format!("limits of '{name}'"), format!("[{low}, {high}]"));
+            let what = format!("limits of '{}'", sensor.name);
+            let found = format!("[{low}, {high}]");
             return Err(Error::setting(what, "a lower and a higher number", found));
         }
     }

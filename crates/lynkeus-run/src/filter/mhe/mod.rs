@@ -61,9 +61,7 @@ impl Persist for Mhe {
         let count = walk.length(self.rows.len())?;
         self.rows.resize_with(count, Row::default);
         for row in &mut self.rows {
-            // a row that was not there yet has no room
-            row.make_room(self.inputs, states);
-            row.walk(walk, self.sensors)?;
+            row.walk(walk, [self.inputs, states, self.sensors])?;
         }
         Ok(())
     }
@@ -115,14 +113,8 @@ impl Mhe {
     /// The first row leaves. What is known before the second are the states as the window has
     /// them. A bound that was met there told where the state is, and not that it will never leave.
     fn shorten(&mut self, solved: GaussNewtonStep) {
-        let GaussNewtonStep {
-            solution,
-            rows,
-            free,
-            ..
-        } = solved;
-        let passes = solution.passes.unwrap_or(free);
-        let (mut passes, mut rows) = (passes.into_iter(), rows.into_iter().skip(1));
+        let passes = solved.solution.passes.unwrap_or(solved.free);
+        let (mut passes, mut rows) = (passes.into_iter(), solved.rows.into_iter().skip(1));
         let (Some(first), Some(second), Some(linear)) = (passes.next(), passes.next(), rows.next())
         else {
             return;
@@ -218,10 +210,9 @@ impl Mhe {
         for ((row, from), (x, met)) in all.zip(tried.solution.x.iter().zip(&tried.solution.met)) {
             for (guess, (from, to)) in row.guess.iter_mut().zip(from.iter().zip(x)) {
                 // all of it without rounding
-                *guess = if share < 1.0 {
-                    from + share * (to - from)
-                } else {
-                    *to
+                *guess = match share < 1.0 {
+                    true => from + share * (to - from),
+                    false => *to,
                 };
             }
             confine(&mut row.guess, &self.bounds);
@@ -365,15 +356,15 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    /// Of so many inputs and states, for a walk over it.
-    pub fn make_room(&mut self, inputs: usize, states: usize) {
+    /// Of a plant with so many inputs, states and sensors.
+    pub fn walk(
+        &mut self,
+        walk: &mut Walk<'_>,
+        [inputs, states, sensors]: [usize; 3],
+    ) -> Result<(), Damaged> {
+        // a row that was not there yet has no room
         self.inputs.resize(inputs, 0.0);
         self.guess.resize(states, 0.0);
-    }
-
-    /// Of a plant with so many sensors.
-    pub fn walk(&mut self, walk: &mut Walk<'_>, sensors: usize) -> Result<(), Damaged> {
-        let states = self.guess.len();
         walk.number(&mut self.t)?;
         walk.numbers(&mut self.inputs)?;
         walk.numbers(&mut self.guess)?;

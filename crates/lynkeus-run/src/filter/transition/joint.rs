@@ -119,28 +119,21 @@ impl Dynamics for Variational<'_> {
     }
 
     fn derivatives(&mut self, t: f64, z: &[f64], dz: &mut [f64]) {
-        let Equation {
-            n,
-            width,
-            entries,
-            slopes,
-            noise,
-            ..
-        } = &mut *self.equation;
-        let (n, width) = (*n, *width);
+        let equation = &mut *self.equation;
+        let (n, width, slopes) = (equation.n, equation.width, &mut equation.slopes);
         let (x, rows) = z.split_at(n);
         let (dx, drows) = dz.split_at_mut(n);
         self.driven.derivatives(t, x, dx);
         self.driven.outputs(t, x, slopes);
         drows.fill(0.0);
-        for (&(i, j), slope) in entries.iter().zip(&*slopes) {
+        for (&(i, j), slope) in equation.entries.iter().zip(&*slopes) {
             let into = &mut drows[i * width..(i + 1) * width];
             for (into, from) in into.iter_mut().zip(&rows[j * width..(j + 1) * width]) {
                 *into += slope * from;
             }
         }
         // FW is there; its transpose and Q/q are added
-        for (i, q) in noise.iter().enumerate() {
+        for (i, q) in equation.noise.iter().enumerate() {
             for j in 0..i {
                 let (a, b) = (i * width + n + j, j * width + n + i);
                 let sum = drows[a] + drows[b];

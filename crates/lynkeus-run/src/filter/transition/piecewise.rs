@@ -44,7 +44,6 @@ pub(crate) struct Piecewise {
     /// units of the states
     units: Vec<f64>,
     slopes: Vec<f64>,
-    derivatives: Vec<f64>,
 }
 
 /// A piece of an interval.
@@ -55,6 +54,10 @@ struct Piece {
 }
 
 impl Piece {
+    fn new(from: f64, to: f64) -> Self {
+        Self { from, to }
+    }
+
     fn length(self) -> f64 {
         self.to - self.from
     }
@@ -75,10 +78,9 @@ impl Piecewise {
         Ok(Self {
             integrator: Integrator::new(method, n)?,
             entries: flow.jacobians().state.places().to_vec(),
-            process_noise: if noisy {
-                process_noise.to_vec()
-            } else {
-                vec![]
+            process_noise: match noisy {
+                true => process_noise.to_vec(),
+                false => vec![],
             },
             tolerance,
             lobatto: Lobatto::new(),
@@ -86,7 +88,6 @@ impl Piecewise {
             step: f64::INFINITY,
             units: vec![],
             slopes: vec![0.0; flow.system().outputs().len()],
-            derivatives: vec![0.0; n],
         })
     }
 
@@ -111,10 +112,7 @@ impl Piecewise {
             if end - start <= 16.0 * resolution(end) && end < to {
                 continue;
             }
-            let segment = Piece {
-                from: start,
-                to: end,
-            };
+            let segment = Piece::new(start, end);
             driven.enter(segment.at(0.5));
             if start == from {
                 self.choose_units(driven, belief, segment, x)?;
@@ -160,7 +158,6 @@ impl Piecewise {
 
     /// F at (t, x), the values of its entries.
     fn look(&mut self, driven: &mut Evaluation, t: f64, x: &[f64]) -> Result<(), Error> {
-        driven.derivatives(t, x, &mut self.derivatives);
         driven.outputs(t, x, &mut self.slopes);
         match self.slopes.iter().all(|s| s.is_finite()) {
             true => Ok(()),
@@ -211,7 +208,7 @@ impl Piecewise {
                 step if step > 0.5 * left => t + 0.5 * left,
                 step => t + step,
             };
-            let piece = Piece { from: t, to };
+            let piece = Piece::new(t, to);
             let mut end = vec![];
             let polynomial = self.polynomial(driven, piece, x, &mut end)?;
             let n = x.len();
@@ -229,11 +226,8 @@ impl Piecewise {
             }
             let stiff = polynomial.is_some() && piece.length() * MOST_SERIES < segment.length();
             if stiff || shortest {
-                let rest = Piece {
-                    from: t,
-                    to: segment.to,
-                };
                 self.step = f64::INFINITY;
+                let rest = Piece::new(t, segment.to);
                 return self.stiff(driven, rest, x, transition);
             }
             self.step = 0.5 * piece.length();
@@ -345,29 +339,21 @@ impl Piecewise {
             return Ok(coarse);
         }
         let half = piece.at(0.5);
-        let (left, right) = (
-            Piece { to: half, ..piece },
-            Piece {
-                from: half,
-                ..piece
-            },
-        );
+        let (left, right) = (Piece::new(piece.from, half), Piece::new(half, piece.to));
         let first = self.leaf(driven, left, x)?;
         let second = self.leaf(driven, right, &first.end)?;
         let both = first.result.then(&second.result);
         // of a method of order 2, what is better is a quarter as wrong
         let error = both.distance(&coarse.result) / 3.0;
-        let (first, second) = if error <= self.tolerance.max(STIFF) {
-            (first, second)
-        } else {
-            let first = self.refined(driven, left, x, first, halvings - 1)?;
-            let second = self.leaf(driven, right, &first.end)?;
-            let middle = first.end.clone();
-            (
-                first,
-                self.refined(driven, right, &middle, second, halvings - 1)?,
-            )
-        };
+        if error <= self.tolerance.max(STIFF) {
+            return Ok(Leaf {
+                result: both,
+                ..second
+            });
+        }
+        let first = self.refined(driven, left, x, first, halvings - 1)?;
+        let second = self.leaf(driven, right, &first.end)?;
+        let second = self.refined(driven, right, &first.end, second, halvings - 1)?;
         Ok(Leaf {
             result: first.result.then(&second.result),
             varies: true,
@@ -387,13 +373,11 @@ impl Piecewise {
         let mut end = middle.clone();
         self.integrator.advance(driven, half, piece.to, &mut end)?;
         let last = self.scaled(driven, piece.to, &end, h)?;
-        let three = first.iter().zip(&between).zip(&last);
-        let mean = three.map(|((a, b), c)| (a + 4.0 * b + c) / 6.0);
+        let three = || first.iter().zip(&between).zip(&last);
+        let mean = three().map(|((a, b), c)| (a + 4.0 * b + c) / 6.0);
         let mean = self.sparse(&mean.collect::<Vec<f64>>());
-        let ends = first.iter().zip(&between).zip(&last);
-        let varies = ends
-            .map(|((a, b), c)| (a - b).abs().max((a - c).abs()) / a.abs().max(1.0))
-            .any(|change| change > STIFF);
+        let change = |a: f64, b: f64, c: f64| (a - b).abs().max((a - c).abs()) / a.abs().max(1.0);
+        let varies = three().any(|((a, b), c)| change(*a, *b, *c) > STIFF);
         let drive = self.drive(h);
         let result = Transition::constant(x.len(), &mean, &drive, &mut self.series);
         let result = result.ok_or_else(|| driven.not_finite(piece.from, x))?;
@@ -515,12 +499,7 @@ fn combined(basis: &[Vec<f64>], values: &[Vec<f64>]) -> Vec<Vec<f64>> {
 fn basis(nodes: &[f64]) -> Vec<Vec<f64>> {
     let one = |i: usize| {
         let mut polynomial = vec![1.0];
-        for c in nodes
-            .iter()
-            .enumerate()
-            .filter(|(j, _)| *j != i)
-            .map(|n| n.1)
-        {
+        for (_, c) in nodes.iter().enumerate().filter(|(j, _)| *j != i) {
             let scale = 1.0 / (nodes[i] - c);
             polynomial.push(0.0);
             for k in (0..polynomial.len()).rev() {

@@ -6,7 +6,7 @@
 use lynkeus_expr::Graph;
 use nalgebra::{DMatrix, DVector};
 
-use crate::filter::root::factor;
+use crate::filter::root::Factor;
 use crate::filter::tests::exact;
 use crate::filter::{FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor};
 use crate::{Estimator, Level};
@@ -167,7 +167,7 @@ impl Case {
             .collect();
         (
             transition,
-            DMatrix::from_row_slice(n, n, &factor(&entries, n)),
+            DMatrix::from_row_slice(n, n, Factor::default().of(&entries, n)),
         )
     }
 
