@@ -190,7 +190,8 @@ impl Symbols {
 
 /// A closed loop under way.
 pub(crate) struct Loop {
-    joined: Evaluation,
+    /// plant and observer as one system, whose outputs are the values of a row
+    pub joined: Evaluation,
     sensors: Sensors,
     wiring: Wiring,
 }
@@ -206,11 +207,6 @@ impl Loop {
             sensors,
             wiring,
         })
-    }
-
-    /// Plant and observer as one system, whose outputs are the values of a row.
-    pub(crate) fn joined(&mut self) -> &mut Evaluation {
-        &mut self.joined
     }
 
     /// Columns that are not estimates.

@@ -1,7 +1,6 @@
 //! Runs of an observer that end: an estimate that diverges, a matrix that is singular.
 
 use crate::error::{digits, state_text};
-use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, Margin};
 
 /// An estimate this many times larger than anything seen is no estimate.
@@ -10,7 +9,8 @@ const FACTOR: f64 = 1e12;
 /// Bound on an estimate, from its start and the signals seen.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bound {
-    scale: f64,
+    /// the largest number seen, or 1
+    pub scale: f64,
 }
 
 impl Bound {
@@ -25,11 +25,6 @@ impl Bound {
         for value in values {
             self.scale = self.scale.max(value.abs());
         }
-    }
-
-    /// The largest number seen, or 1.
-    pub(crate) fn scale(&self) -> f64 {
-        self.scale
     }
 
     /// # Errors
@@ -86,12 +81,6 @@ pub(crate) fn check_deviations(
             name: names.get(i).cloned().unwrap_or_default(),
             value: deviations[i],
         }),
-    }
-}
-
-impl Persist for Bound {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        walk.number(&mut self.scale)
     }
 }
 

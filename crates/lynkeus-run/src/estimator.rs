@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::filter::{Filter, FilterSettings, Health, Innovation, NoisyModel, Smoothed};
+use crate::filter::{Filter, Health, Innovation, Smoothed};
 use crate::runner::{Runner, Sample};
 use crate::sampled::Sampled;
 use crate::snapshot::{self, Damaged, Walk};
@@ -104,18 +104,6 @@ impl Estimator {
     /// As [`Blueprint::estimator`].
     pub fn new(observer: &System, settings: EstimatorSettings) -> Result<Self, Error> {
         Self::of(Blueprint::new(observer, settings))
-    }
-
-    /// A Kalman filter, at the plant's first estimate.
-    ///
-    /// # Errors
-    /// As [`Blueprint::estimator`].
-    pub fn filter(
-        model: &NoisyModel,
-        settings: FilterSettings,
-        run: EstimatorSettings,
-    ) -> Result<Self, Error> {
-        Self::of(Blueprint::filter(model.clone(), settings, run))
     }
 
     /// Goes to `t`, at which nothing is read: inputs stay as they were, and the estimate is

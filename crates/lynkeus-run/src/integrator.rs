@@ -200,18 +200,14 @@ impl Persist for Integrator {
         match &mut self.stepper {
             Stepper::Adaptive(adaptive) => adaptive.walk(walk),
             Stepper::Fixed(fixed) => {
-                walk.optional(&mut fixed.advice, |walk, advice| advice.walk(walk))?;
+                walk.optional(&mut fixed.advice, |walk, advice| {
+                    walk.number(&mut advice.spectral_radius)?;
+                    walk.number(&mut advice.needed)?;
+                    walk.number(&mut advice.used)
+                })?;
                 walk.count(&mut fixed.since_look)
             }
         }
-    }
-}
-
-impl Persist for StepAdvice {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        walk.number(&mut self.spectral_radius)?;
-        walk.number(&mut self.needed)?;
-        walk.number(&mut self.used)
     }
 }
 

@@ -167,14 +167,12 @@ impl Routine {
 fn classical_step(g: &Graph, inputs: &[Node], slopes: &[Node]) -> (Vec<Node>, Vec<Node>) {
     let h = g.fresh("h");
     let t = g.expr(inputs[0]);
-    let x: Vec<Expr<'_>> = inputs[1..=slopes.len()]
-        .iter()
-        .map(|&x| g.expr(x))
-        .collect();
+    let states = &inputs[1..=slopes.len()];
+    let x: Vec<Expr<'_>> = states.iter().map(|&x| g.expr(x)).collect();
     let moved = |factor: Expr<'_>, k: &[Node]| -> Vec<Node> {
         let ends = x.iter().zip(k);
-        ends.map(|(&x, &k)| (x + factor * g.expr(k)).node())
-            .collect()
+        let ends = ends.map(|(&x, &k)| (x + factor * g.expr(k)).node());
+        ends.collect()
     };
     let slope = |t: Expr<'_>, at: Vec<Node>| -> Vec<Node> {
         let places = inputs.iter().copied().zip([t.node()].into_iter().chain(at));

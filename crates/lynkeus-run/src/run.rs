@@ -83,8 +83,8 @@ struct Run {
 impl Run {
     fn new(simulation: &Simulation) -> Result<Self, Error> {
         let itinerary = Itinerary::new(simulation)?;
-        let mut system = Loop::new(simulation, itinerary.hold())?;
-        let x = system.joined().system().start().to_vec();
+        let system = Loop::new(simulation, itinerary.hold())?;
+        let x = system.joined.system().start().to_vec();
         Ok(Self {
             itinerary: itinerary.exact(system.is_exact()),
             integrator: Integrator::new(simulation.method, x.len())?,
@@ -106,10 +106,9 @@ impl Run {
             match stop {
                 Stop::Draw { is_sample } => self.system.draw(is_sample),
                 Stop::Advance { from, to } => {
-                    let done = self
-                        .integrator
-                        .advance(&mut self.system, from, to, &mut self.x);
-                    let scale = self.bound.scale();
+                    let (system, x) = (&mut self.system, &mut self.x);
+                    let done = self.integrator.advance(system, from, to, x);
+                    let scale = self.bound.scale;
                     done.map_err(|error| self.system.explained(error, &self.x, scale))?;
                 }
                 Stop::Row(time) => {
@@ -126,14 +125,13 @@ impl Run {
 
     fn record(&mut self, t: f64) -> Result<&[f64], Error> {
         self.row.clear();
-        self.system.joined().enter(t);
+        self.system.joined.enter(t);
         self.system.row(t, &self.x, &mut self.row)?;
         let (names, estimate) = self.system.estimate(&self.x);
         self.bound.see(&self.row[..self.system.known_columns()]);
-        let inside = self
-            .bound
-            .check(t, names, estimate, || self.integrator.hint());
-        let scale = self.bound.scale();
+        let (bound, hint) = (self.bound, || self.integrator.hint());
+        let inside = bound.check(t, names, estimate, hint);
+        let scale = bound.scale;
         inside.map_err(|error| self.system.explained(error, &self.x, scale))?;
         Ok(&self.row)
     }
@@ -215,10 +213,9 @@ impl Itinerary {
 
     /// Time of row k.
     pub fn time(&self, k: usize) -> f64 {
-        if k == self.intervals {
-            self.until
-        } else {
-            self.grid.time(k)
+        match k == self.intervals {
+            true => self.until,
+            false => self.grid.time(k),
         }
     }
 
@@ -249,11 +246,9 @@ impl Iterator for Itinerary {
             return self.planned.take();
         }
         let Some(before) = self.row.checked_sub(1) else {
-            let is_drawn = self.drawn > 0;
-            return Some(if is_drawn {
-                self.arrive(self.start)
-            } else {
-                self.draw()
+            return Some(match self.drawn {
+                0 => self.draw(),
+                _ => self.arrive(self.start),
             });
         };
         let (from, to) = (self.time(before), self.time(self.row));
@@ -275,12 +270,7 @@ impl Iterator for Itinerary {
 
 /// Number of intervals between rows.
 fn intervals(simulation: &Simulation) -> Result<usize, Error> {
-    let Simulation {
-        start,
-        until,
-        output_step,
-        ..
-    } = simulation;
+    let (start, until) = (simulation.start, simulation.until);
     if !start.is_finite() {
         return Err(Error::setting("start", "a finite time", start));
     }
@@ -288,16 +278,9 @@ fn intervals(simulation: &Simulation) -> Result<usize, Error> {
         let expected = format!("a finite time after the start {start}");
         return Err(Error::setting("until", expected, until));
     }
-    if !(*output_step > 0.0 && output_step.is_finite()) {
-        return Err(Error::setting(
-            "output_step",
-            "a finite time above 0",
-            output_step,
-        ));
-    }
-    let intervals = ((until - start) / output_step * (1.0 - 1e-12))
-        .ceil()
-        .max(1.0);
+    let output_step = checked_step("output_step", simulation.output_step)?;
+    let intervals = (until - start) / output_step * (1.0 - 1e-12);
+    let intervals = intervals.ceil().max(1.0);
     let cells = intervals * (1 + simulation.plant.states().len()) as f64;
     if cells > MOST_CELLS {
         let expected = format!("a step that makes fewer than {MOST_CELLS:e} values");
@@ -305,6 +288,13 @@ fn intervals(simulation: &Simulation) -> Result<usize, Error> {
         return Err(Error::setting("output_step", expected, found));
     }
     Ok(intervals as usize)
+}
+
+fn checked_step(name: &str, step: f64) -> Result<f64, Error> {
+    match step > 0.0 && step.is_finite() {
+        true => Ok(step),
+        false => Err(Error::setting(name, "a finite time above 0", step)),
+    }
 }
 
 /// Draws of process noise from one sample to the next.
@@ -317,14 +307,8 @@ fn draws(simulation: &Simulation) -> Result<usize, Error> {
 }
 
 fn sample_step(simulation: &Simulation) -> Result<f64, Error> {
-    let sample_step = simulation
-        .noise
-        .sample_step
-        .unwrap_or(simulation.output_step);
-    if !(sample_step > 0.0 && sample_step.is_finite()) {
-        let expected = "a finite time above 0";
-        return Err(Error::setting("sample_step", expected, sample_step));
-    }
+    let given = simulation.noise.sample_step;
+    let sample_step = checked_step("sample_step", given.unwrap_or(simulation.output_step))?;
     let samples = (simulation.until - simulation.start) / sample_step;
     if samples > MOST_CELLS {
         let expected = format!("a step that makes fewer than {MOST_CELLS:e} samples");

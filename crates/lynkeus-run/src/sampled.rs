@@ -4,6 +4,7 @@ use crate::Evaluation;
 use crate::blueprint::Tuned;
 use crate::divergence::{Bound, check_deviations};
 use crate::filter::{Health, Innovation, NoisyModel};
+use crate::method::are_finite;
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::spread::Spread;
@@ -32,21 +33,13 @@ impl Sampled {
         predict: bool,
         errors: Option<&NoisyModel>,
     ) -> Result<Self, Error> {
-        let Blueprint {
-            flow: system,
-            sensors,
-            run,
-            judges,
-            ..
-        } = blueprint;
-        let count = sensors.len();
+        let (system, run) = (&blueprint.flow, blueprint.run);
+        let count = blueprint.sensors.len();
         let tuned = blueprint.tuned().map(Tuned::signals).unwrap_or_default();
+        let signals = system.signals().len().saturating_sub(tuned.len());
         for (what, found) in [
             ("states", system.states().len()),
-            (
-                "signals",
-                system.signals().len().saturating_sub(tuned.len()),
-            ),
+            ("signals", signals),
             ("outputs", system.outputs().len()),
         ] {
             if found < count {
@@ -54,15 +47,13 @@ impl Sampled {
                 return Err(Error::setting(what, expected, found));
             }
         }
-        let mut signals = vec![0.0; system.signals().len().saturating_sub(tuned.len())];
-        signals.extend(tuned);
-        let spread = errors.map(|model| Spread::new(model, *judges, *run));
+        let spread = errors.map(|model| Spread::new(model, blueprint.judges, run));
         Ok(Self {
             driven: system.driven(run.between),
             integrator: Integrator::new(run.method, system.states().len())?,
             x: system.start().to_vec(),
             outputs: vec![0.0; system.estimates().len()],
-            signals,
+            signals: [vec![0.0; signals], tuned].concat(),
             sensors: count,
             predict,
             bound: Bound::new(system.start()),
@@ -88,7 +79,7 @@ impl Sampled {
         let evaluation = &mut self.driven;
         evaluation.enter(t);
         evaluation.estimates(t, &self.x, &mut self.outputs);
-        match self.outputs.iter().all(|v| v.is_finite()) {
+        match are_finite(&self.outputs) {
             true => Ok(()),
             false => Err(evaluation.not_finite(t, &self.x)),
         }
@@ -113,11 +104,12 @@ impl Runner for Sampled {
         self.driven.aim(from, sample.t, sample.inputs);
         let done = match &mut self.spread {
             Some(spread) => spread.advance(from, sample, &mut self.x),
-            None => self
-                .integrator
-                .advance(&mut self.driven, from, sample.t, &mut self.x),
+            None => {
+                let (driven, x) = (&mut self.driven, &mut self.x);
+                self.integrator.advance(driven, from, sample.t, x)
+            }
         };
-        let scale = self.bound.scale();
+        let scale = self.bound.scale;
         let evaluation = &mut self.driven;
         done.map_err(|error| evaluation.explained(error, &self.x, scale))?;
         self.driven.arrive();
@@ -155,10 +147,9 @@ impl Runner for Sampled {
     fn report(&mut self, t: f64) -> Result<(), Error> {
         let own = self.x.len() - self.sensors;
         let names = self.driven.system().states();
-        let inside = self
-            .bound
-            .check(t, names, &self.x[..own], || self.integrator.hint());
-        let scale = self.bound.scale();
+        let (bound, hint) = (self.bound, || self.integrator.hint());
+        let inside = bound.check(t, names, &self.x[..own], hint);
+        let scale = bound.scale;
         let evaluation = &mut self.driven;
         inside.map_err(|error| evaluation.explained(error, &self.x, scale))?;
         self.evaluate(t)?;
@@ -205,7 +196,7 @@ impl Persist for Sampled {
         self.integrator.walk(walk)?;
         walk.numbers(&mut self.x)?;
         walk.numbers(&mut self.outputs)?;
-        self.bound.walk(walk)?;
+        walk.number(&mut self.bound.scale)?;
         if let Some(spread) = &mut self.spread {
             spread.walk(walk)?;
         }

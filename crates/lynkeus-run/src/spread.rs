@@ -179,7 +179,7 @@ impl Persist for Spread {
         self.propagation.walk(walk)?;
         self.belief.walk(walk)?;
         if let Some(settled) = &mut self.settled {
-            settled.walk(walk)?;
+            walk.numbers(&mut settled.entries)?;
         }
         for innovation in &mut self.innovations {
             innovation.walk(walk)?;
@@ -265,11 +265,7 @@ impl Spread {
             let predicted = expected.outputs()[i];
             let noise = self.sensors[i].noise.variance(predicted);
             expected.write_slopes(i, &mut row);
-            let mut deviation = |root: &Root| {
-                root.transposed_times(&row, &mut projected);
-                let own: f64 = projected.iter().map(|p| p * p).sum();
-                (own + noise).sqrt()
-            };
+            let mut deviation = |root: &Root| (variance(root, &row, &mut projected) + noise).sqrt();
             *innovation = Innovation {
                 value: reading - predicted,
                 deviation: deviation(&self.belief.root),
@@ -287,10 +283,15 @@ impl Spread {
         let (mut row, mut projected) = (vec![0.0; n], vec![0.0; n]);
         for (i, deviation) in self.deviations.iter_mut().enumerate() {
             self.jacobians.estimate.write_row(&self.values, i, &mut row);
-            self.belief.root.transposed_times(&row, &mut projected);
-            *deviation = projected.iter().map(|p| p * p).sum::<f64>().sqrt();
+            *deviation = variance(&self.belief.root, &row, &mut projected).sqrt();
         }
     }
+}
+
+/// The variance of a sum of the states, with such weights.
+fn variance(root: &Root, weights: &[f64], projected: &mut [f64]) -> f64 {
+    root.transposed_times(weights, projected);
+    projected.iter().map(|p| p * p).sum()
 }
 
 /// ν = v − C e becomes what a sensor's state is off by: `views` are the entries of its row of C.
@@ -304,10 +305,8 @@ fn read(root: &mut Root, state: usize, views: &[(usize, f64)], deviation: f64) {
     }
     root.entries[state * n..(state + 1) * n].copy_from_slice(&expected);
     // one column more for the new error, then back to n
-    let mut rows: Vec<f64> = (0..n)
-        .flat_map(|k| (0..n).map(move |i| (i, k)))
-        .map(|(i, k)| root.entries[i * n + k])
-        .collect();
+    let places = (0..n).flat_map(|k| (0..n).map(move |i| i * n + k));
+    let mut rows: Vec<f64> = places.map(|place| root.entries[place]).collect();
     rows.extend((0..n).map(|i| if i == state { deviation } else { 0.0 }));
     root.of_rows(&mut rows, &mut vec![0.0; n]);
 }

@@ -1,6 +1,7 @@
 //! Systems compiled for evaluation, and at work.
 
 use std::fmt::Write;
+use std::ops::Range;
 use std::sync::Arc;
 
 use lynkeus_expr::{Evaluator, Graph, MissingInput, Node, Tape};
@@ -305,14 +306,17 @@ impl Evaluation {
 
     /// The signals' values, in the order of [`System::signals`], to write to.
     pub fn signals_mut(&mut self) -> &mut [f64] {
-        let from = 1 + self.system.states().len();
-        let to = self.first_mode();
-        &mut self.inputs[from..to]
+        let places = self.signal_places();
+        &mut self.inputs[places]
     }
 
     /// The signals' values.
     pub fn signals(&self) -> &[f64] {
-        &self.inputs[1 + self.system.states().len()..self.first_mode()]
+        &self.inputs[self.signal_places()]
+    }
+
+    fn signal_places(&self) -> Range<usize> {
+        1 + self.system.states().len()..self.first_mode()
     }
 
     /// The first sample.
@@ -332,8 +336,8 @@ impl Evaluation {
     pub(crate) fn arrive(&mut self) {
         self.line = None;
         self.last.copy_from_slice(&self.next);
-        let place = 1 + self.system.states().len();
-        self.inputs[place..place + self.last.len()].copy_from_slice(&self.last);
+        let places = self.signal_places();
+        self.inputs[places].copy_from_slice(&self.last);
     }
 
     /// Writes the outputs at (t, x) to `y`, in the order of [`System::outputs`].
@@ -353,10 +357,9 @@ impl Evaluation {
     /// Writes what an observer reports at (t, x), in the order of
     /// [`System::estimates`].
     pub fn estimates(&mut self, t: f64, x: &[f64], estimates: &mut [f64]) {
-        if self.system.outputs().is_empty() {
-            estimates.copy_from_slice(x);
-        } else {
-            self.outputs(t, x, estimates);
+        match self.system.outputs().is_empty() {
+            true => estimates.copy_from_slice(x),
+            false => self.outputs(t, x, estimates),
         }
     }
 

@@ -130,7 +130,7 @@ impl Plan {
     fn legs(&mut self, from: f64, to: f64, events: &mut Vec<Event>) -> Result<(), Error> {
         check_interval(from, to)?;
         self.instants.clear();
-        let clock = self.clock.joined();
+        let clock = &mut self.clock.joined;
         clock.instants(from, to, &mut self.instants)?;
         let length = self.step.length(to - from).unwrap_or(to - from);
         for (start, end) in pieces(from, to, &mut self.instants) {
@@ -147,7 +147,7 @@ impl Plan {
 
     /// The values of what jumps with time.
     fn modes(&mut self, t: f64) -> Vec<f64> {
-        let clock = self.clock.joined();
+        let clock = &mut self.clock.joined;
         clock.enter(t);
         clock.modes().to_vec()
     }
@@ -155,7 +155,7 @@ impl Plan {
 
 /// The code of a step and of a row.
 fn program(clock: &mut Loop) -> Result<Option<Program>, Error> {
-    let system = clock.joined().system().clone();
+    let system = clock.joined.system().clone();
     let equations = system.equations();
     let (states, disturbances) = (equations.states.len(), equations.signals.len());
     let own = 1..1 + states + disturbances;
@@ -246,11 +246,8 @@ impl Divided {
         };
         let common = Tape::new(g, &common, &divided.values)?;
         let own_inputs = own.len();
-        let own = Tape::new(
-            g,
-            &[&divided.symbols, &inputs[own]].concat(),
-            &divided.roots,
-        )?;
+        let own = [&divided.symbols, &inputs[own]].concat();
+        let own = Tape::new(g, &own, &divided.roots)?;
         let sweeping = |own: &Tape| Function::sweeping(own, shared, spacing);
         Ok(Self {
             common: Engine::new(&common, Function::compile),

@@ -40,7 +40,7 @@ impl Belief {
 impl Persist for Belief {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         walk.numbers(&mut self.x)?;
-        self.root.walk(walk)
+        walk.numbers(&mut self.root.entries)
     }
 }
 

@@ -8,7 +8,7 @@
 //! ```
 //! use lynkeus_expr::Graph;
 //! use lynkeus_run::filter::{FilterKind, FilterSettings, NoisyModel, NoisyPlant, Sensor};
-//! use lynkeus_run::{Estimator, EstimatorSettings, Level};
+//! use lynkeus_run::{Blueprint, EstimatorSettings, Level};
 //!
 //! // a level that nobody moves, measured with noise of standard deviation 1
 //! let g = Graph::new();
@@ -26,7 +26,8 @@
 //!     confined: None,
 //! })?;
 //! let settings = FilterSettings::of(FilterKind::Extended);
-//! let mut filter = Estimator::filter(&model, settings, EstimatorSettings::default())?;
+//! let filter = Blueprint::filter(model, settings, EstimatorSettings::default());
+//! let mut filter = filter.estimator()?;
 //! filter.push(0.0, &[3.0])?;
 //! assert!((filter.estimate()[0] - 1.5).abs() < 1e-12);
 //! // no reading, no correction
@@ -326,7 +327,7 @@ impl Persist for Filter {
         self.propagation.walk(walk)?;
         match &mut self.engine {
             Engine::Extended(_) => {}
-            Engine::Unscented(ukf) => ukf.walk(walk)?,
+            Engine::Unscented(ukf) => ukf.integrator.walk(walk)?,
             Engine::MovingHorizon(mhe) => mhe.walk(walk)?,
         }
         if let Some(spare) = &mut self.spare {
@@ -335,7 +336,7 @@ impl Persist for Filter {
         self.belief.walk(walk)?;
         self.sensing.walk(walk)?;
         walk.numbers(&mut self.deviations)?;
-        self.bound.walk(walk)?;
+        walk.number(&mut self.bound.scale)?;
         let n = self.belief.x.len();
         walk.optional(&mut self.pending, |walk, pending| pending.walk(walk, n))
     }

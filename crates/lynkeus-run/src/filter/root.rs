@@ -1,7 +1,5 @@
 //! Square roots of covariances: P = S Sᵀ, matrices row by row.
 
-use crate::snapshot::{Damaged, Persist, Walk};
-
 /// A lower triangular root S of P, n × n. Whatever is done to S, S Sᵀ has no negative eigenvalue.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Root {
@@ -116,12 +114,6 @@ impl Root {
                 self.entries[j * n + i] = sign * rows[i * n + j];
             }
         }
-    }
-}
-
-impl Persist for Root {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        walk.numbers(&mut self.entries)
     }
 }
 

@@ -8,7 +8,6 @@ use super::settings::{SigmaPoints, Weights};
 use super::smoother::Correction;
 use super::transition::Propagation;
 use crate::runner::Sample;
-use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, Integrator, Method};
 
 /// Images of two points that differ by no more than this share of their size do not differ.
@@ -17,7 +16,7 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// Sigma points under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Ukf {
-    integrator: Integrator,
+    pub integrator: Integrator,
     weights: Weights,
     points: Vec<f64>,
     mean: Vec<f64>,
@@ -302,12 +301,6 @@ impl Weights {
         });
         let halves: Vec<f64> = apart.map(|d| 0.5 * d / self.spread).collect();
         root.against(&halves)
-    }
-}
-
-impl Persist for Ukf {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        self.integrator.walk(walk)
     }
 }
 

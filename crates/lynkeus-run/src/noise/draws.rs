@@ -3,8 +3,6 @@
 //! What is held for δ is white only for what is slow beside δ: the variance of x' = −ax + w then comes
 //! out as tanh(aδ/2)/(aδ/2) of what it is. Draws are as dense as the linearised plant needs.
 
-use std::ops::ControlFlow;
-
 use nalgebra::DMatrix;
 
 use crate::jacobian::fastest;
@@ -57,21 +55,16 @@ pub fn process_draws(simulation: &Simulation) -> ProcessDraws {
     let states = simulation.plant.states();
     let density = |name: &String| simulation.noise.process.get(name).copied().unwrap_or(0.0);
     let densities: Vec<f64> = states.iter().map(density).collect();
+    let (mut per_sample, mut are_enough) = (1, true);
     if densities.iter().any(|q| *q > 0.0) && samples.is_finite() && sample > 0.0 {
         let most = (MOST / samples).max(1.0).log2().floor() as usize;
         let needed = halvings(simulation, &densities, [sample, samples], most + 1);
-        let halvings = needed.min(most);
-        let per_sample = 1 << halvings;
-        return ProcessDraws {
-            per_sample,
-            hold: sample / per_sample as f64,
-            are_enough: needed <= most,
-        };
+        (per_sample, are_enough) = (1 << needed.min(most), needed <= most);
     }
     ProcessDraws {
-        per_sample: 1,
-        hold: sample,
-        are_enough: true,
+        per_sample,
+        hold: sample / per_sample as f64,
+        are_enough,
     }
 }
 
@@ -91,11 +84,7 @@ fn halvings(
         output_step: time / PLACES as f64,
         ..simulation.clone()
     };
-    let watch = &mut |_| ControlFlow::Continue(());
-    let run = match quiet.run_watched(watch) {
-        Ok(run) => run,
-        Err(ended) => ended.partial,
-    };
+    let run = quiet.run().unwrap_or_else(|ended| ended.partial);
     let mut plant = simulation.plant.evaluation();
     let (n, inputs) = (plant.dimension(), plant.signals().len());
     let mut slopes = Slopes::default();
@@ -203,15 +192,11 @@ impl Transition {
 
     /// Over twice the time.
     fn doubled(&self) -> Self {
-        let Self {
-            transition,
-            integral,
-            noise,
-        } = self;
+        let flow = &self.transition;
         Self {
-            transition: transition * transition,
-            integral: integral + transition * integral,
-            noise: noise + transition * noise * transition.transpose(),
+            transition: flow * flow,
+            integral: &self.integral + flow * &self.integral,
+            noise: &self.noise + flow * &self.noise * flow.transpose(),
         }
     }
 }

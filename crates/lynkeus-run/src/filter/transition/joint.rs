@@ -5,13 +5,12 @@ use std::sync::Arc;
 use super::series::Transition;
 use crate::Evaluation;
 use crate::filter::profile::Profile;
-use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place, Slopes};
 
 /// x̂, Φ and W by one integration, for flows with few states.
 #[derive(Clone, Debug)]
 pub(crate) struct Joint {
-    integrator: Integrator,
+    pub integrator: Integrator,
     equation: Equation,
     /// q, the largest entry of Q
     scale: f64,
@@ -63,12 +62,6 @@ impl Joint {
             noise.fill(columns(n, self.scale));
         }
         Ok(())
-    }
-}
-
-impl Persist for Joint {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        self.integrator.walk(walk)
     }
 }
 

@@ -144,7 +144,7 @@ impl Persist for Propagation {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.driven.walk(walk)?;
         match &mut self.scheme {
-            Scheme::Joint(joint) => joint.walk(walk),
+            Scheme::Joint(joint) => joint.integrator.walk(walk),
             Scheme::Piecewise(variation) => variation.walk(walk),
         }
     }

@@ -12,7 +12,7 @@ use super::series::{Series, Transition, largest_row};
 use crate::Evaluation;
 use crate::filter::belief::Belief;
 use crate::filter::profile::{Entry, Profile};
-use crate::method::resolution;
+use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place};
 
@@ -159,7 +159,7 @@ impl Piecewise {
     /// F at (t, x), the values of its entries.
     fn look(&mut self, driven: &mut Evaluation, t: f64, x: &[f64]) -> Result<(), Error> {
         driven.outputs(t, x, &mut self.slopes);
-        match self.slopes.iter().all(|s| s.is_finite()) {
+        match are_finite(&self.slopes) {
             true => Ok(()),
             false => Err(driven.not_finite(t, x)),
         }

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::filter::root::Factor;
 use crate::filter::tests::exact;
 use crate::filter::{FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor};
-use crate::{Estimator, Level};
+use crate::{Blueprint, Estimator, Level};
 
 /// Xorshift.
 struct Random(u64);
@@ -146,7 +146,9 @@ impl Case {
             confined: None,
         });
         let kind = FilterKind::MovingHorizon(20);
-        Estimator::filter(&model.unwrap(), FilterSettings::of(kind), exact()).unwrap()
+        Blueprint::filter(model.unwrap(), FilterSettings::of(kind), exact())
+            .estimator()
+            .unwrap()
     }
 
     /// Φ and a root of W over a time (C. Van Loan's exponential).
