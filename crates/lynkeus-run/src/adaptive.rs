@@ -10,7 +10,7 @@ use crate::error::state_text;
 use crate::events::{Ahead, Filippov, Span};
 use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Method, Tolerances, spectral_radius};
+use crate::{Dynamics, Error, Method, Result, Tolerances, spectral_radius};
 
 use dop853::Dop853;
 use one_step::OneStep;
@@ -116,7 +116,7 @@ impl Adaptive {
         from: f64,
         to: f64,
         x: &mut [f64],
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let mut leg = Leg { f, t: from, to, x };
         if leg.at_the_end() || leg.x.is_empty() {
             return leg.check_start();
@@ -156,11 +156,9 @@ impl Adaptive {
         &mut self,
         leg: &mut Leg<'_, '_, impl Dynamics>,
         of: fn(&mut Self) -> &mut Option<Box<M>>,
-    ) -> Result<bool, Error> {
-        let mut method = match of(self).take() {
-            Some(method) => method,
-            None => Box::new(M::new(leg.x.len())),
-        };
+    ) -> Result<bool> {
+        let new = || Box::new(M::new(leg.x.len()));
+        let mut method = of(self).take().unwrap_or_else(new);
         method.restart(true);
         let is_done = self.steps(&mut *method, leg);
         *of(self) = Some(method);
@@ -171,7 +169,7 @@ impl Adaptive {
         &mut self,
         method: &mut impl OneStep,
         leg: &mut Leg<'_, '_, impl Dynamics>,
-    ) -> Result<bool, Error> {
+    ) -> Result<bool> {
         let tolerances = self.tolerances;
         if !self.is_implicit {
             self.next = self.next.min(leg.to - leg.t);
@@ -204,7 +202,7 @@ impl Adaptive {
         &mut self,
         method: &mut impl OneStep,
         leg: &mut Leg<'_, '_, impl Dynamics>,
-    ) -> Result<f64, Error> {
+    ) -> Result<f64> {
         loop {
             let proposed = self.next;
             let step = leg.step(proposed);
@@ -231,7 +229,7 @@ impl Adaptive {
         method: &mut impl OneStep,
         leg: &mut Leg<'_, '_, impl Dynamics>,
         step: f64,
-    ) -> Result<f64, Error> {
+    ) -> Result<f64> {
         let (t, start, reached) = (leg.t, leg.x.to_vec(), method.reached().to_vec());
         let span = Span {
             from: (t, &start),
@@ -265,7 +263,7 @@ impl Adaptive {
     }
 
     /// Pays for one step.
-    fn spend(&mut self, leg: &mut Leg<'_, '_, impl Dynamics>) -> Result<(), Error> {
+    fn spend(&mut self, leg: &mut Leg<'_, '_, impl Dynamics>) -> Result<()> {
         if leg.f.is_over() {
             return Err(Error::Cancelled { time: leg.t });
         }
@@ -292,7 +290,7 @@ impl Adaptive {
         span: &Span<'_>,
         ahead: Ahead,
         mut attempt: impl FnMut(&mut Filippov<'_, D>, f64) -> Option<Vec<f64>>,
-    ) -> Result<Option<Reach>, Error> {
+    ) -> Result<Option<Reach>> {
         let (t, step) = (span.from.0, span.step);
         let reach = |f: &mut Filippov<'_, D>, step: f64, x: Vec<f64>| {
             let margins = f.margins(t + step, &x);
@@ -397,7 +395,7 @@ impl<D: Dynamics> Leg<'_, '_, D> {
         };
     }
 
-    fn check_start(&mut self) -> Result<(), Error> {
+    fn check_start(&mut self) -> Result<()> {
         let mut dx = vec![0.0; self.x.len()];
         self.f.derivatives(self.t, self.x, &mut dx);
         if are_finite(&dx) {
@@ -406,7 +404,7 @@ impl<D: Dynamics> Leg<'_, '_, D> {
         Err(self.f.not_finite(self.t, self.x))
     }
 
-    fn check_step(&mut self, step: f64, bad: Option<&(f64, Vec<f64>)>) -> Result<(), Error> {
+    fn check_step(&mut self, step: f64, bad: Option<&(f64, Vec<f64>)>) -> Result<()> {
         if step > resolution(self.t) {
             return Ok(());
         }

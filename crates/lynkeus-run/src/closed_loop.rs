@@ -7,7 +7,7 @@ use lynkeus_expr::{Graph, Node, Nodes, Reals};
 use crate::equations::{Both, Equations, Roots};
 use crate::method::are_finite;
 use crate::noise::Sensors;
-use crate::{Dynamics, Error, Evaluation, Events, Simulation, Slopes, System};
+use crate::{Dynamics, Error, Evaluation, Events, Result, Simulation, Slopes, System};
 
 /// The place of a name among those that a system can read.
 fn place(
@@ -15,7 +15,7 @@ fn place(
     name: &str,
     among: &[String],
     available: &[String],
-) -> Result<usize, Error> {
+) -> Result<usize> {
     let mut found = (0..among.len()).filter(|&i| among[i] == name);
     match (found.next(), found.next()) {
         (Some(place), None) => Ok(place),
@@ -50,7 +50,7 @@ struct Symbols {
 }
 
 impl Wiring {
-    fn new(simulation: &Simulation) -> Result<Self, Error> {
+    fn new(simulation: &Simulation) -> Result<Self> {
         let Simulation { plant, inputs, .. } = simulation;
         if let Some(name) = inputs.signals().first() {
             return Err(Error::Unconnected {
@@ -89,7 +89,7 @@ impl Wiring {
 
     /// One system: its states are the plant's, then the observer's, its signals what disturbs each
     /// sensor and each moved state, its outputs the values of a row.
-    fn joined(&self, sensors: &Sensors) -> Result<System, Error> {
+    fn joined(&self, sensors: &Sensors) -> Result<System> {
         let Simulation { plant, inputs, .. } = &self.simulation;
         let observer = self.simulation.observer.as_ref();
         let g = Graph::new();
@@ -127,10 +127,8 @@ impl Wiring {
             jumps,
             graph: Mutex::new(g),
         };
-        System::compiled(
-            equations,
-            self.parts().flat_map(System::start).copied().collect(),
-        )
+        let start = self.parts().flat_map(System::start).copied();
+        System::compiled(equations, start.collect())
     }
 
     /// What the joined system computes, of `held` alone: with what jumps with the state held, or as
@@ -198,7 +196,7 @@ pub(crate) struct Loop {
 
 impl Loop {
     /// Of a simulation whose process noise is held for `hold`.
-    pub(crate) fn new(simulation: &Simulation, hold: f64) -> Result<Self, Error> {
+    pub(crate) fn new(simulation: &Simulation, hold: f64) -> Result<Self> {
         let Simulation { plant, noise, .. } = simulation;
         let sensors = Sensors::new(noise, plant.outputs(), plant.states(), hold)?;
         let wiring = Wiring::new(simulation)?;
@@ -251,7 +249,7 @@ impl Loop {
     }
 
     /// Writes the recorded values at (t, x), in the order of [`Simulation::table`].
-    pub(crate) fn row(&mut self, t: f64, x: &[f64], row: &mut Vec<f64>) -> Result<(), Error> {
+    pub(crate) fn row(&mut self, t: f64, x: &[f64], row: &mut Vec<f64>) -> Result<()> {
         row.resize(self.joined.system().outputs().len(), 0.0);
         self.joined.outputs(t, x, row);
         match are_finite(row) {

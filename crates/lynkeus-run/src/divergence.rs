@@ -1,7 +1,7 @@
 //! Runs of an observer that end: an estimate that diverges, a matrix that is singular.
 
 use crate::error::{digits, state_text};
-use crate::{Error, Margin};
+use crate::{Error, Margin, Result};
 
 /// An estimate this many times larger than anything seen is no estimate.
 const FACTOR: f64 = 1e12;
@@ -35,7 +35,7 @@ impl Bound {
         names: &[String],
         values: &[f64],
         hint: impl FnOnce() -> String,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         // a reading may be so large that the bound itself is infinite
         let inside = |v: &f64| v.is_finite() && v.abs() <= FACTOR * self.scale;
         match values.iter().position(|v| !inside(v)) {
@@ -69,11 +69,7 @@ pub(crate) fn largest(x: &[f64]) -> usize {
 
 /// # Errors
 /// [`Error::DeviationDiverged`] of a covariance that has grown beyond every number.
-pub(crate) fn check_deviations(
-    time: f64,
-    names: &[String],
-    deviations: &[f64],
-) -> Result<(), Error> {
+pub(crate) fn check_deviations(time: f64, names: &[String], deviations: &[f64]) -> Result<()> {
     match deviations.iter().position(|d| !d.is_finite()) {
         None => Ok(()),
         Some(i) => Err(Error::DeviationDiverged {
@@ -88,22 +84,23 @@ pub(crate) fn check_deviations(
 /// the run.
 const RUN_AWAY: f64 = 1e6;
 
-/// The margin that is furthest below its limit.
-fn closest<'m>(margins: &[(&'m Margin, f64)]) -> Option<(&'m Margin, f64)> {
-    let low = margins.iter().filter(|(m, value)| *value < m.below);
+/// The margin that is furthest below its limit, with its value among those of the outputs.
+fn closest<'m>(margins: &'m [Margin], outputs: &[f64]) -> Option<(&'m Margin, f64)> {
+    let known = margins.iter();
+    let known = known.filter_map(|m| Some((m, *outputs.get(m.output)?)));
+    let low = known.filter(|(m, value)| *value < m.below);
     low.min_by(|a, b| (a.1 / a.0.below).total_cmp(&(b.1 / b.0.below)))
-        .copied()
 }
 
 /// An integration that could not go on at `x`, by its cause: an estimate on its way to infinity, far
 /// beyond `scale`, the largest number among starts and signals, or a matrix that is singular at
-/// the estimate, by the margins with their values there. Other errors stay.
+/// the estimate, by the margins and the outputs there. Other errors stay.
 pub(crate) fn explained(
     mut error: Error,
     names: &[String],
     x: &[f64],
     scale: f64,
-    margins: &[(&Margin, f64)],
+    (margins, outputs): (&[Margin], &[f64]),
 ) -> Error {
     let Some(time) = error.time() else {
         return error;
@@ -113,7 +110,7 @@ pub(crate) fn explained(
     if is_away && !matches!(error, Error::Diverged { .. }) {
         error = diverged(time, names, x, place, String::new());
     }
-    let Some((margin, value)) = closest(margins) else {
+    let Some((margin, value)) = closest(margins, outputs) else {
         return error;
     };
     if let Error::Diverged { hint, .. } = &mut error {

@@ -4,6 +4,9 @@ use lynkeus_expr::MissingInput;
 
 use crate::{SnapshotFault, Trajectory};
 
+/// What comes of work that may end in this crate's error.
+pub(crate) type Result<T, E = Error> = std::result::Result<T, E>;
+
 /// Why a system could not be built, simulated or replayed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -279,11 +282,9 @@ pub(crate) fn digits(value: f64) -> String {
 pub(crate) fn state_text(names: &[String], values: &[f64]) -> String {
     let mut order: Vec<usize> = (0..names.len().min(values.len())).collect();
     order.sort_by_key(|&i| values[i].is_finite());
-    let listed: Vec<String> = order
-        .iter()
-        .take(LISTED)
-        .map(|&i| format!("{} = {}", names[i], digits(values[i])))
-        .collect();
+    let listed = order.iter().take(LISTED);
+    let listed = listed.map(|&i| format!("{} = {}", names[i], digits(values[i])));
+    let listed: Vec<String> = listed.collect();
     let mut text = listed.join(", ");
     if order.len() > LISTED {
         text.push_str(&format!(", … ({} states)", order.len()));

@@ -37,11 +37,10 @@ impl Slopes {
     ) {
         let n = x.len();
         // as many places as there are in all are all of them
+        let column = |column: usize| (0..n).map(move |row| Place { row, column });
         let places = match self.places().len() == n * n {
             true => self.places().clone(),
-            false => (0..n)
-                .flat_map(|column| (0..n).map(move |row| Place { row, column }))
-                .collect(),
+            false => (0..n).flat_map(column).collect(),
         };
         let mut base = vec![0.0; n];
         f.derivatives(t, x, &mut base);

@@ -119,6 +119,7 @@ mod trajectory;
 pub use batch::{Batch, Ended, Member};
 pub use blueprint::{Blueprint, Tuned, Updates, fastest_at, fastest_mode};
 pub use dynamics::{Dynamics, Events, Function};
+pub(crate) use error::Result;
 pub use error::{Error, Interrupted, Margin};
 pub use estimator::Estimator;
 pub use events::{Guards, first_jump};

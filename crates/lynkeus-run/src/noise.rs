@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
-use crate::Error;
+use crate::{Error, Result};
 
 mod draws;
 
@@ -202,7 +202,7 @@ impl Sensors {
         outputs: &[String],
         states: &[String],
         hold: f64,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         for (name, level) in &noise.levels {
             check_name("noise", name, "outputs", outputs)?;
             check_size("noise", name, level.size())?;
@@ -229,11 +229,9 @@ impl Sensors {
             let level = Level::Absolute((density / hold).sqrt());
             Some(Channel::new(level, noise.seed, &format!("'{name}")))
         };
+        let limits = |name: &String| noise.limits.get(name).copied();
         Ok(Self {
-            limits: outputs
-                .iter()
-                .map(|o| noise.limits.get(o).copied())
-                .collect(),
+            limits: outputs.iter().map(limits).collect(),
             channels: outputs.iter().map(channel).collect(),
             process: states.iter().map(process).collect(),
         })
@@ -292,7 +290,7 @@ impl Sensors {
 
 /// # Errors
 /// [`Error::Setting`] if the name is not among those that are known.
-fn check_name(what: &str, name: &str, kind: &str, known: &[String]) -> Result<(), Error> {
+fn check_name(what: &str, name: &str, kind: &str, known: &[String]) -> Result<()> {
     if known.iter().any(|k| k == name) {
         return Ok(());
     }
@@ -303,7 +301,7 @@ fn check_name(what: &str, name: &str, kind: &str, known: &[String]) -> Result<()
 
 /// # Errors
 /// [`Error::Setting`] for what is no size of a noise.
-pub(crate) fn check_size(what: &str, name: &str, size: f64) -> Result<(), Error> {
+pub(crate) fn check_size(what: &str, name: &str, size: f64) -> Result<()> {
     if size >= 0.0 && size.is_finite() {
         return Ok(());
     }

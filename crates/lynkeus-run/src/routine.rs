@@ -191,17 +191,11 @@ fn classical_step(g: &Graph, inputs: &[Node], slopes: &[Node]) -> (Vec<Node>, Ve
     ([inputs, &[h.node()]].concat(), next)
 }
 
-/// Machine code in use, or how often it would have been.
-#[derive(Clone, Debug)]
-enum Engine {
-    Waiting(u32),
-    Running(Function<1>),
-}
-
-impl Default for Engine {
-    fn default() -> Self {
-        Self::Waiting(0)
-    }
+/// Machine code in use, and how often it would have been before.
+#[derive(Clone, Debug, Default)]
+struct Engine {
+    waited: u32,
+    running: Option<Function<1>>,
 }
 
 impl Engine {
@@ -210,18 +204,15 @@ impl Engine {
         &mut self,
         make: impl FnOnce() -> Option<&'f Function<1>>,
     ) -> Option<&mut Function<1>> {
-        if let Self::Waiting(count) = self {
-            if Backend::patience(PATIENCE).is_none_or(|patience| *count < patience) {
-                *count = count.saturating_add(1);
+        if self.running.is_none() {
+            if Backend::patience(PATIENCE).is_none_or(|patience| self.waited < patience) {
+                self.waited = self.waited.saturating_add(1);
                 return None;
             }
             // what cannot be compiled is not tried again: the routine remembers
-            *self = Self::Running(make()?.clone());
+            self.running = make().cloned();
         }
-        match self {
-            Self::Running(evaluator) => Some(evaluator),
-            Self::Waiting(_) => None,
-        }
+        self.running.as_mut()
     }
 }
 

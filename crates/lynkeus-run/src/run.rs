@@ -5,7 +5,8 @@ use std::ops::ControlFlow;
 use crate::closed_loop::Loop;
 use crate::divergence::Bound;
 use crate::{
-    Error, Events, Integrator, Interrupted, Role, Simulation, System, Trajectory, process_draws,
+    Error, Events, Integrator, Interrupted, Result, Role, Simulation, System, Trajectory,
+    process_draws,
 };
 
 impl Simulation {
@@ -50,7 +51,7 @@ impl Simulation {
         &self,
         take: &mut dyn FnMut(f64, &[f64]),
         watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         Run::new(self)?.rows(take, watch)
     }
 
@@ -81,7 +82,7 @@ struct Run {
 }
 
 impl Run {
-    fn new(simulation: &Simulation) -> Result<Self, Error> {
+    fn new(simulation: &Simulation) -> Result<Self> {
         let itinerary = Itinerary::new(simulation)?;
         let system = Loop::new(simulation, itinerary.hold())?;
         let x = system.joined.system().start().to_vec();
@@ -99,7 +100,7 @@ impl Run {
         &mut self,
         take: &mut dyn FnMut(f64, &[f64]),
         watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let all = self.itinerary.intervals() as f64;
         let mut made = 0_usize;
         while let Some(stop) = self.itinerary.next() {
@@ -123,7 +124,7 @@ impl Run {
         Ok(())
     }
 
-    fn record(&mut self, t: f64) -> Result<&[f64], Error> {
+    fn record(&mut self, t: f64) -> Result<&[f64]> {
         self.row.clear();
         self.system.joined.enter(t);
         self.system.row(t, &self.x, &mut self.row)?;
@@ -177,7 +178,7 @@ impl Itinerary {
     ///
     /// # Errors
     /// [`Error::Setting`] for times and steps that cannot be.
-    pub fn new(simulation: &Simulation) -> Result<Self, Error> {
+    pub fn new(simulation: &Simulation) -> Result<Self> {
         let intervals = intervals(simulation)?;
         let sample_step = sample_step(simulation)?;
         Ok(Self {
@@ -269,7 +270,7 @@ impl Iterator for Itinerary {
 }
 
 /// Number of intervals between rows.
-fn intervals(simulation: &Simulation) -> Result<usize, Error> {
+fn intervals(simulation: &Simulation) -> Result<usize> {
     let (start, until) = (simulation.start, simulation.until);
     if !start.is_finite() {
         return Err(Error::setting("start", "a finite time", start));
@@ -290,7 +291,7 @@ fn intervals(simulation: &Simulation) -> Result<usize, Error> {
     Ok(intervals as usize)
 }
 
-fn checked_step(name: &str, step: f64) -> Result<f64, Error> {
+fn checked_step(name: &str, step: f64) -> Result<f64> {
     match step > 0.0 && step.is_finite() {
         true => Ok(step),
         false => Err(Error::setting(name, "a finite time above 0", step)),
@@ -298,7 +299,7 @@ fn checked_step(name: &str, step: f64) -> Result<f64, Error> {
 }
 
 /// Draws of process noise from one sample to the next.
-fn draws(simulation: &Simulation) -> Result<usize, Error> {
+fn draws(simulation: &Simulation) -> Result<usize> {
     match simulation.noise.process_draws {
         Some(0) => Err(Error::setting("process_draws", "at least 1 per sample", 0)),
         Some(draws) => Ok(draws),
@@ -306,7 +307,7 @@ fn draws(simulation: &Simulation) -> Result<usize, Error> {
     }
 }
 
-fn sample_step(simulation: &Simulation) -> Result<f64, Error> {
+fn sample_step(simulation: &Simulation) -> Result<f64> {
     let given = simulation.noise.sample_step;
     let sample_step = checked_step("sample_step", given.unwrap_or(simulation.output_step))?;
     let samples = (simulation.until - simulation.start) / sample_step;

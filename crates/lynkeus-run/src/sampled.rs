@@ -8,7 +8,7 @@ use crate::method::are_finite;
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::spread::Spread;
-use crate::{Blueprint, Dynamics, Error, Events, Integrator, StepAdvice};
+use crate::{Blueprint, Dynamics, Error, Events, Integrator, Result, StepAdvice};
 
 /// An observer whose readings [jump](crate::Updates::Jumps), under way.
 #[derive(Clone, Debug)]
@@ -28,11 +28,7 @@ pub(crate) struct Sampled {
 
 impl Sampled {
     /// Of a blueprint whose readings jump, with these parts.
-    pub fn new(
-        blueprint: &Blueprint,
-        predict: bool,
-        errors: Option<&NoisyModel>,
-    ) -> Result<Self, Error> {
+    pub fn new(blueprint: &Blueprint, predict: bool, errors: Option<&NoisyModel>) -> Result<Self> {
         let (system, run) = (&blueprint.flow, blueprint.run);
         let count = blueprint.sensors.len();
         let tuned = blueprint.tuned().map(Tuned::signals).unwrap_or_default();
@@ -75,7 +71,7 @@ impl Sampled {
         }
     }
 
-    fn evaluate(&mut self, t: f64) -> Result<(), Error> {
+    fn evaluate(&mut self, t: f64) -> Result<()> {
         let evaluation = &mut self.driven;
         evaluation.enter(t);
         evaluation.estimates(t, &self.x, &mut self.outputs);
@@ -92,7 +88,7 @@ impl Sampled {
 
 impl Runner for Sampled {
     /// Before a sensor's first reading the model's own output stands in for it.
-    fn begin(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
+    fn begin(&mut self, sample: &Sample<'_>) -> Result<()> {
         self.start(sample);
         self.evaluate(sample.t)?;
         let (first, expected) = (self.x.len() - self.sensors, self.told());
@@ -100,7 +96,7 @@ impl Runner for Sampled {
         Ok(())
     }
 
-    fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
+    fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<()> {
         self.driven.aim(from, sample.t, sample.inputs);
         let done = match &mut self.spread {
             Some(spread) => spread.advance(from, sample, &mut self.x),
@@ -116,7 +112,7 @@ impl Runner for Sampled {
         Ok(())
     }
 
-    fn update(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
+    fn update(&mut self, sample: &Sample<'_>) -> Result<()> {
         self.health.inputs_held += sample.held;
         self.start(sample);
         if let Some(spread) = &mut self.spread {
@@ -144,7 +140,7 @@ impl Runner for Sampled {
         Ok(())
     }
 
-    fn report(&mut self, t: f64) -> Result<(), Error> {
+    fn report(&mut self, t: f64) -> Result<()> {
         let own = self.x.len() - self.sensors;
         let names = self.driven.system().states();
         let (bound, hint) = (self.bound, || self.integrator.hint());

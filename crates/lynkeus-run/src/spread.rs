@@ -10,7 +10,7 @@ use crate::filter::{Belief, Innovation, NoisyModel, NoisyPlant, Reading, Sensor,
 use crate::linearised::{Entries, OutputMap};
 use crate::runner::Sample;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Error, EstimatorSettings, Events, Jacobian, Jacobians, Linearised};
+use crate::{EstimatorSettings, Events, Jacobian, Jacobians, Linearised, Result};
 
 /// How measurements that are held fall behind.
 #[derive(Clone, Copy, Debug)]
@@ -37,12 +37,12 @@ impl NoisyModel {
     /// of a filter is.
     ///
     /// # Errors
-    /// [`Error::MissingInput`], and [`Error::Setting`] for wrong numbers of noises.
+    /// [`crate::Error::MissingInput`], and [`crate::Error::Setting`] for wrong numbers of noises.
     pub fn of_observer(
         observer: &NoisyPlant<'_>,
         estimates: &[Node],
         lag: Option<Lag<'_>>,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         check_counts(observer)?;
         // C first: nodes are made in this order
         let mut output = observer.views();
@@ -190,7 +190,7 @@ impl Persist for Spread {
 
 impl Spread {
     /// Whether readings are judged.
-    pub fn new(model: &NoisyModel, judges: bool, run: EstimatorSettings) -> Result<Self, Error> {
+    pub fn new(model: &NoisyModel, judges: bool, run: EstimatorSettings) -> Result<Self> {
         let flow = model.flow.system();
         let judged = if judges { model.sensors.len() } else { 0 };
         Ok(Self {
@@ -207,7 +207,7 @@ impl Spread {
     }
 
     /// State and covariance to the time of a sample.
-    pub fn advance(&mut self, from: f64, to: &Sample<'_>, x: &mut [f64]) -> Result<(), Error> {
+    pub fn advance(&mut self, from: f64, to: &Sample<'_>, x: &mut [f64]) -> Result<()> {
         self.belief.x.copy_from_slice(x);
         self.propagation.driven.aim(from, to.t, to.inputs);
         let done = self.propagation.predict(&mut self.belief, from, to.t);

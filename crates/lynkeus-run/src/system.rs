@@ -12,7 +12,7 @@ use crate::error::state_text;
 use crate::events::{Guards, TimeEvents};
 use crate::routine::{Routine, Runner};
 use crate::snapshot::{Damaged, Digest, Persist, Walk};
-use crate::{BetweenSamples, Dynamics, Error, Events, Margin, Slopes};
+use crate::{BetweenSamples, Dynamics, Error, Events, Margin, Result, Slopes};
 
 /// A compiled system x' = f(t, x, w), y = h(t, x, w): a plant, an observer, or
 /// (without states) inputs as functions of time.
@@ -57,14 +57,10 @@ impl System {
         signals: &[(String, Node)],
         derivatives: &[Node],
         outputs: &[(String, Node)],
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         if states.len() != derivatives.len() {
-            let expected = format!("{}, one per state", states.len());
-            return Err(Error::setting(
-                "number of derivatives",
-                expected,
-                derivatives.len(),
-            ));
+            let (expected, found) = (per_state(states.len()), derivatives.len());
+            return Err(Error::setting("number of derivatives", expected, found));
         }
         let mut symbols = vec![time];
         symbols.extend(states.iter().map(|(_, node, _)| *node));
@@ -84,7 +80,7 @@ impl System {
     ///
     /// # Errors
     /// As [`System::new`].
-    pub(crate) fn compiled(equations: Equations, start: Vec<f64>) -> Result<Self, Error> {
+    pub(crate) fn compiled(equations: Equations, start: Vec<f64>) -> Result<Self> {
         let equations = Arc::new(equations);
         let Equations { roots, inputs, .. } = &*equations;
         let both = |roots: &Both<Vec<Node>>, inputs: usize| -> Result<_, MissingInput> {
@@ -95,23 +91,16 @@ impl System {
             })
         };
         let held = (!equations.jumps.is_empty()).then(|| both(&roots.held, inputs.len()));
-        let (held, free) = (
-            held.transpose()?,
-            both(&roots.free, equations.smooth_inputs())?,
-        );
+        let held = held.transpose()?;
+        let free = both(&roots.free, equations.smooth_inputs())?;
         let graph = equations.graph();
         let surfaces: Vec<Node> = roots.surfaces.iter().map(|surface| surface.node).collect();
+        let states = equations.states.len();
         let code = Code {
             free,
             held,
             indicators: Tape::new(&graph, inputs, &surfaces)?,
-            guards: Guards::new(
-                &graph,
-                inputs,
-                equations.states.len(),
-                &roots.surfaces,
-                &roots.bends,
-            )?,
+            guards: Guards::new(&graph, inputs, states, &roots.surfaces, &roots.bends)?,
             equations: equations.clone(),
         };
         drop(graph);
@@ -127,14 +116,10 @@ impl System {
     ///
     /// # Errors
     /// [`Error::Setting`] for a wrong number of values or one that is not finite.
-    pub fn with_start(mut self, start: Vec<f64>) -> Result<Self, Error> {
+    pub fn with_start(mut self, start: Vec<f64>) -> Result<Self> {
         if start.len() != self.states().len() {
-            let expected = format!("{}, one per state", self.states().len());
-            return Err(Error::setting(
-                "number of start values",
-                expected,
-                start.len(),
-            ));
+            let (expected, found) = (per_state(self.states().len()), start.len());
+            return Err(Error::setting("number of start values", expected, found));
         }
         if let Some(i) = start.iter().position(|value| !value.is_finite()) {
             let what = format!("start value of '{}'", self.states()[i]);
@@ -271,6 +256,10 @@ impl System {
     }
 }
 
+fn per_state(states: usize) -> String {
+    format!("{states}, one per state")
+}
+
 /// Evaluates one [`System`] without allocating; holds the values of its signals.
 #[derive(Clone, Debug)]
 pub struct Evaluation {
@@ -374,10 +363,8 @@ impl Evaluation {
         if !system.margins.is_empty() {
             self.outputs(time, x, &mut values);
         }
-        let value = |margin: &Margin| values.get(margin.output).copied();
-        let margins = system.margins.iter();
-        let margins: Vec<(&Margin, f64)> = margins.filter_map(|m| Some((m, value(m)?))).collect();
-        explained(error, system.states(), x, scale, &margins)
+        let margins = (&*system.margins, &values[..]);
+        explained(error, system.states(), x, scale, margins)
     }
 
     /// Values of the switches at the last [`Events::enter`]; then, while it is held, those of the
@@ -476,7 +463,7 @@ impl Dynamics for Evaluation {
 }
 
 impl Events for Evaluation {
-    fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
+    fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<()> {
         let mut switches = self.switches.iter_mut();
         switches.try_for_each(|switches| switches.instants(from, to, times))
     }

@@ -54,9 +54,8 @@ impl Shifted {
         let (n, places) = (self.n, &self.places);
         let most = (FULL * (n * n) as f64) as usize;
         let may_be_sparse = n > SMALL && places.len() <= most;
-        self.order = may_be_sparse
-            .then(|| least_degree(n, places, most / 2))
-            .flatten();
+        let order = || least_degree(n, places, most / 2);
+        self.order = may_be_sparse.then(order).flatten();
         self.entries = Columns::default();
         let mut numbered: Vec<(usize, Place)> = places.iter().copied().enumerate().collect();
         numbered.sort_by_key(|(_, at)| at.column);

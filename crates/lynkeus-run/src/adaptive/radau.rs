@@ -471,9 +471,8 @@ fn lagrange(s: f64) -> [f64; 3] {
     let nodes = [-1.0, C[0] - 1.0, C[1] - 1.0, 0.0];
     [1, 2, 3].map(|i| {
         let others = (0..4).filter(|&j| j != i);
-        others
-            .map(|j| (s - nodes[j]) / (nodes[i] - nodes[j]))
-            .product()
+        let factors = others.map(|j| (s - nodes[j]) / (nodes[i] - nodes[j]));
+        factors.product()
     })
 }
 

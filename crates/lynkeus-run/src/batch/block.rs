@@ -5,11 +5,11 @@ use std::ops::ControlFlow;
 use lynkeus_native::Buffer;
 
 use super::plan::{Divided, Event, LANES, Lane, Leg, Program};
-use crate::Error;
 use crate::divergence::Bound;
 use crate::error::state_text;
 use crate::integrator::instant;
 use crate::noise::Sensors;
+use crate::{Error, Result};
 
 /// Bytes that the states of a block may take, twice: they should stay in the first cache.
 const CACHE: usize = 16 * 1024;
@@ -306,7 +306,7 @@ impl Run {
         extent: &Extent,
         x: &[Lane],
         lane: usize,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let x = || x.iter().map(|x| x[lane]).collect::<Vec<f64>>();
         self.bound.see(&[extent.known[lane]]);
         if extent.oddity[lane] != 0.0 {

@@ -15,7 +15,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Builder, available_parallelism};
 
-use crate::{Column, Error, Simulation};
+use crate::{Column, Error, Result, Simulation};
 pub use block::Ended;
 
 use block::{Block, Desk, IsOver, groups};
@@ -55,7 +55,7 @@ impl Batch {
         simulation: &Simulation,
         members: &[Member],
         columns: &[Column],
-    ) -> Result<Option<Self>, Error> {
+    ) -> Result<Option<Self>> {
         let Some((plan, program)) = Plan::new(simulation)? else {
             return Ok(None);
         };
@@ -79,7 +79,7 @@ impl Batch {
                 Ok((plan.sensors(simulation, m.seed)?, start))
             };
             let members = members.iter().map(member);
-            let members = members.collect::<Result<Vec<_>, Error>>()?;
+            let members = members.collect::<Result<Vec<_>>>()?;
             blocks.push(Block::new(&program, k * size, members));
         }
         Ok(Some(Self {
@@ -119,7 +119,7 @@ impl Batch {
         rows: usize,
         threads: usize,
         is_over: &(dyn Fn() -> bool + Sync),
-    ) -> Result<bool, Error> {
+    ) -> Result<bool> {
         self.times.clear();
         while !self.is_cancelled {
             let events = self.plan.next(rows.max(1))?;

@@ -550,10 +550,8 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         }
         let right = DVector::from_iterator(along.len(), along.iter().map(|&j| -here[j]));
         // where both sides move alike nothing decides between them
-        let parts = matrix
-            .lu()
-            .solve(&right)
-            .unwrap_or_else(|| DVector::repeat(along.len(), 0.5));
+        let parts = matrix.lu().solve(&right);
+        let parts = parts.unwrap_or_else(|| DVector::repeat(along.len(), 0.5));
         let f = dx.to_vec();
         for ((&i, part), other) in along.iter().zip(parts.iter()).zip(&others) {
             self.parts[i] = *part;

@@ -11,8 +11,8 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Algebra, Evaluator, Graph, Interval, Jets, MissingInput, Node, Reals, Tape};
 
 use super::guards::interval;
-use crate::Error;
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::{Error, Result};
 
 /// Switching instants allowed in one interval, over all indicators of a system.
 const SWITCHES: usize = 100_000;
@@ -73,12 +73,7 @@ impl TimeEvents {
     }
 
     /// Appends the instants of the events strictly inside (`from`, `to`).
-    pub(crate) fn instants(
-        &mut self,
-        from: f64,
-        to: f64,
-        times: &mut Vec<f64>,
-    ) -> Result<(), Error> {
+    pub(crate) fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<()> {
         if self.indicators.is_empty() {
             return Ok(());
         }
@@ -158,13 +153,13 @@ impl Effort {
     }
 
     /// Pays for one look.
-    fn look(&mut self, at: f64) -> Result<(), Error> {
+    fn look(&mut self, at: f64) -> Result<()> {
         self.looks = self.looks.checked_sub(1).ok_or_else(|| unresolved(at))?;
         Ok(())
     }
 
     /// Pays for a stretch at `at` on which the mode is not certain.
-    fn doubt(&mut self, at: f64, width: f64) -> Result<(), Error> {
+    fn doubt(&mut self, at: f64, width: f64) -> Result<()> {
         // around a simple zero some last bits are always in doubt
         if width > 64.0 * apart(at) {
             self.doubtful -= width;
@@ -176,7 +171,7 @@ impl Effort {
     }
 
     /// Refuses more than the switches that are left.
-    fn check(&self, count: f64) -> Result<(), Error> {
+    fn check(&self, count: f64) -> Result<()> {
         if count <= self.switches as f64 {
             return Ok(());
         }
@@ -189,7 +184,7 @@ impl Effort {
     }
 
     /// Pays for a switch.
-    fn switch(&mut self) -> Result<(), Error> {
+    fn switch(&mut self) -> Result<()> {
         self.check(1.0)?;
         self.switches -= 1;
         Ok(())
@@ -287,7 +282,7 @@ impl Indicator {
     }
 
     /// Finds the mode over the interval of `effort`; `before` are the indicators before.
-    fn follow(&mut self, effort: &mut Effort, before: &[Self]) -> Result<(), Error> {
+    fn follow(&mut self, effort: &mut Effort, before: &[Self]) -> Result<()> {
         self.timeline.0.clear();
         let read = self.reads.iter().map(|&i| &before[i].timeline);
         let mut ends: Vec<f64> = read.flat_map(Timeline::instants).collect();
@@ -309,7 +304,7 @@ impl Indicator {
     }
 
     /// Over a piece on which the modes inside stay.
-    fn piece(&mut self, start: f64, end: f64, effort: &mut Effort) -> Result<(), Error> {
+    fn piece(&mut self, start: f64, end: f64, effort: &mut Effort) -> Result<()> {
         let isolation = Isolation {
             indicator: self,
             effort,
@@ -353,15 +348,11 @@ impl Indicator {
     }
 
     /// The first Taylor coefficients of the quantity, over time and what reads of it.
-    fn taylor<A: Algebra>(
-        &self,
-        inner: &A,
-        mut time: Vec<A::Value>,
-        count: usize,
-        mode: impl Fn(f64) -> A::Value,
-    ) -> Vec<A::Value> {
+    fn taylor<A: Algebra>(&self, inner: &A, time: A::Value, count: usize) -> Vec<A::Value> {
+        let mut time = vec![time, inner.constant(1.0)];
         time.truncate(count);
-        let modes = self.inputs[1..].iter().map(|&value| vec![mode(value)]);
+        let modes = self.inputs[1..].iter();
+        let modes = modes.map(|&mode| vec![inner.constant(mode)]);
         let inputs: Vec<_> = std::iter::once(time).chain(modes).collect();
         let jets = Jets {
             inner,
@@ -372,14 +363,13 @@ impl Indicator {
 
     /// The first Taylor coefficients of the quantity, enclosed over `stretch`.
     fn series<const N: usize>(&self, stretch: Interval) -> [Interval; N] {
-        let time = vec![stretch, Interval::ONE];
-        let series = self.taylor(&Intervals, time, N, Interval::point);
+        let series = self.taylor(&Intervals, stretch, N);
         std::array::from_fn(|k| series.get(k).copied().unwrap_or(Interval::ZERO))
     }
 
     /// The Taylor coefficient of power `k` at `t`.
     fn coefficient(&self, k: usize, t: f64) -> f64 {
-        let series = self.taylor(&Reals, vec![t, 1.0], k + 1, |mode| mode);
+        let series = self.taylor(&Reals, t, k + 1);
         series.get(k).copied().unwrap_or(0.0)
     }
 }
@@ -397,7 +387,7 @@ struct Isolation<'a> {
 
 impl Isolation<'_> {
     /// The instants strictly inside, increasing.
-    fn run(mut self) -> Result<Vec<f64>, Error> {
+    fn run(mut self) -> Result<Vec<f64>> {
         let mut cells = vec![(self.start, self.end)];
         while let Some((a, b)) = cells.pop() {
             self.effort.look(a)?;
@@ -502,7 +492,7 @@ impl Isolation<'_> {
 
     /// Whether a cell that nothing is known of is not worth another cut: time does not
     /// resolve it, or rounding errors hide the mode in it.
-    fn is_hidden(&mut self, a: f64, b: f64) -> Result<bool, Error> {
+    fn is_hidden(&mut self, a: f64, b: f64) -> Result<bool> {
         let width = b - a;
         if width <= apart(self.start.abs().max(self.end.abs())) {
             return Ok(true);
@@ -523,7 +513,7 @@ impl Isolation<'_> {
     }
 
     /// Finds the switches of a part on which the quantity is monotone.
-    fn monotone(&mut self, a: f64, b: f64) -> Result<(), Error> {
+    fn monotone(&mut self, a: f64, b: f64) -> Result<()> {
         if self.indicator.counts {
             let levels = (self.indicator.value(b) - self.indicator.value(a)).abs();
             self.effort.check(levels.max(0.0))?;
@@ -543,21 +533,19 @@ impl Isolation<'_> {
     /// The time nearest to `end` at which the mode is certain, on the way to `other`.
     fn probe(&self, end: f64, other: f64) -> Option<f64> {
         let shares = (1..=17).rev().map(|k| 0.5_f64.powi(3 * k));
-        std::iter::once(0.0)
-            .chain(shares)
-            .chain([0.5])
-            .map(|share| end + share * (other - end))
-            .find(|&t| self.is_certain(t))
+        let shares = std::iter::once(0.0).chain(shares).chain([0.5]);
+        let mut times = shares.map(|share| end + share * (other - end));
+        times.find(|&t| self.is_certain(t))
     }
 
     /// The mode is certain at `t`.
-    fn arrive(&mut self, t: f64) -> Result<(), Error> {
+    fn arrive(&mut self, t: f64) -> Result<()> {
         let value = self.indicator.value(t);
         self.reach(t, value)
     }
 
     /// The mode is what it is at `inside` from `t` on.
-    fn settle(&mut self, inside: f64, t: f64) -> Result<(), Error> {
+    fn settle(&mut self, inside: f64, t: f64) -> Result<()> {
         let value = self.indicator.value(inside);
         self.reach(t, value)?;
         self.certain = Some((inside, value));
@@ -565,7 +553,7 @@ impl Isolation<'_> {
     }
 
     /// Finds every switch between the last certain time and `t`, where the mode is `value`.
-    fn reach(&mut self, t: f64, value: f64) -> Result<(), Error> {
+    fn reach(&mut self, t: f64, value: f64) -> Result<()> {
         while let Some((left, current)) = self.certain
             && !same(current, value)
         {
@@ -581,7 +569,7 @@ impl Isolation<'_> {
         Ok(())
     }
 
-    fn push(&mut self, switch: f64) -> Result<(), Error> {
+    fn push(&mut self, switch: f64) -> Result<()> {
         let last = self.instants.last().copied().unwrap_or(self.start);
         if switch - last <= apart(switch) || self.end - switch <= apart(self.end) {
             return Ok(());

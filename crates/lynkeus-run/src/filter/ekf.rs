@@ -3,7 +3,7 @@
 use super::belief::Belief;
 use super::sensing::{Believed, Sensing};
 use super::smoother::Correction;
-use crate::Error;
+use crate::Result;
 use crate::runner::Sample;
 
 /// Room for its corrections.
@@ -25,7 +25,7 @@ impl Ekf {
         sensing: &mut Sensing,
         belief: &mut Belief,
         sample: &Sample<'_>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         sensing.judge_all(belief, sample, &mut self.taken)?;
         self.before.clone_from(&belief.x);
         let inside = self.taken.iter().filter(|b| b.end.is_none());

@@ -63,7 +63,7 @@ pub use smoother::Smoothed;
 use crate::divergence::{Bound, check_deviations};
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Error, EstimatorSettings};
+use crate::{Error, EstimatorSettings, Result};
 use belief::{Projection, confine};
 use ekf::Ekf;
 use mhe::Mhe;
@@ -107,7 +107,7 @@ impl Filter {
         model: &NoisyModel,
         settings: &FilterSettings,
         run: EstimatorSettings,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let flow = model.flow.system();
         let n = flow.states().len();
         settings.check(n, model.ranges.len())?;
@@ -128,9 +128,7 @@ impl Filter {
             ranges: model.ranges.clone(),
             deviations: model.initial_variance.iter().map(|v| v.sqrt()).collect(),
             belief: Belief::new(flow.start(), &model.initial_variance),
-            projection: settings
-                .projects
-                .then(|| Projection::new(model.ranges.clone())),
+            projection: (settings.projects).then(|| Projection::new(model.ranges.clone())),
             sensing: Sensing::new(model, settings),
             bound: Bound::new(flow.start()),
             history: settings.keep_history.then(History::default),
@@ -140,7 +138,7 @@ impl Filter {
 
     /// To the next sample; the transition is what the smoother needs of it. Where the plant has no
     /// value on the way, inside the declared ranges.
-    fn predict(&mut self, from: f64, sample: &Sample<'_>) -> Result<Option<Profile>, Error> {
+    fn predict(&mut self, from: f64, sample: &Sample<'_>) -> Result<Option<Profile>> {
         // a window finds its own
         let keep = self.sensing.corrections.is_some();
         let (propagation, belief) = (&mut self.propagation, &mut self.belief);
@@ -179,7 +177,7 @@ impl Filter {
         }
     }
 
-    fn correct(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
+    fn correct(&mut self, sample: &Sample<'_>) -> Result<()> {
         match self.correct_here(sample) {
             // the outputs are evaluated before a reading is counted; a window keeps its states
             // inside anyway
@@ -196,7 +194,7 @@ impl Filter {
         }
     }
 
-    fn correct_here(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
+    fn correct_here(&mut self, sample: &Sample<'_>) -> Result<()> {
         let (sensing, belief) = (&mut self.sensing, &mut self.belief);
         match &mut self.engine {
             Engine::Extended(ekf) => ekf.correct(sensing, belief, sample),
@@ -209,7 +207,7 @@ impl Filter {
 }
 
 impl Runner for Filter {
-    fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
+    fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<()> {
         self.bound.see(self.propagation.driven.signals());
         let transition = self.predict(from, sample)?;
         self.propagation.driven.arrive();
@@ -223,7 +221,7 @@ impl Runner for Filter {
         Ok(())
     }
 
-    fn update(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
+    fn update(&mut self, sample: &Sample<'_>) -> Result<()> {
         self.sensing.health.inputs_held += sample.held;
         // those of an update that failed
         self.sensing.take_corrections();
@@ -233,7 +231,7 @@ impl Runner for Filter {
         Ok(())
     }
 
-    fn report(&mut self, t: f64) -> Result<(), Error> {
+    fn report(&mut self, t: f64) -> Result<()> {
         let names = self.propagation.driven.system().states();
         self.bound.check(t, names, &self.belief.x, String::new)?;
         for (i, deviation) in self.deviations.iter_mut().enumerate() {
@@ -288,10 +286,8 @@ impl Runner for Filter {
         let mut rows = history.smoothed(&newest, lag, deviations);
         if let Some(lag) = lag {
             // as it was known then: the rows kept are linearised about what was known later
-            for (row, x) in rows
-                .iter_mut()
-                .zip(history.in_windows(self.belief.x.len(), lag))
-            {
+            let known = history.in_windows(self.belief.x.len(), lag);
+            for (row, x) in rows.iter_mut().zip(known) {
                 row.estimate.copy_from_slice(x);
             }
         }

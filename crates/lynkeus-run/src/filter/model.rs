@@ -7,7 +7,7 @@ use lynkeus_expr::{Graph, Node};
 
 use crate::noise::{Level, Limits, check_size};
 use crate::snapshot::Digest;
-use crate::{Error, Linearised};
+use crate::{Error, Linearised, Result};
 
 /// x' = f(t, x, u) + w, y_i = h_i(t, x, u) + v_i with white noises w, v.
 #[derive(Clone, Debug)]
@@ -78,7 +78,7 @@ impl NoisyModel {
     /// # Errors
     /// [`Error::MissingInput`] for an expression that reads another symbol; [`Error::Setting`]
     /// for a plant without states, a noise or a variance that is negative or not finite, and for wrong numbers of them.
-    pub fn new(plant: &NoisyPlant<'_>) -> Result<Self, Error> {
+    pub fn new(plant: &NoisyPlant<'_>) -> Result<Self> {
         check(plant)?;
         let flow = |f: &Vec<Node>| {
             Linearised::flow(plant.graph, plant.time, &plant.states, &plant.inputs, f)
@@ -92,19 +92,13 @@ impl NoisyModel {
         plant: &NoisyPlant<'_>,
         flow: Linearised,
         confined: Option<Linearised>,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let outputs = plant.sensors.iter().map(|s| (s.name.clone(), s.output));
         let outputs: Vec<(String, Node)> = outputs.collect();
-        let (graph, time) = (plant.graph, plant.time);
+        let (graph, time, signals) = (plant.graph, plant.time, &plant.inputs);
         Ok(Self {
             flow,
-            output_map: Linearised::output_map(
-                graph,
-                time,
-                &plant.states,
-                &plant.inputs,
-                &outputs,
-            )?,
+            output_map: Linearised::output_map(graph, time, &plant.states, signals, &outputs)?,
             sensors: plant.sensors.clone(),
             process_noise: plant.process_noise.clone(),
             initial_variance: plant.initial_variance.clone(),
@@ -129,7 +123,7 @@ impl NoisyModel {
 }
 
 /// That there is a density and a variance for each state.
-pub(crate) fn check_counts(plant: &NoisyPlant<'_>) -> Result<(), Error> {
+pub(crate) fn check_counts(plant: &NoisyPlant<'_>) -> Result<()> {
     let n = plant.states.len();
     for (what, values) in lists(plant) {
         if values.len() != n {
@@ -147,7 +141,7 @@ fn lists<'p>(plant: &'p NoisyPlant<'_>) -> [(&'static str, &'p [f64]); 2] {
     ]
 }
 
-fn check(plant: &NoisyPlant<'_>) -> Result<(), Error> {
+fn check(plant: &NoisyPlant<'_>) -> Result<()> {
     if plant.states.is_empty() {
         return Err(Error::setting("number of states", "1 at least", 0));
     }

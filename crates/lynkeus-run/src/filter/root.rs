@@ -173,9 +173,13 @@ fn triangularise(rows: &mut [f64], n: usize, sums: &mut [f64]) {
 /// The power of two of the largest of some numbers; none where all are as good as zero.
 fn unit(numbers: impl Iterator<Item = f64>) -> Option<f64> {
     const EXPONENT: u64 = 0x7ff << 52;
-    let largest = numbers.fold(0.0, |m: f64, x| if x.abs() <= m { m } else { x.abs() });
-    let power = f64::from_bits(largest.to_bits() & EXPONENT);
+    let power = f64::from_bits(largest(numbers).to_bits() & EXPONENT);
     (power > 0.0).then_some(power)
+}
+
+/// The largest size of some numbers; not a number where the last of them is none.
+pub(crate) fn largest(numbers: impl Iterator<Item = f64>) -> f64 {
+    numbers.fold(0.0, |m: f64, x| if x.abs() <= m { m } else { x.abs() })
 }
 
 /// Room for the factor of a matrix.

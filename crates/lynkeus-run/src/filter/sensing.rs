@@ -16,7 +16,7 @@ use super::model::{NoisyModel, Sensor};
 use super::root::dot;
 use super::settings::FilterSettings;
 use super::smoother::Correction;
-use crate::Error;
+use crate::Result;
 use crate::linearised::OutputMap;
 use crate::noise::Limits;
 use crate::runner::Sample;
@@ -136,7 +136,7 @@ impl Sensing {
         belief: &Belief,
         sample: &Sample<'_>,
         taken: &mut Vec<Believed>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         self.output_map
             .linearise(sample.t, &belief.x, sample.inputs)?;
         taken.clear();
@@ -284,9 +284,8 @@ impl Tail {
             0.5 - density * sum
         } else {
             // Laplace's continued fraction: φ/Φ(−a) = a + 1/(a + 2/(a + 3/…))
-            let excess = (1..80)
-                .rev()
-                .fold(0.0, |rest, k| f64::from(k) / (size + rest));
+            let fractions = (1..80).rev().map(f64::from);
+            let excess = fractions.fold(0.0, |rest, k| k / (size + rest));
             let weight = density / (size + excess);
             if a > 0.0 {
                 let mean = a + excess;

@@ -8,7 +8,7 @@ use super::settings::{SigmaPoints, Weights};
 use super::smoother::Correction;
 use super::transition::Propagation;
 use crate::runner::Sample;
-use crate::{Error, Integrator, Method};
+use crate::{Integrator, Method, Result};
 
 /// Images of two points that differ by no more than this share of their size do not differ.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -31,7 +31,7 @@ pub(crate) struct Ukf {
 
 impl Ukf {
     /// Of n states.
-    pub fn new(n: usize, points: SigmaPoints, method: Method) -> Result<Self, Error> {
+    pub fn new(n: usize, points: SigmaPoints, method: Method) -> Result<Self> {
         Ok(Self {
             integrator: Integrator::new(method, n)?,
             weights: points.weights(n)?,
@@ -47,12 +47,7 @@ impl Ukf {
     }
 
     /// Points of the belief beside their mean, and what the sensors show of them.
-    fn show(
-        &mut self,
-        sensing: &mut Sensing,
-        belief: &Belief,
-        sample: &Sample<'_>,
-    ) -> Result<(), Error> {
+    fn show(&mut self, sensing: &mut Sensing, belief: &Belief, sample: &Sample<'_>) -> Result<()> {
         let weights = self.weights;
         let n = belief.x.len();
         draw(belief, weights.spread, &mut self.points);
@@ -92,14 +87,13 @@ impl Ukf {
             .collect();
         let column = |a: usize| gain.iter().map(|k| k[a]).collect();
         let unit = |a: usize| (0..count).map(|b| f64::from(u8::from(a == b))).collect();
+        let units = (0..count).map(unit);
         if let Some(corrections) = &mut sensing.corrections {
             let row = |b: &Believed| weights.row(&belief.root, &self.shown, m, b.sensor);
             corrections.push(Correction {
                 slopes: taken.iter().map(row).collect(),
                 gains: (0..count).map(column).collect(),
-                information: (0..count)
-                    .flat_map(|a| solved(lower, count, unit(a)))
-                    .collect(),
+                information: units.flat_map(|unit| solved(lower, count, unit)).collect(),
                 weighed: solved(lower, count, taken.iter().map(|b| b.innovation).collect()),
             });
         }
@@ -164,7 +158,7 @@ impl Ukf {
         from: f64,
         to: f64,
         keep: bool,
-    ) -> Result<Option<Profile>, Error> {
+    ) -> Result<Option<Profile>> {
         let weights = self.weights;
         let n = belief.x.len();
         draw(belief, weights.spread, &mut self.points);
@@ -197,7 +191,7 @@ impl Ukf {
         sensing: &mut Sensing,
         belief: &mut Belief,
         sample: &Sample<'_>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         self.show(sensing, belief, sample)?;
         let m = sample.readings.len();
         let (mut inside, mut at_ends) = (vec![], vec![]);

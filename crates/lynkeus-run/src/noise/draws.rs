@@ -130,8 +130,13 @@ fn halvings_at(
     if !F.iter().all(|f| f.is_finite()) {
         return 0;
     }
-    let flow = LinearPlant::new(F, densities, sample, samples);
-    (0..most).find(|j| flow.fits(*j)).unwrap_or(most)
+    let Q = DMatrix::from_diagonal(&densities.to_vec().into());
+    let (steps, whole) = transitions(F, &Q, sample, samples);
+    let fits = |j: &usize| {
+        let steps = whole.checked_sub(*j).and_then(|first| steps.get(first..));
+        steps.is_none_or(|steps| may_hold(steps, &Q, sample / 2.0_f64.powi(*j as i32)))
+    };
+    (0..most).find(fits).unwrap_or(most)
 }
 
 /// Where noise of density q on state i takes a plant within some time, as far as its own slope there lets it: s² = q/2|F|.
@@ -202,63 +207,45 @@ impl Transition {
 }
 
 /// A linear plant x' = Fx + w over 1/2^k of a sampling interval, then over the interval, then over more
-/// and more of them.
-struct LinearPlant {
-    Q: DMatrix<f64>,
-    /// the shortest first
-    steps: Vec<Transition>,
-    /// which of them is the interval, and its length
-    sample: usize,
+/// and more of them; and which of these is the interval.
+fn transitions(
+    F: &DMatrix<f64>,
+    Q: &DMatrix<f64>,
     interval: f64,
+    samples: f64,
+) -> (Vec<Transition>, usize) {
+    let turn = (F.norm() * interval).max(f64::MIN_POSITIVE);
+    let halvings = (turn / 0.125).log2().ceil().clamp(0.0, DOUBLINGS as f64) as usize;
+    let h = interval / 2.0_f64.powi(halvings as i32);
+    let all = halvings + (samples.log2().ceil() as usize).min(DOUBLINGS);
+    let (mut steps, mut next) = (vec![], Transition::short(F, Q, h));
+    for count in 0..=all {
+        let size = next.noise.norm() + next.transition.norm();
+        if count > halvings && (size.is_nan() || size >= 1e150) {
+            break;
+        }
+        let twice = next.doubled();
+        steps.push(std::mem::replace(&mut next, twice));
+    }
+    (steps, halvings)
 }
 
-impl LinearPlant {
-    fn new(F: &DMatrix<f64>, densities: &[f64], interval: f64, samples: f64) -> Self {
-        let Q = DMatrix::from_diagonal(&densities.to_vec().into());
-        let turn = (F.norm() * interval).max(f64::MIN_POSITIVE);
-        let halvings = (turn / 0.125).log2().ceil().clamp(0.0, DOUBLINGS as f64) as usize;
-        let h = interval / 2.0_f64.powi(halvings as i32);
-        let mut steps = vec![Transition::short(F, &Q, h)];
-        let all = halvings + (samples.log2().ceil() as usize).min(DOUBLINGS);
-        while steps.len() <= all {
-            let Some(next) = steps.last().map(Transition::doubled) else {
-                break;
-            };
-            let size = next.noise.norm() + next.transition.norm();
-            if steps.len() > halvings && (size.is_nan() || size >= 1e150) {
-                break;
-            }
-            steps.push(next);
-        }
-        Self {
-            Q,
-            steps,
-            sample: halvings,
-            interval,
-        }
+/// Whether noise that is held for the first of these steps makes the variances of the states that white
+/// noise makes, at the end.
+fn may_hold(steps: &[Transition], Q: &DMatrix<f64>, hold: f64) -> bool {
+    let [.., last] = steps else {
+        return true;
+    };
+    let mut held = &steps[0].integral * Q * steps[0].integral.transpose() / hold;
+    for step in &steps[..steps.len() - 1] {
+        held += &step.transition * &held * step.transition.transpose();
     }
-
-    /// Whether noise that is held for 1/2^j of an interval makes the variances of the states that
-    /// white noise makes, at the end.
-    fn fits(&self, j: usize) -> bool {
-        let Some(first) = self.sample.checked_sub(j) else {
-            return true;
-        };
-        let (Some(step), Some(last)) = (self.steps.get(first), self.steps.last()) else {
-            return true;
-        };
-        let hold = self.interval / 2.0_f64.powi(j as i32);
-        let mut held = &step.integral * &self.Q * step.integral.transpose() / hold;
-        for step in &self.steps[first..self.steps.len() - 1] {
-            held += &step.transition * &held * step.transition.transpose();
-        }
-        (0..held.nrows()).all(|i| {
-            let white = last.noise[(i, i)];
-            let off = (held[(i, i)] - white).abs();
-            // what is no number tells nothing
-            off.is_nan() || white.is_nan() || off <= OFF * white.abs()
-        })
-    }
+    (0..held.nrows()).all(|i| {
+        let white = last.noise[(i, i)];
+        let off = (held[(i, i)] - white).abs();
+        // what is no number tells nothing
+        off.is_nan() || white.is_nan() || off <= OFF * white.abs()
+    })
 }
 
 #[cfg(test)]

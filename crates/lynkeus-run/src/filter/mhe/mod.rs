@@ -22,10 +22,10 @@ use super::root::dot;
 use super::sensing::{Believed, Sensing};
 use super::smoother::{History, Step};
 use super::transition::{Propagation, Stage};
-use crate::Error;
 use crate::noise::Limits;
 use crate::runner::Sample;
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::{Error, Result};
 use quadratic::{Linear, Pass, Pin, Problem, Seen, Solution, carried, corrected};
 
 /// Most Gauss–Newton steps per sample,
@@ -68,7 +68,7 @@ impl Persist for Mhe {
 }
 
 impl Mhe {
-    pub fn new(model: &NoisyModel, length: usize, keep: bool) -> Result<Self, Error> {
+    pub fn new(model: &NoisyModel, length: usize, keep: bool) -> Result<Self> {
         if length == 0 {
             return Err(Error::setting("horizon", "at least 1 sample", 0));
         }
@@ -145,7 +145,7 @@ impl Mhe {
         &mut self,
         propagation: &mut Propagation,
         sensing: &mut Sensing,
-    ) -> Result<GaussNewtonStep, Error> {
+    ) -> Result<GaussNewtonStep> {
         let mut share = 1.0;
         let mut best: Option<GaussNewtonStep> = None;
         for _ in 0..STEPS {
@@ -183,7 +183,7 @@ impl Mhe {
         &self,
         propagation: &mut Propagation,
         sensing: &mut Sensing,
-    ) -> Result<GaussNewtonStep, Error> {
+    ) -> Result<GaussNewtonStep> {
         let met = self.rows.iter().map(|row| row.met.clone()).collect();
         let problem = self.linearise(propagation, sensing)?;
         let solution = problem.solve(met);
@@ -238,7 +238,7 @@ impl Mhe {
         &self,
         propagation: &mut Propagation,
         sensing: &mut Sensing,
-    ) -> Result<Problem<'_>, Error> {
+    ) -> Result<Problem<'_>> {
         let count = self.rows.len();
         let mut rows: Vec<Linear> = Vec::with_capacity(count);
         let mut free: Vec<Pass> = Vec::with_capacity(count);
@@ -270,7 +270,7 @@ impl Mhe {
         sensing: &mut Sensing,
         belief: &mut Belief,
         sample: &Sample<'_>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         (self.window, self.left) = (vec![], None);
         let mut taken = vec![];
         sensing.judge_all(belief, sample, &mut taken)?;
@@ -306,12 +306,7 @@ impl Mhe {
 }
 
 /// The way between two rows, about the guess at the first.
-fn between(
-    propagation: &mut Propagation,
-    from: &Row,
-    to: &Row,
-    last: &Pass,
-) -> Result<Stage, Error> {
+fn between(propagation: &mut Propagation, from: &Row, to: &Row, last: &Pass) -> Result<Stage> {
     propagation.driven.start(&from.inputs);
     propagation.driven.aim(from.t, to.t, &to.inputs);
     let about = Belief {
@@ -389,7 +384,7 @@ impl Row {
 }
 
 /// The readings of a row, h linearised at its guess.
-pub(crate) fn seen(sensing: &mut Sensing, row: &Row) -> Result<Vec<Seen>, Error> {
+pub(crate) fn seen(sensing: &mut Sensing, row: &Row) -> Result<Vec<Seen>> {
     let map = &mut sensing.output_map;
     let h = map.linearise(row.t, &row.guess, &row.inputs)?.to_vec();
     let seen = |believed: &Believed| {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::series::Transition;
 use crate::Evaluation;
 use crate::filter::profile::Profile;
-use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place, Slopes};
+use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place, Result, Slopes};
 
 /// x̂, Φ and W by one integration, for flows with few states.
 #[derive(Clone, Debug)]
@@ -19,7 +19,7 @@ pub(crate) struct Joint {
 }
 
 impl Joint {
-    pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self, Error> {
+    pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self> {
         let scale = process_noise.iter().fold(0.0_f64, |m, q| m.max(*q));
         let noise = match scale > 0.0 {
             true => process_noise.iter().map(|q| q / scale).collect(),
@@ -42,7 +42,7 @@ impl Joint {
         to: f64,
         x: &mut [f64],
         transition: &mut Transition<Profile>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let equation = &mut self.equation;
         let (n, width) = (equation.n, equation.width);
         self.z.clear();

@@ -4,6 +4,7 @@
 use nalgebra::DMatrix;
 
 use crate::filter::profile::{Entry, Profile};
+use crate::filter::root::largest;
 
 /// Terms after which a series is given up.
 const MOST_TERMS: usize = 60;
@@ -46,8 +47,7 @@ impl Transition<Profile> {
 
     /// The larger of both norms; not a number where one is none.
     fn norm(&self) -> f64 {
-        let norms = self.both().map(Profile::norm);
-        norms.fold(0.0, |m: f64, s| if s <= m { m } else { s })
+        largest(self.both().map(Profile::norm))
     }
 
     fn add(&mut self, other: &Self) {
