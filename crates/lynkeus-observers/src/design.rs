@@ -5,7 +5,7 @@ use lynkeus_expr::{MissingInput, Spent};
 use lynkeus_structure::{AugmentedPlant, Region, Standing};
 
 use crate::statement::standing;
-use crate::{Check, Observer, Reason, Statement, TuningError};
+use crate::{Check, Family, Observer, Reason, Statement, TuningError};
 
 /// Whether a family fits, in the words of reports: it does where every condition is proved, and
 /// does not where the form is another or a condition is refuted.
@@ -20,8 +20,8 @@ pub fn fit_word(fit: Standing) -> &'static str {
 /// What a family finds in a plant.
 #[derive(Clone, Debug)]
 pub struct Examination {
-    /// name of the family
-    pub family: &'static str,
+    /// the family
+    pub family: &'static dyn Family,
     /// what was found: the chains, or what breaks the form
     pub summary: Reason,
     /// names of the states of each chain, where the form was found
@@ -51,7 +51,7 @@ impl Examination {
     pub(crate) fn new(
         augmented: &AugmentedPlant<'_>,
         region: &Region,
-        family: &'static str,
+        family: &'static dyn Family,
         summary: impl Into<Reason>,
         chains: Vec<Vec<String>>,
         checks: Vec<Check>,
@@ -68,7 +68,7 @@ impl Examination {
 
     /// The plant does not have the form, or a condition ends the search for one.
     pub(crate) fn unfit(
-        family: &'static str,
+        family: &'static dyn Family,
         summary: impl Into<Reason>,
         checks: Vec<Check>,
     ) -> Self {
@@ -81,11 +81,11 @@ impl Examination {
         }
     }
 
-    /// Of a family that asks nothing of a plant, and promises nothing.
-    pub(crate) fn of_any_plant(family: &'static str, summary: impl Into<Reason>) -> Self {
+    /// Of a filter, which asks nothing of a plant, and promises nothing.
+    pub(crate) fn of_any_plant(family: &'static dyn Family, called: &'static str) -> Self {
         Self {
             family,
-            summary: summary.into(),
+            summary: Reason::AnyPlant(called),
             chains: vec![],
             checks: vec![],
             plant: PlantFit::Any,
@@ -93,7 +93,7 @@ impl Examination {
     }
 
     /// A limit ended the examination: whether the family fits is not known.
-    pub(crate) fn ended(family: &'static str, spent: Spent) -> Self {
+    pub(crate) fn ended(family: &'static dyn Family, spent: Spent) -> Self {
         Self {
             plant: PlantFit::Ended(spent),
             ..Self::unfit(family, Reason::Ended(spent), vec![])

@@ -152,13 +152,8 @@ pub enum Reason {
         /// of the chain of this output
         output: String,
     },
-    /// a filter takes any plant
-    AnyPlant {
-        /// which filter
-        filter: &'static str,
-        /// where the plant is not regular
-        irregular: Option<Box<Reason>>,
-    },
+    /// a filter takes any plant: this one
+    AnyPlant(&'static str),
     /// the gain of a filter depends on the run
     GainOfTheRun,
     /// of the certificate by linear matrix inequalities

@@ -445,8 +445,3 @@ pub(crate) fn is_or_has(name: &str, variable: &str) -> bool {
     let element = variable.strip_prefix(name);
     element.is_some_and(|rest| rest.is_empty() || rest.starts_with('['))
 }
-
-/// A key whose wrong value is told by the stage that needs it: another family may own a key
-/// of that name with another shape, and `auto` examines a plant for both. Where the study names
-/// the family, [`Family::verify`] tells it at once.
-pub(crate) type Deferred<T> = Result<T, TuningError>;

@@ -6,17 +6,31 @@ use std::collections::HashMap;
 use lynkeus_expr::{Expr, Graph, Node, jacobian};
 use lynkeus_structure::{AugmentedPlant, Blocks, Chain};
 
-use super::form::{Form, NAME, chain_rule};
+use super::form::{Form, chain_rule};
 use super::said::Correction;
 use super::settings::Settings;
 use crate::design::Found;
 use crate::estimate::{PlantCopy, Speed, prolong};
 use crate::peaking::{Part, Transient};
 use crate::printed::AtStart;
-use crate::{Design, DesignError, estimate, peaking, printed};
+use crate::{Design, DesignError, estimate, guarantee, peaking, printed};
+
+pub(super) fn design(
+    augmented: &AugmentedPlant<'_>,
+    settings: &Settings,
+    found: Found<Form>,
+) -> Result<Design, DesignError> {
+    match (settings.lmi()?, settings.remedies.low_power) {
+        (Some(lmi), _) => {
+            guarantee::design_lmi(augmented, &settings.common, lmi, found.examination)
+        }
+        (None, true) => low_power(augmented, settings, found),
+        (None, false) => observer(augmented, settings, found),
+    }
+}
 
 /// Observer (7) or (3).
-pub(super) fn observer(
+fn observer(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Form>,
@@ -86,7 +100,7 @@ pub(super) fn observer(
         prolong(&copy, chain, partials, &mut derivatives)?;
     }
     Ok(Design {
-        observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
+        observer: copy.observer(derivatives)?.tuned_by(&speeds),
         notes: chain_rule(blocks, &θ).into_iter().collect(),
         examination,
         gains,
@@ -104,7 +118,7 @@ fn injected(copy: &PlantCopy<'_, '_>, blocks: &Blocks, place: usize) -> HashMap<
 }
 
 /// The observer whose chains have the low-power form.
-pub(super) fn low_power(
+fn low_power(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Form>,

@@ -14,11 +14,12 @@ use lynkeus_proof::{lyapunov, metzler};
 use lynkeus_structure::{AugmentedPlant, Blocks, Standing};
 use nalgebra::DMatrix;
 
-use super::form::chain_rule;
+use super::form::{Form, chain_rule};
 use super::said::{Correction, Lee, Said};
 use super::settings::Settings;
 use super::transformed::{Plant, Similar, Table, Term};
 use crate::conditions::{GainedChain, Partial, along, names};
+use crate::design::Found;
 use crate::peaking::departure;
 use crate::statement::{proved, standing, undecided};
 use crate::theorem::{conclude, slopes, state_noise};
@@ -29,10 +30,10 @@ pub(super) const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
 pub(super) fn certificate(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
-    blocks: &Blocks,
+    Found { form, .. }: Found<Form>,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
-    let lmi = settings.lmi.clone()?;
+    let (lmi, blocks) = (settings.lmi()?, &form.blocks);
     if let Some(check) = departure(Lee::Observer, lmi.as_ref(), &settings.remedies) {
         return Ok(Certificate::new(BASIS, assumptions, vec![check]));
     }

@@ -89,12 +89,11 @@ impl Lmi {
     }
 }
 
-/// The observer with a certified gain, under the name of the family that asked.
+/// The observer with a certified gain, for the family that asked.
 pub(crate) fn design_lmi(
     augmented: &AugmentedPlant<'_>,
     common: &Tuning,
     asked: Lmi,
-    family: &'static str,
     examination: Examination,
 ) -> Result<Design, DesignError> {
     estimate::refuse(common, "gain = \"lmi\"")?;
@@ -124,7 +123,7 @@ pub(crate) fn design_lmi(
             return Err(TuningError::absent(RATE.name, expected).into());
         }
     };
-    assemble(augmented, &copy, family, examination, &request, &gain)
+    assemble(augmented, &copy, examination, &request, &gain)
 }
 
 /// Of each output the state that it shows, and |c| of y = c·x + d: the smallest on the box where it
@@ -241,7 +240,6 @@ fn fastest(system: &ErrorSystem, mut request: Request) -> Result<Gain, DesignErr
 fn assemble(
     augmented: &AugmentedPlant<'_>,
     copy: &PlantCopy<'_, '_>,
-    family: &'static str,
     examination: Examination,
     request: &Request,
     gain: &Gain,
@@ -265,7 +263,7 @@ fn assemble(
             entries,
         });
     }
-    let mut observer = copy.observer(family, derivatives)?;
+    let mut observer = copy.observer(derivatives)?;
     observer.is_whole = copy.common.tunable;
     let slopes = gain.proof.multipliers.first().map_or(0, |t| t.len());
     let row = |name: &str, value| (name.to_owned(), value);

@@ -54,7 +54,7 @@ use lynkeus_proof::matrix::square;
 use lynkeus_structure::output_map::Rows;
 use lynkeus_structure::{AugmentedPlant, Matrix, Measurement, range};
 
-use super::form::{Form, NAME};
+use super::form::Form;
 use super::said::Said;
 use super::settings::Settings;
 use crate::conditions::names;
@@ -74,7 +74,7 @@ const SQUARINGS: i32 = 7;
 const ALARM: f64 = 1e-6;
 
 /// Observer (7)–(8).
-pub(super) fn assemble(
+pub(super) fn design(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Form>,
@@ -99,7 +99,7 @@ pub(super) fn assemble(
     }
     derivatives.extend(factor.derivatives(θ.expr(graph), &F, &v));
     let alarm = alarm(augmented, &form, settings)?;
-    let mut observer = copy.observer(NAME, derivatives)?.tuned_by([&θ]);
+    let mut observer = copy.observer(derivatives)?.tuned_by([&θ]);
     observer.monitors.extend(monitor(&factor, alarm));
     observer.states.extend(factor.states);
     let outside = outside_last(augmented, &form).into_iter();
@@ -148,7 +148,7 @@ pub(super) fn alarm(
     form: &Form,
     settings: &Settings,
 ) -> Result<f64, DesignError> {
-    match settings.alarm.clone()? {
+    match settings.alarm()? {
         Some(alarm) => Ok(alarm),
         None => Ok(ALARM * least_reach(augmented, form)?),
     }

@@ -7,7 +7,6 @@ use crate::conditions::{CHAINS, chain_request};
 use crate::estimate::PROLONG;
 use crate::guarantee::{LMI, LMI_KEYS, Lmi};
 use crate::peaking::Remedies;
-use crate::tuning::Deferred;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, peaking};
 
 const THETA: KeySpec = KeySpec {
@@ -88,7 +87,6 @@ pub(super) const KEYS: &[&[KeySpec]] = &[&OWN, &LMI_KEYS, &peaking::KEYS];
 pub struct Settings {
     pub common: Tuning,
     /// per chain, as in every list here
-    θ: Deferred<Option<Vec<f64>>>,
     pub δ: Option<Vec<f64>>,
     pub r: Option<Vec<f64>>,
     pub S: Option<Vec<Tridiagonal>>,
@@ -99,6 +97,8 @@ pub struct Settings {
     pub leading: Option<usize>,
     pub lmi: Option<Lmi>,
     pub remedies: Remedies,
+    /// measured outputs
+    outputs: usize,
 }
 
 impl Settings {
@@ -115,7 +115,6 @@ impl Settings {
         };
         Ok(Self {
             common: tuning.checked()?,
-            θ: tuning.positive_per_chain(THETA.name, count),
             δ: tuning.positive_per_chain(DELTA.name, count)?,
             r: tuning.positive_per_chain(FACTOR.name, count)?,
             S,
@@ -124,20 +123,16 @@ impl Settings {
             leading: leading(augmented, tuning)?,
             lmi,
             remedies: Remedies::read(tuning, count, of_standard)?,
+            outputs: count,
         })
     }
 
-    /// The first of the keys left for later that has a wrong value.
-    pub fn deferred(&self) -> Result<(), TuningError> {
-        self.θ.as_ref().map_err(TuningError::clone)?;
-        Ok(())
-    }
-
-    /// θ, which has no default.
+    /// θ by chain, which has no default.
     pub fn θ(&self) -> Result<Vec<f64>, TuningError> {
         let expected = "a positive number (the gain grows like theta^n)";
         let missing = || TuningError::absent(THETA.name, expected);
-        self.θ.clone()?.ok_or_else(missing)
+        let given = self.common.positive_per_chain(THETA.name, self.outputs)?;
+        given.ok_or_else(missing)
     }
 }
 

@@ -26,22 +26,23 @@ use lynkeus_expr::{Expr, MissingInput, Node};
 use lynkeus_gain::integrators::Chain;
 use lynkeus_structure::{AugmentedPlant, Matrix};
 
-use super::form::{Form, NAME, along, column};
+use super::form::{Form, along, column};
 use super::said::{Said, Shape};
 use super::settings::{Settings, no_theta};
 use crate::conditions::names;
+use crate::design::Found;
 use crate::estimate::{PlantCopy, Speed, limited};
 use crate::printed::{StartPoint, expressions, is_constant};
 use crate::theorem::{Enclosure, undeclared};
-use crate::{ChainGain, Design, DesignError, Examination, ParameterValue};
+use crate::{ChainGain, Design, DesignError, ParameterValue};
 
 pub(super) fn design(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
-    form: &Form<'_, '_>,
-    examination: Examination,
+    Found { form, examination }: Found<Form<'_, '_>>,
 ) -> Result<Design, DesignError> {
-    let (thetas, note) = match settings.thetas.clone()? {
+    let form = &form;
+    let (thetas, note) = match settings.thetas()? {
         Some(given) => (given, None),
         None => {
             let (found, c) = thetas(form)?;
@@ -54,7 +55,7 @@ pub(super) fn design(
     let start = StartPoint::new(&copy)?;
     let matrices = Matrices::new(form, thetas);
     Ok(Design {
-        observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
+        observer: copy.observer(derivatives)?.tuned_by(&speeds),
         gains: matrices.gains(&start)?,
         parameters: matrices.parameters(&start)?,
         notes: note.into_iter().map(Into::into).collect(),
