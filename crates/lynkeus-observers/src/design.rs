@@ -1,6 +1,7 @@
 //! What a family makes of a plant: an examination of its conditions, and an observer with
 //! everything that led to it, or why there is none.
 
+use derive_more::From;
 use lynkeus_expr::{MissingInput, Spent};
 use lynkeus_structure::{AugmentedPlant, Region, Standing};
 
@@ -164,15 +165,17 @@ pub struct Design {
 }
 
 /// The value of a parameter of a design.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, From)]
 pub enum ParameterValue {
     /// names or expressions
+    #[from]
     Names(Vec<String>),
     /// names in blocks, one after the other
     Blocks(Vec<Vec<String>>),
     /// the least excitation that raises no alarm
     Alarm(f64),
     /// numbers
+    #[from]
     Numbers(Vec<f64>),
     /// pairs of them
     Pairs(Vec<[f64; 2]>),
@@ -218,21 +221,9 @@ pub struct Shown {
     pub at_start: Option<f64>,
 }
 
-impl From<Vec<String>> for ParameterValue {
-    fn from(names: Vec<String>) -> Self {
-        Self::Names(names)
-    }
-}
-
 impl From<f64> for ParameterValue {
     fn from(number: f64) -> Self {
         Self::Numbers(vec![number])
-    }
-}
-
-impl From<Vec<f64>> for ParameterValue {
-    fn from(numbers: Vec<f64>) -> Self {
-        Self::Numbers(numbers)
     }
 }
 

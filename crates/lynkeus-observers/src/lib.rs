@@ -24,6 +24,7 @@ pub mod kalman;
 mod observer;
 mod peaking;
 mod printed;
+mod sparse;
 pub mod state_affine;
 mod statement;
 mod theorem;

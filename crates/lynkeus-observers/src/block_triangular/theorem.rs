@@ -123,7 +123,7 @@ impl Study<'_> {
         let similar = (0..count).map(|i| self.plant.similar(i));
         let similar: Vec<Similar> = similar.collect::<Result<_, _>>()?;
         self.terms = match classical {
-            true => plain.into_iter().map(steady).collect(),
+            true => plain.into_iter().map(Term::from).collect(),
             false => self.plant.terms(&similar)?,
         };
         (self.partials, self.similar) = (ranges.collect(), similar);
@@ -258,13 +258,14 @@ impl Study<'_> {
             chains.find_map(|(i, (_, c))| Some((i, c.iter().position(|s| *s == state)? + 1)))
         };
         self.terms.iter().all(|term| {
-            let (Some((i, l)), Some((k, m))) = (place(term.row), place(term.column)) else {
+            let (Some((i, l)), Some((k, m))) = (place(term.steady.row), place(term.steady.column))
+            else {
                 return false;
             };
             let steady = ν[k] * m as f64 - ν[i] * l as f64 - 0.5 * (ν[i] + ν[k]);
             let powers = term.powers.iter().map(|&(c, power, _)| ν[c] * power as f64);
             let largest = powers.fold(0.0, f64::max);
-            let there = term.size > 0.0 || !term.powers.is_empty();
+            let there = term.steady.size > 0.0 || !term.powers.is_empty();
             !there || steady + largest <= 0.0
         })
     }
@@ -286,15 +287,6 @@ impl Study<'_> {
         let moving = (!self.classical).then(|| Said::MovingM.into());
         let notes = std::iter::once(self.place()).chain(self.rule.clone());
         notes.chain(moving).collect()
-    }
-}
-
-fn steady(slope: Slope) -> Term {
-    Term {
-        row: slope.row,
-        column: slope.column,
-        size: slope.size,
-        powers: vec![],
     }
 }
 
@@ -348,8 +340,8 @@ impl Study<'_> {
         let (rows, columns) = (&self.blocks().order[i].1, &self.blocks().order[j].1);
         let mut H = vec![vec![0.0; columns.len()]; rows.len()];
         for term in &self.terms {
-            let l = rows.iter().position(|s| *s == term.row);
-            let m = columns.iter().position(|s| *s == term.column);
+            let l = rows.iter().position(|s| *s == term.steady.row);
+            let m = columns.iter().position(|s| *s == term.steady.column);
             if let (Some(l), Some(m)) = (l, m) {
                 let scale = |θ: f64, k: usize| Interval::point(θ).powi(k as i32 + 1);
                 let size = Interval::point(term.at(&self.θ).size);

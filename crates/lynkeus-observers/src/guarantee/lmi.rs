@@ -14,7 +14,6 @@ use lynkeus_structure::{AugmentedPlant, Measurement, Slopes, range};
 
 use super::error_system::{ErrorSystem, expanded};
 use super::said::{Obstacle, Said};
-use crate::conditions::on_output;
 use crate::estimate::PlantCopy;
 use crate::{
     ChainGain, Design, DesignError, Examination, KeySpec, ParameterValue, Shape, Tuning,
@@ -44,6 +43,9 @@ const MINIMISE: KeySpec = KeySpec {
     default: "`\"noise\"`",
     meaning: "what the gain makes small at that rate, with `\"lmi\"`",
 };
+
+/// What the words of [`MINIMISE`] stand for.
+const AIMS: [Aim; 3] = [Aim::Noise, Aim::Gain, Aim::Peak];
 
 /// The word under the key `gain` that asks for it.
 pub(crate) const LMI: &str = "lmi";
@@ -82,7 +84,7 @@ impl Lmi {
             (true, _) => Ok(Some(Self {
                 rate: tuning.positive(RATE.name)?,
                 limit: tuning.positive(LIMIT.name)?,
-                aim: aim(tuning)?,
+                aim: tuning.meant(&MINIMISE, AIMS)?.unwrap_or(Aim::Noise),
                 noise: tuning.noise.clone(),
             })),
         }
@@ -170,15 +172,6 @@ fn weights(augmented: &AugmentedPlant<'_>, declared: &BTreeMap<String, f64>) -> 
     }
 }
 
-fn aim(tuning: &Tuning) -> Result<Aim, TuningError> {
-    let chosen = tuning.choice(MINIMISE.name, &["noise", "peak", "gain"])?;
-    Ok(match chosen.as_deref() {
-        Some("peak") => Aim::Peak,
-        Some("gain") => Aim::Gain,
-        _ => Aim::Noise,
-    })
-}
-
 fn none(key: &'static str, said: Said) -> DesignError {
     let reason = Box::new(said.into());
     DesignError::NoGain { key, reason }
@@ -256,11 +249,14 @@ fn assemble(
             let correction = graph.constant(k) * graph.expr(innovation);
             *derivative = (graph.expr(*derivative) - correction).node();
         }
-        let all: Vec<usize> = (0..K.len()).collect();
-        let entries = on_output(augmented, j, &all, &K);
+        let slope = output.state.map(|(_, slope, _)| slope);
+        let slope = slope.and_then(|slope| graph.constant_value(slope));
+        let states = augmented.states.iter().map(|state| state.name.clone());
+        // on ŷ − y, where the slope is a number
+        let on_output = K.iter().map(|k| k / slope.unwrap_or(1.0));
         gains.push(ChainGain {
             output: output.variable.name.clone(),
-            entries,
+            entries: states.zip(on_output).collect(),
         });
     }
     let mut observer = copy.observer(derivatives)?;

@@ -55,19 +55,21 @@ pub(super) struct Sample {
 /// The worst point that a deterministic search finds.
 pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Sample {
     let sides = system.sides.dimensions.iter().map(finite);
-    let mut search = Search {
-        system,
-        evaluator: system.evaluator(),
-        sides: match system.is_rough(graph) {
-            true => sides.enumerate().map(inner).collect(),
-            false => sides.collect(),
-        },
-        skipped: false,
+    let sides: Vec<Dimension> = match system.is_rough(graph) {
+        true => sides.enumerate().map(inner).collect(),
+        false => sides.collect(),
     };
-    let (mut best, mut highest) = (spread(&search.sides, 0), f64::NEG_INFINITY);
+    let mut evaluator = system.evaluator();
+    let mut skipped = false;
+    let mut abscissa = |point: &[f64]| {
+        let found = spectrum::abscissa(system.at(&mut evaluator, point));
+        skipped |= found.is_none();
+        found
+    };
+    let (mut best, mut highest) = (spread(&sides, 0), f64::NEG_INFINITY);
     for index in 0..POINTS {
-        let point = spread(&search.sides, index);
-        if let Some(abscissa) = search.abscissa(&point)
+        let point = spread(&sides, index);
+        if let Some(abscissa) = abscissa(&point)
             && abscissa > highest
         {
             (best, highest) = (point, abscissa);
@@ -75,18 +77,17 @@ pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Sample {
     }
     if highest.is_finite() {
         let moves = |side: &Dimension| !side.integer && side.min != side.max;
-        let sides = search.sides.clone();
         (highest, best) = climbed(&sides, HALVINGS, moves, (highest, best), |point| {
-            Some((search.abscissa(&point)?, point))
+            Some((abscissa(&point)?, point))
         });
     }
     let coordinates = system.sides.dimensions.iter().zip(&best);
     let named = coordinates.map(|(d, x)| (d.name.clone(), *x));
     let cell: Vec<Interval> = best.iter().map(|&x| Interval::point(x)).collect();
     // the mean of all real parts is no higher than the highest, and no matter of rounding
-    let mean = system.at(&mut search.evaluator, &best).trace() / system.scale.len() as f64;
+    let mean = system.at(&mut evaluator, &best).trace() / system.scale.len() as f64;
     Sample {
-        slowest: (!search.skipped).then_some(-highest),
+        slowest: (!skipped).then_some(-highest),
         limit: match highest < 0.0 && highest.is_finite() {
             true => -highest,
             false => -mean,
@@ -125,14 +126,6 @@ fn is_constant(augmented: &AugmentedPlant<'_>, observer: &Observer, system: &Err
     let read = graph.symbols_of(system.entries());
     let hats: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
     read.is_empty() && edges(graph, &observer.derivatives, &hats).is_empty()
-}
-
-struct Search<'a> {
-    system: &'a ErrorSystem,
-    evaluator: Evaluator,
-    sides: Vec<Dimension>,
-    /// the eigenvalues at a point were not found
-    skipped: bool,
 }
 
 /// A side of the box with infinite ends replaced by large ones.
@@ -187,15 +180,6 @@ pub(super) fn spread(sides: &[Dimension], index: usize) -> Vec<f64> {
             if side.integer { x.round() } else { x }
         })
         .collect()
-}
-
-impl Search<'_> {
-    /// The largest real part of an eigenvalue of A there.
-    fn abscissa(&mut self, point: &[f64]) -> Option<f64> {
-        let found = spectrum::abscissa(self.system.at(&mut self.evaluator, point));
-        self.skipped |= found.is_none();
-        found
-    }
 }
 
 /// Coordinate by coordinate to a worse point, with ever smaller steps: of those that move, to what is

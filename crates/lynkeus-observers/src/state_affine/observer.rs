@@ -61,6 +61,7 @@ use crate::conditions::names;
 use crate::design::Found;
 use crate::estimate::{PlantCopy, Speed};
 use crate::printed::{StartPoint, expressions};
+use crate::sparse::{Sparse, minus, sum, times};
 use crate::{Design, DesignError, Monitor, ParameterValue, Reason, Signal};
 
 /// The smallest d_i that forgetting leaves.
@@ -299,9 +300,6 @@ fn gain(C: &[Vec<f64>], form: &Form, θ: f64, S: &UnitFactor) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// An entry that may be zero everywhere.
-type Sparse<'g> = Option<Expr<'g>>;
-
 /// The states of the factors as symbols.
 struct Factor<'g> {
     graph: &'g Graph,
@@ -311,23 +309,6 @@ struct Factor<'g> {
     U: Vec<Vec<Sparse<'g>>>,
     /// with their starts, in the order of [`Factor::derivatives`]
     pub states: Vec<(Signal, f64)>,
-}
-
-/// Σ of the terms that are not zero everywhere.
-fn sum<'g>(terms: impl Iterator<Item = Sparse<'g>>) -> Sparse<'g> {
-    terms.flatten().reduce(|a, b| a + b)
-}
-
-fn times<'g>(a: Sparse<'g>, b: Sparse<'g>) -> Sparse<'g> {
-    Some(a? * b?)
-}
-
-fn minus<'g>(a: Sparse<'g>, b: Sparse<'g>) -> Sparse<'g> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(a - b),
-        (None, Some(b)) => Some(-b),
-        (a, None) => a,
-    }
 }
 
 impl<'g> Factor<'g> {

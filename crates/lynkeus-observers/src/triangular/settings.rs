@@ -7,7 +7,8 @@ use crate::conditions::{CHAINS, chain_request};
 use crate::estimate::PROLONG;
 use crate::guarantee::{LMI, LMI_KEYS, Lmi};
 use crate::peaking::Remedies;
-use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, peaking};
+use crate::tuning::numbers;
+use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value, peaking};
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
@@ -146,21 +147,24 @@ fn leading(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Option<usi
 
 /// S as the study gives it.
 fn explicit(tuning: &Tuning) -> Result<Option<Vec<Tridiagonal>>, TuningError> {
-    let fields = [DIAGONAL.name, BESIDE.name];
-    let Some(tables) = tuning.number_tables(MATRICES.name, &fields)? else {
+    let Some(value) = tuning.values.get(MATRICES.name) else {
         return Ok(None);
     };
-    let matrix = |(i, mut table): (usize, Vec<Vec<f64>>)| {
-        let (off, diagonal) = (
-            table.pop().unwrap_or_default(),
-            table.pop().unwrap_or_default(),
-        );
-        Tridiagonal::new(diagonal, off).map_err(|error| {
+    let expected = "a list of tables with the keys diag and off";
+    let wrong = || TuningError::new(MATRICES.name, expected, value);
+    let matrix = |(i, table): (usize, &Value)| {
+        let entries = match table {
+            Value::Table(entries) if entries.len() == 2 => entries,
+            _ => return Err(wrong()),
+        };
+        let field = |key: KeySpec| numbers(MATRICES.name, entries.get(key.name).ok_or_else(wrong)?);
+        Tridiagonal::new(field(DIAGONAL)?, field(BESIDE)?).map_err(|error| {
             let place = i + 1;
             let expected = format!("a positive definite tridiagonal matrix as entry {place}");
             TuningError::new(MATRICES.name, expected, error)
         })
     };
-    let matrices = tables.into_iter().enumerate().map(matrix);
+    let tables = value.list().ok_or_else(wrong)?;
+    let matrices = tables.iter().enumerate().map(matrix);
     matrices.collect::<Result<_, _>>().map(Some)
 }

@@ -24,7 +24,7 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{Expr, MissingInput, Node};
 use lynkeus_gain::integrators::Chain;
-use lynkeus_structure::{AugmentedPlant, Matrix};
+use lynkeus_structure::{AugmentedPlant, Matrix, Measurement};
 
 use super::form::{Form, along, column};
 use super::said::{Said, Shape};
@@ -239,12 +239,9 @@ impl<'f, 'e, 'p> Matrices<'f, 'e, 'p> {
     /// The outputs' slopes in the states that they show, where they are numbers.
     fn slopes(&self) -> Option<Vec<f64>> {
         let graph = self.form.augmented.graph();
-        let mut outputs = self.form.augmented.outputs.iter();
-        let slope = |(_, slope, _): (usize, _, _)| graph.constant_value(slope);
-        outputs.try_fold(vec![], |mut found, output| {
-            found.push(output.state.and_then(slope)?);
-            Some(found)
-        })
+        let outputs = self.form.augmented.outputs.iter();
+        let slope = |output: &Measurement| graph.constant_value(output.state?.1);
+        outputs.map(slope).collect()
     }
 
     /// Everything that (14) multiplies the innovations with.
