@@ -127,6 +127,12 @@ pub(crate) fn output_slope(
     Ok(Some(statement.with(found)))
 }
 
+/// The measured outputs.
+pub(crate) fn output_names<'a>(augmented: &'a AugmentedPlant<'_>) -> Vec<&'a str> {
+    let outputs = augmented.outputs.iter();
+    outputs.map(|o| o.variable.name.as_str()).collect()
+}
+
 pub(crate) fn names(augmented: &AugmentedPlant<'_>, states: &[usize]) -> Vec<String> {
     states
         .iter()

@@ -46,6 +46,21 @@ enum PlantFit {
 }
 
 impl Examination {
+    fn made(
+        family: &'static dyn Family,
+        summary: Reason,
+        checks: Vec<Check>,
+        plant: PlantFit,
+    ) -> Self {
+        Self {
+            family,
+            summary,
+            chains: vec![],
+            checks,
+            plant,
+        }
+    }
+
     /// What a family finds in a plant that has its form. The fit is that of the
     /// conditions, of which the first is always that the plant is [regular](
     /// AugmentedPlant::regularity) on the box.
@@ -58,12 +73,10 @@ impl Examination {
         checks: Vec<Check>,
     ) -> Result<Self, MissingInput> {
         let regularity = Statement::PlantIsRegular.with(augmented.regularity(region)?);
+        let plant = PlantFit::Form(Box::new(regularity));
         Ok(Self {
-            family,
-            summary: summary.into(),
             chains,
-            checks,
-            plant: PlantFit::Form(Box::new(regularity)),
+            ..Self::made(family, summary.into(), checks, plant)
         })
     }
 
@@ -73,32 +86,17 @@ impl Examination {
         summary: impl Into<Reason>,
         checks: Vec<Check>,
     ) -> Self {
-        Self {
-            family,
-            summary: summary.into(),
-            chains: vec![],
-            checks,
-            plant: PlantFit::Unfit,
-        }
+        Self::made(family, summary.into(), checks, PlantFit::Unfit)
     }
 
     /// Of a filter, which asks nothing of a plant, and promises nothing.
     pub(crate) fn of_any_plant(family: &'static dyn Family, called: &'static str) -> Self {
-        Self {
-            family,
-            summary: Reason::AnyPlant(called),
-            chains: vec![],
-            checks: vec![],
-            plant: PlantFit::Any,
-        }
+        Self::made(family, Reason::AnyPlant(called), vec![], PlantFit::Any)
     }
 
     /// A limit ended the examination: whether the family fits is not known.
     pub(crate) fn ended(family: &'static dyn Family, spent: Spent) -> Self {
-        Self {
-            plant: PlantFit::Ended(spent),
-            ..Self::unfit(family, Reason::Ended(spent), vec![])
-        }
+        Self::made(family, Reason::Ended(spent), vec![], PlantFit::Ended(spent))
     }
 
     /// Whether a theorem stands behind the family, whose conditions are told here.

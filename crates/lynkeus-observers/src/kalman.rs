@@ -22,7 +22,7 @@ use crate::family::lasting;
 use crate::tuning::is_or_has;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, Family, FilterTuning, KeySpec,
-    ParameterValue, Shape, Signal, Tuning, TuningError, Value,
+    ParameterValue, Shape, Tuning, TuningError, Value,
 };
 
 /// The tunable number of a filter: no equation reads it, the noises are the study's.
@@ -120,7 +120,13 @@ impl Filter {
         let mut observer = copy.observer(derivatives)?;
         let scale = Speed::new(&copy, NOISE_SCALE, 1.0, NOISE_MEANING.to_owned());
         observer = observer.tuned_by([&scale]);
-        let variance = settings.variances(augmented, &observer.states);
+        let starts = observer.states.iter().map(|(_, start)| *start);
+        let given = settings.variance.iter().zip(&augmented.states);
+        let variance = given
+            .clone()
+            .zip(starts)
+            .map(|((given, state), start)| given.unwrap_or_else(|| prior_variance(state, start)));
+        let variance: Vec<f64> = variance.collect();
         observer.filter = Some(FilterTuning {
             kind: settings.kind.clone(),
             gate: settings.gate,
@@ -129,7 +135,6 @@ impl Filter {
             confined,
             initial_variance: variance.clone(),
         });
-        let given = settings.variance.iter().zip(&augmented.states);
         let parameters = variance
             .iter()
             .zip(given)
@@ -278,18 +283,6 @@ struct Settings {
     variance: Vec<Option<f64>>,
 }
 
-impl Settings {
-    /// The variances given, and those that follow from the declared ranges.
-    fn variances(&self, augmented: &AugmentedPlant<'_>, starts: &[(Signal, f64)]) -> Vec<f64> {
-        let states = augmented.states.iter().zip(starts).zip(&self.variance);
-        states
-            .map(|((state, (_, start)), given)| {
-                given.unwrap_or_else(|| prior_variance(state, *start))
-            })
-            .collect()
-    }
-}
-
 /// The square of a quarter of the range: two standard deviations reach its ends. Without a range, that of
 /// the start value, or 1.
 pub fn prior_variance(state: &Variable, start: f64) -> f64 {
@@ -309,9 +302,9 @@ fn variances(
         Some(Value::Table(table)) => table,
         Some(other) => return Err(VARIANCE.wrong(other)),
     };
-    let variance = |name: &str, value: &Value| match value {
-        Value::Number(x) if *x >= 0.0 && x.is_finite() => Ok(*x),
-        other => Err(VARIANCE.wrong(format!("{name} = {other}"))),
+    let variance = |name: &str, value: &Value| {
+        let number = value.number().filter(|x| *x >= 0.0 && x.is_finite());
+        number.ok_or_else(|| VARIANCE.wrong(format!("{name} = {value}")))
     };
     let default = table.get("default").map(|value| variance("default", value));
     let mut found = vec![default.transpose()?; augmented.states.len()];

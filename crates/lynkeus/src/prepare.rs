@@ -335,15 +335,9 @@ impl<'a> Prepared<'a> {
             return Ok(vec![]);
         };
         let plant = self.plant();
-        let time = Dimension {
-            name: "time".into(),
-            symbol: plant.time,
-            min: settings.start,
-            max: settings.until,
-            integer: false,
-        };
+        let (start, until) = (settings.start, settings.until);
         let region = Region {
-            dimensions: vec![time],
+            dimensions: vec![Dimension::new("time", plant.time, start, until)],
         };
         let mut narrower = vec![];
         let is_chosen = |name: &str| self.study.narrower.iter().any(|(n, ..)| n.text == name);

@@ -3,7 +3,7 @@
 use lynkeus_structure::{AugmentedPlant, ChainRequest};
 
 use super::said::Correction;
-use crate::conditions::{CHAINS, chain_request};
+use crate::conditions::{CHAINS, chain_request, output_names};
 use crate::estimate::PROLONG;
 use crate::guarantee::{LMI, LMI_KEYS, Lmi};
 use crate::peaking::Remedies;
@@ -156,8 +156,7 @@ fn order(
     let Some(names) = tuning.names(ORDER.name)? else {
         return Ok(None);
     };
-    let outputs = augmented.outputs.iter().map(|o| o.variable.name.as_str());
-    let outputs: Vec<&str> = outputs.collect();
+    let outputs = output_names(augmented);
     let place = |name: &String| outputs.iter().position(|o| o == name);
     let places: Option<Vec<usize>> = names.iter().map(place).collect();
     let all = places.filter(|places| {

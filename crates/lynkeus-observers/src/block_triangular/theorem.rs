@@ -22,7 +22,7 @@ use crate::conditions::{GainedChain, Partial, along, names};
 use crate::design::Found;
 use crate::peaking::departure;
 use crate::statement::{proved, standing, undecided};
-use crate::theorem::{conclude, slopes, state_noise};
+use crate::theorem::{as_computed, conclude, is_along, slopes, state_noise};
 use crate::{Assumptions, Certificate, Check, Constant, DesignError, Reason, Tuning, estimate};
 
 pub(super) const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
@@ -138,9 +138,7 @@ impl Study<'_> {
     fn skipped(&self, row: usize, column: usize) -> bool {
         let order = &self.blocks().order;
         let place = |state: usize| order.iter().position(|(_, c)| c.contains(&state));
-        let along = order
-            .iter()
-            .any(|(_, c)| c.windows(2).any(|p| p == [row, column]));
+        let along = order.iter().any(|(_, c)| is_along(c, row, column));
         along || place(column) > place(row)
     }
 
@@ -177,16 +175,12 @@ impl Study<'_> {
         let states = self.blocks().order[i].1.clone();
         let speed = Interval::point(θ);
         let weighed = |i, j| Interval::point(c) * Interval::point(P[(i, j)]);
-        let error = Interval::new(1.0 - 1e-12, 1.0 + 1e-12).unwrap_or(Interval::ONE);
         Chain {
             scales: (1..=states.len()).map(|j| speed.powi(j as i32)).collect(),
             states,
             speed,
             S: square(P.nrows(), weighed),
-            g: self.plant.K[i]
-                .iter()
-                .map(|&k| Interval::point(k) * error)
-                .collect(),
+            g: as_computed(self.plant.K[i].iter().copied()),
             partials: self.partials[i].iter().map(|&range| range.into()).collect(),
         }
     }

@@ -111,7 +111,8 @@ impl Plant<'_> {
             self.moving(i, similar, &mut found)?;
             terms.extend(found);
             for (j, before) in similar.iter().enumerate().take(i) {
-                let coupled = product(&product(&own.M, &self.coupling(i, j)?), &before.inverse);
+                let slopes = self.jacobian(self.chain(i), self.chain(j))?;
+                let coupled = product(&product(&own.M, &slopes), &before.inverse);
                 terms.extend(self.entries(i, j, &coupled));
             }
         }
@@ -147,11 +148,6 @@ impl Plant<'_> {
         let row = |row: &Vec<Sparse<'_>>| row.iter().map(width).collect();
         let own = self.chain(i);
         slopes(self.augmented, own, own).iter().map(row).collect()
-    }
-
-    /// |∂f_i/∂x_j|
-    fn coupling(&self, i: usize, j: usize) -> Result<Table, DesignError> {
-        self.jacobian(self.chain(i), self.chain(j))
     }
 
     /// |∂f/∂x| for the equations of `rows` and the states `columns`.
@@ -219,12 +215,8 @@ impl Plant<'_> {
         let state = self.chain(c)[place];
         let f = self.size(Some(self.augmented.derivatives[state]))?;
         if c > i {
-            let drift = self
-                .assumptions
-                .drift
-                .get(state)
-                .copied()
-                .unwrap_or(f64::INFINITY);
+            let drift = self.assumptions.drift.get(state);
+            let drift = drift.copied().unwrap_or(f64::INFINITY);
             // a noisy signal has no derivative, nor has one that process noise moves
             let moved = self.assumptions.process_noise.get(state);
             let smooth = self.noise[c] == 0.0 && moved.is_none_or(|density| *density == 0.0);
@@ -235,12 +227,8 @@ impl Plant<'_> {
             ));
         }
         let head = &self.augmented.states[self.chain(c)[0]];
-        let side = self
-            .assumptions
-            .region
-            .dimensions
-            .iter()
-            .find(|d| d.symbol == head.node);
+        let mut sides = self.assumptions.region.dimensions.iter();
+        let side = sides.find(|d| d.symbol == head.node);
         let width = side.map_or(f64::INFINITY, |d| plus(d.max, -d.min));
         let innovation = plus(width, self.noise[c]);
         let row = &similar[c].inverse[place];

@@ -370,13 +370,7 @@ pub(super) fn with_slopes(
     for ((input, jet), bounds) in augmented.inputs.iter().zip(U).zip(bounds) {
         let further = jet.iter().enumerate().skip(1).map(|(k, &symbol)| {
             let bound = bounds.get(k - 1).copied().unwrap_or(f64::INFINITY);
-            Dimension {
-                name: derivative_name(&input.name, k),
-                symbol,
-                min: -bound,
-                max: bound,
-                integer: false,
-            }
+            Dimension::new(derivative_name(&input.name, k), symbol, -bound, bound)
         });
         region.dimensions.extend(further);
     }

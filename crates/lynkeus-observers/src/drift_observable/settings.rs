@@ -359,12 +359,9 @@ fn per_output(value: &Value, p: usize) -> Result<Vec<Poles>, TuningError> {
 
 /// So many finite numbers.
 fn numbers(value: &Value, count: usize) -> Result<Option<Vec<f64>>, TuningError> {
-    let number = |value: &Value| match value {
-        Value::Number(x) if x.is_finite() => Some(*x),
-        _ => None,
-    };
-    let found: Option<Vec<f64>> = match value {
-        Value::List(values) => values.iter().map(number).collect(),
+    let number = |value: &Value| value.number().filter(|x| x.is_finite());
+    let found = match value {
+        Value::List(_) => value.all(number),
         one => number(one).map(|x| vec![x]),
     };
     Ok(found.filter(|found| found.len() == count))
@@ -425,10 +422,7 @@ fn pole(key: &str, value: &Value) -> Result<Option<Pole>, TuningError> {
     match value {
         Value::Number(λ) => Ok(Some(Pole::Real(negative(key, *λ)?))),
         Value::Table(parts) => {
-            let part = |name: &str| match parts.get(name) {
-                Some(Value::Number(x)) if x.is_finite() => Some(*x),
-                _ => None,
-            };
+            let part = |name: &str| parts.get(name)?.number().filter(|x| x.is_finite());
             let (Some(re), Some(im), 2) = (part("re"), part("im"), parts.len()) else {
                 let expected = "a conjugate pair as { re = number, im = number }";
                 return Err(TuningError::new(key, expected, value));

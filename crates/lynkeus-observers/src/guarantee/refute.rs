@@ -19,7 +19,7 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape, jacobian};
 use lynkeus_proof::decay::is_unstable;
 use lynkeus_proof::spectrum;
-use lynkeus_structure::{AugmentedPlant, Coordinate, Dimension, Point};
+use lynkeus_structure::{AugmentedPlant, Dimension, Point};
 use nalgebra::{DMatrix, DVector};
 
 use super::error_system::{ErrorSystem, edges};
@@ -59,7 +59,7 @@ pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Sample {
         true => sides.enumerate().map(inner).collect(),
         false => sides.collect(),
     };
-    let mut evaluator = system.evaluator();
+    let mut evaluator = system.right.evaluator();
     let mut skipped = false;
     let mut abscissa = |point: &[f64]| {
         let found = spectrum::abscissa(system.at(&mut evaluator, point));
@@ -81,8 +81,6 @@ pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Sample {
             Some((abscissa(&point)?, point))
         });
     }
-    let coordinates = system.sides.dimensions.iter().zip(&best);
-    let named = coordinates.map(|(d, x)| (d.name.clone(), *x));
     let cell: Vec<Interval> = best.iter().map(|&x| Interval::point(x)).collect();
     // the mean of all real parts is no higher than the highest, and no matter of rounding
     let mean = system.at(&mut evaluator, &best).trace() / system.scale.len() as f64;
@@ -94,7 +92,7 @@ pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Sample {
         },
         unstable: highest > 0.0 && is_unstable(&system.enclosed_at(&cell)),
         worst: Point {
-            coordinates: named.map(Coordinate::from).collect(),
+            coordinates: system.sides.coordinates(&best),
             value: highest,
         },
     }
@@ -123,7 +121,7 @@ pub(super) fn growing(
 /// its worst value: the plant need not stay in the box while the input keeps that value.
 fn is_constant(augmented: &AugmentedPlant<'_>, observer: &Observer, system: &ErrorSystem) -> bool {
     let graph = augmented.graph();
-    let read = graph.symbols_of(system.entries());
+    let read = graph.symbols_of(&system.entries);
     let hats: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
     read.is_empty() && edges(graph, &observer.derivatives, &hats).is_empty()
 }
@@ -306,7 +304,7 @@ impl<'a> EquilibriumSearch<'a> {
         equations.sort();
         equations.dedup();
         equations.retain(|f| graph.constant_value(*f) != Some(0.0));
-        let moved = graph.symbols_of(&[&equations[..], system.corrected()].concat());
+        let moved = graph.symbols_of(&[&equations[..], &system.corrected[..]].concat());
         let still = !moved.contains(&augmented.plant.time) && !moved.contains(&observer.time);
         let sides = sides(system, symbols.len());
         let wide = sides
@@ -326,13 +324,13 @@ impl<'a> EquilibriumSearch<'a> {
         let hats: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
         let pairs = augmented.symbols().into_iter().zip(hats.iter().copied());
         let mut values = graph.substitute(&equations, &pairs.collect());
-        values.extend(system.corrected());
+        values.extend(&system.corrected);
         let mut smooth = edges(graph, &values, &hats);
         let edges = smooth.len();
         smooth.extend(values);
         Ok(Some(Self {
             system,
-            right: system.evaluator(),
+            right: system.right.evaluator(),
             plant: Tape::new(graph, &symbols, &equations)?,
             slopes: Tape::new(graph, &symbols, &entries)?,
             smooth: Tape::new(graph, &system.sides.symbols(), &smooth)?,
@@ -421,10 +419,9 @@ impl<'a> EquilibriumSearch<'a> {
         }
         let middle: Vec<f64> = cell.iter().map(|x| x.midpoint()).collect();
         let value = self.abscissa(&middle)?;
-        let sides = self.system.sides.dimensions.iter();
-        let named = sides.zip(self.full(&middle, 0.0));
+        let full = self.full(&middle, 0.0);
         Some(Point {
-            coordinates: named.map(|(d, x)| (d.name.clone(), x).into()).collect(),
+            coordinates: self.system.sides.coordinates(&full),
             value,
         })
     }

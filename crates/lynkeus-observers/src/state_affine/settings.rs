@@ -105,13 +105,10 @@ fn start(tuning: &Tuning, n: usize) -> Result<Given, TuningError> {
         None => return Ok(Given::Number(1.0)),
         Some(Value::Number(s)) if *s > 0.0 && s.is_finite() => return Ok(Given::Number(*s)),
         Some(Value::List(rows)) => {
-            let entry = |x: &Value| match x {
-                Value::Number(x) => Ok(*x),
-                other => Err(wrong(other.to_string())),
-            };
-            let row = |row: &Value| match row {
-                Value::List(row) => row.iter().map(entry).collect::<Result<Vec<f64>, _>>(),
-                other => Err(wrong(other.to_string())),
+            let entry = |x: &Value| x.number().ok_or_else(|| wrong(x.to_string()));
+            let row = |row: &Value| {
+                let entries = row.list().ok_or_else(|| wrong(row.to_string()))?;
+                entries.iter().map(entry).collect::<Result<Vec<f64>, _>>()
             };
             rows.iter().map(row).collect::<Result<Vec<_>, _>>()?
         }

@@ -3,7 +3,7 @@
 use lynkeus_gain::Tridiagonal;
 use lynkeus_structure::{AugmentedPlant, ChainRequest};
 
-use crate::conditions::{CHAINS, chain_request};
+use crate::conditions::{CHAINS, chain_request, output_names};
 use crate::estimate::PROLONG;
 use crate::guarantee::{LMI, LMI_KEYS, Lmi};
 use crate::peaking::Remedies;
@@ -139,8 +139,7 @@ impl Settings {
 
 /// The chain that the study lets lead, by the place of its output.
 fn leading(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Option<usize>, TuningError> {
-    let outputs = augmented.outputs.iter().map(|o| o.variable.name.as_str());
-    let outputs: Vec<&str> = outputs.collect();
+    let outputs = output_names(augmented);
     let name = tuning.choice(LEADING.name, &outputs)?;
     Ok(name.and_then(|name| outputs.iter().position(|o| *o == name)))
 }

@@ -27,14 +27,10 @@ use crate::conditions::{along, names};
 use crate::design::Found;
 use crate::peaking::departure;
 use crate::statement::{proved, refuted, standing, sufficient, undecided};
-use crate::theorem::{conclude, slopes, state_noise, undeclared};
+use crate::theorem::{as_computed, conclude, is_along, slopes, state_noise, undeclared};
 use crate::{Assumptions, Certificate, Check, Constant, DesignError, Reason, estimate};
 
 pub(super) const BASIS: &str = "Theorem 2 of Hammouri, Targui and Armanet (one chain: Theorem 1)";
-
-/// How much the gain may differ from the computed one, relatively: rounding of
-/// the powers of θ in the observer.
-const GAIN_ERROR: f64 = 1e-12;
 
 pub(super) fn certificate(
     augmented: &AugmentedPlant<'_>,
@@ -50,10 +46,7 @@ pub(super) fn certificate(
         .iter()
         .map(|chain| chain.iter().map(|p| p.bounds).collect());
     let bounds: Vec<Vec<(f64, f64)>> = bounds.collect();
-    let skip = |a: usize, b: usize| {
-        let mut chains = chains.iter();
-        chains.any(|c| c.windows(2).any(|p| p == [a, b]))
-    };
+    let skip = |a: usize, b: usize| chains.iter().any(|chain| is_along(chain, a, b));
     let (slopes, check) = slopes(augmented, region, skip)?;
     checks.push(check);
     let basis = match form.assignment.chains.len() {
@@ -170,7 +163,6 @@ impl Study<'_> {
             }
             scales.push(speed.powi(j as i32 + 2) / T);
         }
-        let error = Interval::new(1.0 - GAIN_ERROR, 1.0 + GAIN_ERROR).unwrap_or(Interval::ONE);
         let S = &gains.S[i];
         let weight = Interval::point(c);
         let entry = |j: usize| {
@@ -178,10 +170,6 @@ impl Study<'_> {
                 .map(move |k| weight * Interval::point(S.get(j, k)))
                 .collect()
         };
-        let g = S
-            .gain()
-            .into_iter()
-            .map(|s| Interval::point(gains.r[i] * s) * error);
         let partials = match gains.divided {
             true => vec![(1.0, 1.0).into(); bounds.len()],
             false => bounds.iter().map(|&range| range.into()).collect(),
@@ -191,7 +179,7 @@ impl Study<'_> {
             speed,
             scales,
             S: (0..S.size()).map(entry).collect(),
-            g: g.collect(),
+            g: as_computed(S.gain().into_iter().map(|s| gains.r[i] * s)),
             partials,
         }
     }

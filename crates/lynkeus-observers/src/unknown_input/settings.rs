@@ -2,6 +2,7 @@
 
 use lynkeus_structure::AugmentedPlant;
 
+use crate::conditions::output_names;
 use crate::{KeySpec, Shape, Tuning, TuningError, Value};
 
 const THETA: KeySpec = KeySpec {
@@ -61,11 +62,7 @@ fn partition(
     let Some(value) = tuning.values.get(PARTITION.name) else {
         return Ok(None);
     };
-    let outputs: Vec<&str> = augmented
-        .outputs
-        .iter()
-        .map(|o| o.variable.name.as_str())
-        .collect();
+    let outputs = output_names(augmented);
     let wrong = |found: &Value| {
         let expected = format!(
             "a list of measured outputs, those of x₁¹ ({})",
@@ -73,15 +70,10 @@ fn partition(
         );
         TuningError::new(PARTITION.name, expected, found)
     };
-    let Value::List(list) = value else {
-        return Err(wrong(value));
-    };
     let mut first = vec![];
-    for entry in list {
-        let place = match entry {
-            Value::Text(name) => outputs.iter().position(|o| o == name),
-            _ => None,
-        };
+    for entry in value.list().ok_or_else(|| wrong(value))? {
+        let named = entry.text();
+        let place = named.and_then(|name| outputs.iter().position(|o| *o == name));
         let place = place.filter(|place| !first.contains(place));
         first.push(place.ok_or_else(|| wrong(entry))?);
     }
