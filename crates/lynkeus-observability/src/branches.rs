@@ -225,7 +225,6 @@ pub(crate) fn value(graph: &Graph, node: Node, values: &HashMap<Node, f64>) -> O
     let symbols = graph.symbols_of(&[node]);
     let inputs: Option<Vec<f64>> = symbols.iter().map(|s| values.get(s).copied()).collect();
     let tape = Tape::new(graph, &symbols, &[node]).ok()?;
-    let mut out = [0.0];
-    tape.evaluator().eval(&inputs?, &mut out);
-    out[0].is_finite().then_some(out[0])
+    let value = tape.evaluator().value(&inputs?);
+    value.is_finite().then_some(value)
 }

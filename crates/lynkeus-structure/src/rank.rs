@@ -196,12 +196,11 @@ pub fn subsets(n: usize, k: usize, limit: usize) -> Option<Vec<Vec<usize>>> {
 fn may_keep_sign(graph: &Graph, node: Node, region: &Region) -> Result<bool, MissingInput> {
     let region = region.restricted(&graph.symbols_of(&[node]));
     let mut evaluator = Tape::new(graph, &region.symbols(), &[node])?.evaluator();
-    let mut out = [0.0];
     let (mut positive, mut negative) = (true, true);
     for point in region.samples(&region.cell()) {
-        evaluator.eval(&point, &mut out);
-        positive &= out[0] > 0.0;
-        negative &= out[0] < 0.0;
+        let value = evaluator.value(&point);
+        positive &= value > 0.0;
+        negative &= value < 0.0;
     }
     Ok(positive || negative)
 }

@@ -83,8 +83,7 @@ pub fn keeps_sign(graph: &Graph, node: Node, region: &Region) -> Result<Sign, Mi
 /// # Errors
 /// [`MissingInput`] where the node depends on a symbol outside the region.
 pub fn bounded(graph: &Graph, node: Node, region: &Region) -> Result<bool, MissingInput> {
-    let found = range_within(graph, node, region, GLANCE)?.enclosure;
-    Ok(found.is_defined() && found.lo().is_finite() && found.hi().is_finite())
+    Ok(range_within(graph, node, region, GLANCE)?.enclosure.is_bounded())
 }
 
 /// Which of the expressions the whole box proves [bounded], without halving it: one
@@ -99,8 +98,7 @@ pub fn bounded_at_once(
 ) -> Result<Vec<bool>, MissingInput> {
     let tape = Tape::new(graph, &region.symbols(), nodes)?;
     let values = tape.eval_in(&Intervals, &region.cell());
-    let is_bounded = |x: &Interval| x.is_defined() && x.magnitude().is_finite();
-    Ok(values.iter().map(is_bounded).collect())
+    Ok(values.iter().map(|x| x.is_bounded()).collect())
 }
 
 /// Names of the sides of the weakest cell that have no declared end.
@@ -126,10 +124,8 @@ fn witness(
     let at = |point: &Point| -> Vec<f64> { point.coordinates.iter().map(|c| c.value).collect() };
     let (low, high) = (at(lowest), at(highest));
     for (point, at) in [(lowest, &low), (highest, &high)] {
-        let value = enclosure(&tape, at);
         // where it jumps, the value between is no zero
-        if value.lo() == 0.0
-            && value.hi() == 0.0
+        if enclosure(&tape, at).is_zero()
             && is_regular(graph, smooth, &region, &around(at, &region))?
         {
             return Ok(Some(point.clone().into()));

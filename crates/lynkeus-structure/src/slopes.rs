@@ -113,8 +113,7 @@ impl Slopes {
     /// The first slope without bound, and the variables without bound that it depends
     /// on (none where the slope is unbounded by itself, as that of √ at 0 is).
     pub fn unbounded(&self, region: &Region) -> Option<(&Slope, Vec<String>)> {
-        let infinite = |s: &&Slope| !s.range.magnitude().is_finite() || !s.range.is_defined();
-        let slope = self.slopes.iter().find(infinite)?;
+        let slope = self.slopes.iter().find(|s| !s.range.is_bounded())?;
         let open = |name: &&String| {
             let mut sides = region.dimensions.iter();
             sides.any(|d| d.name == **name && !(d.min.is_finite() && d.max.is_finite()))
@@ -309,8 +308,7 @@ fn is_idle(
     if !vanishing.iter().any(|symbol| used.contains(symbol)) {
         return Ok(false);
     }
-    let found = range_within(graph, term, region, 0)?;
-    Ok(found.enclosure.is_defined() && found.enclosure == Interval::ZERO)
+    Ok(range_within(graph, term, region, 0)?.enclosure == Interval::ZERO)
 }
 
 fn sector(

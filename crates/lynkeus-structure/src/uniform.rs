@@ -237,9 +237,7 @@ fn cells(graph: &Graph, node: Node, region: &Region) -> Result<(Vec<Place>, f64)
     let tape = Tape::new(graph, &region.symbols(), &[node])?;
     let mut bounds = tape.evaluator_in(Intervals);
     let mut may_vanish = |cell: &Cell| {
-        let mut values = [lynkeus_expr::Interval::ENTIRE];
-        bounds.eval(cell, &mut values);
-        let [value] = values;
+        let value = bounds.value(cell);
         value.contains_zero() || !value.is_defined()
     };
     let mut open = vec![(region.cell(), 1.0_f64)];

@@ -181,9 +181,7 @@ impl<'a> Part<'a> {
         let n = self.places.len();
         let mut J = vec![Interval::ENTIRE; self.rows * n];
         slopes.eval(&hull(pair), &mut J);
-        let is_bounded =
-            |x: &Interval| x.is_defined() && !x.is_empty() && x.magnitude().is_finite();
-        if !J.iter().all(is_bounded) {
+        if !J.iter().all(|x| x.is_bounded()) {
             return false;
         }
         let zeros = vec![Interval::ZERO; n];
