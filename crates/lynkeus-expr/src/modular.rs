@@ -298,6 +298,12 @@ impl Random {
     }
 }
 
+/// Σ a_k b_k, over as many as both have.
+pub fn dot(a: &[Modular], b: &[Modular]) -> Modular {
+    let terms = a.iter().zip(b).map(|(a, b)| *a * *b);
+    terms.fold(Modular::ZERO, |sum, term| sum + term)
+}
+
 /// Row echelon form, row by row: the row space of the rows added so far.
 #[derive(Clone, Debug)]
 pub struct Echelon {
@@ -311,6 +317,15 @@ impl Echelon {
     pub fn new(width: usize) -> Self {
         let rows = vec![];
         Self { width, rows }
+    }
+
+    /// The space that rows of that many columns span.
+    pub fn of<R: AsRef<[Modular]>>(width: usize, rows: impl IntoIterator<Item = R>) -> Self {
+        let mut space = Self::new(width);
+        for row in rows {
+            space.add(row.as_ref());
+        }
+        space
     }
 
     /// Number of independent rows.

@@ -113,14 +113,9 @@ impl<'a> Expansion<'a> {
             .advance(&|place| (self.coefficients[place].0, vec![]))
     }
 
-    /// The latest coefficient of a state's derivative with its sensitivities.
-    pub fn derivative(&self, state: usize) -> (Modular, Vec<Modular>) {
-        self.run.root(state)
-    }
-
-    /// Sensitivities of the latest coefficient of a root.
-    pub fn root(&self, root: usize) -> Vec<Modular> {
-        self.run.root(root).1
+    /// The latest coefficient of a root, as the derivative of the state of that number is one, with its sensitivities.
+    pub fn root(&self, root: usize) -> (Modular, Vec<Modular>) {
+        self.run.root(root)
     }
 
     /// Sensitivities of the latest coefficient of a symbol; empty where nothing moves it.
@@ -130,13 +125,13 @@ impl<'a> Expansion<'a> {
 
     /// Sensitivities of the latest coefficient of an output.
     pub fn output(&self, output: usize) -> Vec<Modular> {
-        self.root(self.model.states + output)
+        self.root(self.model.states + output).1
     }
 
     /// Sensitivities of the latest coefficient of an expression asked about.
     pub fn about(&self, expression: usize) -> Vec<Modular> {
         let first = self.model.states + self.model.outputs;
-        self.root(first + expression)
+        self.root(first + expression).1
     }
 
     /// The next coefficient of every symbol: of states from the derivative's last one.

@@ -55,7 +55,7 @@ fn velocity(model: &Model, start: Start, moving: &[usize]) -> Result<Vec<Modular
     let mut velocity = vec![Modular::ZERO; model.symbols.len()];
     for &place in moving {
         velocity[place] = match model.symbols[place].role {
-            Role::State(i) => expansion.derivative(i).0,
+            Role::State(i) => expansion.root(i).0,
             _ => Modular::ONE,
         };
     }

@@ -83,7 +83,9 @@ pub fn keeps_sign(graph: &Graph, node: Node, region: &Region) -> Result<Sign, Mi
 /// # Errors
 /// [`MissingInput`] where the node depends on a symbol outside the region.
 pub fn bounded(graph: &Graph, node: Node, region: &Region) -> Result<bool, MissingInput> {
-    Ok(range_within(graph, node, region, GLANCE)?.enclosure.is_bounded())
+    Ok(range_within(graph, node, region, GLANCE)?
+        .enclosure
+        .is_bounded())
 }
 
 /// Which of the expressions the whole box proves [bounded], without halving it: one
