@@ -294,7 +294,8 @@ mod tests {
         let columns = Columns::new(&model, model.depth);
         let mut search = Search::new(&model, &start, columns);
         search.advance().unwrap();
-        let found = search.follow();
+        let gradient = |root: usize| search.expansion.root(root).1;
+        let found = Succession::new(&model, &gradient);
         search.until(None, model.depth).unwrap();
         assert!(search.succession.is_none());
         let name = |place: &usize| {

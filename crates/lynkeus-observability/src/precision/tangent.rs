@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 
 use super::deviations::Information;
 use super::forward::{Forward, WIDE};
-use super::{Checkpoint, Experiment, Precision};
+use super::{Checkpoint, Experiment, Precision, share, side_by_side};
 
 /// Samples gathered before they are worked into the information.
 const CHUNK: usize = 256;
@@ -251,26 +251,12 @@ fn reach(
 
 /// Takes all batches over the instants, side by side.
 fn advance(batches: &mut [Batch<'_>], instants: &[f64]) -> Result<Vec<Piece>, Error> {
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let share = batches.len().div_ceil(threads).max(1);
-    let work = |some: &mut [Batch<'_>]| -> Result<Vec<Piece>, Error> {
+    let work = |some: &mut [Batch<'_>]| -> Vec<Result<Piece, Error>> {
         some.iter_mut().map(|batch| batch.run(instants)).collect()
     };
-    let work = &work;
-    std::thread::scope(|scope| {
-        let crew: Vec<_> = batches
-            .chunks_mut(share)
-            .map(|some| scope.spawn(move || work(some)))
-            .collect();
-        let mut pieces = vec![];
-        for worker in crew {
-            match worker.join() {
-                Ok(done) => pieces.extend(done?),
-                Err(panic) => std::panic::resume_unwind(panic),
-            }
-        }
-        Ok(pieces)
-    })
+    let share = share(batches.len());
+    let pieces = side_by_side(batches.chunks_mut(share), work);
+    pieces.into_iter().flatten().collect()
 }
 
 /// Puts the columns of the batches together, sample by sample and sensor by sensor.
