@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 use lynkeus_expr::interval::{Intervals, solve};
 use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Tape, jacobian};
 
-use crate::matrix::{blocks, determinant};
+use crate::matrix::blocks;
 use crate::region::Cell;
 use crate::{
     Dimension, Finding, Matrix, Point, Reason, Region, Verdict, Witness, regularity, sign, steps,
@@ -245,13 +245,13 @@ pub fn regular(matrix: &Matrix<'_>, region: &Region) -> Result<Finding, MissingI
         }
     }
     Ok(open.unwrap_or(Finding::proved(match product {
-        Some((low, high)) => determinant_in((low, high), false),
+        Some((low, high)) => Reason::Determinant {
+            low,
+            high,
+            open: false,
+        },
         None => Reason::RegularParts(parts),
     })))
-}
-
-fn determinant_in((low, high): (f64, f64), open: bool) -> Reason {
-    Reason::Determinant { low, high, open }
 }
 
 /// Of an irreducible block: proved by [`Reason::Determinant`] where that was expanded, else by
@@ -261,10 +261,8 @@ fn decide(block: &Matrix<'_>, region: &Region) -> Result<Finding, MissingInput> 
         return by_parts(block, region);
     }
     let graph = block.graph();
-    let rows: Vec<Vec<_>> = (0..block.rows)
-        .map(|i| (0..block.columns).map(|j| block.get(i, j)).collect())
-        .collect();
-    let det = determinant(graph, &rows).unwrap_or_else(|| graph.constant(0.0).node());
+    let zero = || graph.constant(0.0).node();
+    let det = block.expanded().unwrap_or_else(zero);
     let found = sign::keeps_sign(graph, det, region)?;
     let verdict = found.finding.verdict;
     let open = matches!(verdict, Verdict::Undecided(_));
@@ -274,7 +272,8 @@ fn decide(block: &Matrix<'_>, region: &Region) -> Result<Finding, MissingInput> 
             return Ok(second);
         }
     }
-    let reason = determinant_in(found.bounds, open);
+    let (low, high) = found.bounds;
+    let reason = Reason::Determinant { low, high, open };
     Ok(Finding { verdict, reason })
 }
 
@@ -289,7 +288,8 @@ fn by_parts(block: &Matrix<'_>, region: &Region) -> Result<Finding, MissingInput
         let entries = tape.eval_in(&Intervals, cell);
         entries.iter().all(|e| e.is_defined() && !e.is_empty()) && solve(&entries, &zeros).1
     };
-    let (mut negative, mut positive): (Option<Point>, Option<Point>) = (None, None);
+    // points with a negative and with a positive determinant
+    let mut seen: [Option<Point>; 2] = [None, None];
     let mut open = VecDeque::from([region.cell()]);
     let mut parts = 0;
     let mut looked = 0;
@@ -302,19 +302,13 @@ fn by_parts(block: &Matrix<'_>, region: &Region) -> Result<Finding, MissingInput
         let middle = region.middle_point(&cell);
         let at: Cell = middle.iter().map(|&x| Interval::point(x)).collect();
         if let Some(value) = sure_determinant(tape.eval_in(&Intervals, &at), block.rows) {
-            let seen = if value > 0.0 {
-                &mut positive
-            } else {
-                &mut negative
-            };
-            *seen = Some(Point {
+            let place = usize::from(value > 0.0);
+            seen[place] = Some(Point {
                 coordinates: region.coordinates(&middle),
                 value,
             });
         }
-        // determinants of either sign
-        let both = negative.iter().chain(&positive).cloned();
-        let witness = Some(both.collect::<Vec<Point>>()).filter(|points| points.len() == 2);
+        let witness: Option<Vec<Point>> = seen.iter().cloned().collect();
         let halves = region
             .split(&cell)
             .filter(|_| looked < CELLS && graph.spent().is_none());

@@ -96,10 +96,8 @@ impl Region {
     }
 
     /// Names of the dimensions without a declared end.
-    pub fn open(&self) -> Vec<&str> {
-        let open = |d: &&Dimension| d.min.is_infinite() || d.max.is_infinite();
-        let open = self.dimensions.iter().filter(open);
-        open.map(|d| d.name.as_str()).collect()
+    pub fn open(&self) -> Vec<String> {
+        undeclared(&self.dimensions)
     }
 
     /// A point by the names of the sides.
@@ -230,6 +228,13 @@ impl Region {
         let sides = self.dimensions.iter().zip(p.iter().zip(q));
         sides.into_iter().all(|(d, (p, q))| !d.integer || p == q)
     }
+}
+
+/// Names of the sides without a declared end.
+pub(crate) fn undeclared(sides: &[Dimension]) -> Vec<String> {
+    let open = |side: &&Dimension| side.min.is_infinite() || side.max.is_infinite();
+    let open = sides.iter().filter(open);
+    open.map(|side| side.name.clone()).collect()
 }
 
 /// Every side of a cell at its lower end.

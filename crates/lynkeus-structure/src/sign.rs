@@ -4,7 +4,7 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 
 use crate::jumps::without_removable_jumps;
-use crate::region::Cell;
+use crate::region::{Cell, undeclared};
 use crate::regularity::is_regular;
 use crate::{
     Dimension, Finding, Point, Range, Reason, Region, Verdict, Witness, range, range_within,
@@ -53,7 +53,7 @@ pub fn keeps_sign(graph: &Graph, node: Node, region: &Region) -> Result<Sign, Mi
             false => regular,
             true => Finding {
                 verdict: Verdict::Undecided(found.weakest.clone()),
-                reason: lies(true, undeclared(&found)),
+                reason: lies(true, undeclared(&found.weakest)),
             },
         }
     };
@@ -101,13 +101,6 @@ pub fn bounded_at_once(
     let tape = Tape::new(graph, &region.symbols(), nodes)?;
     let values = tape.eval_in(&Intervals, &region.cell());
     Ok(values.iter().map(|x| x.is_bounded()).collect())
-}
-
-/// Names of the sides of the weakest cell that have no declared end.
-fn undeclared(found: &Range) -> Vec<String> {
-    let open = |side: &&Dimension| side.min.is_infinite() || side.max.is_infinite();
-    let open = found.weakest.iter().filter(open);
-    open.map(|side| side.name.clone()).collect()
 }
 
 fn witness(

@@ -88,12 +88,7 @@ pub fn uniformity(
         regular,
         singular,
         share,
-        undeclared: region
-            .restricted(&graph.symbols_of(&[node]))
-            .open()
-            .into_iter()
-            .map(str::to_owned)
-            .collect(),
+        undeclared: region.restricted(&graph.symbols_of(&[node])).open(),
         sides: region.dimensions[..n].to_vec(),
     }))
 }

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::detectability::exact::{self, Shows};
 use crate::detectability::hidden::{Detectability, Hidden, HiddenErrors, Observability};
-use crate::detectability::modes::{Modes, image, null_space, reached};
+use crate::detectability::modes::{Modes, beside, image, null_space, reached};
 use crate::{AugmentedPlant, Region};
 
 /// States beyond which no modes are looked for.
@@ -154,18 +154,16 @@ impl Linear {
     /// What can move without a trace: pairs (x, v), one per column, and an orthonormal basis of V. None where no
     /// decomposition is found.
     fn traceless(&self) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
-        let (n, m) = (self.F.nrows(), self.G.ncols());
-        let flow = DMatrix::from_fn(n, n + m, |i, j| match j < n {
-            true => self.F[(i, j)],
-            false => self.G[(i, j - n)],
-        });
+        let n = self.F.nrows();
+        let flow = beside(&self.F, &self.G);
         let seen = equilibrated(&self.outputs, 0.0);
         let mut V = DMatrix::identity(n, n);
         loop {
             // (Fx + Gv) has no part across V
             let across = null_space(&V.transpose(), ZERO)?;
             let stays = equilibrated(&(across.transpose() * &flow), ZERO * flow.amax());
-            let pairs = null_space(&stacked(&stays, &seen), ZERO)?;
+            let all = beside(&stays.transpose(), &seen.transpose()).transpose();
+            let pairs = null_space(&all, ZERO)?;
             // of columns of length one: where no state moves, rounding moves none
             let pairs = pairs.map(|x| if x.abs() > ZERO { x } else { 0.0 });
             let next = image(&pairs.rows(0, n).into_owned(), ZERO)?;
@@ -240,15 +238,6 @@ fn equilibrated(rows: &DMatrix<f64>, least: f64) -> DMatrix<f64> {
     DMatrix::from_fn(kept.len(), rows.ncols(), |i, j| kept[i][j])
 }
 
-fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
-    DMatrix::from_fn(above.nrows() + below.nrows(), below.ncols(), |i, j| match i
-        .checked_sub(above.nrows())
-    {
-        None => above[(i, j)],
-        Some(i) => below[(i, j)],
-    })
-}
-
 /// Newton's steps.
 const STEPS: usize = 40;
 /// Derivatives below this share of their terms are zero.
@@ -281,10 +270,8 @@ impl Rest {
     ) -> Result<Self, MissingInput> {
         let augmented = hidden.augmented;
         let graph = augmented.graph();
-        let is_free = |entry: &&(usize, usize, Node)| {
-            hidden.observability[entry.1] != Observability::Determined
-        };
-        let entries = slopes.entries.iter().filter(is_free);
+        let entries = slopes.entries.iter();
+        let entries = entries.filter(|entry| hidden.is_free(entry.1));
         let mut open: Vec<Node> = entries.map(|entry| entry.2).collect();
         let mut found: Vec<usize> = vec![];
         loop {
@@ -432,22 +419,22 @@ fn moved(
             .any(|s| moving.contains(s))
     };
     let count = hidden.observability.len();
-    let is_free = |i: usize| i < count && hidden.observability[i] != Observability::Determined;
-    let entries = slopes.entries.iter().filter(|entry| is_free(entry.1));
+    let entries = slopes.entries.iter();
+    let entries = entries.filter(|entry| hidden.is_free(entry.1));
     let entries: Vec<(usize, usize, bool)> = entries
         .map(|(i, j, slope)| (*i, *j, reads(*slope)))
         .collect();
-    let is_driven = (0..count).any(|i| is_free(i) && hidden.is_signal(i));
+    let is_driven = !hidden.free().1.is_empty();
     let mut moved = vec![false; count];
     loop {
-        let is_new = |i: usize| !is_free(i) || !moved[i];
+        let is_new = |i: usize| !hidden.is_free(i) || !moved[i];
         let next = entries
             .iter()
             .find(|&&(i, j, own)| is_new(i) && (own || moved[j]));
         match next {
             // what the outputs and the equations of what is known say couples all that is
             // hidden, as do unknown inputs
-            Some(&(i, ..)) if is_driven || !is_free(i) => return vec![true; count],
+            Some(&(i, ..)) if is_driven || !hidden.is_free(i) => return vec![true; count],
             Some(&(i, ..)) => moved[i] = true,
             None => return moved,
         }
@@ -462,11 +449,9 @@ fn weaken(
     sure: &[bool],
     of: &mut [Detectability],
 ) {
-    let count = hidden.observability.len();
-    let is_free = |i: usize| i < count && hidden.observability[i] != Observability::Determined;
-    let entries = slopes.entries.iter();
-    let is_coupled = |i: usize, j: usize| is_free(i) && is_free(j) && !sure[i];
-    let couplings = entries.filter(|entry| is_coupled(entry.0, entry.1));
+    let is_coupled = |i: usize, j: usize| hidden.is_free(i) && hidden.is_free(j) && !sure[i];
+    let couplings = slopes.entries.iter();
+    let couplings = couplings.filter(|entry| is_coupled(entry.0, entry.1));
     let couplings: Vec<(usize, usize)> = couplings.map(|(i, j, _)| (*i, *j)).collect();
     loop {
         let doubted = couplings.iter().find(|(i, j)| match of[*i] {

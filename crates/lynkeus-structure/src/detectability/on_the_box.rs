@@ -235,6 +235,15 @@ fn add(to: &mut [Interval], factor: Interval, row: &[Interval]) {
 }
 
 impl Row {
+    /// A row of its size in which nothing stands.
+    fn empty(&self) -> Self {
+        let zeros = |row: &[Interval]| vec![Interval::ZERO; row.len()];
+        Self {
+            a: zeros(&self.a),
+            b: zeros(&self.b),
+        }
+    }
+
     /// The row with δv_u put in from 0 = `given`.
     fn without_input(&mut self, u: usize, given: &Row) {
         let factor = -self.b[u] / given.b[u];
@@ -315,10 +324,7 @@ impl System {
         };
         let given = self.constraints.remove(place);
         self.rows().for_each(|row| row.without_input(u, &given));
-        let mut own = Row {
-            a: vec![Interval::ZERO; given.a.len()],
-            b: given.b.iter().map(|_| Interval::ZERO).collect(),
-        };
+        let mut own = given.empty();
         own.b[u] = Interval::ONE;
         own.without_input(u, &given);
         self.inputs[u] = Some(own);
@@ -351,10 +357,7 @@ impl System {
         let given = self.constraints.remove(k);
         self.flow[p] = None;
         self.rows().for_each(|row| row.without_state(p, &given));
-        let mut own = Row {
-            a: vec![Interval::ZERO; given.a.len()],
-            b: given.b.clone(),
-        };
+        let mut own = given.empty();
         own.a[p] = Interval::ONE;
         own.without_state(p, &given);
         self.followers.push((p, own));
