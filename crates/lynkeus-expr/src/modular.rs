@@ -298,6 +298,13 @@ impl Random {
     }
 }
 
+/// The vector with 1 in one place and 0 in the others.
+pub fn unit(width: usize, place: usize) -> Vec<Modular> {
+    let mut unit = vec![Modular::ZERO; width];
+    unit[place] = Modular::ONE;
+    unit
+}
+
 /// Σ a_k b_k, over as many as both have.
 pub fn dot(a: &[Modular], b: &[Modular]) -> Modular {
     let terms = a.iter().zip(b).map(|(a, b)| *a * *b);
@@ -402,8 +409,7 @@ impl Echelon {
         let rows = self.reduced_rows();
         let free = (0..self.width).filter(|j| rows.iter().all(|(pivot, _)| pivot != j));
         let direction = |j: usize| {
-            let mut direction = vec![Modular::ZERO; self.width];
-            direction[j] = Modular::ONE;
+            let mut direction = unit(self.width, j);
             for (pivot, row) in &rows {
                 direction[*pivot] = -row[j];
             }

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::model::{First, Model, Role};
 use crate::series::{Functions, Run, Stop};
-use lynkeus_expr::modular::{Modular, Random};
+use lynkeus_expr::modular::{Modular, Random, unit};
 
 /// The unknowns with respect to which a series is differentiated, as columns: the named
 /// quantities, the derivatives of unknown inputs, directions in which known starts move.
@@ -55,9 +55,7 @@ impl Columns {
     }
 
     pub fn unit(&self, column: usize) -> Vec<Modular> {
-        let mut unit = vec![Modular::ZERO; self.width()];
-        unit[column] = Modular::ONE;
-        unit
+        unit(self.width(), column)
     }
 
     fn first_of_moving(&self) -> usize {

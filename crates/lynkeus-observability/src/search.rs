@@ -191,7 +191,27 @@ impl<'a> Succession<'a> {
     /// What follows at a start, where `gradient` has the sensitivities of a root's first
     /// coefficient.
     fn new(model: &'a Model, gradient: &dyn Fn(usize) -> Vec<Modular>) -> Self {
-        let mut all = Self::unsought(model);
+        let is_unknown = |place: &usize| {
+            let symbol = &model.symbols[*place];
+            // a given start says nothing of later values
+            symbol.column.is_some() || matches!(symbol.role, Role::State(_))
+        };
+        let roots = model.states + model.outputs;
+        let read = |root: usize| model.program.inputs(root).into_iter().filter(is_unknown);
+        let missing: Vec<BTreeSet<usize>> = (0..roots).map(|root| read(root).collect()).collect();
+        let mut readers = vec![vec![]; model.symbols.len()];
+        for (root, places) in missing.iter().enumerate() {
+            places.iter().for_each(|&place| readers[place].push(root));
+        }
+        let mut all = Self {
+            known: vec![None; roots],
+            ready: VecDeque::new(),
+            places: vec![],
+            order: 0,
+            missing,
+            readers,
+            model,
+        };
         for output in model.states..model.states + model.outputs {
             all.know(output, 0);
         }
@@ -206,38 +226,6 @@ impl<'a> Succession<'a> {
             }
         }
         all
-    }
-
-    fn unsought(model: &'a Model) -> Self {
-        let is_unknown = |place: &usize| {
-            let symbol = &model.symbols[*place];
-            // a given start says nothing of later values
-            symbol.column.is_some() || matches!(symbol.role, Role::State(_))
-        };
-        let roots = model.states + model.outputs;
-        let missing: Vec<BTreeSet<usize>> = (0..roots)
-            .map(|root| {
-                model
-                    .program
-                    .inputs(root)
-                    .into_iter()
-                    .filter(is_unknown)
-                    .collect()
-            })
-            .collect();
-        let mut readers = vec![vec![]; model.symbols.len()];
-        for (root, places) in missing.iter().enumerate() {
-            places.iter().for_each(|&place| readers[place].push(root));
-        }
-        Self {
-            known: vec![None; roots],
-            ready: VecDeque::new(),
-            places: vec![],
-            order: 0,
-            missing,
-            readers,
-            model,
-        }
     }
 
     /// A root is known from so many derivatives of the outputs.

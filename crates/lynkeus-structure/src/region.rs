@@ -147,16 +147,10 @@ impl Region {
     /// The cell cut along one side; none where that has nothing between its ends.
     pub(crate) fn halves(&self, cell: &Cell, side: usize) -> Option<[Cell; 2]> {
         let (low, high) = (cell[side].lo(), cell[side].hi());
-        let (left, right) = if self.dimensions[side].integer {
-            let middle = self.middle(side, &cell[side]);
-            (middle, (middle + 1.0).min(high))
-        } else {
-            let middle = between(low, high);
-            (middle, middle)
-        };
-        let splits = match self.dimensions[side].integer {
-            true => low < high,
-            false => low < left && right < high,
+        let left = self.middle(side, &cell[side]);
+        let (right, splits) = match self.dimensions[side].integer {
+            true => ((left + 1.0).min(high), low < high),
+            false => (left, low < left && left < high),
         };
         if !splits {
             return None;

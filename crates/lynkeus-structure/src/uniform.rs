@@ -286,15 +286,13 @@ fn blind(
     let graph = augmented.graph();
     let mut found = vec![];
     for input in &augmented.inputs {
-        let ends = [
-            0.0,
-            input.min,
-            input.max,
-            match input.integer {
-                true => f64::midpoint(input.min, input.max).floor(),
-                false => f64::midpoint(input.min, input.max),
-            },
-        ];
+        let middle = f64::midpoint(input.min, input.max);
+        let middle = if input.integer {
+            middle.floor()
+        } else {
+            middle
+        };
+        let ends = [0.0, input.min, input.max, middle];
         let inside = |x: &f64| {
             let whole = !input.integer || x.fract() == 0.0;
             x.is_finite() && *x >= input.min && *x <= input.max && whole

@@ -285,8 +285,7 @@ fn transition(tangent: &Tangent, batches: &[Batch<'_>]) -> DMatrix<f64> {
     let mut matrix = DMatrix::zeros(wide, wide);
     for batch in batches {
         for (place, &j) in batch.dynamics.columns.iter().enumerate() {
-            let column = batch.column(place);
-            for (i, value) in column.enumerate() {
+            for (i, value) in batch.column(place).enumerate() {
                 matrix[(i, j)] = value;
             }
         }
@@ -304,8 +303,6 @@ struct Batch<'t> {
     integrator: Integrator,
     /// states, then one column after the other, in units
     x: Vec<f64>,
-    /// states as they are
-    states: Vec<f64>,
     t: f64,
 }
 
@@ -333,11 +330,9 @@ impl<'t> Batch<'t> {
         experiment: &Experiment<'_>,
     ) -> Result<Self, Error> {
         let n = tangent.states;
-        let mut x = vec![0.0; n * (1 + columns.len())];
         let start = tangent.flow.system().start().iter().zip(&tangent.units);
-        x.iter_mut()
-            .zip(start)
-            .for_each(|(x, (start, unit))| *x = start / unit);
+        let mut x: Vec<f64> = start.map(|(start, unit)| start / unit).collect();
+        x.resize(n * (1 + columns.len()), 0.0);
         let mut batch = Self {
             dynamics: Variation {
                 tangent,
@@ -350,7 +345,6 @@ impl<'t> Batch<'t> {
             sight: tangent.sight.system().evaluation(),
             integrator: Integrator::new(experiment.method, x.len())?,
             x,
-            states: vec![0.0; n],
             t: experiment.window.start,
         };
         batch.restart();
@@ -362,14 +356,10 @@ impl<'t> Batch<'t> {
         let tangent = self.dynamics.tangent;
         let n = tangent.states;
         self.x[n..].fill(0.0);
-        let own = self
-            .dynamics
-            .columns
-            .iter()
-            .enumerate()
-            .filter(|(_, j)| **j < n);
-        for (place, &j) in own {
-            self.x[n + place * n + j] = tangent.scales[j] / tangent.units[j];
+        for (place, &j) in self.dynamics.columns.iter().enumerate() {
+            if j < n {
+                self.x[n + place * n + j] = tangent.scales[j] / tangent.units[j];
+            }
         }
     }
 
@@ -403,8 +393,8 @@ impl<'t> Batch<'t> {
     fn look(&mut self, piece: &mut Piece) -> Result<(), Error> {
         let (tangent, own) = (self.dynamics.tangent, &self.dynamics.columns);
         let (states, columns) = self.x.split_at(tangent.states);
-        tangent.in_own_units(states, &mut self.states);
-        let states = &self.states;
+        tangent.in_own_units(states, &mut self.dynamics.states);
+        let states = &self.dynamics.states;
         let mut seen = vec![0.0; self.sight.system().outputs().len()];
         self.sight.enter(self.t);
         self.sight.outputs(self.t, states, &mut seen);

@@ -170,11 +170,10 @@ impl ErrorModel {
     }
 
     fn ranges(&self) -> Vec<Bounds> {
-        let range = |s: &Sector| Bounds {
-            lower: s.range.lo(),
-            upper: s.range.hi(),
-        };
-        self.sectors.iter().map(range).collect()
+        let ranges = self.sectors.iter().map(|s| s.range);
+        ranges
+            .map(|range| (range.lo(), range.hi()).into())
+            .collect()
     }
 
     /// The model with these slopes, exactly enclosed: without sectors.

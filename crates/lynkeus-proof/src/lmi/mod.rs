@@ -38,16 +38,13 @@ pub struct Problem {
 }
 
 /// Why there is no solution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failure {
     /// no point satisfies every inequality
-    #[error("the inequalities contradict each other")]
     Infeasible,
     /// the arithmetic gave out before a decision
-    #[error("the inequalities could not be decided in double precision; scale the problem")]
     Numerical,
     /// a limit ended the search
-    #[error("undecided: {0}")]
     Spent(Spent),
 }
 

@@ -11,10 +11,10 @@ use lynkeus_expr::{Evaluator, MissingInput, Node, Tape, jacobian};
 use lynkeus_proof::spectrum;
 use nalgebra::{DMatrix, DVector};
 
+use crate::Region;
 use crate::detectability::exact::{self, Shows};
 use crate::detectability::hidden::{Detectability, Hidden, HiddenErrors, Observability};
 use crate::detectability::modes::{Modes, beside, image, null_space, reached};
-use crate::{AugmentedPlant, Region};
 
 /// States beyond which no modes are looked for.
 const STATES: usize = 60;
@@ -72,18 +72,16 @@ pub(super) fn hidden_errors(hidden: &Hidden<'_, '_>) -> Result<Option<HiddenErro
                 *detectability = Detectability::Undecided;
             }
         }
-        let (mut named, time): (Vec<_>, Vec<_>) = region
-            .coordinates(&point)
-            .into_iter()
-            .zip(&region.dimensions)
-            .partition(|(_, side)| side.symbol != augmented.plant.time);
-        if is_read(augmented, &nodes) {
+        let mut at = region.coordinates(&point);
+        let time = at.pop();
+        let read = augmented.graph().symbols_of(&nodes);
+        if read.contains(&augmented.plant.time) {
             // first, as long points are shown in part
-            named.splice(0..0, time);
+            at.splice(0..0, time);
         }
         return Ok(Some(HiddenErrors {
             of: of.into_iter().map(Some).collect(),
-            point: named.into_iter().map(|(at, _)| at).collect(),
+            point: at,
         }));
     }
     Ok(None)
@@ -92,14 +90,13 @@ pub(super) fn hidden_errors(hidden: &Hidden<'_, '_>) -> Result<Option<HiddenErro
 /// The start, then points inside the ranges.
 fn points(hidden: &Hidden<'_, '_>, region: &Region) -> Vec<Vec<f64>> {
     let augmented = hidden.augmented;
-    let start = |symbol: Node| {
-        let mut variables = augmented.states.iter().chain(&augmented.inputs);
-        variables.find(|v| v.node == symbol).and_then(|v| v.start)
-    };
+    let variables = || augmented.states.iter().chain(&augmented.inputs);
     let of_share = |share: f64, starts: bool| -> Vec<f64> {
-        let sides = region.dimensions.iter();
+        // time comes last
+        let start = variables().map(|v| v.start).chain([None]);
+        let sides = region.dimensions.iter().zip(start);
         sides
-            .map(|d| {
+            .map(|(d, start)| {
                 let inside = match (d.min.is_finite(), d.max.is_finite()) {
                     (true, true) => d.min + share * (d.max - d.min),
                     (true, false) => d.min.max(0.0),
@@ -107,7 +104,7 @@ fn points(hidden: &Hidden<'_, '_>, region: &Region) -> Vec<Vec<f64>> {
                     (false, false) => 0.0,
                 };
                 let inside = if d.integer { inside.round() } else { inside };
-                start(d.symbol).filter(|_| starts).unwrap_or(inside)
+                start.filter(|_| starts).unwrap_or(inside)
             })
             .collect()
     };
@@ -297,16 +294,13 @@ impl Rest {
         for i in 0..states.len() {
             nodes.extend((0..unknowns.len()).map(|j| own.get(i, j).unwrap_or(zero)));
         }
-        let symbols = region.symbols();
-        let place = |unknown: &Node| symbols.iter().position(|symbol| symbol == unknown);
-        let sides = free
-            .iter()
-            .map(|&i| (augmented.states[i].min, augmented.states[i].max));
+        let side = |&i: &usize| (augmented.states[i].min, augmented.states[i].max);
         Ok(Self {
-            places: unknowns.iter().filter_map(place).collect(),
-            sides: sides.collect(),
+            sides: free.iter().map(side).collect(),
+            // the augmented states come first
+            places: free,
             driven: behind(&states, &reads, HashSet::from([augmented.plant.time])),
-            evaluator: Tape::new(graph, &symbols, &nodes)?.evaluator(),
+            evaluator: Tape::new(graph, &region.symbols(), &nodes)?.evaluator(),
             states,
             reads,
         })
@@ -396,12 +390,6 @@ fn behind(states: &[Node], reads: &[Vec<Node>], mut found: HashSet<Node>) -> Has
             None => return found,
         };
     }
-}
-
-/// Whether one of these expressions reads the time.
-fn is_read(augmented: &AugmentedPlant<'_>, nodes: &[Node]) -> bool {
-    let symbols = augmented.graph().symbols_of(nodes);
-    symbols.contains(&augmented.plant.time)
 }
 
 /// Per augmented state whether the error in it, if it is hidden, obeys an equation that reads one of these

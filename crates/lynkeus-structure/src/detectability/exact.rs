@@ -3,7 +3,7 @@
 //! The numbers of the Jacobian are rational, every one of them. Their images modulo a prime of 61 bits have the same
 //! ranks, but for accidents of a probability near 2⁻⁵⁰.
 
-use lynkeus_expr::modular::{Echelon, Modular, dot};
+use lynkeus_expr::modular::{Echelon, Modular, dot, unit};
 use nalgebra::DMatrix;
 
 /// What an augmented state shows of what can move without a trace.
@@ -65,11 +65,7 @@ fn traceless(
     wide: usize,
 ) -> Vec<(usize, Vec<Modular>)> {
     let n = flow.len();
-    let unit = |i: usize| -> Vec<Modular> {
-        let entries = (0..n).map(|j| Modular::new(u64::from(i == j)));
-        entries.collect()
-    };
-    let mut space = Echelon::of(n, (0..n).map(unit));
+    let mut space = Echelon::of(n, (0..n).map(|i| unit(n, i)));
     loop {
         // what has no part across the space
         let across = space.kernel();
