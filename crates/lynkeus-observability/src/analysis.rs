@@ -314,7 +314,7 @@ impl<'a> Analysis<'a> {
         if search.rank() >= generic.rank() {
             return Ok(vec![Hidden::all(search)]);
         }
-        let fields = self.fields(set)?;
+        let fields = lie::directions(self.model, set, &self.start)?;
         let proved = joined(search, beside(search, &generic), &fields);
         if search.is_complete() || proved.iter().any(|hidden| hidden.among.is_none()) {
             return Ok(proved);
@@ -324,11 +324,6 @@ impl<'a> Analysis<'a> {
             true => vec![Hidden::all(search)],
             false => joined(search, beside(search, &generic), &fields),
         })
-    }
-
-    /// Directions along which verified symmetries move the unknowns at the start.
-    fn fields(&self, set: &Affine) -> Result<Vec<Vec<Modular>>, Stop> {
-        lie::directions(self.model, set, &self.start)
     }
 
     fn steady(&self, set: &Affine, search: &mut Search<'_>) -> Result<Vec<Hidden>, Stop> {
@@ -341,7 +336,10 @@ impl<'a> Analysis<'a> {
         let starts = (&self.start, &elsewhere);
         Ok(match is_steady(self.model, starts, set, last)? {
             true => vec![Hidden::all(search)],
-            false => joined(search, vec![], &self.fields(set)?),
+            false => {
+                let fields = lie::directions(self.model, set, &self.start)?;
+                joined(search, vec![], &fields)
+            }
         })
     }
 

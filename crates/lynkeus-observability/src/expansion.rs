@@ -57,10 +57,6 @@ impl Columns {
     pub fn unit(&self, column: usize) -> Vec<Modular> {
         unit(self.width(), column)
     }
-
-    fn first_of_moving(&self) -> usize {
-        self.width() - self.moving.len()
-    }
 }
 
 /// The series at one start.
@@ -206,7 +202,7 @@ impl<'a> Expansion<'a> {
 
     /// A row of sensitivities with those to the directions in which known starts move.
     fn moved(&self, place: usize, mut row: Vec<Modular>) -> Vec<Modular> {
-        let first = self.columns.first_of_moving();
+        let first = self.columns.width() - self.columns.moving.len();
         for (i, direction) in self.columns.moving.iter().enumerate() {
             if !direction[place].is_zero() {
                 row.resize(self.columns.width(), Modular::ZERO);

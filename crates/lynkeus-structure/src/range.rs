@@ -393,10 +393,7 @@ impl<'a> Search<'a> {
         if value.is_nan() {
             return;
         }
-        let attained = || Point {
-            coordinates: self.asked.region.coordinates(at),
-            value,
-        };
+        let attained = || self.asked.region.point(at, value);
         if self.lowest.as_ref().is_none_or(|best| value < best.value) {
             self.lowest = Some(attained());
         }

@@ -303,10 +303,7 @@ fn by_parts(block: &Matrix<'_>, region: &Region) -> Result<Finding, MissingInput
         let at: Cell = middle.iter().map(|&x| Interval::point(x)).collect();
         if let Some(value) = sure_determinant(tape.eval_in(&Intervals, &at), block.rows) {
             let place = usize::from(value > 0.0);
-            seen[place] = Some(Point {
-                coordinates: region.coordinates(&middle),
-                value,
-            });
+            seen[place] = Some(region.point(&middle, value));
         }
         let witness: Option<Vec<Point>> = seen.iter().cloned().collect();
         let halves = region

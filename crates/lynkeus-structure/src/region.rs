@@ -34,6 +34,15 @@ impl From<(String, f64)> for Coordinate {
     }
 }
 
+/// A point of the box and the value of the expression in question there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// of every variable the expression depends on
+    pub coordinates: Vec<Coordinate>,
+    /// value of the expression at the point
+    pub value: f64,
+}
+
 /// A part of the box; without sides where none says more than the whole box.
 pub type Place = Vec<Dimension>;
 
@@ -104,6 +113,14 @@ impl Region {
     pub(crate) fn coordinates(&self, point: &[f64]) -> Vec<Coordinate> {
         let sides = self.dimensions.iter().zip(point);
         sides.map(|(d, &x)| (d.name.clone(), x).into()).collect()
+    }
+
+    /// The same with the value there.
+    pub(crate) fn point(&self, at: &[f64], value: f64) -> Point {
+        Point {
+            coordinates: self.coordinates(at),
+            value,
+        }
     }
 
     /// Whether a point is not absurdly far where no end is declared.

@@ -63,17 +63,10 @@ pub fn keeps_sign(graph: &Graph, node: Node, region: &Region) -> Result<Sign, Mi
     } else {
         1.0
     };
-    let bounds = if low > 0.0 {
-        (low, high)
-    } else if high < 0.0 {
-        (-high, -low)
-    } else {
-        (0.0, high.max(-low))
-    };
     Ok(Sign {
         finding,
         sign,
-        bounds,
+        bounds: (found.enclosure.mignitude(), found.enclosure.magnitude()),
     })
 }
 
@@ -187,10 +180,7 @@ fn along(from: &[f64], to: &[f64], halvings: i32) -> Vec<f64> {
 /// The place with the value there.
 fn told(tape: &Tape, region: &Region, place: &[f64]) -> Point {
     let value = enclosure(tape, place);
-    Point {
-        coordinates: region.coordinates(place),
-        value: f64::midpoint(value.lo(), value.hi()),
-    }
+    region.point(place, f64::midpoint(value.lo(), value.hi()))
 }
 
 /// A small cell of the region around a point.

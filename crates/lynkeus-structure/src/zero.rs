@@ -4,7 +4,7 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 
 use crate::region::{inside, spread};
-use crate::{Point, Region, Verdict, Witness};
+use crate::{Region, Verdict};
 
 /// Points tried beside those on the edges of the box.
 const POINTS: usize = 12;
@@ -31,11 +31,9 @@ pub fn vanishes(graph: &Graph, node: Node, region: &Region) -> Result<Verdict, M
         let cell: Vec<Interval> = point.iter().map(|&x| Interval::point(x)).collect();
         let enclosure = bounds.value(&cell);
         let sure = enclosure.is_positive() || enclosure.is_negative();
-        if sure && enclosure.lo().is_finite() && enclosure.hi().is_finite() {
-            return Ok(Verdict::Refuted(Witness::from(Point {
-                coordinates: region.coordinates(&point),
-                value: enclosure.lo() + (enclosure.hi() - enclosure.lo()) / 2.0,
-            })));
+        if sure && enclosure.magnitude().is_finite() {
+            let value = enclosure.lo() + (enclosure.hi() - enclosure.lo()) / 2.0;
+            return Ok(Verdict::Refuted(region.point(&point, value).into()));
         }
     }
     Ok(Verdict::open())

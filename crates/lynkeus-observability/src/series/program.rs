@@ -73,9 +73,7 @@ impl Program {
         builder.program.roots = roots.ok_or(Note::System)?;
         Ok(builder.program)
     }
-}
 
-impl Program {
     /// Number of operations.
     pub fn len(&self) -> usize {
         self.steps.len()
@@ -142,6 +140,9 @@ impl Program {
         seen
     }
 }
+
+/// What stands for all inverse functions of angles in the list of functions.
+const ARCS: &str = "asin";
 
 struct Builder<'a> {
     graph: &'a Graph,
@@ -319,12 +320,7 @@ impl Builder<'_> {
         self.solutions.insert(node, solution);
         Ok(())
     }
-}
 
-/// Parts of a right angle's multiples that are looked for.
-const PARTS: [f64; 7] = [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 180.0];
-
-impl Builder<'_> {
     /// A number: e and the logarithms of 2 and 10 by what they are, fractions of π as such.
     pub(super) fn number(&mut self, x: f64) -> Result<usize, Note> {
         let natural = [(LN_2, 2.0), (LN_10, 10.0)];
@@ -340,26 +336,7 @@ impl Builder<'_> {
         let value = value.ok_or(Note::Number(x))?;
         Ok(self.push(Step::Constant(value)))
     }
-}
 
-fn fraction_of_pi(x: f64) -> Option<Modular> {
-    PARTS.into_iter().find_map(|part| {
-        let times = (x * part / PI).round();
-        if times == 0.0
-            || times.abs() > 1000.0
-            || (times * PI / part != x && times / part * PI != x)
-        {
-            return None;
-        }
-        let part = Modular::from_f64(part)?.inverse()?;
-        Some(Modular::from_f64(PI)? * Modular::from_f64(times)? * part)
-    })
-}
-
-/// What stands for all inverse functions of angles in the list of functions.
-const ARCS: &str = "asin";
-
-impl Builder<'_> {
     /// The slots of (sin, cos).
     fn pair(&mut self, a: usize) -> (usize, usize) {
         if let Some(&slot) = self.pairs.get(&a) {
@@ -546,4 +523,21 @@ impl Builder<'_> {
         let sum = self.push(Step::Add(one, square));
         Ok(self.integral(a, (one, sum), Function::Arctangent))
     }
+}
+
+/// Parts of a right angle's multiples that are looked for.
+const PARTS: [f64; 7] = [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 180.0];
+
+fn fraction_of_pi(x: f64) -> Option<Modular> {
+    PARTS.into_iter().find_map(|part| {
+        let times = (x * part / PI).round();
+        if times == 0.0
+            || times.abs() > 1000.0
+            || (times * PI / part != x && times / part * PI != x)
+        {
+            return None;
+        }
+        let part = Modular::from_f64(part)?.inverse()?;
+        Some(Modular::from_f64(PI)? * Modular::from_f64(times)? * part)
+    })
 }

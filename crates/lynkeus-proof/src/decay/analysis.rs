@@ -49,7 +49,8 @@ fn prove_in(
     rate: f64,
     budget: &Budget,
 ) -> Option<Proof> {
-    let scaled: Vec<ErrorModel> = models.iter().map(|m| frame.scaled(m)).collect();
+    let scaled = |m: &ErrorModel| m.scaled(&frame.sizes, frame.unit);
+    let scaled: Vec<ErrorModel> = models.iter().map(scaled).collect();
     let seen: Vec<Seen> = scaled.iter().map(|m| frame.seen(m)).collect();
     let mut problem = Problem::new(budget);
     let P = extent.lyapunov(&mut problem, &scaled);

@@ -2,6 +2,7 @@
 
 use lynkeus_expr::{Budget, Interval, MissingInput, Node, components, jacobian};
 use lynkeus_proof::decay::{ErrorModel, Sector, fastest};
+use lynkeus_proof::matrix::sum;
 use lynkeus_proof::spectrum;
 use nalgebra::DMatrix;
 
@@ -100,13 +101,9 @@ impl System {
     fn decay(&self, states: &[usize], rows: &[&Row]) -> Option<f64> {
         let entry = |i: usize, j: usize| rows[i].a[states[j]];
         let n = states.len();
-        let mut entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
         // what comes from outside of the block has to be bounded as well
-        let mut outside = rows.iter().flat_map(|row| &row.a);
-        if n > COUPLED
-            || !entries.all(|(i, j)| entry(i, j).is_bounded())
-            || !outside.all(|x| x.is_bounded())
-        {
+        let mut read = rows.iter().flat_map(|row| &row.a);
+        if n > COUPLED || !read.all(|x| x.is_bounded()) {
             return None;
         }
         if let [_] = states {
@@ -138,7 +135,7 @@ impl System {
         let terms = row.b.iter().zip(&self.reach).filter(|(b, _)| !b.is_zero());
         let terms =
             terms.map(|(b, width)| Interval::point(b.magnitude()) * Interval::point(*width));
-        let sum = terms.fold(Interval::ZERO, |sum, term| sum + term);
+        let sum = sum(terms);
         let bound = (sum / Interval::point(rate)).hi();
         // the range itself is a bound
         let tells = bound < self.scales[s] && sum.is_defined();

@@ -286,12 +286,8 @@ impl Part<'_> {
         }
         let is_proved = self.is_proved(&first, &second).unwrap_or(false);
         let value = self.values(&first)[0];
-        let point = |at: Vec<f64>| Point {
-            coordinates: self.region.coordinates(&at),
-            value,
-        };
         Some(Alike {
-            points: [first, second].map(point),
+            points: [first, second].map(|at| self.region.point(&at, value)),
             is_proved,
         })
     }
