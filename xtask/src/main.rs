@@ -1,23 +1,12 @@
 //! The project's own chores, run as `cargo xtask <task>`.
 
-mod attack;
-mod draw;
-mod exercise;
-mod falsify;
-mod figures;
-mod gallery;
-mod gap;
-mod numbers;
-mod options;
 mod package;
-mod peers;
-mod process;
-mod python;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use process::{cargo, run};
+use xtask::process::{begins, cargo, run};
+use xtask::python;
 
 const USAGE: &str = "\
 usage: cargo xtask <task>
@@ -26,57 +15,51 @@ usage: cargo xtask <task>
   package   build the Python package, install it into .venv-package and run its tests
   ci        format check, lints, documentation, then `test`
   site      build the documentation site into target/site, every link checked
+
+and, built with --release first (`chores` runs their own tests, which `test` leaves out):
+
   gallery   draw the pictures of docs/pictures again from the shipped studies
   figures   draw the figures of the five papers again into target/figures, with trajectories that were
             computed apart where they are at hand
   gap       compute the table of docs/gap.md again from the shipped studies;
             `gap NAME` only the rows of that example
   falsify   try to break the certificates of random and adversarial plants
-            [--seed N] [--count N] [--refutations N] [--family F]; build with --release
+            [--seed N] [--count N] [--refutations N] [--family F]
   attack    run the command on mutated models, studies, logs and options, and see that it neither
             fails nor harms; [--seed N] [--count N] [--seconds N] [--limit SECONDS]
-            [--binary FILE]; build with --release
+            [--binary FILE]
   exercise  random operations on estimators of every kind: no panic, always finite or an error, a
-            restored snapshot equal to the bit; [--seed N] [--count N] [--seconds N]; build with
-            --release
+            restored snapshot equal to the bit; [--seed N] [--count N] [--seconds N]
   bench-peers  ours beside C by hand, numba, JAX, diffrax, CasADi and SciPy: the table of
-            BENCHMARKS.md; [--rounds N]; needs gcc; build with --release
+            BENCHMARKS.md; [--rounds N]; needs gcc
   bench-runs   10,000 runs of the column with noise beside JAX: clock, processor time and memory;
-            [--runs N] [--rounds N]; needs `cargo build --release`; build with --release";
+            [--runs N] [--rounds N]; needs `cargo build --release`";
 
-/// Tasks with options of their own.
-const WITH_OPTIONS: [&str; 6] = [
+/// What the package `chores` does.
+const CHORES: [&str; 8] = [
+    "gallery",
+    "figures",
+    "gap",
     "falsify",
     "attack",
     "exercise",
     "bench-peers",
     "bench-runs",
-    "bench-ours",
 ];
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let (task, name) = match arguments.as_slice() {
-        [task, ..] if WITH_OPTIONS.contains(&task.as_str()) => (task.as_str(), None),
-        [task] => (task.as_str(), None),
-        [task, name] if task == "gap" => ("gap", Some(name.as_str())),
-        _ => ("", None),
-    };
-    let outcome = match task {
-        "test" => test(),
-        "ci" => ci(),
-        "package" => package::interpreter().and_then(|python| package::test(&python)),
-        "site" => package::site(),
-        "gallery" => gallery::draw(),
-        "figures" => figures::draw(),
-        "gap" => gap::tabulate(name),
-        "attack" => attack::run(&arguments[1..]),
-        "exercise" => exercise::run(&arguments[1..]),
-        "falsify" => falsify::run(&arguments[1..]),
-        "bench-peers" => peers::bench(&arguments[1..]),
-        "bench-runs" => peers::runs::bench(&arguments[1..]),
-        // one of the peers, as a process of its own
-        "bench-ours" => peers::ours::print(arguments.get(1).map_or("", String::as_str)),
+    let task = arguments.first().map_or("", String::as_str);
+    let outcome = match (task, arguments.len()) {
+        ("test", 1) => test(),
+        ("ci", 1) => ci(),
+        ("chores", 1) => run(&mut cargo(&["test", "--package", "chores"])),
+        ("package", 1) => package::interpreter().and_then(|python| package::test(&python)),
+        ("site", 1) => package::site(),
+        _ if CHORES.contains(&task) => {
+            let mut chore = cargo(&["run", "--release", "--package", "chores", "--"]);
+            run(chore.args(&arguments))
+        }
         _ => {
             eprintln!("{USAGE}");
             return ExitCode::from(2);
@@ -93,7 +76,8 @@ fn main() -> ExitCode {
 
 /// Runs every test. `cargo test` comes last, so its summary closes the output.
 fn test() -> Result<(), String> {
-    let mut tests = cargo(&["test", "--workspace"]);
+    begins("the Python environments");
+    let mut tests = cargo(&["test", "--workspace", "--exclude", "chores"]);
     match found(python::interpreter(), "the Python cross-checks")? {
         Some(path) => tests.env(python::VARIABLE, path),
         None => tests.env_remove(python::VARIABLE),
@@ -101,6 +85,7 @@ fn test() -> Result<(), String> {
     if let Some(python) = found(package::interpreter(), "the tests of the Python package")? {
         package::test(&python)?;
     }
+    begins("the tests in Rust");
     run(&mut tests)
 }
 

@@ -6,8 +6,8 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::process::{cargo, root, run, target};
-use crate::python;
+use xtask::process::{begins, cargo, root, run, target};
+use xtask::python;
 
 /// What its tests need, pinned.
 const REQUIREMENTS: &str = include_str!("../../python/requirements.txt");
@@ -20,6 +20,7 @@ const COMMAND: &str = "LYNKEUS_COMMAND";
 /// # Errors
 /// What is missing, or what failed.
 pub fn test(python: &Path) -> Result<(), String> {
+    begins("the Python package, as a wheel");
     let wheel = wheel(python)?;
     let mut install = Command::new(python);
     install
@@ -27,8 +28,16 @@ pub fn test(python: &Path) -> Result<(), String> {
         .args(["--quiet", "--force-reinstall", "--no-deps", "--no-index"])
         .arg(wheel);
     run(&mut install)?;
+    begins("the tests, compiled");
     // as all tests are built later, so that nothing is built twice
-    run(&mut cargo(&["test", "--workspace", "--no-run"]))?;
+    run(&mut cargo(&[
+        "test",
+        "--workspace",
+        "--exclude",
+        "chores",
+        "--no-run",
+    ]))?;
+    begins("the tests of the Python package");
     let command = target().join("debug").join("lynkeus");
     let command = command.with_extension(std::env::consts::EXE_EXTENSION);
     let mut tests = Command::new(python);
@@ -37,6 +46,7 @@ pub fn test(python: &Path) -> Result<(), String> {
         .env(COMMAND, command)
         .current_dir(root());
     run(&mut tests)?;
+    begins("the types of the Python package");
     let mut types = Command::new(python);
     types.args(["-m", "mypy"]).current_dir(root());
     run(&mut types)
@@ -77,7 +87,7 @@ fn wheel(python: &Path) -> Result<PathBuf, String> {
     }
     let mut build = Command::new(python);
     build
-        .args(["-m", "maturin", "build", "--quiet", "--profile", "dev"])
+        .args(["-m", "maturin", "build", "--profile", "dev"])
         .args(["--auditwheel", "skip", "--out"])
         .arg(&folder)
         .current_dir(root());

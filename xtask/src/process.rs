@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::LazyLock;
+use std::time::Instant;
 
 /// The root of the workspace: the folder above this crate's.
 pub fn root() -> PathBuf {
@@ -21,6 +23,13 @@ pub fn cargo(arguments: &[&str]) -> Command {
     let mut command = Command::new(program);
     command.args(arguments).current_dir(root());
     command
+}
+
+/// Says what a task that takes minutes does next, and how long it has been at it.
+pub fn begins(what: &str) {
+    static SINCE: LazyLock<Instant> = LazyLock::new(Instant::now);
+    let seconds = SINCE.elapsed().as_secs();
+    eprintln!("[{}:{:02}] {what}", seconds / 60, seconds % 60);
 }
 
 /// Runs a command to its end; an exit status other than success is an error that names it.

@@ -1,11 +1,8 @@
-//! A tape as a list of operations that languages have.
+//! Expressions as a list of operations that languages have.
 
-use std::cell::RefCell;
-use std::ops::Range;
+use std::collections::{HashMap, HashSet};
 
-use lynkeus_expr::{
-    Algebra, Binary, Expr, Graph, Implicit, Node, Nodes, Op, Tape, Unary, jacobian,
-};
+use lynkeus_expr::{Binary, Call, Expr, Graph, Node, Op, Unary, jacobian};
 
 use crate::Refusal;
 
@@ -20,25 +17,6 @@ pub(crate) struct Code {
     outputs: Vec<Node>,
 }
 
-/// Some outputs of a tape.
-#[derive(Clone, Debug)]
-pub(crate) struct Part<'t> {
-    /// its inputs are those of the code
-    pub tape: &'t Tape,
-    /// which outputs
-    pub outputs: Range<usize>,
-}
-
-impl<'t> Part<'t> {
-    /// All outputs.
-    pub fn all(tape: &'t Tape) -> Self {
-        Self {
-            tape,
-            outputs: 0..tape.outputs(),
-        }
-    }
-}
-
 /// What a language's solver of linear systems tells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Solver {
@@ -49,57 +27,60 @@ pub(crate) enum Solver {
 }
 
 impl Code {
-    /// What a tape computes, for a language whose solver tells the solution alone.
+    /// Expressions of a graph as functions of the symbols `inputs`, all that they read, part by part.
     ///
     /// # Errors
     /// [`Refusal::Loop`] and [`Refusal::LargeSystem`].
-    pub fn of(tape: &Tape) -> Result<Self, Refusal> {
-        Self::of_parts(&[Part::all(tape)], Solver::Plain)
-    }
-
-    /// What tapes with the same inputs compute, one after the other.
-    ///
-    /// # Errors
-    /// [`Refusal::Loop`] and [`Refusal::LargeSystem`].
-    pub fn of_parts(parts: &[Part<'_>], solver: Solver) -> Result<Self, Refusal> {
-        let (first, conditions) = Self::lowered(parts, &[])?;
+    pub fn of(
+        graph: &Graph,
+        inputs: &[Node],
+        parts: &[&[Node]],
+        solver: Solver,
+    ) -> Result<Self, Refusal> {
+        let (first, conditions) = Self::lowered(graph, inputs, parts, HashSet::new())?;
         if solver == Solver::Conditioned {
             return Ok(first);
         }
         let needed = first.operations();
         let is_read = |rcond: &Node| needed.binary_search(rcond).is_ok();
-        let read: Vec<bool> = conditions.iter().map(is_read).collect();
-        match read.contains(&true) {
-            true => Ok(Self::lowered(parts, &read)?.0),
-            false => Ok(first),
+        let read = conditions.into_iter().filter(|(_, rcond)| is_read(rcond));
+        let read: HashSet<Node> = read.map(|(system, _)| system).collect();
+        match read.is_empty() {
+            true => Ok(first),
+            false => Ok(Self::lowered(graph, inputs, parts, read)?.0),
         }
     }
 
-    /// The code and the conditions of its linear systems, in the order of the tapes; those marked
-    /// are spelled out.
-    fn lowered(parts: &[Part<'_>], spelled: &[bool]) -> Result<(Self, Vec<Node>), Refusal> {
+    /// The code, and the condition of each linear system; those in `spelled` are spelled out.
+    fn lowered(
+        from: &Graph,
+        inputs: &[Node],
+        parts: &[&[Node]],
+        spelled: HashSet<Node>,
+    ) -> Result<(Self, HashMap<Node, Node>), Refusal> {
         let graph = Graph::new();
         let symbol = |i| graph.fresh(format!("input {i}")).node();
-        let count = parts.first().map_or(0, |part| part.tape.inputs());
-        let inputs: Vec<Node> = (0..count).map(symbol).collect();
-        let lowering = Lowering {
-            nodes: Nodes(&graph),
+        let symbols: Vec<Node> = (0..inputs.len()).map(symbol).collect();
+        let mut lowering = Lowering {
+            from,
+            to: &graph,
             spelled,
-            conditions: RefCell::default(),
-            refusal: RefCell::default(),
+            images: inputs
+                .iter()
+                .copied()
+                .zip(symbols.iter().copied())
+                .collect(),
+            results: HashMap::new(),
+            conditions: HashMap::new(),
         };
-        let outputs = parts.iter().flat_map(|part| {
-            let all = part.tape.eval_in(&lowering, &inputs).into_iter();
-            all.skip(part.outputs.start).take(part.outputs.len())
-        });
-        let outputs = outputs.collect();
-        if let Some(refusal) = lowering.refusal.into_inner() {
-            return Err(refusal);
+        let mut outputs = vec![];
+        for part in parts {
+            outputs.extend(lowering.part(part)?);
         }
-        let conditions = lowering.conditions.into_inner();
+        let conditions = lowering.conditions;
         let code = Self {
             graph,
-            inputs,
+            inputs: symbols,
             outputs,
         };
         Ok((code, conditions))
@@ -166,67 +147,89 @@ pub(crate) fn is_truth(op: Op) -> bool {
     }
 }
 
-/// The nodes of a graph, but for what no language has.
+/// Takes expressions to another graph, but for what no language has.
 struct Lowering<'g> {
-    nodes: Nodes<'g>,
-    /// by linear system, in order
-    spelled: &'g [bool],
-    /// of the linear systems met
-    conditions: RefCell<Vec<Node>>,
-    refusal: RefCell<Option<Refusal>>,
+    from: &'g Graph,
+    to: &'g Graph,
+    /// linear systems that are spelled out
+    spelled: HashSet<Node>,
+    /// of what was met, but of systems
+    images: HashMap<Node, Node>,
+    /// of systems: their unknowns, then the reciprocal condition
+    results: HashMap<Node, Vec<Node>>,
+    /// of linear systems
+    conditions: HashMap<Node, Node>,
 }
 
-impl Algebra for Lowering<'_> {
-    type Value = Node;
-
-    fn constant(&self, value: f64) -> Node {
-        self.nodes.constant(value)
-    }
-
-    fn unary(&self, op: Unary, x: &Node) -> Node {
-        self.nodes.unary(op, x)
-    }
-
-    fn powi(&self, x: &Node, n: i32) -> Node {
-        self.nodes.powi(x, n)
-    }
-
-    fn binary(&self, op: Binary, x: &Node, y: &Node) -> Node {
-        self.nodes.binary(op, x, y)
+impl Lowering<'_> {
+    /// The images of some expressions.
+    fn part(&mut self, roots: &[Node]) -> Result<Vec<Node>, Refusal> {
+        let (from, to) = (self.from, self.to);
+        let mut nodes = from.reachable(roots);
+        // a product is of its older factor first: numbers stand before what they multiply
+        nodes.sort_by_key(|&node| from.constant_value(node).is_none());
+        for node in nodes {
+            if self.images.contains_key(&node) {
+                continue;
+            }
+            let image = match from.op(node) {
+                Op::System(_) => {
+                    if let Some(call) = from.system(node) {
+                        self.system(node, &call)?;
+                    }
+                    continue;
+                }
+                Op::Entry(system, entry) => Some(self.results[&system][entry as usize]),
+                Op::Select(condition, x, y) => {
+                    let [condition, x, y] = [condition, x, y].map(|node| self.images[&node]);
+                    Some(self.select(condition, x, y))
+                }
+                _ => to.rebuilt(from, node, |argument| self.images[&argument]),
+            };
+            self.images.extend(image.map(|image| (node, image)));
+        }
+        Ok(roots.iter().map(|root| self.images[root]).collect())
     }
 
     /// A condition that is a number may be NaN: then nobody knows.
-    fn select(&self, condition: &Node, x: &Node, y: &Node) -> Node {
-        let graph = self.nodes.0;
-        let chosen = self.nodes.select(condition, x, y);
-        let op = graph.op(*condition);
+    fn select(&self, condition: Node, x: Node, y: Node) -> Node {
+        let graph = self.to;
+        let chosen = graph.select(condition, x, y);
+        let op = graph.op(condition);
         if is_truth(op) || matches!(op, Op::Constant(_)) {
             return chosen;
         }
-        let is_known = graph.binary(Binary::Equal, *condition, *condition);
+        let is_known = graph.binary(Binary::Equal, condition, condition);
         graph.select(is_known, chosen, graph.constant(f64::NAN).node())
     }
 
-    fn solve(&self, a: &[Node], b: &[Node]) -> (Vec<Node>, Node) {
-        let conditions = &mut *self.conditions.borrow_mut();
-        let is_spelled = self.spelled.get(conditions.len());
-        let (x, rcond) = match is_spelled {
-            Some(true) if b.len() > LARGEST => {
-                let (size, most) = (b.len(), LARGEST);
-                *self.refusal.borrow_mut() = Some(Refusal::LargeSystem { size, most });
-                self.nodes.solve(a, b)
-            }
-            Some(true) => factorised(self.nodes.0, a, b),
-            _ => self.nodes.solve(a, b),
+    fn system(&mut self, node: Node, call: &Call) -> Result<(), Refusal> {
+        if self.results.contains_key(&node) {
+            return Ok(());
+        }
+        let Some((a, b)) = call.linear() else {
+            let unknowns = call.function().map_or(&[][..], |function| function.names());
+            let unknowns = unknowns.to_vec();
+            return Err(Refusal::Loop { unknowns });
         };
-        conditions.push(rcond);
-        (x, rcond)
-    }
-
-    fn implicit(&self, function: &Implicit, _: &[Node]) -> Vec<Node> {
-        let unknowns = function.names().to_vec();
-        *self.refusal.borrow_mut() = Some(Refusal::Loop { unknowns });
-        vec![self.constant(f64::NAN); function.size()]
+        let image = |nodes: &[Node]| -> Vec<Node> {
+            nodes.iter().map(|argument| self.images[argument]).collect()
+        };
+        let (a, b) = (image(a), image(b));
+        let (x, rcond) = match self.spelled.contains(&node) {
+            true if b.len() > LARGEST => {
+                let (size, most) = (b.len(), LARGEST);
+                return Err(Refusal::LargeSystem { size, most });
+            }
+            true => factorised(self.to, &a, &b),
+            false => {
+                let solution = self.to.solve(&a, &b);
+                (solution.x, solution.rcond)
+            }
+        };
+        self.conditions.insert(node, rcond);
+        self.results.insert(node, [&x[..], &[rcond]].concat());
+        Ok(())
     }
 }
 
@@ -389,7 +392,7 @@ fn reflected<'g>(graph: &'g Graph, v: &[Expr<'g>], vv: Expr<'g>, y: &[Expr<'g>])
 mod tests {
     use super::*;
     use lynkeus_expr::{Algebra, Reals, Tape};
-    use lynkeus_expr::{ImplicitUnknown, Interval};
+    use lynkeus_expr::{Implicit, ImplicitUnknown, Interval};
     use proptest::prelude::*;
 
     #[test]
@@ -402,8 +405,7 @@ mod tests {
             range: Interval::ENTIRE,
         };
         let root = Implicit::solve(&g, &[unknown], &[(a + a.exp() - x).node()]).unwrap()[0];
-        let tape = Tape::new(&g, &[x.node()], &[root]).unwrap();
-        let refusal = Code::of(&tape).unwrap_err();
+        let refusal = Code::of(&g, &[x.node()], &[&[root]], Solver::Plain).unwrap_err();
         assert_eq!(
             refusal,
             Refusal::Loop {
@@ -418,11 +420,12 @@ mod tests {
         let [a, b, c] = ["a", "b", "c"].map(|name| g.symbol(name));
         let inputs = [a, b, c].map(|e| e.node());
         let solution = g.solve(&[a, b, c, a * b].map(|e| e.node()), &[inputs[0], inputs[1]]);
-        let plain = Tape::new(&g, &inputs, &solution.x).unwrap();
-        assert!(Code::of(&plain).unwrap().has_systems());
-        let read = Tape::new(&g, &inputs, &[solution.x[0], solution.rcond]).unwrap();
-        let code = Code::of(&read).unwrap();
+        let of = |outputs: &[Node]| Code::of(&g, &inputs, &[outputs], Solver::Plain).unwrap();
+        assert!(of(&solution.x).has_systems());
+        let outputs = [solution.x[0], solution.rcond];
+        let code = of(&outputs);
         assert!(!code.has_systems());
+        let read = Tape::new(&g, &inputs, &outputs).unwrap();
         let again = Tape::new(code.graph(), code.inputs(), code.outputs()).unwrap();
         let at = [0.7, -1.3, 0.4];
         let (mut ours, mut spelled) = ([0.0; 2], [0.0; 2]);

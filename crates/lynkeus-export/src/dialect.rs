@@ -339,8 +339,9 @@ impl Printer<'_> {
 mod tests {
     use super::*;
     use crate::Form;
+    use crate::code::Solver;
     use crate::python::Namespace;
-    use lynkeus_expr::{Expr, Graph, Tape};
+    use lynkeus_expr::{Expr, Graph};
 
     fn printed<const N: usize>(
         dialect: &dyn Dialect,
@@ -349,9 +350,9 @@ mod tests {
         let g = Graph::new();
         let symbols = ["a", "b", "c"].map(|name| g.symbol(name));
         let outputs = make(symbols).map(|e| e.node());
-        let tape = Tape::new(&g, &symbols.map(|e| e.node()), &outputs).unwrap();
+        let code = Code::of(&g, &symbols.map(|e| e.node()), &[&outputs], Solver::Plain)?;
         let inputs = ["a", "b", "c"].map(Text::atom);
-        Body::of(&Code::of(&tape)?, dialect, &inputs, &mut Names::default())
+        Body::of(&code, dialect, &inputs, &mut Names::default())
     }
 
     fn text(make: impl for<'g> Fn([Expr<'g>; 3]) -> Expr<'g>) -> String {

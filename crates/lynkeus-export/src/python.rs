@@ -1,18 +1,18 @@
 //! Functions in Python over a namespace `xp`: `numpy` or `jax.numpy`, or `casadi`.
 //!
 //! ```
-//! use lynkeus_expr::{Graph, Tape};
+//! use lynkeus_expr::Graph;
 //! use lynkeus_export::python::{Function, Namespace, Vector, module};
 //!
 //! let g = Graph::new();
 //! let [t, level, inflow] = ["t", "level", "inflow"].map(|name| g.symbol(name));
 //! let inputs = [t, level, inflow].map(|e| e.node());
-//! let tape = Tape::new(&g, &inputs, &[(inflow - 0.5 * level.sqrt()).node()])?;
+//! let outputs = [(inflow - 0.5 * level.sqrt()).node()];
 //! let vectors = [("x", "level"), ("u", "inflow")].map(|(name, entry)| Vector {
 //!     name: name.into(),
 //!     entries: vec![entry.into()],
 //! });
-//! let f = Function { name: "f", tape: &tape };
+//! let f = Function { name: "f", graph: &g, inputs: &inputs, outputs: &outputs };
 //! let module = module("Tank", &[f], &vectors, Namespace::Numpy)?;
 //! assert!(module.text.ends_with(
 //!     "    level = x[0]\n    inflow = u[0]\n    return xp.array([inflow - 0.5*xp.sqrt(level)])\n"
@@ -20,8 +20,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use lynkeus_expr::{Binary, Tape, Unary};
+use lynkeus_expr::{Binary, Graph, Node, Unary};
 
+use crate::code::Solver;
 use crate::{Binding, Body, Code, Dialect, Form, Names, Refusal, Text};
 
 /// Whose functions are called.
@@ -47,8 +48,12 @@ pub struct Vector {
 pub struct Function<'a> {
     /// an identifier
     pub name: &'a str,
-    /// its inputs are time, then the entries of the vectors; its outputs are what is returned
-    pub tape: &'a Tape,
+    /// what holds its expressions
+    pub graph: &'a Graph,
+    /// symbols, all that it reads: time, then the entries of the vectors
+    pub inputs: &'a [Node],
+    /// what is returned
+    pub outputs: &'a [Node],
 }
 
 /// The text of a module.
@@ -76,7 +81,13 @@ pub fn module(
     }
     let mut has_systems = false;
     for function in functions {
-        let code = Code::of(function.tape)?;
+        let Function {
+            graph,
+            inputs,
+            outputs,
+            ..
+        } = function;
+        let code = Code::of(graph, inputs, &[outputs], Solver::Plain)?;
         has_systems |= code.has_systems();
         text += "\n\n";
         text += &namespace.function(function.name, &code, vectors)?;

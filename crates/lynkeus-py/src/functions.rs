@@ -1,7 +1,7 @@
 //! Plants and observers as functions that are called with numbers, and as texts in languages
 //! that have such functions.
 
-use std::sync::{Mutex, OnceLock};
+use std::sync::{Mutex, MutexGuard, OnceLock};
 
 use lynkeus::Error;
 use lynkeus::expr::{Budget, Evaluator, Graph, MissingInput, Node, Tape, jacobian};
@@ -56,10 +56,13 @@ struct Equations {
 
 impl Equations {
     fn compiled(&self, values: &[Node]) -> Result<Compiled, MissingInput> {
-        let arguments = [&[self.time][..], &self.states, &self.inputs].concat();
-        let tape = Tape::new(&self.graph, &arguments, values)?;
-        let evaluator = Mutex::new(tape.evaluator());
-        Ok(Compiled { tape, evaluator })
+        let tape = Tape::new(&self.graph, &self.arguments(), values)?;
+        Ok(Compiled(Mutex::new(tape.evaluator())))
+    }
+
+    /// The symbols of time, states and inputs.
+    fn arguments(&self) -> Vec<Node> {
+        [&[self.time][..], &self.states, &self.inputs].concat()
     }
 
     fn jacobian(&self) -> Result<Jacobian, MissingInput> {
@@ -73,15 +76,12 @@ impl Equations {
     }
 }
 
-struct Compiled {
-    tape: Tape,
-    evaluator: Mutex<Evaluator>,
-}
+struct Compiled(Mutex<Evaluator>);
 
 impl Compiled {
     fn at(&self, arguments: &[f64]) -> Vec<f64> {
-        let mut found = vec![0.0; self.tape.outputs()];
-        let mut evaluator = self.evaluator.lock().unwrap_or_else(|e| e.into_inner());
+        let mut evaluator = self.0.lock().unwrap_or_else(|e| e.into_inner());
+        let mut found = vec![0.0; evaluator.tape().outputs()];
         evaluator.eval(arguments, &mut found);
         found
     }
@@ -229,13 +229,17 @@ impl Functions {
         Ok(function.at(&arguments).into_pyarray(py))
     }
 
+    fn equations(&self) -> MutexGuard<'_, Equations> {
+        self.equations.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
     /// Made when first asked for.
     fn slopes(&self, py: Python<'_>) -> PyResult<&Jacobian> {
         if let Some(known) = self.jacobian.get() {
             return Ok(known);
         }
         let made = away(py, &Terms::default(), |budget, _| {
-            let equations = self.equations.lock().unwrap_or_else(|e| e.into_inner());
+            let equations = self.equations();
             let made = equations.graph.budgeted(budget, || equations.jacobian());
             made.map_err(Error::ended)?.map_err(Error::from_source)
         });
@@ -337,11 +341,6 @@ impl Functions {
                 ))));
             }
         };
-        let functions = [("f", &self.f), ("h", &self.h)];
-        let functions = functions.map(|(name, compiled)| Function {
-            name,
-            tape: &compiled.tape,
-        });
         let About {
             title,
             states,
@@ -349,7 +348,18 @@ impl Functions {
             ..
         } = &self.about;
         let vectors = [states.clone(), inputs.clone()];
-        let printed = py.detach(|| module(title, &functions, &vectors, namespace));
+        let printed = py.detach(|| {
+            let equations = &*self.equations();
+            let arguments = equations.arguments();
+            let values = [("f", &equations.derivatives), ("h", &equations.outputs)];
+            let functions = values.map(|(name, outputs)| Function {
+                name,
+                graph: &equations.graph,
+                inputs: &arguments,
+                outputs,
+            });
+            module(title, &functions, &vectors, namespace)
+        });
         let printed = printed.map_err(|e| exception(&Error::refused(e.to_string())))?;
         Ok((printed.text, printed.has_systems))
     }

@@ -134,5 +134,5 @@ pub use simulation::Simulation;
 pub use slopes::{Place, Slopes};
 pub use snapshot::{Digest, SnapshotFault};
 pub use spread::Lag;
-pub use system::{Evaluation, System};
+pub use system::{Evaluation, Expressions, System};
 pub use trajectory::{Column, Role, Trajectory};

@@ -26,6 +26,19 @@ pub struct System {
     margins: Arc<[Margin]>,
 }
 
+/// The equations of a [`System`] as expressions.
+#[derive(Debug)]
+pub struct Expressions<'s> {
+    /// a copy of the system's own
+    pub graph: Graph,
+    /// symbols: time, states x, signals w, [modes](System::modes)
+    pub inputs: &'s [Node],
+    /// x'
+    pub derivatives: &'s [Node],
+    /// y
+    pub outputs: &'s [Node],
+}
+
 #[derive(Debug)]
 struct Code {
     equations: Arc<Equations>,
@@ -212,18 +225,23 @@ impl System {
         &self.code.free.derivatives
     }
 
-    /// (t, x, w, [modes](System::modes)) → x'.
-    pub fn derivative_tape(&self) -> &Tape {
-        self.code.free.derivatives.tape()
-    }
-
-    /// (t, x, w, [modes](System::modes)) → y.
-    pub fn output_tape(&self) -> &Tape {
-        self.code.free.outputs.tape()
+    /// Its equations, without what jumps.
+    pub fn expressions(&self) -> Expressions<'_> {
+        let equations = &*self.code.equations;
+        let Both {
+            derivatives,
+            outputs,
+        } = &equations.roots.free;
+        Expressions {
+            graph: equations.graph().clone(),
+            inputs: &equations.inputs[..equations.smooth_inputs()],
+            derivatives,
+            outputs,
+        }
     }
 
     /// How many values the switches in time have: what jumps with time alone is an input of the
-    /// tapes.
+    /// equations.
     pub fn modes(&self) -> usize {
         self.code.equations.modes()
     }

@@ -303,8 +303,9 @@ fn listed(kind: &str, name: &str, mut texts: Vec<String>, zero: &str) -> String 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::code::Solver;
     use crate::{Body, Code, Names};
-    use lynkeus_expr::{Graph, Tape};
+    use lynkeus_expr::Graph;
 
     #[test]
     fn a_truth_that_is_used_twice_is_no_number() {
@@ -313,9 +314,9 @@ mod tests {
         let is_less = a.less(b);
         let outputs = [is_less.select(a, c), is_less.select(c, b), is_less + c];
         let inputs = [a, b, c].map(|e| e.node());
-        let tape = Tape::new(&g, &inputs, &outputs.map(|e| e.node())).unwrap();
         let texts = ["a", "b", "c"].map(Text::atom);
-        let code = Code::of(&tape).unwrap();
+        let outputs = outputs.map(|e| e.node());
+        let code = Code::of(&g, &inputs, &[&outputs], Solver::Plain).unwrap();
         let body = Body::of(&code, &Draft, &texts, &mut Names::default()).unwrap();
         assert_eq!(body.lines, ["const truth v1 = a < b;"]);
         assert_eq!(body.outputs[0].text, "(v1 ? a : c)");

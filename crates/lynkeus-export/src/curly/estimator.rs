@@ -10,7 +10,6 @@ use super::machine::{FIELD, INTEGRATE, Linear, Machine, Which, code, refuse_jump
 use super::syntax::Type;
 use super::template::{chosen, exchanged};
 use crate::Refusal;
-use crate::code::Part;
 
 const PUSH: &str = include_str!("runtime/push.c");
 const SPREAD: &str = include_str!("runtime/spread.c");
@@ -123,10 +122,11 @@ impl Machine {
             vec![0.0; system.signals().len()],
         );
         let arguments = arguments(system.states(), system.signals(), device);
+        let own = system.expressions();
         let outputs = draft(
             "What the observer reports, then what it expects of each sensor.",
             "outputs",
-            &code(&[Part::all(system.output_tape())])?,
+            &code(&own, &[own.outputs])?,
             &arguments,
             &[Target::all("y", system.outputs().len())],
         )?;
@@ -187,7 +187,7 @@ impl Machine {
         };
         self.linear(Which::Free, &linear, arguments)?;
         self.carried(Which::Free, &linear);
-        let tape = flow.system().output_tape();
+        let own = flow.system().expressions();
         let Jacobians {
             estimate, output, ..
         } = flow.jacobians();
@@ -208,8 +208,7 @@ impl Machine {
                 name: "c",
                 places: places.collect(),
             };
-            let outputs = jacobian.outputs();
-            let code = code(&[Part { tape, outputs }])?;
+            let code = code(&own, &[&own.outputs[jacobian.outputs()]])?;
             self.add(&draft(about, name, &code, arguments, &[target])?);
         }
         self.add(SPREAD);
@@ -333,9 +332,9 @@ impl Machine {
         let (n, m) = (model.process_noise.len(), model.sensors.len());
         let output_map = &model.output_map;
         refuse_jumps(output_map.system())?;
-        let tape = output_map.system().output_tape();
+        let own = output_map.system().expressions();
         let mut targets = vec![Target::all("h", m)];
-        let mut outputs = 0..m;
+        let mut outputs = &own.outputs[..m];
         if *kind == FilterKind::Extended {
             let entries = output_map.jacobians().output.places();
             let places = entries.iter().map(|(i, j)| i * n + j);
@@ -343,12 +342,12 @@ impl Machine {
                 name: "c",
                 places: places.collect(),
             });
-            outputs = 0..tape.outputs();
+            outputs = own.outputs;
         }
         let text = draft(
             "What the sensors show (c: the derivatives by x, row by row).",
             "measure",
-            &code(&[Part { tape, outputs }])?,
+            &code(&own, &[outputs])?,
             arguments,
             &targets,
         )?;
@@ -510,10 +509,11 @@ impl Machine {
                     x: vec![],
                     w: names.iter().map(|name| Entry::named(*name)).collect(),
                 };
+                let own = gains.system.expressions();
                 let text = draft(
                     "What the equations make of the numbers that may be changed.",
                     "tune",
-                    &code(&[Part::all(gains.system.output_tape())])?,
+                    &code(&own, &[own.outputs])?,
                     &arguments,
                     &[Target::all("gains", count)],
                 )?;

@@ -1,12 +1,13 @@
 //! A draft under way: its state, its tables, and how it goes along a flow, alone or with its Jacobian and the
 //! covariance along an estimate.
 
-use lynkeus_run::{Level, Linearised, Method, Step, System};
+use lynkeus_expr::Node;
+use lynkeus_run::{Expressions, Level, Linearised, Method, Step, System};
 
 use super::draft::{Arguments, Target, draft, places, table};
 use super::syntax::Type;
 use super::template::{chosen, exchanged, mentions, parts};
-use crate::code::{Part, Solver};
+use crate::code::Solver;
 use crate::{Code, Refusal};
 
 /// A part of the state that is carried from sample to sample.
@@ -113,10 +114,11 @@ impl Machine {
     /// x' alone.
     pub fn flow(&mut self, system: &System, arguments: &Arguments) -> Result<(), Refusal> {
         refuse_jumps(system)?;
+        let own = system.expressions();
         let text = draft(
             "The derivatives.",
             "flow",
-            &code(&[Part::all(system.derivative_tape())])?,
+            &code(&own, &[own.derivatives])?,
             arguments,
             &[Target::all("dx", system.states().len())],
         )?;
@@ -128,8 +130,9 @@ impl Machine {
 /// How a state changes, as a type.
 pub(super) const FIELD: &str = "/* How a state changes: writes dx. */\ntypedef void (*field)(real t, const real *x, const real *w, real *dx);\n";
 
-pub(super) fn code(parts: &[Part<'_>]) -> Result<Code, Refusal> {
-    Code::of_parts(parts, Solver::Conditioned)
+/// Some expressions of a system, part by part.
+pub(super) fn code(of: &Expressions<'_>, parts: &[&[Node]]) -> Result<Code, Refusal> {
+    Code::of(&of.graph, of.inputs, parts, Solver::Conditioned)
 }
 
 /// The length of a step, for an interval of some `length`.
@@ -299,14 +302,12 @@ impl Machine {
             tables += &table("process_noise", &shares);
         }
         self.tables += &which.renamed(&tables);
-        let jacobian = Part {
-            tape: flow.output_tape(),
-            outputs: 0..entries.len(),
-        };
+        let own = flow.expressions();
+        let slopes = &own.outputs[..entries.len()];
         let flow = draft(
             "The derivatives, and the entries of their Jacobian that are not zero.",
             "linear_flow",
-            &code(&[Part::all(flow.derivative_tape()), jacobian])?,
+            &code(&own, &[own.derivatives, slopes])?,
             arguments,
             &[Target::all("dx", n), Target::all("slopes", entries.len())],
         )?;

@@ -13,7 +13,7 @@ use super::draft::{Arguments, Target, draft};
 use super::fmu::{EXCHANGE, archive, reasons};
 use super::machine::{Machine, code, refuse_jumps};
 use super::template::exchanged;
-use crate::code::{Part, Solver};
+use crate::code::Solver;
 use crate::{Code, Refusal};
 
 const ADVANCE: &str = include_str!("runtime/ode.c");
@@ -90,7 +90,8 @@ pub(super) fn sources(ode: &Ode<'_>) -> Result<Sources, Refusal> {
     };
     let (dx, y) = (Target::all("dx", n), Target::all("y", told));
     machine.flow(system, &arguments)?;
-    let report = code(&[Part::all(system.output_tape())])?;
+    let own = system.expressions();
+    let report = code(&own, &[own.outputs])?;
     machine.add(&draft(
         "The outputs.",
         "outputs",
@@ -98,9 +99,9 @@ pub(super) fn sources(ode: &Ode<'_>) -> Result<Sources, Refusal> {
         &arguments,
         std::slice::from_ref(&y),
     )?);
-    let parts = [system.derivative_tape(), system.output_tape()].map(Part::all);
+    let parts = [own.derivatives, own.outputs];
     // a condition of a linear system has a derivative where it is spelled out
-    let all = Code::of_parts(&parts, Solver::Plain)?;
+    let all = Code::of(&own.graph, own.inputs, &parts, Solver::Plain)?;
     machine.add(&draft(
         "How both change along a direction, which is at the end of w: of time, x and the inputs.",
         "along",

@@ -8,7 +8,7 @@ mod draw;
 mod gains;
 mod judge;
 mod known;
-#[path = "../../../../xtask/src/numbers.rs"]
+#[path = "../../../../chores/src/numbers.rs"]
 mod numbers;
 mod pair;
 mod plants;

@@ -3,7 +3,7 @@
 use std::fs;
 
 use super::rows::Row;
-use crate::process::root;
+use xtask::process::root;
 
 /// Names with numbers.
 pub type Values<'a> = &'a [(String, f64)];

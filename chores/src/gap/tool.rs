@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-use crate::process::target;
+use xtask::process::target;
 
 /// The answer of `lynkeus certify --json`.
 pub struct Certificate(Value);

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::process::{cargo, root, run, target};
+use xtask::process::{cargo, root, run, target};
 
 /// What a curve shows.
 #[derive(Clone, Copy)]

@@ -13,10 +13,10 @@ mod trial;
 use std::fmt::Write as _;
 use std::fs;
 
-use crate::process::{cargo, root, run};
 use rows::{ROWS, Row};
 use search::{Found, smallest};
 use study::Text;
+use xtask::process::{cargo, root, run};
 
 const BEGIN: &str = "<!-- table: cargo xtask gap -->\n";
 const END: &str = "<!-- end of table -->";

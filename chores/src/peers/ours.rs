@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::clock::Clock;
 use super::lanes;
-use crate::process::root;
+use xtask::process::root;
 
 const STUDY: &str = include_str!("../../peers/lee.toml");
 

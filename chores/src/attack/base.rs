@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use crate::falsify::case::{Kind, Role};
 use crate::falsify::generate;
 use crate::numbers::Numbers;
-use crate::process::root;
+use xtask::process::root;
 
 /// A study with what it needs.
 #[derive(Clone, Debug)]

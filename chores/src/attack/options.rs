@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::options;
-use crate::process::{cargo, root, run, target};
+use xtask::process::{cargo, root, run, target};
 
 /// What was asked for.
 #[derive(Clone, Debug)]

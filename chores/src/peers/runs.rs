@@ -9,8 +9,8 @@ use serde_json::Value;
 
 use super::{REQUIREMENTS, text, write};
 use crate::options;
-use crate::process::{root, run};
-use crate::python;
+use xtask::process::{root, run};
+use xtask::python;
 
 const STUDY: &str = include_str!("../../peers/column.toml");
 const NOISE: &str = "noise = { top = \"5%\", bottom = \"5%\" }";
@@ -66,7 +66,7 @@ impl Desk {
             folder: root().join("target").join("peers"),
             lynkeus: this.with_file_name(name),
             python: python::environment(".venv-peers", REQUIREMENTS)?,
-            script: root().join("xtask").join("peers").join("column.py"),
+            script: root().join("chores").join("peers").join("column.py"),
         };
         if !desk.lynkeus.exists() {
             return Err(format!(

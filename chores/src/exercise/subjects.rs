@@ -3,7 +3,7 @@
 use lynkeus::Study;
 use lynkeus::run::Estimator;
 
-use crate::process::root;
+use xtask::process::root;
 
 /// An estimator before its first sample, and what is usual for it.
 #[derive(Clone, Debug)]

@@ -17,8 +17,8 @@ use std::path::Path;
 use std::process::Command;
 
 use crate::options;
-use crate::process::{root, run};
-use crate::python;
+use xtask::process::{root, run};
+use xtask::python;
 
 const END: &str = "<!-- end of table -->";
 const REQUIREMENTS: &str = include_str!("../../peers/requirements.txt");
@@ -82,12 +82,12 @@ fn agree<'p>(mut ends: impl Iterator<Item = (&'p str, f64)>) -> Result<(), Strin
 
 fn peers() -> Result<Vec<Peer>, String> {
     let python = python::environment(".venv-peers", REQUIREMENTS)?;
-    let script = root().join("xtask").join("peers").join("peers.py");
+    let script = root().join("chores").join("peers").join("peers.py");
     let library = |name: &str| vec![text(&python), text(&script), name.to_owned()];
     let this = std::env::current_exe().map_err(|error| error.to_string())?;
     let ours = |backend: &str| vec![text(&this), "bench-ours".to_owned(), backend.to_owned()];
-    let lee = "xtask/peers/lee.c";
-    let in_lanes = "xtask/peers/lanes.c";
+    let lee = "chores/peers/lee.c";
+    let in_lanes = "chores/peers/lanes.c";
     let plain = ["-O2", "-ffp-contract=off"];
     let fused = ["-O3", "-march=native"];
     let avx = ["-O3", "-mavx2", "-ffp-contract=off"];

@@ -7,7 +7,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::process::{cargo, root, run};
+use xtask::process::{cargo, root, run};
 
 /// What the tool says of a study whose answer is no: such studies have no picture.
 const REFUSED: i32 = 1;
