@@ -231,17 +231,14 @@ pub fn regular(matrix: &Matrix<'_>, region: &Region) -> Result<Finding, MissingI
                 let reason = Reason::DeterminantVanishes;
                 return Ok(Finding { reason, ..found });
             }
-            (Verdict::Undecided(_), _) => open = open.or(Some(found)),
             (Verdict::Proved, Reason::Determinant { low, high, .. }) => {
                 product = product.map(|all| (all.0 * low, all.1 * high));
             }
-            (Verdict::Proved, reason) => {
+            (Verdict::Proved, Reason::RegularParts(more)) => {
                 product = None;
-                parts += match reason {
-                    Reason::RegularParts(parts) => *parts,
-                    _ => 0,
-                };
+                parts += more;
             }
+            _ => open = open.or(Some(found)),
         }
     }
     Ok(open.unwrap_or(Finding::proved(match product {

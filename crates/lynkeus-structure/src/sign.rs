@@ -58,14 +58,10 @@ pub fn keeps_sign(graph: &Graph, node: Node, region: &Region) -> Result<Sign, Mi
         }
     };
     let sample = found.highest.as_ref().map_or(1.0, |p| p.value);
-    let sign = if high < 0.0 || (low <= 0.0 && sample < 0.0) {
-        -1.0
-    } else {
-        1.0
-    };
+    let is_negative = high < 0.0 || (low <= 0.0 && sample < 0.0);
     Ok(Sign {
         finding,
-        sign,
+        sign: if is_negative { -1.0 } else { 1.0 },
         bounds: (found.enclosure.mignitude(), found.enclosure.magnitude()),
     })
 }

@@ -42,12 +42,8 @@ impl Modes {
         }
         let (coarse, found) = (coarse.slowest()?, fine.slowest()?);
         let agree = std::mem::discriminant(&coarse) == std::mem::discriminant(&found);
-        let found = if agree {
-            found
-        } else {
-            Detectability::Undecided
-        };
-        Some((found, fine.A.nrows()))
+        let found = Some(found).filter(|_| agree);
+        Some((found.unwrap_or(Detectability::Undecided), fine.A.nrows()))
     }
 
     /// What shows in a row. In it every eigenvalue has one eigenvector.
