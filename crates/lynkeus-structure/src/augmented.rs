@@ -157,13 +157,7 @@ impl<'p> AugmentedPlant<'p> {
             inputs,
             outputs,
             pattern,
-            time: Dimension {
-                name: "time".into(),
-                symbol: plant.time,
-                min: f64::NEG_INFINITY,
-                max: f64::INFINITY,
-                integer: false,
-            },
+            time: Dimension::new("time", plant.time, f64::NEG_INFINITY, f64::INFINITY),
         })
     }
 
@@ -217,7 +211,7 @@ impl<'p> AugmentedPlant<'p> {
     }
 
     /// h(t, x, u), one expression per measured output.
-    pub fn output_nodes(&self) -> Vec<Node> {
+    pub(crate) fn output_nodes(&self) -> Vec<Node> {
         self.outputs.iter().map(|o| o.variable.node).collect()
     }
 

@@ -42,9 +42,9 @@ impl Assignment {
 }
 
 /// Difference between the longest and the shortest.
-pub(crate) fn imbalance(lengths: &[usize]) -> usize {
-    let longest = lengths.iter().max().copied().unwrap_or(0);
-    longest - lengths.iter().min().copied().unwrap_or(0)
+pub(crate) fn imbalance(chains: &[Chain]) -> usize {
+    let lengths = || chains.iter().map(Vec::len);
+    lengths().max().unwrap_or(0) - lengths().min().unwrap_or(0)
 }
 
 /// What the user asks of the assignment.
@@ -57,15 +57,11 @@ pub struct ChainRequest {
 }
 
 impl ChainRequest {
-    /// Whether chains of these lengths and of states with these names are what is asked for.
-    pub(crate) fn is_met(
-        &self,
-        lengths: &[usize],
-        names: impl FnOnce() -> Vec<Vec<String>>,
-    ) -> bool {
-        let are = |asked: &Vec<usize>| asked == lengths;
-        let named = |asked: &Vec<Vec<String>>| *asked == names();
-        self.lengths.as_ref().is_none_or(are) && self.names.as_ref().is_none_or(named)
+    /// Whether these chains are what is asked for.
+    pub(crate) fn is_met(&self, augmented: &AugmentedPlant<'_>, chains: &[Chain]) -> bool {
+        let lengths = |asked: &Vec<usize>| chains.iter().map(Vec::len).eq(asked.iter().copied());
+        let names = |asked: &Vec<Vec<String>>| *asked == named(augmented, chains);
+        self.lengths.as_ref().is_none_or(lengths) && self.names.as_ref().is_none_or(names)
     }
 }
 
@@ -83,20 +79,15 @@ pub fn find(
         [head] => vec![single(augmented, head)?],
         _ => cuts(augmented, &heads)?,
     };
-    let named = |a: &Assignment| -> Vec<Vec<String>> {
-        let chains = a.chains.iter();
-        chains
-            .map(|chain| names(augmented, chain.clone()))
-            .collect()
-    };
     let (mut fits, other): (Vec<Assignment>, Vec<_>) = found
         .into_iter()
-        .partition(|a| request.is_met(&a.lengths(), || named(a)));
+        .partition(|a| request.is_met(augmented, &a.chains));
     if fits.is_empty() {
-        let allowed = other.iter().take(NAMED).map(named);
+        let allowed = other.iter().take(NAMED);
+        let allowed = allowed.map(|a| named(augmented, &a.chains));
         return Err(Misfit::OtherChains(allowed.collect()));
     }
-    fits.sort_by_key(|a| (imbalance(&a.lengths()), a.leading));
+    fits.sort_by_key(|a| (imbalance(&a.chains), a.leading));
     fits.truncate(MOST);
     Ok(fits)
 }
@@ -145,6 +136,17 @@ pub(crate) fn names(
 ) -> Vec<String> {
     let names = states.into_iter().map(|i| augmented.states[i].name.clone());
     names.collect()
+}
+
+/// Names of the states of each chain.
+pub(crate) fn named<'c>(
+    augmented: &AugmentedPlant<'_>,
+    chains: impl IntoIterator<Item = &'c Chain>,
+) -> Vec<Vec<String>> {
+    let chains = chains.into_iter();
+    chains
+        .map(|chain| names(augmented, chain.iter().copied()))
+        .collect()
 }
 
 fn single(augmented: &AugmentedPlant<'_>, head: usize) -> Result<Assignment, Misfit> {

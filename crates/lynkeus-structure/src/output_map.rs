@@ -181,31 +181,26 @@ pub fn relative_degree(
     region: &Region,
 ) -> Result<Degree, MissingInput> {
     let graph = augmented.graph();
-    let input = &augmented.inputs[j].name;
-    let mut proved = true;
+    let mut degree = Degree {
+        r: rows.len(),
+        proved: true,
+        input: augmented.inputs[j].name.clone(),
+        witness: None,
+    };
     for (k, row) in rows.iter().enumerate() {
         let Some(node) = along_column(graph, row, &form.input_columns[j]) else {
             continue;
         };
         match vanishes(graph, node, region)? {
             Verdict::Proved => {}
-            Verdict::Undecided(_) => proved = false,
+            Verdict::Undecided(_) => degree.proved = false,
             Verdict::Refuted(witness) => {
-                return Ok(Degree {
-                    r: k + 1,
-                    proved,
-                    input: input.clone(),
-                    witness: Some(witness),
-                });
+                (degree.r, degree.witness) = (k + 1, Some(witness));
+                break;
             }
         }
     }
-    Ok(Degree {
-        r: rows.len(),
-        proved,
-        input: input.clone(),
-        witness: None,
-    })
+    Ok(degree)
 }
 
 /// Points at which the rank of the rows is tried.

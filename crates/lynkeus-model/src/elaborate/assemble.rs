@@ -411,9 +411,7 @@ fn computed(graph: &Graph, node: Node, value: impl Fn(Node) -> Option<f64>) -> O
     let symbols = graph.symbols_of(&[node]);
     let values: Option<Vec<f64>> = symbols.iter().map(|&symbol| value(symbol)).collect();
     let tape = Tape::new(graph, &symbols, &[node]).ok()?;
-    let mut out = [f64::NAN];
-    tape.evaluator().eval(&values?, &mut out);
-    Some(out[0])
+    Some(tape.evaluator().value(&values?))
 }
 
 const UNREAD: &str = "an initial equation of a derivative has no effect";
