@@ -81,6 +81,26 @@ impl Implicit {
         matrix
     }
 
+    /// Newton steps from `z` over any algebra, undamped: each doubles the digits that are
+    /// right, where the algebra has them.
+    pub fn refined<A: Algebra>(
+        &self,
+        algebra: &A,
+        mut z: Vec<A::Value>,
+        p: &[A::Value],
+        steps: usize,
+    ) -> Vec<A::Value> {
+        for _ in 0..steps {
+            let at = [&z[..], p].concat();
+            let g = self.residual(algebra, &at);
+            let (step, _) = algebra.solve(&self.matrix(algebra, &at), &g);
+            for (z, step) in z.iter_mut().zip(&step) {
+                *z = algebra.binary(Binary::Sub, z, step);
+            }
+        }
+        z
+    }
+
     /// The entries of g_p at (z, p) that are not zero everywhere: (row, column, value).
     pub(crate) fn sensitivities(&self, graph: &Graph, at: &[Node]) -> Vec<(usize, usize, Node)> {
         self.0.by_parameters.entries(&Nodes(graph), at)

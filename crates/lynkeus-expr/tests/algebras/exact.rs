@@ -208,16 +208,8 @@ impl Algebra for Exact {
     fn implicit(&self, function: &Implicit, p: &[BigFloat]) -> Vec<BigFloat> {
         let near: Vec<f64> = p.iter().map(to_f64).collect();
         let z = Reals.implicit(function, &near);
-        let mut z: Vec<BigFloat> = z.iter().map(|&z| self.constant(z)).collect();
-        for _ in 0..8 {
-            let at = [&z[..], p].concat();
-            let g = function.residual(self, &at);
-            let (step, _) = self.solve(&function.matrix(self, &at), &g);
-            for (z, step) in z.iter_mut().zip(&step) {
-                *z = self.sub(z, step);
-            }
-        }
-        z
+        let z = z.iter().map(|&z| self.constant(z)).collect();
+        function.refined(self, z, p, 8)
     }
 }
 
