@@ -10,7 +10,8 @@ use std::sync::Arc;
 use crate::code::{Body, Implicit, Slopes, Tape};
 use crate::interval::Intervals;
 use crate::{
-    Algebra, Binary, Graph, Interval, MissingInput, Node, Nodes, Op, Reals, Unary, jacobian, linear,
+    Algebra, Binary, Evaluator, Graph, Interval, MissingInput, Node, Nodes, Op, Unary, jacobian,
+    linear,
 };
 
 /// Characters of an equation in a message.
@@ -192,7 +193,7 @@ impl Implicit {
     /// # Errors
     /// Why no root was found.
     pub(crate) fn root(&self, p: &[f64]) -> Result<Vec<f64>, String> {
-        let search = Newton { function: self, p };
+        let mut search = Newton::new(self, p);
         let first = search.newton(self.start());
         if search.is_root(&first) {
             return Ok(first);
@@ -246,12 +247,42 @@ impl Implicit {
 /// Newton's method on one function at one p.
 struct Newton<'a> {
     function: &'a Implicit,
-    p: &'a [f64],
+    residual: Evaluator,
+    slopes: Evaluator,
+    /// (z, p)
+    at: Vec<f64>,
 }
 
-impl Newton<'_> {
-    fn residual(&self, z: &[f64]) -> Vec<f64> {
-        self.function.residual(&Reals, &[z, self.p].concat())
+impl<'a> Newton<'a> {
+    fn new(function: &'a Implicit, p: &[f64]) -> Self {
+        let mut at = function.start().to_vec();
+        at.extend(p);
+        Self {
+            residual: function.0.residual.evaluator(),
+            slopes: function.0.by_unknowns.tape.evaluator(),
+            function,
+            at,
+        }
+    }
+
+    fn residual(&mut self, z: &[f64]) -> Vec<f64> {
+        let mut g = vec![0.0; z.len()];
+        self.at[..z.len()].copy_from_slice(z);
+        self.residual.eval(&self.at, &mut g);
+        g
+    }
+
+    fn matrix(&mut self, z: &[f64]) -> Vec<f64> {
+        let n = z.len();
+        let places = &self.function.0.by_unknowns.places;
+        let mut entries = vec![0.0; places.len()];
+        self.at[..n].copy_from_slice(z);
+        self.slopes.eval(&self.at, &mut entries);
+        let mut matrix = vec![0.0; n * n];
+        for (&(i, j), entry) in places.iter().zip(entries) {
+            matrix[i * n + j] = entry;
+        }
+        matrix
     }
 
     fn within(&self, z: f64, i: usize) -> f64 {
@@ -261,7 +292,7 @@ impl Newton<'_> {
 
     /// The point where Newton's method ends, be it a root or not. The size of the residual is
     /// measured in rows scaled to one, so that no unit counts more than another.
-    fn newton(&self, start: &[f64]) -> Vec<f64> {
+    fn newton(&mut self, start: &[f64]) -> Vec<f64> {
         let start = start.iter().enumerate();
         let mut z: Vec<f64> = start.map(|(i, &z)| self.within(z, i)).collect();
         for _ in 0..STEPS {
@@ -269,7 +300,7 @@ impl Newton<'_> {
             if g.iter().all(|&g| g == 0.0) {
                 return z;
             }
-            let mut matrix = self.function.matrix(&Reals, &[&z[..], self.p].concat());
+            let mut matrix = self.matrix(&z);
             let scales = row_scales(&matrix, &z, self.function.start());
             let mut step: Vec<f64> = g.iter().map(|g| -g).collect();
             linear::solve(&mut matrix, &mut step);
@@ -288,7 +319,7 @@ impl Newton<'_> {
     }
 
     /// The longest of the halved steps that makes the residual smaller.
-    fn damped(&self, z: &[f64], step: &[f64], before: f64, scales: &[f64]) -> Option<Vec<f64>> {
+    fn damped(&mut self, z: &[f64], step: &[f64], before: f64, scales: &[f64]) -> Option<Vec<f64>> {
         let mut fraction = 1.0;
         for _ in 0..HALVINGS {
             let next: Vec<f64> = (z.iter().zip(step).enumerate())
@@ -304,9 +335,11 @@ impl Newton<'_> {
     }
 
     /// Whether g may vanish within a few roundings of z. NaN is none; nor is a jump over zero.
-    fn is_root(&self, z: &[f64]) -> bool {
-        let near = |z: &f64| Interval::point(*z).inflate(LAST * z.abs());
-        let at: Vec<Interval> = z.iter().chain(self.p).map(near).collect();
+    fn is_root(&mut self, z: &[f64]) -> bool {
+        let n = z.len();
+        let near = |z: f64| Interval::point(z).inflate(LAST * z.abs());
+        let p = self.at[n..].iter().map(|&p| near(p));
+        let at: Vec<Interval> = z.iter().map(|&z| near(z)).chain(p).collect();
         let steps = self.function.steps_in(&Intervals, &at);
         if steps.iter().any(|step| !step.is_point()) {
             return self.residual(z).iter().all(|&g| g == 0.0);
@@ -317,7 +350,7 @@ impl Newton<'_> {
     }
 
     /// A single unknown between two values of which g has different signs, the nearest found.
-    fn bracketed(&self) -> Option<Vec<f64>> {
+    fn bracketed(&mut self) -> Option<Vec<f64>> {
         let start = self.within(self.function.start()[0], 0);
         let range = self.function.range()[0];
         let (mut below, mut above) = (start, start);
@@ -342,7 +375,7 @@ impl Newton<'_> {
     }
 
     /// Halves a bracket down to neighbouring numbers.
-    fn halved(&self, (mut a, at_a): (f64, f64), mut b: f64) -> f64 {
+    fn halved(&mut self, (mut a, at_a): (f64, f64), mut b: f64) -> f64 {
         for _ in 0..BISECTIONS {
             let middle = 0.5 * a + 0.5 * b;
             if middle == a || middle == b {
