@@ -1,5 +1,6 @@
 //! What can be guaranteed about an observer, and why.
 
+use derive_more::From;
 use lynkeus_expr::{Interval, MissingInput, Node, Spent};
 use lynkeus_structure::{AugmentedPlant, Dimension, Measurement, Region, Standing, range};
 use nalgebra::DMatrix;
@@ -212,18 +213,12 @@ impl Constant {
 }
 
 /// What the error of a quantity ends within.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, From)]
 pub struct UltimateBound {
     /// name of the augmented state
     pub name: String,
     /// of the absolute value, in the state's unit
     pub value: f64,
-}
-
-impl From<(String, f64)> for UltimateBound {
-    fn from((name, value): (String, f64)) -> Self {
-        Self { name, value }
-    }
 }
 
 /// What the error as a whole and quantity by quantity ends within.

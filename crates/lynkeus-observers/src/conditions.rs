@@ -127,25 +127,17 @@ pub(crate) fn output_slope(
     Ok(Some(statement.with(found)))
 }
 
+/// The measured outputs.
+pub(crate) fn output_names<'a>(augmented: &'a AugmentedPlant<'_>) -> Vec<&'a str> {
+    let outputs = augmented.outputs.iter();
+    outputs.map(|o| o.variable.name.as_str()).collect()
+}
+
 pub(crate) fn names(augmented: &AugmentedPlant<'_>, states: &[usize]) -> Vec<String> {
     states
         .iter()
         .map(|&i| augmented.states[i].name.clone())
         .collect()
-}
-
-/// Gains on the error of the state that output `i` shows as gains on ŷ − y: divided by
-/// the output's slope in that state, where it is a number.
-pub(crate) fn on_output(
-    augmented: &AugmentedPlant<'_>,
-    i: usize,
-    states: &[usize],
-    gains: &[f64],
-) -> Vec<(String, f64)> {
-    let shown = augmented.outputs[i].state;
-    let slope = shown.and_then(|(_, slope, _)| augmented.graph().constant_value(slope));
-    let gains = gains.iter().map(|k| k / slope.unwrap_or(1.0));
-    names(augmented, states).into_iter().zip(gains).collect()
 }
 
 /// Ends a form or a design whose budget is spent: it would not count.

@@ -1,11 +1,12 @@
 //! What a family makes of a plant: an examination of its conditions, and an observer with
 //! everything that led to it, or why there is none.
 
+use derive_more::From;
 use lynkeus_expr::{MissingInput, Spent};
 use lynkeus_structure::{AugmentedPlant, Region, Standing};
 
 use crate::statement::standing;
-use crate::{Check, Observer, Reason, Statement, TuningError};
+use crate::{Check, Family, Observer, Reason, Statement, TuningError};
 
 /// Whether a family fits, in the words of reports: it does where every condition is proved, and
 /// does not where the form is another or a condition is refuted.
@@ -20,8 +21,8 @@ pub fn fit_word(fit: Standing) -> &'static str {
 /// What a family finds in a plant.
 #[derive(Clone, Debug)]
 pub struct Examination {
-    /// name of the family
-    pub family: &'static str,
+    /// the family
+    pub family: &'static dyn Family,
     /// what was found: the chains, or what breaks the form
     pub summary: Reason,
     /// names of the states of each chain, where the form was found
@@ -45,59 +46,57 @@ enum PlantFit {
 }
 
 impl Examination {
+    fn made(
+        family: &'static dyn Family,
+        summary: Reason,
+        checks: Vec<Check>,
+        plant: PlantFit,
+    ) -> Self {
+        Self {
+            family,
+            summary,
+            chains: vec![],
+            checks,
+            plant,
+        }
+    }
+
     /// What a family finds in a plant that has its form. The fit is that of the
     /// conditions, of which the first is always that the plant is [regular](
     /// AugmentedPlant::regularity) on the box.
     pub(crate) fn new(
         augmented: &AugmentedPlant<'_>,
         region: &Region,
-        family: &'static str,
+        family: &'static dyn Family,
         summary: impl Into<Reason>,
         chains: Vec<Vec<String>>,
         checks: Vec<Check>,
     ) -> Result<Self, MissingInput> {
         let regularity = Statement::PlantIsRegular.with(augmented.regularity(region)?);
+        let plant = PlantFit::Form(Box::new(regularity));
         Ok(Self {
-            family,
-            summary: summary.into(),
             chains,
-            checks,
-            plant: PlantFit::Form(Box::new(regularity)),
+            ..Self::made(family, summary.into(), checks, plant)
         })
     }
 
     /// The plant does not have the form, or a condition ends the search for one.
     pub(crate) fn unfit(
-        family: &'static str,
+        family: &'static dyn Family,
         summary: impl Into<Reason>,
         checks: Vec<Check>,
     ) -> Self {
-        Self {
-            family,
-            summary: summary.into(),
-            chains: vec![],
-            checks,
-            plant: PlantFit::Unfit,
-        }
+        Self::made(family, summary.into(), checks, PlantFit::Unfit)
     }
 
-    /// Of a family that asks nothing of a plant, and promises nothing.
-    pub(crate) fn of_any_plant(family: &'static str, summary: impl Into<Reason>) -> Self {
-        Self {
-            family,
-            summary: summary.into(),
-            chains: vec![],
-            checks: vec![],
-            plant: PlantFit::Any,
-        }
+    /// Of a filter, which asks nothing of a plant, and promises nothing.
+    pub(crate) fn of_any_plant(family: &'static dyn Family, called: &'static str) -> Self {
+        Self::made(family, Reason::AnyPlant(called), vec![], PlantFit::Any)
     }
 
     /// A limit ended the examination: whether the family fits is not known.
-    pub(crate) fn ended(family: &'static str, spent: Spent) -> Self {
-        Self {
-            plant: PlantFit::Ended(spent),
-            ..Self::unfit(family, Reason::Ended(spent), vec![])
-        }
+    pub(crate) fn ended(family: &'static dyn Family, spent: Spent) -> Self {
+        Self::made(family, Reason::Ended(spent), vec![], PlantFit::Ended(spent))
     }
 
     /// Whether a theorem stands behind the family, whose conditions are told here.
@@ -164,15 +163,17 @@ pub struct Design {
 }
 
 /// The value of a parameter of a design.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, From)]
 pub enum ParameterValue {
     /// names or expressions
+    #[from]
     Names(Vec<String>),
     /// names in blocks, one after the other
     Blocks(Vec<Vec<String>>),
     /// the least excitation that raises no alarm
     Alarm(f64),
     /// numbers
+    #[from]
     Numbers(Vec<f64>),
     /// pairs of them
     Pairs(Vec<[f64; 2]>),
@@ -218,21 +219,9 @@ pub struct Shown {
     pub at_start: Option<f64>,
 }
 
-impl From<Vec<String>> for ParameterValue {
-    fn from(names: Vec<String>) -> Self {
-        Self::Names(names)
-    }
-}
-
 impl From<f64> for ParameterValue {
     fn from(number: f64) -> Self {
         Self::Numbers(vec![number])
-    }
-}
-
-impl From<Vec<f64>> for ParameterValue {
-    fn from(numbers: Vec<f64>) -> Self {
-        Self::Numbers(numbers)
     }
 }
 

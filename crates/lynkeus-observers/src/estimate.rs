@@ -146,17 +146,12 @@ impl PlantCopy<'_, '_> {
     }
 
     /// An observer whose states are x̂ alone.
-    pub fn observer(
-        &self,
-        family: &'static str,
-        derivatives: Vec<Node>,
-    ) -> Result<Observer, TuningError> {
+    pub fn observer(&self, derivatives: Vec<Node>) -> Result<Observer, TuningError> {
         let signal = |v: &Variable| Signal {
             name: v.name.clone(),
             symbol: v.node,
         };
         Ok(Observer {
-            family,
             time: self.augmented.plant.time,
             states: self.states()?,
             derivatives,

@@ -1,6 +1,8 @@
 //! What a family is: settings read once, the form found, the design and the theorem
 //! from both. What the [`Family`] trait offers is made of these stages, the same for all.
 
+use std::fmt;
+
 use lynkeus_structure::{AugmentedPlant, Region, Standing};
 
 use crate::design::Found;
@@ -8,61 +10,60 @@ use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Tuning, TuningError,
 };
 
-/// A published observer design, stage by stage.
-pub(crate) trait Stages: Sync {
-    /// the keys, read
-    type Settings;
+/// What belongs to the settings of a family: the keys, read.
+pub trait Settings: Sized + 'static {
     /// the canonical form in a plant
-    type Form<'e, 'p: 'e>;
+    type Form<'e>;
+    /// the family itself
+    const FAMILY: &'static dyn Family;
+}
+
+/// A published observer design: what is said of it, and its stages.
+pub struct Paper<S: Settings> {
     /// name in studies
-    const NAME: &'static str;
+    pub name: &'static str,
     /// where it was published
-    const PAPER: &'static str;
+    pub paper: &'static str,
     /// the theorem, in words
-    const BASIS: &'static str;
+    pub basis: &'static str,
     /// Whether the theorem's form is sought on the box of the assumptions, where a refuted condition
     /// ends the proof. Else it is sought on the declared one, for its conditions choose the observer:
     /// the theorem decides its hypotheses on the box of its assumptions, whatever they said.
-    const FORM_ON_ASSUMED_BOX: bool = false;
+    pub form_on_assumed_box: bool,
     /// its keys, in groups
-    const KEYS: &'static [&'static [KeySpec]];
+    pub keys: &'static [&'static [KeySpec]],
     /// how the entries of `theta` stand to one another where it has to be a list
-    const SPEEDS: &'static [f64] = &[];
-
-    /// The settings of a study.
-    fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning)
-    -> Result<Self::Settings, TuningError>;
-
-    /// The keys whose wrong values `read` leaves to later stages.
-    ///
-    /// # Errors
-    /// The first wrong value.
-    fn deferred(_settings: &Self::Settings) -> Result<(), TuningError> {
-        Ok(())
-    }
-
-    /// The form with its conditions on `region`.
-    fn form<'e, 'p>(
-        augmented: &'e AugmentedPlant<'p>,
-        settings: &Self::Settings,
-        region: &Region,
-    ) -> Result<Found<Self::Form<'e, 'p>>, DesignError>;
-
-    /// The observer; no condition of the form is refuted.
-    fn design<'e, 'p>(
-        augmented: &'e AugmentedPlant<'p>,
-        settings: &Self::Settings,
-        found: Found<Self::Form<'e, 'p>>,
-    ) -> Result<Design, DesignError>;
-
-    /// What the theorem guarantees.
-    fn theorem<'e, 'p>(
-        augmented: &'e AugmentedPlant<'p>,
-        settings: &Self::Settings,
-        found: Found<Self::Form<'e, 'p>>,
-        assumptions: &Assumptions,
-    ) -> Result<Certificate, DesignError>;
+    pub speeds: &'static [f64],
+    /// the settings of a study
+    pub read: fn(&AugmentedPlant<'_>, &Tuning) -> Result<S, TuningError>,
+    /// the first wrong value of the keys that `read` leaves to later stages
+    pub deferred: fn(&S) -> Result<(), TuningError>,
+    /// the form with its conditions on a box
+    pub form: FormStage<S>,
+    /// the observer; no condition of the form is refuted
+    pub design: DesignStage<S>,
+    /// what the theorem guarantees
+    pub theorem: TheoremStage<S>,
 }
+
+type FormStage<S> = for<'e> fn(
+    &'e AugmentedPlant<'e>,
+    &S,
+    &Region,
+) -> Result<Found<<S as Settings>::Form<'e>>, DesignError>;
+
+type DesignStage<S> = for<'e> fn(
+    &'e AugmentedPlant<'e>,
+    &S,
+    Found<<S as Settings>::Form<'e>>,
+) -> Result<Design, DesignError>;
+
+type TheoremStage<S> = for<'e> fn(
+    &'e AugmentedPlant<'e>,
+    &S,
+    Found<<S as Settings>::Form<'e>>,
+    &Assumptions,
+) -> Result<Certificate, DesignError>;
 
 /// Work whose result counts only where the budget lasted.
 pub(crate) fn lasting<T>(
@@ -73,54 +74,61 @@ pub(crate) fn lasting<T>(
     graph.budgeted(graph.budget().part(1.0), work)?
 }
 
-impl<S: Stages> Family for S {
+/// Whether a key that a later stage reads has a value that can be used, or none.
+pub(crate) fn usable<T>(value: Result<T, TuningError>) -> Result<(), TuningError> {
+    match value {
+        Err(error) if !error.absent => Err(error),
+        _ => Ok(()),
+    }
+}
+
+impl<S: Settings> Family for Paper<S> {
     fn name(&self) -> &'static str {
-        S::NAME
+        self.name
     }
 
     fn paper(&self) -> &'static str {
-        S::PAPER
+        self.paper
     }
 
     fn speeds(&self) -> &'static [f64] {
-        S::SPEEDS
+        self.speeds
     }
 
     fn keys(&self) -> Vec<&'static KeySpec> {
-        S::KEYS.iter().copied().flatten().collect()
+        self.keys.iter().copied().flatten().collect()
     }
 
     fn verify(&self, augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<(), TuningError> {
-        S::deferred(&S::read(augmented, tuning)?)
+        (self.deferred)(&(self.read)(augmented, tuning)?)
     }
 
     fn examine(
-        &self,
+        &'static self,
         augmented: &AugmentedPlant<'_>,
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
-        let settings = S::read(augmented, tuning)?;
-        match lasting(augmented, || {
-            S::form(augmented, &settings, &augmented.region())
-        }) {
+        let settings = (self.read)(augmented, tuning)?;
+        let form = || (self.form)(augmented, &settings, &augmented.region());
+        match lasting(augmented, form) {
             Ok(found) => Ok(found.examination),
             Err(DesignError::Refused(examination)) => Ok(*examination),
-            Err(DesignError::Spent(spent)) => Ok(Examination::ended(S::NAME, spent)),
+            Err(DesignError::Spent(spent)) => Ok(Examination::ended(self, spent)),
             Err(error) => Err(error),
         }
     }
 
     fn design(
-        &self,
+        &'static self,
         augmented: &AugmentedPlant<'_>,
         tuning: &Tuning,
     ) -> Result<Design, DesignError> {
-        let settings = S::read(augmented, tuning)?;
-        let form = || S::form(augmented, &settings, &augmented.region());
+        let settings = (self.read)(augmented, tuning)?;
+        let form = || (self.form)(augmented, &settings, &augmented.region());
         let found = lasting(augmented, form)?;
         match found.examination.fit() {
             Standing::Refuted => Err(found.examination.into()),
-            _ => lasting(augmented, || S::design(augmented, &settings, found)),
+            _ => lasting(augmented, || (self.design)(augmented, &settings, found)),
         }
     }
 
@@ -130,38 +138,47 @@ impl<S: Stages> Family for S {
         tuning: &Tuning,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        match theorem::<S>(augmented, tuning, assumptions) {
-            Err(DesignError::Spent(spent)) => Ok(Certificate::ended(S::BASIS, assumptions, spent)),
+        match self.certified(augmented, tuning, assumptions) {
+            Err(DesignError::Spent(spent)) => {
+                Ok(Certificate::ended(self.basis, assumptions, spent))
+            }
             found => found.map(|certificate| certificate.under(assumptions)),
         }
     }
 }
 
-fn theorem<S: Stages>(
-    augmented: &AugmentedPlant<'_>,
-    tuning: &Tuning,
-    assumptions: &Assumptions,
-) -> Result<Certificate, DesignError> {
-    let settings = S::read(augmented, tuning)?;
-    let region = match S::FORM_ON_ASSUMED_BOX {
-        true => assumptions.region.clone(),
-        false => augmented.region(),
-    };
-    let examination = match lasting(augmented, || S::form(augmented, &settings, &region)) {
-        Ok(found) if S::FORM_ON_ASSUMED_BOX && found.examination.fit() == Standing::Refuted => {
-            found.examination
+impl<S: Settings> Paper<S> {
+    fn certified(
+        &self,
+        augmented: &AugmentedPlant<'_>,
+        tuning: &Tuning,
+        assumptions: &Assumptions,
+    ) -> Result<Certificate, DesignError> {
+        let settings = (self.read)(augmented, tuning)?;
+        let region = match self.form_on_assumed_box {
+            true => assumptions.region.clone(),
+            false => augmented.region(),
+        };
+        let ends =
+            |found: &Examination| self.form_on_assumed_box && found.fit() == Standing::Refuted;
+        let examination = match lasting(augmented, || (self.form)(augmented, &settings, &region)) {
+            Ok(found) if ends(&found.examination) => found.examination,
+            Ok(found) => {
+                return lasting(augmented, || {
+                    (self.theorem)(augmented, &settings, found, assumptions)
+                });
+            }
+            Err(DesignError::Refused(examination)) => *examination,
+            Err(error) => return Err(error),
+        };
+        match examination.refuted() {
+            Some(_) => Ok(Certificate::new(
+                self.basis,
+                assumptions,
+                examination.checks,
+            )),
+            None => Err(examination.into()),
         }
-        Ok(found) => {
-            return lasting(augmented, || {
-                S::theorem(augmented, &settings, found, assumptions)
-            });
-        }
-        Err(DesignError::Refused(examination)) => *examination,
-        Err(error) => return Err(error),
-    };
-    match examination.refuted() {
-        Some(_) => Ok(Certificate::new(S::BASIS, assumptions, examination.checks)),
-        None => Err(examination.into()),
     }
 }
 
@@ -200,7 +217,7 @@ pub trait Family: Sync {
     /// # Errors
     /// Tuning keys that cannot be used; parameters without value.
     fn examine(
-        &self,
+        &'static self,
         augmented: &AugmentedPlant<'_>,
         tuning: &Tuning,
     ) -> Result<Examination, DesignError>;
@@ -210,7 +227,7 @@ pub trait Family: Sync {
     /// [`DesignError::Refused`] where the family does not fit; tuning keys that
     /// cannot be used.
     fn design(
-        &self,
+        &'static self,
         augmented: &AugmentedPlant<'_>,
         tuning: &Tuning,
     ) -> Result<Design, DesignError>;
@@ -226,4 +243,23 @@ pub trait Family: Sync {
         tuning: &Tuning,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError>;
+}
+
+impl PartialEq for dyn Family {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name()
+    }
+}
+
+impl fmt::Debug for dyn Family {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Its name.
+impl fmt::Display for dyn Family {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
 }

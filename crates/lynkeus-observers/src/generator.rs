@@ -160,7 +160,6 @@ mod tests {
             symbol: graph.symbol(name).node(),
         });
         Observer {
-            family: "none",
             time: time.symbol,
             states: vec![(x, 0.0)],
             derivatives: vec![(graph.expr(u.symbol) + graph.expr(slope.symbol)).node()],

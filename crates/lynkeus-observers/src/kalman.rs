@@ -15,14 +15,14 @@
 
 use lynkeus_model::Variable;
 use lynkeus_run::filter::{FilterKind, SigmaPoints};
-use lynkeus_structure::{AugmentedPlant, Standing};
+use lynkeus_structure::AugmentedPlant;
 
 use crate::estimate::{PlantCopy, Speed, limited};
 use crate::family::lasting;
 use crate::tuning::is_or_has;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, Family, FilterTuning, KeySpec,
-    ParameterValue, Reason, Shape, Signal, Statement, Tuning, TuningError, Value,
+    ParameterValue, Shape, Tuning, TuningError, Value,
 };
 
 /// The tunable number of a filter: no equation reads it, the noises are the study's.
@@ -31,31 +31,33 @@ const NOISE_SCALE: &str = "process_noise_scale";
 const NOISE_MEANING: &str = "multiplies the densities of process noise";
 
 /// A filter as a family.
-#[derive(Clone, Copy, Debug)]
-pub struct Filter {
+struct Filter {
     name: &'static str,
     paper: &'static str,
     /// what people call it
     called: &'static str,
     keys: &'static [&'static [KeySpec]],
+    smooths: bool,
     kind: fn(&Tuning) -> Result<FilterKind, TuningError>,
 }
 
 /// The family `ekf`.
-pub const EKF: Filter = Filter {
+pub const EKF: &dyn Family = &Filter {
     name: "ekf",
     paper: "Jazwinski 1970, the extended Kalman filter, continuous-discrete",
     called: "extended Kalman filter",
     keys: &[&KEYS, &BOUNDS],
+    smooths: true,
     kind: |_| Ok(FilterKind::Extended),
 };
 
 /// The family `ukf`.
-pub const UKF: Filter = Filter {
+pub const UKF: &dyn Family = &Filter {
     name: "ukf",
     paper: "Julier and Uhlmann 1997, the unscented Kalman filter",
     called: "unscented Kalman filter",
     keys: &[&KEYS, &BOUNDS, &POINTS],
+    smooths: false,
     kind: |tuning| {
         let SigmaPoints { alpha, beta, kappa } = SigmaPoints::default();
         let [own_alpha, own_beta, own_kappa] = &POINTS;
@@ -68,11 +70,12 @@ pub const UKF: Filter = Filter {
 };
 
 /// The family `mhe`.
-pub const MHE: Filter = Filter {
+pub const MHE: &dyn Family = &Filter {
     name: "mhe",
     paper: "Rao, Rawlings and Mayne 2003, moving-horizon estimation",
     called: "moving-horizon estimator",
     keys: &[&KEYS, &WINDOW],
+    smooths: false,
     kind: |tuning| {
         let [horizon] = &WINDOW;
         let length = match number(tuning, horizon)? {
@@ -99,18 +102,6 @@ impl Filter {
         })
     }
 
-    fn examined(&self, augmented: &AugmentedPlant<'_>) -> Result<Examination, DesignError> {
-        let region = augmented.region();
-        let regularity = Statement::PlantIsRegular.with(augmented.regularity(&region)?);
-        let irregular = match regularity.standing() {
-            Standing::Refuted => Some(Box::new(regularity.reason)),
-            _ => None,
-        };
-        let filter = self.called;
-        let summary = Reason::AnyPlant { filter, irregular };
-        Ok(Examination::of_any_plant(self.name, summary))
-    }
-
     fn designed(
         &self,
         augmented: &AugmentedPlant<'_>,
@@ -126,10 +117,16 @@ impl Filter {
         let confined = augmented
             .graph()
             .substitute(&derivatives, &limits.collect());
-        let mut observer = copy.observer(self.name, derivatives)?;
+        let mut observer = copy.observer(derivatives)?;
         let scale = Speed::new(&copy, NOISE_SCALE, 1.0, NOISE_MEANING.to_owned());
         observer = observer.tuned_by([&scale]);
-        let variance = settings.variances(augmented, &observer.states);
+        let starts = observer.states.iter().map(|(_, start)| *start);
+        let given = settings.variance.iter().zip(&augmented.states);
+        let variance = given
+            .clone()
+            .zip(starts)
+            .map(|((given, state), start)| given.unwrap_or_else(|| prior_variance(state, start)));
+        let variance: Vec<f64> = variance.collect();
         observer.filter = Some(FilterTuning {
             kind: settings.kind.clone(),
             gate: settings.gate,
@@ -138,7 +135,6 @@ impl Filter {
             confined,
             initial_variance: variance.clone(),
         });
-        let given = settings.variance.iter().zip(&augmented.states);
         let parameters = variance
             .iter()
             .zip(given)
@@ -177,7 +173,7 @@ impl Family for Filter {
     }
 
     fn smooths(&self) -> bool {
-        self.name == EKF.name
+        self.smooths
     }
 
     fn verify(&self, augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<(), TuningError> {
@@ -185,24 +181,21 @@ impl Family for Filter {
     }
 
     fn examine(
-        &self,
+        &'static self,
         augmented: &AugmentedPlant<'_>,
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
         self.read(augmented, tuning)?;
-        match lasting(augmented, || self.examined(augmented)) {
-            Err(DesignError::Spent(spent)) => Ok(Examination::ended(self.name, spent)),
-            examined => examined,
-        }
+        Ok(Examination::of_any_plant(self, self.called))
     }
 
     fn design(
-        &self,
+        &'static self,
         augmented: &AugmentedPlant<'_>,
         tuning: &Tuning,
     ) -> Result<Design, DesignError> {
         let settings = self.read(augmented, tuning)?;
-        let examination = lasting(augmented, || self.examined(augmented))?;
+        let examination = Examination::of_any_plant(self, self.called);
         lasting(augmented, || {
             self.designed(augmented, &settings, examination)
         })
@@ -290,18 +283,6 @@ struct Settings {
     variance: Vec<Option<f64>>,
 }
 
-impl Settings {
-    /// The variances given, and those that follow from the declared ranges.
-    fn variances(&self, augmented: &AugmentedPlant<'_>, starts: &[(Signal, f64)]) -> Vec<f64> {
-        let states = augmented.states.iter().zip(starts).zip(&self.variance);
-        states
-            .map(|((state, (_, start)), given)| {
-                given.unwrap_or_else(|| prior_variance(state, *start))
-            })
-            .collect()
-    }
-}
-
 /// The square of a quarter of the range: two standard deviations reach its ends. Without a range, that of
 /// the start value, or 1.
 pub fn prior_variance(state: &Variable, start: f64) -> f64 {
@@ -321,9 +302,9 @@ fn variances(
         Some(Value::Table(table)) => table,
         Some(other) => return Err(VARIANCE.wrong(other)),
     };
-    let variance = |name: &str, value: &Value| match value {
-        Value::Number(x) if *x >= 0.0 && x.is_finite() => Ok(*x),
-        other => Err(VARIANCE.wrong(format!("{name} = {other}"))),
+    let variance = |name: &str, value: &Value| {
+        let number = value.number().filter(|x| *x >= 0.0 && x.is_finite());
+        number.ok_or_else(|| VARIANCE.wrong(format!("{name} = {value}")))
     };
     let default = table.get("default").map(|value| variance("default", value));
     let mut found = vec![default.transpose()?; augmented.states.len()];

@@ -24,6 +24,7 @@ pub mod kalman;
 mod observer;
 mod peaking;
 mod printed;
+mod sparse;
 pub mod state_affine;
 mod statement;
 mod theorem;
@@ -49,23 +50,23 @@ pub use drift_observable::Germani;
 pub use state_affine::Ltaief;
 pub use unknown_input::Farza;
 
-use block_triangular::BlockTriangular;
-use drift_observable::DriftObservable;
+use block_triangular::BLOCK_TRIANGULAR;
+use drift_observable::DRIFT_OBSERVABLE;
 use kalman::{EKF, MHE, UKF};
-use state_affine::StateAffine;
-use triangular::Triangular;
-use unknown_input::UnknownInput;
+use state_affine::STATE_AFFINE;
+use triangular::TRIANGULAR;
+use unknown_input::UNKNOWN_INPUT;
 
 /// Every family, in the order in which `auto` tries them.
 pub const FAMILIES: &[&dyn Family] = &[
-    &Triangular,
-    &BlockTriangular,
-    &StateAffine,
-    &UnknownInput,
-    &DriftObservable,
-    &EKF,
-    &UKF,
-    &MHE,
+    TRIANGULAR,
+    BLOCK_TRIANGULAR,
+    STATE_AFFINE,
+    UNKNOWN_INPUT,
+    DRIFT_OBSERVABLE,
+    EKF,
+    UKF,
+    MHE,
 ];
 
 /// The family of that name.

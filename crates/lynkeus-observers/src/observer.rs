@@ -64,8 +64,6 @@ pub struct InputDerivative {
 /// z' = F(t, z, u, y), x̂ = z or a function of it, over the graph of the plant.
 #[derive(Clone, Debug)]
 pub struct Observer {
-    /// name of the family
-    pub family: &'static str,
     /// the symbol of time
     pub time: Node,
     /// states z and where they start; the estimate first, then what the gain needs

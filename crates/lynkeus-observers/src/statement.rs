@@ -3,8 +3,9 @@
 //! A statement is known by its variant, never by its words: these are for people. Each paper
 //! has an enum of its own, as has the certificate by linear matrix inequalities.
 
+use derive_more::From;
 use lynkeus_expr::{Interval, Spent};
-use lynkeus_structure::{Finding, Standing, Verdict, Witness};
+use lynkeus_structure::{Finding, Misfit, Standing, Verdict, Witness};
 
 use crate::block_triangular::{Lee, Said as SaidOfBlockTriangular};
 use crate::drift_observable::{Germani, Said as SaidOfDriftObservable};
@@ -14,7 +15,7 @@ use crate::triangular::{Hammouri, Said as SaidOfTriangular};
 use crate::unknown_input::{Farza, Said as SaidOfUnknownInput};
 
 /// What has to hold: a condition of a family or a hypothesis of a theorem.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, From)]
 pub enum Statement {
     /// f and h have values on the box and do not jump: asked of every plant
     PlantIsRegular,
@@ -43,26 +44,33 @@ pub enum Statement {
     /// every ∂f/∂x that a proof meets is bounded on the box
     SlopesOfTheProof,
     /// of the certificate by linear matrix inequalities
+    #[from]
     Inequality(Inequality),
     /// the error of a Kalman filter decays: no theorem says so
     FilterConverges,
     /// of the family `triangular`
+    #[from]
     Hammouri(Hammouri),
     /// of the family `block-triangular`
+    #[from]
     Lee(Lee),
     /// of the family `state-affine`
+    #[from]
     Ltaief(Ltaief),
     /// of the family `unknown-input`
+    #[from]
     Farza(Farza),
     /// of the family `drift-observable`
+    #[from]
     Germani(Germani),
 }
 
 /// What is said of a plant, a verdict, an observer or a certificate, as data: `lynkeus-words` has
 /// the sentences.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, From)]
 pub enum Reason {
     /// found in the structure of the plant
+    #[from(lynkeus_structure::Reason, Misfit)]
     Structure(lynkeus_structure::Reason),
     /// a number that has to be at most a limit, and is or not
     AtMost {
@@ -152,75 +160,28 @@ pub enum Reason {
         /// of the chain of this output
         output: String,
     },
-    /// a filter takes any plant
-    AnyPlant {
-        /// which filter
-        filter: &'static str,
-        /// where the plant is not regular
-        irregular: Option<Box<Reason>>,
-    },
+    /// a filter takes any plant: this one
+    AnyPlant(&'static str),
     /// the gain of a filter depends on the run
     GainOfTheRun,
     /// of the certificate by linear matrix inequalities
+    #[from]
     Guarantee(SaidOfGuarantee),
     /// of the family `triangular`
+    #[from]
     Triangular(SaidOfTriangular),
     /// of the family `block-triangular`
+    #[from]
     BlockTriangular(SaidOfBlockTriangular),
     /// of the family `state-affine`
+    #[from]
     StateAffine(SaidOfStateAffine),
     /// of the family `unknown-input`
+    #[from]
     UnknownInput(SaidOfUnknownInput),
     /// of the family `drift-observable`
+    #[from]
     DriftObservable(SaidOfDriftObservable),
-}
-
-impl From<lynkeus_structure::Misfit> for Reason {
-    fn from(misfit: lynkeus_structure::Misfit) -> Self {
-        Self::Structure(misfit.into())
-    }
-}
-
-impl From<lynkeus_structure::Reason> for Reason {
-    fn from(reason: lynkeus_structure::Reason) -> Self {
-        Self::Structure(reason)
-    }
-}
-
-impl From<SaidOfStateAffine> for Reason {
-    fn from(said: SaidOfStateAffine) -> Self {
-        Self::StateAffine(said)
-    }
-}
-
-impl From<SaidOfUnknownInput> for Reason {
-    fn from(said: SaidOfUnknownInput) -> Self {
-        Self::UnknownInput(said)
-    }
-}
-
-impl From<SaidOfDriftObservable> for Reason {
-    fn from(said: SaidOfDriftObservable) -> Self {
-        Self::DriftObservable(said)
-    }
-}
-
-impl From<SaidOfGuarantee> for Reason {
-    fn from(said: SaidOfGuarantee) -> Self {
-        Self::Guarantee(said)
-    }
-}
-
-impl From<SaidOfTriangular> for Reason {
-    fn from(said: SaidOfTriangular) -> Self {
-        Self::Triangular(said)
-    }
-}
-
-impl From<SaidOfBlockTriangular> for Reason {
-    fn from(said: SaidOfBlockTriangular) -> Self {
-        Self::BlockTriangular(said)
-    }
 }
 
 /// A statement with its verdict.
@@ -312,42 +273,6 @@ pub(crate) fn sufficient(
         false => Verdict::open(),
     };
     statement.into().found(verdict, reason)
-}
-
-impl From<Hammouri> for Statement {
-    fn from(part: Hammouri) -> Self {
-        Self::Hammouri(part)
-    }
-}
-
-impl From<Lee> for Statement {
-    fn from(part: Lee) -> Self {
-        Self::Lee(part)
-    }
-}
-
-impl From<Ltaief> for Statement {
-    fn from(part: Ltaief) -> Self {
-        Self::Ltaief(part)
-    }
-}
-
-impl From<Farza> for Statement {
-    fn from(part: Farza) -> Self {
-        Self::Farza(part)
-    }
-}
-
-impl From<Germani> for Statement {
-    fn from(part: Germani) -> Self {
-        Self::Germani(part)
-    }
-}
-
-impl From<Inequality> for Statement {
-    fn from(part: Inequality) -> Self {
-        Self::Inequality(part)
-    }
 }
 
 #[cfg(test)]

@@ -130,6 +130,22 @@ pub(crate) fn state_noise(
     Ok(found)
 }
 
+/// How much the gain may differ from the computed one, relatively: rounding of
+/// the powers of θ in the observer.
+const GAIN_ERROR: f64 = 1e-12;
+
+/// Gains as far as the observer's may differ from them.
+pub(crate) fn as_computed(gains: impl IntoIterator<Item = f64>) -> Vec<Interval> {
+    let error = Interval::new(1.0 - GAIN_ERROR, 1.0 + GAIN_ERROR).unwrap_or(Interval::ONE);
+    let gains = gains.into_iter();
+    gains.map(|gain| Interval::point(gain) * error).collect()
+}
+
+/// Whether the partial ∂f_row/∂x_column is one along the chain.
+pub(crate) fn is_along(chain: &[usize], row: usize, column: usize) -> bool {
+    chain.windows(2).any(|pair| pair == [row, column])
+}
+
 /// Fills in what the rate σ guarantees, where every hypothesis holds; `of` has the bounds that it leaves
 /// for the densities of process noise, by augmented state.
 pub(crate) fn conclude(
@@ -232,13 +248,8 @@ impl<'g> Enclosure<'g> {
     /// A further variable of the box.
     pub fn add(&mut self, name: String, symbol: Node, min: f64, max: f64) {
         self.sizes.get_mut().clear();
-        self.region.dimensions.push(Dimension {
-            name,
-            symbol,
-            min,
-            max,
-            integer: false,
-        });
+        let side = Dimension::new(name, symbol, min, max);
+        self.region.dimensions.push(side);
     }
 
     /// The side of a variable; the whole line where the box has none.

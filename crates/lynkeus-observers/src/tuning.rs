@@ -271,39 +271,10 @@ impl Tuning {
     pub fn names(&self, key: &str) -> Result<Option<Vec<String>>, TuningError> {
         self.read(key, "a list of names", |value| value.all(Value::text))
     }
-
-    /// A list of tables, each with lists of numbers under exactly the given keys.
-    ///
-    /// # Errors
-    /// Anything else.
-    pub fn number_tables(
-        &self,
-        key: &str,
-        fields: &[&str],
-    ) -> Result<Option<Vec<Vec<Vec<f64>>>>, TuningError> {
-        let Some(value) = self.values.get(key) else {
-            return Ok(None);
-        };
-        let shape = format!("a list of tables with the keys {}", fields.join(" and "));
-        let wrong = || TuningError::new(key, shape.clone(), value);
-        let Value::List(tables) = value else {
-            return Err(wrong());
-        };
-        let table = |table: &Value| {
-            let Value::Table(entries) = table else {
-                return Err(wrong());
-            };
-            if entries.len() != fields.len() {
-                return Err(wrong());
-            }
-            let field = |name: &&str| numbers(key, entries.get(*name).ok_or_else(wrong)?);
-            fields.iter().map(field).collect()
-        };
-        tables.iter().map(table).collect::<Result<_, _>>().map(Some)
-    }
 }
 
-fn numbers(key: &str, value: &Value) -> Result<Vec<f64>, TuningError> {
+/// A number, or a list of them.
+pub(crate) fn numbers(key: &str, value: &Value) -> Result<Vec<f64>, TuningError> {
     let number = |value: &Value| match value {
         Value::Number(x) => Ok(*x),
         other => Err(TuningError::new(key, "a number", other)),
@@ -445,8 +416,3 @@ pub(crate) fn is_or_has(name: &str, variable: &str) -> bool {
     let element = variable.strip_prefix(name);
     element.is_some_and(|rest| rest.is_empty() || rest.starts_with('['))
 }
-
-/// A key whose wrong value is told by the stage that needs it: another family may own a key
-/// of that name with another shape, and `auto` examines a plant for both. Where the study names
-/// the family, [`Family::verify`] tells it at once.
-pub(crate) type Deferred<T> = Result<T, TuningError>;

@@ -179,7 +179,7 @@ impl Told for Ran {
             None => "credible".to_owned(),
             Some(refusal) => format!("not credible: {refusal}"),
         };
-        let family = design.observer.family;
+        let family = design.examination.family;
         format!("{plant}: {family} observer, {rows} rows; {credible}")
     }
 

@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, OnceLock};
 use lynkeus::Error;
 use lynkeus::expr::{Budget, Evaluator, Graph, MissingInput, Node, Tape, jacobian};
 use lynkeus::model::{Plant, Variable};
-use lynkeus::observers::{self, Observer};
+use lynkeus::observers::{self, Design};
 use lynkeus::study::SimulateSettings;
 use lynkeus_export::python::{Function, Namespace, Vector, module};
 use numpy::ndarray::Array2;
@@ -146,7 +146,8 @@ impl Functions {
     ///
     /// # Errors
     /// As [`Functions::of_plant`].
-    pub fn of_observer(plant: &Plant, observer: &Observer) -> Result<Self, Error> {
+    pub fn of_observer(plant: &Plant, design: &Design) -> Result<Self, Error> {
+        let observer = &design.observer;
         let system = lynkeus::observer_system(plant, observer)?;
         let read = observer.measured.iter().chain(&observer.inputs);
         let signals = read.chain(observer.input_derivatives.iter().map(|d| &d.signal));
@@ -160,7 +161,7 @@ impl Functions {
             outputs: estimates.map(|estimate| estimate.node).collect(),
         };
         let outputs = system.outputs().iter().take(equations.outputs.len());
-        let (family, name) = (observer.family, &plant.name);
+        let (family, name) = (design.examination.family.name(), &plant.name);
         let about = About {
             title: format!("{family} observer of {name}: z' = f(t, z, w), estimates h(t, z, w)"),
             states: vector("z", system.states().to_vec()),

@@ -266,7 +266,7 @@ impl Study {
         self.ask(py, &terms, |study, _| {
             let plant = lynkeus::prepare::plant(study)?;
             let design = Prepared::new(study, &plant)?.design()?;
-            Functions::of_observer(&plant, &design.observer)
+            Functions::of_observer(&plant, &design)
         })
     }
 

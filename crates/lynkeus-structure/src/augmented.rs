@@ -157,13 +157,7 @@ impl<'p> AugmentedPlant<'p> {
             inputs,
             outputs,
             pattern,
-            time: Dimension {
-                name: "time".into(),
-                symbol: plant.time,
-                min: f64::NEG_INFINITY,
-                max: f64::INFINITY,
-                integer: false,
-            },
+            time: Dimension::new("time", plant.time, f64::NEG_INFINITY, f64::INFINITY),
         })
     }
 

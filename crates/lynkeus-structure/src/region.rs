@@ -19,6 +19,19 @@ pub struct Dimension {
     pub integer: bool,
 }
 
+impl Dimension {
+    /// Of a real variable.
+    pub fn new(name: impl Into<String>, symbol: Node, min: f64, max: f64) -> Self {
+        Self {
+            name: name.into(),
+            symbol,
+            min,
+            max,
+            integer: false,
+        }
+    }
+}
+
 /// Where a variable is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coordinate {
@@ -110,7 +123,7 @@ impl Region {
     }
 
     /// A point by the names of the sides.
-    pub(crate) fn coordinates(&self, point: &[f64]) -> Vec<Coordinate> {
+    pub fn coordinates(&self, point: &[f64]) -> Vec<Coordinate> {
         let sides = self.dimensions.iter().zip(point);
         sides.map(|(d, &x)| (d.name.clone(), x).into()).collect()
     }

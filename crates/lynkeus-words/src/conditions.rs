@@ -86,10 +86,7 @@ impl Words for Reason {
             Self::InTheBox { clamp: false } => "The guarantee holds while plant and estimate stay in the box, or the functions are prolonged outside of it with the same bounds of their partial derivatives.".to_owned(),
             Self::AnotherObserver { key } => format!("the key '{key}' makes another observer, which the theorem does not cover"),
             Self::PartialsVary { output } => format!("form: in the chain of {output} the partials vary more than the stability of M is proved for; narrower min and max help, and for the family triangular partials = true, which makes M constant"),
-            Self::AnyPlant { filter, irregular } => {
-                let jumps = irregular.as_ref().map(|found| format!("; {}: the filter linearises beside such places", found.words()));
-                format!("the {filter} runs on any plant; no theorem bounds its error{}", jumps.unwrap_or_default())
-            }
+            Self::AnyPlant(filter) => format!("the {filter} runs on any plant; no theorem bounds its error"),
             Self::GainOfTheRun => "its gain depends on the run: no theorem holds on the whole box, however good it is on a log".to_owned(),
             Self::Guarantee(said) => said.words(),
             Self::Triangular(said) => said.words(),

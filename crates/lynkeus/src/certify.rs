@@ -123,7 +123,7 @@ impl<'a> Task<'a> {
         if let Some(choice) = self.prepared.choice()?.filter(|c| c.ended.is_some()) {
             notes.extend(choice.notes());
         }
-        let family = lynkeus_observers::find(design.observer.family).filter(|_| !lmi);
+        let family = (!lmi).then_some(design.examination.family);
         let theorem = match family {
             Some(family) => {
                 let assumptions = assumptions::of(&self.prepared, place)?;
@@ -288,7 +288,7 @@ impl CertifyReport {
     pub fn to_json(&self) -> serde_json::Value {
         serde_json::json!({
             "plant": self.plant,
-            "family": self.design.observer.family,
+            "family": self.design.examination.family.name(),
             "gain": self.correction.gain_json(),
             "injection": self.correction.injection_json(),
             "certificate": certificate_json(self),

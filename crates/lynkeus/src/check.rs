@@ -126,7 +126,7 @@ fn by_which(
     report.knowledge = knowledge(&prepared, &known, symbolic, options, report, time)?;
     report.examinations = prepared.examinations()?.to_vec();
     report.choice = prepared.choice()?.cloned();
-    report.recommended = report.choice.as_ref().map(|choice| choice.family);
+    report.recommended = report.choice.as_ref().map(|choice| choice.family.name());
     if report.choice.is_some() {
         refuse(&prepared)?;
     }
@@ -239,7 +239,7 @@ impl Report {
         let chosen = self
             .examinations
             .iter()
-            .find(|e| Some(e.family) == self.recommended);
+            .find(|e| Some(e.family.name()) == self.recommended);
         let with_theorem = chosen.is_some_and(Examination::has_theorem);
         let hidden = |q: &(lynkeus_observability::Asked, _)| q.0.verdict == Verdict::Unobservable;
         // what was not decided is no refusal
@@ -339,7 +339,7 @@ impl Report {
         while let Some(reason) = open.first().map(|e| &e.summary) {
             let same = |e: &&Examination| e.summary == *reason;
             let (told, rest): (Vec<_>, Vec<_>) = open.iter().copied().partition(same);
-            let names: Vec<&str> = told.iter().map(|e| e.family).collect();
+            let names: Vec<&str> = told.iter().map(|e| e.family.name()).collect();
             writeln!(f, "\n{}: undecided\n  {}", names.join(", "), reason.words())?;
             open = rest;
         }
@@ -350,7 +350,7 @@ impl Report {
     fn none(&self) -> String {
         let is_open = |e: &&Examination| e.spent().is_some_and(Spent::is_limit);
         let undecided = self.examinations.iter().filter(is_open);
-        let names: Vec<&str> = undecided.map(|e| e.family).collect();
+        let names: Vec<&str> = undecided.map(|e| e.family.name()).collect();
         match names.is_empty() {
             true => "no observer of this version fits these sensors".to_owned(),
             false => format!(

@@ -10,8 +10,8 @@ use serde_json::{Value as Json, json};
 /// The family to use.
 #[derive(Clone, Debug)]
 pub struct Choice {
-    /// its name
-    pub family: &'static str,
+    /// it itself
+    pub family: &'static dyn Family,
     /// the study names it
     pub is_asked_for: bool,
     /// what stands behind it
@@ -133,7 +133,7 @@ impl Choice {
     /// For machines.
     pub(crate) fn to_json(&self) -> Json {
         json!({
-            "family": self.family,
+            "family": self.family.name(),
             "asked_for": self.is_asked_for,
             "grounds": match self.grounds {
                 Grounds::Proved { .. } => "proved",

@@ -6,7 +6,7 @@
 //! ended the examination or the trial of a family that comes before it, the decision says so.
 
 use lynkeus_expr::Spent;
-use lynkeus_observers::{Design, DesignError, Examination, find};
+use lynkeus_observers::{Design, DesignError, Examination};
 use lynkeus_structure::Standing;
 
 use crate::choice::{Choice, Grounds, Proposal, Speed};
@@ -225,12 +225,12 @@ fn settles_it(proposal: &Proposal) -> bool {
 /// The speed for want of which the design fails.
 fn lacked_speed(prepared: &Prepared<'_>, examination: &Examination) -> Option<Speed> {
     let tuning = &prepared.study().observer.tuning;
-    let family = find(examination.family)?;
+    let family = examination.family;
     let absent =
         |speed: &Speed| family.owns(speed.key()) && !tuning.values.contains_key(speed.key());
     let speed = Speed::ALL.into_iter().find(absent)?;
     // it may be given in other words
-    match prepared.designed(examination, prepared.augmented(), tuning) {
+    match family.design(prepared.augmented(), tuning) {
         Err(DesignError::Tuning(e)) if e.absent && e.key == speed.key() => Some(speed),
         _ => None,
     }
@@ -258,8 +258,7 @@ fn left_out(prepared: &Prepared<'_>) -> Vec<String> {
 /// Whether the study has a key that belongs to families with a theorem.
 fn has_keys(prepared: &Prepared<'_>, examination: &Examination) -> bool {
     let keys = &prepared.study().observer.tuning.values;
-    keys.keys()
-        .any(|key| find(examination.family).is_some_and(|family| family.owns(key)))
+    keys.keys().any(|key| examination.family.owns(key))
 }
 
 fn tried(prepared: &Prepared<'_>, examination: &Examination) -> Trial {
@@ -279,7 +278,7 @@ fn tried(prepared: &Prepared<'_>, examination: &Examination) -> Trial {
             tuned.values.insert(speed.key().to_owned(), value.clone());
         }
     }
-    let design = match prepared.designed(examination, prepared.augmented(), &tuned) {
+    let design = match examination.family.design(prepared.augmented(), &tuned) {
         Ok(design) => design,
         Err(DesignError::Tuning(e)) if e.absent => {
             let can_be_tried = Speed::ALL.iter().any(|speed| e.key == speed.key());

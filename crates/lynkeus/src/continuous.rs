@@ -64,7 +64,7 @@ pub(crate) fn observer(study: &Study, options: &ExportOptions) -> Result<Export,
     let plant = prepare::plant(study)?;
     let design = Prepared::new(study, &plant)?.design()?;
     if design.observer.filter.is_some() {
-        return Err(filter(study, design.observer.family));
+        return Err(filter(study, design.examination.family.name()));
     }
     let about = format!(
         "An observer of {} in continuous time: its inputs are the measurements.",

@@ -53,7 +53,7 @@ impl DesignReport {
             .collect();
         json!({
             "plant": self.plant,
-            "family": observer.family,
+            "family": examination.family.name(),
             "fit": fit_word(examination.fit()),
             "chains": examination.chains,
             "gain": self.certified.correction.gain_json(),
@@ -78,7 +78,7 @@ impl fmt::Display for DesignReport {
             f,
             "{}: {} observer, {}",
             self.plant,
-            observer.family,
+            examination.family,
             counted(observer.states.len(), "state")
         )?;
         writeln!(f, "  {}", examination.summary.words())?;

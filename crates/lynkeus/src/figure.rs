@@ -38,7 +38,7 @@ pub fn figure(
     Ok(Figure {
         title: format!(
             "{}: {} observer",
-            outcome.plant, outcome.design.observer.family
+            outcome.plant, outcome.design.examination.family
         ),
         time_label: format!("time{unit}"),
         panels,

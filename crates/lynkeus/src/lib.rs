@@ -5,7 +5,7 @@
 //!
 //! ```
 //! use lynkeus::model::{LoadOptions, Model, Plant};
-//! use lynkeus::observers::{Family, Tuning, triangular::Triangular};
+//! use lynkeus::observers::{Tuning, triangular::TRIANGULAR};
 //! use lynkeus::run::{Estimator, EstimatorSettings};
 //! use lynkeus::structure::{AugmentedPlant, Sensors};
 //!
@@ -36,7 +36,7 @@
 //! for plant in [in_modelica, in_rust] {
 //!     let sensors = Sensors { unknown: vec!["inflow".into()], ..Sensors::default() };
 //!     let augmented = AugmentedPlant::new(&plant, &sensors)?;
-//!     let design = Triangular.design(&augmented, &Tuning::from([("theta", 1.0)]))?;
+//!     let design = TRIANGULAR.design(&augmented, &Tuning::from([("theta", 1.0)]))?;
 //!     let observer = lynkeus::observer_system(&plant, &design.observer)?;
 //!     let mut estimator = Estimator::new(&observer, EstimatorSettings::default())?;
 //!     for second in 0..60 {

@@ -234,7 +234,7 @@ impl<'a> Prepared<'a> {
         if let Some(known) = self.examinations.get() {
             return Ok(known);
         }
-        let families: Vec<&dyn Family> = self.study.observer.families().collect();
+        let families: Vec<_> = self.study.observer.families().collect();
         let mut found = vec![];
         for (done, family) in families.iter().enumerate() {
             found.push(self.examined(*family, families.len() - done)?);
@@ -243,7 +243,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// What one family finds, of `left` that are still to come, in its share of the time.
-    fn examined(&self, family: &dyn Family, left: usize) -> Result<Examination, Error> {
+    fn examined(&self, family: &'static dyn Family, left: usize) -> Result<Examination, Error> {
         let graph = self.augmented.graph();
         let whole = graph.budget();
         // the rest of the work needs a share as well
@@ -300,10 +300,6 @@ impl<'a> Prepared<'a> {
         {
             return Ok(design.clone());
         }
-        let examinations = self.examinations()?;
-        let Some(chosen) = examinations.iter().find(|e| e.family == choice.family) else {
-            return Err(none_fits(self.study, examinations));
-        };
         let mut tuned = choice.completed(tuning);
         // a certified gain holds for the known inputs as the study simulates them
         let simulated = match is_certified_gain(tuning) {
@@ -315,21 +311,8 @@ impl<'a> Prepared<'a> {
             false => None,
         };
         let place = simulated.as_ref().unwrap_or(&self.augmented);
-        let design = self.designed(chosen, place, &tuned);
+        let design = choice.family.design(place, &tuned);
         design.map_err(|error| self.refusal(error))
-    }
-
-    /// What a family makes of the plant on a box.
-    pub(crate) fn designed(
-        &self,
-        chosen: &Examination,
-        place: &AugmentedPlant<'_>,
-        tuning: &Tuning,
-    ) -> Result<Design, DesignError> {
-        match lynkeus_observers::find(chosen.family) {
-            Some(family) => family.design(place, tuning),
-            None => Err(DesignError::Refused(Box::new(chosen.clone()))),
-        }
     }
 
     /// The plant on a smaller box.
@@ -352,15 +335,9 @@ impl<'a> Prepared<'a> {
             return Ok(vec![]);
         };
         let plant = self.plant();
-        let time = Dimension {
-            name: "time".into(),
-            symbol: plant.time,
-            min: settings.start,
-            max: settings.until,
-            integer: false,
-        };
+        let (start, until) = (settings.start, settings.until);
         let region = Region {
-            dimensions: vec![time],
+            dimensions: vec![Dimension::new("time", plant.time, start, until)],
         };
         let mut narrower = vec![];
         let is_chosen = |name: &str| self.study.narrower.iter().any(|(n, ..)| n.text == name);

@@ -59,12 +59,10 @@ fn knee(
     use std::ops::ControlFlow;
 
     let study = prepared.study();
-    let (Some(run), Some(family)) = (
-        study.simulate.as_ref(),
-        lynkeus_observers::find(examination.family),
-    ) else {
+    let Some(run) = &study.simulate else {
         return Ok(None);
     };
+    let family = examination.family;
     let span = run.until - run.start;
     let step = run.sample_step.or(run.output_step).unwrap_or(span / 500.0);
     if prepared.augmented().states.len() > STATES || span / step > ROWS {
@@ -141,8 +139,7 @@ pub(crate) fn time_scales(
     examination: &Examination,
     speed: Speed,
 ) -> Option<Proposal> {
-    let family = lynkeus_observers::find(examination.family)?;
-    let augmented = prepared.augmented();
+    let (family, augmented) = (examination.family, prepared.augmented());
     let modes = spectrum::eigenvalues(Start::of(augmented).jacobian(augmented)?)?;
     let sizes: Vec<f64> = modes.iter().map(|λ| λ.norm()).collect();
     let largest = sizes.iter().copied().fold(0.0, f64::max);

@@ -16,10 +16,9 @@ use super::said::{Correction, Lee, Said};
 use super::settings::Settings;
 use crate::conditions::{GainedChain, Partial, lipschitz, names, output_slope, partials};
 use crate::design::{Found, first_fit};
+use crate::family::Settings as _;
 use crate::statement::{proved, refuted, undecided};
 use crate::{Check, DesignError, Examination, Reason, TuningError};
-
-pub(super) const NAME: &str = "block-triangular";
 
 /// Different chains that are examined before the first without a refuted condition is taken.
 const EXAMINED: usize = 16;
@@ -38,7 +37,8 @@ pub(super) fn form(
     settings: &Settings,
     region: &Region,
 ) -> Result<Found<Form>, DesignError> {
-    let refusal = |summary: Reason| Err(Examination::unfit(NAME, summary, vec![]).into());
+    let refusal =
+        |summary: Reason| Err(Examination::unfit(Settings::FAMILY, summary, vec![]).into());
     if settings.impossible() {
         return refusal(Said::OnlyClassical.into());
     }
@@ -65,7 +65,7 @@ fn distinct(
     settings: &Settings,
     arrangements: &[Blocks],
 ) -> Result<Vec<Choice>, TuningError> {
-    let θ = settings.θ.clone()?;
+    let θ = settings.given_θ()?;
     let breaks = |blocks: &Blocks| θ.as_ref().is_some_and(|θ| chain_rule(blocks, θ).is_some());
     let mut found: Vec<(Vec<Vec<String>>, Choice)> = vec![];
     for blocks in arrangements {
@@ -117,7 +117,8 @@ fn examined(
         orders,
     };
     let chains = blocks.names(augmented);
-    let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
+    let examination =
+        Examination::new(augmented, region, Settings::FAMILY, summary, chains, checks)?;
     let form = Form {
         blocks,
         partials: all,

@@ -21,68 +21,26 @@ mod settings;
 mod theorem;
 mod transformed;
 
-use lynkeus_structure::{AugmentedPlant, Region};
-
-use crate::design::Found;
-use crate::family::Stages;
-use crate::{
-    Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError, guarantee,
-};
-use form::{Form, NAME};
-use observer::observer;
+use crate::family::{self, Family, Paper, usable};
 pub use said::{Correction, Lee, Said};
 use settings::Settings;
-use theorem::BASIS;
 
 /// The family `block-triangular`.
-#[derive(Clone, Copy, Debug)]
-pub struct BlockTriangular;
+pub const BLOCK_TRIANGULAR: &dyn Family = &Paper {
+    name: "block-triangular",
+    paper: "Lee, Yee, Park 2000, observers (3) and (7)",
+    basis: theorem::BASIS,
+    form_on_assumed_box: false,
+    keys: settings::KEYS,
+    speeds: &[],
+    read: Settings::read,
+    deferred: |settings| usable(settings.θ()).and(usable(settings.lmi())),
+    form: form::form,
+    design: observer::design,
+    theorem: theorem::certificate,
+};
 
-impl Stages for BlockTriangular {
-    type Settings = Settings;
-    type Form<'e, 'p: 'e> = Form;
-    const NAME: &'static str = NAME;
-    const PAPER: &'static str = "Lee, Yee, Park 2000, observers (3) and (7)";
-    const BASIS: &'static str = BASIS;
-    const KEYS: &'static [&'static [KeySpec]] = settings::KEYS;
-
-    fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
-        Settings::read(augmented, tuning)
-    }
-
-    fn deferred(settings: &Settings) -> Result<(), TuningError> {
-        settings.deferred()
-    }
-
-    fn form(
-        augmented: &AugmentedPlant<'_>,
-        settings: &Settings,
-        region: &Region,
-    ) -> Result<Found<Form>, DesignError> {
-        form::form(augmented, settings, region)
-    }
-
-    fn design(
-        augmented: &AugmentedPlant<'_>,
-        settings: &Settings,
-        found: Found<Form>,
-    ) -> Result<Design, DesignError> {
-        match (settings.lmi.clone()?, settings.remedies.low_power) {
-            (Some(lmi), _) => {
-                let examination = found.examination;
-                guarantee::design_lmi(augmented, &settings.common, lmi, NAME, examination)
-            }
-            (None, true) => observer::low_power(augmented, settings, found),
-            (None, false) => observer(augmented, settings, found),
-        }
-    }
-
-    fn theorem(
-        augmented: &AugmentedPlant<'_>,
-        settings: &Settings,
-        found: Found<Form>,
-        assumptions: &Assumptions,
-    ) -> Result<Certificate, DesignError> {
-        theorem::certificate(augmented, settings, &found.form.blocks, assumptions)
-    }
+impl family::Settings for Settings {
+    type Form<'e> = form::Form;
+    const FAMILY: &'static dyn Family = BLOCK_TRIANGULAR;
 }

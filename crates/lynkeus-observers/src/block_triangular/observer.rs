@@ -3,20 +3,35 @@
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Expr, Graph, Node, jacobian};
+use lynkeus_expr::{Expr, Node, jacobian};
 use lynkeus_structure::{AugmentedPlant, Blocks, Chain};
 
-use super::form::{Form, NAME, chain_rule};
+use super::form::{Form, chain_rule};
 use super::said::Correction;
 use super::settings::Settings;
 use crate::design::Found;
 use crate::estimate::{PlantCopy, Speed, prolong};
 use crate::peaking::{Part, Transient};
 use crate::printed::AtStart;
-use crate::{Design, DesignError, estimate, peaking, printed};
+use crate::sparse::{Sparse, dot, minus, sum};
+use crate::{Design, DesignError, estimate, guarantee, peaking, printed};
+
+pub(super) fn design(
+    augmented: &AugmentedPlant<'_>,
+    settings: &Settings,
+    found: Found<Form>,
+) -> Result<Design, DesignError> {
+    match (settings.lmi()?, settings.remedies.low_power) {
+        (Some(lmi), _) => {
+            guarantee::design_lmi(augmented, &settings.common, lmi, found.examination)
+        }
+        (None, true) => low_power(augmented, settings, found),
+        (None, false) => observer(augmented, settings, found),
+    }
+}
 
 /// Observer (7) or (3).
-pub(super) fn observer(
+fn observer(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Form>,
@@ -72,8 +87,8 @@ pub(super) fn observer(
             None => {
                 if correction == Correction::Lee {
                     let found = Steps::new(augmented, chain);
-                    let L: Vec<_> = found.L.iter().map(|&l| vec![l]).collect();
-                    parameters.push((format!("M{}", output + 1), start.table(&found.M(graph))));
+                    let L: Vec<_> = found.L.iter().map(|l| vec![l.map(Expr::node)]).collect();
+                    parameters.push((format!("M{}", output + 1), start.table(&found.M())));
                     parameters.push((format!("L{}", output + 1), start.table(&L)));
                 }
                 let constants: Vec<f64> = steady.iter().map(|gain| gain.0).collect();
@@ -86,7 +101,7 @@ pub(super) fn observer(
         prolong(&copy, chain, partials, &mut derivatives)?;
     }
     Ok(Design {
-        observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
+        observer: copy.observer(derivatives)?.tuned_by(&speeds),
         notes: chain_rule(blocks, &θ).into_iter().collect(),
         examination,
         gains,
@@ -104,7 +119,7 @@ fn injected(copy: &PlantCopy<'_, '_>, blocks: &Blocks, place: usize) -> HashMap<
 }
 
 /// The observer whose chains have the low-power form.
-pub(super) fn low_power(
+fn low_power(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Form>,
@@ -133,60 +148,58 @@ pub(super) fn low_power(
 }
 
 /// M̄, L and W of the five steps: they make the similarity transformation M = W⁻¹M̄ of the error.
-pub(super) struct Steps {
-    M̄: Vec<Vec<Sparse>>,
-    pub L: Vec<Sparse>,
-    W: Vec<Vec<Sparse>>,
+pub(super) struct Steps<'g> {
+    M̄: Vec<Vec<Sparse<'g>>>,
+    pub L: Vec<Sparse<'g>>,
+    W: Vec<Vec<Sparse<'g>>>,
 }
 
-impl Steps {
-    pub fn new(augmented: &AugmentedPlant<'_>, chain: &Chain) -> Self {
-        let graph = augmented.graph();
+impl<'g> Steps<'g> {
+    pub fn new(augmented: &AugmentedPlant<'g>, chain: &Chain) -> Self {
         let n = chain.len();
         let F = slopes(augmented, chain, chain);
+        // C = (1, 0, …, 0)
+        let one = augmented.graph().constant(1.0);
+        let C: Vec<Sparse<'g>> = (0..n).map(|j| (j == 0).then_some(one)).collect();
         // Step 1: M̄ = (C; CF; …; CF^{n−1}), lower triangular, and the next power CFⁿ
-        let mut rows = vec![unit(graph, n)];
+        let mut rows = vec![C.clone()];
         for k in 0..n {
-            rows.push(times(graph, &rows[k], &F));
+            let column = |j: usize| F.iter().map(|row| row[j]).collect::<Vec<_>>();
+            let next = (0..n).map(|j| dot(&rows[k], &column(j))).collect();
+            rows.push(next);
         }
         let next = rows.pop().unwrap_or_default();
         let M̄ = rows;
         // Steps 2 and 3: the last row q of M̄FM̄⁻¹ − A solves q M̄ = CFⁿ; L_j = q_{n−j+1}
-        let q = solve_left(graph, &M̄, next);
-        let L: Vec<Sparse> = q.into_iter().rev().collect();
+        let q = solve_left(&M̄, &next);
+        let L: Vec<Sparse<'g>> = q.into_iter().rev().collect();
         // Step 4: W = (C; C(A + LC); …)
-        let Ā = |row: &[Sparse]| -> Vec<Sparse> {
-            (0..n)
-                .map(|j| match j {
-                    0 => dot(graph, row, &L),
-                    _ => row[j - 1],
-                })
-                .collect()
-        };
-        let mut W = vec![unit(graph, n)];
+        let mut W = vec![C];
         for k in 1..n {
-            W.push(Ā(&W[k - 1]));
+            let row = &W[k - 1];
+            let next = std::iter::once(dot(row, &L)).chain(row.iter().copied());
+            W.push(next.take(n).collect());
         }
         Self { M̄, L, W }
     }
 
     /// M, row by row; the observer does without.
-    pub fn M(&self, graph: &Graph) -> Vec<Vec<Sparse>> {
-        solved(graph, &self.W, &self.M̄)
+    pub fn M(&self) -> Vec<Vec<Option<Node>>> {
+        solved(&self.W, &self.M̄)
     }
 
     /// M⁻¹ = M̄⁻¹W.
-    pub fn inverse(&self, graph: &Graph) -> Vec<Vec<Sparse>> {
-        solved(graph, &self.M̄, &self.W)
+    pub fn inverse(&self) -> Vec<Vec<Option<Node>>> {
+        solved(&self.M̄, &self.W)
     }
 }
 
 /// A⁻¹B for a lower triangular A.
-fn solved(graph: &Graph, A: &[Vec<Sparse>], B: &[Vec<Sparse>]) -> Vec<Vec<Sparse>> {
+fn solved(A: &[Vec<Sparse<'_>>], B: &[Vec<Sparse<'_>>]) -> Vec<Vec<Option<Node>>> {
     let n = A.len();
-    let column = |j: usize| solve_lower(graph, A, B.iter().map(|row| row[j]).collect());
-    let columns: Vec<Vec<Sparse>> = (0..n).map(column).collect();
-    let row = |i: usize| columns.iter().map(|c| c[i]).collect();
+    let column = |j: usize| solve_lower(A, B.iter().map(|row| row[j]).collect());
+    let columns: Vec<Vec<Sparse<'_>>> = (0..n).map(column).collect();
+    let row = |i: usize| columns.iter().map(|c| c[i].map(Expr::node)).collect();
     (0..n).map(row).collect()
 }
 
@@ -196,94 +209,55 @@ fn lee(augmented: &AugmentedPlant<'_>, chain: &Chain, gains: &[Node]) -> Vec<Nod
     let graph = augmented.graph();
     let Steps { M̄, L, W } = Steps::new(augmented, chain);
     // Step 5, multiplied out
-    let v: Vec<Sparse> = L
-        .iter()
-        .zip(gains)
-        .map(|(&l, &k)| sum(graph, l, Some(k)))
+    let pairs = L.iter().zip(gains);
+    let v: Vec<Sparse<'_>> = pairs
+        .map(|(&l, &k)| sum([l, Some(graph.expr(k))]))
         .collect();
-    let right: Vec<Sparse> = W.iter().map(|row| dot(graph, row, &v)).collect();
-    let zero = graph.constant(0.0).node();
-    let gain = solve_lower(graph, &M̄, right);
-    gain.into_iter().map(|g| g.unwrap_or(zero)).collect()
+    let right: Vec<Sparse<'_>> = W.iter().map(|row| dot(row, &v)).collect();
+    let zero = graph.constant(0.0);
+    let gain = solve_lower(&M̄, right);
+    gain.into_iter().map(|g| g.unwrap_or(zero).node()).collect()
 }
 
-/// An entry that may be zero everywhere.
-pub(super) type Sparse = Option<Node>;
-
 /// ∂f/∂x for the equations of `rows` and the states `columns`, row by row; F_i of a chain and itself.
-pub(super) fn slopes(
-    augmented: &AugmentedPlant<'_>,
+pub(super) fn slopes<'g>(
+    augmented: &AugmentedPlant<'g>,
     rows: &[usize],
     columns: &[usize],
-) -> Vec<Vec<Sparse>> {
+) -> Vec<Vec<Sparse<'g>>> {
+    let graph = augmented.graph();
     let f: Vec<Node> = rows.iter().map(|&i| augmented.derivatives[i]).collect();
     let x: Vec<Node> = columns.iter().map(|&i| augmented.states[i].node).collect();
-    let jacobian = jacobian::forward(augmented.graph(), &f, &x);
-    let row = |i: usize| (0..x.len()).map(|j| jacobian.get(i, j)).collect();
+    let jacobian = jacobian::forward(graph, &f, &x);
+    let entry = |i: usize, j: usize| Some(graph.expr(jacobian.get(i, j)?));
+    let row = |i: usize| (0..x.len()).map(|j| entry(i, j)).collect();
     (0..f.len()).map(row).collect()
 }
 
-/// C = (1, 0, …, 0)
-fn unit(graph: &Graph, n: usize) -> Vec<Sparse> {
-    let one = graph.constant(1.0).node();
-    (0..n).map(|j| (j == 0).then_some(one)).collect()
-}
-
-fn sum(graph: &Graph, a: Sparse, b: Sparse) -> Sparse {
-    match (a, b) {
-        (Some(a), Some(b)) => Some((graph.expr(a) + graph.expr(b)).node()),
-        (a, b) => a.or(b),
-    }
-}
-
-fn product<'g>(graph: &'g Graph, a: Sparse, b: Sparse) -> Option<Expr<'g>> {
-    Some(graph.expr(a?) * graph.expr(b?))
-}
-
-fn dot(graph: &Graph, a: &[Sparse], b: &[Sparse]) -> Sparse {
-    let terms = a.iter().zip(b).filter_map(|(&a, &b)| product(graph, a, b));
-    terms.reduce(|a, b| a + b).map(Expr::node)
-}
-
-fn times(graph: &Graph, row: &[Sparse], F: &[Vec<Sparse>]) -> Vec<Sparse> {
-    let column = |j: usize| F.iter().map(|r| r[j]).collect::<Vec<_>>();
-    (0..row.len())
-        .map(|j| dot(graph, row, &column(j)))
-        .collect()
-}
-
 /// (right − known)/pivot
-fn eliminated(graph: &Graph, right: Sparse, known: Sparse, pivot: Sparse) -> Sparse {
-    let numerator = match (right, known) {
-        (Some(r), Some(k)) => graph.expr(r) - graph.expr(k),
-        (Some(r), None) => graph.expr(r),
-        (None, Some(k)) => -graph.expr(k),
-        (None, None) => return None,
-    };
-    Some(match pivot {
-        Some(pivot) => (numerator / graph.expr(pivot)).node(),
-        None => numerator.node(),
-    })
+fn eliminated<'g>(right: Sparse<'g>, known: Sparse<'g>, pivot: Sparse<'g>) -> Sparse<'g> {
+    let numerator = minus(right, known)?;
+    Some(pivot.map_or(numerator, |pivot| numerator / pivot))
 }
 
 /// x with M x = b for a lower triangular M.
-fn solve_lower(graph: &Graph, M: &[Vec<Sparse>], b: Vec<Sparse>) -> Vec<Sparse> {
-    let mut x: Vec<Sparse> = vec![];
+fn solve_lower<'g>(M: &[Vec<Sparse<'g>>], b: Vec<Sparse<'g>>) -> Vec<Sparse<'g>> {
+    let mut x: Vec<Sparse<'g>> = vec![];
     for (i, right) in b.into_iter().enumerate() {
-        let known = dot(graph, &M[i][..i], &x);
-        x.push(eliminated(graph, right, known, M[i][i]));
+        let known = dot(&M[i][..i], &x);
+        x.push(eliminated(right, known, M[i][i]));
     }
     x
 }
 
 /// q with q M = c for a lower triangular M.
-fn solve_left(graph: &Graph, M: &[Vec<Sparse>], c: Vec<Sparse>) -> Vec<Sparse> {
+fn solve_left<'g>(M: &[Vec<Sparse<'g>>], c: &[Sparse<'g>]) -> Vec<Sparse<'g>> {
     let n = c.len();
-    let mut q: Vec<Sparse> = vec![None; n];
+    let mut q: Vec<Sparse<'g>> = vec![None; n];
     for j in (0..n).rev() {
-        let column: Vec<Sparse> = M.iter().map(|row| row[j]).collect();
-        let known = dot(graph, &q[j + 1..], &column[j + 1..]);
-        q[j] = eliminated(graph, c[j], known, M[j][j]);
+        let column: Vec<Sparse<'g>> = M.iter().map(|row| row[j]).collect();
+        let known = dot(&q[j + 1..], &column[j + 1..]);
+        q[j] = eliminated(c[j], known, M[j][j]);
     }
     q
 }

@@ -3,11 +3,10 @@
 use lynkeus_structure::{AugmentedPlant, ChainRequest};
 
 use super::said::Correction;
-use crate::conditions::{CHAINS, chain_request};
+use crate::conditions::{CHAINS, chain_request, output_names};
 use crate::estimate::PROLONG;
 use crate::guarantee::{LMI, LMI_KEYS, Lmi};
 use crate::peaking::Remedies;
-use crate::tuning::Deferred;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value, peaking};
 
 const THETA: KeySpec = KeySpec {
@@ -66,8 +65,7 @@ pub(super) const KEYS: &[&[KeySpec]] = &[&OWN, &LMI_KEYS, &peaking::KEYS];
 /// The keys, read.
 pub struct Settings {
     pub common: Tuning,
-    /// per measured output, as in every list here
-    pub θ: Deferred<Option<Vec<f64>>>,
+    /// per measured output
     pub K: Option<Vec<Vec<f64>>>,
     /// K comes from the study as it is, not by its poles
     pub given: bool,
@@ -75,8 +73,9 @@ pub struct Settings {
     /// the outputs, by place, in the order of the blocks
     pub order: Option<Vec<usize>>,
     pub request: ChainRequest,
-    pub lmi: Deferred<Option<Lmi>>,
     pub remedies: Remedies,
+    /// measured outputs
+    outputs: usize,
 }
 
 impl Settings {
@@ -88,28 +87,31 @@ impl Settings {
         let lengths = K.as_ref().map(|k| k.iter().map(Vec::len).collect());
         Ok(Self {
             common: tuning.checked()?,
-            θ: tuning.positive_per_chain(THETA.name, count),
             K,
             given: tuning.values.contains_key(GIVEN.name),
             correction: correction.unwrap_or(Correction::Lee),
             request: chain_request(augmented, tuning, GIVEN.name, lengths)?,
             order: order(augmented, tuning)?,
-            lmi: (tuning.meant(&GAIN, [true])).and_then(|asked| Lmi::read(tuning, asked.is_some())),
             remedies,
+            outputs: count,
         })
     }
 
-    /// The first of the keys left for later that has a wrong value.
-    pub fn deferred(&self) -> Result<(), TuningError> {
-        self.θ.as_ref().map_err(TuningError::clone)?;
-        self.lmi.as_ref().map_err(TuningError::clone)?;
-        Ok(())
+    /// θ by measured output, where the study has it.
+    pub fn given_θ(&self) -> Result<Option<Vec<f64>>, TuningError> {
+        self.common.positive_per_chain(THETA.name, self.outputs)
     }
 
     /// θ, which has no default.
     pub fn θ(&self) -> Result<Vec<f64>, TuningError> {
         let missing = || TuningError::absent(THETA.name, "a positive number per chain");
-        self.θ.clone()?.ok_or_else(missing)
+        self.given_θ()?.ok_or_else(missing)
+    }
+
+    /// The certified gain, where the study asks for one.
+    pub fn lmi(&self) -> Result<Option<Lmi>, TuningError> {
+        let asked = self.common.meant(&GAIN, [true])?;
+        Lmi::read(&self.common, asked.is_some())
     }
 
     /// K for chains of these lengths, every eigenvalue of A − KC at −1 by default.
@@ -154,8 +156,7 @@ fn order(
     let Some(names) = tuning.names(ORDER.name)? else {
         return Ok(None);
     };
-    let outputs = augmented.outputs.iter().map(|o| o.variable.name.as_str());
-    let outputs: Vec<&str> = outputs.collect();
+    let outputs = output_names(augmented);
     let place = |name: &String| outputs.iter().position(|o| o == name);
     let places: Option<Vec<usize>> = names.iter().map(place).collect();
     let all = places.filter(|places| {

@@ -14,14 +14,15 @@ use lynkeus_proof::{lyapunov, metzler};
 use lynkeus_structure::{AugmentedPlant, Blocks, Standing};
 use nalgebra::DMatrix;
 
-use super::form::chain_rule;
+use super::form::{Form, chain_rule};
 use super::said::{Correction, Lee, Said};
 use super::settings::Settings;
 use super::transformed::{Plant, Similar, Table, Term};
 use crate::conditions::{GainedChain, Partial, along, names};
+use crate::design::Found;
 use crate::peaking::departure;
 use crate::statement::{proved, standing, undecided};
-use crate::theorem::{conclude, slopes, state_noise};
+use crate::theorem::{as_computed, conclude, is_along, slopes, state_noise};
 use crate::{Assumptions, Certificate, Check, Constant, DesignError, Reason, Tuning, estimate};
 
 pub(super) const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
@@ -29,10 +30,10 @@ pub(super) const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
 pub(super) fn certificate(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
-    blocks: &Blocks,
+    Found { form, .. }: Found<Form>,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
-    let lmi = settings.lmi.clone()?;
+    let (lmi, blocks) = (settings.lmi()?, &form.blocks);
     if let Some(check) = departure(Lee::Observer, lmi.as_ref(), &settings.remedies) {
         return Ok(Certificate::new(BASIS, assumptions, vec![check]));
     }
@@ -122,7 +123,7 @@ impl Study<'_> {
         let similar = (0..count).map(|i| self.plant.similar(i));
         let similar: Vec<Similar> = similar.collect::<Result<_, _>>()?;
         self.terms = match classical {
-            true => plain.into_iter().map(steady).collect(),
+            true => plain.into_iter().map(Term::from).collect(),
             false => self.plant.terms(&similar)?,
         };
         (self.partials, self.similar) = (ranges.collect(), similar);
@@ -137,9 +138,7 @@ impl Study<'_> {
     fn skipped(&self, row: usize, column: usize) -> bool {
         let order = &self.blocks().order;
         let place = |state: usize| order.iter().position(|(_, c)| c.contains(&state));
-        let along = order
-            .iter()
-            .any(|(_, c)| c.windows(2).any(|p| p == [row, column]));
+        let along = order.iter().any(|(_, c)| is_along(c, row, column));
         along || place(column) > place(row)
     }
 
@@ -176,16 +175,12 @@ impl Study<'_> {
         let states = self.blocks().order[i].1.clone();
         let speed = Interval::point(θ);
         let weighed = |i, j| Interval::point(c) * Interval::point(P[(i, j)]);
-        let error = Interval::new(1.0 - 1e-12, 1.0 + 1e-12).unwrap_or(Interval::ONE);
         Chain {
             scales: (1..=states.len()).map(|j| speed.powi(j as i32)).collect(),
             states,
             speed,
             S: square(P.nrows(), weighed),
-            g: self.plant.K[i]
-                .iter()
-                .map(|&k| Interval::point(k) * error)
-                .collect(),
+            g: as_computed(self.plant.K[i].iter().copied()),
             partials: self.partials[i].iter().map(|&range| range.into()).collect(),
         }
     }
@@ -257,13 +252,14 @@ impl Study<'_> {
             chains.find_map(|(i, (_, c))| Some((i, c.iter().position(|s| *s == state)? + 1)))
         };
         self.terms.iter().all(|term| {
-            let (Some((i, l)), Some((k, m))) = (place(term.row), place(term.column)) else {
+            let (Some((i, l)), Some((k, m))) = (place(term.steady.row), place(term.steady.column))
+            else {
                 return false;
             };
             let steady = ν[k] * m as f64 - ν[i] * l as f64 - 0.5 * (ν[i] + ν[k]);
             let powers = term.powers.iter().map(|&(c, power, _)| ν[c] * power as f64);
             let largest = powers.fold(0.0, f64::max);
-            let there = term.size > 0.0 || !term.powers.is_empty();
+            let there = term.steady.size > 0.0 || !term.powers.is_empty();
             !there || steady + largest <= 0.0
         })
     }
@@ -285,15 +281,6 @@ impl Study<'_> {
         let moving = (!self.classical).then(|| Said::MovingM.into());
         let notes = std::iter::once(self.place()).chain(self.rule.clone());
         notes.chain(moving).collect()
-    }
-}
-
-fn steady(slope: Slope) -> Term {
-    Term {
-        row: slope.row,
-        column: slope.column,
-        size: slope.size,
-        powers: vec![],
     }
 }
 
@@ -347,8 +334,8 @@ impl Study<'_> {
         let (rows, columns) = (&self.blocks().order[i].1, &self.blocks().order[j].1);
         let mut H = vec![vec![0.0; columns.len()]; rows.len()];
         for term in &self.terms {
-            let l = rows.iter().position(|s| *s == term.row);
-            let m = columns.iter().position(|s| *s == term.column);
+            let l = rows.iter().position(|s| *s == term.steady.row);
+            let m = columns.iter().position(|s| *s == term.steady.column);
             if let (Some(l), Some(m)) = (l, m) {
                 let scale = |θ: f64, k: usize| Interval::point(θ).powi(k as i32 + 1);
                 let size = Interval::point(term.at(&self.θ).size);

@@ -12,13 +12,14 @@
 //! On the box |y − x̂_1| is at most the width of the range of x_1, so Ṁ has a bound
 //! with powers of θ, and the terms here carry them.
 
-use lynkeus_expr::{Interval, Node, jacobian};
+use lynkeus_expr::{Expr, Interval, Node, jacobian};
 use lynkeus_proof::chain::Slope;
 use lynkeus_proof::magnitude::{plus, product, times};
 use lynkeus_proof::matrix::sum;
 use lynkeus_structure::{AugmentedPlant, Blocks, Chain, Matrix, range};
 
-use super::observer::{Sparse, Steps, slopes};
+use super::observer::{Steps, slopes};
+use crate::sparse::Sparse;
 use crate::theorem::magnitude;
 use crate::{Assumptions, DesignError};
 
@@ -27,11 +28,17 @@ pub(super) type Table = Vec<Vec<f64>>;
 
 /// |∂ē_row'/∂ē_column| ≤ size + Σ coefficient·θ_chain^power.
 pub(super) struct Term {
-    pub row: usize,
-    pub column: usize,
-    pub size: f64,
+    /// what does not grow with θ
+    pub steady: Slope,
     /// (place of the chain, power, coefficient)
     pub powers: Vec<(usize, usize, f64)>,
+}
+
+impl From<Slope> for Term {
+    fn from(steady: Slope) -> Self {
+        let powers = vec![];
+        Self { steady, powers }
+    }
 }
 
 impl Term {
@@ -39,11 +46,10 @@ impl Term {
         let grown = self.powers.iter().map(|&(c, k, coefficient)| {
             Interval::point(coefficient) * Interval::point(θ[c]).powi(k as i32)
         });
-        let size = (Interval::point(self.size) + sum(grown)).hi();
+        let size = (Interval::point(self.steady.size) + sum(grown)).hi();
         Slope {
-            row: self.row,
-            column: self.column,
             size,
+            ..self.steady
         }
     }
 }
@@ -53,7 +59,7 @@ pub(super) struct Similar {
     pub M: Table,
     pub inverse: Table,
     pub L: Vec<f64>,
-    nodes: Vec<Vec<Sparse>>,
+    nodes: Vec<Vec<Option<Node>>>,
 }
 
 /// What the bounds are taken of.
@@ -68,15 +74,15 @@ pub(super) struct Plant<'a> {
 }
 
 impl Plant<'_> {
-    fn size(&self, node: Sparse) -> Result<f64, DesignError> {
+    fn size(&self, node: Option<Node>) -> Result<f64, DesignError> {
         match node {
             None => Ok(0.0),
             Some(node) => magnitude(self.augmented.graph(), node, &self.assumptions.region),
         }
     }
 
-    fn table(&self, nodes: &[Vec<Sparse>]) -> Result<Table, DesignError> {
-        let row = |row: &Vec<Sparse>| row.iter().map(|&x| self.size(x)).collect();
+    fn table(&self, nodes: &[Vec<Option<Node>>]) -> Result<Table, DesignError> {
+        let row = |row: &Vec<_>| row.iter().map(|&x| self.size(x)).collect();
         nodes.iter().map(row).collect()
     }
 
@@ -85,14 +91,13 @@ impl Plant<'_> {
     }
 
     pub fn similar(&self, place: usize) -> Result<Similar, DesignError> {
-        let graph = self.augmented.graph();
         let found = Steps::new(self.augmented, self.chain(place));
-        let nodes = found.M(graph);
-        let L = found.L.iter().map(|&l| self.size(l));
+        let nodes = found.M();
+        let L = found.L.iter().map(|l| self.size(l.map(Expr::node)));
         Ok(Similar {
             L: L.collect::<Result<_, _>>()?,
             M: self.table(&nodes)?,
-            inverse: self.table(&found.inverse(graph))?,
+            inverse: self.table(&found.inverse())?,
             nodes,
         })
     }
@@ -106,7 +111,8 @@ impl Plant<'_> {
             self.moving(i, similar, &mut found)?;
             terms.extend(found);
             for (j, before) in similar.iter().enumerate().take(i) {
-                let coupled = product(&product(&own.M, &self.coupling(i, j)?), &before.inverse);
+                let slopes = self.jacobian(self.chain(i), self.chain(j))?;
+                let coupled = product(&product(&own.M, &slopes), &before.inverse);
                 terms.extend(self.entries(i, j, &coupled));
             }
         }
@@ -117,12 +123,7 @@ impl Plant<'_> {
         let (rows, columns) = (self.chain(i), self.chain(j));
         let pairs = table.iter().zip(rows).flat_map(|(entries, &row)| {
             let columns = entries.iter().zip(columns);
-            columns.map(move |(&size, &column)| Term {
-                row,
-                column,
-                size,
-                powers: vec![],
-            })
+            columns.map(move |(&size, &column)| Slope { row, column, size }.into())
         });
         pairs.collect()
     }
@@ -130,8 +131,10 @@ impl Plant<'_> {
     /// Widths of the ranges of the entries of F_i.
     fn widths(&self, i: usize) -> Result<Table, DesignError> {
         let (graph, region) = (self.augmented.graph(), &self.assumptions.region);
-        let width = |node: &Sparse| -> Result<f64, DesignError> {
-            let Some(node) = *node else { return Ok(0.0) };
+        let width = |entry: &Sparse<'_>| -> Result<f64, DesignError> {
+            let Some(node) = entry.map(Expr::node) else {
+                return Ok(0.0);
+            };
             let found = range(graph, node, region)?;
             let span =
                 Interval::point(found.enclosure.hi()) - Interval::point(found.enclosure.lo());
@@ -142,24 +145,21 @@ impl Plant<'_> {
                 (None, false) => f64::INFINITY,
             })
         };
-        let row = |row: &Vec<Sparse>| row.iter().map(width).collect();
+        let row = |row: &Vec<Sparse<'_>>| row.iter().map(width).collect();
         let own = self.chain(i);
         slopes(self.augmented, own, own).iter().map(row).collect()
     }
 
-    /// |∂f_i/∂x_j|
-    fn coupling(&self, i: usize, j: usize) -> Result<Table, DesignError> {
-        self.jacobian(self.chain(i), self.chain(j))
-    }
-
     /// |∂f/∂x| for the equations of `rows` and the states `columns`.
     pub fn jacobian(&self, rows: &[usize], columns: &[usize]) -> Result<Table, DesignError> {
-        self.table(&slopes(self.augmented, rows, columns))
+        let size = |entry: &Sparse<'_>| self.size(entry.map(Expr::node));
+        let row = |row: &Vec<Sparse<'_>>| row.iter().map(size).collect();
+        let slopes = slopes(self.augmented, rows, columns);
+        slopes.iter().map(row).collect()
     }
 
     /// Adds Ṁ M⁻¹ to the terms of chain i.
     fn moving(&self, i: usize, similar: &[Similar], terms: &mut [Term]) -> Result<(), DesignError> {
-        let n = self.chain(i).len();
         for (c, (_, chain)) in self.blocks.order.iter().enumerate() {
             for (place, &state) in chain.iter().enumerate() {
                 let slope = self.slope_of_M(&similar[i], self.augmented.states[state].node)?;
@@ -169,8 +169,8 @@ impl Plant<'_> {
                 }
                 let (steady, powers) = self.speed(c, place, i, similar)?;
                 for (p, &factor) in product.iter().flatten().enumerate() {
-                    let term = &mut terms[p / n * n + p % n];
-                    term.size = plus(term.size, times(factor, steady));
+                    let term = &mut terms[p];
+                    term.steady.size = plus(term.steady.size, times(factor, steady));
                     let grown = powers.iter().map(|&(k, x)| (c, k, times(factor, x)));
                     term.powers.extend(grown.filter(|g| g.2 != 0.0));
                 }
@@ -183,7 +183,8 @@ impl Plant<'_> {
             let slope = self.slope_of_M(&similar[i], symbol)?;
             let product = product(&slope, &similar[i].inverse);
             for (p, &size) in product.iter().flatten().enumerate() {
-                terms[p].size = plus(terms[p].size, times(size, speed));
+                let steady = &mut terms[p].steady.size;
+                *steady = plus(*steady, times(size, speed));
             }
         }
         Ok(())
@@ -199,7 +200,7 @@ impl Plant<'_> {
         };
         let slopes = Matrix::from_fn(graph, (n, n), slope);
         let row = |i: usize| (0..n).map(|j| slopes.get(i, j)).collect();
-        self.table(&(0..n).map(row).collect::<Vec<Vec<Sparse>>>())
+        self.table(&(0..n).map(row).collect::<Vec<_>>())
     }
 
     /// |x̂'| of the state at `place` in chain c ≤ i, as (steady part, powers of θ_c);
@@ -214,12 +215,8 @@ impl Plant<'_> {
         let state = self.chain(c)[place];
         let f = self.size(Some(self.augmented.derivatives[state]))?;
         if c > i {
-            let drift = self
-                .assumptions
-                .drift
-                .get(state)
-                .copied()
-                .unwrap_or(f64::INFINITY);
+            let drift = self.assumptions.drift.get(state);
+            let drift = drift.copied().unwrap_or(f64::INFINITY);
             // a noisy signal has no derivative, nor has one that process noise moves
             let moved = self.assumptions.process_noise.get(state);
             let smooth = self.noise[c] == 0.0 && moved.is_none_or(|density| *density == 0.0);
@@ -230,12 +227,8 @@ impl Plant<'_> {
             ));
         }
         let head = &self.augmented.states[self.chain(c)[0]];
-        let side = self
-            .assumptions
-            .region
-            .dimensions
-            .iter()
-            .find(|d| d.symbol == head.node);
+        let mut sides = self.assumptions.region.dimensions.iter();
+        let side = sides.find(|d| d.symbol == head.node);
         let width = side.map_or(f64::INFINITY, |d| plus(d.max, -d.min));
         let innovation = plus(width, self.noise[c]);
         let row = &similar[c].inverse[place];

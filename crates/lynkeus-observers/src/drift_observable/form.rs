@@ -14,10 +14,9 @@ use super::said::Said;
 use super::settings::{Settings, Variant};
 use crate::conditions::{lasts, lipschitz, names};
 use crate::design::Found;
+use crate::family::Settings as _;
 use crate::statement::{sufficient, undecided};
 use crate::{Check, DesignError, Examination, Germani, Reason, Statement};
-
-pub(super) const NAME: &str = "drift-observable";
 
 /// Operations of the map that a second is enough for, with what is decided of them: measured on
 /// chains of 20 to 100 states, generously.
@@ -150,7 +149,8 @@ impl Form {
         }
         let every: Vec<usize> = (0..augmented.states.len()).collect();
         let (summary, chains) = (form.summary(augmented), vec![names(augmented, &every)]);
-        let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
+        let examination =
+            Examination::new(augmented, region, Settings::FAMILY, summary, chains, checks)?;
         Ok(Found { form, examination })
     }
 
@@ -264,7 +264,7 @@ fn at(graph: &Graph, Q: &Rows, images: &HashMap<Node, Node>) -> Rows {
 }
 
 pub(super) fn unfit(summary: impl Into<Reason>) -> Examination {
-    Examination::unfit(NAME, summary, vec![])
+    Examination::unfit(Settings::FAMILY, summary, vec![])
 }
 
 /// Φ̄, and Q̄ and Q̄_a of (4.20).
@@ -370,13 +370,7 @@ pub(super) fn with_slopes(
     for ((input, jet), bounds) in augmented.inputs.iter().zip(U).zip(bounds) {
         let further = jet.iter().enumerate().skip(1).map(|(k, &symbol)| {
             let bound = bounds.get(k - 1).copied().unwrap_or(f64::INFINITY);
-            Dimension {
-                name: derivative_name(&input.name, k),
-                symbol,
-                min: -bound,
-                max: bound,
-                integer: false,
-            }
+            Dimension::new(derivative_name(&input.name, k), symbol, -bound, bound)
         });
         region.dimensions.extend(further);
     }

@@ -24,56 +24,28 @@ mod said;
 mod settings;
 mod theorem;
 
-use lynkeus_structure::{AugmentedPlant, Region};
-
-use crate::design::Found;
-use crate::family::Stages;
-use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
-use form::{Form, NAME};
+use crate::family::{self, Family, Paper};
 pub use said::{Germani, Known, Others, Said};
 use settings::Settings;
 
 const PAPER: &str = "Germani, Manes 1999, http://dml.cz/dmlcz/135297";
 
 /// The family `drift-observable`.
-#[derive(Clone, Copy, Debug)]
-pub struct DriftObservable;
+pub const DRIFT_OBSERVABLE: &dyn Family = &Paper {
+    name: "drift-observable",
+    paper: PAPER,
+    basis: PAPER,
+    form_on_assumed_box: true,
+    keys: &[&settings::KEYS],
+    speeds: &[],
+    read: Settings::read,
+    deferred: |_| Ok(()),
+    form: indices::form,
+    design: observer::design,
+    theorem: theorem::certificate,
+};
 
-impl Stages for DriftObservable {
-    type Settings = Settings;
-    type Form<'e, 'p: 'e> = Form;
-    const NAME: &'static str = NAME;
-    const PAPER: &'static str = PAPER;
-    const BASIS: &'static str = PAPER;
-    const FORM_ON_ASSUMED_BOX: bool = true;
-    const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];
-
-    fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
-        Settings::read(augmented, tuning)
-    }
-
-    fn form(
-        augmented: &AugmentedPlant<'_>,
-        settings: &Settings,
-        region: &Region,
-    ) -> Result<Found<Form>, DesignError> {
-        indices::form(augmented, settings, region)
-    }
-
-    fn design(
-        augmented: &AugmentedPlant<'_>,
-        settings: &Settings,
-        found: Found<Form>,
-    ) -> Result<Design, DesignError> {
-        observer::design(augmented, settings, found)
-    }
-
-    fn theorem(
-        augmented: &AugmentedPlant<'_>,
-        settings: &Settings,
-        found: Found<Form>,
-        assumptions: &Assumptions,
-    ) -> Result<Certificate, DesignError> {
-        theorem::certificate(augmented, settings, found, assumptions)
-    }
+impl family::Settings for Settings {
+    type Form<'e> = form::Form;
+    const FAMILY: &'static dyn Family = DRIFT_OBSERVABLE;
 }

@@ -10,7 +10,7 @@ use lynkeus_proof::magnitude::{root, times};
 use lynkeus_structure::AugmentedPlant;
 use nalgebra::{DMatrix, DVector};
 
-use super::form::{Form, NAME, derivative_name};
+use super::form::{Form, derivative_name};
 use super::said::Said;
 use super::settings::{Settings, Variant, spaced};
 use crate::design::Found;
@@ -55,7 +55,7 @@ pub(super) fn design(
         .map(|(&f, &x)| (graph.expr(f) + graph.expr(x)).node())
         .collect();
     derivatives.extend(filters.iter().flat_map(|filter| filter.derivatives(graph)));
-    let mut observer = copy.observer(NAME, derivatives)?.tuned_by([&speed]);
+    let mut observer = copy.observer(derivatives)?.tuned_by([&speed]);
     let x_a = filters.into_iter().flat_map(|filter| filter.x_a);
     observer.states.extend(x_a.zip(gains.filter_start.concat()));
     let matrix = match form.variant {

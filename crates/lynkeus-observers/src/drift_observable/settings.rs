@@ -1,8 +1,6 @@
 //! The study's keys: which of the three observers, indices, poles, filters, bounds of slopes.
 //! What depends on the form is kept as it stands until the indices are known.
 
-use std::collections::BTreeMap;
-
 use lynkeus_expr::Node;
 use lynkeus_gain::integrators::{self, Lemma32, Pole};
 use lynkeus_structure::AugmentedPlant;
@@ -119,7 +117,6 @@ pub struct Settings {
     pub indices: Vec<Option<usize>>,
     /// α, β and γ of Lemma 3.2
     lemma: [Option<f64>; 3],
-    values: BTreeMap<String, Value>,
     /// names of the known inputs
     inputs: Vec<String>,
 }
@@ -133,20 +130,19 @@ impl Settings {
             variant: tuning.meant(&VARIANT, Variant::ALL)?,
             indices: indices(augmented, tuning)?,
             lemma: [positive(ALPHA)?, positive(BETA)?, positive(GAMMA)?],
-            values: tuning.values.clone(),
             inputs: names.collect(),
         })
     }
 
     /// Whether the study decides the poles.
     pub fn has_poles(&self) -> bool {
-        self.values.contains_key(POLES.name) || self.lemma[0].is_some()
+        self.common.values.contains_key(POLES.name) || self.lemma[0].is_some()
     }
 
     /// `poles`: for one output its n poles; for several a list or the slowest pole of each. A single
     /// number is the slowest pole of every output. None where they are not listed.
     pub fn poles(&self, μ: &[usize]) -> Result<Option<Vec<Vec<Pole>>>, TuningError> {
-        let Some(value) = self.values.get(POLES.name) else {
+        let Some(value) = self.common.values.get(POLES.name) else {
             return Ok(None);
         };
         let given = per_output(value, μ.len())?;
@@ -233,7 +229,7 @@ impl Settings {
         read: impl Fn(&Value, usize) -> Result<Option<T>, TuningError>,
     ) -> Result<Vec<Option<T>>, TuningError> {
         let mut found: Vec<Option<T>> = self.inputs.iter().map(|_| None).collect();
-        let Some(all) = self.values.get(key.name) else {
+        let Some(all) = self.common.values.get(key.name) else {
             return Ok(found);
         };
         let takes: Vec<usize> = (0..found.len()).filter(|&j| orders[j] > 0).collect();
@@ -363,12 +359,9 @@ fn per_output(value: &Value, p: usize) -> Result<Vec<Poles>, TuningError> {
 
 /// So many finite numbers.
 fn numbers(value: &Value, count: usize) -> Result<Option<Vec<f64>>, TuningError> {
-    let number = |value: &Value| match value {
-        Value::Number(x) if x.is_finite() => Some(*x),
-        _ => None,
-    };
-    let found: Option<Vec<f64>> = match value {
-        Value::List(values) => values.iter().map(number).collect(),
+    let number = |value: &Value| value.number().filter(|x| x.is_finite());
+    let found = match value {
+        Value::List(_) => value.all(number),
         one => number(one).map(|x| vec![x]),
     };
     Ok(found.filter(|found| found.len() == count))
@@ -429,10 +422,7 @@ fn pole(key: &str, value: &Value) -> Result<Option<Pole>, TuningError> {
     match value {
         Value::Number(λ) => Ok(Some(Pole::Real(negative(key, *λ)?))),
         Value::Table(parts) => {
-            let part = |name: &str| match parts.get(name) {
-                Some(Value::Number(x)) if x.is_finite() => Some(*x),
-                _ => None,
-            };
+            let part = |name: &str| parts.get(name)?.number().filter(|x| x.is_finite());
             let (Some(re), Some(im), 2) = (part("re"), part("im"), parts.len()) else {
                 let expected = "a conjugate pair as { re = number, im = number }";
                 return Err(TuningError::new(key, expected, value));

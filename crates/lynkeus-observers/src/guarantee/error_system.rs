@@ -35,11 +35,11 @@ pub(super) struct ErrorSystem {
     /// bounds of |∂F_i/∂y_j|, one row per state
     pub injection: Vec<Vec<f64>>,
     /// A at x̂ = x, row by row, at a point of `sides`
-    right: Tape,
-    /// A as an expression, row by row
-    entries: Vec<Node>,
-    /// F(x̂, u, h(x̂))
-    corrected: Vec<Node>,
+    pub right: Tape,
+    /// A as an expression of estimate, known inputs, measurements and time, row by row
+    pub entries: Vec<Node>,
+    /// what the observer does where it is right, F(x̂, u, h(x̂))
+    pub corrected: Vec<Node>,
     /// estimate (here also the state), known inputs, and time if A depends on it
     pub sides: Region,
 }
@@ -120,20 +120,6 @@ impl ErrorSystem {
         Statement::from(Inequality::SlopesAreBounded).found(verdict, said)
     }
 
-    /// A as an expression of estimate, known inputs, measurements and time, row by row.
-    pub fn entries(&self) -> &[Node] {
-        &self.entries
-    }
-
-    /// What the observer does where it is right, F(x̂, u, h(x̂)).
-    pub fn corrected(&self) -> &[Node] {
-        &self.corrected
-    }
-
-    pub fn evaluator(&self) -> Evaluator {
-        self.right.evaluator()
-    }
-
     /// Whether an entry of A has kinks, jumps or singular ends: |x|, min, √, conditions.
     pub fn is_rough(&self, graph: &Graph) -> bool {
         !edges(graph, &self.entries, &self.region.symbols()).is_empty()
@@ -201,25 +187,15 @@ fn seen_by(
     let moving = observer.input_derivatives.iter().map(|d| {
         let input = augmented.inputs.iter().position(|u| u.name == d.input);
         let bound = input.map_or(f64::INFINITY, |j| assumptions.input_derivative(j, d.order));
-        Dimension {
-            name: d.signal.name.clone(),
-            symbol: d.signal.symbol,
-            min: -bound,
-            max: bound,
-            integer: false,
-        }
+        Dimension::new(&d.signal.name, d.signal.symbol, -bound, bound)
     });
     seen.dimensions.extend(moving);
     for (j, (signal, output)) in observer.measured.iter().zip(&augmented.outputs).enumerate() {
         let values = range(augmented.graph(), output.variable.node, region)?.enclosure;
         let values = values.inflate(assumptions.noise.get(j).copied().unwrap_or(0.0));
-        seen.dimensions.push(Dimension {
-            name: signal.name.clone(),
-            symbol: signal.symbol,
-            min: values.lo(),
-            max: values.hi(),
-            integer: false,
-        });
+        let (low, high) = (values.lo(), values.hi());
+        let side = Dimension::new(&signal.name, signal.symbol, low, high);
+        seen.dimensions.push(side);
     }
     Ok(seen)
 }
@@ -297,18 +273,10 @@ fn around_innovations(
         innovations.push(Innovation { symbol, state });
         let values = range(graph, hat, region)?.enclosure;
         let size = (Interval::point(values.hi()) - Interval::point(values.lo())).magnitude();
-        let size = if size.is_finite() {
-            size
-        } else {
-            f64::INFINITY
-        };
-        sides.dimensions.push(Dimension {
-            name,
-            symbol,
-            min: -size,
-            max: size,
-            integer: false,
-        });
+        let size = Some(size).filter(|size| size.is_finite());
+        let size = size.unwrap_or(f64::INFINITY);
+        let side = Dimension::new(name, symbol, -size, size);
+        sides.dimensions.push(side);
     }
     let derivatives = graph.substitute(&observer.derivatives, &images);
     Slopes::new(graph, &derivatives, symbols, &innovations, &sides)

@@ -14,7 +14,6 @@ use lynkeus_structure::{AugmentedPlant, Measurement, Slopes, range};
 
 use super::error_system::{ErrorSystem, expanded};
 use super::said::{Obstacle, Said};
-use crate::conditions::on_output;
 use crate::estimate::PlantCopy;
 use crate::{
     ChainGain, Design, DesignError, Examination, KeySpec, ParameterValue, Shape, Tuning,
@@ -44,6 +43,9 @@ const MINIMISE: KeySpec = KeySpec {
     default: "`\"noise\"`",
     meaning: "what the gain makes small at that rate, with `\"lmi\"`",
 };
+
+/// What the words of [`MINIMISE`] stand for.
+const AIMS: [Aim; 3] = [Aim::Noise, Aim::Gain, Aim::Peak];
 
 /// The word under the key `gain` that asks for it.
 pub(crate) const LMI: &str = "lmi";
@@ -82,19 +84,18 @@ impl Lmi {
             (true, _) => Ok(Some(Self {
                 rate: tuning.positive(RATE.name)?,
                 limit: tuning.positive(LIMIT.name)?,
-                aim: aim(tuning)?,
+                aim: tuning.meant(&MINIMISE, AIMS)?.unwrap_or(Aim::Noise),
                 noise: tuning.noise.clone(),
             })),
         }
     }
 }
 
-/// The observer with a certified gain, under the name of the family that asked.
+/// The observer with a certified gain, for the family that asked.
 pub(crate) fn design_lmi(
     augmented: &AugmentedPlant<'_>,
     common: &Tuning,
     asked: Lmi,
-    family: &'static str,
     examination: Examination,
 ) -> Result<Design, DesignError> {
     estimate::refuse(common, "gain = \"lmi\"")?;
@@ -124,7 +125,7 @@ pub(crate) fn design_lmi(
             return Err(TuningError::absent(RATE.name, expected).into());
         }
     };
-    assemble(augmented, &copy, family, examination, &request, &gain)
+    assemble(augmented, &copy, examination, &request, &gain)
 }
 
 /// Of each output the state that it shows, and |c| of y = c·x + d: the smallest on the box where it
@@ -169,15 +170,6 @@ fn weights(augmented: &AugmentedPlant<'_>, declared: &BTreeMap<String, f64>) -> 
         true => sizes,
         false => vec![1.0; sizes.len()],
     }
-}
-
-fn aim(tuning: &Tuning) -> Result<Aim, TuningError> {
-    let chosen = tuning.choice(MINIMISE.name, &["noise", "peak", "gain"])?;
-    Ok(match chosen.as_deref() {
-        Some("peak") => Aim::Peak,
-        Some("gain") => Aim::Gain,
-        _ => Aim::Noise,
-    })
 }
 
 fn none(key: &'static str, said: Said) -> DesignError {
@@ -241,7 +233,6 @@ fn fastest(system: &ErrorSystem, mut request: Request) -> Result<Gain, DesignErr
 fn assemble(
     augmented: &AugmentedPlant<'_>,
     copy: &PlantCopy<'_, '_>,
-    family: &'static str,
     examination: Examination,
     request: &Request,
     gain: &Gain,
@@ -258,14 +249,17 @@ fn assemble(
             let correction = graph.constant(k) * graph.expr(innovation);
             *derivative = (graph.expr(*derivative) - correction).node();
         }
-        let all: Vec<usize> = (0..K.len()).collect();
-        let entries = on_output(augmented, j, &all, &K);
+        let slope = output.state.map(|(_, slope, _)| slope);
+        let slope = slope.and_then(|slope| graph.constant_value(slope));
+        let states = augmented.states.iter().map(|state| state.name.clone());
+        // on ŷ − y, where the slope is a number
+        let on_output = K.iter().map(|k| k / slope.unwrap_or(1.0));
         gains.push(ChainGain {
             output: output.variable.name.clone(),
-            entries,
+            entries: states.zip(on_output).collect(),
         });
     }
-    let mut observer = copy.observer(family, derivatives)?;
+    let mut observer = copy.observer(derivatives)?;
     observer.is_whole = copy.common.tunable;
     let slopes = gain.proof.multipliers.first().map_or(0, |t| t.len());
     let row = |name: &str, value| (name.to_owned(), value);

@@ -19,7 +19,7 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape, jacobian};
 use lynkeus_proof::decay::is_unstable;
 use lynkeus_proof::spectrum;
-use lynkeus_structure::{AugmentedPlant, Coordinate, Dimension, Point};
+use lynkeus_structure::{AugmentedPlant, Dimension, Point};
 use nalgebra::{DMatrix, DVector};
 
 use super::error_system::{ErrorSystem, edges};
@@ -55,19 +55,21 @@ pub(super) struct Sample {
 /// The worst point that a deterministic search finds.
 pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Sample {
     let sides = system.sides.dimensions.iter().map(finite);
-    let mut search = Search {
-        system,
-        evaluator: system.evaluator(),
-        sides: match system.is_rough(graph) {
-            true => sides.enumerate().map(inner).collect(),
-            false => sides.collect(),
-        },
-        skipped: false,
+    let sides: Vec<Dimension> = match system.is_rough(graph) {
+        true => sides.enumerate().map(inner).collect(),
+        false => sides.collect(),
     };
-    let (mut best, mut highest) = (spread(&search.sides, 0), f64::NEG_INFINITY);
+    let mut evaluator = system.right.evaluator();
+    let mut skipped = false;
+    let mut abscissa = |point: &[f64]| {
+        let found = spectrum::abscissa(system.at(&mut evaluator, point));
+        skipped |= found.is_none();
+        found
+    };
+    let (mut best, mut highest) = (spread(&sides, 0), f64::NEG_INFINITY);
     for index in 0..POINTS {
-        let point = spread(&search.sides, index);
-        if let Some(abscissa) = search.abscissa(&point)
+        let point = spread(&sides, index);
+        if let Some(abscissa) = abscissa(&point)
             && abscissa > highest
         {
             (best, highest) = (point, abscissa);
@@ -75,25 +77,22 @@ pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Sample {
     }
     if highest.is_finite() {
         let moves = |side: &Dimension| !side.integer && side.min != side.max;
-        let sides = search.sides.clone();
         (highest, best) = climbed(&sides, HALVINGS, moves, (highest, best), |point| {
-            Some((search.abscissa(&point)?, point))
+            Some((abscissa(&point)?, point))
         });
     }
-    let coordinates = system.sides.dimensions.iter().zip(&best);
-    let named = coordinates.map(|(d, x)| (d.name.clone(), *x));
     let cell: Vec<Interval> = best.iter().map(|&x| Interval::point(x)).collect();
     // the mean of all real parts is no higher than the highest, and no matter of rounding
-    let mean = system.at(&mut search.evaluator, &best).trace() / system.scale.len() as f64;
+    let mean = system.at(&mut evaluator, &best).trace() / system.scale.len() as f64;
     Sample {
-        slowest: (!search.skipped).then_some(-highest),
+        slowest: (!skipped).then_some(-highest),
         limit: match highest < 0.0 && highest.is_finite() {
             true => -highest,
             false => -mean,
         },
         unstable: highest > 0.0 && is_unstable(&system.enclosed_at(&cell)),
         worst: Point {
-            coordinates: named.map(Coordinate::from).collect(),
+            coordinates: system.sides.coordinates(&best),
             value: highest,
         },
     }
@@ -122,17 +121,9 @@ pub(super) fn growing(
 /// its worst value: the plant need not stay in the box while the input keeps that value.
 fn is_constant(augmented: &AugmentedPlant<'_>, observer: &Observer, system: &ErrorSystem) -> bool {
     let graph = augmented.graph();
-    let read = graph.symbols_of(system.entries());
+    let read = graph.symbols_of(&system.entries);
     let hats: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
     read.is_empty() && edges(graph, &observer.derivatives, &hats).is_empty()
-}
-
-struct Search<'a> {
-    system: &'a ErrorSystem,
-    evaluator: Evaluator,
-    sides: Vec<Dimension>,
-    /// the eigenvalues at a point were not found
-    skipped: bool,
 }
 
 /// A side of the box with infinite ends replaced by large ones.
@@ -187,15 +178,6 @@ pub(super) fn spread(sides: &[Dimension], index: usize) -> Vec<f64> {
             if side.integer { x.round() } else { x }
         })
         .collect()
-}
-
-impl Search<'_> {
-    /// The largest real part of an eigenvalue of A there.
-    fn abscissa(&mut self, point: &[f64]) -> Option<f64> {
-        let found = spectrum::abscissa(self.system.at(&mut self.evaluator, point));
-        self.skipped |= found.is_none();
-        found
-    }
 }
 
 /// Coordinate by coordinate to a worse point, with ever smaller steps: of those that move, to what is
@@ -322,7 +304,7 @@ impl<'a> EquilibriumSearch<'a> {
         equations.sort();
         equations.dedup();
         equations.retain(|f| graph.constant_value(*f) != Some(0.0));
-        let moved = graph.symbols_of(&[&equations[..], system.corrected()].concat());
+        let moved = graph.symbols_of(&[&equations[..], &system.corrected[..]].concat());
         let still = !moved.contains(&augmented.plant.time) && !moved.contains(&observer.time);
         let sides = sides(system, symbols.len());
         let wide = sides
@@ -342,13 +324,13 @@ impl<'a> EquilibriumSearch<'a> {
         let hats: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
         let pairs = augmented.symbols().into_iter().zip(hats.iter().copied());
         let mut values = graph.substitute(&equations, &pairs.collect());
-        values.extend(system.corrected());
+        values.extend(&system.corrected);
         let mut smooth = edges(graph, &values, &hats);
         let edges = smooth.len();
         smooth.extend(values);
         Ok(Some(Self {
             system,
-            right: system.evaluator(),
+            right: system.right.evaluator(),
             plant: Tape::new(graph, &symbols, &equations)?,
             slopes: Tape::new(graph, &symbols, &entries)?,
             smooth: Tape::new(graph, &system.sides.symbols(), &smooth)?,
@@ -437,10 +419,9 @@ impl<'a> EquilibriumSearch<'a> {
         }
         let middle: Vec<f64> = cell.iter().map(|x| x.midpoint()).collect();
         let value = self.abscissa(&middle)?;
-        let sides = self.system.sides.dimensions.iter();
-        let named = sides.zip(self.full(&middle, 0.0));
+        let full = self.full(&middle, 0.0);
         Some(Point {
-            coordinates: named.map(|(d, x)| (d.name.clone(), x).into()).collect(),
+            coordinates: self.system.sides.coordinates(&full),
             value,
         })
     }

@@ -185,7 +185,7 @@ pub(crate) fn low_power(
         let added = run.add(&blocks).into_iter();
         parameters.extend(added.map(|(state, x)| (format!("{output}: on {state}"), x.into())));
     }
-    let mut observer = copy.observer(examination.family, run.derivatives)?;
+    let mut observer = copy.observer(run.derivatives)?;
     for (state, derivative) in run.copies {
         observer.states.push(state);
         observer.derivatives.push(derivative);

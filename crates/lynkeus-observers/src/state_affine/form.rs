@@ -4,12 +4,12 @@ use lynkeus_structure::output_map::Rows;
 use lynkeus_structure::{AugmentedPlant, Region, Standing, Superdiagonal, superdiagonal};
 
 use super::said::{Ltaief, Said};
+use super::settings::Settings;
 use crate::conditions::{lipschitz, names};
 use crate::design::Found;
+use crate::family::Settings as _;
 use crate::statement::standing;
 use crate::{DesignError, Examination, Reason, Statement};
-
-pub(super) const NAME: &str = "state-affine";
 
 /// A plant in blocks, with its states in their order.
 pub struct Form {
@@ -57,12 +57,13 @@ impl Form {
 /// The blocks with what is known of A2 and A4.
 pub(super) fn form(
     augmented: &AugmentedPlant<'_>,
+    _: &Settings,
     region: &Region,
 ) -> Result<Found<Form>, DesignError> {
     let form = match superdiagonal::find(augmented) {
         Ok(blocks) => Form::new(augmented, blocks),
         Err(why) => {
-            return Err(Examination::unfit(NAME, Reason::from(why), vec![]).into());
+            return Err(Examination::unfit(Settings::FAMILY, Reason::from(why), vec![]).into());
         }
     };
     let mut checks = vec![];
@@ -85,6 +86,7 @@ pub(super) fn form(
         blocks,
         depends_on_inputs,
     };
-    let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
+    let examination =
+        Examination::new(augmented, region, Settings::FAMILY, summary, chains, checks)?;
     Ok(Found { form, examination })
 }

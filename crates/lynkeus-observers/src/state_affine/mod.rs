@@ -21,58 +21,26 @@ mod said;
 mod settings;
 mod theorem;
 
-use lynkeus_structure::{AugmentedPlant, Region};
-
-use crate::design::Found;
-use crate::family::Stages;
-use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
-use form::{Form, NAME};
+use crate::family::{self, Family, Paper};
 pub use said::{Ltaief, Said};
 use settings::Settings;
-use theorem::BASIS;
 
 /// The family `state-affine`.
-#[derive(Clone, Copy, Debug)]
-pub struct StateAffine;
+pub const STATE_AFFINE: &dyn Family = &Paper {
+    name: "state-affine",
+    paper: "Ltaief, Maatoug, Farza, Ménard, M'Saad, Koubaa, observer (7)–(8)",
+    basis: theorem::BASIS,
+    form_on_assumed_box: false,
+    keys: &[&settings::KEYS],
+    speeds: &[],
+    read: Settings::read,
+    deferred: Settings::deferred,
+    form: form::form,
+    design: observer::design,
+    theorem: theorem::certificate,
+};
 
-impl Stages for StateAffine {
-    type Settings = Settings;
-    type Form<'e, 'p: 'e> = Form;
-    const NAME: &'static str = NAME;
-    const PAPER: &'static str = "Ltaief, Maatoug, Farza, Ménard, M'Saad, Koubaa, observer (7)–(8)";
-    const BASIS: &'static str = BASIS;
-    const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];
-
-    fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
-        Settings::read(augmented, tuning)
-    }
-
-    fn deferred(settings: &Settings) -> Result<(), TuningError> {
-        settings.deferred()
-    }
-
-    fn form(
-        augmented: &AugmentedPlant<'_>,
-        _: &Settings,
-        region: &Region,
-    ) -> Result<Found<Form>, DesignError> {
-        form::form(augmented, region)
-    }
-
-    fn design(
-        augmented: &AugmentedPlant<'_>,
-        settings: &Settings,
-        found: Found<Form>,
-    ) -> Result<Design, DesignError> {
-        observer::assemble(augmented, settings, found)
-    }
-
-    fn theorem(
-        augmented: &AugmentedPlant<'_>,
-        settings: &Settings,
-        found: Found<Form>,
-        assumptions: &Assumptions,
-    ) -> Result<Certificate, DesignError> {
-        theorem::certificate(augmented, settings, found, assumptions)
-    }
+impl family::Settings for Settings {
+    type Form<'e> = form::Form;
+    const FAMILY: &'static dyn Family = STATE_AFFINE;
 }

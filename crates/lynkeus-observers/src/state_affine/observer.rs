@@ -54,13 +54,14 @@ use lynkeus_proof::matrix::square;
 use lynkeus_structure::output_map::Rows;
 use lynkeus_structure::{AugmentedPlant, Matrix, Measurement, range};
 
-use super::form::{Form, NAME};
+use super::form::Form;
 use super::said::Said;
 use super::settings::Settings;
 use crate::conditions::names;
 use crate::design::Found;
 use crate::estimate::{PlantCopy, Speed};
 use crate::printed::{StartPoint, expressions};
+use crate::sparse::{Sparse, minus, sum, times};
 use crate::{Design, DesignError, Monitor, ParameterValue, Reason, Signal};
 
 /// The smallest d_i that forgetting leaves.
@@ -74,7 +75,7 @@ const SQUARINGS: i32 = 7;
 const ALARM: f64 = 1e-6;
 
 /// Observer (7)–(8).
-pub(super) fn assemble(
+pub(super) fn design(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Form>,
@@ -99,7 +100,7 @@ pub(super) fn assemble(
     }
     derivatives.extend(factor.derivatives(θ.expr(graph), &F, &v));
     let alarm = alarm(augmented, &form, settings)?;
-    let mut observer = copy.observer(NAME, derivatives)?.tuned_by([&θ]);
+    let mut observer = copy.observer(derivatives)?.tuned_by([&θ]);
     observer.monitors.extend(monitor(&factor, alarm));
     observer.states.extend(factor.states);
     let outside = outside_last(augmented, &form).into_iter();
@@ -148,7 +149,7 @@ pub(super) fn alarm(
     form: &Form,
     settings: &Settings,
 ) -> Result<f64, DesignError> {
-    match settings.alarm.clone()? {
+    match settings.alarm()? {
         Some(alarm) => Ok(alarm),
         None => Ok(ALARM * least_reach(augmented, form)?),
     }
@@ -299,9 +300,6 @@ fn gain(C: &[Vec<f64>], form: &Form, θ: f64, S: &UnitFactor) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// An entry that may be zero everywhere.
-type Sparse<'g> = Option<Expr<'g>>;
-
 /// The states of the factors as symbols.
 struct Factor<'g> {
     graph: &'g Graph,
@@ -311,23 +309,6 @@ struct Factor<'g> {
     U: Vec<Vec<Sparse<'g>>>,
     /// with their starts, in the order of [`Factor::derivatives`]
     pub states: Vec<(Signal, f64)>,
-}
-
-/// Σ of the terms that are not zero everywhere.
-fn sum<'g>(terms: impl Iterator<Item = Sparse<'g>>) -> Sparse<'g> {
-    terms.flatten().reduce(|a, b| a + b)
-}
-
-fn times<'g>(a: Sparse<'g>, b: Sparse<'g>) -> Sparse<'g> {
-    Some(a? * b?)
-}
-
-fn minus<'g>(a: Sparse<'g>, b: Sparse<'g>) -> Sparse<'g> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(a - b),
-        (None, Some(b)) => Some(-b),
-        (a, None) => a,
-    }
 }
 
 impl<'g> Factor<'g> {

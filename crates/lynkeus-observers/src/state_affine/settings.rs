@@ -5,7 +5,7 @@ use lynkeus_proof::matrix::square;
 use lynkeus_structure::AugmentedPlant;
 
 use crate::estimate::PROLONG;
-use crate::tuning::Deferred;
+use crate::family::usable;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 
 const THETA: KeySpec = KeySpec {
@@ -43,48 +43,43 @@ pub(super) const KEYS: [KeySpec; 4] = [THETA, START, ALARM, CONTINUED];
 /// The keys, read.
 pub struct Settings {
     pub common: Tuning,
-    θ: Deferred<Option<f64>>,
-    /// S(0) in the order of the plant's states
-    S0: Deferred<Given>,
-    pub alarm: Deferred<Option<f64>>,
+    /// of the plant, with the unknown inputs
+    states: usize,
 }
 
 impl Settings {
     pub fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
         Ok(Self {
             common: tuning.checked()?,
-            θ: tuning.positive(THETA.name),
-            S0: start(tuning, augmented.states.len()),
-            alarm: tuning.positive(ALARM.name),
+            states: augmented.states.len(),
         })
     }
 
     /// The first of the keys left for later that has a wrong value.
     pub fn deferred(&self) -> Result<(), TuningError> {
-        self.θ.as_ref().map_err(TuningError::clone)?;
-        self.S0.as_ref().map_err(TuningError::clone)?;
-        self.alarm.as_ref().map_err(TuningError::clone)?;
-        Ok(())
+        usable(self.θ())?;
+        usable(start(&self.common, self.states))?;
+        usable(self.alarm())
     }
 
     /// θ, which has no default.
     pub fn θ(&self) -> Result<f64, TuningError> {
         let expected = "a positive number (the gain of block k grows like theta^k)";
         let missing = || TuningError::absent(THETA.name, expected);
-        self.θ.clone()?.ok_or_else(missing)
+        self.common.positive(THETA.name)?.ok_or_else(missing)
+    }
+
+    /// Below this excitation the flag is raised, where the study says so.
+    pub fn alarm(&self) -> Result<Option<f64>, TuningError> {
+        self.common.positive(ALARM.name)
     }
 
     /// S(0) with the states in this order.
     pub fn S0(&self, order: &[usize]) -> Result<UnitFactor, TuningError> {
-        let given = self.S0.as_ref().map_err(TuningError::clone)?;
-        let entry = |i: usize, j: usize| match given {
-            Given::Number(s) => {
-                if i == j {
-                    *s
-                } else {
-                    0.0
-                }
-            }
+        let given = start(&self.common, self.states)?;
+        let entry = |i: usize, j: usize| match &given {
+            Given::Number(s) if i == j => *s,
+            Given::Number(_) => 0.0,
             Given::Matrix(given) => given[order[i]][order[j]],
         };
         let n = order.len();
@@ -101,7 +96,7 @@ enum Given {
 }
 
 /// S(0): s·I for a number s, or a matrix in the order of the plant's states.
-fn start(tuning: &Tuning, n: usize) -> Deferred<Given> {
+fn start(tuning: &Tuning, n: usize) -> Result<Given, TuningError> {
     let expected = format!(
         "a positive number s for s·I, or a symmetric positive definite {n}×{n} matrix as a list of rows, one per estimated quantity"
     );
@@ -110,13 +105,10 @@ fn start(tuning: &Tuning, n: usize) -> Deferred<Given> {
         None => return Ok(Given::Number(1.0)),
         Some(Value::Number(s)) if *s > 0.0 && s.is_finite() => return Ok(Given::Number(*s)),
         Some(Value::List(rows)) => {
-            let entry = |x: &Value| match x {
-                Value::Number(x) => Ok(*x),
-                other => Err(wrong(other.to_string())),
-            };
-            let row = |row: &Value| match row {
-                Value::List(row) => row.iter().map(entry).collect::<Result<Vec<f64>, _>>(),
-                other => Err(wrong(other.to_string())),
+            let entry = |x: &Value| x.number().ok_or_else(|| wrong(x.to_string()));
+            let row = |row: &Value| {
+                let entries = row.list().ok_or_else(|| wrong(row.to_string()))?;
+                entries.iter().map(entry).collect::<Result<Vec<f64>, _>>()
             };
             rows.iter().map(row).collect::<Result<Vec<_>, _>>()?
         }

@@ -7,11 +7,12 @@ use lynkeus_proof::spectrum;
 use lynkeus_structure::{Assignment, AugmentedPlant, Region, chains};
 use nalgebra::DMatrix;
 
-use super::form::{Form, Gains, NAME, Window};
+use super::form::{Form, Gains, Window};
 use super::said::{Hammouri, Loose, Said};
 use super::settings::Settings;
 use crate::conditions::{GainedChain, along, lipschitz, names};
 use crate::design::{Found, first_fit};
+use crate::family::Settings as _;
 use crate::statement::undecided;
 use crate::{DesignError, Examination, Reason};
 
@@ -22,7 +23,8 @@ pub(super) fn form(
     settings: &Settings,
     region: &Region,
 ) -> Result<Found<Form>, DesignError> {
-    let refusal = |summary: Reason| Err(Examination::unfit(NAME, summary, vec![]).into());
+    let refusal =
+        |summary: Reason| Err(Examination::unfit(Settings::FAMILY, summary, vec![]).into());
     let mut assignments = match chains::find(augmented, &settings.request) {
         Ok(assignments) => assignments,
         Err(summary) => return refusal(summary.into()),
@@ -93,7 +95,8 @@ fn examined(
         leading,
         loose,
     };
-    let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
+    let examination =
+        Examination::new(augmented, region, Settings::FAMILY, summary, chains, checks)?;
     Ok(Found { form, examination })
 }
 

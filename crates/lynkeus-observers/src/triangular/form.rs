@@ -12,8 +12,6 @@ use crate::estimate::{PlantCopy, Speed};
 use crate::peaking::Transient;
 use crate::{ParameterValue, Reason, TuningError, peaking};
 
-pub(super) const NAME: &str = "triangular";
-
 /// The triangular form of a plant with the facts about its partials.
 pub struct Form {
     pub assignment: Assignment,

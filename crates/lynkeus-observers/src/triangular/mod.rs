@@ -16,70 +16,26 @@ mod said;
 mod settings;
 mod theorem;
 
-use lynkeus_structure::{AugmentedPlant, Region};
-
-use crate::design::Found;
-use crate::family::Stages;
-use crate::{
-    Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError, guarantee,
-};
-use form::{Form, Gains, NAME};
-use observer::observer;
+use crate::family::{self, Family, Paper, usable};
 pub use said::{Hammouri, Loose, Said};
 use settings::Settings;
-use theorem::BASIS;
 
 /// The family `triangular`.
-#[derive(Clone, Copy, Debug)]
-pub struct Triangular;
+pub const TRIANGULAR: &dyn Family = &Paper {
+    name: "triangular",
+    paper: "Hammouri, Targui, Armanet 2002, doi:10.1002/rnc.638",
+    basis: theorem::BASIS,
+    form_on_assumed_box: false,
+    keys: settings::KEYS,
+    speeds: &[],
+    read: Settings::read,
+    deferred: |settings| usable(settings.θ()),
+    form: conditions::form,
+    design: observer::design,
+    theorem: theorem::certificate,
+};
 
-impl Stages for Triangular {
-    type Settings = Settings;
-    type Form<'e, 'p: 'e> = Form;
-    const NAME: &'static str = NAME;
-    const PAPER: &'static str = "Hammouri, Targui, Armanet 2002, doi:10.1002/rnc.638";
-    const BASIS: &'static str = BASIS;
-    const KEYS: &'static [&'static [KeySpec]] = settings::KEYS;
-
-    fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
-        Settings::read(augmented, tuning)
-    }
-
-    fn deferred(settings: &Settings) -> Result<(), TuningError> {
-        settings.deferred()
-    }
-
-    fn form(
-        augmented: &AugmentedPlant<'_>,
-        settings: &Settings,
-        region: &Region,
-    ) -> Result<Found<Form>, DesignError> {
-        conditions::form(augmented, settings, region)
-    }
-
-    fn design(
-        augmented: &AugmentedPlant<'_>,
-        settings: &Settings,
-        found: Found<Form>,
-    ) -> Result<Design, DesignError> {
-        if let Some(lmi) = settings.lmi.clone() {
-            let examination = found.examination;
-            return guarantee::design_lmi(augmented, &settings.common, lmi, NAME, examination);
-        }
-        if settings.remedies.low_power {
-            return Ok(observer::low_power(augmented, settings, found)?);
-        }
-        let Found { form, examination } = found;
-        let gains = Gains::new(&form, settings)?;
-        Ok(observer(augmented, settings, &form, &gains, examination)?)
-    }
-
-    fn theorem(
-        augmented: &AugmentedPlant<'_>,
-        settings: &Settings,
-        found: Found<Form>,
-        assumptions: &Assumptions,
-    ) -> Result<Certificate, DesignError> {
-        theorem::certificate(augmented, settings, found, assumptions)
-    }
+impl family::Settings for Settings {
+    type Form<'e> = form::Form;
+    const FAMILY: &'static dyn Family = TRIANGULAR;
 }

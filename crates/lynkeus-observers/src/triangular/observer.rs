@@ -7,14 +7,30 @@
 use lynkeus_expr::{Graph, Node};
 use lynkeus_structure::AugmentedPlant;
 
-use super::form::{Form, Gains, NAME, Window, exponents};
+use super::form::{Form, Gains, Window, exponents};
 use super::settings::Settings;
 use crate::conditions::Partial;
 use crate::design::Found;
 use crate::estimate::{PlantCopy, Speed, prolong};
 use crate::peaking::Part;
 use crate::printed::{AtStart, ChainCorrection};
-use crate::{Design, Examination, TuningError, estimate, peaking};
+use crate::{Design, DesignError, Examination, TuningError, estimate, guarantee, peaking};
+
+pub(super) fn design(
+    augmented: &AugmentedPlant<'_>,
+    settings: &Settings,
+    found: Found<Form>,
+) -> Result<Design, DesignError> {
+    if let Some(lmi) = settings.lmi.clone() {
+        return guarantee::design_lmi(augmented, &settings.common, lmi, found.examination);
+    }
+    if settings.remedies.low_power {
+        return Ok(low_power(augmented, settings, found)?);
+    }
+    let Found { form, examination } = found;
+    let gains = Gains::new(&form, settings)?;
+    Ok(observer(augmented, settings, &form, &gains, examination)?)
+}
 
 /// Observer (9).
 pub(super) fn observer(
@@ -59,7 +75,7 @@ pub(super) fn observer(
         prolong(&copy, chain, partials, &mut derivatives)?;
     }
     Ok(Design {
-        observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
+        observer: copy.observer(derivatives)?.tuned_by(&speeds),
         parameters,
         notes: Window::notes(&form.assignment, &gains.δ),
         gains: table,
@@ -96,7 +112,7 @@ fn scaled(
 }
 
 /// The observer whose chains have the low-power form.
-pub(super) fn low_power(
+fn low_power(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
     Found { form, examination }: Found<Form>,

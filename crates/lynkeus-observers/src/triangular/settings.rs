@@ -3,12 +3,12 @@
 use lynkeus_gain::Tridiagonal;
 use lynkeus_structure::{AugmentedPlant, ChainRequest};
 
-use crate::conditions::{CHAINS, chain_request};
+use crate::conditions::{CHAINS, chain_request, output_names};
 use crate::estimate::PROLONG;
 use crate::guarantee::{LMI, LMI_KEYS, Lmi};
 use crate::peaking::Remedies;
-use crate::tuning::Deferred;
-use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, peaking};
+use crate::tuning::numbers;
+use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value, peaking};
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
@@ -88,7 +88,6 @@ pub(super) const KEYS: &[&[KeySpec]] = &[&OWN, &LMI_KEYS, &peaking::KEYS];
 pub struct Settings {
     pub common: Tuning,
     /// per chain, as in every list here
-    θ: Deferred<Option<Vec<f64>>>,
     pub δ: Option<Vec<f64>>,
     pub r: Option<Vec<f64>>,
     pub S: Option<Vec<Tridiagonal>>,
@@ -99,6 +98,8 @@ pub struct Settings {
     pub leading: Option<usize>,
     pub lmi: Option<Lmi>,
     pub remedies: Remedies,
+    /// measured outputs
+    outputs: usize,
 }
 
 impl Settings {
@@ -115,7 +116,6 @@ impl Settings {
         };
         Ok(Self {
             common: tuning.checked()?,
-            θ: tuning.positive_per_chain(THETA.name, count),
             δ: tuning.positive_per_chain(DELTA.name, count)?,
             r: tuning.positive_per_chain(FACTOR.name, count)?,
             S,
@@ -124,48 +124,46 @@ impl Settings {
             leading: leading(augmented, tuning)?,
             lmi,
             remedies: Remedies::read(tuning, count, of_standard)?,
+            outputs: count,
         })
     }
 
-    /// The first of the keys left for later that has a wrong value.
-    pub fn deferred(&self) -> Result<(), TuningError> {
-        self.θ.as_ref().map_err(TuningError::clone)?;
-        Ok(())
-    }
-
-    /// θ, which has no default.
+    /// θ by chain, which has no default.
     pub fn θ(&self) -> Result<Vec<f64>, TuningError> {
         let expected = "a positive number (the gain grows like theta^n)";
         let missing = || TuningError::absent(THETA.name, expected);
-        self.θ.clone()?.ok_or_else(missing)
+        let given = self.common.positive_per_chain(THETA.name, self.outputs)?;
+        given.ok_or_else(missing)
     }
 }
 
 /// The chain that the study lets lead, by the place of its output.
 fn leading(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Option<usize>, TuningError> {
-    let outputs = augmented.outputs.iter().map(|o| o.variable.name.as_str());
-    let outputs: Vec<&str> = outputs.collect();
+    let outputs = output_names(augmented);
     let name = tuning.choice(LEADING.name, &outputs)?;
     Ok(name.and_then(|name| outputs.iter().position(|o| *o == name)))
 }
 
 /// S as the study gives it.
 fn explicit(tuning: &Tuning) -> Result<Option<Vec<Tridiagonal>>, TuningError> {
-    let fields = [DIAGONAL.name, BESIDE.name];
-    let Some(tables) = tuning.number_tables(MATRICES.name, &fields)? else {
+    let Some(value) = tuning.values.get(MATRICES.name) else {
         return Ok(None);
     };
-    let matrix = |(i, mut table): (usize, Vec<Vec<f64>>)| {
-        let (off, diagonal) = (
-            table.pop().unwrap_or_default(),
-            table.pop().unwrap_or_default(),
-        );
-        Tridiagonal::new(diagonal, off).map_err(|error| {
+    let expected = "a list of tables with the keys diag and off";
+    let wrong = || TuningError::new(MATRICES.name, expected, value);
+    let matrix = |(i, table): (usize, &Value)| {
+        let entries = match table {
+            Value::Table(entries) if entries.len() == 2 => entries,
+            _ => return Err(wrong()),
+        };
+        let field = |key: KeySpec| numbers(MATRICES.name, entries.get(key.name).ok_or_else(wrong)?);
+        Tridiagonal::new(field(DIAGONAL)?, field(BESIDE)?).map_err(|error| {
             let place = i + 1;
             let expected = format!("a positive definite tridiagonal matrix as entry {place}");
             TuningError::new(MATRICES.name, expected, error)
         })
     };
-    let matrices = tables.into_iter().enumerate().map(matrix);
+    let tables = value.list().ok_or_else(wrong)?;
+    let matrices = tables.iter().enumerate().map(matrix);
     matrices.collect::<Result<_, _>>().map(Some)
 }

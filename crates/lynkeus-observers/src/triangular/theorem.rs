@@ -27,14 +27,10 @@ use crate::conditions::{along, names};
 use crate::design::Found;
 use crate::peaking::departure;
 use crate::statement::{proved, refuted, standing, sufficient, undecided};
-use crate::theorem::{conclude, slopes, state_noise, undeclared};
+use crate::theorem::{as_computed, conclude, is_along, slopes, state_noise, undeclared};
 use crate::{Assumptions, Certificate, Check, Constant, DesignError, Reason, estimate};
 
 pub(super) const BASIS: &str = "Theorem 2 of Hammouri, Targui and Armanet (one chain: Theorem 1)";
-
-/// How much the gain may differ from the computed one, relatively: rounding of
-/// the powers of θ in the observer.
-const GAIN_ERROR: f64 = 1e-12;
 
 pub(super) fn certificate(
     augmented: &AugmentedPlant<'_>,
@@ -50,10 +46,7 @@ pub(super) fn certificate(
         .iter()
         .map(|chain| chain.iter().map(|p| p.bounds).collect());
     let bounds: Vec<Vec<(f64, f64)>> = bounds.collect();
-    let skip = |a: usize, b: usize| {
-        let mut chains = chains.iter();
-        chains.any(|c| c.windows(2).any(|p| p == [a, b]))
-    };
+    let skip = |a: usize, b: usize| chains.iter().any(|chain| is_along(chain, a, b));
     let (slopes, check) = slopes(augmented, region, skip)?;
     checks.push(check);
     let basis = match form.assignment.chains.len() {
@@ -111,7 +104,7 @@ struct Study<'a> {
 
 impl Study<'_> {
     fn certificate(&self, mut checks: Vec<Check>) -> Result<Certificate, DesignError> {
-        let (mut constants, mut μ, mut broken) = (vec![], vec![], false);
+        let (mut constants, mut μ) = (vec![], vec![]);
         checks.extend(self.constant_gain());
         let count = self.form.assignment.chains.len();
         for i in 0..count {
@@ -121,12 +114,12 @@ impl Study<'_> {
                 _ => format!(" of chain {}", i + 1),
             };
             let chain = self.chain(i, self.gains.θ[i], 1.0);
-            let found = verify(&chain, &self.gains.S[i], self.gains.r[i], &states, &suffix);
-            checks.push(found.check);
-            broken |= found.broken;
-            constants.extend(found.constants);
-            μ.extend(found.μ);
+            let (S, r) = (&self.gains.S[i], self.gains.r[i]);
+            let (check, decay) = verify(&chain, S, r, &states, &suffix, &mut constants);
+            checks.push(check);
+            μ.extend(decay);
         }
+        let broken = standing(&checks) == Standing::Refuted;
         let windows = Window::of(&self.form.assignment, &self.gains.δ);
         checks.extend(windows.iter().map(|w| windowed(w, count, &mut constants)));
         let steepest = self.slopes.iter().fold(0.0, |m: f64, s| m.max(s.size));
@@ -135,12 +128,10 @@ impl Study<'_> {
             steepest,
             "upper bound of every |∂f/∂x| beside the chains' own partials",
         ));
-        let ready =
-            steepest.is_finite() && μ.len() == count && standing(&checks) != Standing::Refuted;
-        let rate = if ready {
-            self.rate(&μ, &windows, &mut checks, &mut constants)
-        } else {
-            None
+        let ready = steepest.is_finite() && μ.len() == count && !broken;
+        let rate = match ready {
+            true => self.rate(&μ, &windows, &mut checks, &mut constants),
+            false => None,
         };
         let mut certificate = Certificate::new(self.basis, self.assumptions, checks);
         certificate.constants = constants;
@@ -172,7 +163,6 @@ impl Study<'_> {
             }
             scales.push(speed.powi(j as i32 + 2) / T);
         }
-        let error = Interval::new(1.0 - GAIN_ERROR, 1.0 + GAIN_ERROR).unwrap_or(Interval::ONE);
         let S = &gains.S[i];
         let weight = Interval::point(c);
         let entry = |j: usize| {
@@ -180,10 +170,6 @@ impl Study<'_> {
                 .map(move |k| weight * Interval::point(S.get(j, k)))
                 .collect()
         };
-        let g = S
-            .gain()
-            .into_iter()
-            .map(|s| Interval::point(gains.r[i] * s) * error);
         let partials = match gains.divided {
             true => vec![(1.0, 1.0).into(); bounds.len()],
             false => bounds.iter().map(|&range| range.into()).collect(),
@@ -193,7 +179,7 @@ impl Study<'_> {
             speed,
             scales,
             S: (0..S.size()).map(entry).collect(),
-            g: g.collect(),
+            g: as_computed(S.gain().into_iter().map(|s| gains.r[i] * s)),
             partials,
         }
     }
@@ -364,60 +350,40 @@ fn remainder(bounds: &[Vec<(f64, f64)>]) -> Reason {
     Said::BoundsKnown { known, all }.into()
 }
 
-/// What Lemma 1 says of a chain.
-struct Verified {
-    pub check: Check,
-    /// AᵀS + SA − ρCᵀC ≤ −μ·diag(S) with ρ = 2r; none where it is not proved
-    pub μ: Option<f64>,
-    /// S satisfies it for no ρ
-    pub broken: bool,
-    pub constants: Vec<Constant>,
-}
-
-/// Checks (17) with ρ = 2r. `names`: the states of the chain; `suffix` tells the
-/// constants of several chains apart.
-fn verify(chain: &Chain, S: &Tridiagonal, r: f64, names: &[String], suffix: &str) -> Verified {
+/// Lemma 1's (17) with ρ = 2r, refuted where S satisfies it for no ρ, and μ of
+/// AᵀS + SA − ρCᵀC ≤ −μ·diag(S) where that is proved. `names`: the states of the chain; `suffix` tells
+/// the constants of several chains apart.
+fn verify(
+    chain: &Chain,
+    S: &Tridiagonal,
+    r: f64,
+    names: &[String],
+    suffix: &str,
+    constants: &mut Vec<Constant>,
+) -> (Check, Option<f64>) {
     let title = Hammouri::Lemma1 {
         states: names.to_vec(),
         ρ: 2.0 * r,
     };
-    let open = |check: Check| Verified {
-        check,
-        μ: None,
-        broken: false,
-        constants: vec![],
-    };
-    let bounds = &chain.partials;
-    let least = match lemma1::kernel(S, bounds) {
+    let least = match lemma1::kernel(S, &chain.partials) {
         Ok(Kernel::Holds { ρ }) => ρ,
-        Ok(Kernel::Breaks(found)) => {
-            let (check, broken) = breaks(title, S, &found, names);
-            return Verified {
-                broken,
-                ..open(check)
-            };
-        }
-        Err(error) => return open(undecided(title, Said::NoKernel(error))),
+        Ok(Kernel::Breaks(found)) => return (breaks(title, S, &found, names), None),
+        Err(error) => return (undecided(title, Said::NoKernel(error)), None),
     };
     let Some(μ) = chain.decay() else {
         let said = match 2.0 * r > least {
             true => Said::LemmaBarely,
             false => Said::LemmaAbove { least },
         };
-        return open(undecided(title, said));
+        return (undecided(title, said), None);
     };
     let smallest = S.diagonal().iter().copied().fold(f64::INFINITY, f64::min);
     let η = (Interval::point(μ) * Interval::point(smallest)).lo();
-    let constants = constants(chain, suffix, [least, 2.0 * r, η, μ]);
-    Verified {
-        check: proved(title, Said::LemmaHolds { η, least }),
-        μ: Some(μ),
-        broken: false,
-        constants,
-    }
+    constants.extend(of_lemma(chain, suffix, [least, 2.0 * r, η, μ]));
+    (proved(title, Said::LemmaHolds { η, least }), Some(μ))
 }
 
-fn constants(chain: &Chain, suffix: &str, [least, ρ, η, μ]: [f64; 4]) -> Vec<Constant> {
+fn of_lemma(chain: &Chain, suffix: &str, [least, ρ, η, μ]: [f64; 4]) -> Vec<Constant> {
     let (lower, upper) = chain
         .partials
         .iter()
@@ -447,8 +413,8 @@ fn constants(chain: &Chain, suffix: &str, [least, ρ, η, μ]: [f64; 4]) -> Vec<
     list
 }
 
-/// The refutation, and whether it is one: at a vertex of the bounds, in a direction that C does not see.
-fn breaks(title: Hammouri, S: &Tridiagonal, found: &Breaking, names: &[String]) -> (Check, bool) {
+/// At a vertex of the bounds, in a direction that C does not see: a refutation where its sign is certain.
+fn breaks(title: Hammouri, S: &Tridiagonal, found: &Breaking, names: &[String]) -> Check {
     let certain = quotient(S, found).is_positive();
     let said = Said::LemmaBreaks {
         direction: names
@@ -460,7 +426,7 @@ fn breaks(title: Hammouri, S: &Tridiagonal, found: &Breaking, names: &[String]) 
         certain,
     };
     if !certain {
-        return (undecided(title, said), false);
+        return undecided(title, said);
     }
     let name = |j: usize| format!("a{}", j + 1);
     let coordinates = found.a.iter().enumerate().map(|(j, &a)| (name(j), a));
@@ -468,7 +434,7 @@ fn breaks(title: Hammouri, S: &Tridiagonal, found: &Breaking, names: &[String]) 
         coordinates: coordinates.map(Coordinate::from).collect(),
         value: found.eigenvalue,
     };
-    (refuted(title, point, said), true)
+    refuted(title, point, said)
 }
 
 /// vᵀ(AᵀS + SA)v, rounding included: a proof that the form is positive somewhere.
@@ -509,11 +475,11 @@ mod tests {
             g: vec![Interval::ONE; 2],
             partials: vec![(1e250, 1e250).into()],
         };
-        let found = verify(&chain, &S, 1.0, &["x".into(), "z".into()], "");
-        assert!(!found.broken && found.μ.is_none());
-        assert!(matches!(found.check.verdict, Verdict::Undecided(_)));
+        let names = ["x".into(), "z".into()];
+        let (check, μ) = verify(&chain, &S, 1.0, &names, "", &mut vec![]);
+        assert!(μ.is_none() && matches!(check.verdict, Verdict::Undecided(_)));
         let said = Reason::from(Said::NoKernel(lemma1::Error::Overflow));
-        assert_eq!(found.check.reason, said);
+        assert_eq!(check.reason, said);
     }
 
     /// AᵀS + SA = 0 on the kernel of C: that rounding does not tell its sign says nothing of ρ.
@@ -526,8 +492,8 @@ mod tests {
                 eigenvalue,
                 direction: vec![0.0, 1.0],
             };
-            let (check, is_refuted) = breaks(title(), &S, &found, &["x".into(), "z".into()]);
-            assert!(!is_refuted && matches!(check.verdict, Verdict::Undecided(_)));
+            let check = breaks(title(), &S, &found, &["x".into(), "z".into()]);
+            assert!(matches!(check.verdict, Verdict::Undecided(_)));
             let is_certain = |said: &Reason| {
                 matches!(
                     said,

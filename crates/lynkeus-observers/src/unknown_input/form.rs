@@ -23,10 +23,9 @@ use super::said::{Said, Shape};
 use super::settings::{Settings, wrong_size};
 use crate::conditions::{lipschitz, names, output_slope};
 use crate::design::Found;
+use crate::family::Settings as _;
 use crate::statement::{proved, standing, sufficient};
 use crate::{Check, DesignError, Examination, Farza, Reason, Statement, TuningError};
-
-pub(super) const NAME: &str = "unknown-input";
 
 /// More partitions are not tried.
 const MAX_PARTITIONS: usize = 500;
@@ -176,7 +175,7 @@ pub(super) fn search<'e, 'p>(
     let layers = match layers::find(augmented) {
         Ok(layers) => layers,
         Err(why) => {
-            return Err(Examination::unfit(NAME, Reason::from(why), vec![]).into());
+            return Err(Examination::unfit(Settings::FAMILY, Reason::from(why), vec![]).into());
         }
     };
     let given = given(augmented, &layers, settings)?;
@@ -337,7 +336,8 @@ fn finish<'e, 'p>(
         first: chains[0].clone(),
         second: chains[1].clone(),
     };
-    let examination = Examination::new(augmented, region, NAME, summary, chains, checks)?;
+    let examination =
+        Examination::new(augmented, region, Settings::FAMILY, summary, chains, checks)?;
     Ok(Found { form, examination })
 }
 
@@ -365,7 +365,7 @@ fn none(
         closest,
     };
     let own = furthest.map_or(vec![], |(_, own)| own);
-    Examination::unfit(NAME, summary, [shared, own].concat())
+    Examination::unfit(Settings::FAMILY, summary, [shared, own].concat())
 }
 
 fn layer_names(augmented: &AugmentedPlant<'_>, layers: &Layers<'_>) -> Vec<Vec<String>> {

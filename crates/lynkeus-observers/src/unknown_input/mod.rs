@@ -25,60 +25,27 @@ mod said;
 mod settings;
 mod theorem;
 
-use lynkeus_structure::{AugmentedPlant, Region};
-
-use crate::design::Found;
-use crate::family::Stages;
-use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
-use form::NAME;
+use crate::family::{self, Family, Paper, usable};
 pub use said::{Farza, Said, Shape};
 use settings::Settings;
 
 /// The family `unknown-input`.
-#[derive(Clone, Copy, Debug)]
-pub struct UnknownInput;
+pub const UNKNOWN_INPUT: &dyn Family = &Paper {
+    name: "unknown-input",
+    paper: "Farza, M'Saad, Liu, Targui 2005, observer (14)",
+    basis: theorem::BASIS,
+    form_on_assumed_box: true,
+    keys: &[&settings::KEYS],
+    // θ₁ is four times θ₂, as in the paper's example
+    speeds: &[4.0, 1.0],
+    read: Settings::read,
+    deferred: |settings| usable(settings.thetas()),
+    form: form::search,
+    design: observer::design,
+    theorem: theorem::certificate,
+};
 
-impl Stages for UnknownInput {
-    type Settings = Settings;
-    type Form<'e, 'p: 'e> = form::Form<'e, 'p>;
-    const NAME: &'static str = NAME;
-    const PAPER: &'static str = "Farza, M'Saad, Liu, Targui 2005, observer (14)";
-    const BASIS: &'static str = theorem::BASIS;
-    const FORM_ON_ASSUMED_BOX: bool = true;
-    /// θ₁ is four times θ₂, as in the paper's example
-    const SPEEDS: &'static [f64] = &[4.0, 1.0];
-    const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];
-
-    fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
-        Settings::read(augmented, tuning)
-    }
-
-    fn deferred(settings: &Settings) -> Result<(), TuningError> {
-        settings.deferred()
-    }
-
-    fn form<'e, 'p>(
-        augmented: &'e AugmentedPlant<'p>,
-        settings: &Settings,
-        region: &Region,
-    ) -> Result<Found<form::Form<'e, 'p>>, DesignError> {
-        form::search(augmented, settings, region)
-    }
-
-    fn design<'e, 'p>(
-        augmented: &'e AugmentedPlant<'p>,
-        settings: &Settings,
-        found: Found<form::Form<'e, 'p>>,
-    ) -> Result<Design, DesignError> {
-        observer::design(augmented, settings, &found.form, found.examination)
-    }
-
-    fn theorem<'e, 'p>(
-        _: &'e AugmentedPlant<'p>,
-        settings: &Settings,
-        found: Found<form::Form<'e, 'p>>,
-        assumptions: &Assumptions,
-    ) -> Result<Certificate, DesignError> {
-        theorem::certificate(&found.form, found.examination, settings, assumptions)
-    }
+impl family::Settings for Settings {
+    type Form<'e> = form::Form<'e, 'e>;
+    const FAMILY: &'static dyn Family = UNKNOWN_INPUT;
 }

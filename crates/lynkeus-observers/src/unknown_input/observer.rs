@@ -24,24 +24,25 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{Expr, MissingInput, Node};
 use lynkeus_gain::integrators::Chain;
-use lynkeus_structure::{AugmentedPlant, Matrix};
+use lynkeus_structure::{AugmentedPlant, Matrix, Measurement};
 
-use super::form::{Form, NAME, along, column};
+use super::form::{Form, along, column};
 use super::said::{Said, Shape};
 use super::settings::{Settings, no_theta};
 use crate::conditions::names;
+use crate::design::Found;
 use crate::estimate::{PlantCopy, Speed, limited};
 use crate::printed::{StartPoint, expressions, is_constant};
 use crate::theorem::{Enclosure, undeclared};
-use crate::{ChainGain, Design, DesignError, Examination, ParameterValue};
+use crate::{ChainGain, Design, DesignError, ParameterValue};
 
 pub(super) fn design(
     augmented: &AugmentedPlant<'_>,
     settings: &Settings,
-    form: &Form<'_, '_>,
-    examination: Examination,
+    Found { form, examination }: Found<Form<'_, '_>>,
 ) -> Result<Design, DesignError> {
-    let (thetas, note) = match settings.thetas.clone()? {
+    let form = &form;
+    let (thetas, note) = match settings.thetas()? {
         Some(given) => (given, None),
         None => {
             let (found, c) = thetas(form)?;
@@ -54,7 +55,7 @@ pub(super) fn design(
     let start = StartPoint::new(&copy)?;
     let matrices = Matrices::new(form, thetas);
     Ok(Design {
-        observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
+        observer: copy.observer(derivatives)?.tuned_by(&speeds),
         gains: matrices.gains(&start)?,
         parameters: matrices.parameters(&start)?,
         notes: note.into_iter().map(Into::into).collect(),
@@ -238,12 +239,9 @@ impl<'f, 'e, 'p> Matrices<'f, 'e, 'p> {
     /// The outputs' slopes in the states that they show, where they are numbers.
     fn slopes(&self) -> Option<Vec<f64>> {
         let graph = self.form.augmented.graph();
-        let mut outputs = self.form.augmented.outputs.iter();
-        let slope = |(_, slope, _): (usize, _, _)| graph.constant_value(slope);
-        outputs.try_fold(vec![], |mut found, output| {
-            found.push(output.state.and_then(slope)?);
-            Some(found)
-        })
+        let outputs = self.form.augmented.outputs.iter();
+        let slope = |output: &Measurement| graph.constant_value(output.state?.1);
+        outputs.map(slope).collect()
     }
 
     /// Everything that (14) multiplies the innovations with.

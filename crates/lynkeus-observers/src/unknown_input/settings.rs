@@ -2,7 +2,7 @@
 
 use lynkeus_structure::AugmentedPlant;
 
-use crate::tuning::Deferred;
+use crate::conditions::output_names;
 use crate::{KeySpec, Shape, Tuning, TuningError, Value};
 
 const THETA: KeySpec = KeySpec {
@@ -28,9 +28,6 @@ pub(super) const KEYS: [KeySpec; 2] = [THETA, PARTITION];
 /// The keys, read.
 pub struct Settings {
     pub common: Tuning,
-    /// θ₁ and θ₂, none where the proof is to choose them; `theta` belongs to other families too,
-    /// with another shape
-    pub thetas: Deferred<Option<[f64; 2]>>,
     /// places of the measured outputs of x₁¹ in ascending order; none to search them
     pub partition: Option<Vec<usize>>,
 }
@@ -39,28 +36,22 @@ impl Settings {
     pub fn read(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
         Ok(Self {
             common: tuning.checked()?,
-            thetas: thetas(tuning),
             partition: partition(tuning, augmented)?,
         })
     }
 
-    /// The first of the keys left for later that has a wrong value.
-    pub fn deferred(&self) -> Result<(), TuningError> {
-        self.thetas.as_ref().map_err(TuningError::clone)?;
-        Ok(())
-    }
-}
-
-fn thetas(tuning: &Tuning) -> Deferred<Option<[f64; 2]>> {
-    let Some(found) = tuning.numbers(THETA.name)? else {
-        return Ok(None);
-    };
-    let [θ1, θ2] = found[..] else {
-        return Err(THETA.wrong(format!("{} number(s)", found.len())));
-    };
-    match [θ1, θ2].iter().find(|θ| !(**θ > 0.0 && θ.is_finite())) {
-        Some(wrong) => Err(THETA.wrong(wrong)),
-        None => Ok(Some([θ1, θ2])),
+    /// θ₁ and θ₂, none where the proof is to choose them.
+    pub fn thetas(&self) -> Result<Option<[f64; 2]>, TuningError> {
+        let Some(found) = self.common.numbers(THETA.name)? else {
+            return Ok(None);
+        };
+        let [θ1, θ2] = found[..] else {
+            return Err(THETA.wrong(format!("{} number(s)", found.len())));
+        };
+        match [θ1, θ2].iter().find(|θ| !(**θ > 0.0 && θ.is_finite())) {
+            Some(wrong) => Err(THETA.wrong(wrong)),
+            None => Ok(Some([θ1, θ2])),
+        }
     }
 }
 
@@ -71,11 +62,7 @@ fn partition(
     let Some(value) = tuning.values.get(PARTITION.name) else {
         return Ok(None);
     };
-    let outputs: Vec<&str> = augmented
-        .outputs
-        .iter()
-        .map(|o| o.variable.name.as_str())
-        .collect();
+    let outputs = output_names(augmented);
     let wrong = |found: &Value| {
         let expected = format!(
             "a list of measured outputs, those of x₁¹ ({})",
@@ -83,15 +70,10 @@ fn partition(
         );
         TuningError::new(PARTITION.name, expected, found)
     };
-    let Value::List(list) = value else {
-        return Err(wrong(value));
-    };
     let mut first = vec![];
-    for entry in list {
-        let place = match entry {
-            Value::Text(name) => outputs.iter().position(|o| o == name),
-            _ => None,
-        };
+    for entry in value.list().ok_or_else(|| wrong(value))? {
+        let named = entry.text();
+        let place = named.and_then(|name| outputs.iter().position(|o| *o == name));
         let place = place.filter(|place| !first.contains(place));
         first.push(place.ok_or_else(|| wrong(entry))?);
     }

@@ -12,18 +12,17 @@ use lynkeus_expr::Interval;
 use lynkeus_gain::integrators::Chain;
 use lynkeus_proof::magnitude::{length, plus, size, times, total};
 use lynkeus_proof::matrix::sum;
+use lynkeus_structure::AugmentedPlant;
 
 use super::constants::{Norms, in_S};
 use super::form::Form;
 use super::said::Said;
 use super::settings::Settings;
 use super::{constants, observer};
+use crate::design::Found;
 use crate::statement::{sufficient, undecided};
 use crate::theorem::Enclosure;
-use crate::{
-    Assumptions, Certificate, Check, Constant, DesignError, Examination, Farza, Reason,
-    UltimateBound,
-};
+use crate::{Assumptions, Certificate, Check, Constant, DesignError, Farza, Reason, UltimateBound};
 
 pub(super) const BASIS: &str = "Theorem 1 of Farza, M'Saad, Liu and Targui";
 
@@ -31,12 +30,12 @@ pub(super) const BASIS: &str = "Theorem 1 of Farza, M'Saad, Liu and Targui";
 const CLEAR: f64 = 1.0 + 1e-9;
 
 pub(super) fn certificate(
-    form: &Form<'_, '_>,
-    examination: Examination,
+    _: &AugmentedPlant<'_>,
     settings: &Settings,
+    Found { form, examination }: Found<Form<'_, '_>>,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
-    let given = settings.thetas.clone()?;
+    let (form, given) = (&form, settings.thetas()?);
     let norms = constants::norms(form, assumptions)?;
     let c = norms.constants();
     let chosen = || observer::thetas(form).ok().map(|(thetas, _)| thetas);

@@ -1,7 +1,7 @@
 //! The family `block-triangular` against the formulas of its paper.
 
 use crate::common::{assert_close, design_with, plant, refused, slope};
-use lynkeus_observers::{Tuning, Value, block_triangular::BlockTriangular};
+use lynkeus_observers::{Tuning, Value, block_triangular::BLOCK_TRIANGULAR};
 use lynkeus_structure::Standing;
 use lynkeus_words::Words;
 
@@ -53,7 +53,7 @@ fn the_gains_of_the_example() {
     ];
     let classical = [[6.0, 9.0], [18.0, 81.0]];
     for (correction, g) in [("lee", lee), ("classical", classical)] {
-        let design = design_with(&BlockTriangular, &plant, &[], &tuning(correction)).unwrap();
+        let design = design_with(BLOCK_TRIANGULAR, &plant, &[], &tuning(correction)).unwrap();
         let expected = [
             f[3] + g[1][1] * (y2 - x3),
             f[0] + g[0][0] * (y1 - x1),
@@ -81,7 +81,7 @@ fn the_correction_cancels_the_nonlinearity_for_any_length() {
          der(c1) = 2*c2 + c1^2; der(c2) = c3*(1 + 0.1*c1^2) + c2*b2; der(c3) = c1*c2*c3; end Three;",
     );
     let design = design_with(
-        &BlockTriangular,
+        BLOCK_TRIANGULAR,
         &plant,
         &[],
         &Tuning::from([("theta", 1e-30)]),
@@ -119,7 +119,7 @@ fn the_rule_for_theta_is_checked() {
     let mut short = tuning("lee");
     let list = Value::List(vec![Value::Number(3.0), Value::Number(8.0)]);
     short.values.insert("theta".into(), list);
-    let design = design_with(&BlockTriangular, &plant, &[], &short).unwrap();
+    let design = design_with(BLOCK_TRIANGULAR, &plant, &[], &short).unwrap();
     assert!(
         design.notes[0].words().contains("9 = 3^2"),
         "{:?}",
@@ -133,7 +133,7 @@ fn an_equation_with_two_new_states_is_named() {
         "model No Real a; Real b; Real c; output Real y = a;
          equation der(a) = b + c; der(b) = 0; der(c) = 0; end No;",
     );
-    let examination = refused(&BlockTriangular, &plant, &Tuning::from([("theta", 1.0)]));
+    let examination = refused(BLOCK_TRIANGULAR, &plant, &Tuning::from([("theta", 1.0)]));
     assert_eq!(examination.fit(), Standing::Refuted);
     assert!(
         examination
@@ -156,7 +156,7 @@ fn poles_decide_k() {
         .values
         .insert("k_poles".into(), Value::List(vec![list([-1.0, -1.0]); 2]));
     let gains =
-        |tuning: &Tuning| design_with(&BlockTriangular, &plant, &[], tuning).map(|d| d.gains);
+        |tuning: &Tuning| design_with(BLOCK_TRIANGULAR, &plant, &[], tuning).map(|d| d.gains);
     assert_eq!(gains(&placed).unwrap(), gains(&tuning("lee")).unwrap());
     placed
         .values

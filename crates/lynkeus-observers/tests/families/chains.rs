@@ -5,7 +5,7 @@ use crate::common::{
 };
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Certificate, Family, Tuning, Value, block_triangular::BlockTriangular, triangular::Triangular,
+    Certificate, Family, Tuning, Value, block_triangular::BLOCK_TRIANGULAR, triangular::TRIANGULAR,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 use lynkeus_words::Words;
@@ -31,7 +31,7 @@ fn classical() -> (&'static str, Value) {
     ("correction", Value::Text("classical".into()))
 }
 
-fn certificate(family: &dyn Family, plant: &Plant, tuning: Tuning) -> Certificate {
+fn certificate(family: &'static dyn Family, plant: &Plant, tuning: Tuning) -> Certificate {
     let (drift, noise) = (
         vec![0.0; plant.states.len()],
         vec![0.0; plant.outputs.len()],
@@ -81,7 +81,7 @@ fn three_chains_of_three_one_and_two() {
     let found = |θ: &[f64], keys: &[(&str, Value)]| {
         let mut all = vec![classical(), ("k_poles", poles.clone())];
         all.extend_from_slice(keys);
-        let design = design_with(&BlockTriangular, &plant, &[], &with(θ, &all)).unwrap();
+        let design = design_with(BLOCK_TRIANGULAR, &plant, &[], &with(θ, &all)).unwrap();
         assert_eq!(
             design.examination.fit(),
             Standing::Undecided,
@@ -120,7 +120,7 @@ fn an_order_that_is_none_is_refused() {
     );
     for wrong in [names(&["y"]), names(&["y", "y"]), names(&["y", "q"])] {
         let tuning = with(&[1.0], &[("order", wrong)]);
-        let error = design_with(&BlockTriangular, &plant, &[], &tuning).unwrap_err();
+        let error = design_with(BLOCK_TRIANGULAR, &plant, &[], &tuning).unwrap_err();
         assert!(
             error
                 .to_string()
@@ -142,7 +142,7 @@ fn blocks_of_three_two_and_two_behind_moving_outputs() {
          der(b1) = 4*b2 + a3; der(b2) = -b1;
          der(c1) = c2; der(c2) = -c1 + b2; end Blocks;",
     );
-    let design = design_with(&BlockTriangular, &plant, &[], &with(&[2.0, 8.0, 64.0], &[])).unwrap();
+    let design = design_with(BLOCK_TRIANGULAR, &plant, &[], &with(&[2.0, 8.0, 64.0], &[])).unwrap();
     let x = [0.3, -0.8, 0.5, 1.1, -0.4, 0.9, 0.7];
     let (u, [ya, yb, yc]) = (0.6, [0.7, 0.8, -0.2]);
     let (ea, eb, ec) = (ya / 2.6 - x[0], yb - x[3], (yc - 0.6) / 1.36 - x[5]);
@@ -195,7 +195,7 @@ fn more_than_seven_outputs_are_arranged() {
         text += &format!("output Real y{i} = x{i}; ");
     }
     let plant = plant(&format!("{text} equation {equations} end Many;"));
-    let design = design_with(&BlockTriangular, &plant, &[], &with(&[1.0], &[])).unwrap();
+    let design = design_with(BLOCK_TRIANGULAR, &plant, &[], &with(&[1.0], &[])).unwrap();
     assert_eq!(design.examination.fit(), Standing::Proved);
     assert!(
         design
@@ -217,7 +217,7 @@ fn the_low_power_form_knows_the_sign() {
     let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
     let form = ("form", Value::Text("low-power".into()));
     let fit = |keys: &[(&str, Value)]| {
-        BlockTriangular
+        BLOCK_TRIANGULAR
             .examine(&augmented, &with(&[5.0], keys))
             .unwrap()
             .fit()
@@ -230,7 +230,7 @@ fn the_low_power_form_knows_the_sign() {
 #[test]
 fn the_classical_gain_of_a_negative_partial_is_refuted() {
     let plant = plant(NEGATIVE);
-    let found = refused(&BlockTriangular, &plant, &with(&[5.0], &[classical()]));
+    let found = refused(BLOCK_TRIANGULAR, &plant, &with(&[5.0], &[classical()]));
     let check = found.refuted().unwrap();
     let Verdict::Refuted(witness) = &check.verdict else {
         panic!("{check:?}")
@@ -248,13 +248,13 @@ fn a_gain_with_the_sign_of_the_partial_is_proved() {
     let plant = plant(NEGATIVE);
     let k = ("k", Value::List(vec![numbers(&[2.0, -0.5])]));
     let tuning = with(&[20.0], &[classical(), k]);
-    let design = design_with(&BlockTriangular, &plant, &[], &tuning).unwrap();
+    let design = design_with(BLOCK_TRIANGULAR, &plant, &[], &tuning).unwrap();
     assert_eq!(design.examination.fit(), Standing::Proved);
     assert_eq!(
         design.gains[0].entries,
         [("a".to_owned(), 40.0), ("b".to_owned(), -200.0)]
     );
-    let found = certificate(&BlockTriangular, &plant, tuning);
+    let found = certificate(BLOCK_TRIANGULAR, &plant, tuning);
     assert_eq!(found.verdict(), Standing::Proved, "{found:#?}");
     keeps(&plant, &design, &found, &[-0.4, 0.6]);
 }
@@ -269,7 +269,7 @@ fn a_positive_partial_that_is_too_large_is_refuted() {
         )
     };
     let large = plant(&text(10.0));
-    let found = refused(&BlockTriangular, &large, &with(&[5.0], &[classical()]));
+    let found = refused(BLOCK_TRIANGULAR, &large, &with(&[5.0], &[classical()]));
     assert!(
         found
             .refuted()
@@ -279,7 +279,7 @@ fn a_positive_partial_that_is_too_large_is_refuted() {
             .starts_with("A(a) − KC is stable")
     );
     let fine = plant(&text(8.0));
-    let design = design_with(&BlockTriangular, &fine, &[], &with(&[5.0], &[classical()])).unwrap();
+    let design = design_with(BLOCK_TRIANGULAR, &fine, &[], &with(&[5.0], &[classical()])).unwrap();
     assert_eq!(design.examination.fit(), Standing::Proved);
 }
 
@@ -291,7 +291,7 @@ fn an_unstable_k_is_refused_with_its_eigenvalues() {
     for keys in [vec![], vec![classical()]] {
         let mut all = vec![("k", Value::List(vec![numbers(&[-2.0, 2.0])]))];
         all.extend(keys);
-        let found = refused(&BlockTriangular, &plant, &with(&[1.0], &all));
+        let found = refused(BLOCK_TRIANGULAR, &plant, &with(&[1.0], &all));
         let detail = &found.refuted().unwrap().reason.words();
         assert!(
             detail.contains("1 ± 1i") && detail.contains("k_poles"),
@@ -315,7 +315,7 @@ fn an_s_that_rests_on_damping_is_told() {
     // S⁻¹Cᵀ = (1, −off)/(1 − off²)
     let fit = |θ: f64, off: f64| {
         let tuning = with(&[θ], &[table(off)]);
-        design_with(&Triangular, &plant, &[], &tuning)
+        design_with(TRIANGULAR, &plant, &[], &tuning)
             .unwrap()
             .examination
     };
@@ -360,7 +360,7 @@ fn a_long_chain_is_not_called_damped() {
             &[1.0],
             &[("S", Value::List(vec![Value::Table(pairs.into())]))],
         );
-        let examination = design_with(&Triangular, &plant(&text), &[], &tuning)
+        let examination = design_with(TRIANGULAR, &plant(&text), &[], &tuning)
             .unwrap()
             .examination;
         assert_eq!(examination.fit(), Standing::Undecided);
@@ -385,9 +385,8 @@ fn the_roles_of_two_chains_can_be_swapped() {
          output Real y = a; output Real z = c;
          equation der(a) = b; der(b) = -a + c; der(c) = -c + a*b; end Two;",
     );
-    let designed = |keys: &[(&str, Value)]| {
-        design_with(&Triangular, &plant, &[], &with(&[4.0], keys)).unwrap()
-    };
+    let designed =
+        |keys: &[(&str, Value)]| design_with(TRIANGULAR, &plant, &[], &with(&[4.0], keys)).unwrap();
     let leading = |name: &str| ("leading", Value::Text(name.into()));
     assert_eq!(designed(&[leading("y")]).parameters[1].1.words(), "1, 4");
     assert_eq!(
@@ -401,7 +400,7 @@ fn the_roles_of_two_chains_can_be_swapped() {
             .words()
             .contains("window")
     );
-    let found = certificate(&Triangular, &plant, with(&[30.0], &[given]));
+    let found = certificate(TRIANGULAR, &plant, with(&[30.0], &[given]));
     assert_eq!(found.verdict(), Standing::Proved, "{found:#?}");
 }
 
@@ -414,7 +413,7 @@ fn the_printed_gain_is_the_one_that_acts() {
     );
     let divided = ("partials", Value::Flag(true));
     let design = design_with(
-        &Triangular,
+        TRIANGULAR,
         &constant,
         &[],
         &with(&[3.0], std::slice::from_ref(&divided)),
@@ -428,7 +427,7 @@ fn the_printed_gain_is_the_one_that_acts() {
         "model M Real a(start=1); Real b(min=1,max=2,start=1.5); output Real y = a;
          equation der(a) = b^2; der(b) = 0; end M;",
     );
-    let design = design_with(&Triangular, &moving, &[], &with(&[3.0], &[divided])).unwrap();
+    let design = design_with(TRIANGULAR, &moving, &[], &with(&[3.0], &[divided])).unwrap();
     assert!(design.gains.is_empty());
     let row = design
         .parameters
@@ -485,9 +484,9 @@ fn damped(sign: &str) -> Plant {
 #[test]
 fn prolongation_from_far_outside_of_the_box() {
     for (family, sign) in [
-        (&Triangular as &dyn Family, "+"),
-        (&Triangular, "-"),
-        (&BlockTriangular, "+"),
+        (TRIANGULAR, "+"),
+        (TRIANGULAR, "-"),
+        (BLOCK_TRIANGULAR, "+"),
     ] {
         let plant = damped(sign);
         let keys = match family.name() {
@@ -527,7 +526,7 @@ fn what_cannot_be_prolonged_is_said() {
             ("partials", Value::Flag(true)),
         ],
     );
-    let text = design_with(&Triangular, &open, &[], &tuning)
+    let text = design_with(TRIANGULAR, &open, &[], &tuning)
         .unwrap_err()
         .to_string();
     assert!(
@@ -541,7 +540,7 @@ fn what_cannot_be_prolonged_is_said() {
             ("form", Value::Text("low-power".into())),
         ],
     );
-    let text = design_with(&Triangular, &damped("+"), &[], &low)
+    let text = design_with(TRIANGULAR, &damped("+"), &[], &low)
         .unwrap_err()
         .to_string();
     assert!(
@@ -568,7 +567,7 @@ fn lemma_1_for_twenty_states() {
     let plant = plant(&format!(
         "model L {states} output Real y = x1; equation {equations} end L;"
     ));
-    let found = certificate(&Triangular, &plant, with(&[1.0], &[]));
+    let found = certificate(TRIANGULAR, &plant, with(&[1.0], &[]));
     let lemma = hypothesis(&found, "Lemma 1");
     assert_eq!(lemma.verdict, Verdict::Proved, "{lemma:?}");
     assert_eq!(found.verdict(), Standing::Proved, "{found:#?}");

@@ -17,7 +17,7 @@ pub fn plant(text: &str) -> Plant {
 
 /// The design of a family with every output measured.
 pub fn design_with(
-    family: &dyn Family,
+    family: &'static dyn Family,
     plant: &Plant,
     unknown: &[&str],
     tuning: &Tuning,
@@ -31,7 +31,7 @@ pub fn design_with(
 }
 
 /// The examination that a refusal carries.
-pub fn refused(family: &dyn Family, plant: &Plant, tuning: &Tuning) -> Examination {
+pub fn refused(family: &'static dyn Family, plant: &Plant, tuning: &Tuning) -> Examination {
     match design_with(family, plant, &[], tuning) {
         Err(DesignError::Refused(examination)) => *examination,
         other => panic!("expected a refusal, found {other:?}"),

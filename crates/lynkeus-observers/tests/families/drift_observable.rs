@@ -11,7 +11,7 @@ use crate::common::{assert_follows, design_with, plant, reference, refused, run,
 use lynkeus_expr::{Tape, jacobian};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Design, DesignError, Initial, Tuning, Value, drift_observable::DriftObservable,
+    Design, DesignError, Initial, Tuning, Value, drift_observable::DRIFT_OBSERVABLE,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 use lynkeus_words::Words;
@@ -48,7 +48,7 @@ fn tuning(variant: &str, x̂: [f64; 3], x̂_a: &[f64]) -> Tuning {
 fn paper(variant: &str, x̂_a: &[f64]) -> (Plant, Design) {
     let plant = plant(PLANT);
     let tuning = tuning(variant, [0.5, 1.0, 1.0], x̂_a);
-    let design = design_with(&DriftObservable, &plant, &[], &tuning).unwrap();
+    let design = design_with(DRIFT_OBSERVABLE, &plant, &[], &tuning).unwrap();
     (plant, design)
 }
 
@@ -276,7 +276,7 @@ fn states_in_any_order_and_names_give_the_same_estimates() {
     let mut tuning = tuning("practical", [0.0; 3], &[5.0, 12.0]);
     let start = [("gamma", 1.0), ("alpha", 0.5), ("beta", 1.0)];
     tuning.initial.values = start.map(|(n, x)| (n.to_owned(), x)).into();
-    let design = design_with(&DriftObservable, &renamed, &[], &tuning).unwrap();
+    let design = design_with(DRIFT_OBSERVABLE, &renamed, &[], &tuning).unwrap();
     let times = [0.0, 0.5, 1.0, 2.0, 4.0];
     let a = run(&first, &first_design, INPUT, &START, &times, 1e-3);
     let b = run(
@@ -343,7 +343,7 @@ fn a_maximal_relative_degree_needs_nothing_of_the_input() {
         values: [("poles".to_owned(), list(&[-2.0, -3.0]))].into(),
         ..Tuning::default()
     };
-    let design = design_with(&DriftObservable, &plant, &[], &poles).unwrap();
+    let design = design_with(DRIFT_OBSERVABLE, &plant, &[], &poles).unwrap();
     assert_eq!(design.examination.fit(), Standing::Proved);
     assert_eq!(design.parameters[0].1.words(), "bounded");
     let found = slope(&plant, &design, &[0.4, 0.2], &[0.3], &[0.5]);
@@ -378,7 +378,7 @@ fn several_inputs_and_outputs() {
             let start = Value::Table([("v".to_owned(), list(&[1.0]))].into());
             tuning.values.insert("filter_initial".to_owned(), start);
         }
-        let design = design_with(&DriftObservable, &plant, &[], &tuning).unwrap();
+        let design = design_with(DRIFT_OBSERVABLE, &plant, &[], &tuning).unwrap();
         let filters = design.observer.states.len() - 3;
         assert_eq!(parameter(&design, "K of y"), "7, 12");
         assert_eq!(parameter(&design, "K of z"), "5");
@@ -403,7 +403,7 @@ fn several_inputs_and_outputs() {
 fn lemma_3_2_gives_the_poles() {
     let plant = plant(PLANT);
     let tuning = Tuning::from([("alpha", 0.5), ("beta", 1.0), ("gamma", 0.8)]);
-    let design = design_with(&DriftObservable, &plant, &[], &tuning).unwrap();
+    let design = design_with(DRIFT_OBSERVABLE, &plant, &[], &tuning).unwrap();
     let σ: f64 = parameter(&design, "σ of Lemma 3.2").parse().unwrap();
     // σ ≥ α + 3β²/2 + γ²‖V⁻¹‖²/2 with ‖V⁻¹‖ > 1
     assert!(σ > 0.5 + 1.5 + 0.32 && σ < 3.2, "{σ}");
@@ -419,7 +419,7 @@ fn plants_of_another_form_are_refused_with_the_reason() {
             values: [("poles".to_owned(), list(&[-1.0, -1.0]))].into(),
             ..Tuning::default()
         };
-        refused(&DriftObservable, &plant(text), &poles)
+        refused(DRIFT_OBSERVABLE, &plant(text), &poles)
             .summary
             .words()
     };
@@ -451,7 +451,7 @@ fn a_singular_map_is_refused_with_the_point() {
         "model Q Real a(min = -1, max = 1); Real b(min = -1, max = 1); output Real y = a;
          equation der(a) = b^2; der(b) = -b; end Q;",
     );
-    let error = design_with(&DriftObservable, &plant, &[], &Tuning::default()).unwrap_err();
+    let error = design_with(DRIFT_OBSERVABLE, &plant, &[], &Tuning::default()).unwrap_err();
     let text = error.words();
     assert!(
         text.contains("Q(x) is regular on the box (drift-observable): refuted"),
@@ -465,7 +465,7 @@ fn keys_that_cannot_be_used_are_named() {
     let text = |key: &str, value: Value| {
         let mut tuning = tuning("practical", START, &[5.0, 0.0]);
         tuning.values.insert(key.to_owned(), value);
-        match design_with(&DriftObservable, &plant, &[], &tuning) {
+        match design_with(DRIFT_OBSERVABLE, &plant, &[], &tuning) {
             Err(DesignError::Tuning(error)) => format!("{}: {error}", error.key),
             other => panic!("{other:?}"),
         }
@@ -478,7 +478,7 @@ fn keys_that_cannot_be_used_are_named() {
     assert!(text("indices", list(&[2.0])).contains("the number of states (3) in sum"));
     let table = Value::Table([("w".to_owned(), list(&[-1.0, -2.0]))].into());
     assert!(text("filter_poles", table).contains("filter of u"));
-    let nothing = design_with(&DriftObservable, &plant, &[], &Tuning::default());
+    let nothing = design_with(DRIFT_OBSERVABLE, &plant, &[], &Tuning::default());
     assert!(
         nothing
             .unwrap_err()
@@ -486,7 +486,7 @@ fn keys_that_cannot_be_used_are_named() {
             .contains("alpha, beta and gamma")
     );
     let negative = Tuning::from([("alpha", -1.0), ("gamma", 1.0)]);
-    let negative = design_with(&DriftObservable, &plant, &[], &negative);
+    let negative = design_with(DRIFT_OBSERVABLE, &plant, &[], &negative);
     assert!(
         negative
             .unwrap_err()

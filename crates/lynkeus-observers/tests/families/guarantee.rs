@@ -1,7 +1,7 @@
 //! What is certified of an observer as a system, whatever its family.
 
 use crate::common::{design_with, plant};
-use lynkeus_observers::{Assumptions, Certificate, Claim, Tuning, certify, triangular::Triangular};
+use lynkeus_observers::{Assumptions, Certificate, Claim, Tuning, certify, triangular::TRIANGULAR};
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
 use lynkeus_words::Words;
 
@@ -10,7 +10,7 @@ fn certified(f: &str) -> Certificate {
     let plant = plant(&format!(
         "model P Real x(start = 0.1, min = 0, max = 2); output Real y = x; equation der(x) = -x - {f}; end P;"
     ));
-    let design = design_with(&Triangular, &plant, &[], &Tuning::from([("theta", 3.0)])).unwrap();
+    let design = design_with(TRIANGULAR, &plant, &[], &Tuning::from([("theta", 3.0)])).unwrap();
     let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
     let assumptions = Assumptions::new(&augmented, augmented.region()).unwrap();
     certify(&augmented, &design.observer, &assumptions, Claim::Fastest).unwrap()

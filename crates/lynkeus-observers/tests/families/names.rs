@@ -3,8 +3,8 @@
 use lynkeus_expr::Expr;
 use lynkeus_model::{Model, Plant, Variable};
 use lynkeus_observers::{
-    Family, Tuning, Value, block_triangular::BlockTriangular, drift_observable::DriftObservable,
-    state_affine::StateAffine, triangular::Triangular,
+    Family, Tuning, Value, block_triangular::BLOCK_TRIANGULAR, drift_observable::DRIFT_OBSERVABLE,
+    state_affine::STATE_AFFINE, triangular::TRIANGULAR,
 };
 
 use crate::common::{Guaranteed, design_with, slope};
@@ -43,10 +43,10 @@ fn families() -> [(&'static dyn Family, Tuning); 4] {
     poles.values.insert("poles".to_owned(), Value::List(list));
     let theta = || Tuning::from([("theta", 3.0)]);
     [
-        (&Triangular, theta()),
-        (&BlockTriangular, theta()),
-        (&StateAffine, theta()),
-        (&DriftObservable, poles),
+        (TRIANGULAR, theta()),
+        (BLOCK_TRIANGULAR, theta()),
+        (STATE_AFFINE, theta()),
+        (DRIFT_OBSERVABLE, poles),
     ]
 }
 
@@ -66,7 +66,7 @@ fn no_name_meets_a_symbol_of_the_observer() {
 
 /// x̂' at a point, then the verdict and the constants of the theorem.
 fn told(
-    family: &dyn Family,
+    family: &'static dyn Family,
     tuning: &Tuning,
     names: [&str; 4],
 ) -> (Vec<f64>, Option<f64>, Vec<f64>) {

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use crate::common::{assert_close, design_with, plant, refused, run, slope};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Design, DesignError, Family, Tuning, Value, block_triangular::BlockTriangular,
-    triangular::Triangular,
+    Design, DesignError, Family, Tuning, Value, block_triangular::BLOCK_TRIANGULAR,
+    triangular::TRIANGULAR,
 };
 use lynkeus_words::Words;
 
@@ -54,11 +54,11 @@ fn table(entries: &[(&str, f64)]) -> Value {
     Value::Table(BTreeMap::from_iter(entries.iter().map(entry)))
 }
 
-fn designed(family: &dyn Family, plant: &Plant, tuning: &Tuning) -> Design {
+fn designed(family: &'static dyn Family, plant: &Plant, tuning: &Tuning) -> Design {
     design_with(family, plant, &[], tuning).unwrap()
 }
 
-fn refusal(family: &dyn Family, plant: &Plant, tuning: &Tuning) -> String {
+fn refusal(family: &'static dyn Family, plant: &Plant, tuning: &Tuning) -> String {
     match design_with(family, plant, &[], tuning) {
         Err(DesignError::Tuning(error)) => error.to_string(),
         other => panic!("expected a key to be refused, found {other:?}"),
@@ -90,7 +90,7 @@ fn largest(values: &[f64]) -> f64 {
 fn the_low_power_form_converges_with_gains_of_second_power() {
     let plant = plant(FOUR);
     let θ = 12.0;
-    let design = designed(&Triangular, &plant, &low_power(θ, &[]));
+    let design = designed(TRIANGULAR, &plant, &low_power(θ, &[]));
     assert_eq!(design.observer.states.len(), 2 * 4 - 2);
     assert_eq!(design.observer.estimates.len(), 4);
     // K_i = (2, (4 − i)/i): no gain above 3θ², where the standard one has θ⁴
@@ -102,7 +102,7 @@ fn the_low_power_form_converges_with_gains_of_second_power() {
         &gains,
         &[2.0 * θ, 3.0 * θ * θ, 2.0 * θ, θ * θ, 2.0 * θ, θ * θ / 3.0],
     );
-    let standard = designed(&Triangular, &plant, &with(θ, &[]));
+    let standard = designed(TRIANGULAR, &plant, &with(θ, &[]));
     assert!(standard.gains[0].entries[3].1 > 10.0 * gains[1]);
     assert!(largest(&errors(&plant, &design, 8.0, 6.0)) < 1e-6);
 }
@@ -113,7 +113,7 @@ fn a_chain_of_one_state_takes_no_coefficients() {
     let plant = plant("model One Real a; output Real y = a; equation der(a) = -a; end One;");
     let none = Value::List(vec![Value::List(vec![])]);
     let design = designed(
-        &Triangular,
+        TRIANGULAR,
         &plant,
         &low_power(2.0, &[("low_power_k", none)]),
     );
@@ -148,7 +148,7 @@ fn partials_enter_one_at_a_time() {
             ("low_power_k", K.clone()),
             ("partials", Value::Flag(partials)),
         ];
-        let design = designed(&Triangular, &plant, &low_power(θ, &keys));
+        let design = designed(TRIANGULAR, &plant, &low_power(θ, &keys));
         let found = slope(&plant, &design, &[a, b, c, second], &[], &[y]);
         assert_close(&found, &expected);
     }
@@ -159,13 +159,13 @@ fn two_chains_and_one_of_a_single_state() {
     let plant = plant(TWO);
     let poles = Value::List(vec![list(&[-1.0, -1.5, -2.0, -2.5]), list(&[-1.0, -2.0])]);
     let keys = [("low_power_poles", poles), ("delta", list(&[1.0, 1.5]))];
-    let design = designed(&Triangular, &plant, &low_power(8.0, &keys));
+    let design = designed(TRIANGULAR, &plant, &low_power(8.0, &keys));
     assert_eq!(design.observer.states.len(), 4 + 2);
     assert!(largest(&errors(&plant, &design, 8.0, 6.0)) < 1e-6);
     let single = crate::common::plant(
         "model Single Real x(start = 1); output Real y = x; equation der(x) = -x^3; end Single;",
     );
-    let design = designed(&Triangular, &single, &low_power(3.0, &[]));
+    let design = designed(TRIANGULAR, &single, &low_power(3.0, &[]));
     assert_close(
         &slope(&single, &design, &[0.5], &[], &[1.0]),
         &[-0.125 + 3.0 * 0.5],
@@ -181,11 +181,11 @@ fn the_classical_observer_in_the_low_power_form() {
         ("form", text("low-power")),
         ("theta", list(&[6.0, 20.0])),
     ];
-    let design = designed(&BlockTriangular, &plant, &with(6.0, &keys));
+    let design = designed(BLOCK_TRIANGULAR, &plant, &with(6.0, &keys));
     assert_eq!(design.observer.states.len(), 4 + 2);
     assert!(largest(&errors(&plant, &design, 8.0, 6.0)) < 1e-5);
     let lee = low_power(6.0, &[]);
-    let lee = refused(&BlockTriangular, &plant, &lee);
+    let lee = refused(BLOCK_TRIANGULAR, &plant, &lee);
     assert!(lee.summary.words().contains("correction = \"classical\""));
 }
 
@@ -194,12 +194,12 @@ fn the_classical_observer_in_the_low_power_form() {
 fn limited_copies_do_not_hand_their_peaks_on() {
     let text = FOUR.replace("(start", "(min = -2, max = 2, start");
     let plant = plant(&text);
-    let free = designed(&Triangular, &plant, &low_power(12.0, &[]));
+    let free = designed(TRIANGULAR, &plant, &low_power(12.0, &[]));
     let limited = Tuning {
         clamp: true,
         ..low_power(12.0, &[])
     };
-    let limited = designed(&Triangular, &plant, &limited);
+    let limited = designed(TRIANGULAR, &plant, &limited);
     let (free, limited) = (
         errors(&plant, &free, 8.0, 0.0),
         errors(&plant, &limited, 8.0, 0.0),
@@ -213,7 +213,7 @@ fn the_gain_changes_at_the_end_of_the_transient() {
     let plant = plant(FOUR);
     let correction = |transient: Option<Value>| -> Vec<f64> {
         let keys: Vec<(&str, Value)> = transient.map(|t| ("transient", t)).into_iter().collect();
-        let design = designed(&Triangular, &plant, &with(8.0, &keys));
+        let design = designed(TRIANGULAR, &plant, &with(8.0, &keys));
         slope(&plant, &design, &[0.0; 4], &[], &[1.0])
     };
     let scaled = |θ: f64| -> Vec<f64> {
@@ -238,10 +238,10 @@ fn the_gain_changes_at_the_end_of_the_transient() {
 fn a_gentle_transient_peaks_less() {
     let plant = plant(FOUR);
     let gentle = ("transient", table(&[("theta", 3.0), ("until", 2.0)]));
-    let tunings: [(&dyn Family, Tuning); 3] = [
-        (&Triangular, with(12.0, &[])),
-        (&Triangular, low_power(12.0, &[])),
-        (&BlockTriangular, with(12.0, &[])),
+    let tunings: [(&'static dyn Family, Tuning); 3] = [
+        (TRIANGULAR, with(12.0, &[])),
+        (TRIANGULAR, low_power(12.0, &[])),
+        (BLOCK_TRIANGULAR, with(12.0, &[])),
     ];
     for (family, tuning) in tunings {
         let mut switched = tuning.clone();
@@ -269,7 +269,7 @@ fn the_innovation_is_limited() {
         "model Scaled Real a; Real b; output Real y = -2*a; equation der(a) = b; der(b) = 0; end Scaled;",
     );
     let keys = [("innovation_limit", Value::Number(0.5))];
-    for family in [&Triangular as &dyn Family, &BlockTriangular] {
+    for family in [TRIANGULAR, BLOCK_TRIANGULAR] {
         let plain = designed(family, &plant, &with(3.0, &[]));
         let limited = designed(family, &plant, &with(3.0, &keys));
         let at = |design: &Design, y: f64| slope(&plant, design, &[0.0, 0.0], &[], &[y]);
@@ -282,7 +282,7 @@ fn the_innovation_is_limited() {
 #[test]
 fn wrong_keys_are_refused_with_what_is_expected() {
     let plant = plant(FOUR);
-    let said = |tuning: Tuning| refusal(&Triangular, &plant, &tuning);
+    let said = |tuning: Tuning| refusal(TRIANGULAR, &plant, &tuning);
     let pairs = |pairs: &[[f64; 2]]| {
         Value::List(vec![Value::List(pairs.iter().map(|p| list(p)).collect())])
     };
@@ -360,6 +360,6 @@ fn wrong_keys_are_refused_with_what_is_expected() {
     let wide = crate::common::plant(
         "model Wide Real a; Real b; output Real y = a; equation der(a) = exp(b); der(b) = 0; end Wide;",
     );
-    let found = refusal(&Triangular, &wide, &low_power(1.0, &[]));
+    let found = refusal(TRIANGULAR, &wide, &low_power(1.0, &[]));
     assert!(found.contains("set partials = true"), "{found}");
 }

@@ -7,8 +7,7 @@ use lynkeus_expr::Tape;
 use lynkeus_gain::UnitFactor;
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Design, DesignError, Family, Initial, Tuning, Value, state_affine::StateAffine,
-    triangular::Triangular,
+    Design, DesignError, Initial, Tuning, Value, state_affine::STATE_AFFINE, triangular::TRIANGULAR,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 use lynkeus_words::Words;
@@ -50,7 +49,7 @@ fn design(plant: &Plant, disturbances: &[&str], tuning: &Tuning) -> Design {
         disturbances: disturbances.iter().map(|s| s.to_string()).collect(),
         ..Sensors::default()
     };
-    StateAffine
+    STATE_AFFINE
         .design(&AugmentedPlant::new(plant, &sensors).unwrap(), tuning)
         .unwrap()
 }
@@ -426,7 +425,7 @@ fn a_coupling_of_either_sign_fits() {
         "model CounterExample input Integer s(min = 0, max = 1); Real u; Real x1; Real x2; output Real y = x1;
          equation u = 2*s - 1; der(x1) = u*x2; der(x2) = 0; end CounterExample;",
     );
-    refused(&Triangular, &plant, &Tuning::from([("theta", 1.0)]));
+    refused(TRIANGULAR, &plant, &Tuning::from([("theta", 1.0)]));
     let design = design(&plant, &[], &Tuning::from([("theta", 2.0)]));
     assert_eq!(design.examination.fit(), Standing::Proved);
     let inputs = [("s", "if sin(3*time) > 0 then 1 else 0")];
@@ -472,7 +471,7 @@ fn plants_of_another_form_are_refused() {
     let square = plant(
         "model P Real a; Real b; output Real y = a; equation der(a) = b^2; der(b) = 1; end P;",
     );
-    let examination = refused(&StateAffine, &square, &Tuning::from([("theta", 1.0)]));
+    let examination = refused(STATE_AFFINE, &square, &Tuning::from([("theta", 1.0)]));
     assert!(
         examination
             .summary
@@ -484,7 +483,7 @@ fn plants_of_another_form_are_refused() {
     let same = plant(
         "model P Real a; Real b; Real c; output Real y = a; equation der(a) = b + c; der(b) = -b; der(c) = b; end P;",
     );
-    let examination = refused(&StateAffine, &same, &Tuning::from([("theta", 1.0)]));
+    let examination = refused(STATE_AFFINE, &same, &Tuning::from([("theta", 1.0)]));
     let check = examination.refuted().unwrap();
     assert!(
         matches!(check.verdict, Verdict::Refuted(_)) && check.statement.words().contains("(b, c)"),
@@ -508,7 +507,7 @@ fn uncertainty_outside_of_the_last_block_is_noted() {
 #[test]
 fn keys_that_cannot_be_used_are_named() {
     let plant = plant(EXAMPLE);
-    let text = |tuning: &Tuning| match design_with(&StateAffine, &plant, &[], tuning) {
+    let text = |tuning: &Tuning| match design_with(STATE_AFFINE, &plant, &[], tuning) {
         Err(DesignError::Tuning(error)) => error.to_string(),
         other => panic!("{other:?}"),
     };

@@ -4,13 +4,13 @@ use crate::common::{
     Guaranteed, assert_safely, constant, design_with, hypothesis, numbers, plant, run,
 };
 use lynkeus_model::{LoadOptions, Plant};
-use lynkeus_observers::{Tuning, Value, block_triangular::BlockTriangular};
+use lynkeus_observers::{Tuning, Value, block_triangular::BLOCK_TRIANGULAR};
 use lynkeus_structure::Standing;
 use lynkeus_words::Words;
 
 fn study<'a>(plant: &'a Plant, tuning: Tuning) -> Guaranteed<'a> {
     Guaranteed {
-        family: &BlockTriangular,
+        family: BLOCK_TRIANGULAR,
         plant,
         unknown: &[],
         tuning,
@@ -185,7 +185,7 @@ fn simulations_keep_the_guarantee() {
         let found = study(&plant, tuning.clone()).certificate();
         assert_eq!(found.verdict(), Standing::Proved, "{found:#?}");
         let (σ, λ1) = (found.rate.unwrap(), constant(&found, "λ1"));
-        let design = design_with(&BlockTriangular, &plant, &[], &tuning).unwrap();
+        let design = design_with(BLOCK_TRIANGULAR, &plant, &[], &tuning).unwrap();
         let x0: Vec<f64> = (0..4).map(|_| start(random())).collect();
         let rows: Vec<f64> = (0..=20).map(|k| k as f64 * 3.0 / σ / 20.0).collect();
         let run = run(&plant, &design, &[], &x0, &rows, 0.2 / (θ * θ));

@@ -4,13 +4,13 @@ use crate::common::{
     Guaranteed, assert_safely, constant, design_with, hypothesis, numbers, plant, run,
 };
 use lynkeus_model::{LoadOptions, Plant};
-use lynkeus_observers::{Initial, Ltaief, Tuning, state_affine::StateAffine};
+use lynkeus_observers::{Initial, Ltaief, Tuning, state_affine::STATE_AFFINE};
 use lynkeus_structure::Standing;
 use lynkeus_words::Words;
 
 fn study<'a>(plant: &'a Plant, tuning: Tuning) -> Guaranteed<'a> {
     Guaranteed {
-        family: &StateAffine,
+        family: STATE_AFFINE,
         plant,
         unknown: &[],
         tuning,
@@ -141,7 +141,7 @@ fn simulations_keep_the_guarantee() {
         let found = study(&plant, tuning.clone()).certificate();
         assert_eq!(found.verdict(), Standing::Proved);
         let (σ, ratio) = (found.rate.unwrap(), constant(&found, "η√α(θ)"));
-        let design = design_with(&StateAffine, &plant, &[], &tuning).unwrap();
+        let design = design_with(STATE_AFFINE, &plant, &[], &tuning).unwrap();
         let x0: Vec<f64> = (0..n).map(|_| 4.0 * random() - 2.0).collect();
         let rows: Vec<f64> = (0..=30).map(|k| k as f64 * 10.0 / θ / 5.0).collect();
         let run = run(&plant, &design, &[], &x0, &rows, 0.01 / θ);

@@ -6,13 +6,13 @@ use crate::common::{
     Guaranteed, assert_safely, constant, design_with, hypothesis, numbers, plant, run,
 };
 use lynkeus_model::{LoadOptions, Plant};
-use lynkeus_observers::{Certificate, Initial, Tuning, Value, triangular::Triangular};
+use lynkeus_observers::{Certificate, Initial, Tuning, Value, triangular::TRIANGULAR};
 use lynkeus_structure::{Standing, Verdict};
 use lynkeus_words::Words;
 
 fn study<'a>(plant: &'a Plant, tuning: Tuning) -> Guaranteed<'a> {
     Guaranteed {
-        family: &Triangular,
+        family: TRIANGULAR,
         plant,
         unknown: &[],
         tuning,
@@ -353,7 +353,7 @@ fn simulations_keep_the_guarantee() {
         let found = study(&plant, tuning.clone()).certificate();
         assert_eq!(found.verdict(), Standing::Proved);
         let (σ, λ1) = (found.rate.unwrap(), constant(&found, "λ1"));
-        let design = design_with(&Triangular, &plant, &[], &tuning).unwrap();
+        let design = design_with(TRIANGULAR, &plant, &[], &tuning).unwrap();
         let x0: Vec<f64> = (0..n).map(|_| 4.0 * random() - 2.0).collect();
         let rows: Vec<f64> = (0..=40)
             .map(|k| k as f64 * 4.0 / σ.max(0.5) / 40.0)

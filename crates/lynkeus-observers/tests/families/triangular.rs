@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use crate::common::{assert_close, design_with, plant, slope};
 use lynkeus_model::Plant;
-use lynkeus_observers::{Design, DesignError, Initial, Tuning, Value, triangular::Triangular};
+use lynkeus_observers::{Design, DesignError, Initial, Tuning, Value, triangular::TRIANGULAR};
 use lynkeus_structure::{Standing, Verdict};
 use lynkeus_words::Words;
 
 fn design(plant: &Plant, unknown: &[&str], tuning: &Tuning) -> Result<Design, DesignError> {
-    design_with(&Triangular, plant, unknown, tuning)
+    design_with(TRIANGULAR, plant, unknown, tuning)
 }
 
 fn matrix(diag: &[f64], off: &[f64]) -> Value {

@@ -9,7 +9,7 @@ use crate::common::{
 };
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Design, DesignError, FAMILIES, Family, Tuning, TuningError, Value, unknown_input::UnknownInput,
+    Design, DesignError, FAMILIES, Family, Tuning, TuningError, Value, unknown_input::UNKNOWN_INPUT,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 use lynkeus_words::Words;
@@ -56,7 +56,7 @@ fn with_partition(mut tuning: Tuning, outputs: &[&str]) -> Tuning {
 }
 
 fn design(plant: &Plant, tuning: &Tuning) -> Result<Design, DesignError> {
-    design_with(&UnknownInput, plant, &["v"], tuning)
+    design_with(UNKNOWN_INPUT, plant, &["v"], tuning)
 }
 
 /// (14) written out for the example, at time 0.
@@ -189,7 +189,7 @@ fn order_and_names_do_not_matter() {
     );
     let plant = plant(renamed);
     let tuning = starts(tuning(60.0, 15.0), ["q", "e", "d"]);
-    let design = design_with(&UnknownInput, &plant, &["d"], &tuning).unwrap();
+    let design = design_with(UNKNOWN_INPUT, &plant, &["d"], &tuning).unwrap();
     let x0: Vec<f64> = plant.states.iter().map(|s| s.start.unwrap()).collect();
     let other = run(
         &plant,
@@ -223,7 +223,7 @@ fn the_error_of_a_linear_plant_has_the_poles_of_the_paper() {
     );
     let (θ1, θ2) = (2.0, 3.0);
     let tuning = with_partition(tuning(θ1, θ2), &["y1", "y3"]);
-    let design = design_with(&UnknownInput, &plant, &["v1", "v2"], &tuning).unwrap();
+    let design = design_with(UNKNOWN_INPUT, &plant, &["v1", "v2"], &tuning).unwrap();
     assert_eq!(design.examination.fit(), Standing::Proved);
     let rest = slope(&plant, &design, &[0.0; 7], &[], &[1.0, 0.0, 0.0]);
     assert_close(&rest, &[0.0; 7]);
@@ -367,7 +367,7 @@ fn wrong_keys_are_named() {
 
 #[test]
 fn what_is_missing_is_said() {
-    let examination = refused(&UnknownInput, &plant(EXAMPLE), &tuning(60.0, 15.0));
+    let examination = refused(UNKNOWN_INPUT, &plant(EXAMPLE), &tuning(60.0, 15.0));
     assert!(
         examination.summary.words().contains("'unknown'"),
         "{}",
@@ -418,7 +418,7 @@ fn no_family_before_it_fits_the_example() {
         ..Sensors::default()
     };
     let augmented = AugmentedPlant::new(&plant, &sensors).unwrap();
-    let fits = |family: &&&dyn Family| {
+    let fits = |family: &&&'static dyn Family| {
         let found = family.examine(&augmented, &Tuning::default()).unwrap();
         found.fit() == Standing::Proved
     };

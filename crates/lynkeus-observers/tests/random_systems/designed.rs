@@ -2,7 +2,7 @@
 
 use lynkeus_observers::{
     Claim as Sought, Correction, Design, DesignError, Family, Observer, Tuning, Value,
-    block_triangular::BlockTriangular, triangular::Triangular,
+    block_triangular::BLOCK_TRIANGULAR, triangular::TRIANGULAR,
 };
 use lynkeus_structure::{AugmentedPlant, Standing};
 
@@ -58,7 +58,7 @@ fn design(
     tuning: &Tuning,
     family: usize,
 ) -> Result<Design, DesignError> {
-    let family: &dyn Family = [&Triangular as &dyn Family, &BlockTriangular][family];
+    let family: &'static dyn Family = [TRIANGULAR, BLOCK_TRIANGULAR][family];
     family.design(augmented, tuning)
 }
 
@@ -158,7 +158,7 @@ fn declared_noise_weighs_the_outputs_in_their_own_units() {
             .insert("gain".into(), Value::Text("lmi".into()));
         let named = ["y", "q"].map(str::to_owned).into_iter().zip(noise);
         tuning.noise = named.collect();
-        let found = Triangular.design(&augmented, &tuning).unwrap();
+        let found = TRIANGULAR.design(&augmented, &tuning).unwrap();
         match Correction::of(&augmented, &found.observer).unwrap() {
             Correction::Gain(K) => [K.column(0).amax(), K.column(1).amax()],
             Correction::Varying(other) => panic!("{other:?}"),

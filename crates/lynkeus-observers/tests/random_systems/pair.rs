@@ -52,7 +52,6 @@ pub fn observer(augmented: &AugmentedPlant<'_>, K: &DMatrix<f64>) -> Observer {
     };
     let inputs = augmented.inputs.iter();
     Observer {
-        family: "triangular",
         time: augmented.plant.time,
         estimates: states.map(estimate).collect(),
         derivatives,

@@ -2,8 +2,8 @@
 //! limited errors: the same judgement.
 
 use lynkeus_observers::{
-    Claim as Sought, Family, Tuning, Value, block_triangular::BlockTriangular,
-    triangular::Triangular,
+    Claim as Sought, Family, Tuning, Value, block_triangular::BLOCK_TRIANGULAR,
+    triangular::TRIANGULAR,
 };
 use lynkeus_structure::Standing;
 
@@ -22,24 +22,24 @@ fn tuned(numbers: &mut Numbers) -> (&'static dyn Family, Tuning) {
     let mut with = |key: &str, value: Value| {
         tuning.values.insert(key.to_owned(), value);
     };
-    let family: &dyn Family = match numbers.below(13) {
-        0..3 => &Triangular,
+    let family: &'static dyn Family = match numbers.below(13) {
+        0..3 => TRIANGULAR,
         3..6 => {
             with("partials", Value::Flag(true));
-            &Triangular
+            TRIANGULAR
         }
         6..9 => {
             let keys = [("theta", 0.5 * θ), ("until", 1.0)];
             let keys = keys.map(|(key, x)| (key.to_owned(), Value::Number(x)));
             with("transient", Value::Table(keys.into()));
-            &Triangular
+            TRIANGULAR
         }
         9..12 => {
             with("innovation_limit", Value::Number(numbers.size(0.05, 2.0)));
-            &Triangular
+            TRIANGULAR
         }
         // rarely: the slopes of its gain take long to enclose
-        _ => &BlockTriangular,
+        _ => BLOCK_TRIANGULAR,
     };
     (family, tuning)
 }

@@ -37,12 +37,11 @@ impl fmt::Display for CertifyReport {
 }
 
 fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt::Result {
-    let observer = &report.design.observer;
     writeln!(
         f,
         "{}: {} observer, {}",
         report.plant,
-        observer.family,
+        report.design.examination.family,
         conclusion(report)
     )?;
     writeln!(f, "{}", region(report))?;

@@ -67,7 +67,7 @@ fn family(examination: &Examination) -> Value {
         entry
     };
     json!({
-        "family": examination.family,
+        "family": examination.family.name(),
         "fit": fit_word(examination.fit()),
         "summary": examination.summary.words(),
         "chains": examination.chains,

@@ -149,7 +149,7 @@ fn observer(prepared: &Prepared<'_>, choice: &Choice) -> String {
     let study = prepared.study();
     let mut lines = vec![
         "[observer]".to_owned(),
-        format!("family = {}", text(choice.family)),
+        format!("family = {}", text(choice.family.name())),
     ];
     if let Some(Proposal {
         speed, value, why, ..
@@ -157,9 +157,8 @@ fn observer(prepared: &Prepared<'_>, choice: &Choice) -> String {
     {
         lines.push(format!("{} = {value}  # {why}", speed.key()));
     }
-    let family = lynkeus_observers::find(choice.family);
     let given = study.observer.tuning.values.iter();
-    let given = given.filter(|(name, _)| family.is_some_and(|family| family.owns(name)));
+    let given = given.filter(|(name, _)| choice.family.owns(name));
     lines.extend(given.map(|(name, value)| format!("{} = {}", key(name), toml(value))));
     lines.extend(common(&study.observer.tuning));
     if choice.grounds == Grounds::Filter && !prepared.declared().process_noise.is_declared() {

@@ -177,7 +177,7 @@ fn reported(
     let limit = limit.map(|spent| format!("{done} of {asked} runs: {spent}"));
     MonteCarlo {
         plant: plant.name.clone(),
-        family: rig.design.observer.family,
+        family: rig.design.examination.family.name(),
         file: study.file.clone(),
         asked,
         seeds,

@@ -29,7 +29,7 @@ impl Outcome {
         let outside = |outside: &Option<Outside>| json!(outside.as_ref().map(|o| o.to_json()));
         json!({
             "plant": self.plant,
-            "family": self.design.observer.family,
+            "family": self.design.examination.family.name(),
             "chains": self.design.examination.chains,
             "gains": object(gains.collect()),
             "rows": self.time.len(),

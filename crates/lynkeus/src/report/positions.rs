@@ -57,7 +57,7 @@ impl Positions {
 
 fn speeds(prepared: &Prepared<'_>, design: &Design) -> Result<Option<Positions>, Error> {
     let mut study = prepared.study().clone();
-    study.observer.family = Some(Name::from(design.observer.family));
+    study.observer.family = Some(Name::from(design.examination.family.name()));
     study.observer.tuning = prepared.tuning()?;
     let Some(axis) = axis::around(&study, TO_A_SIDE) else {
         return Ok(None);

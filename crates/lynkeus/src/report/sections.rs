@@ -63,7 +63,7 @@ impl Told<'_> {
             "p class=\"lead\"",
             &format!(
                 "The {} observer estimates {} from {}.",
-                observer.family,
+                outcome.design.examination.family,
                 listed(&estimated),
                 listed(&measured)
             ),
@@ -236,7 +236,7 @@ fn accuracy(accuracy: &Accuracy) -> Vec<Cell> {
 fn examination(html: &mut Html, examination: &Examination) {
     html.raw(&format!(
         "<p>{}: {} {}</p>",
-        super::html::escaped(examination.family),
+        super::html::escaped(examination.family.name()),
         badge(fit_word(examination.fit())),
         super::html::escaped(&examination.summary.words())
     ));

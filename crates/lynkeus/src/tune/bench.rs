@@ -42,9 +42,10 @@ impl<'a> Bench<'a> {
         };
         let is_filter = design.observer.filter.is_some();
         match self {
-            Self::Simulation(_) | Self::Log(_) if is_filter => {
-                Err(filter_refused(prepared.study(), design.observer.family))
-            }
+            Self::Simulation(_) | Self::Log(_) if is_filter => Err(filter_refused(
+                prepared.study(),
+                design.examination.family.name(),
+            )),
             Self::Simulation(reference) => {
                 trial::simulated(prepared, &design, reference, row, watch)
             }

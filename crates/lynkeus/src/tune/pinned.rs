@@ -1,6 +1,6 @@
 //! The study of a sweep: one family for all values.
 
-use lynkeus_observers::Examination;
+use lynkeus_observers::{Examination, Family};
 use lynkeus_structure::Standing;
 
 use super::axis;
@@ -37,10 +37,7 @@ pub(super) fn pinned(prepared: &Prepared<'_>) -> Result<Pinned, Error> {
     let Some(choice) = prepared.choice()? else {
         return Ok(as_it_is());
     };
-    let owns = |name: &str| {
-        let family = lynkeus_observers::find(name);
-        family.is_some_and(|family| swept.iter().all(|key| family.owns(key)))
-    };
+    let owns = |family: &dyn Family| swept.iter().all(|key| family.owns(key));
     let may_fit = |e: &&Examination| e.fit() != Standing::Refuted && owns(e.family);
     let family = match owns(choice.family) {
         true => Some(choice.family),
@@ -68,6 +65,6 @@ pub(super) fn pinned(prepared: &Prepared<'_>) -> Result<Pinned, Error> {
             "every value is one of the family {family}; `family` of [observer] names another"
         ));
     }
-    pinned.study.observer.family = Some(Name::from(family));
+    pinned.study.observer.family = Some(Name::from(family.name()));
     Ok(pinned)
 }

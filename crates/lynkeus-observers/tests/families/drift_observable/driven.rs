@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::common::{plant, run};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Assumptions, Certificate, Family, Tuning, Value, drift_observable::DriftObservable,
+    Assumptions, Certificate, Tuning, Value, drift_observable::DRIFT_OBSERVABLE,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
 
@@ -46,7 +46,7 @@ impl Driven<'_> {
             .with_drift(vec![0.0; augmented.states.len()])
             .with_noise(vec![0.0; augmented.outputs.len()])
             .with_input_derivatives(vec![]);
-        DriftObservable
+        DRIFT_OBSERVABLE
             .theorem(&augmented, &self.tuning(), &assumptions)
             .unwrap()
     }
@@ -54,7 +54,7 @@ impl Driven<'_> {
     /// The largest errors of the states, and of all together, over the last quarter.
     fn left(&self, plant: &Plant) -> (Vec<f64>, f64) {
         let augmented = AugmentedPlant::new(plant, &Sensors::default()).unwrap();
-        let design = DriftObservable.design(&augmented, &self.tuning()).unwrap();
+        let design = DRIFT_OBSERVABLE.design(&augmented, &self.tuning()).unwrap();
         let n = augmented.states.len();
         let times: Vec<f64> = (0..=400)
             .map(|k| self.until * f64::from(k) / 400.0)

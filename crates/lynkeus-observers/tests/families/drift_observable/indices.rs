@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use crate::common::{design_with, plant, run, slope};
 use lynkeus_observers::{
-    DesignError, Examination, Family, Tuning, Value, drift_observable::DriftObservable,
+    DesignError, Examination, Tuning, Value, drift_observable::DRIFT_OBSERVABLE,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 use lynkeus_words::Words;
@@ -29,7 +29,7 @@ fn pair(re: f64, im: f64) -> Value {
 fn examine(text: &str, tuning: &Tuning) -> Result<Examination, DesignError> {
     let plant = plant(text);
     let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
-    DriftObservable.examine(&augmented, tuning)
+    DRIFT_OBSERVABLE.examine(&augmented, tuning)
 }
 
 /// Indices (2, 3); rows of Q by hand, and Q s = b by substitution.
@@ -69,7 +69,7 @@ fn indices_2_3_against_substitution_by_hand() {
         list(&[-3.0, -4.0]),
         Value::List(vec![Value::Number(-5.0), pair(-3.0, -1.0)]),
     ]);
-    let design = design_with(&DriftObservable, &plant, &[], &with(&[("poles", poles)])).unwrap();
+    let design = design_with(DRIFT_OBSERVABLE, &plant, &[], &with(&[("poles", poles)])).unwrap();
     assert_eq!(design.examination.fit(), Standing::Proved);
     let summary = &design.examination.summary.words();
     assert!(summary.contains("y, y', z, z', z''"), "{summary}");
@@ -87,7 +87,7 @@ fn indices_2_3_against_substitution_by_hand() {
         Value::List(vec![list(&[-3.0, -4.0]), list(&[-3.0, -4.0, -5.0])]),
     )]);
     wrong.initial.default = Some(0.0);
-    let design = design_with(&DriftObservable, &plant, &[], &wrong).unwrap();
+    let design = design_with(DRIFT_OBSERVABLE, &plant, &[], &wrong).unwrap();
     let found = run(
         &plant,
         &design,
@@ -125,7 +125,7 @@ fn indices_that_are_regular_everywhere_are_preferred() {
             found.summary.words()
         );
     }
-    let design = design_with(&DriftObservable, &plant(SINGULAR), &[], &slowest).unwrap();
+    let design = design_with(DRIFT_OBSERVABLE, &plant(SINGULAR), &[], &slowest).unwrap();
     assert_eq!(
         parameter(&design, "λ of ya"),
         "-3, -3.5999999999999996, -4.32"

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use lynkeus_expr::{Budget, Spent};
-use lynkeus_observers::{Examination, Family, Tuning, drift_observable::DriftObservable};
+use lynkeus_observers::{Examination, Tuning, drift_observable::DRIFT_OBSERVABLE};
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
 use lynkeus_words::Words;
 
@@ -21,7 +21,7 @@ fn examined(n: usize, declared: &str, equations: &str, seconds: u64) -> Examinat
     let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
     let budget = Budget::new(Some(Duration::from_secs(seconds)), None);
     augmented.graph().set_budget(budget);
-    DriftObservable
+    DRIFT_OBSERVABLE
         .examine(&augmented, &Tuning::default())
         .unwrap()
 }

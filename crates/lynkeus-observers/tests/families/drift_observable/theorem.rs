@@ -4,8 +4,8 @@
 use crate::common::{plant, run};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Assumptions, Certificate, Check, Design, Family, Germani, Reason, Tuning, UltimateBound, Value,
-    drift_observable::DriftObservable,
+    Assumptions, Certificate, Check, Design, Germani, Reason, Tuning, UltimateBound, Value,
+    drift_observable::DRIFT_OBSERVABLE,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
 use lynkeus_words::Words;
@@ -48,13 +48,13 @@ fn certificate(plant: &Plant, tuning: &Tuning, drift: &[f64], noise: &[f64]) -> 
         .unwrap()
         .with_drift(drift.to_vec())
         .with_noise(noise.to_vec());
-    let found = DriftObservable.theorem(&augmented, tuning, &assumptions);
+    let found = DRIFT_OBSERVABLE.theorem(&augmented, tuning, &assumptions);
     found.unwrap()
 }
 
 fn design(plant: &Plant, tuning: &Tuning) -> Design {
     let augmented = AugmentedPlant::new(plant, &sensors(plant)).unwrap();
-    DriftObservable.design(&augmented, tuning).unwrap()
+    DRIFT_OBSERVABLE.design(&augmented, tuning).unwrap()
 }
 
 fn value(found: &Certificate, name: &str) -> f64 {
@@ -318,7 +318,7 @@ fn bounds_of_slopes_may_come_from_the_assumptions() {
             .with_drift(vec![0.0; 2])
             .with_noise(vec![0.0])
             .with_input_derivatives(vec![slopes.to_vec()]);
-        DriftObservable
+        DRIFT_OBSERVABLE
             .theorem(&augmented, tuning, &assumptions)
             .unwrap()
     };

@@ -4,7 +4,7 @@
 use crate::common::{constant, plant, run};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Assumptions, Certificate, Family, Tuning, UltimateBound, unknown_input::UnknownInput,
+    Assumptions, Certificate, Tuning, UltimateBound, unknown_input::UNKNOWN_INPUT,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
 
@@ -30,7 +30,7 @@ impl Promise<'_> {
             .unwrap()
             .with_drift(self.drift.to_vec())
             .with_noise(self.noise.to_vec());
-        UnknownInput
+        UNKNOWN_INPUT
             .theorem(&augmented, tuning, &assumptions)
             .unwrap()
     }
@@ -39,7 +39,7 @@ impl Promise<'_> {
         let found = self.certificate(tuning);
         assert_eq!(found.verdict(), Standing::Proved, "{:#?}", found.hypotheses);
         let augmented = AugmentedPlant::new(self.plant, &self.sensors).unwrap();
-        let design = UnknownInput.design(&augmented, tuning).unwrap();
+        let design = UNKNOWN_INPUT.design(&augmented, tuning).unwrap();
         let times: Vec<f64> = (0..=100).map(|i| 0.05 * f64::from(i)).collect();
         let n = self.x0.len();
         let errors = |row: &[f64]| -> Vec<f64> {

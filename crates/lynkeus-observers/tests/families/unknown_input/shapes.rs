@@ -4,7 +4,7 @@
 use crate::common::{assert_close, constant, design_with, hypothesis, plant, slope};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Assumptions, Certificate, DesignError, Family, Tuning, unknown_input::UnknownInput,
+    Assumptions, Certificate, DesignError, Tuning, unknown_input::UNKNOWN_INPUT,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 use lynkeus_words::Words;
@@ -26,7 +26,7 @@ fn two_unknown_inputs_with_four_outputs() {
          der(c1) = -c1 + v2; der(c2) = 0.3*c1*c2 - v1; end Two;",
     );
     let given = with_partition(tuning(6.0, 3.0), &["y1", "y2"]);
-    let design = design_with(&UnknownInput, &plant, &["v1", "v2"], &given).unwrap();
+    let design = design_with(UNKNOWN_INPUT, &plant, &["v1", "v2"], &given).unwrap();
     let chosen = &design.examination;
     assert_eq!(chosen.fit(), Standing::Proved, "{:#?}", chosen.checks);
     let state = [0.3, -0.2, 0.5, 0.1, 0.7, -0.4, 0.6, -0.8];
@@ -60,7 +60,7 @@ fn more_outputs_in_x11_than_unknown_inputs() {
          der(c) = d + 0.1*d^3 + 0.5*v; der(d) = e - d*c + c*v; der(e) = -e + a - v; end More;",
     );
     let given = with_partition(tuning(5.0, 2.0), &["ya", "yb"]);
-    let design = design_with(&UnknownInput, &plant, &["v"], &given).unwrap();
+    let design = design_with(UNKNOWN_INPUT, &plant, &["v"], &given).unwrap();
     assert_eq!(design.examination.fit(), Standing::Proved);
     let state = [0.3, -0.2, 0.5, 0.1, 0.7, 0.6];
     let found = slope(&plant, &design, &state, &[], &[0.1, 1.4, 0.4]);
@@ -101,7 +101,7 @@ fn certificate(plant: &Plant, tuning: &Tuning, slew: f64, noise: f64) -> Certifi
         .unwrap()
         .with_drift(drift)
         .with_noise(vec![noise; augmented.outputs.len()]);
-    UnknownInput
+    UNKNOWN_INPUT
         .theorem(&augmented, tuning, &assumptions)
         .unwrap()
 }
@@ -113,7 +113,7 @@ fn a_left_inverse_in_the_gain() {
     let plant = plant(TALL);
     let augmented = AugmentedPlant::new(&plant, &sensors()).unwrap();
     let given = with_partition(tuning(5.0, 2.0), &["ya"]);
-    let design = UnknownInput.design(&augmented, &given).unwrap();
+    let design = UNKNOWN_INPUT.design(&augmented, &given).unwrap();
     let (state, y) = ([0.3, -0.2, 0.5, 0.1, 0.7, 0.6], [0.1, 0.2, 0.4]);
     let found = slope(&plant, &design, &state, &[], &y);
     let expected = [
@@ -223,7 +223,7 @@ fn narrowing(layers: usize, end: usize) -> String {
 #[test]
 fn shortened_chains_that_the_papers_gains_make_unstable_are_refused() {
     let Err(DesignError::Refused(examination)) = design_with(
-        &UnknownInput,
+        UNKNOWN_INPUT,
         &plant(&narrowing(12, 7)),
         &["v"],
         &tuning(10.0, 2.0),
@@ -237,7 +237,7 @@ fn shortened_chains_that_the_papers_gains_make_unstable_are_refused() {
         refuted.statement.words()
     );
     let fine = design_with(
-        &UnknownInput,
+        UNKNOWN_INPUT,
         &plant(&narrowing(4, 2)),
         &["v"],
         &tuning(10.0, 2.0),
@@ -258,7 +258,7 @@ fn shortened_chains_that_the_papers_gains_make_unstable_are_refused() {
         .unwrap()
         .with_drift(vec![0.0; augmented.states.len()])
         .with_noise(vec![0.0; 3]);
-    let found = UnknownInput
+    let found = UNKNOWN_INPUT
         .theorem(&augmented, &tuning(1e4, 20.0), &assumptions)
         .unwrap();
     assert_eq!(found.verdict(), Standing::Undecided);
@@ -294,7 +294,7 @@ fn the_matrices_of_the_paper_are_shown() {
     );
     let mut tuning = tuning(10.0, 5.0);
     tuning.initial.default = Some(0.5);
-    let design = design_with(&UnknownInput, &plant, &["v"], &tuning).unwrap();
+    let design = design_with(UNKNOWN_INPUT, &plant, &["v"], &tuning).unwrap();
     assert!(design.gains.is_empty());
     let value = |name: &str| {
         let found = design.parameters.iter().find(|(n, _)| n == name);
@@ -329,7 +329,7 @@ fn a_moving_input_needs_a_bound_of_its_derivative() {
         let assumptions = Assumptions::new(&augmented, augmented.region())
             .unwrap()
             .with_input_derivatives(bounds);
-        let found = UnknownInput
+        let found = UNKNOWN_INPUT
             .theorem(&augmented, &tuning(50.0, 10.0), &assumptions)
             .unwrap();
         hypothesis(&found, "c1, c2, c4 and c5").is_proved()

@@ -4,7 +4,7 @@
 use crate::common::{design_with, plant, run};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Assumptions, Certificate, Family, Tuning, UltimateBound, Value, unknown_input::UnknownInput,
+    Assumptions, Certificate, Tuning, UltimateBound, Value, unknown_input::UNKNOWN_INPUT,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 use lynkeus_words::Words;
@@ -32,7 +32,7 @@ fn certificate(plant: &Plant, tuning: &Tuning, drift: &[f64], noise: &[f64]) -> 
         .unwrap()
         .with_drift(drift.to_vec())
         .with_noise(noise.to_vec());
-    UnknownInput
+    UNKNOWN_INPUT
         .theorem(&augmented, tuning, &assumptions)
         .unwrap()
 }
@@ -174,7 +174,7 @@ fn promised(text: &str, x0: &[f64], start: &[f64]) -> bool {
     assert_eq!(found.verdict(), Standing::Proved);
     let names = plant.states.iter().map(|s| s.name.clone());
     tuning.initial.values = names.chain(["v".into()]).zip(start.to_vec()).collect();
-    let design = design_with(&UnknownInput, &plant, &["v"], &tuning).unwrap();
+    let design = design_with(UNKNOWN_INPUT, &plant, &["v"], &tuning).unwrap();
     let times: Vec<f64> = (0..=40).map(|i| 0.1 * f64::from(i)).collect();
     let inputs = [("v", "0.3*sin(2*time)")];
     let rows = run(&plant, &design, &inputs, x0, &times, 0.3 / θ[0]).rows;
