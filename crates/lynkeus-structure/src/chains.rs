@@ -74,11 +74,7 @@ pub fn find(
     augmented: &AugmentedPlant<'_>,
     request: &ChainRequest,
 ) -> Result<Vec<Assignment>, Misfit> {
-    let heads = heads(augmented)?;
-    let found = match heads[..] {
-        [head] => vec![single(augmented, head)?],
-        _ => cuts(augmented, &heads)?,
-    };
+    let found = cuts(augmented, &heads(augmented)?)?;
     let (mut fits, other): (Vec<Assignment>, Vec<_>) = found
         .into_iter()
         .partition(|a| request.is_met(augmented, &a.chains));
@@ -149,18 +145,6 @@ pub(crate) fn named<'c>(
         .collect()
 }
 
-fn single(augmented: &AugmentedPlant<'_>, head: usize) -> Result<Assignment, Misfit> {
-    let (chain, new) = grown(augmented, head, |_| false);
-    if chain.len() < augmented.states.len() {
-        return Err(stuck(augmented, &chain, new));
-    }
-    Ok(Assignment {
-        chains: vec![chain],
-        leading: 0,
-        leads: vec![0],
-    })
-}
-
 /// Why a chain does not reach every state.
 fn stuck(augmented: &AugmentedPlant<'_>, chain: &[usize], new: Vec<usize>) -> Misfit {
     let names = |states: Vec<usize>| names(augmented, states);
@@ -177,7 +161,7 @@ fn stuck(augmented: &AugmentedPlant<'_>, chain: &[usize], new: Vec<usize>) -> Mi
     }
 }
 
-/// Every cut into a leading chain and following ones.
+/// Every cut into a leading chain and following ones; of one output its chain.
 fn cuts(augmented: &AugmentedPlant<'_>, heads: &[usize]) -> Result<Vec<Assignment>, Misfit> {
     let grown = |&head: &usize| grown(augmented, head, |_| false);
     let paths: Vec<_> = heads.iter().map(grown).collect();
@@ -216,7 +200,11 @@ fn cuts(augmented: &AugmentedPlant<'_>, heads: &[usize]) -> Result<Vec<Assignmen
     if found.is_empty() {
         let reasons = paths.into_iter();
         let reasons = reasons.map(|(chain, new)| stuck(augmented, &chain, new));
-        return Err(Misfit::NoCut(reasons.collect()));
+        let mut reasons: Vec<Misfit> = reasons.collect();
+        return Err(match reasons.len() {
+            1 => reasons.remove(0),
+            _ => Misfit::NoCut(reasons),
+        });
     }
     Ok(found)
 }

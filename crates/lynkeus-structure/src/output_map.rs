@@ -253,11 +253,9 @@ impl Codistribution {
     /// no point shows more.
     pub fn krener_respondek(&mut self) -> Vec<usize> {
         let mut best = vec![0; self.lengths.len()];
-        for point in 0..POINTS {
-            let Some(values) = self.at(point) else {
-                continue;
-            };
-            let indices = self.indices_at(&values);
+        let points: Vec<Vec<f64>> = (0..POINTS).filter_map(|p| self.at(p)).collect();
+        for values in &points {
+            let indices = self.indices_at(values);
             if indices.iter().sum::<usize>() > best.iter().sum() {
                 best = indices;
             }
@@ -293,15 +291,14 @@ impl Codistribution {
     /// Whether the determinant of the chosen rows is seen with both signs: such indices
     /// are singular somewhere, unless the box falls apart.
     pub fn changes_sign(&mut self, indices: &[usize]) -> bool {
+        let (rows, n) = (self.chosen(indices), self.n);
+        if rows.len() != n {
+            return false;
+        }
         let (mut positive, mut negative) = (false, false);
-        for point in 0..SIGNS {
-            let Some(values) = self.at(point) else {
-                continue;
-            };
-            let rows = self.chosen(indices);
-            let square = rows.len() == self.n;
-            let matrix = DMatrix::from_fn(rows.len(), self.n, |i, j| values[rows[i] * self.n + j]);
-            let det = if square { matrix.determinant() } else { 0.0 };
+        for values in (0..SIGNS).filter_map(|point| self.at(point)) {
+            let matrix = DMatrix::from_fn(n, n, |i, j| values[rows[i] * n + j]);
+            let det = matrix.determinant();
             positive |= det > 0.0;
             negative |= det < 0.0;
         }

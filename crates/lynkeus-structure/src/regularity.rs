@@ -290,10 +290,8 @@ impl<'g> Walk<'g> {
 
     /// Whether every operation is needed wherever the roots are: none is chosen.
     fn needs_all(&self) -> bool {
-        !self
-            .steps
-            .iter()
-            .any(|step| matches!(step.op, Op::Select(..)))
+        let mut steps = self.steps.iter();
+        !steps.any(|step| matches!(step.op, Op::Select(..)))
     }
 
     /// The nodes behind the roots' troubles: a branch that is not taken is none.
@@ -307,11 +305,9 @@ impl<'g> Walk<'g> {
                 continue;
             }
             let untaken = match (step.op, &step.arguments[..]) {
-                (Op::Select(..), &[c, a, b]) => match decided(self.known[c].values) {
-                    Some(true) => Some(b),
-                    Some(false) => Some(a),
-                    None => None,
-                },
+                (Op::Select(..), &[c, a, b]) => {
+                    decided(self.known[c].values).map(|taken| if taken { b } else { a })
+                }
                 _ => None,
             };
             for &argument in &step.arguments {
