@@ -175,17 +175,8 @@ pub fn lemma_3_2(n: usize, α: f64, β: f64, γ: f64) -> Result<Lemma32, Error> 
     while excess(high).ok_or_else(large)? < 0.0 {
         (low, high) = (high, 2.0 * high);
     }
-    loop {
-        let middle = low + (high - low) / 2.0;
-        if middle <= low || middle >= high {
-            break;
-        }
-        match excess(middle) {
-            Some(x) if x >= 0.0 => high = middle,
-            // poles so close that V⁻¹ is out of range: σ is too small
-            _ => low = middle,
-        }
-    }
+    // poles so close that V⁻¹ is out of range: σ is too small
+    let [_, high] = bisected([low, high], |σ| excess(σ).is_some_and(|x| x >= 0.0));
     let poles = powers(high, n);
     let inverse_norm = inverse_norm(high, n).ok_or_else(large)?;
     let peaking = norm(vandermonde(&poles)).map_or(f64::INFINITY, |norm| norm * inverse_norm);
@@ -195,6 +186,17 @@ pub fn lemma_3_2(n: usize, α: f64, β: f64, γ: f64) -> Result<Lemma32, Error> 
         poles,
         peaking,
     })
+}
+
+/// Two neighbouring numbers between which a test begins to be passed, by halving.
+pub(crate) fn bisected([mut low, mut high]: [f64; 2], passes: impl Fn(f64) -> bool) -> [f64; 2] {
+    loop {
+        match low + (high - low) / 2.0 {
+            middle if middle <= low || middle >= high => return [low, high],
+            middle if passes(middle) => high = middle,
+            middle => low = middle,
+        }
+    }
 }
 
 fn powers(σ: f64, n: usize) -> Vec<f64> {
@@ -208,11 +210,8 @@ fn inverse_norm(σ: f64, n: usize) -> Option<f64> {
 
 /// The spectral norm, where it is a number.
 fn norm(matrix: DMatrix<f64>) -> Option<f64> {
-    Some(
-        spectrum::singular(matrix, false, false)?
-            .singular_values
-            .max(),
-    )
+    let decomposed = spectrum::singular(matrix, false, false)?;
+    Some(decomposed.singular_values.max())
 }
 
 /// V_n(λ) of (2.25).

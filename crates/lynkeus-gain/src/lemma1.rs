@@ -94,10 +94,8 @@ const RHO: f64 = 2.0;
 pub fn construct(bounds: &[Bounds]) -> Result<Lemma1, Error> {
     let size = check(bounds)?;
     let w = scale(bounds);
-    let scaled: Vec<Bounds> = bounds
-        .iter()
-        .map(|b| (b.lower * w, b.upper * w).into())
-        .collect();
+    let scaled = bounds.iter().map(|b| (b.lower * w, b.upper * w).into());
+    let scaled: Vec<Bounds> = scaled.collect();
     let (mut diagonal, mut off): (Vec<f64>, Vec<f64>) = (vec![1.0], vec![]);
     let mut pivot = 1.0;
     let mut growth = Growth::new();

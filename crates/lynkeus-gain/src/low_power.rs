@@ -15,6 +15,8 @@
 //! last: κ_m = P(0), −k_m1 is a real root of (P − P(0))/s, which has odd degree, and
 //! (P − P(0))/(s(s + k_m1)) is the polynomial of the blocks before.
 
+use std::cmp::Ordering;
+
 use lynkeus_proof::decay::{self, ErrorModel, Proof};
 use lynkeus_proof::matrix::points;
 use lynkeus_proof::{lyapunov, spectrum, vertices};
@@ -76,23 +78,16 @@ fn value(P: &[f64], s: f64) -> f64 {
 fn real_root(P: &[f64]) -> Option<f64> {
     // Cauchy's bound
     let bound = 1.0 + P[1..].iter().fold(0.0, |m: f64, c| m.max(c.abs()));
-    let mut ends = match value(P, 0.0) > 0.0 {
-        true => (-bound, 0.0),
-        false => (0.0, bound),
-    };
     if !bound.is_finite() {
         return None;
     }
-    loop {
-        let middle = ends.0 + (ends.1 - ends.0) / 2.0;
-        if middle <= ends.0 || middle >= ends.1 {
-            return Some(middle);
-        }
-        match value(P, middle) < 0.0 {
-            true => ends.0 = middle,
-            false => ends.1 = middle,
-        }
-    }
+    let ends = match value(P, 0.0) > 0.0 {
+        true => [-bound, 0.0],
+        false => [0.0, bound],
+    };
+    let passes = |s: f64| value(P, s).partial_cmp(&0.0) != Some(Ordering::Less);
+    let [low, high] = integrators::bisected(ends, passes);
+    Some(low + (high - low) / 2.0)
 }
 
 /// P/(s − root), by Horner's scheme.

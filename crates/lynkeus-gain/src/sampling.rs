@@ -61,19 +61,14 @@ pub fn limits(M: &DMatrix<f64>, C: &DMatrix<f64>) -> Option<Limits> {
     if !shrinks(interval) {
         return None;
     }
-    while shrinks(interval * FINER) {
+    while interval <= LONGEST / fastest && shrinks(interval * FINER) {
         interval *= FINER;
-        if interval > LONGEST / fastest {
-            return Some(Limits {
-                predict: f64::INFINITY,
-                hold,
-            });
-        }
     }
-    Some(Limits {
-        predict: between(interval, interval * FINER, shrinks),
-        hold,
-    })
+    let predict = match interval > LONGEST / fastest {
+        true => f64::INFINITY,
+        false => between(interval, interval * FINER, shrinks),
+    };
+    Some(Limits { predict, hold })
 }
 
 /// Where errors cease to shrink, to 1 %.

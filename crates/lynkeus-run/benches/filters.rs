@@ -5,7 +5,7 @@ use lynkeus_expr::Graph;
 use lynkeus_run::filter::{
     FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
 };
-use lynkeus_run::{Error, Estimator, EstimatorSettings, Level, Method, Tolerances};
+use lynkeus_run::{Blueprint, Error, EstimatorSettings, Level, Method, Tolerances};
 
 fn main() {
     divan::main();
@@ -57,8 +57,9 @@ fn measure(bencher: Bencher, n: usize, kind: FilterKind) {
         method,
         ..EstimatorSettings::default()
     };
-    let filter =
-        chain(n).and_then(|model| Estimator::filter(&model, FilterSettings::of(kind), run));
+    let filter = chain(n).and_then(|model| {
+        Blueprint::filter(model.clone(), FilterSettings::of(kind), run).estimator()
+    });
     let mut filter = filter.unwrap_or_else(|error| panic!("{error}"));
     let mut k = 0_u32;
     let mut push = || {

@@ -10,7 +10,7 @@ use crate::error::state_text;
 use crate::events::{Ahead, Filippov, Span};
 use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Method, Tolerances, spectral_radius};
+use crate::{Dynamics, Error, Method, Result, Tolerances, spectral_radius};
 
 use dop853::Dop853;
 use one_step::OneStep;
@@ -43,7 +43,7 @@ const TRIES: usize = 60;
 const HALVINGS: usize = 8;
 
 /// Error-controlled integrator; remembers its step and method between calls.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Adaptive {
     tolerances: Tolerances,
     /// both methods may be used
@@ -90,16 +90,8 @@ impl Adaptive {
             tolerances,
             may_change: matches!(method, Method::Adaptive(_)),
             is_implicit: matches!(method, Method::Stiff(_)),
-            explicit: None,
-            implicit: None,
-            next: 0.0,
-            since_look: 0,
-            agreeing: 0,
-            granted: 0,
-            left: 0,
-            before: 0,
             of_run: STEPS_PER_RUN,
-            spent: 0,
+            ..Self::default()
         }
     }
 
@@ -124,7 +116,7 @@ impl Adaptive {
         from: f64,
         to: f64,
         x: &mut [f64],
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let mut leg = Leg { f, t: from, to, x };
         if leg.at_the_end() || leg.x.is_empty() {
             return leg.check_start();
@@ -149,21 +141,14 @@ impl Adaptive {
         }
         self.since_look = 0;
         let product = spectral_radius(leg.f, leg.t, leg.x) * step;
-        let speaks_for_change = if self.is_implicit {
-            product < STIFF_BELOW
-        } else {
-            product > STIFF_ABOVE
+        self.agreeing = match self.is_implicit {
+            true if product < STIFF_BELOW => self.agreeing + 1,
+            false if product > STIFF_ABOVE => self.agreeing + 1,
+            _ => 0,
         };
-        self.agreeing = if speaks_for_change {
-            self.agreeing + 1
-        } else {
-            0
-        };
-        let change = self.agreeing >= LOOKS;
-        if change {
-            self.agreeing = 0;
-        }
-        change
+        let changes = self.agreeing >= LOOKS;
+        self.agreeing %= LOOKS;
+        changes
     }
 
     /// Steps of one of the methods; false where the other one fits better from there.
@@ -171,11 +156,9 @@ impl Adaptive {
         &mut self,
         leg: &mut Leg<'_, '_, impl Dynamics>,
         of: fn(&mut Self) -> &mut Option<Box<M>>,
-    ) -> Result<bool, Error> {
-        let mut method = match of(self).take() {
-            Some(method) => method,
-            None => Box::new(M::new(leg.x.len())),
-        };
+    ) -> Result<bool> {
+        let new = || Box::new(M::new(leg.x.len()));
+        let mut method = of(self).take().unwrap_or_else(new);
         method.restart(true);
         let is_done = self.steps(&mut *method, leg);
         *of(self) = Some(method);
@@ -186,7 +169,7 @@ impl Adaptive {
         &mut self,
         method: &mut impl OneStep,
         leg: &mut Leg<'_, '_, impl Dynamics>,
-    ) -> Result<bool, Error> {
+    ) -> Result<bool> {
         let tolerances = self.tolerances;
         if !self.is_implicit {
             self.next = self.next.min(leg.to - leg.t);
@@ -219,7 +202,7 @@ impl Adaptive {
         &mut self,
         method: &mut impl OneStep,
         leg: &mut Leg<'_, '_, impl Dynamics>,
-    ) -> Result<f64, Error> {
+    ) -> Result<f64> {
         loop {
             let proposed = self.next;
             let step = leg.step(proposed);
@@ -229,10 +212,9 @@ impl Adaptive {
                 Err(shorter) => self.next = shorter,
                 Ok(next) => {
                     // a step cut short by a stop says nothing about the next one
-                    self.next = if step < proposed {
-                        proposed.max(next)
-                    } else {
-                        next
+                    self.next = match step < proposed {
+                        true => proposed.max(next),
+                        false => next,
                     };
                     return Ok(step);
                 }
@@ -247,7 +229,7 @@ impl Adaptive {
         method: &mut impl OneStep,
         leg: &mut Leg<'_, '_, impl Dynamics>,
         step: f64,
-    ) -> Result<f64, Error> {
+    ) -> Result<f64> {
         let (t, start, reached) = (leg.t, leg.x.to_vec(), method.reached().to_vec());
         let span = Span {
             from: (t, &start),
@@ -281,7 +263,7 @@ impl Adaptive {
     }
 
     /// Pays for one step.
-    fn spend(&mut self, leg: &mut Leg<'_, '_, impl Dynamics>) -> Result<(), Error> {
+    fn spend(&mut self, leg: &mut Leg<'_, '_, impl Dynamics>) -> Result<()> {
         if leg.f.is_over() {
             return Err(Error::Cancelled { time: leg.t });
         }
@@ -308,7 +290,7 @@ impl Adaptive {
         span: &Span<'_>,
         ahead: Ahead,
         mut attempt: impl FnMut(&mut Filippov<'_, D>, f64) -> Option<Vec<f64>>,
-    ) -> Result<Option<Reach>, Error> {
+    ) -> Result<Option<Reach>> {
         let (t, step) = (span.from.0, span.step);
         let reach = |f: &mut Filippov<'_, D>, step: f64, x: Vec<f64>| {
             let margins = f.margins(t + step, &x);
@@ -398,26 +380,22 @@ impl<D: Dynamics> Leg<'_, '_, D> {
     /// The step to take: the proposed one, or what ends the leg without a
     /// tiny step at its end.
     fn step(&self, proposed: f64) -> f64 {
-        let left = self.to - self.t;
-        if proposed >= left {
-            left
-        } else if proposed > 0.5 * left {
-            0.5 * left
-        } else {
-            proposed
+        match self.to - self.t {
+            left if proposed >= left => left,
+            left if proposed > 0.5 * left => 0.5 * left,
+            _ => proposed,
         }
     }
 
     /// Time goes on by a step.
     fn pass(&mut self, step: f64) {
-        self.t = if step == self.to - self.t {
-            self.to
-        } else {
-            self.t + step
+        self.t = match step == self.to - self.t {
+            true => self.to,
+            false => self.t + step,
         };
     }
 
-    fn check_start(&mut self) -> Result<(), Error> {
+    fn check_start(&mut self) -> Result<()> {
         let mut dx = vec![0.0; self.x.len()];
         self.f.derivatives(self.t, self.x, &mut dx);
         if are_finite(&dx) {
@@ -426,7 +404,7 @@ impl<D: Dynamics> Leg<'_, '_, D> {
         Err(self.f.not_finite(self.t, self.x))
     }
 
-    fn check_step(&mut self, step: f64, bad: Option<&(f64, Vec<f64>)>) -> Result<(), Error> {
+    fn check_step(&mut self, step: f64, bad: Option<&(f64, Vec<f64>)>) -> Result<()> {
         if step > resolution(self.t) {
             return Ok(());
         }

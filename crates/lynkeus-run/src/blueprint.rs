@@ -68,9 +68,7 @@ impl Tuned {
     /// The last signals of the observer.
     pub fn signals(&self) -> Vec<f64> {
         let mut evaluation = self.system.evaluation();
-        for (signal, value) in evaluation.signals_mut().iter_mut().zip(&self.values) {
-            *signal = *value;
-        }
+        evaluation.signals_mut().copy_from_slice(&self.values);
         let mut signals = vec![0.0; self.system.outputs().len()];
         evaluation.outputs(0.0, &[], &mut signals);
         signals
@@ -213,7 +211,7 @@ pub fn fastest_mode(
 #[must_use]
 pub fn fastest_at(evaluation: &mut Evaluation, start: &[f64], sizes: &[f64]) -> Option<Fastest> {
     evaluation.enter(0.0);
-    let seen = fastest(evaluation, 0.0, start, sizes);
+    let seen = fastest(evaluation, 0.0, start, Some(sizes));
     (seen.step() > 0.0).then_some(seen)
 }
 

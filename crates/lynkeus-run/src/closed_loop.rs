@@ -2,12 +2,12 @@
 
 use std::sync::Mutex;
 
-use lynkeus_expr::{Expr, Graph, Node};
+use lynkeus_expr::{Graph, Node, Nodes, Reals};
 
 use crate::equations::{Both, Equations, Roots};
 use crate::method::are_finite;
-use crate::noise::{Level, Limits, Sensors};
-use crate::{Dynamics, Error, Evaluation, Events, Simulation, Slopes, System};
+use crate::noise::Sensors;
+use crate::{Dynamics, Error, Evaluation, Events, Result, Simulation, Slopes, System};
 
 /// The place of a name among those that a system can read.
 fn place(
@@ -15,7 +15,7 @@ fn place(
     name: &str,
     among: &[String],
     available: &[String],
-) -> Result<usize, Error> {
+) -> Result<usize> {
     let mut found = (0..among.len()).filter(|&i| among[i] == name);
     match (found.next(), found.next()) {
         (Some(place), None) => Ok(place),
@@ -50,13 +50,8 @@ struct Symbols {
 }
 
 impl Wiring {
-    fn new(simulation: &Simulation) -> Result<Self, Error> {
-        let Simulation {
-            plant,
-            inputs,
-            observer,
-            ..
-        } = simulation;
+    fn new(simulation: &Simulation) -> Result<Self> {
+        let Simulation { plant, inputs, .. } = simulation;
         if let Some(name) = inputs.signals().first() {
             return Err(Error::Unconnected {
                 reader: "inputs",
@@ -67,7 +62,7 @@ impl Wiring {
         let all = [plant.outputs(), inputs.outputs()].concat();
         let plant_wires = plant.signals().iter();
         let plant_wires = plant_wires.map(|name| place("plant", name, inputs.outputs(), &all));
-        let observer_wires = observer.iter().flat_map(System::signals);
+        let observer_wires = simulation.observer.iter().flat_map(System::signals);
         let observer_wires = observer_wires.map(|name| place("observer", name, &all, &all));
         Ok(Self {
             plant_wires: plant_wires.collect::<Result<_, _>>()?,
@@ -77,13 +72,8 @@ impl Wiring {
     }
 
     fn parts(&self) -> impl Iterator<Item = &System> {
-        let Simulation {
-            plant,
-            inputs,
-            observer,
-            ..
-        } = &self.simulation;
-        [inputs, plant].into_iter().chain(observer)
+        let Simulation { plant, inputs, .. } = &self.simulation;
+        [inputs, plant].into_iter().chain(&self.simulation.observer)
     }
 
     /// The signals of the plant, given the inputs.
@@ -99,13 +89,9 @@ impl Wiring {
 
     /// One system: its states are the plant's, then the observer's, its signals what disturbs each
     /// sensor and each moved state, its outputs the values of a row.
-    fn joined(&self, sensors: &Sensors) -> Result<System, Error> {
-        let Simulation {
-            plant,
-            inputs,
-            observer,
-            ..
-        } = &self.simulation;
+    fn joined(&self, sensors: &Sensors) -> Result<System> {
+        let Simulation { plant, inputs, .. } = &self.simulation;
+        let observer = self.simulation.observer.as_ref();
         let g = Graph::new();
         let fresh = |count: usize| (0..count).map(|_| g.fresh("x").node()).collect::<Vec<_>>();
         let own = |part: Option<&System>| {
@@ -116,7 +102,7 @@ impl Wiring {
             time: g.fresh("time").node(),
             noise: fresh(plant.outputs().len()),
             drives: fresh(sensors.moved().count()),
-            own: [Some(inputs), Some(plant), observer.as_ref()].map(own),
+            own: [Some(inputs), Some(plant), observer].map(own),
         };
         let free = self.roots(&g, sensors, &symbols, false).held;
         let roots = Roots {
@@ -129,7 +115,7 @@ impl Wiring {
             jumps.extend(part.jumps.iter().map(|jump| jump.after(surfaces)));
             surfaces += part.roots.surfaces.len();
         }
-        let of_observer = observer.iter().flat_map(System::states);
+        let of_observer = observer.into_iter().flat_map(System::states);
         let of_observer = of_observer.map(|name| format!("observer's {name}"));
         let equations = Equations {
             states: plant.states().iter().cloned().chain(of_observer).collect(),
@@ -141,10 +127,8 @@ impl Wiring {
             jumps,
             graph: Mutex::new(g),
         };
-        System::compiled(
-            equations,
-            self.parts().flat_map(System::start).copied().collect(),
-        )
+        let start = self.parts().flat_map(System::start).copied();
+        System::compiled(equations, start.collect())
     }
 
     /// What the joined system computes, of `held` alone: with what jumps with the state held, or as
@@ -170,7 +154,7 @@ impl Wiring {
         for (state, &drive) in sensors.moved().zip(&symbols.drives) {
             derivatives[state] = (g.expr(derivatives[state]) + g.expr(drive)).node();
         }
-        let shown = symbols.shown(g, sensors, y);
+        let shown = sensors.shown(&Nodes(g), y, &symbols.noise);
         let mut row = [&own_plant[0][..], &w].concat();
         if simulation.record_outputs {
             row.extend(y.iter().chain(&shown));
@@ -191,51 +175,28 @@ impl Wiring {
 }
 
 impl Symbols {
-    /// What the sensors show.
-    fn shown(&self, g: &Graph, sensors: &Sensors, y: &[Node]) -> Vec<Node> {
-        let shown = |(i, &y): (usize, &Node)| {
-            let (y, noise) = (g.expr(y), g.expr(self.noise[i]));
-            let disturbed = match sensors.level(i) {
-                None => y,
-                Some(Level::Relative(_)) => y * noise,
-                Some(Level::Absolute(_) | Level::Uniform(_)) => y + noise,
-            };
-            let limited = |Limits { low, high }| -> Expr<'_> {
-                disturbed.min(g.constant(high)).max(g.constant(low))
-            };
-            sensors.limits(i).map_or(disturbed, limited).node()
-        };
-        y.iter().enumerate().map(shown).collect()
-    }
-
     /// In the order of a system's inputs.
     fn all(&self) -> Vec<Node> {
         let [states, modes, held] = [0, 1, 2].map(|kind| {
             let parts = self.own.iter().flat_map(|own| &own[kind]);
             parts.copied().collect::<Vec<_>>()
         });
-        [
-            &[self.time][..],
-            &states,
-            &self.noise,
-            &self.drives,
-            &modes,
-            &held,
-        ]
-        .concat()
+        let signals = [&self.noise[..], &self.drives].concat();
+        [vec![self.time], states, signals, modes, held].concat()
     }
 }
 
 /// A closed loop under way.
 pub(crate) struct Loop {
-    joined: Evaluation,
+    /// plant and observer as one system, whose outputs are the values of a row
+    pub joined: Evaluation,
     sensors: Sensors,
     wiring: Wiring,
 }
 
 impl Loop {
     /// Of a simulation whose process noise is held for `hold`.
-    pub(crate) fn new(simulation: &Simulation, hold: f64) -> Result<Self, Error> {
+    pub(crate) fn new(simulation: &Simulation, hold: f64) -> Result<Self> {
         let Simulation { plant, noise, .. } = simulation;
         let sensors = Sensors::new(noise, plant.outputs(), plant.states(), hold)?;
         let wiring = Wiring::new(simulation)?;
@@ -244,11 +205,6 @@ impl Loop {
             sensors,
             wiring,
         })
-    }
-
-    /// Plant and observer as one system, whose outputs are the values of a row.
-    pub(crate) fn joined(&mut self) -> &mut Evaluation {
-        &mut self.joined
     }
 
     /// Columns that are not estimates.
@@ -293,7 +249,7 @@ impl Loop {
     }
 
     /// Writes the recorded values at (t, x), in the order of [`Simulation::table`].
-    pub(crate) fn row(&mut self, t: f64, x: &[f64], row: &mut Vec<f64>) -> Result<(), Error> {
+    pub(crate) fn row(&mut self, t: f64, x: &[f64], row: &mut Vec<f64>) -> Result<()> {
         row.resize(self.joined.system().outputs().len(), 0.0);
         self.joined.outputs(t, x, row);
         match are_finite(row) {
@@ -325,9 +281,8 @@ impl Loop {
         let guilty = if are_finite(&u) { 1 } else { 0 };
         let mut parts = vec![inputs, plant];
         if let Some(observer) = &self.wiring.simulation.observer {
-            let measured = |(i, &y): (usize, &f64)| self.sensors.measured(i, y);
-            let outputs = self.wiring.simulation.plant.outputs().len();
-            let shown: Vec<f64> = y[..outputs].iter().enumerate().map(measured).collect();
+            let disturbances: Vec<f64> = self.sensors.disturbances().collect();
+            let shown = self.sensors.shown(&Reals, &y, &disturbances);
             let signals = self.wiring.observed(&u, &shown);
             parts.push(part(observer, &signals, &x[plant_x.len()..]).0);
         }

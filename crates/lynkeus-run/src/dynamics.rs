@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::error::state_text;
 use crate::events::Guards;
-use crate::{Error, Slopes};
+use crate::{Error, Result, Slopes};
 
 /// A right-hand side x' = f(t, x), with its [`Events`].
 ///
@@ -62,7 +62,7 @@ pub trait Events {
     /// # Errors
     /// [`Error::TooManySwitches`] where there is no bounded number of them,
     /// [`Error::UnresolvedSwitches`] where rounding errors hide them.
-    fn instants(&mut self, _from: f64, _to: f64, _times: &mut Vec<f64>) -> Result<(), Error> {
+    fn instants(&mut self, _from: f64, _to: f64, _times: &mut Vec<f64>) -> Result<()> {
         Ok(())
     }
 

@@ -121,18 +121,9 @@ impl Equations {
 
 impl Roots {
     fn nodes(&mut self) -> impl Iterator<Item = &mut Node> {
-        let Self {
-            free,
-            held,
-            surfaces,
-            bends,
-        } = self;
-        let surfaces = surfaces.iter_mut().map(|surface| &mut surface.node);
-        [free, held]
-            .into_iter()
-            .flat_map(|both| [&mut both.derivatives, &mut both.outputs])
-            .chain([bends])
-            .flatten()
-            .chain(surfaces)
+        let surfaces = self.surfaces.iter_mut().map(|surface| &mut surface.node);
+        let both = [&mut self.free, &mut self.held].into_iter();
+        let lists = both.flat_map(|both| [&mut both.derivatives, &mut both.outputs]);
+        lists.chain([&mut self.bends]).flatten().chain(surfaces)
     }
 }

@@ -4,6 +4,9 @@ use lynkeus_expr::MissingInput;
 
 use crate::{SnapshotFault, Trajectory};
 
+/// What comes of work that may end in this crate's error.
+pub(crate) type Result<T, E = Error> = std::result::Result<T, E>;
+
 /// Why a system could not be built, simulated or replayed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -102,21 +105,16 @@ pub enum Error {
 
     /// The integration cannot go on where a matrix of the observer is singular.
     #[error(
-        "the observer comes to where {matrix} is singular at t = {time} ({name} = {value:.3e}, its flag is raised below {below}) and cannot be integrated on: {meaning}; the estimate is {state}"
+        "the observer comes to where {} is singular at t = {time} ({} = {value:.3e}, its flag is raised below {}) and cannot be integrated on: {}; the estimate is {state}",
+        .margin.matrix, .margin.name, .margin.below, .margin.meaning
     )]
     Singular {
         /// when
         time: f64,
-        /// what the matrix is called
-        matrix: String,
-        /// the output that says how close it is to singular
-        name: String,
+        /// what says how close the matrix is to singular
+        margin: Box<Margin>,
         /// its value
         value: f64,
-        /// its limit
-        below: f64,
-        /// what that means, and what to do
-        meaning: String,
         /// names and values of the observer's state
         state: String,
     },
@@ -206,6 +204,22 @@ pub enum Error {
     },
 }
 
+/// An output of a system that says how far a matrix is from singular: its reciprocal condition
+/// number, which a run that cannot go on is judged by.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Margin {
+    /// its place among the outputs
+    pub output: usize,
+    /// what people call it
+    pub name: String,
+    /// what the matrix is called
+    pub matrix: String,
+    /// below this it is close to singular
+    pub below: f64,
+    /// what that means, and what to do
+    pub meaning: String,
+}
+
 impl Error {
     /// When a run ended, where it could not go on.
     pub(crate) fn time(&self) -> Option<f64> {
@@ -252,15 +266,6 @@ pub struct Interrupted {
     pub partial: Trajectory,
 }
 
-impl From<Error> for Box<Interrupted> {
-    fn from(error: Error) -> Self {
-        Box::new(Interrupted {
-            error,
-            partial: Trajectory::default(),
-        })
-    }
-}
-
 /// How many states a message lists.
 const LISTED: usize = 6;
 
@@ -277,11 +282,9 @@ pub(crate) fn digits(value: f64) -> String {
 pub(crate) fn state_text(names: &[String], values: &[f64]) -> String {
     let mut order: Vec<usize> = (0..names.len().min(values.len())).collect();
     order.sort_by_key(|&i| values[i].is_finite());
-    let listed: Vec<String> = order
-        .iter()
-        .take(LISTED)
-        .map(|&i| format!("{} = {}", names[i], digits(values[i])))
-        .collect();
+    let listed = order.iter().take(LISTED);
+    let listed = listed.map(|&i| format!("{} = {}", names[i], digits(values[i])));
+    let listed: Vec<String> = listed.collect();
     let mut text = listed.join(", ");
     if order.len() > LISTED {
         text.push_str(&format!(", … ({} states)", order.len()));

@@ -2,11 +2,13 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::filter::{Filter, FilterSettings, Health, Innovation, NoisyModel, Smoothed};
+use crate::filter::{Filter, Health, Innovation, Smoothed};
 use crate::runner::{Runner, Sample};
 use crate::sampled::Sampled;
 use crate::snapshot::{self, Damaged, Walk};
-use crate::{Blueprint, Error, EstimatorSettings, SnapshotFault, StepAdvice, System, Updates};
+use crate::{
+    Blueprint, Error, EstimatorSettings, Result, SnapshotFault, StepAdvice, System, Updates,
+};
 
 /// Any observer, one sample after the other, live or from a log.
 ///
@@ -69,13 +71,13 @@ impl Blueprint {
     /// # Errors
     /// [`Error::Setting`] for impossible numbers of the method; for a filter also of the gate or the
     /// sigma points.
-    pub fn estimator(&self) -> Result<Estimator, Error> {
+    pub fn estimator(&self) -> Result<Estimator> {
         Estimator::of(self.clone())
     }
 }
 
 impl Estimator {
-    fn of(blueprint: Blueprint) -> Result<Self, Error> {
+    fn of(blueprint: Blueprint) -> Result<Self> {
         let runner: Box<dyn Runner> = match &blueprint.updates {
             Updates::Jumps {
                 predict, errors, ..
@@ -102,20 +104,8 @@ impl Estimator {
     ///
     /// # Errors
     /// As [`Blueprint::estimator`].
-    pub fn new(observer: &System, settings: EstimatorSettings) -> Result<Self, Error> {
+    pub fn new(observer: &System, settings: EstimatorSettings) -> Result<Self> {
         Self::of(Blueprint::new(observer, settings))
-    }
-
-    /// A Kalman filter, at the plant's first estimate.
-    ///
-    /// # Errors
-    /// As [`Blueprint::estimator`].
-    pub fn filter(
-        model: &NoisyModel,
-        settings: FilterSettings,
-        run: EstimatorSettings,
-    ) -> Result<Self, Error> {
-        Self::of(Blueprint::filter(model.clone(), settings, run))
     }
 
     /// Goes to `t`, at which nothing is read: inputs stay as they were, and the estimate is
@@ -124,7 +114,7 @@ impl Estimator {
     /// # Errors
     /// [`Error::Setting`] before the first sample, [`Error::TimeBefore`], [`Error::NoNumber`];
     /// [`Error::Diverged`], [`Error::NotFinite`] and the errors of the integration.
-    pub fn predict(&mut self, t: f64) -> Result<&[f64], Error> {
+    pub fn predict(&mut self, t: f64) -> Result<&[f64]> {
         self.started()?;
         self.check_time(t)?;
         self.save();
@@ -138,7 +128,7 @@ impl Estimator {
     ///
     /// # Errors
     /// As [`Estimator::push`], and [`Error::Setting`] before the first sample.
-    pub fn update(&mut self, signals: &[f64]) -> Result<&[f64], Error> {
+    pub fn update(&mut self, signals: &[f64]) -> Result<&[f64]> {
         let t = self.started()?;
         self.push(t, signals)
     }
@@ -152,7 +142,7 @@ impl Estimator {
     /// [`Error::Setting`] for a wrong number of signals, [`Error::TimeBefore`],
     /// [`Error::NoNumber`] for a time or the first value of an input; [`Error::Diverged`],
     /// [`Error::NotFinite`] and the errors of the integration.
-    pub fn push(&mut self, t: f64, signals: &[f64]) -> Result<&[f64], Error> {
+    pub fn push(&mut self, t: f64, signals: &[f64]) -> Result<&[f64]> {
         if signals.len() != self.names.len() {
             let expected = format!("{}: {}", self.names.len(), self.names.join(", "));
             return Err(Error::setting("number of signals", expected, signals.len()));
@@ -174,12 +164,12 @@ impl Estimator {
     }
 
     /// The time of the last sample.
-    fn started(&self) -> Result<f64, Error> {
+    fn started(&self) -> Result<f64> {
         let none = || Error::setting("samples so far", "one, which sets the time", 0);
         self.time.ok_or_else(none)
     }
 
-    fn check_time(&self, t: f64) -> Result<(), Error> {
+    fn check_time(&self, t: f64) -> Result<()> {
         if !t.is_finite() {
             return Err(no_number("t", t));
         }
@@ -266,9 +256,8 @@ impl Estimator {
     /// A number that differs for observers with other equations, settings, noises or starts.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
-        *self
-            .fingerprint
-            .get_or_init(|| self.blueprint.fingerprint())
+        let find = || self.blueprint.fingerprint();
+        *self.fingerprint.get_or_init(find)
     }
 
     /// Everything that the future depends on, with a version, the [fingerprint](Self::fingerprint)
@@ -284,7 +273,7 @@ impl Estimator {
     ///
     /// # Errors
     /// [`Error::Snapshot`]: damaged, of another version, or of another observer.
-    pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), Error> {
+    pub fn restore(&mut self, snapshot: &[u8]) -> Result<()> {
         let refused = |fault| Error::Snapshot { fault };
         let state = snapshot::opened(snapshot, self.fingerprint()).map_err(refused)?;
         let mut restored = self.clone();
@@ -304,7 +293,7 @@ impl Estimator {
     }
 
     /// The observer to the sample that was taken in; back to what was saved where that fails.
-    fn settle(&mut self, before: Option<f64>, has_signals: bool) -> Result<&[f64], Error> {
+    fn settle(&mut self, before: Option<f64>, has_signals: bool) -> Result<&[f64]> {
         if let Err(error) = self.go(before, has_signals) {
             let image = std::mem::take(&mut self.image);
             // the same walk over what it made
@@ -318,7 +307,7 @@ impl Estimator {
         Ok(self.estimate())
     }
 
-    fn go(&mut self, before: Option<f64>, has_signals: bool) -> Result<(), Error> {
+    fn go(&mut self, before: Option<f64>, has_signals: bool) -> Result<()> {
         let (readings, inputs) = self.signals.split_at(self.sensors);
         let sample = Sample {
             t: self.time.unwrap_or_default(),

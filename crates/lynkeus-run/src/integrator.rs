@@ -2,10 +2,11 @@
 //! method with fixed steps.
 
 use crate::adaptive::Adaptive;
+use crate::divergence::{diverged, largest};
 use crate::events::{Filippov, Sides};
 use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Method, Step, spectral_radius};
+use crate::{Dynamics, Error, Method, Result, Step, spectral_radius};
 
 /// Most fixed steps in one interval.
 const MOST_STEPS: usize = 1_000_000;
@@ -81,7 +82,7 @@ impl Integrator {
     ///
     /// # Errors
     /// [`Error::Setting`] if a number of the method is impossible.
-    pub fn new(method: Method, dimension: usize) -> Result<Self, Error> {
+    pub fn new(method: Method, dimension: usize) -> Result<Self> {
         method.check()?;
         let stepper = match method {
             Method::Adaptive(tolerances)
@@ -118,51 +119,32 @@ impl Integrator {
         from: f64,
         to: f64,
         x: &mut [f64],
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         check_interval(from, to)?;
-        let mut instants = std::mem::take(&mut self.instants);
-        instants.clear();
-        let found = match f.events() {
-            Some(events) => events.instants(from, to, &mut instants),
-            None => Ok(()),
-        };
-        let result = found.and_then(|()| self.segments(f, from, to, &mut instants, x));
-        self.instants = instants;
-        result.map_err(|error| self.explained(error, f, x))
+        let done = self.segments(f, from, to, x);
+        done.map_err(|error| self.explained(error, f, x))
     }
 
     /// Blames a fixed step that is too large for a value that is not finite.
     fn explained(&self, error: Error, f: &impl Dynamics, x: &[f64]) -> Error {
-        let (Error::NotFinite { time, .. }, hint) = (&error, self.hint()) else {
-            return error;
-        };
-        if hint.is_empty() {
-            return error;
-        }
-        let largest = (0..x.len()).max_by(|&i, &j| x[i].abs().total_cmp(&x[j].abs()));
-        Error::Diverged {
-            time: *time,
-            name: largest
-                .and_then(|i| f.names().get(i).cloned())
-                .unwrap_or_default(),
-            value: largest.map_or(0.0, |i| x[i]),
-            hint,
+        match (error, self.hint()) {
+            (Error::NotFinite { time, .. }, hint) if !hint.is_empty() => {
+                diverged(time, &f.names(), x, largest(x), hint)
+            }
+            (error, _) => error,
         }
     }
 
-    fn segments(
-        &mut self,
-        f: &mut impl Dynamics,
-        from: f64,
-        to: f64,
-        instants: &mut Vec<f64>,
-        x: &mut [f64],
-    ) -> Result<(), Error> {
+    fn segments(&mut self, f: &mut impl Dynamics, from: f64, to: f64, x: &mut [f64]) -> Result<()> {
+        self.instants.clear();
+        if let Some(events) = f.events() {
+            events.instants(from, to, &mut self.instants)?;
+        }
         if let Stepper::Adaptive(adaptive) = &mut self.stepper {
-            adaptive.grant(instants.len());
+            adaptive.grant(self.instants.len());
         }
         let whole = to - from;
-        for (start, end) in pieces(from, to, instants) {
+        for (start, end) in pieces(from, to, &mut self.instants, APART) {
             if let Some(events) = f.events() {
                 events.enter(start + 0.5 * (end - start));
             }
@@ -208,18 +190,14 @@ impl Persist for Integrator {
         match &mut self.stepper {
             Stepper::Adaptive(adaptive) => adaptive.walk(walk),
             Stepper::Fixed(fixed) => {
-                walk.optional(&mut fixed.advice, |walk, advice| advice.walk(walk))?;
+                walk.optional(&mut fixed.advice, |walk, advice| {
+                    walk.number(&mut advice.spectral_radius)?;
+                    walk.number(&mut advice.needed)?;
+                    walk.number(&mut advice.used)
+                })?;
                 walk.count(&mut fixed.since_look)
             }
         }
-    }
-}
-
-impl Persist for StepAdvice {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        walk.number(&mut self.spectral_radius)?;
-        walk.number(&mut self.needed)?;
-        walk.number(&mut self.used)
     }
 }
 
@@ -231,38 +209,31 @@ impl Fixed {
         to: f64,
         whole: f64,
         x: &mut [f64],
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let Some(used) = self.step.length(whole) else {
             return self.auto(f, from, to, x);
         };
         if self.advice.is_none() {
-            self.look(f, from, x, used);
+            self.advice = Some(advice(f, from, x, used));
         }
         let steps = fixed_steps(from, to, used)?;
         self.begin.copy_from_slice(x);
         let result = self.rk4.advance(f, from, to, steps, x);
         if let Err(Error::NotFinite { .. }) = result {
-            let begin = std::mem::take(&mut self.begin);
-            self.look(f, from, &begin, used);
-            self.begin = begin;
+            self.advice = Some(advice(f, from, &self.begin, used));
         }
         result
     }
 
     /// With a step from the spectral radius; a failed interval is tried again
     /// with smaller steps, since the Jacobian may have grown meanwhile.
-    fn auto(
-        &mut self,
-        f: &mut impl Dynamics,
-        from: f64,
-        to: f64,
-        x: &mut [f64],
-    ) -> Result<(), Error> {
-        if self.since_look == 0 {
-            self.look(f, from, x, to - from);
-        }
+    fn auto(&mut self, f: &mut impl Dynamics, from: f64, to: f64, x: &mut [f64]) -> Result<()> {
+        let known = self.advice.filter(|_| self.since_look > 0);
+        let mut seen = known.unwrap_or_else(|| advice(f, from, x, to - from));
+        let needed = seen.needed;
+        seen.used = seen.used.min(needed);
+        self.advice = Some(seen);
         self.since_look = (self.since_look + 1) % LOOK_EVERY;
-        let needed = self.advice.map_or(f64::INFINITY, |advice| advice.needed);
         let mut steps = count(from, to, needed).ok_or(Error::TooStiff {
             time: from,
             needed,
@@ -280,33 +251,27 @@ impl Fixed {
         }
         self.rk4.advance(f, from, to, steps, x)
     }
+}
 
-    /// Looks at the fastest mode at (t, x).
-    fn look(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64], used: f64) {
-        let spectral_radius = spectral_radius(f, t, x);
-        let needed = AUTO_PRODUCT / spectral_radius;
+/// A step beside the fastest mode at (t, x).
+fn advice(f: &mut impl Dynamics, t: f64, x: &[f64], used: f64) -> StepAdvice {
+    let spectral_radius = spectral_radius(f, t, x);
+    let needed = AUTO_PRODUCT / spectral_radius;
+    StepAdvice {
+        spectral_radius,
         // where the Jacobian is not defined there is nothing to go by
-        let needed = if needed.is_nan() {
+        needed: if needed.is_nan() {
             f64::INFINITY
         } else {
             needed
-        };
-        let used = if self.step == Step::Auto {
-            used.min(needed)
-        } else {
-            used
-        };
-        self.advice = Some(StepAdvice {
-            spectral_radius,
-            needed,
-            used,
-        });
+        },
+        used,
     }
 }
 
 /// # Errors
 /// [`Error::Setting`] for an interval that is empty or too short for the resolution of time.
-pub(crate) fn check_interval(from: f64, to: f64) -> Result<(), Error> {
+pub(crate) fn check_interval(from: f64, to: f64) -> Result<()> {
     let shortest = 4.0 * resolution(to);
     let length = to - from;
     if length.is_finite() && length > shortest {
@@ -317,18 +282,22 @@ pub(crate) fn check_interval(from: f64, to: f64) -> Result<(), Error> {
     Err(Error::setting(what, expected, length))
 }
 
-/// The pieces of an interval between switching instants, which are put in order.
+/// Two detectors may find one switch, so many shares of its time apart by rounding.
+pub(crate) const APART: f64 = 4.0 * f64::EPSILON;
+
+/// The pieces of an interval between switching instants, which are put in order; those that are no such
+/// share of their time `apart` are one.
 pub(crate) fn pieces(
     from: f64,
     to: f64,
     instants: &mut Vec<f64>,
+    apart: f64,
 ) -> impl Iterator<Item = (f64, f64)> {
     instants.sort_unstable_by(f64::total_cmp);
     instants.push(to);
     let mut start = from;
     instants.iter().filter_map(move |&end| {
-        // two detectors may find one switch, a rounding error apart
-        let is_same = end - start <= 4.0 * f64::EPSILON * end.abs() && end < to;
+        let is_same = end - start <= apart * end.abs() && end < to;
         (!is_same).then(|| (std::mem::replace(&mut start, end), end))
     })
 }
@@ -337,7 +306,7 @@ pub(crate) fn pieces(
 ///
 /// # Errors
 /// [`Error::Setting`] if too many.
-pub(crate) fn fixed_steps(from: f64, to: f64, h: f64) -> Result<usize, Error> {
+pub(crate) fn fixed_steps(from: f64, to: f64, h: f64) -> Result<usize> {
     count(from, to, h).ok_or_else(|| {
         let least = (to - from) / MOST_STEPS as f64;
         let expected = format!("at least {least:e} for the interval from {from} to {to}");
@@ -394,13 +363,7 @@ impl Rk4 {
     ///
     /// # Panics
     /// If `f` or `x` has another dimension.
-    pub fn step(
-        &mut self,
-        f: &mut impl Dynamics,
-        t: f64,
-        h: f64,
-        x: &mut [f64],
-    ) -> Result<(), Error> {
+    pub fn step(&mut self, f: &mut impl Dynamics, t: f64, h: f64, x: &mut [f64]) -> Result<()> {
         if f.step(t, h, x, &mut self.stage) && are_finite(&self.stage) {
             x.copy_from_slice(&self.stage);
             return Ok(());
@@ -432,7 +395,7 @@ impl Rk4 {
         to: f64,
         steps: usize,
         x: &mut [f64],
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let mut t = from;
         for i in 0..steps {
             let next = instant(from, to, steps, i + 1);

@@ -37,11 +37,10 @@ impl Slopes {
     ) {
         let n = x.len();
         // as many places as there are in all are all of them
+        let column = |column: usize| (0..n).map(move |row| Place { row, column });
         let places = match self.places().len() == n * n {
             true => self.places().clone(),
-            false => (0..n)
-                .flat_map(|column| (0..n).map(move |row| Place { row, column }))
-                .collect(),
+            false => (0..n).flat_map(column).collect(),
         };
         let mut base = vec![0.0; n];
         f.derivatives(t, x, &mut base);
@@ -83,7 +82,7 @@ fn rounding(x: f64) -> f64 {
 /// no eigenvalue iteration and takes strongly non-normal matrices (high gain) as well
 /// as complex pairs. Not finite where the derivative is not.
 pub fn spectral_radius(f: &mut impl Dynamics, t: f64, x: &[f64]) -> f64 {
-    seen(f, t, x, None).radius
+    fastest(f, t, x, None).radius
 }
 
 /// The fastest mode of a system at a point, and how it was seen.
@@ -96,13 +95,9 @@ pub struct Fastest {
     pub is_steep: bool,
 }
 
-/// As [`spectral_radius`], but where f knows its slopes and one is not finite, as that of a root at 0,
-/// by secants over a hundredth of each state's size (1 where none is given).
-pub(crate) fn fastest(f: &mut impl Dynamics, t: f64, x: &[f64], sizes: &[f64]) -> Fastest {
-    seen(f, t, x, Some(sizes))
-}
-
-fn seen(f: &mut impl Dynamics, t: f64, x: &[f64], sizes: Option<&[f64]>) -> Fastest {
+/// As [`spectral_radius`]; with sizes of the states, where f knows its slopes and one is not finite, as
+/// that of a root at 0, by secants over a hundredth of each (of 1 where none is given).
+pub(crate) fn fastest(f: &mut impl Dynamics, t: f64, x: &[f64], sizes: Option<&[f64]>) -> Fastest {
     let (n, mut slopes) = (x.len(), Slopes::default());
     let is_known = n > 0 && f.slopes(t, x, &mut slopes);
     let is_steep = is_known && !slopes.are_finite();

@@ -118,9 +118,9 @@ mod trajectory;
 
 pub use batch::{Batch, Ended, Member};
 pub use blueprint::{Blueprint, Tuned, Updates, fastest_at, fastest_mode};
-pub use divergence::Margin;
 pub use dynamics::{Dynamics, Events, Function};
-pub use error::{Error, Interrupted};
+pub(crate) use error::Result;
+pub use error::{Error, Interrupted, Margin};
 pub use estimator::Estimator;
 pub use events::{Guards, first_jump};
 pub use integrator::{Integrator, Rk4, StepAdvice};

@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use lynkeus_expr::{Graph, Node, jacobian};
 
+use crate::method::are_finite;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Evaluation, Events, System};
+use crate::{Dynamics, Evaluation, Events, Result, System};
 
 /// A [`System`] x' = f(t, x, w), y = h(t, x, w), x̂ = g(t, x, w) with those of its Jacobians F = ∂f/∂x,
 /// G = ∂g/∂x and C = ∂h/∂x that are asked for.
@@ -54,19 +55,14 @@ impl Linearised {
         derivatives: &[Node],
         outputs: &[(String, Node)],
         jacobians: &Jacobians<Entries>,
-    ) -> Result<Self, Error> {
-        let Jacobians {
-            state,
-            estimate,
-            output,
-        } = jacobians;
+    ) -> Result<Self> {
         let mut all = vec![];
-        let state = Jacobian::among(&mut all, state);
+        let state = Jacobian::among(&mut all, &jacobians.state);
         all.extend_from_slice(outputs);
         let jacobians = Jacobians {
             state,
-            estimate: Jacobian::among(&mut all, estimate),
-            output: Jacobian::among(&mut all, output),
+            estimate: Jacobian::among(&mut all, &jacobians.estimate),
+            output: Jacobian::among(&mut all, &jacobians.output),
         };
         let system = System::new(graph, time, states, signals, derivatives, &all)?;
         Ok(Self { system, jacobians })
@@ -82,7 +78,7 @@ impl Linearised {
         states: &[(String, Node, f64)],
         signals: &[(String, Node)],
         derivatives: &[Node],
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let symbols: Vec<Node> = states.iter().map(|s| s.1).collect();
         let jacobians = Jacobians {
             state: jacobian::forward(graph, derivatives, &symbols).entries,
@@ -101,7 +97,7 @@ impl Linearised {
         states: &[(String, Node, f64)],
         signals: &[(String, Node)],
         outputs: &[(String, Node)],
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let symbols: Vec<Node> = states.iter().map(|s| s.1).collect();
         let h: Vec<Node> = outputs.iter().map(|output| output.1).collect();
         let jacobians = Jacobians {
@@ -184,23 +180,23 @@ impl OutputMap {
     }
 
     /// h(t, x, u), whether or not C has values there.
-    pub fn predict(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64], Error> {
+    pub fn predict(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64]> {
         self.evaluate(t, x, u, self.jacobian.first)
     }
 
     /// h(t, x, u), and C there.
-    pub fn linearise(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64], Error> {
+    pub fn linearise(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64]> {
         self.evaluate(t, x, u, self.values.len())
     }
 
     /// Evaluates h and C, of which the first `needed` values are to be finite.
-    fn evaluate(&mut self, t: f64, x: &[f64], u: &[f64], needed: usize) -> Result<&[f64], Error> {
+    fn evaluate(&mut self, t: f64, x: &[f64], u: &[f64], needed: usize) -> Result<&[f64]> {
         let (own, known) = self.evaluation.signals_mut().split_at_mut(x.len());
         own.copy_from_slice(x);
         known.copy_from_slice(u);
         self.evaluation.enter(t);
         self.evaluation.outputs(t, &[], &mut self.values);
-        match self.values[..needed].iter().all(|v| v.is_finite()) {
+        match are_finite(&self.values[..needed]) {
             true => Ok(self.outputs()),
             false => Err(self.evaluation.not_finite(t, &[])),
         }

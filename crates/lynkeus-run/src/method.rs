@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use crate::Error;
+use crate::{Error, Result};
 
 /// How a system is integrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +28,7 @@ impl Method {
     ///
     /// # Errors
     /// [`Error::Setting`] names the number that is impossible.
-    pub fn check(&self) -> Result<(), Error> {
+    pub fn check(&self) -> Result<()> {
         match self {
             Self::Adaptive(t) | Self::Explicit(t) | Self::Stiff(t) => t.check(),
             Self::Rk4(step) => step.check(),
@@ -64,7 +64,7 @@ impl Tolerances {
     /// wrong by.
     pub const RELATIVE: RangeInclusive<f64> = 1e-13..=0.1;
 
-    fn check(&self) -> Result<(), Error> {
+    fn check(&self) -> Result<()> {
         let range = Self::RELATIVE;
         if !range.contains(&self.relative) {
             let expected = format!("a number in [{:e}, {}]", range.start(), range.end());
@@ -107,7 +107,7 @@ impl Step {
         }
     }
 
-    fn check(&self) -> Result<(), Error> {
+    fn check(&self) -> Result<()> {
         match *self {
             Self::AtMost(h) if !(h > 0.0 && h.is_finite()) => {
                 Err(Error::setting("step", "a finite number above 0", h))

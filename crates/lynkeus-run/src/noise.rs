@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
-use crate::Error;
+use crate::{Error, Result};
 
 mod draws;
 
@@ -122,8 +122,12 @@ impl Limits {
     /// What the sensor shows of a value.
     #[must_use]
     pub fn shown(self, value: f64) -> f64 {
-        let capped = Reals.binary(Binary::Min, &value, &self.high);
-        Reals.binary(Binary::Max, &capped, &self.low)
+        self.shown_in(&Reals, &value)
+    }
+
+    fn shown_in<A: Algebra>(self, algebra: &A, value: &A::Value) -> A::Value {
+        let capped = algebra.binary(Binary::Min, value, &algebra.constant(self.high));
+        algebra.binary(Binary::Max, &capped, &algebra.constant(self.low))
     }
 
     /// Whether a reading only says "at most" or "at least".
@@ -198,7 +202,7 @@ impl Sensors {
         outputs: &[String],
         states: &[String],
         hold: f64,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         for (name, level) in &noise.levels {
             check_name("noise", name, "outputs", outputs)?;
             check_size("noise", name, level.size())?;
@@ -225,11 +229,9 @@ impl Sensors {
             let level = Level::Absolute((density / hold).sqrt());
             Some(Channel::new(level, noise.seed, &format!("'{name}")))
         };
+        let limits = |name: &String| noise.limits.get(name).copied();
         Ok(Self {
-            limits: outputs
-                .iter()
-                .map(|o| noise.limits.get(o).copied())
-                .collect(),
+            limits: outputs.iter().map(limits).collect(),
             channels: outputs.iter().map(channel).collect(),
             process: states.iter().map(process).collect(),
         })
@@ -246,17 +248,11 @@ impl Sensors {
         process.filter_map(|(i, channel)| channel.is_some().then_some(i))
     }
 
-    /// What noise adds to the derivative of a state at present.
-    pub(crate) fn drive(&self, state: usize) -> f64 {
-        self.process[state]
-            .as_ref()
-            .map_or(0.0, Channel::disturbance)
-    }
-
     /// What noise does at every sensor, then to every moved state, at present.
     pub(crate) fn disturbances(&self) -> impl Iterator<Item = f64> + '_ {
-        let sensors = (0..self.channels.len()).map(|i| self.disturbance(i));
-        sensors.chain(self.moved().map(|state| self.drive(state)))
+        let at = |channel: &Option<Channel>| channel.as_ref().map_or(0.0, Channel::disturbance);
+        let moved = self.process.iter().filter(|channel| channel.is_some());
+        self.channels.iter().chain(moved).map(at)
     }
 
     /// Draws what moves the states from here on, and the next sample of every channel, if it is time.
@@ -266,38 +262,35 @@ impl Sensors {
         drawn.for_each(Channel::draw);
     }
 
-    /// What sensor `index` shows of the value.
-    pub(crate) fn measured(&self, index: usize, value: f64) -> f64 {
-        let disturbed = match self.level(index) {
-            None => value,
-            Some(Level::Relative(_)) => value * self.disturbance(index),
-            Some(Level::Absolute(_) | Level::Uniform(_)) => value + self.disturbance(index),
-        };
-        self.limits(index)
-            .map_or(disturbed, |limits| limits.shown(disturbed))
-    }
-
-    /// The range that sensor `index` can show, where it is not everything.
-    pub(crate) fn limits(&self, index: usize) -> Option<Limits> {
-        self.limits[index]
-    }
-
-    /// The noise at sensor `index`, where there is some.
-    pub(crate) fn level(&self, index: usize) -> Option<Level> {
-        self.channels[index].as_ref().map(|channel| channel.level)
-    }
-
-    /// The number that is added at sensor `index` at present, or multiplied with.
-    pub(crate) fn disturbance(&self, index: usize) -> f64 {
-        self.channels[index]
-            .as_ref()
-            .map_or(0.0, Channel::disturbance)
+    /// What the sensors show of such values that are disturbed so: numbers, or expressions.
+    pub(crate) fn shown<A: Algebra>(
+        &self,
+        algebra: &A,
+        values: &[A::Value],
+        disturbances: &[A::Value],
+    ) -> Vec<A::Value> {
+        let channels = self.channels.iter().zip(&self.limits);
+        let shown = channels.zip(values.iter().zip(disturbances));
+        let shown = shown.map(|((channel, limits), (value, disturbance))| {
+            let disturbed = match channel.as_ref().map(|channel| channel.level) {
+                None => value.clone(),
+                Some(Level::Relative(_)) => algebra.binary(Binary::Mul, value, disturbance),
+                Some(Level::Absolute(_) | Level::Uniform(_)) => {
+                    algebra.binary(Binary::Add, value, disturbance)
+                }
+            };
+            match limits {
+                Some(limits) => limits.shown_in(algebra, &disturbed),
+                None => disturbed,
+            }
+        });
+        shown.collect()
     }
 }
 
 /// # Errors
 /// [`Error::Setting`] if the name is not among those that are known.
-fn check_name(what: &str, name: &str, kind: &str, known: &[String]) -> Result<(), Error> {
+fn check_name(what: &str, name: &str, kind: &str, known: &[String]) -> Result<()> {
     if known.iter().any(|k| k == name) {
         return Ok(());
     }
@@ -308,7 +301,7 @@ fn check_name(what: &str, name: &str, kind: &str, known: &[String]) -> Result<()
 
 /// # Errors
 /// [`Error::Setting`] for what is no size of a noise.
-pub(crate) fn check_size(what: &str, name: &str, size: f64) -> Result<(), Error> {
+pub(crate) fn check_size(what: &str, name: &str, size: f64) -> Result<()> {
     if size >= 0.0 && size.is_finite() {
         return Ok(());
     }

@@ -72,19 +72,11 @@ const FEW: usize = 50_000;
 const SAVED: usize = 20;
 
 impl Routine {
-    /// `outputs` as functions of so many inputs.
+    /// `outputs` as functions of so many inputs; their places where they are entries of a Jacobian.
     ///
     /// # Errors
     /// [`MissingInput`] where an output depends on another symbol.
     pub fn new(
-        equations: &Arc<Equations>,
-        inputs: usize,
-        outputs: Vec<Node>,
-    ) -> Result<Arc<Self>, MissingInput> {
-        Self::placed(equations, inputs, outputs, vec![])
-    }
-
-    fn placed(
         equations: &Arc<Equations>,
         inputs: usize,
         outputs: Vec<Node>,
@@ -153,7 +145,7 @@ impl Routine {
             let entries = entries.into_iter();
             let placed = entries.map(|(row, column, node)| (node, Place { row, column }));
             let (nodes, places) = placed.unzip();
-            Self::placed(&self.equations, self.tape.inputs(), nodes, places).ok()
+            Self::new(&self.equations, self.tape.inputs(), nodes, places).ok()
         };
         self.slopes.get_or_init(find).as_ref()
     }
@@ -175,14 +167,12 @@ impl Routine {
 fn classical_step(g: &Graph, inputs: &[Node], slopes: &[Node]) -> (Vec<Node>, Vec<Node>) {
     let h = g.fresh("h");
     let t = g.expr(inputs[0]);
-    let x: Vec<Expr<'_>> = inputs[1..=slopes.len()]
-        .iter()
-        .map(|&x| g.expr(x))
-        .collect();
+    let states = &inputs[1..=slopes.len()];
+    let x: Vec<Expr<'_>> = states.iter().map(|&x| g.expr(x)).collect();
     let moved = |factor: Expr<'_>, k: &[Node]| -> Vec<Node> {
         let ends = x.iter().zip(k);
-        ends.map(|(&x, &k)| (x + factor * g.expr(k)).node())
-            .collect()
+        let ends = ends.map(|(&x, &k)| (x + factor * g.expr(k)).node());
+        ends.collect()
     };
     let slope = |t: Expr<'_>, at: Vec<Node>| -> Vec<Node> {
         let places = inputs.iter().copied().zip([t.node()].into_iter().chain(at));
@@ -201,17 +191,11 @@ fn classical_step(g: &Graph, inputs: &[Node], slopes: &[Node]) -> (Vec<Node>, Ve
     ([inputs, &[h.node()]].concat(), next)
 }
 
-/// Machine code in use, or how often it would have been.
-#[derive(Clone, Debug)]
-enum Engine {
-    Waiting(u32),
-    Running(Function<1>),
-}
-
-impl Default for Engine {
-    fn default() -> Self {
-        Self::Waiting(0)
-    }
+/// Machine code in use, and how often it would have been before.
+#[derive(Clone, Debug, Default)]
+struct Engine {
+    waited: u32,
+    running: Option<Function<1>>,
 }
 
 impl Engine {
@@ -220,18 +204,15 @@ impl Engine {
         &mut self,
         make: impl FnOnce() -> Option<&'f Function<1>>,
     ) -> Option<&mut Function<1>> {
-        if let Self::Waiting(count) = self {
-            if Backend::patience(PATIENCE).is_none_or(|patience| *count < patience) {
-                *count = count.saturating_add(1);
+        if self.running.is_none() {
+            if Backend::patience(PATIENCE).is_none_or(|patience| self.waited < patience) {
+                self.waited = self.waited.saturating_add(1);
                 return None;
             }
             // what cannot be compiled is not tried again: the routine remembers
-            *self = Self::Running(make()?.clone());
+            self.running = make().cloned();
         }
-        match self {
-            Self::Running(evaluator) => Some(evaluator),
-            Self::Waiting(_) => None,
-        }
+        self.running.as_mut()
     }
 }
 
@@ -300,7 +281,7 @@ mod tests {
             let symbols: Vec<Node> = [t].into_iter().chain(x.iter().map(|x| x.node())).collect();
             let equations = Arc::new(Equations::new(&g, &symbols, &dx, &[]).unwrap());
             let dx = equations.roots.free.derivatives.clone();
-            let routine = Routine::new(&equations, symbols.len(), dx).unwrap();
+            let routine = Routine::new(&equations, symbols.len(), dx, vec![]).unwrap();
             routine.slopes(n).map(|known| known.places.len())
         };
         assert_eq!(known(400, false), Some(799));

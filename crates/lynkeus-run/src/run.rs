@@ -5,7 +5,8 @@ use std::ops::ControlFlow;
 use crate::closed_loop::Loop;
 use crate::divergence::Bound;
 use crate::{
-    Error, Events, Integrator, Interrupted, Role, Simulation, System, Trajectory, process_draws,
+    Error, Events, Integrator, Interrupted, Result, Role, Simulation, System, Trajectory,
+    process_draws,
 };
 
 impl Simulation {
@@ -50,7 +51,7 @@ impl Simulation {
         &self,
         take: &mut dyn FnMut(f64, &[f64]),
         watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         Run::new(self)?.rows(take, watch)
     }
 
@@ -81,10 +82,10 @@ struct Run {
 }
 
 impl Run {
-    fn new(simulation: &Simulation) -> Result<Self, Error> {
+    fn new(simulation: &Simulation) -> Result<Self> {
         let itinerary = Itinerary::new(simulation)?;
-        let mut system = Loop::new(simulation, itinerary.hold())?;
-        let x = system.joined().system().start().to_vec();
+        let system = Loop::new(simulation, itinerary.hold())?;
+        let x = system.joined.system().start().to_vec();
         Ok(Self {
             itinerary: itinerary.exact(system.is_exact()),
             integrator: Integrator::new(simulation.method, x.len())?,
@@ -99,17 +100,16 @@ impl Run {
         &mut self,
         take: &mut dyn FnMut(f64, &[f64]),
         watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let all = self.itinerary.intervals() as f64;
         let mut made = 0_usize;
         while let Some(stop) = self.itinerary.next() {
             match stop {
                 Stop::Draw { is_sample } => self.system.draw(is_sample),
                 Stop::Advance { from, to } => {
-                    let done = self
-                        .integrator
-                        .advance(&mut self.system, from, to, &mut self.x);
-                    let scale = self.bound.scale();
+                    let (system, x) = (&mut self.system, &mut self.x);
+                    let done = self.integrator.advance(system, from, to, x);
+                    let scale = self.bound.scale;
                     done.map_err(|error| self.system.explained(error, &self.x, scale))?;
                 }
                 Stop::Row(time) => {
@@ -124,16 +124,15 @@ impl Run {
         Ok(())
     }
 
-    fn record(&mut self, t: f64) -> Result<&[f64], Error> {
+    fn record(&mut self, t: f64) -> Result<&[f64]> {
         self.row.clear();
-        self.system.joined().enter(t);
+        self.system.joined.enter(t);
         self.system.row(t, &self.x, &mut self.row)?;
         let (names, estimate) = self.system.estimate(&self.x);
         self.bound.see(&self.row[..self.system.known_columns()]);
-        let inside = self
-            .bound
-            .check(t, names, estimate, || self.integrator.hint());
-        let scale = self.bound.scale();
+        let (bound, hint) = (self.bound, || self.integrator.hint());
+        let inside = bound.check(t, names, estimate, hint);
+        let scale = bound.scale;
         inside.map_err(|error| self.system.explained(error, &self.x, scale))?;
         Ok(&self.row)
     }
@@ -179,7 +178,7 @@ impl Itinerary {
     ///
     /// # Errors
     /// [`Error::Setting`] for times and steps that cannot be.
-    pub fn new(simulation: &Simulation) -> Result<Self, Error> {
+    pub fn new(simulation: &Simulation) -> Result<Self> {
         let intervals = intervals(simulation)?;
         let sample_step = sample_step(simulation)?;
         Ok(Self {
@@ -215,10 +214,9 @@ impl Itinerary {
 
     /// Time of row k.
     pub fn time(&self, k: usize) -> f64 {
-        if k == self.intervals {
-            self.until
-        } else {
-            self.grid.time(k)
+        match k == self.intervals {
+            true => self.until,
+            false => self.grid.time(k),
         }
     }
 
@@ -249,11 +247,9 @@ impl Iterator for Itinerary {
             return self.planned.take();
         }
         let Some(before) = self.row.checked_sub(1) else {
-            let is_drawn = self.drawn > 0;
-            return Some(if is_drawn {
-                self.arrive(self.start)
-            } else {
-                self.draw()
+            return Some(match self.drawn {
+                0 => self.draw(),
+                _ => self.arrive(self.start),
             });
         };
         let (from, to) = (self.time(before), self.time(self.row));
@@ -274,13 +270,8 @@ impl Iterator for Itinerary {
 }
 
 /// Number of intervals between rows.
-fn intervals(simulation: &Simulation) -> Result<usize, Error> {
-    let Simulation {
-        start,
-        until,
-        output_step,
-        ..
-    } = simulation;
+fn intervals(simulation: &Simulation) -> Result<usize> {
+    let (start, until) = (simulation.start, simulation.until);
     if !start.is_finite() {
         return Err(Error::setting("start", "a finite time", start));
     }
@@ -288,16 +279,9 @@ fn intervals(simulation: &Simulation) -> Result<usize, Error> {
         let expected = format!("a finite time after the start {start}");
         return Err(Error::setting("until", expected, until));
     }
-    if !(*output_step > 0.0 && output_step.is_finite()) {
-        return Err(Error::setting(
-            "output_step",
-            "a finite time above 0",
-            output_step,
-        ));
-    }
-    let intervals = ((until - start) / output_step * (1.0 - 1e-12))
-        .ceil()
-        .max(1.0);
+    let output_step = checked_step("output_step", simulation.output_step)?;
+    let intervals = (until - start) / output_step * (1.0 - 1e-12);
+    let intervals = intervals.ceil().max(1.0);
     let cells = intervals * (1 + simulation.plant.states().len()) as f64;
     if cells > MOST_CELLS {
         let expected = format!("a step that makes fewer than {MOST_CELLS:e} values");
@@ -307,8 +291,15 @@ fn intervals(simulation: &Simulation) -> Result<usize, Error> {
     Ok(intervals as usize)
 }
 
+fn checked_step(name: &str, step: f64) -> Result<f64> {
+    match step > 0.0 && step.is_finite() {
+        true => Ok(step),
+        false => Err(Error::setting(name, "a finite time above 0", step)),
+    }
+}
+
 /// Draws of process noise from one sample to the next.
-fn draws(simulation: &Simulation) -> Result<usize, Error> {
+fn draws(simulation: &Simulation) -> Result<usize> {
     match simulation.noise.process_draws {
         Some(0) => Err(Error::setting("process_draws", "at least 1 per sample", 0)),
         Some(draws) => Ok(draws),
@@ -316,15 +307,9 @@ fn draws(simulation: &Simulation) -> Result<usize, Error> {
     }
 }
 
-fn sample_step(simulation: &Simulation) -> Result<f64, Error> {
-    let sample_step = simulation
-        .noise
-        .sample_step
-        .unwrap_or(simulation.output_step);
-    if !(sample_step > 0.0 && sample_step.is_finite()) {
-        let expected = "a finite time above 0";
-        return Err(Error::setting("sample_step", expected, sample_step));
-    }
+fn sample_step(simulation: &Simulation) -> Result<f64> {
+    let given = simulation.noise.sample_step;
+    let sample_step = checked_step("sample_step", given.unwrap_or(simulation.output_step))?;
     let samples = (simulation.until - simulation.start) / sample_step;
     if samples > MOST_CELLS {
         let expected = format!("a step that makes fewer than {MOST_CELLS:e} samples");

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use crate::filter::Smoothed;
 use crate::filter::health::{Health, Innovation};
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Error, StepAdvice};
+use crate::{Result, StepAdvice};
 
 /// A sample as an observer takes it.
 #[derive(Clone, Copy, Debug)]
@@ -23,18 +23,18 @@ pub(crate) struct Sample<'a> {
 /// then goes back to where it was.
 pub(crate) trait Runner: Persist + Debug + Send + Sync {
     /// The first sample, before its readings count.
-    fn begin(&mut self, _: &Sample<'_>) -> Result<(), Error> {
+    fn begin(&mut self, _: &Sample<'_>) -> Result<()> {
         Ok(())
     }
 
     /// From the sample before to the time of this one; only its inputs count.
-    fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error>;
+    fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<()>;
 
     /// The readings and inputs of a sample at its time.
-    fn update(&mut self, sample: &Sample<'_>) -> Result<(), Error>;
+    fn update(&mut self, sample: &Sample<'_>) -> Result<()>;
 
     /// Estimates and deviations at a time, all of them finite.
-    fn report(&mut self, t: f64) -> Result<(), Error>;
+    fn report(&mut self, t: f64) -> Result<()>;
 
     fn estimate(&self) -> &[f64];
 

@@ -4,10 +4,11 @@ use crate::Evaluation;
 use crate::blueprint::Tuned;
 use crate::divergence::{Bound, check_deviations};
 use crate::filter::{Health, Innovation, NoisyModel};
+use crate::method::are_finite;
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::spread::Spread;
-use crate::{Blueprint, Dynamics, Error, Events, Integrator, StepAdvice};
+use crate::{Blueprint, Dynamics, Error, Events, Integrator, Result, StepAdvice};
 
 /// An observer whose readings [jump](crate::Updates::Jumps), under way.
 #[derive(Clone, Debug)]
@@ -27,26 +28,14 @@ pub(crate) struct Sampled {
 
 impl Sampled {
     /// Of a blueprint whose readings jump, with these parts.
-    pub fn new(
-        blueprint: &Blueprint,
-        predict: bool,
-        errors: Option<&NoisyModel>,
-    ) -> Result<Self, Error> {
-        let Blueprint {
-            flow: system,
-            sensors,
-            run,
-            judges,
-            ..
-        } = blueprint;
-        let count = sensors.len();
+    pub fn new(blueprint: &Blueprint, predict: bool, errors: Option<&NoisyModel>) -> Result<Self> {
+        let (system, run) = (&blueprint.flow, blueprint.run);
+        let count = blueprint.sensors.len();
         let tuned = blueprint.tuned().map(Tuned::signals).unwrap_or_default();
+        let signals = system.signals().len().saturating_sub(tuned.len());
         for (what, found) in [
             ("states", system.states().len()),
-            (
-                "signals",
-                system.signals().len().saturating_sub(tuned.len()),
-            ),
+            ("signals", signals),
             ("outputs", system.outputs().len()),
         ] {
             if found < count {
@@ -54,15 +43,13 @@ impl Sampled {
                 return Err(Error::setting(what, expected, found));
             }
         }
-        let mut signals = vec![0.0; system.signals().len().saturating_sub(tuned.len())];
-        signals.extend(tuned);
-        let spread = errors.map(|model| Spread::new(model, *judges, *run));
+        let spread = errors.map(|model| Spread::new(model, blueprint.judges, run));
         Ok(Self {
             driven: system.driven(run.between),
             integrator: Integrator::new(run.method, system.states().len())?,
             x: system.start().to_vec(),
             outputs: vec![0.0; system.estimates().len()],
-            signals,
+            signals: [vec![0.0; signals], tuned].concat(),
             sensors: count,
             predict,
             bound: Bound::new(system.start()),
@@ -84,11 +71,11 @@ impl Sampled {
         }
     }
 
-    fn evaluate(&mut self, t: f64) -> Result<(), Error> {
+    fn evaluate(&mut self, t: f64) -> Result<()> {
         let evaluation = &mut self.driven;
         evaluation.enter(t);
         evaluation.estimates(t, &self.x, &mut self.outputs);
-        match self.outputs.iter().all(|v| v.is_finite()) {
+        match are_finite(&self.outputs) {
             true => Ok(()),
             false => Err(evaluation.not_finite(t, &self.x)),
         }
@@ -101,7 +88,7 @@ impl Sampled {
 
 impl Runner for Sampled {
     /// Before a sensor's first reading the model's own output stands in for it.
-    fn begin(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
+    fn begin(&mut self, sample: &Sample<'_>) -> Result<()> {
         self.start(sample);
         self.evaluate(sample.t)?;
         let (first, expected) = (self.x.len() - self.sensors, self.told());
@@ -109,22 +96,23 @@ impl Runner for Sampled {
         Ok(())
     }
 
-    fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
+    fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<()> {
         self.driven.aim(from, sample.t, sample.inputs);
         let done = match &mut self.spread {
             Some(spread) => spread.advance(from, sample, &mut self.x),
-            None => self
-                .integrator
-                .advance(&mut self.driven, from, sample.t, &mut self.x),
+            None => {
+                let (driven, x) = (&mut self.driven, &mut self.x);
+                self.integrator.advance(driven, from, sample.t, x)
+            }
         };
-        let scale = self.bound.scale();
+        let scale = self.bound.scale;
         let evaluation = &mut self.driven;
         done.map_err(|error| evaluation.explained(error, &self.x, scale))?;
         self.driven.arrive();
         Ok(())
     }
 
-    fn update(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
+    fn update(&mut self, sample: &Sample<'_>) -> Result<()> {
         self.health.inputs_held += sample.held;
         self.start(sample);
         if let Some(spread) = &mut self.spread {
@@ -152,13 +140,12 @@ impl Runner for Sampled {
         Ok(())
     }
 
-    fn report(&mut self, t: f64) -> Result<(), Error> {
+    fn report(&mut self, t: f64) -> Result<()> {
         let own = self.x.len() - self.sensors;
         let names = self.driven.system().states();
-        let inside = self
-            .bound
-            .check(t, names, &self.x[..own], || self.integrator.hint());
-        let scale = self.bound.scale();
+        let (bound, hint) = (self.bound, || self.integrator.hint());
+        let inside = bound.check(t, names, &self.x[..own], hint);
+        let scale = bound.scale;
         let evaluation = &mut self.driven;
         inside.map_err(|error| evaluation.explained(error, &self.x, scale))?;
         self.evaluate(t)?;
@@ -205,7 +192,7 @@ impl Persist for Sampled {
         self.integrator.walk(walk)?;
         walk.numbers(&mut self.x)?;
         walk.numbers(&mut self.outputs)?;
-        self.bound.walk(walk)?;
+        walk.number(&mut self.bound.scale)?;
         if let Some(spread) = &mut self.spread {
             spread.walk(walk)?;
         }

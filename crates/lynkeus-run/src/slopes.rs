@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
+use crate::method::are_finite;
+
 /// A place in a matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
@@ -14,19 +16,10 @@ pub struct Place {
 }
 
 /// ∂f/∂x at a point: zero but for the entries at known places, the same ones at every point.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Slopes {
     places: Arc<[Place]>,
     values: Vec<f64>,
-}
-
-impl Default for Slopes {
-    fn default() -> Self {
-        Self {
-            places: Arc::new([]),
-            values: vec![],
-        }
-    }
 }
 
 impl Slopes {
@@ -56,7 +49,7 @@ impl Slopes {
 
     /// Whether every entry is a finite number.
     pub(crate) fn are_finite(&self) -> bool {
-        self.values.iter().all(|v| v.is_finite())
+        are_finite(&self.values)
     }
 
     /// The whole matrix of n rows and columns.

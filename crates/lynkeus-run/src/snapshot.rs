@@ -148,10 +148,9 @@ impl Walk<'_> {
             Walk::Save(bytes) => {
                 let from = bytes.len();
                 bytes.resize(from + 8 * numbers.len(), 0);
-                let places = bytes[from..].chunks_exact_mut(8);
-                places
-                    .zip(numbers)
-                    .for_each(|(place, x)| place.copy_from_slice(&x.to_le_bytes()));
+                for (place, x) in bytes[from..].chunks_exact_mut(8).zip(numbers) {
+                    place.copy_from_slice(&x.to_le_bytes());
+                }
             }
             Walk::Load(bytes) => {
                 let (own, rest) = bytes.split_at_checked(8 * numbers.len()).ok_or(Damaged)?;

@@ -10,7 +10,7 @@ use crate::filter::{Belief, Innovation, NoisyModel, NoisyPlant, Reading, Sensor,
 use crate::linearised::{Entries, OutputMap};
 use crate::runner::Sample;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Error, EstimatorSettings, Events, Jacobian, Jacobians, Linearised};
+use crate::{EstimatorSettings, Events, Jacobian, Jacobians, Linearised, Result};
 
 /// How measurements that are held fall behind.
 #[derive(Clone, Copy, Debug)]
@@ -37,12 +37,12 @@ impl NoisyModel {
     /// of a filter is.
     ///
     /// # Errors
-    /// [`Error::MissingInput`], and [`Error::Setting`] for wrong numbers of noises.
+    /// [`crate::Error::MissingInput`], and [`crate::Error::Setting`] for wrong numbers of noises.
     pub fn of_observer(
         observer: &NoisyPlant<'_>,
         estimates: &[Node],
         lag: Option<Lag<'_>>,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         check_counts(observer)?;
         // C first: nodes are made in this order
         let mut output = observer.views();
@@ -179,7 +179,7 @@ impl Persist for Spread {
         self.propagation.walk(walk)?;
         self.belief.walk(walk)?;
         if let Some(settled) = &mut self.settled {
-            settled.walk(walk)?;
+            walk.numbers(&mut settled.entries)?;
         }
         for innovation in &mut self.innovations {
             innovation.walk(walk)?;
@@ -190,7 +190,7 @@ impl Persist for Spread {
 
 impl Spread {
     /// Whether readings are judged.
-    pub fn new(model: &NoisyModel, judges: bool, run: EstimatorSettings) -> Result<Self, Error> {
+    pub fn new(model: &NoisyModel, judges: bool, run: EstimatorSettings) -> Result<Self> {
         let flow = model.flow.system();
         let judged = if judges { model.sensors.len() } else { 0 };
         Ok(Self {
@@ -207,7 +207,7 @@ impl Spread {
     }
 
     /// State and covariance to the time of a sample.
-    pub fn advance(&mut self, from: f64, to: &Sample<'_>, x: &mut [f64]) -> Result<(), Error> {
+    pub fn advance(&mut self, from: f64, to: &Sample<'_>, x: &mut [f64]) -> Result<()> {
         self.belief.x.copy_from_slice(x);
         self.propagation.driven.aim(from, to.t, to.inputs);
         let done = self.propagation.predict(&mut self.belief, from, to.t);
@@ -265,11 +265,7 @@ impl Spread {
             let predicted = expected.outputs()[i];
             let noise = self.sensors[i].noise.variance(predicted);
             expected.write_slopes(i, &mut row);
-            let mut deviation = |root: &Root| {
-                root.transposed_times(&row, &mut projected);
-                let own: f64 = projected.iter().map(|p| p * p).sum();
-                (own + noise).sqrt()
-            };
+            let mut deviation = |root: &Root| (variance(root, &row, &mut projected) + noise).sqrt();
             *innovation = Innovation {
                 value: reading - predicted,
                 deviation: deviation(&self.belief.root),
@@ -287,10 +283,15 @@ impl Spread {
         let (mut row, mut projected) = (vec![0.0; n], vec![0.0; n]);
         for (i, deviation) in self.deviations.iter_mut().enumerate() {
             self.jacobians.estimate.write_row(&self.values, i, &mut row);
-            self.belief.root.transposed_times(&row, &mut projected);
-            *deviation = projected.iter().map(|p| p * p).sum::<f64>().sqrt();
+            *deviation = variance(&self.belief.root, &row, &mut projected).sqrt();
         }
     }
+}
+
+/// The variance of a sum of the states, with such weights.
+fn variance(root: &Root, weights: &[f64], projected: &mut [f64]) -> f64 {
+    root.transposed_times(weights, projected);
+    projected.iter().map(|p| p * p).sum()
 }
 
 /// ν = v − C e becomes what a sensor's state is off by: `views` are the entries of its row of C.
@@ -304,10 +305,8 @@ fn read(root: &mut Root, state: usize, views: &[(usize, f64)], deviation: f64) {
     }
     root.entries[state * n..(state + 1) * n].copy_from_slice(&expected);
     // one column more for the new error, then back to n
-    let mut rows: Vec<f64> = (0..n)
-        .flat_map(|k| (0..n).map(move |i| (i, k)))
-        .map(|(i, k)| root.entries[i * n + k])
-        .collect();
+    let places = (0..n).flat_map(|k| (0..n).map(move |i| i * n + k));
+    let mut rows: Vec<f64> = places.map(|place| root.entries[place]).collect();
     rows.extend((0..n).map(|i| if i == state { deviation } else { 0.0 }));
     root.of_rows(&mut rows, &mut vec![0.0; n]);
 }

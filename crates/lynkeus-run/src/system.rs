@@ -1,6 +1,7 @@
 //! Systems compiled for evaluation, and at work.
 
 use std::fmt::Write;
+use std::ops::Range;
 use std::sync::Arc;
 
 use lynkeus_expr::{Evaluator, Graph, MissingInput, Node, Tape};
@@ -11,7 +12,7 @@ use crate::error::state_text;
 use crate::events::{Guards, TimeEvents};
 use crate::routine::{Routine, Runner};
 use crate::snapshot::{Damaged, Digest, Persist, Walk};
-use crate::{BetweenSamples, Dynamics, Error, Events, Margin, Slopes};
+use crate::{BetweenSamples, Dynamics, Error, Events, Margin, Result, Slopes};
 
 /// A compiled system x' = f(t, x, w), y = h(t, x, w): a plant, an observer, or
 /// (without states) inputs as functions of time.
@@ -69,14 +70,10 @@ impl System {
         signals: &[(String, Node)],
         derivatives: &[Node],
         outputs: &[(String, Node)],
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         if states.len() != derivatives.len() {
-            let expected = format!("{}, one per state", states.len());
-            return Err(Error::setting(
-                "number of derivatives",
-                expected,
-                derivatives.len(),
-            ));
+            let (expected, found) = (per_state(states.len()), derivatives.len());
+            return Err(Error::setting("number of derivatives", expected, found));
         }
         let mut symbols = vec![time];
         symbols.extend(states.iter().map(|(_, node, _)| *node));
@@ -96,33 +93,27 @@ impl System {
     ///
     /// # Errors
     /// As [`System::new`].
-    pub(crate) fn compiled(equations: Equations, start: Vec<f64>) -> Result<Self, Error> {
+    pub(crate) fn compiled(equations: Equations, start: Vec<f64>) -> Result<Self> {
         let equations = Arc::new(equations);
         let Equations { roots, inputs, .. } = &*equations;
         let both = |roots: &Both<Vec<Node>>, inputs: usize| -> Result<_, MissingInput> {
+            let routine = |of: &Vec<Node>| Routine::new(&equations, inputs, of.clone(), vec![]);
             Ok(Both {
-                derivatives: Routine::new(&equations, inputs, roots.derivatives.clone())?,
-                outputs: Routine::new(&equations, inputs, roots.outputs.clone())?,
+                derivatives: routine(&roots.derivatives)?,
+                outputs: routine(&roots.outputs)?,
             })
         };
         let held = (!equations.jumps.is_empty()).then(|| both(&roots.held, inputs.len()));
-        let (held, free) = (
-            held.transpose()?,
-            both(&roots.free, equations.smooth_inputs())?,
-        );
+        let held = held.transpose()?;
+        let free = both(&roots.free, equations.smooth_inputs())?;
         let graph = equations.graph();
         let surfaces: Vec<Node> = roots.surfaces.iter().map(|surface| surface.node).collect();
+        let states = equations.states.len();
         let code = Code {
             free,
             held,
             indicators: Tape::new(&graph, inputs, &surfaces)?,
-            guards: Guards::new(
-                &graph,
-                inputs,
-                equations.states.len(),
-                &roots.surfaces,
-                &roots.bends,
-            )?,
+            guards: Guards::new(&graph, inputs, states, &roots.surfaces, &roots.bends)?,
             equations: equations.clone(),
         };
         drop(graph);
@@ -138,14 +129,10 @@ impl System {
     ///
     /// # Errors
     /// [`Error::Setting`] for a wrong number of values or one that is not finite.
-    pub fn with_start(mut self, start: Vec<f64>) -> Result<Self, Error> {
+    pub fn with_start(mut self, start: Vec<f64>) -> Result<Self> {
         if start.len() != self.states().len() {
-            let expected = format!("{}, one per state", self.states().len());
-            return Err(Error::setting(
-                "number of start values",
-                expected,
-                start.len(),
-            ));
+            let (expected, found) = (per_state(self.states().len()), start.len());
+            return Err(Error::setting("number of start values", expected, found));
         }
         if let Some(i) = start.iter().position(|value| !value.is_finite()) {
             let what = format!("start value of '{}'", self.states()[i]);
@@ -287,6 +274,10 @@ impl System {
     }
 }
 
+fn per_state(states: usize) -> String {
+    format!("{states}, one per state")
+}
+
 /// Evaluates one [`System`] without allocating; holds the values of its signals.
 #[derive(Clone, Debug)]
 pub struct Evaluation {
@@ -322,14 +313,17 @@ impl Evaluation {
 
     /// The signals' values, in the order of [`System::signals`], to write to.
     pub fn signals_mut(&mut self) -> &mut [f64] {
-        let from = 1 + self.system.states().len();
-        let to = self.first_mode();
-        &mut self.inputs[from..to]
+        let places = self.signal_places();
+        &mut self.inputs[places]
     }
 
     /// The signals' values.
     pub fn signals(&self) -> &[f64] {
-        &self.inputs[1 + self.system.states().len()..self.first_mode()]
+        &self.inputs[self.signal_places()]
+    }
+
+    fn signal_places(&self) -> Range<usize> {
+        1 + self.system.states().len()..self.first_mode()
     }
 
     /// The first sample.
@@ -349,8 +343,8 @@ impl Evaluation {
     pub(crate) fn arrive(&mut self) {
         self.line = None;
         self.last.copy_from_slice(&self.next);
-        let place = 1 + self.system.states().len();
-        self.inputs[place..place + self.last.len()].copy_from_slice(&self.last);
+        let places = self.signal_places();
+        self.inputs[places].copy_from_slice(&self.last);
     }
 
     /// Writes the outputs at (t, x) to `y`, in the order of [`System::outputs`].
@@ -370,10 +364,9 @@ impl Evaluation {
     /// Writes what an observer reports at (t, x), in the order of
     /// [`System::estimates`].
     pub fn estimates(&mut self, t: f64, x: &[f64], estimates: &mut [f64]) {
-        if self.system.outputs().is_empty() {
-            estimates.copy_from_slice(x);
-        } else {
-            self.outputs(t, x, estimates);
+        match self.system.outputs().is_empty() {
+            true => estimates.copy_from_slice(x),
+            false => self.outputs(t, x, estimates),
         }
     }
 
@@ -388,10 +381,8 @@ impl Evaluation {
         if !system.margins.is_empty() {
             self.outputs(time, x, &mut values);
         }
-        let value = |margin: &Margin| values.get(margin.output).copied();
-        let margins = system.margins.iter();
-        let margins: Vec<(&Margin, f64)> = margins.filter_map(|m| Some((m, value(m)?))).collect();
-        explained(error, system.states(), x, scale, &margins)
+        let margins = (&*system.margins, &values[..]);
+        explained(error, system.states(), x, scale, margins)
     }
 
     /// Values of the switches at the last [`Events::enter`]; then, while it is held, those of the
@@ -490,7 +481,7 @@ impl Dynamics for Evaluation {
 }
 
 impl Events for Evaluation {
-    fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
+    fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<()> {
         let mut switches = self.switches.iter_mut();
         switches.try_for_each(|switches| switches.instants(from, to, times))
     }

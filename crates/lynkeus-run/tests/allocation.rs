@@ -81,7 +81,9 @@ fn filter() -> Estimator {
     };
     let model = NoisyModel::new(&plant).unwrap();
     let kind = FilterSettings::of(FilterKind::Extended);
-    Estimator::filter(&model, kind, settings()).unwrap()
+    Blueprint::filter(model.clone(), kind, settings())
+        .estimator()
+        .unwrap()
 }
 
 // one test: another thread's memory would count, too; that of the harness counts in one window

@@ -99,7 +99,7 @@ fn run(simulation: &Simulation, members: &[Member], rows: usize, threads: usize)
     let mut batch = Batch::new(simulation, members, &COLUMNS).unwrap().unwrap();
     let mut found = vec![vec![]; members.len()];
     let mut times = 0;
-    while batch.advance(rows, threads).unwrap() {
+    while batch.advance(rows, threads, &|| false).unwrap() {
         times += batch.times().len();
         for row in 0..batch.times().len() {
             for column in 0..COLUMNS.len() {
@@ -185,7 +185,7 @@ fn a_run_that_ends_is_told_and_the_others_go_on() {
     let column = [Role::State.at(0)];
     let mut batch = Batch::new(&simulation, &members, &column).unwrap().unwrap();
     let mut last = vec![];
-    while batch.advance(2, 2).unwrap() {
+    while batch.advance(2, 2, &|| false).unwrap() {
         last = batch.values(batch.times().len() - 1, 0).collect();
     }
     let mut ended: Vec<usize> = batch.ended().map(|e| e.run).collect();
@@ -238,14 +238,14 @@ fn a_batch_that_is_told_to_end_ends_between_two_rows() {
         let mut batch = Batch::new(&simulation, &members(0..count), &COLUMNS)
             .unwrap()
             .unwrap();
-        assert!(batch.advance(1, 2).unwrap());
+        assert!(batch.advance(1, 2, &|| false).unwrap());
         let asked = AtomicUsize::new(0);
         let is_over = || asked.fetch_add(1, Ordering::Relaxed) >= 3;
-        let ended = batch.advance_watched(1, 2, &is_over);
+        let ended = batch.advance(1, 2, &is_over);
         assert_eq!(ended, Err(Error::Cancelled { time: 0.0 }), "{count}");
         assert!(asked.into_inner() <= 5);
         assert_eq!(batch.times(), []);
-        let again = batch.advance(1, 2);
+        let again = batch.advance(1, 2, &|| false);
         assert_eq!(again, Err(Error::Cancelled { time: 0.0 }));
     }
 }
@@ -279,7 +279,7 @@ fn runs_without_states_are_judged_as_well() {
     };
     let members = vec![member; 5];
     let mut batch = Batch::new(&simulation, &members, &[]).unwrap().unwrap();
-    while batch.advance(1, 1).unwrap() {}
+    while batch.advance(1, 1, &|| false).unwrap() {}
     let ended: Vec<usize> = batch.ended().map(|ended| ended.run).collect();
     assert_eq!(ended, [0, 1, 2, 3, 4]);
     for ended in batch.ended() {

@@ -10,7 +10,7 @@ use lynkeus_expr::Graph;
 use lynkeus_run::filter::{
     FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
 };
-use lynkeus_run::{Estimator, EstimatorSettings, Level, Method, Step};
+use lynkeus_run::{Blueprint, Estimator, EstimatorSettings, Level, Method, Step};
 
 /// A damped swing, x' = v, v' = −2 sin x − 0.3v + w, driven by noise: nearly linear for |x| < 0.5.
 const DENSITY: f64 = 0.01;
@@ -99,7 +99,9 @@ impl Case {
             method: Method::Rk4(Step::AtMost(0.05)),
             ..EstimatorSettings::default()
         };
-        Estimator::filter(&model.unwrap(), settings, run).unwrap()
+        Blueprint::filter(model.unwrap(), settings, run)
+            .estimator()
+            .unwrap()
     }
 
     /// True states and readings of a run.

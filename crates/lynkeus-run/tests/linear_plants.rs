@@ -7,7 +7,7 @@ use lynkeus_expr::Graph;
 use lynkeus_run::filter::{
     FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
 };
-use lynkeus_run::{Estimator, EstimatorSettings, Level, Method, Tolerances};
+use lynkeus_run::{Blueprint, Estimator, EstimatorSettings, Level, Method, Tolerances};
 use nalgebra::{DMatrix, DVector};
 
 /// x' = Fx + w, y = Cx + v.
@@ -147,7 +147,9 @@ impl Linear {
             }),
             ..EstimatorSettings::default()
         };
-        Estimator::filter(&model.unwrap(), settings, run).unwrap()
+        Blueprint::filter(model.unwrap(), settings, run)
+            .estimator()
+            .unwrap()
     }
 }
 

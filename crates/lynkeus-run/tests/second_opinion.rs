@@ -7,7 +7,7 @@ use lynkeus_expr::{Expr, Graph};
 use lynkeus_run::filter::{
     FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints, Smoothed,
 };
-use lynkeus_run::{Estimator, EstimatorSettings, Level, Method, Tolerances};
+use lynkeus_run::{Blueprint, Estimator, EstimatorSettings, Level, Method, Tolerances};
 use numeris::estimate::{Ckf, Ekf, EkfStep, Ukf, rts_smooth};
 use numeris::{Matrix, Vector};
 
@@ -138,7 +138,9 @@ impl Plant {
             }),
             ..EstimatorSettings::default()
         };
-        Estimator::filter(&model.unwrap(), settings, run).unwrap()
+        Blueprint::filter(model.unwrap(), settings, run)
+            .estimator()
+            .unwrap()
     }
 }
 

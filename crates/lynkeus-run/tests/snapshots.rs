@@ -6,7 +6,8 @@ use lynkeus_run::filter::{
     FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
 };
 use lynkeus_run::{
-    BetweenSamples, Estimator, EstimatorSettings, Level, Method, Step, System, Tolerances,
+    BetweenSamples, Blueprint, Estimator, EstimatorSettings, Level, Method, Step, System,
+    Tolerances,
 };
 
 fn settings(method: Method) -> EstimatorSettings {
@@ -84,7 +85,9 @@ fn chain(n: usize, kind: FilterKind, method: Method) -> Estimator {
         ..FilterSettings::of(kind)
     };
     let model = NoisyModel::new(&plant).unwrap();
-    Estimator::filter(&model, of_filter, settings(method)).unwrap()
+    Blueprint::filter(model.clone(), of_filter, settings(method))
+        .estimator()
+        .unwrap()
 }
 
 fn bits(values: &[f64]) -> Vec<u64> {

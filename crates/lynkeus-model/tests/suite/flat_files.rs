@@ -1,8 +1,10 @@
 //! What flat files bring: units on every variable, and thousands of equations.
 
+use std::time::Duration;
+
 use lynkeus_expr::Tape;
 
-use crate::support::{plant, refused};
+use crate::support::{plant, refused, within};
 
 #[test]
 fn units_that_do_not_fit_are_told() {
@@ -96,12 +98,9 @@ fn text_to_tape_of_flat_equations() {
 fn ten_thousand_flat_equations_are_read_soon() {
     let n = 10_000;
     let text = chain(n);
-    let start = std::time::Instant::now();
-    let read = plant(&text);
-    let elapsed = start.elapsed();
+    // half a second of a processor's time in a release build; room for less speed
+    let read = within(Duration::from_secs(5), || plant(&text));
     assert_eq!(read.algebraics.len(), n);
-    // half a second in a release build on an idle machine; room for a busy one and less speed
-    assert!(elapsed.as_secs_f64() < 5.0, "{elapsed:?}");
     // a ladder of as many equations that need each other, linear and not
     let ladder = |term: &str| {
         let mut text = String::from("model Loop Real x; ");
@@ -109,17 +108,13 @@ fn ten_thousand_flat_equations_are_read_soon() {
         text += &format!("for i in 2:{n} - 1 loop 2*v[i] = v[i - 1] + {term}; end for; end Loop;");
         text
     };
-    let start = std::time::Instant::now();
-    assert_eq!(plant(&ladder("v[i + 1]")).states.len(), 1);
-    let found = refused(&ladder("sin(v[i + 1])"));
+    let found = within(Duration::from_secs(10), || {
+        assert_eq!(plant(&ladder("v[i + 1]")).states.len(), 1);
+        refused(&ladder("sin(v[i + 1])"))
+    });
     assert!(
         found.message.contains("need each other"),
         "{}",
         found.message
-    );
-    assert!(
-        start.elapsed().as_secs_f64() < 10.0,
-        "{:?}",
-        start.elapsed()
     );
 }

@@ -1,7 +1,34 @@
 //! What the tests of plants share.
 
+use std::time::{Duration, Instant};
+
 use lynkeus_expr::{Node, Tape};
 use lynkeus_model::{Diagnostic, LoadOptions, Plant};
+
+/// What some work makes, for which the processor may be busy so long. Where the system does not tell, it
+/// is the time that passes; of that a machine with other work may need many times as much.
+pub fn within<T>(limit: Duration, work: impl FnOnce() -> T) -> T {
+    let (begun, before) = (Instant::now(), processor_time());
+    let made = work();
+    let passed = begun.elapsed();
+    let after = processor_time();
+    let busy = after
+        .zip(before)
+        .map_or(passed, |(after, before)| after - before);
+    assert!(
+        busy < limit && passed < 20 * limit,
+        "{busy:?} in {passed:?}"
+    );
+    made
+}
+
+/// The time for which this thread has had a processor.
+fn processor_time() -> Option<Duration> {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    let nanoseconds = told.split_whitespace().next()?.parse().ok()?;
+    // a system that does not count says 0
+    Some(Duration::from_nanos(nanoseconds)).filter(|time| !time.is_zero())
+}
 
 /// The plant of a text that must be taken.
 pub fn plant(text: &str) -> Plant {

@@ -328,10 +328,9 @@ impl OneStep for Dop853 {
             parts.fold(0.0, |sum, part| sum + part)
         };
         let (slope, size) = (norm(&self.slopes[0]), norm(x));
-        let h = if slope <= 1e-10 || size <= 1e-10 {
-            1e-6
-        } else {
-            (size / slope).sqrt() * 0.01
+        let h = match slope <= 1e-10 || size <= 1e-10 {
+            true => 1e-6,
+            false => (size / slope).sqrt() * 0.01,
         };
         self.stage.copy_from_slice(x);
         add(&mut self.stage, h, &self.slopes[0]);
@@ -340,10 +339,9 @@ impl OneStep for Dop853 {
         add(second, -1.0, first);
         let curvature = norm(second).sqrt() / h;
         let fastest = slope.sqrt().max(curvature);
-        let wanted = if fastest <= 1e-15 {
-            h * 1e-3
-        } else {
-            (0.01 / fastest).powf(1.0 / ORDER)
+        let wanted = match fastest <= 1e-15 {
+            true => h * 1e-3,
+            false => (0.01 / fastest).powf(1.0 / ORDER),
         };
         // a guess that time does not resolve is too careful: it may be longer all the same
         let first = (h * 100.0).min(wanted).min(span);
@@ -420,21 +418,12 @@ impl Dop853 {
         let slope = |j: usize| self.slopes[j][state];
         let rise = self.reached[state] - from;
         let (begins, ends) = (h * slope(0), h * slope(STAGES));
-        let mut terms = [
-            rise,
-            begins - rise,
-            2.0 * rise - begins - ends,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        ];
-        for (term, row) in terms[3..].iter_mut().zip(D) {
-            *term = h * row.iter().map(|&(j, d)| d * slope(j)).sum::<f64>();
-        }
+        let highest = D.map(|row| h * row.iter().map(|&(j, d)| d * slope(j)).sum::<f64>());
+        let terms = [rise, begins - rise, 2.0 * rise - begins - ends];
         // terms[0]·s + terms[1]·s(1 − s) + terms[2]·s²(1 − s) + …, from the last to the first
         let mut c = [0.0; COEFFICIENTS];
-        for (k, term) in terms.iter().enumerate().rev() {
+        let backward = terms.iter().chain(&highest).rev();
+        for (k, term) in (0..COEFFICIENTS - 1).rev().zip(backward) {
             c[0] += term;
             let before = c;
             for i in (0..COEFFICIENTS).rev() {

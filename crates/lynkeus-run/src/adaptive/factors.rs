@@ -54,9 +54,8 @@ impl Shifted {
         let (n, places) = (self.n, &self.places);
         let most = (FULL * (n * n) as f64) as usize;
         let may_be_sparse = n > SMALL && places.len() <= most;
-        self.order = may_be_sparse
-            .then(|| least_degree(n, places, most / 2))
-            .flatten();
+        let order = || least_degree(n, places, most / 2);
+        self.order = may_be_sparse.then(order).flatten();
         self.entries = Columns::default();
         let mut numbered: Vec<(usize, Place)> = places.iter().copied().enumerate().collect();
         numbered.sort_by_key(|(_, at)| at.column);
@@ -223,11 +222,8 @@ impl<T: ComplexField<RealField = f64> + Copy> Column<T> {
     /// The row to be the pivot of column c; none where the column is zero or not finite.
     fn pivot(&self, step: usize, c: usize) -> Option<usize> {
         let size = |row: usize| self.values[row].norm1();
-        let largest = self
-            .free
-            .iter()
-            .copied()
-            .max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
+        let free = self.free.iter().copied();
+        let largest = free.max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
         let is_free = self.met[c] == step + 1 && self.step_of[c].is_none();
         let row = match is_free && size(c) >= DIAGONAL * size(largest) {
             true => c,

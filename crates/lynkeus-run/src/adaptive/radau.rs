@@ -152,12 +152,7 @@ impl OneStep for Radau {
     ) -> f64 {
         self.set_scale(x, tolerances);
         let speed = rms(&self.f0, &self.scale);
-        let guess = if speed > 0.0 {
-            1e-3 / speed.sqrt()
-        } else {
-            f64::MAX
-        };
-        guess.min(0.01 * span)
+        (1e-3 / speed.sqrt()).min(0.01 * span)
     }
 
     fn attempt(
@@ -308,10 +303,9 @@ impl Radau {
         let mut sharper = &from_stages + &self.k[0];
         factors.e1.solve(&mut sharper);
         let sharper = rms(&sharper, &self.scale);
-        if sharper.is_finite() {
-            sharper.max(1e-10)
-        } else {
-            error
+        match sharper.is_finite() {
+            true => sharper.max(1e-10),
+            false => error,
         }
     }
 
@@ -477,9 +471,8 @@ fn lagrange(s: f64) -> [f64; 3] {
     let nodes = [-1.0, C[0] - 1.0, C[1] - 1.0, 0.0];
     [1, 2, 3].map(|i| {
         let others = (0..4).filter(|&j| j != i);
-        others
-            .map(|j| (s - nodes[j]) / (nodes[i] - nodes[j]))
-            .product()
+        let factors = others.map(|j| (s - nodes[j]) / (nodes[i] - nodes[j]));
+        factors.product()
     })
 }
 

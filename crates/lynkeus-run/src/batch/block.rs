@@ -5,11 +5,11 @@ use std::ops::ControlFlow;
 use lynkeus_native::Buffer;
 
 use super::plan::{Divided, Event, LANES, Lane, Leg, Program};
-use crate::Error;
 use crate::divergence::Bound;
 use crate::error::state_text;
 use crate::integrator::instant;
 use crate::noise::Sensors;
+use crate::{Error, Result};
 
 /// Bytes that the states of a block may take, twice: they should stay in the first cache.
 const CACHE: usize = 16 * 1024;
@@ -100,11 +100,9 @@ impl<'p> Desk<'p> {
     fn share(&mut self, leg: &Leg, first: usize) -> usize {
         let count = AHEAD.min(leg.steps - first);
         let size = self.program.step.shared;
-        for (k, table) in (0..count).step_by(LANES).zip(
-            self.shared
-                .values_mut()
-                .chunks_exact_mut(LANES * size.max(1)),
-        ) {
+        let tables = self.shared.values_mut();
+        let tables = tables.chunks_exact_mut(LANES * size.max(1));
+        for (k, table) in (0..count).step_by(LANES).zip(tables) {
             let times: [[f64; 2]; LANES] = std::array::from_fn(|lane| {
                 // lanes without a step of their own do the last one again
                 let step = (first + k + lane).min(leg.steps - 1);
@@ -308,7 +306,7 @@ impl Run {
         extent: &Extent,
         x: &[Lane],
         lane: usize,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let x = || x.iter().map(|x| x[lane]).collect::<Vec<f64>>();
         self.bound.see(&[extent.known[lane]]);
         if extent.oddity[lane] != 0.0 {
@@ -318,14 +316,12 @@ impl Run {
                 state: state_text(&program.names, &x()),
             });
         }
-        let names = &program.observer_names;
-        self.bound
-            .check(time, &[], &[extent.estimates[lane]], String::new)
-            .or_else(|_| {
-                let x = x();
-                self.bound
-                    .check(time, names, &x[program.plant_states..], String::new)
-            })
+        let (bound, names) = (self.bound, &program.observer_names);
+        let largest = [extent.estimates[lane]];
+        match bound.check(time, &[], &largest, String::new) {
+            Ok(()) => Ok(()),
+            Err(_) => bound.check(time, names, &x()[program.plant_states..], String::new),
+        }
     }
 }
 

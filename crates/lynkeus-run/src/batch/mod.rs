@@ -11,12 +11,11 @@ mod block;
 mod plan;
 
 use std::num::NonZero;
-use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Builder, available_parallelism};
 
-use crate::{Column, Error, Simulation};
+use crate::{Column, Error, Result, Simulation};
 pub use block::Ended;
 
 use block::{Block, Desk, IsOver, groups};
@@ -56,7 +55,7 @@ impl Batch {
         simulation: &Simulation,
         members: &[Member],
         columns: &[Column],
-    ) -> Result<Option<Self>, Error> {
+    ) -> Result<Option<Self>> {
         let Some((plan, program)) = Plan::new(simulation)? else {
             return Ok(None);
         };
@@ -79,10 +78,8 @@ impl Batch {
                 let start = plant.start().iter().chain(observer).copied().collect();
                 Ok((plan.sensors(simulation, m.seed)?, start))
             };
-            let members = members
-                .iter()
-                .map(member)
-                .collect::<Result<Vec<_>, Error>>()?;
+            let members = members.iter().map(member);
+            let members = members.collect::<Result<Vec<_>>>()?;
             blocks.push(Block::new(&program, k * size, members));
         }
         Ok(Some(Self {
@@ -111,25 +108,18 @@ impl Batch {
     }
 
     /// Takes all runs through the next rows, at most so many, on so many threads. The rows before
-    /// are forgotten. False where there are no more.
+    /// are forgotten. False where there are no more. Every thread asks now and then, also between two
+    /// rows, whether the work is over.
     ///
     /// # Errors
-    /// Times at which something jumps that cannot be found, or too many steps.
-    pub fn advance(&mut self, rows: usize, threads: usize) -> Result<bool, Error> {
-        self.advance_watched(rows, threads, &|| false)
-    }
-
-    /// As [`Batch::advance`]; every thread asks now and then, also between two rows, whether the
-    /// work is over.
-    ///
-    /// # Errors
-    /// As [`Batch::advance`], and [`Error::Cancelled`] where it is: such a batch does not go on.
-    pub fn advance_watched(
+    /// Times at which something jumps that cannot be found, or too many steps; [`Error::Cancelled`]
+    /// where the work is over: such a batch does not go on.
+    pub fn advance(
         &mut self,
         rows: usize,
         threads: usize,
         is_over: &(dyn Fn() -> bool + Sync),
-    ) -> Result<bool, Error> {
+    ) -> Result<bool> {
         self.times.clear();
         while !self.is_cancelled {
             let events = self.plan.next(rows.max(1))?;
@@ -138,7 +128,7 @@ impl Batch {
                 _ => None,
             });
             self.times.extend(times);
-            if self.run(&events, threads, is_over).is_break() {
+            if !self.run(&events, threads, is_over) {
                 self.times.clear();
                 self.is_cancelled = true;
             } else if let Some(time) = self.times.last() {
@@ -152,7 +142,8 @@ impl Batch {
         Err(Error::Cancelled { time })
     }
 
-    fn run(&mut self, events: &[Event], threads: usize, is_over: &IsOver<'_>) -> ControlFlow<()> {
+    /// Whether the work went on to the last of these events.
+    fn run(&mut self, events: &[Event], threads: usize, is_over: &IsOver<'_>) -> bool {
         let (program, columns) = (&self.program, &self.columns[..]);
         let threads = threads.min(self.blocks.len());
         let is_cut = AtomicBool::new(false);
@@ -174,10 +165,7 @@ impl Batch {
             }
             work();
         });
-        match is_cut.into_inner() {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
-        }
+        !is_cut.into_inner()
     }
 
     /// Times of the rows at hand.

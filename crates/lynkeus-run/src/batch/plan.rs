@@ -7,11 +7,11 @@ use lynkeus_expr::{Evaluator, Graph, MissingInput, Node, Op, Tape};
 use lynkeus_native::Function;
 
 use crate::closed_loop::Loop;
-use crate::integrator::{check_interval, fixed_steps, pieces};
+use crate::integrator::{APART, check_interval, fixed_steps, pieces};
 use crate::noise::Sensors;
 use crate::routine::Backend;
 use crate::run::{Itinerary, Stop};
-use crate::{Error, Events, Method, Noise, Simulation, Step};
+use crate::{Events, Method, Noise, Result, Simulation, Step};
 
 /// What all trajectories do next.
 #[derive(Debug)]
@@ -70,7 +70,7 @@ impl Plan {
     ///
     /// # Errors
     /// A simulation that cannot be run.
-    pub fn new(simulation: &Simulation) -> Result<Option<(Self, Program)>, Error> {
+    pub fn new(simulation: &Simulation) -> Result<Option<(Self, Program)>> {
         simulation.method.check()?;
         let Method::Rk4(step @ (Step::AtMost(_) | Step::Substeps(_))) = simulation.method else {
             return Ok(None);
@@ -90,7 +90,7 @@ impl Plan {
     }
 
     /// The sensors of the run of a seed.
-    pub fn sensors(&self, simulation: &Simulation, seed: u64) -> Result<Sensors, Error> {
+    pub fn sensors(&self, simulation: &Simulation, seed: u64) -> Result<Sensors> {
         let noise = Noise {
             seed,
             ..simulation.noise.clone()
@@ -108,9 +108,9 @@ impl Plan {
     /// The next events, with at most so many rows; none at the end.
     ///
     /// # Errors
-    /// [`Error::Setting`] for intervals that are too short or have too many steps, and those of
+    /// [`crate::Error::Setting`] for intervals that are too short or have too many steps, and those of
     /// [`Events::instants`].
-    pub fn next(&mut self, rows: usize) -> Result<Vec<Event>, Error> {
+    pub fn next(&mut self, rows: usize) -> Result<Vec<Event>> {
         let (mut events, mut recorded) = (vec![], 0);
         while recorded < rows && events.len() < AHEAD {
             match self.itinerary.next() {
@@ -127,13 +127,13 @@ impl Plan {
         Ok(events)
     }
 
-    fn legs(&mut self, from: f64, to: f64, events: &mut Vec<Event>) -> Result<(), Error> {
+    fn legs(&mut self, from: f64, to: f64, events: &mut Vec<Event>) -> Result<()> {
         check_interval(from, to)?;
         self.instants.clear();
-        let clock = self.clock.joined();
+        let clock = &mut self.clock.joined;
         clock.instants(from, to, &mut self.instants)?;
         let length = self.step.length(to - from).unwrap_or(to - from);
-        for (start, end) in pieces(from, to, &mut self.instants) {
+        for (start, end) in pieces(from, to, &mut self.instants, APART) {
             clock.enter(start + 0.5 * (end - start));
             events.push(Event::Leg(Leg {
                 from: start,
@@ -147,15 +147,15 @@ impl Plan {
 
     /// The values of what jumps with time.
     fn modes(&mut self, t: f64) -> Vec<f64> {
-        let clock = self.clock.joined();
+        let clock = &mut self.clock.joined;
         clock.enter(t);
         clock.modes().to_vec()
     }
 }
 
 /// The code of a step and of a row.
-fn program(clock: &mut Loop) -> Result<Option<Program>, Error> {
-    let system = clock.joined().system().clone();
+fn program(clock: &mut Loop) -> Result<Option<Program>> {
+    let system = clock.joined.system().clone();
     let equations = system.equations();
     let (states, disturbances) = (equations.states.len(), equations.signals.len());
     let own = 1..1 + states + disturbances;
@@ -246,11 +246,8 @@ impl Divided {
         };
         let common = Tape::new(g, &common, &divided.values)?;
         let own_inputs = own.len();
-        let own = Tape::new(
-            g,
-            &[&divided.symbols, &inputs[own]].concat(),
-            &divided.roots,
-        )?;
+        let own = [&divided.symbols, &inputs[own]].concat();
+        let own = Tape::new(g, &own, &divided.roots)?;
         let sweeping = |own: &Tape| Function::sweeping(own, shared, spacing);
         Ok(Self {
             common: Engine::new(&common, Function::compile),

@@ -36,6 +36,7 @@ fn has_sides(op: Op) -> bool {
 }
 
 /// An operation that jumps or bends where a quantity passes zero; a `floor`, a whole number.
+#[derive(Clone, Copy)]
 struct Operation {
     /// the smooth function whose passing zero (`Floor`: an integer) changes it; a relation holds where it
     /// is positive
@@ -54,44 +55,38 @@ impl Operation {
     fn of(graph: &Graph, node: Node, map: &HashMap<Node, Node>) -> Option<Self> {
         let within = |a: Node| graph.substitute(&[a], map).first().copied().unwrap_or(a);
         let [strict, loose, sign] = [[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [-1.0, 0.0, 1.0]];
-        Some(match graph.op(node) {
+        let (quantity, mode, branches, values) = match graph.op(node) {
             Op::Unary(op @ (Unary::Floor | Unary::Sign), a) => {
                 let a = within(a);
-                Self {
-                    quantity: a,
-                    mode: graph.unary(op, a),
-                    branches: None,
-                    values: (op == Unary::Sign).then_some(sign),
-                }
+                let values = (op == Unary::Sign).then_some(sign);
+                (a, graph.unary(op, a), None, values)
             }
             Op::Unary(Unary::Abs, a) => {
                 let a = within(a);
-                Self {
-                    quantity: a,
-                    mode: graph.unary(Unary::Sign, a),
-                    branches: Some([a, graph.unary(Unary::Neg, a)]),
-                    values: Some(loose),
-                }
+                let mode = graph.unary(Unary::Sign, a);
+                let branches = [a, graph.unary(Unary::Neg, a)];
+                (a, mode, Some(branches), Some(loose))
             }
             Op::Binary(op @ (Binary::Less | Binary::LessEq | Binary::Equal), a, b) => {
                 let (a, b) = (within(a), within(b));
-                Self {
-                    quantity: graph.binary(Binary::Sub, b, a),
-                    mode: graph.binary(op, a, b),
-                    branches: None,
-                    values: Some(if op == Binary::Less { strict } else { loose }),
-                }
+                let quantity = graph.binary(Binary::Sub, b, a);
+                let values = if op == Binary::Less { strict } else { loose };
+                (quantity, graph.binary(op, a, b), None, Some(values))
             }
             Op::Binary(op @ (Binary::Min | Binary::Max), a, b) => {
                 let (a, b) = (within(a), within(b));
-                Self {
-                    quantity: graph.binary(Binary::Sub, a, b),
-                    mode: graph.binary(Binary::Less, a, b),
-                    branches: Some(if op == Binary::Min { [b, a] } else { [a, b] }),
-                    values: Some(loose),
-                }
+                let quantity = graph.binary(Binary::Sub, a, b);
+                let mode = graph.binary(Binary::Less, a, b);
+                let branches = if op == Binary::Min { [b, a] } else { [a, b] };
+                (quantity, mode, Some(branches), Some(loose))
             }
             _ => return None,
+        };
+        Some(Self {
+            quantity,
+            mode,
+            branches,
+            values,
         })
     }
 
@@ -126,14 +121,12 @@ pub(crate) fn time_events(
         };
         let expression = graph.render(node, SHOWN);
         let symbol = graph.fresh(format!("({expression})")).node();
-        indicators.push(Indicator::new(
-            graph,
-            time,
-            &found,
+        let (nodes, counts) = (
             [operation.mode, operation.quantity],
-            expression,
             operation.values.is_none(),
-        )?);
+        );
+        let indicator = Indicator::new(graph, time, &found, nodes, expression, counts)?;
+        indicators.push(indicator);
         inner.insert(node, operation.over_mode(graph, node, symbol));
         found.push(symbol);
         if operation.jumps() {
@@ -166,14 +159,12 @@ pub(crate) fn state_events(
         if !has_sides(op) || is_still || !depends(graph, node, inputs) {
             continue;
         }
-        let Some(Operation {
-            quantity, values, ..
-        }) = Operation::of(graph, node, &replaced)
-        else {
+        let Some(operation) = Operation::of(graph, node, &replaced) else {
             continue;
         };
         let mode = graph.fresh(graph.render(node, SHOWN_OF_STATE)).node();
-        let place = place_of(graph, &mut surfaces, quantity, values.is_none());
+        let values = operation.values;
+        let place = place_of(graph, &mut surfaces, operation.quantity, values.is_none());
         jumps.push(Jump::new(place, values));
         modes.push(mode);
         replaced.insert(node, mode);
@@ -181,20 +172,15 @@ pub(crate) fn state_events(
     // a kink on a surface that is located is smooth on each side, and no step is rejected for it
     for node in graph.reachable(roots) {
         let operation = Operation::of(graph, node, &replaced).filter(|_| !surfaces.is_empty());
-        let Some(Operation {
-            quantity,
-            branches: Some([above, below]),
-            values,
-            ..
-        }) = operation
+        let Some((operation, [above, below])) = operation.and_then(|o| Some((o, o.branches?)))
         else {
             continue;
         };
-        let Some(place) = known_place(graph, &surfaces, quantity) else {
+        let Some(place) = known_place(graph, &surfaces, operation.quantity) else {
             continue;
         };
         let mode = graph.fresh(graph.render(node, SHOWN_OF_STATE)).node();
-        jumps.push(Jump::new(place, values));
+        jumps.push(Jump::new(place, operation.values));
         modes.push(mode);
         replaced.insert(node, graph.select(mode, above, below));
     }
@@ -271,21 +257,17 @@ fn bare(graph: &Graph, mut quantity: Node) -> (Node, bool) {
     let is_zero = |node: Node| graph.constant_value(node) == Some(0.0);
     let mut is_reversed = false;
     loop {
-        let (inner, sign) = match graph.op(quantity) {
-            Op::Unary(Unary::Neg, a) => (a, -1.0),
-            Op::Binary(Binary::Mul, a, b) => match (factor(a), factor(b)) {
-                (Some(c), _) => (b, c),
-                (_, Some(c)) => (a, c),
-                _ => return (quantity, is_reversed),
-            },
-            Op::Binary(Binary::Div, a, b) => match factor(b) {
-                Some(c) => (a, c),
-                None => return (quantity, is_reversed),
-            },
-            Op::Binary(Binary::Add | Binary::Sub, a, b) if is_zero(b) => (a, 1.0),
-            Op::Binary(Binary::Add, a, b) if is_zero(a) => (b, 1.0),
-            Op::Binary(Binary::Sub, a, b) if is_zero(a) => (b, -1.0),
-            _ => return (quantity, is_reversed),
+        let simpler = match graph.op(quantity) {
+            Op::Unary(Unary::Neg, a) => Some((a, -1.0)),
+            Op::Binary(Binary::Mul, a, b) if let Some(c) = factor(a) => Some((b, c)),
+            Op::Binary(Binary::Mul | Binary::Div, a, b) => factor(b).map(|c| (a, c)),
+            Op::Binary(Binary::Add | Binary::Sub, a, b) if is_zero(b) => Some((a, 1.0)),
+            Op::Binary(Binary::Add, a, b) if is_zero(a) => Some((b, 1.0)),
+            Op::Binary(Binary::Sub, a, b) if is_zero(a) => Some((b, -1.0)),
+            _ => None,
+        };
+        let Some((inner, sign)) = simpler else {
+            return (quantity, is_reversed);
         };
         is_reversed ^= sign < 0.0;
         quantity = inner;

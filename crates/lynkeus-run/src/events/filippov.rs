@@ -174,10 +174,9 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     fn surround(&mut self, first: usize, value: f64) {
         let low = value.floor();
         let is_even = 0.5 * low == (0.5 * low).floor();
-        let (even, odd) = if is_even {
-            (low, low + 1.0)
-        } else {
-            (low + 1.0, low)
+        let (even, odd) = match is_even {
+            true => (low, low + 1.0),
+            false => (low + 1.0, low),
         };
         for (i, level) in [(first, even), (first + 1, odd)] {
             self.at.levels[i] = level;
@@ -380,9 +379,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     /// Which surfaces are so close that velocities decide.
     fn reached(&mut self, t: f64, x: &[f64]) -> Vec<bool> {
         self.look(t, x);
-        let mut dx = vec![0.0; x.len()];
-        self.derivatives(t, x, &mut dx);
-        let speeds = self.speeds(t, x, &dx);
+        let speeds = self.speeds_here(t, x);
         let functions = self.values.iter().zip(&self.at.largest).zip(&speeds);
         let is_reached = |((value, largest), speed): ((&f64, &f64), &f64)| {
             value.abs() <= REACHED * largest.max(speed.abs() * self.length)
@@ -393,20 +390,15 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     /// Which side of a surface that is reached carries the state away from it: that one
     /// holds; or neither, and the state slides. On neither side is what stays exactly there.
     fn decide(&mut self, i: usize, t: f64, x: &[f64]) {
-        let (value, sides, sliding) = (
-            self.values[i],
-            self.at.sides.clone(),
-            self.at.sliding.clone(),
-        );
+        let value = self.values[i];
+        let (sides, sliding) = (self.at.sides.clone(), self.at.sliding.clone());
         let mut speed_on = |side: f64| {
             self.at.sides.copy_from_slice(&sides);
             self.at.sliding.copy_from_slice(&sliding);
             self.at.sides[i] = side;
             self.at.sliding[i] = false;
             self.align(t, x, &[i]);
-            let mut dx = vec![0.0; x.len()];
-            self.derivatives(t, x, &mut dx);
-            self.speeds(t, x, &dx)[i]
+            self.speeds_here(t, x)[i]
         };
         // exactly on the surface the equations say where it goes, if both sides let it go
         let tends = if value == 0.0 { speed_on(0.0) } else { value };
@@ -511,6 +503,13 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         }
     }
 
+    /// How fast the functions of the surfaces change.
+    fn speeds_here(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
+        let mut dx = vec![0.0; x.len()];
+        self.derivatives(t, x, &mut dx);
+        self.speeds(t, x, &dx)
+    }
+
     /// How fast the functions of the surfaces change as the state moves with dx: a central
     /// difference, exact for what is affine.
     fn speeds(&mut self, t: f64, x: &[f64], dx: &[f64]) -> Vec<f64> {
@@ -551,10 +550,8 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         }
         let right = DVector::from_iterator(along.len(), along.iter().map(|&j| -here[j]));
         // where both sides move alike nothing decides between them
-        let parts = matrix
-            .lu()
-            .solve(&right)
-            .unwrap_or_else(|| DVector::repeat(along.len(), 0.5));
+        let parts = matrix.lu().solve(&right);
+        let parts = parts.unwrap_or_else(|| DVector::repeat(along.len(), 0.5));
         let f = dx.to_vec();
         for ((&i, part), other) in along.iter().zip(parts.iter()).zip(&others) {
             self.parts[i] = *part;

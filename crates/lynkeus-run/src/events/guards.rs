@@ -123,26 +123,18 @@ impl Guard {
             .collect();
         let read: Vec<Node> = reads.iter().map(|&i| inputs[known[i]]).collect();
         let tape = Tape::new(graph, &read, &[node])?;
-        let jumps = |op: Op| match op {
-            Op::Unary(op, _) => matches!(op, Unary::Floor | Unary::Sign),
-            Op::Binary(op, ..) => matches!(
-                op,
-                Binary::Less | Binary::LessEq | Binary::Equal | Binary::Atan2
-            ),
-            _ => false,
-        };
-        let chooses = |op: Op| {
-            matches!(
-                op,
-                Op::Select(..)
-                    | Op::Unary(Unary::Not, _)
-                    | Op::Binary(Binary::And | Binary::Or, ..)
-            )
-        };
-        let operations = graph.reachable(&[node]).into_iter().map(|n| graph.op(n));
-        let operations: Vec<Op> = operations.collect();
-        let has_slopes = !operations.iter().any(|&op| jumps(op));
-        let is_plain = has_slopes && !operations.iter().any(|&op| chooses(op));
+        let (mut has_slopes, mut chooses) = (true, false);
+        for node in graph.reachable(&[node]) {
+            match graph.op(node) {
+                Op::Unary(Unary::Floor | Unary::Sign, _) => has_slopes = false,
+                Op::Binary(Binary::Less | Binary::LessEq, ..) => has_slopes = false,
+                Op::Binary(Binary::Equal | Binary::Atan2, ..) => has_slopes = false,
+                Op::Select(..) | Op::Unary(Unary::Not, _) => chooses = true,
+                Op::Binary(Binary::And | Binary::Or, ..) => chooses = true,
+                _ => {}
+            }
+        }
+        let is_plain = has_slopes && !chooses;
         let weights = is_plain.then(|| weights(graph, &read, node)).flatten();
         Ok(Self {
             affine: weights.map(|weights| (point(&tape, &vec![0.0; read.len()]), weights)),
@@ -155,12 +147,10 @@ impl Guard {
     /// An enclosure for what is read in such boxes (centre and radius of each).
     pub fn over(&self, boxes: &[[f64; 2]]) -> Option<[f64; 2]> {
         let Some((constant, weights)) = &self.affine else {
-            let read = self.reads.iter().map(|&i| {
+            return self.enclosed(|i| {
                 let [centre, reach] = boxes[i];
-                interval(centre - reach, centre + reach)
+                [centre - reach, centre + reach]
             });
-            let read: Vec<Interval> = read.collect();
-            return bounds(self.tape.eval_in(&Intervals, &read)[0]);
         };
         let (mut middle, mut radius, mut size) = (*constant, 0.0, constant.abs());
         for (&i, weight) in self.reads.iter().zip(weights) {
@@ -171,6 +161,15 @@ impl Guard {
         }
         let radius = radius + 8.0 * f64::EPSILON * size;
         Some([middle - radius, middle + radius])
+    }
+
+    /// The ends of an enclosure of the values that there are where what is read has such ends; none
+    /// where there is no value.
+    fn enclosed(&self, ends: impl Fn(usize) -> [f64; 2]) -> Option<[f64; 2]> {
+        let read = self.reads.iter().map(|&i| ends(i));
+        let read: Vec<Interval> = read.map(|[a, b]| interval(a, b)).collect();
+        let value = self.tape.eval_in(&Intervals, &read)[0];
+        (!value.is_empty()).then(|| [value.lo(), value.hi()])
     }
 
     /// The function along a path, what the guards read as polynomials: for the search for where it
@@ -216,10 +215,9 @@ impl Guard {
         let [a, b] = [0.0, 1.0].map(|s| along.value(s).abs());
         let band = 1e-13 * a.max(b);
         // where a step begins at a bend what follows tells the side
-        let from = if a <= 1e-10 * a.max(b) {
-            AT_THE_END
-        } else {
-            0.0
+        let from = match a <= 1e-10 * a.max(b) {
+            true => AT_THE_END,
+            false => 0.0,
         };
         let side = if along.value(from) < 0.0 { -1.0 } else { 1.0 };
         let search = Search {
@@ -248,11 +246,6 @@ fn point(tape: &Tape, read: &[f64]) -> f64 {
 /// [a, b], or every number where that is none.
 pub(super) fn interval(a: f64, b: f64) -> Interval {
     Interval::new(a, b).unwrap_or(Interval::ENTIRE)
-}
-
-/// The ends of an enclosure of the values that there are; none where there is no value.
-fn bounds(value: Interval) -> Option<[f64; 2]> {
-    (!value.is_empty()).then(|| [value.lo(), value.hi()])
 }
 
 /// What comes first in a step, in parts of it.
@@ -307,10 +300,7 @@ impl Search<'_> {
         if let Some(polynomial) = &self.polynomial {
             return Some(polynomial.range(from, to));
         }
-        let read = self.guard.reads.iter();
-        let read = read.map(|&i| self.path[i].range(from, to));
-        let read: Vec<Interval> = read.map(|[a, b]| interval(a, b)).collect();
-        bounds(self.guard.tape.eval_in(&Intervals, &read)[0])
+        self.guard.enclosed(|i| self.path[i].range(from, to))
     }
 
     /// An enclosure of the slopes over a stretch, where there are some.
@@ -382,18 +372,13 @@ impl Search<'_> {
     /// Of what cannot be enclosed, as an algebraic loop that is searched, samples tell.
     fn sampled(&self, from: f64, to: f64) -> Ahead {
         let samples = (1..=SAMPLES).map(|k| from + (to - from) * k as f64 / SAMPLES as f64);
-        let mut looks = samples.map(|s| self.at(s));
-        looks
-            .find(|at| *at != Ahead::Nothing)
-            .unwrap_or(Ahead::Nothing)
+        self.at(samples)
     }
 
-    /// What the value at one place tells.
-    fn at(&self, s: f64) -> Ahead {
-        match self.margin(s) < -self.band {
-            true => self.jump(s),
-            false => Ahead::Nothing,
-        }
+    /// What the values at some places tell, the first such thing.
+    fn at(&self, mut places: impl Iterator<Item = f64>) -> Ahead {
+        let passed = places.find(|s| self.margin(*s) < -self.band);
+        passed.map_or(Ahead::Nothing, |s| self.jump(s))
     }
 
     /// The passage before `beyond`.
@@ -411,16 +396,12 @@ impl Search<'_> {
             None => return Some(Ahead::Nothing),
             Some([low, _]) if low >= -self.band => return Some(Ahead::Nothing),
             Some([_, high]) if high < -self.band => return Some(self.jump(to)),
-            _ if is_short => return Some(self.at(middle)),
+            _ if is_short => return Some(self.at([middle].into_iter())),
             _ => {}
         }
         let [least, most] = self.slope(from, to)?;
         if least >= 0.0 || most <= 0.0 {
-            let ends = [from, to].map(|s| self.at(s));
-            return ends
-                .into_iter()
-                .find(|at| *at != Ahead::Nothing)
-                .or(Some(Ahead::Nothing));
+            return Some(self.at([from, to].into_iter()));
         }
         let reach = least.abs().max(most.abs()) * radius;
         (self.margin(middle) - reach >= -self.band).then_some(Ahead::Nothing)

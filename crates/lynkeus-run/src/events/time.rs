@@ -11,8 +11,8 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Algebra, Evaluator, Graph, Interval, Jets, MissingInput, Node, Reals, Tape};
 
 use super::guards::interval;
-use crate::Error;
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::{Error, Result};
 
 /// Switching instants allowed in one interval, over all indicators of a system.
 const SWITCHES: usize = 100_000;
@@ -73,12 +73,7 @@ impl TimeEvents {
     }
 
     /// Appends the instants of the events strictly inside (`from`, `to`).
-    pub(crate) fn instants(
-        &mut self,
-        from: f64,
-        to: f64,
-        times: &mut Vec<f64>,
-    ) -> Result<(), Error> {
+    pub(crate) fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<()> {
         if self.indicators.is_empty() {
             return Ok(());
         }
@@ -87,7 +82,7 @@ impl TimeEvents {
             let (before, rest) = self.indicators.split_at_mut(i);
             let followed = rest[0].follow(&mut self.effort, before);
             followed.map_err(|error| error.about(&rest[0].expression))?;
-            times.extend_from_slice(&rest[0].timeline.instants);
+            times.extend(rest[0].timeline.instants());
         }
         self.effort.end();
         Ok(())
@@ -158,13 +153,13 @@ impl Effort {
     }
 
     /// Pays for one look.
-    fn look(&mut self, at: f64) -> Result<(), Error> {
+    fn look(&mut self, at: f64) -> Result<()> {
         self.looks = self.looks.checked_sub(1).ok_or_else(|| unresolved(at))?;
         Ok(())
     }
 
     /// Pays for a stretch at `at` on which the mode is not certain.
-    fn doubt(&mut self, at: f64, width: f64) -> Result<(), Error> {
+    fn doubt(&mut self, at: f64, width: f64) -> Result<()> {
         // around a simple zero some last bits are always in doubt
         if width > 64.0 * apart(at) {
             self.doubtful -= width;
@@ -176,7 +171,7 @@ impl Effort {
     }
 
     /// Refuses more than the switches that are left.
-    fn check(&self, count: f64) -> Result<(), Error> {
+    fn check(&self, count: f64) -> Result<()> {
         if count <= self.switches as f64 {
             return Ok(());
         }
@@ -189,7 +184,7 @@ impl Effort {
     }
 
     /// Pays for a switch.
-    fn switch(&mut self) -> Result<(), Error> {
+    fn switch(&mut self) -> Result<()> {
         self.check(1.0)?;
         self.switches -= 1;
         Ok(())
@@ -204,30 +199,27 @@ fn unresolved(time: f64) -> Error {
     }
 }
 
-/// The values of one mode over an interval.
+/// The values of one mode over an interval, each with where it begins.
 #[derive(Clone, Debug, Default)]
-struct Timeline {
-    /// where the value changes, increasing
-    instants: Vec<f64>,
-    /// one more than instants
-    values: Vec<f64>,
-}
+struct Timeline(Vec<(f64, f64)>);
 
 impl Timeline {
-    /// The mode is `value` from `t` on (from the start, for the first value).
+    /// The mode is `value` from `t` on.
     fn push(&mut self, t: f64, value: f64) {
-        match self.values.last() {
-            Some(&last) if same(last, value) => return,
-            Some(_) => self.instants.push(t),
-            None => {}
+        if !self.0.last().is_some_and(|(_, last)| same(*last, value)) {
+            self.0.push((t, value));
         }
-        self.values.push(value);
+    }
+
+    /// Where the value changes, increasing.
+    fn instants(&self) -> impl Iterator<Item = f64> {
+        self.0.iter().skip(1).map(|(begin, _)| *begin)
     }
 
     /// The value at `t`, which is no instant; NaN before the first value is known.
     fn at(&self, t: f64) -> f64 {
-        let place = self.instants.partition_point(|&instant| instant <= t);
-        self.values.get(place).copied().unwrap_or(f64::NAN)
+        let begun = self.0.partition_point(|(begin, _)| *begin <= t);
+        self.0[..begun].last().map_or(f64::NAN, |(_, value)| *value)
     }
 }
 
@@ -250,12 +242,11 @@ pub(super) struct Indicator {
     /// true where passing any integer, not only zero, changes the mode
     counts: bool,
     /// the mode, over time and the modes read
-    mode: Tape,
+    mode: Evaluator,
     /// what decides it, over the same
     quantity: Tape,
     /// which of the indicators before are read
     reads: Vec<usize>,
-    evaluator: Evaluator,
     /// t, modes read
     inputs: Vec<f64>,
     /// what was found in the interval asked for last
@@ -279,12 +270,10 @@ impl Indicator {
             .collect();
         let mut inputs = vec![time];
         inputs.extend(reads.iter().map(|&i| found[i]));
-        let mode = Tape::new(graph, &inputs, &[mode])?;
         Ok(Self {
             expression,
             counts,
-            evaluator: mode.evaluator(),
-            mode,
+            mode: Tape::new(graph, &inputs, &[mode])?.evaluator(),
             quantity: Tape::new(graph, &inputs, &[quantity])?,
             inputs: vec![0.0; inputs.len()],
             timeline: Timeline::default(),
@@ -293,15 +282,10 @@ impl Indicator {
     }
 
     /// Finds the mode over the interval of `effort`; `before` are the indicators before.
-    fn follow(&mut self, effort: &mut Effort, before: &[Self]) -> Result<(), Error> {
-        self.timeline.instants.clear();
-        self.timeline.values.clear();
-        let mut ends: Vec<f64> = self
-            .reads
-            .iter()
-            .flat_map(|&i| &before[i].timeline.instants)
-            .copied()
-            .collect();
+    fn follow(&mut self, effort: &mut Effort, before: &[Self]) -> Result<()> {
+        self.timeline.0.clear();
+        let read = self.reads.iter().map(|&i| &before[i].timeline);
+        let mut ends: Vec<f64> = read.flat_map(Timeline::instants).collect();
         ends.sort_unstable_by(f64::total_cmp);
         ends.push(effort.to);
         let mut start = effort.from;
@@ -320,7 +304,7 @@ impl Indicator {
     }
 
     /// Over a piece on which the modes inside stay.
-    fn piece(&mut self, start: f64, end: f64, effort: &mut Effort) -> Result<(), Error> {
+    fn piece(&mut self, start: f64, end: f64, effort: &mut Effort) -> Result<()> {
         let isolation = Isolation {
             indicator: self,
             effort,
@@ -329,9 +313,8 @@ impl Indicator {
             certain: None,
             instants: vec![],
         };
-        let instants = isolation.run()?;
         let mut from = start;
-        for to in instants.into_iter().chain([end]) {
+        for to in isolation.run()?.into_iter().chain([end]) {
             let value = self.value(from + 0.5 * (to - from));
             self.timeline.push(from, value);
             from = to;
@@ -343,41 +326,33 @@ impl Indicator {
     fn value(&mut self, t: f64) -> f64 {
         self.inputs[0] = t;
         let mut value = [0.0];
-        self.evaluator.eval(&self.inputs, &mut value);
+        self.mode.eval(&self.inputs, &mut value);
         value[0]
     }
 
     /// Whether the mode is certainly the same all over `stretch`.
     fn is_constant(&self, stretch: Interval) -> bool {
-        let inputs: Vec<Interval> = std::iter::once(stretch)
-            .chain(self.inputs[1..].iter().map(|&mode| Interval::point(mode)))
-            .collect();
-        let values = self.mode.eval_in(&Intervals, &inputs);
-        values
-            .iter()
-            .all(|v| v.is_empty() || (v.is_point() && v.is_defined()))
+        let mut inputs = vec![stretch];
+        inputs.extend(self.inputs[1..].iter().map(|&mode| Interval::point(mode)));
+        let value = self.mode.tape().eval_in(&Intervals, &inputs)[0];
+        value.is_empty() || (value.is_point() && value.is_defined())
     }
 
     /// Whether a mode decided by a quantity in `enclosure` can have one value only.
     fn decides(&self, enclosure: Interval) -> bool {
-        let image = if self.counts {
-            enclosure.floor()
-        } else {
-            enclosure.sign()
+        let image = match self.counts {
+            true => enclosure.floor(),
+            false => enclosure.sign(),
         };
         enclosure.is_defined() && image.is_point()
     }
 
     /// The first Taylor coefficients of the quantity, over time and what reads of it.
-    fn taylor<A: Algebra>(
-        &self,
-        inner: &A,
-        mut time: Vec<A::Value>,
-        count: usize,
-        mode: impl Fn(f64) -> A::Value,
-    ) -> Vec<A::Value> {
+    fn taylor<A: Algebra>(&self, inner: &A, time: A::Value, count: usize) -> Vec<A::Value> {
+        let mut time = vec![time, inner.constant(1.0)];
         time.truncate(count);
-        let modes = self.inputs[1..].iter().map(|&value| vec![mode(value)]);
+        let modes = self.inputs[1..].iter();
+        let modes = modes.map(|&mode| vec![inner.constant(mode)]);
         let inputs: Vec<_> = std::iter::once(time).chain(modes).collect();
         let jets = Jets {
             inner,
@@ -388,14 +363,13 @@ impl Indicator {
 
     /// The first Taylor coefficients of the quantity, enclosed over `stretch`.
     fn series<const N: usize>(&self, stretch: Interval) -> [Interval; N] {
-        let time = vec![stretch, Interval::ONE];
-        let series = self.taylor(&Intervals, time, N, Interval::point);
+        let series = self.taylor(&Intervals, stretch, N);
         std::array::from_fn(|k| series.get(k).copied().unwrap_or(Interval::ZERO))
     }
 
     /// The Taylor coefficient of power `k` at `t`.
     fn coefficient(&self, k: usize, t: f64) -> f64 {
-        let series = self.taylor(&Reals, vec![t, 1.0], k + 1, |mode| mode);
+        let series = self.taylor(&Reals, t, k + 1);
         series.get(k).copied().unwrap_or(0.0)
     }
 }
@@ -413,7 +387,7 @@ struct Isolation<'a> {
 
 impl Isolation<'_> {
     /// The instants strictly inside, increasing.
-    fn run(mut self) -> Result<Vec<f64>, Error> {
+    fn run(mut self) -> Result<Vec<f64>> {
         let mut cells = vec![(self.start, self.end)];
         while let Some((a, b)) = cells.pop() {
             self.effort.look(a)?;
@@ -476,10 +450,8 @@ impl Isolation<'_> {
         debug_assert!(order <= ORDER);
         let mut times = vec![a, b];
         for k in (1..order).rev() {
-            let zeros = times
-                .windows(2)
-                .filter_map(|pair| self.zero(k, pair[0], pair[1]));
-            let zeros: Vec<f64> = zeros.collect();
+            let pairs = times.windows(2);
+            let zeros: Vec<f64> = pairs.filter_map(|p| self.zero(k, p[0], p[1])).collect();
             times.extend(zeros);
             times.sort_unstable_by(f64::total_cmp);
             times.dedup();
@@ -501,10 +473,9 @@ impl Isolation<'_> {
             let middle = a + 0.5 * (b - a);
             let secant = (a * at_b - b * at_a) / (at_b - at_a);
             // every third cut in the middle, so that the end is in sight
-            let t = if round % 3 < 2 && a < secant && secant < b {
-                secant
-            } else {
-                middle
+            let t = match round % 3 < 2 && a < secant && secant < b {
+                true => secant,
+                false => middle,
             };
             let value = self.indicator.coefficient(k, t);
             if value == 0.0 || b - a <= close || middle <= a || middle >= b {
@@ -521,7 +492,7 @@ impl Isolation<'_> {
 
     /// Whether a cell that nothing is known of is not worth another cut: time does not
     /// resolve it, or rounding errors hide the mode in it.
-    fn is_hidden(&mut self, a: f64, b: f64) -> Result<bool, Error> {
+    fn is_hidden(&mut self, a: f64, b: f64) -> Result<bool> {
         let width = b - a;
         if width <= apart(self.start.abs().max(self.end.abs())) {
             return Ok(true);
@@ -542,7 +513,7 @@ impl Isolation<'_> {
     }
 
     /// Finds the switches of a part on which the quantity is monotone.
-    fn monotone(&mut self, a: f64, b: f64) -> Result<(), Error> {
+    fn monotone(&mut self, a: f64, b: f64) -> Result<()> {
         if self.indicator.counts {
             let levels = (self.indicator.value(b) - self.indicator.value(a)).abs();
             self.effort.check(levels.max(0.0))?;
@@ -562,21 +533,19 @@ impl Isolation<'_> {
     /// The time nearest to `end` at which the mode is certain, on the way to `other`.
     fn probe(&self, end: f64, other: f64) -> Option<f64> {
         let shares = (1..=17).rev().map(|k| 0.5_f64.powi(3 * k));
-        std::iter::once(0.0)
-            .chain(shares)
-            .chain([0.5])
-            .map(|share| end + share * (other - end))
-            .find(|&t| self.is_certain(t))
+        let shares = std::iter::once(0.0).chain(shares).chain([0.5]);
+        let mut times = shares.map(|share| end + share * (other - end));
+        times.find(|&t| self.is_certain(t))
     }
 
     /// The mode is certain at `t`.
-    fn arrive(&mut self, t: f64) -> Result<(), Error> {
+    fn arrive(&mut self, t: f64) -> Result<()> {
         let value = self.indicator.value(t);
         self.reach(t, value)
     }
 
     /// The mode is what it is at `inside` from `t` on.
-    fn settle(&mut self, inside: f64, t: f64) -> Result<(), Error> {
+    fn settle(&mut self, inside: f64, t: f64) -> Result<()> {
         let value = self.indicator.value(inside);
         self.reach(t, value)?;
         self.certain = Some((inside, value));
@@ -584,16 +553,15 @@ impl Isolation<'_> {
     }
 
     /// Finds every switch between the last certain time and `t`, where the mode is `value`.
-    fn reach(&mut self, t: f64, value: f64) -> Result<(), Error> {
+    fn reach(&mut self, t: f64, value: f64) -> Result<()> {
         while let Some((left, current)) = self.certain
             && !same(current, value)
         {
             let switch = self.bisect(left, t, current);
             self.push(switch)?;
-            let next = if switch < t {
-                self.indicator.value(switch)
-            } else {
-                value
+            let next = match switch < t {
+                true => self.indicator.value(switch),
+                false => value,
             };
             self.certain = Some((switch, next));
         }
@@ -601,7 +569,7 @@ impl Isolation<'_> {
         Ok(())
     }
 
-    fn push(&mut self, switch: f64) -> Result<(), Error> {
+    fn push(&mut self, switch: f64) -> Result<()> {
         let last = self.instants.last().copied().unwrap_or(self.start);
         if switch - last <= apart(switch) || self.end - switch <= apart(self.end) {
             return Ok(());
@@ -618,10 +586,9 @@ impl Isolation<'_> {
             if middle <= left || middle >= right {
                 return right;
             }
-            if same(self.indicator.value(middle), current) {
-                left = middle;
-            } else {
-                right = middle;
+            match same(self.indicator.value(middle), current) {
+                true => left = middle,
+                false => right = middle,
             }
         }
     }
@@ -642,7 +609,7 @@ mod tests {
             line.push(t, value);
         }
         line.push(4.0, 0.0);
-        assert_eq!(line.instants, [2.0, 4.0]);
+        assert_eq!(line.instants().collect::<Vec<_>>(), [2.0, 4.0]);
         assert_eq!((line.at(0.5), line.at(5.0)), (1.0, 0.0));
         assert!(line.at(2.5).is_nan() && Timeline::default().at(0.0).is_nan());
     }

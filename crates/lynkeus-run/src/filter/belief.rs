@@ -40,7 +40,7 @@ impl Belief {
 impl Persist for Belief {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         walk.numbers(&mut self.x)?;
-        self.root.walk(walk)
+        walk.numbers(&mut self.root.entries)
     }
 }
 
@@ -108,8 +108,7 @@ impl Projection {
 
     fn prepare(&mut self, x: &[f64], root: &Root) {
         let n = x.len();
-        self.before.clear();
-        self.before.extend_from_slice(x);
+        x.clone_into(&mut self.before);
         self.sides.clear();
         self.sides.resize(n, 0);
         self.multipliers.clear();
@@ -163,31 +162,27 @@ impl Projection {
                 self.wanted.push(bound - self.before[i]);
             }
             substitute(self.factor.of(&self.matrix, m), m, &mut self.wanted);
+            let all = || self.met.iter().copied().zip(self.wanted.iter().copied());
             // a multiplier at an upper bound pushes down
-            let inward = |(i, wanted): (&usize, &f64)| f64::from(self.sides[*i]) * wanted >= 0.0;
-            let mut share = 1.0_f64;
-            for (&i, wanted) in self.met.iter().zip(&self.wanted) {
-                if inward((&i, wanted)) {
-                    let own = self.multipliers[i];
-                    let step = own - wanted;
-                    share = share.min(if step == 0.0 { 0.0 } else { own / step });
-                }
-            }
-            let is_met = !self.met.iter().zip(&self.wanted).any(inward);
+            let is_inward = |side: i8, wanted: f64| f64::from(side) * wanted >= 0.0;
+            // the share of the way to what is wanted at which a multiplier vanishes
+            let end = |own: f64, wanted: f64| match own - wanted {
+                0.0 => 0.0,
+                step => own / step,
+            };
+            let inward = all().filter(|&(i, wanted)| is_inward(self.sides[i], wanted));
+            let ends = inward.map(|(i, wanted)| end(self.multipliers[i], wanted));
+            let share = ends.fold(1.0, f64::min);
             let mut let_go = 0;
-            for (&i, wanted) in self.met.iter().zip(&self.wanted) {
-                let is_inward = f64::from(self.sides[i]) * wanted >= 0.0;
-                let own = &mut self.multipliers[i];
-                let step = *own - wanted;
-                let reaches = step == 0.0 || *own / step <= share;
-                *own -= share * step;
-                if is_inward && reaches {
-                    *own = 0.0;
-                    self.sides[i] = 0;
+            for (i, wanted) in all() {
+                let own = self.multipliers[i];
+                self.multipliers[i] -= share * (own - wanted);
+                if is_inward(self.sides[i], wanted) && end(own, wanted) <= share {
+                    (self.multipliers[i], self.sides[i]) = (0.0, 0);
                     let_go += 1;
                 }
             }
-            if is_met || let_go == 0 {
+            if let_go == 0 {
                 return;
             }
         }

@@ -1,10 +1,9 @@
 //! The extended Kalman filter's correction.
 
 use super::belief::Belief;
-use super::root::dot;
 use super::sensing::{Believed, Sensing};
 use super::smoother::Correction;
-use crate::Error;
+use crate::Result;
 use crate::runner::Sample;
 
 /// Room for its corrections.
@@ -14,9 +13,6 @@ pub(crate) struct Ekf {
     taken: Vec<Believed>,
     /// the estimate before the first of them
     before: Vec<f64>,
-    /// a row of C
-    slopes: Vec<f64>,
-    projected: Vec<f64>,
     gain: Vec<f64>,
 }
 
@@ -29,33 +25,23 @@ impl Ekf {
         sensing: &mut Sensing,
         belief: &mut Belief,
         sample: &Sample<'_>,
-    ) -> Result<(), Error> {
-        let Self {
-            taken,
-            before,
-            slopes: c,
-            projected,
-            gain,
-        } = self;
-        sensing.judge_all(belief, sample, taken)?;
-        before.clone_from(&belief.x);
-        c.resize(before.len(), 0.0);
-        projected.resize(before.len(), 0.0);
-        let inside = taken.iter().filter(|b| b.end.is_none());
-        for believed in inside.chain(taken.iter().filter(|b| b.end.is_some())) {
-            sensing.output_map.write_slopes(believed.sensor, c);
-            let moves = belief.x.iter().zip(&*before).map(|(x, x0)| x - x0);
+    ) -> Result<()> {
+        sensing.judge_all(belief, sample, &mut self.taken)?;
+        self.before.clone_from(&belief.x);
+        let inside = self.taken.iter().filter(|b| b.end.is_none());
+        for believed in inside.chain(self.taken.iter().filter(|b| b.end.is_some())) {
+            let spread = sensing.project(believed.sensor, belief);
+            let (c, projected) = (&sensing.slopes, &sensing.projected);
+            let moves = belief.x.iter().zip(&self.before).map(|(x, x0)| x - x0);
             let moved: f64 = c.iter().zip(moves).map(|(c, moved)| c * moved).sum();
-            belief.root.transposed_times(c, projected);
-            let spread = dot(projected, projected);
             let Some((rest, noise)) = believed.weighed(moved, spread) else {
                 continue;
             };
-            if !belief.take(projected, rest, noise, gain) {
+            if !belief.take(projected, rest, noise, &mut self.gain) {
                 continue;
             }
             if let Some(corrections) = &mut sensing.corrections {
-                let (c, gain) = (c.clone(), gain.clone());
+                let (c, gain) = (c.clone(), self.gain.clone());
                 corrections.push(Correction::single(c, rest, spread + noise, gain));
             }
         }

@@ -8,7 +8,7 @@
 //! ```
 //! use lynkeus_expr::Graph;
 //! use lynkeus_run::filter::{FilterKind, FilterSettings, NoisyModel, NoisyPlant, Sensor};
-//! use lynkeus_run::{Estimator, EstimatorSettings, Level};
+//! use lynkeus_run::{Blueprint, EstimatorSettings, Level};
 //!
 //! // a level that nobody moves, measured with noise of standard deviation 1
 //! let g = Graph::new();
@@ -26,7 +26,8 @@
 //!     confined: None,
 //! })?;
 //! let settings = FilterSettings::of(FilterKind::Extended);
-//! let mut filter = Estimator::filter(&model, settings, EstimatorSettings::default())?;
+//! let filter = Blueprint::filter(model, settings, EstimatorSettings::default());
+//! let mut filter = filter.estimator()?;
 //! filter.push(0.0, &[3.0])?;
 //! assert!((filter.estimate()[0] - 1.5).abs() < 1e-12);
 //! // no reading, no correction
@@ -62,7 +63,7 @@ pub use smoother::Smoothed;
 use crate::divergence::{Bound, check_deviations};
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Error, EstimatorSettings};
+use crate::{Error, EstimatorSettings, Result};
 use belief::{Projection, confine};
 use ekf::Ekf;
 use mhe::Mhe;
@@ -106,7 +107,7 @@ impl Filter {
         model: &NoisyModel,
         settings: &FilterSettings,
         run: EstimatorSettings,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let flow = model.flow.system();
         let n = flow.states().len();
         settings.check(n, model.ranges.len())?;
@@ -127,9 +128,7 @@ impl Filter {
             ranges: model.ranges.clone(),
             deviations: model.initial_variance.iter().map(|v| v.sqrt()).collect(),
             belief: Belief::new(flow.start(), &model.initial_variance),
-            projection: settings
-                .projects
-                .then(|| Projection::new(model.ranges.clone())),
+            projection: (settings.projects).then(|| Projection::new(model.ranges.clone())),
             sensing: Sensing::new(model, settings),
             bound: Bound::new(flow.start()),
             history: settings.keep_history.then(History::default),
@@ -137,15 +136,11 @@ impl Filter {
         })
     }
 
-    /// Whether the smoother needs the transition between two updates; a window finds its own.
-    fn keeps_transitions(&self) -> bool {
-        self.history.is_some() && !matches!(self.engine, Engine::MovingHorizon(_))
-    }
-
     /// To the next sample; the transition is what the smoother needs of it. Where the plant has no
     /// value on the way, inside the declared ranges.
-    fn predict(&mut self, from: f64, sample: &Sample<'_>) -> Result<Option<Profile>, Error> {
-        let keep = self.keeps_transitions();
+    fn predict(&mut self, from: f64, sample: &Sample<'_>) -> Result<Option<Profile>> {
+        // a window finds its own
+        let keep = self.sensing.corrections.is_some();
         let (propagation, belief) = (&mut self.propagation, &mut self.belief);
         if let Some(spare) = &mut self.spare {
             spare.driven.start(propagation.driven.signals());
@@ -182,7 +177,7 @@ impl Filter {
         }
     }
 
-    fn correct(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
+    fn correct(&mut self, sample: &Sample<'_>) -> Result<()> {
         match self.correct_here(sample) {
             // the outputs are evaluated before a reading is counted; a window keeps its states
             // inside anyway
@@ -199,7 +194,7 @@ impl Filter {
         }
     }
 
-    fn correct_here(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
+    fn correct_here(&mut self, sample: &Sample<'_>) -> Result<()> {
         let (sensing, belief) = (&mut self.sensing, &mut self.belief);
         match &mut self.engine {
             Engine::Extended(ekf) => ekf.correct(sensing, belief, sample),
@@ -212,7 +207,7 @@ impl Filter {
 }
 
 impl Runner for Filter {
-    fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
+    fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<()> {
         self.bound.see(self.propagation.driven.signals());
         let transition = self.predict(from, sample)?;
         self.propagation.driven.arrive();
@@ -226,7 +221,7 @@ impl Runner for Filter {
         Ok(())
     }
 
-    fn update(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
+    fn update(&mut self, sample: &Sample<'_>) -> Result<()> {
         self.sensing.health.inputs_held += sample.held;
         // those of an update that failed
         self.sensing.take_corrections();
@@ -236,7 +231,7 @@ impl Runner for Filter {
         Ok(())
     }
 
-    fn report(&mut self, t: f64) -> Result<(), Error> {
+    fn report(&mut self, t: f64) -> Result<()> {
         let names = self.propagation.driven.system().states();
         self.bound.check(t, names, &self.belief.x, String::new)?;
         for (i, deviation) in self.deviations.iter_mut().enumerate() {
@@ -291,10 +286,8 @@ impl Runner for Filter {
         let mut rows = history.smoothed(&newest, lag, deviations);
         if let Some(lag) = lag {
             // as it was known then: the rows kept are linearised about what was known later
-            for (row, x) in rows
-                .iter_mut()
-                .zip(history.in_windows(self.belief.x.len(), lag))
-            {
+            let known = history.in_windows(self.belief.x.len(), lag);
+            for (row, x) in rows.iter_mut().zip(known) {
                 row.estimate.copy_from_slice(x);
             }
         }
@@ -330,7 +323,7 @@ impl Persist for Filter {
         self.propagation.walk(walk)?;
         match &mut self.engine {
             Engine::Extended(_) => {}
-            Engine::Unscented(ukf) => ukf.walk(walk)?,
+            Engine::Unscented(ukf) => ukf.integrator.walk(walk)?,
             Engine::MovingHorizon(mhe) => mhe.walk(walk)?,
         }
         if let Some(spare) = &mut self.spare {
@@ -339,7 +332,7 @@ impl Persist for Filter {
         self.belief.walk(walk)?;
         self.sensing.walk(walk)?;
         walk.numbers(&mut self.deviations)?;
-        self.bound.walk(walk)?;
+        walk.number(&mut self.bound.scale)?;
         let n = self.belief.x.len();
         walk.optional(&mut self.pending, |walk, pending| pending.walk(walk, n))
     }

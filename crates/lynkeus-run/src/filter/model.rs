@@ -1,12 +1,13 @@
 //! A plant with its sensors and noises, compiled for what follows a covariance.
 
+use std::cmp::Ordering;
 use std::fmt::Write;
 
 use lynkeus_expr::{Graph, Node};
 
 use crate::noise::{Level, Limits, check_size};
 use crate::snapshot::Digest;
-use crate::{Error, Linearised};
+use crate::{Error, Linearised, Result};
 
 /// x' = f(t, x, u) + w, y_i = h_i(t, x, u) + v_i with white noises w, v.
 #[derive(Clone, Debug)]
@@ -77,7 +78,7 @@ impl NoisyModel {
     /// # Errors
     /// [`Error::MissingInput`] for an expression that reads another symbol; [`Error::Setting`]
     /// for a plant without states, a noise or a variance that is negative or not finite, and for wrong numbers of them.
-    pub fn new(plant: &NoisyPlant<'_>) -> Result<Self, Error> {
+    pub fn new(plant: &NoisyPlant<'_>) -> Result<Self> {
         check(plant)?;
         let flow = |f: &Vec<Node>| {
             Linearised::flow(plant.graph, plant.time, &plant.states, &plant.inputs, f)
@@ -91,27 +92,20 @@ impl NoisyModel {
         plant: &NoisyPlant<'_>,
         flow: Linearised,
         confined: Option<Linearised>,
-    ) -> Result<Self, Error> {
-        let NoisyPlant {
-            graph,
-            time,
-            states,
-            inputs,
-            sensors,
-            ..
-        } = plant;
-        let outputs = sensors.iter().map(|s| (s.name.clone(), s.output));
+    ) -> Result<Self> {
+        let outputs = plant.sensors.iter().map(|s| (s.name.clone(), s.output));
         let outputs: Vec<(String, Node)> = outputs.collect();
+        let (graph, time, signals) = (plant.graph, plant.time, &plant.inputs);
         Ok(Self {
             flow,
-            output_map: Linearised::output_map(graph, *time, states, inputs, &outputs)?,
-            sensors: sensors.clone(),
+            output_map: Linearised::output_map(graph, time, &plant.states, signals, &outputs)?,
+            sensors: plant.sensors.clone(),
             process_noise: plant.process_noise.clone(),
             initial_variance: plant.initial_variance.clone(),
             ranges: plant.ranges.clone(),
             confined,
             lag: None,
-            estimates: states.len(),
+            estimates: plant.states.len(),
         })
     }
 
@@ -129,7 +123,7 @@ impl NoisyModel {
 }
 
 /// That there is a density and a variance for each state.
-pub(crate) fn check_counts(plant: &NoisyPlant<'_>) -> Result<(), Error> {
+pub(crate) fn check_counts(plant: &NoisyPlant<'_>) -> Result<()> {
     let n = plant.states.len();
     for (what, values) in lists(plant) {
         if values.len() != n {
@@ -147,7 +141,7 @@ fn lists<'p>(plant: &'p NoisyPlant<'_>) -> [(&'static str, &'p [f64]); 2] {
     ]
 }
 
-fn check(plant: &NoisyPlant<'_>) -> Result<(), Error> {
+fn check(plant: &NoisyPlant<'_>) -> Result<()> {
     if plant.states.is_empty() {
         return Err(Error::setting("number of states", "1 at least", 0));
     }
@@ -157,18 +151,13 @@ fn check(plant: &NoisyPlant<'_>) -> Result<(), Error> {
             check_size(what, name, *value)?;
         }
     }
-    for Sensor {
-        name,
-        noise,
-        limits,
-        ..
-    } in &plant.sensors
-    {
-        check_size("noise", name, noise.size())?;
-        if let Some(Limits { low, high }) = limits
-            && (low.is_nan() || high.is_nan() || low >= high)
+    for sensor in &plant.sensors {
+        check_size("noise", &sensor.name, sensor.noise.size())?;
+        if let Some(Limits { low, high }) = sensor.limits
+            && low.partial_cmp(&high) != Some(Ordering::Less)
         {
-            let (what, found) = (format!("limits of '{name}'"), format!("[{low}, {high}]"));
+            let what = format!("limits of '{}'", sensor.name);
+            let found = format!("[{low}, {high}]");
             return Err(Error::setting(what, "a lower and a higher number", found));
         }
     }

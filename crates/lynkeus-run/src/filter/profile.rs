@@ -79,11 +79,6 @@ impl Profile {
         }
     }
 
-    pub fn copy_from(&mut self, other: &Self) {
-        self.clear();
-        self.add(other);
-    }
-
     pub fn add_at(&mut self, i: usize, j: usize, value: f64) {
         self.reach(i, &(j..j + 1));
         self.entries[i * self.n + j] += value;

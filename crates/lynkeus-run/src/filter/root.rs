@@ -1,7 +1,5 @@
 //! Square roots of covariances: P = S Sᵀ, matrices row by row.
 
-use crate::snapshot::{Damaged, Persist, Walk};
-
 /// A lower triangular root S of P, n × n. Whatever is done to S, S Sᵀ has no negative eigenvalue.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Root {
@@ -84,15 +82,13 @@ impl Root {
             let before = alpha;
             alpha += v * v;
             // what is left of the column, and what the later ones take
-            let left = if alpha > 0.0 {
-                (before / alpha).sqrt()
-            } else {
-                1.0
+            let left = match alpha > 0.0 {
+                true => (before / alpha).sqrt(),
+                false => 1.0,
             };
-            let taken = if before > 0.0 {
-                v / (before.sqrt() * alpha.sqrt())
-            } else {
-                0.0
+            let taken = match before > 0.0 {
+                true => v / (before.sqrt() * alpha.sqrt()),
+                false => 0.0,
             };
             let column = self.entries[j * (n + 1)..].iter_mut().step_by(n);
             for (s, sum) in column.zip(&mut gain[j..]) {
@@ -118,12 +114,6 @@ impl Root {
                 self.entries[j * n + i] = sign * rows[i * n + j];
             }
         }
-    }
-}
-
-impl Persist for Root {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        walk.numbers(&mut self.entries)
     }
 }
 
@@ -153,10 +143,8 @@ fn triangularise(rows: &mut [f64], n: usize, sums: &mut [f64]) {
         // in units in which squares neither vanish nor overflow: what decays without noise comes
         // to any size, and must not spoil what it is correlated with
         (k..count).for_each(|i| rows[i * n + k] /= unit);
-        let norm = (k..count)
-            .map(|i| rows[i * n + k].powi(2))
-            .sum::<f64>()
-            .sqrt();
+        let squares = (k..count).map(|i| rows[i * n + k].powi(2));
+        let norm = squares.sum::<f64>().sqrt();
         let pivot = rows[k * n + k];
         let head = if pivot > 0.0 { -norm } else { norm };
         // the reflector v = (pivot − head, the rest), H = I − v vᵀ/β
@@ -185,19 +173,16 @@ fn triangularise(rows: &mut [f64], n: usize, sums: &mut [f64]) {
 /// The power of two of the largest of some numbers; none where all are as good as zero.
 fn unit(numbers: impl Iterator<Item = f64>) -> Option<f64> {
     const EXPONENT: u64 = 0x7ff << 52;
-    let largest = numbers.fold(0.0, |m: f64, x| if x.abs() <= m { m } else { x.abs() });
-    let power = f64::from_bits(largest.to_bits() & EXPONENT);
+    let power = f64::from_bits(largest(numbers).to_bits() & EXPONENT);
     (power > 0.0).then_some(power)
 }
 
-/// The lower triangular factor of a matrix that has no negative eigenvalue but by rounding: a
-/// pivot that rounding cannot tell from zero has none. What is zero before the first entry of a
-/// row stays so, and costs nothing.
-pub(crate) fn factor(matrix: &[f64], n: usize) -> Vec<f64> {
-    Factor::default().of(matrix, n).to_vec()
+/// The largest size of some numbers; not a number where the last of them is none.
+pub(crate) fn largest(numbers: impl Iterator<Item = f64>) -> f64 {
+    numbers.fold(0.0, |m: f64, x| if x.abs() <= m { m } else { x.abs() })
 }
 
-/// Room for the [factor] of a matrix.
+/// Room for the factor of a matrix.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Factor {
     lower: Vec<f64>,
@@ -206,7 +191,9 @@ pub(crate) struct Factor {
 }
 
 impl Factor {
-    /// As [`factor`].
+    /// The lower triangular factor of a matrix that has no negative eigenvalue but by rounding: a
+    /// pivot that rounding cannot tell from zero has none. What is zero before the first entry of a
+    /// row stays so, and costs nothing.
     pub fn of(&mut self, matrix: &[f64], n: usize) -> &[f64] {
         let Self { lower, firsts } = self;
         let first =
@@ -229,10 +216,8 @@ impl Factor {
                 if firsts[i] > j {
                     continue;
                 }
-                let known = dot(
-                    &lower[i * n + begin..i * n + j],
-                    &lower[j * n + begin..j * n + j],
-                );
+                let [own, other] = [i, j].map(|k| &lower[k * n + begin..k * n + j]);
+                let known = dot(own, other);
                 lower[i * n + j] = (matrix[i * n + j] - known) / root;
             }
         }
@@ -242,23 +227,17 @@ impl Factor {
 
 /// x with L Lᵀ x = b, in the place of b; components that L does not reach are 0.
 pub(crate) fn substitute(lower: &[f64], m: usize, b: &mut [f64]) {
+    let solved = |i: usize, rest: f64| match lower[i * m + i] {
+        pivot if pivot > 0.0 => rest / pivot,
+        _ => 0.0,
+    };
     for i in 0..m {
         let known = dot(&lower[i * m..i * m + i], &b[..i]);
-        let pivot = lower[i * m + i];
-        b[i] = if pivot > 0.0 {
-            (b[i] - known) / pivot
-        } else {
-            0.0
-        };
+        b[i] = solved(i, b[i] - known);
     }
     for i in (0..m).rev() {
         let known: f64 = (i + 1..m).map(|j| lower[j * m + i] * b[j]).sum();
-        let pivot = lower[i * m + i];
-        b[i] = if pivot > 0.0 {
-            (b[i] - known) / pivot
-        } else {
-            0.0
-        };
+        b[i] = solved(i, b[i] - known);
     }
 }
 
@@ -322,7 +301,7 @@ mod tests {
     #[test]
     fn a_reading_takes_what_the_formula_says() {
         let mut root = Root::diagonal(&[0.0; 2]);
-        root.entries = factor(&[2.0, 1.0, 1.0, 3.0], 2);
+        root.entries = Factor::default().of(&[2.0, 1.0, 1.0, 3.0], 2).to_vec();
         let mut projected = [0.0; 2];
         root.transposed_times(&[1.0, 0.0], &mut projected);
         let mut gain = vec![];
@@ -355,7 +334,8 @@ mod tests {
     fn a_semidefinite_matrix_has_a_factor() {
         let v = [3.0, 0.0, -2.0];
         let matrix: Vec<f64> = (0..9).map(|k| v[k / 3] * v[k % 3]).collect();
-        let lower = factor(&matrix, 3);
+        let mut factor = Factor::default();
+        let lower = factor.of(&matrix, 3);
         for (k, entry) in matrix.iter().enumerate() {
             let (i, j) = (k / 3, k % 3);
             let found = dot(&lower[3 * i..3 * i + 3], &lower[3 * j..3 * j + 3]);

@@ -16,7 +16,7 @@ use super::model::{NoisyModel, Sensor};
 use super::root::dot;
 use super::settings::FilterSettings;
 use super::smoother::Correction;
-use crate::Error;
+use crate::Result;
 use crate::linearised::OutputMap;
 use crate::noise::Limits;
 use crate::runner::Sample;
@@ -99,9 +99,9 @@ pub(crate) struct Sensing {
     /// of this sample, where a smoother asks for them
     pub corrections: Option<Vec<Correction>>,
     /// a row of C
-    slopes: Vec<f64>,
+    pub slopes: Vec<f64>,
     /// Sᵀ times it
-    projected: Vec<f64>,
+    pub projected: Vec<f64>,
 }
 
 impl Sensing {
@@ -125,10 +125,8 @@ impl Sensing {
     }
 
     pub fn take_corrections(&mut self) -> Vec<Correction> {
-        self.corrections
-            .as_mut()
-            .map(std::mem::take)
-            .unwrap_or_default()
+        let corrections = self.corrections.as_mut();
+        corrections.map(std::mem::take).unwrap_or_default()
     }
 
     /// Decides what becomes of all readings of a sample before the first of them corrects, by h and C at the
@@ -138,19 +136,24 @@ impl Sensing {
         belief: &Belief,
         sample: &Sample<'_>,
         taken: &mut Vec<Believed>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         self.output_map
             .linearise(sample.t, &belief.x, sample.inputs)?;
         taken.clear();
         for (i, reading) in sample.readings.iter().enumerate() {
-            self.output_map.write_slopes(i, &mut self.slopes);
-            let projected = &mut self.projected;
-            belief.root.transposed_times(&self.slopes, projected);
-            let spread = dot(projected, projected);
+            let spread = self.project(i, belief);
             let predicted = self.output_map.outputs()[i];
             taken.extend(self.judge(i, *reading, predicted, spread));
         }
         Ok(())
+    }
+
+    /// Takes the row of C of a sensor, and what the belief makes of it: the variance of the output.
+    pub fn project(&mut self, sensor: usize, belief: &Belief) -> f64 {
+        self.output_map.write_slopes(sensor, &mut self.slopes);
+        let projected = &mut self.projected;
+        belief.root.transposed_times(&self.slopes, projected);
+        dot(projected, projected)
     }
 
     /// Decides what becomes of a reading where the model predicts a value with a variance `spread`; what
@@ -281,9 +284,8 @@ impl Tail {
             0.5 - density * sum
         } else {
             // Laplace's continued fraction: φ/Φ(−a) = a + 1/(a + 2/(a + 3/…))
-            let excess = (1..80)
-                .rev()
-                .fold(0.0, |rest, k| f64::from(k) / (size + rest));
+            let fractions = (1..80).rev().map(f64::from);
+            let excess = fractions.fold(0.0, |rest, k| k / (size + rest));
             let weight = density / (size + excess);
             if a > 0.0 {
                 let mean = a + excess;
@@ -383,33 +385,23 @@ fn judge_near_an_end(limits: Limits, end: Option<End>, innovation: &mut Innovati
         return;
     }
     // how far inside the range the prediction is, in deviations of the reading
-    let below = (predicted - limits.low) / deviation;
-    let above = (limits.high - predicted) / deviation;
-    let is_near = below < FAR || above < FAR;
-    if !is_near && end.is_none() {
+    let room = |end: End| end.sign() * (end.value(limits) - predicted) / deviation;
+    let ends = [End::Low, End::High];
+    if end.is_none() && !ends.iter().any(|end| room(*end) < FAR) {
         return;
     }
-    let mean = |end: End| match end {
-        End::Low => -deviation * Tail::beyond(below).mean,
-        End::High => deviation * Tail::beyond(above).mean,
-    };
-    let outside = match (below < 0.0, above < 0.0) {
-        (true, _) => Some((End::Low, below)),
-        (_, true) => Some((End::High, above)),
-        _ => None,
-    };
     if let Some(end) = end {
-        innovation.value = mean(end);
+        innovation.value = end.sign() * deviation * Tail::beyond(room(end)).mean;
     }
-    match outside {
+    match ends.into_iter().find(|end| room(*end) < 0.0) {
         None => {
-            let lost = lost(below) + lost(above);
-            innovation.deviation = deviation * (1.0 - lost).max(0.0).sqrt();
+            let [below, above] = ends.map(|end| lost(room(end)));
+            innovation.deviation = deviation * (1.0 - (below + above)).max(0.0).sqrt();
         }
-        Some((beyond, _)) if end == Some(beyond) => innovation.reading = Reading::AtLimit,
-        Some((beyond, room)) if -room < NO_CHANCE => {
+        Some(beyond) if end == Some(beyond) => innovation.reading = Reading::AtLimit,
+        Some(beyond) if -room(beyond) < NO_CHANCE => {
             // given that it is on this side of the end
-            let rest = Tail::beyond(-room);
+            let rest = Tail::beyond(-room(beyond));
             innovation.value += beyond.sign() * deviation * rest.mean;
             innovation.deviation = deviation * rest.left().sqrt();
         }

@@ -1,6 +1,6 @@
 //! Which filter, and how it works.
 
-use crate::Error;
+use crate::{Error, Result};
 
 /// Which filter.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,7 +46,7 @@ impl FilterSettings {
     }
 
     /// That they can be, for n states with so many ranges.
-    pub(crate) fn check(&self, n: usize, ranges: usize) -> Result<(), Error> {
+    pub(crate) fn check(&self, n: usize, ranges: usize) -> Result<()> {
         if let Some(gate) = self.gate
             && !(gate > 0.0 && gate.is_finite())
         {
@@ -109,14 +109,12 @@ impl SigmaPoints {
     ///
     /// # Errors
     /// [`Error::Setting`] where α²(n + κ) is not above 0.
-    pub fn weights(&self, n: usize) -> Result<Weights, Error> {
+    pub fn weights(&self, n: usize) -> Result<Weights> {
         let n = n as f64;
         let both = self.alpha.powi(2) * (n + self.kappa);
         if !(both > 0.0 && both.is_finite() && self.beta.is_finite()) {
-            let found = format!(
-                "alpha = {}, beta = {}, kappa = {}",
-                self.alpha, self.beta, self.kappa
-            );
+            let Self { alpha, beta, kappa } = self;
+            let found = format!("alpha = {alpha}, beta = {beta}, kappa = {kappa}");
             let expected =
                 format!("alpha² (n + kappa) above 0 for n = {n} states, and finite numbers");
             return Err(Error::setting("sigma points", expected, found));

@@ -110,9 +110,8 @@ impl Step {
         walk.optional(transition, |walk, transition| transition.walk(walk, n))?;
         let count = walk.length(self.corrections.len())?;
         self.corrections.resize_with(count, Correction::default);
-        self.corrections
-            .iter_mut()
-            .try_for_each(|c| c.walk(walk, n))
+        let mut corrections = self.corrections.iter_mut();
+        corrections.try_for_each(|c| c.walk(walk, n))
     }
 }
 
@@ -244,10 +243,8 @@ impl Adjoint {
         let Correction { slopes, gains, .. } = correction;
         let (n, m) = (self.vector.len(), gains.len());
         let rows = || self.matrix.chunks_exact(n);
-        let along: Vec<Vec<f64>> = gains
-            .iter()
-            .map(|k| rows().map(|row| dot(row, k)).collect())
-            .collect();
+        let along = |k: &Vec<f64>| rows().map(|row| dot(row, k)).collect();
+        let along: Vec<Vec<f64>> = gains.iter().map(along).collect();
         for a in 0..m {
             // what is taken from each row along C's row a
             let mut taken = along[a].clone();
@@ -293,9 +290,8 @@ impl Adjoint {
             }
         }
         let rows = half.chunks_exact(n);
-        self.matrix = rows
-            .flat_map(|row| transition.transposed_times(row))
-            .collect();
+        let rows = rows.flat_map(|row| transition.transposed_times(row));
+        self.matrix = rows.collect();
         self.mirror();
     }
 }

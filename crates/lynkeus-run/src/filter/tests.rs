@@ -1,7 +1,7 @@
 //! Filters against formulas by hand.
 
 use super::*;
-use crate::{Estimator, Level, Method, Tolerances};
+use crate::{Blueprint, Estimator, Level, Method, Tolerances};
 use lynkeus_expr::Graph;
 
 /// x' = a x + w, y = x + v.
@@ -51,7 +51,9 @@ fn the_variance_of_a_scalar_follows_its_formula() {
         FilterKind::Unscented(SigmaPoints::default()),
     ] {
         let mut filter =
-            Estimator::filter(&scalar(a, q, r), FilterSettings::of(kind.clone()), exact()).unwrap();
+            Blueprint::filter(scalar(a, q, r), FilterSettings::of(kind.clone()), exact())
+                .estimator()
+                .unwrap();
         let (mut x, mut p) = (1.0, 0.5);
         for k in 0..20 {
             let y = (k as f64).sin();
@@ -80,7 +82,9 @@ fn the_smoother_of_a_constant_is_its_last_estimate() {
         keep_history: true,
         ..FilterSettings::of(FilterKind::Extended)
     };
-    let mut filter = Estimator::filter(&scalar(0.0, 0.0, 0.2), settings, exact()).unwrap();
+    let mut filter = Blueprint::filter(scalar(0.0, 0.0, 0.2), settings, exact())
+        .estimator()
+        .unwrap();
     for k in 0..10 {
         filter.push(f64::from(k), &[f64::from(k % 3)]).unwrap();
     }
@@ -102,7 +106,9 @@ fn a_gate_keeps_outliers_out_and_gives_way_in_the_end() {
         gate: Some(4.0),
         ..FilterSettings::of(FilterKind::Extended)
     };
-    let mut filter = Estimator::filter(&scalar(0.0, 0.0, 0.01), settings, exact()).unwrap();
+    let mut filter = Blueprint::filter(scalar(0.0, 0.0, 0.01), settings, exact())
+        .estimator()
+        .unwrap();
     for k in 0..5 {
         filter.push(f64::from(k), &[1.0]).unwrap();
     }
@@ -152,7 +158,9 @@ fn a_reading_that_sigma_points_cannot_weigh_is_not_taken() {
         ..SigmaPoints::default()
     };
     let settings = FilterSettings::of(FilterKind::Unscented(points));
-    let mut filter = Estimator::filter(&model.unwrap(), settings, exact()).unwrap();
+    let mut filter = Blueprint::filter(model.unwrap(), settings, exact())
+        .estimator()
+        .unwrap();
     filter.push(0.0, &[1.0]).unwrap();
     let health = filter.health().sensors[0];
     assert_eq!((health.taken, health.rejected), (0, 1));
@@ -162,7 +170,7 @@ fn a_reading_that_sigma_points_cannot_weigh_is_not_taken() {
 #[test]
 fn what_cannot_be_is_refused() {
     let model = scalar(0.0, 1.0, 1.0);
-    let new = |settings| Estimator::filter(&model, settings, exact());
+    let new = |settings| Blueprint::filter(model.clone(), settings, exact()).estimator();
     let gate = FilterSettings {
         gate: Some(-1.0),
         ..FilterSettings::of(FilterKind::Extended)
@@ -237,7 +245,9 @@ fn an_estimate_without_a_value_of_the_plant_is_put_back() {
     let run = |confined| {
         let model = NoisyModel::new(&plant(confined)).unwrap();
         let settings = FilterSettings::of(FilterKind::Extended);
-        let mut filter = Estimator::filter(&model, settings, exact()).unwrap();
+        let mut filter = Blueprint::filter(model.clone(), settings, exact())
+            .estimator()
+            .unwrap();
         let result = (0..20).try_for_each(|k| filter.push(0.1 * f64::from(k), &[-0.5]).map(drop));
         (result, filter.health().confined)
     };
@@ -262,7 +272,11 @@ fn smoothing_goes_on_after_a_restore_and_over_predictions() {
             ..FilterSettings::of(kind)
         };
         let model = scalar(-0.3, 0.2, 0.1);
-        let new = || Estimator::filter(&model, settings.clone(), exact()).unwrap();
+        let new = || {
+            Blueprint::filter(model.clone(), settings.clone(), exact())
+                .estimator()
+                .unwrap()
+        };
         let (mut whole, mut stopped, mut restored) = (new(), new(), new());
         for k in 0..12 {
             let (t, y) = (0.5 * f64::from(k), f64::from(k).sin());
@@ -302,7 +316,11 @@ fn smoothing_knows_nothing_of_updates_that_failed() {
             keep_history: true,
             ..FilterSettings::of(kind)
         };
-        let new = || Estimator::filter(&scalar(-0.3, 0.2, 0.1), settings.clone(), exact()).unwrap();
+        let new = || {
+            Blueprint::filter(scalar(-0.3, 0.2, 0.1), settings.clone(), exact())
+                .estimator()
+                .unwrap()
+        };
         let (mut whole, mut troubled) = (new(), new());
         for k in 0..8 {
             let (t, y) = (0.5 * f64::from(k), f64::from(k).sin());

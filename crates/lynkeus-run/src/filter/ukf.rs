@@ -2,14 +2,13 @@
 
 use super::belief::Belief;
 use super::profile::Profile;
-use super::root::{Factor, Root, dot, factor, substitute};
+use super::root::{Factor, Root, dot, substitute};
 use super::sensing::{Believed, Sensing};
 use super::settings::{SigmaPoints, Weights};
 use super::smoother::Correction;
 use super::transition::Propagation;
 use crate::runner::Sample;
-use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Error, Integrator, Method};
+use crate::{Integrator, Method, Result};
 
 /// Images of two points that differ by no more than this share of their size do not differ.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -17,7 +16,7 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// Sigma points under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Ukf {
-    integrator: Integrator,
+    pub integrator: Integrator,
     weights: Weights,
     points: Vec<f64>,
     mean: Vec<f64>,
@@ -32,7 +31,7 @@ pub(crate) struct Ukf {
 
 impl Ukf {
     /// Of n states.
-    pub fn new(n: usize, points: SigmaPoints, method: Method) -> Result<Self, Error> {
+    pub fn new(n: usize, points: SigmaPoints, method: Method) -> Result<Self> {
         Ok(Self {
             integrator: Integrator::new(method, n)?,
             weights: points.weights(n)?,
@@ -48,12 +47,7 @@ impl Ukf {
     }
 
     /// Points of the belief beside their mean, and what the sensors show of them.
-    fn show(
-        &mut self,
-        sensing: &mut Sensing,
-        belief: &Belief,
-        sample: &Sample<'_>,
-    ) -> Result<(), Error> {
+    fn show(&mut self, sensing: &mut Sensing, belief: &Belief, sample: &Sample<'_>) -> Result<()> {
         let weights = self.weights;
         let n = belief.x.len();
         draw(belief, weights.spread, &mut self.points);
@@ -80,7 +74,7 @@ impl Ukf {
             }
             variance[a * count + a] += one.variance;
         }
-        let lower = factor(&variance, count);
+        let lower = self.factor.of(&variance, count);
         let gain: Vec<Vec<f64>> = (0..n)
             .map(|s| {
                 let cross = taken.iter().map(|b| {
@@ -88,30 +82,24 @@ impl Ukf {
                     let shown = self.shown.iter().skip(b.sensor).step_by(m);
                     weights.sum(states.zip(shown))
                 });
-                solved(&lower, count, cross.collect())
+                solved(lower, count, cross.collect())
             })
             .collect();
         let column = |a: usize| gain.iter().map(|k| k[a]).collect();
         let unit = |a: usize| (0..count).map(|b| f64::from(u8::from(a == b))).collect();
+        let units = (0..count).map(unit);
         if let Some(corrections) = &mut sensing.corrections {
-            let slopes = taken
-                .iter()
-                .map(|b| weights.row(&belief.root, &self.shown, m, b.sensor));
+            let row = |b: &Believed| weights.row(&belief.root, &self.shown, m, b.sensor);
             corrections.push(Correction {
-                slopes: slopes.collect(),
+                slopes: taken.iter().map(row).collect(),
                 gains: (0..count).map(column).collect(),
-                information: (0..count)
-                    .flat_map(|a| solved(&lower, count, unit(a)))
-                    .collect(),
-                weighed: solved(&lower, count, taken.iter().map(|b| b.innovation).collect()),
+                information: units.flat_map(|unit| solved(lower, count, unit)).collect(),
+                weighed: solved(lower, count, taken.iter().map(|b| b.innovation).collect()),
             });
         }
         for (x, k) in belief.x.iter_mut().zip(&gain) {
-            *x += taken
-                .iter()
-                .zip(k)
-                .map(|(b, k)| k * b.innovation)
-                .sum::<f64>();
+            let parts = taken.iter().zip(k).map(|(b, k)| k * b.innovation);
+            *x += parts.sum::<f64>();
         }
         // P⁺ = Σ W (dx − K dz)(…)ᵀ + K R Kᵀ, which is P⁻ − K P_zz Kᵀ
         let mut dz = vec![0.0; count];
@@ -126,8 +114,8 @@ impl Ukf {
         }
         self.extra.clear();
         for (a, b) in taken.iter().enumerate() {
-            self.extra
-                .extend(gain.iter().map(|k| k[a] * b.variance.sqrt()));
+            let column = gain.iter().map(|k| k[a] * b.variance.sqrt());
+            self.extra.extend(column);
         }
         self.spread(&mut belief.root);
     }
@@ -135,37 +123,27 @@ impl Ukf {
     /// The lower root of Σ W d dᵀ + Σ e eᵀ over points and extra rows. Where the first weight is
     /// negative the sum is formed, and what it lacks of being definite taken as nothing.
     fn spread(&mut self, root: &mut Root) {
-        let n = root.n;
-        let Self {
-            weights,
-            points,
-            extra,
-            rows,
-            sums,
-            factor,
-            ..
-        } = self;
+        let (n, rows) = (root.n, &mut self.rows);
+        let points = self.points.chunks_exact(n).enumerate();
+        let points = points.map(|(k, d)| (self.weights.of(k), d));
         rows.clear();
-        if weights.centre >= 0.0 {
-            let weighed = points.chunks_exact(n).enumerate();
-            rows.extend(weighed.flat_map(|(k, d)| {
-                let weight = weights.of(k).sqrt();
-                d.iter().map(move |x| weight * x)
-            }));
-            rows.extend_from_slice(extra);
-            sums.resize(n, 0.0);
-            root.of_rows(rows, sums);
+        if self.weights.centre >= 0.0 {
+            for (weight, d) in points {
+                let weight = weight.sqrt();
+                rows.extend(d.iter().map(|x| weight * x));
+            }
+            rows.extend_from_slice(&self.extra);
+            self.sums.resize(n, 0.0);
+            root.of_rows(rows, &mut self.sums);
             return;
         }
         rows.resize(n * n, 0.0);
-        let points = points.chunks_exact(n).enumerate();
-        let points = points.map(|(k, d)| (weights.of(k), d));
-        for (w, d) in points.chain(extra.chunks_exact(n).map(|e| (1.0, e))) {
+        for (w, d) in points.chain(self.extra.chunks_exact(n).map(|e| (1.0, e))) {
             for (k, entry) in rows.iter_mut().enumerate() {
                 *entry += w * d[k / n] * d[k % n];
             }
         }
-        root.entries.copy_from_slice(factor.of(rows, n));
+        root.entries.copy_from_slice(self.factor.of(rows, n));
     }
 
     /// Each point through the flow; P⁻ = Σ W(…)(…)ᵀ + W, W what the process noise comes to along
@@ -180,7 +158,7 @@ impl Ukf {
         from: f64,
         to: f64,
         keep: bool,
-    ) -> Result<Option<Profile>, Error> {
+    ) -> Result<Option<Profile>> {
         let weights = self.weights;
         let n = belief.x.len();
         draw(belief, weights.spread, &mut self.points);
@@ -213,7 +191,7 @@ impl Ukf {
         sensing: &mut Sensing,
         belief: &mut Belief,
         sample: &Sample<'_>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         self.show(sensing, belief, sample)?;
         let m = sample.readings.len();
         let (mut inside, mut at_ends) = (vec![], vec![]);
@@ -277,9 +255,10 @@ impl Weights {
         mean.clear();
         mean.resize(size, 0.0);
         for (k, point) in points.chunks_exact(size.max(1)).enumerate() {
-            let weight = match k {
-                0 => self.mean_of_centre,
-                _ => self.other,
+            let weight = if k > 0 {
+                self.other
+            } else {
+                self.mean_of_centre
             };
             for (m, x) in mean.iter_mut().zip(point) {
                 *m += weight * x;
@@ -311,18 +290,11 @@ impl Weights {
             let (one, other) = (of(1 + k), of(1 + n + k));
             // what is left of a direction without variance is rounding, and would be divided by nothing
             let rounding = ROUNDING * one.abs().max(other.abs());
-            Some(one - other)
-                .filter(|d| d.abs() > rounding)
-                .unwrap_or(0.0)
+            let apart = one - other;
+            if apart.abs() > rounding { apart } else { 0.0 }
         });
         let halves: Vec<f64> = apart.map(|d| 0.5 * d / self.spread).collect();
         root.against(&halves)
-    }
-}
-
-impl Persist for Ukf {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        self.integrator.walk(walk)
     }
 }
 

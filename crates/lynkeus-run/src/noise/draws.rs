@@ -3,8 +3,6 @@
 //! What is held for δ is white only for what is slow beside δ: the variance of x' = −ax + w then comes
 //! out as tanh(aδ/2)/(aδ/2) of what it is. Draws are as dense as the linearised plant needs.
 
-use std::ops::ControlFlow;
-
 use nalgebra::DMatrix;
 
 use crate::jacobian::fastest;
@@ -57,21 +55,16 @@ pub fn process_draws(simulation: &Simulation) -> ProcessDraws {
     let states = simulation.plant.states();
     let density = |name: &String| simulation.noise.process.get(name).copied().unwrap_or(0.0);
     let densities: Vec<f64> = states.iter().map(density).collect();
+    let (mut per_sample, mut are_enough) = (1, true);
     if densities.iter().any(|q| *q > 0.0) && samples.is_finite() && sample > 0.0 {
         let most = (MOST / samples).max(1.0).log2().floor() as usize;
         let needed = halvings(simulation, &densities, [sample, samples], most + 1);
-        let halvings = needed.min(most);
-        let per_sample = 1 << halvings;
-        return ProcessDraws {
-            per_sample,
-            hold: sample / per_sample as f64,
-            are_enough: needed <= most,
-        };
+        (per_sample, are_enough) = (1 << needed.min(most), needed <= most);
     }
     ProcessDraws {
-        per_sample: 1,
-        hold: sample,
-        are_enough: true,
+        per_sample,
+        hold: sample / per_sample as f64,
+        are_enough,
     }
 }
 
@@ -91,11 +84,7 @@ fn halvings(
         output_step: time / PLACES as f64,
         ..simulation.clone()
     };
-    let watch = &mut |_| ControlFlow::Continue(());
-    let run = match quiet.run_watched(watch) {
-        Ok(run) => run,
-        Err(ended) => ended.partial,
-    };
+    let run = quiet.run().unwrap_or_else(|ended| ended.partial);
     let mut plant = simulation.plant.evaluation();
     let (n, inputs) = (plant.dimension(), plant.signals().len());
     let mut slopes = Slopes::default();
@@ -108,7 +97,7 @@ fn halvings(
         }
         plant.enter(t);
         if n > SMALL {
-            let rate = fastest(&mut plant, t, &x, &[]).radius;
+            let rate = fastest(&mut plant, t, &x, Some(&[])).radius;
             let fits = |j: &usize| rate * sample / 2.0_f64.powi(*j as i32) <= TURN;
             if rate.is_finite() {
                 needed = needed.max((0..most).find(fits).unwrap_or(most));
@@ -141,8 +130,13 @@ fn halvings_at(
     if !F.iter().all(|f| f.is_finite()) {
         return 0;
     }
-    let flow = LinearPlant::new(F, densities, sample, samples);
-    (0..most).find(|j| flow.fits(*j)).unwrap_or(most)
+    let Q = DMatrix::from_diagonal(&densities.to_vec().into());
+    let (steps, whole) = transitions(F, &Q, sample, samples);
+    let fits = |j: &usize| {
+        let steps = whole.checked_sub(*j).and_then(|first| steps.get(first..));
+        steps.is_none_or(|steps| may_hold(steps, &Q, sample / 2.0_f64.powi(*j as i32)))
+    };
+    (0..most).find(fits).unwrap_or(most)
 }
 
 /// Where noise of density q on state i takes a plant within some time, as far as its own slope there lets it: s² = q/2|F|.
@@ -203,77 +197,55 @@ impl Transition {
 
     /// Over twice the time.
     fn doubled(&self) -> Self {
-        let Self {
-            transition,
-            integral,
-            noise,
-        } = self;
+        let flow = &self.transition;
         Self {
-            transition: transition * transition,
-            integral: integral + transition * integral,
-            noise: noise + transition * noise * transition.transpose(),
+            transition: flow * flow,
+            integral: &self.integral + flow * &self.integral,
+            noise: &self.noise + flow * &self.noise * flow.transpose(),
         }
     }
 }
 
 /// A linear plant x' = Fx + w over 1/2^k of a sampling interval, then over the interval, then over more
-/// and more of them.
-struct LinearPlant {
-    Q: DMatrix<f64>,
-    /// the shortest first
-    steps: Vec<Transition>,
-    /// which of them is the interval, and its length
-    sample: usize,
+/// and more of them; and which of these is the interval.
+fn transitions(
+    F: &DMatrix<f64>,
+    Q: &DMatrix<f64>,
     interval: f64,
+    samples: f64,
+) -> (Vec<Transition>, usize) {
+    let turn = (F.norm() * interval).max(f64::MIN_POSITIVE);
+    let halvings = (turn / 0.125).log2().ceil().clamp(0.0, DOUBLINGS as f64) as usize;
+    let h = interval / 2.0_f64.powi(halvings as i32);
+    let all = halvings + (samples.log2().ceil() as usize).min(DOUBLINGS);
+    let (mut steps, mut next) = (vec![], Transition::short(F, Q, h));
+    for count in 0..=all {
+        let size = next.noise.norm() + next.transition.norm();
+        if count > halvings && (size.is_nan() || size >= 1e150) {
+            break;
+        }
+        let twice = next.doubled();
+        steps.push(std::mem::replace(&mut next, twice));
+    }
+    (steps, halvings)
 }
 
-impl LinearPlant {
-    fn new(F: &DMatrix<f64>, densities: &[f64], interval: f64, samples: f64) -> Self {
-        let Q = DMatrix::from_diagonal(&densities.to_vec().into());
-        let turn = (F.norm() * interval).max(f64::MIN_POSITIVE);
-        let halvings = (turn / 0.125).log2().ceil().clamp(0.0, DOUBLINGS as f64) as usize;
-        let h = interval / 2.0_f64.powi(halvings as i32);
-        let mut steps = vec![Transition::short(F, &Q, h)];
-        let all = halvings + (samples.log2().ceil() as usize).min(DOUBLINGS);
-        while steps.len() <= all {
-            let Some(next) = steps.last().map(Transition::doubled) else {
-                break;
-            };
-            let size = next.noise.norm() + next.transition.norm();
-            if steps.len() > halvings && (size.is_nan() || size >= 1e150) {
-                break;
-            }
-            steps.push(next);
-        }
-        Self {
-            Q,
-            steps,
-            sample: halvings,
-            interval,
-        }
+/// Whether noise that is held for the first of these steps makes the variances of the states that white
+/// noise makes, at the end.
+fn may_hold(steps: &[Transition], Q: &DMatrix<f64>, hold: f64) -> bool {
+    let [.., last] = steps else {
+        return true;
+    };
+    let mut held = &steps[0].integral * Q * steps[0].integral.transpose() / hold;
+    for step in &steps[..steps.len() - 1] {
+        held += &step.transition * &held * step.transition.transpose();
     }
-
-    /// Whether noise that is held for 1/2^j of an interval makes the variances of the states that
-    /// white noise makes, at the end.
-    fn fits(&self, j: usize) -> bool {
-        let Some(first) = self.sample.checked_sub(j) else {
-            return true;
-        };
-        let (Some(step), Some(last)) = (self.steps.get(first), self.steps.last()) else {
-            return true;
-        };
-        let hold = self.interval / 2.0_f64.powi(j as i32);
-        let mut held = &step.integral * &self.Q * step.integral.transpose() / hold;
-        for step in &self.steps[first..self.steps.len() - 1] {
-            held += &step.transition * &held * step.transition.transpose();
-        }
-        (0..held.nrows()).all(|i| {
-            let white = last.noise[(i, i)];
-            let off = (held[(i, i)] - white).abs();
-            // what is no number tells nothing
-            off.is_nan() || white.is_nan() || off <= OFF * white.abs()
-        })
-    }
+    (0..held.nrows()).all(|i| {
+        let white = last.noise[(i, i)];
+        let off = (held[(i, i)] - white).abs();
+        // what is no number tells nothing
+        off.is_nan() || white.is_nan() || off <= OFF * white.abs()
+    })
 }
 
 #[cfg(test)]

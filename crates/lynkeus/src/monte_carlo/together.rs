@@ -152,7 +152,7 @@ impl Together<'_> {
         let mut rows = 1;
         loop {
             let begun = Instant::now();
-            let goes_on = batch.advance_watched(rows, crew::threads(), &is_over);
+            let goes_on = batch.advance(rows, crew::threads(), &is_over);
             if !goes_on.map_err(|error| self.told(error))? {
                 return Ok(());
             }

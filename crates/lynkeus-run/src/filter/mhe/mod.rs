@@ -22,10 +22,10 @@ use super::root::dot;
 use super::sensing::{Believed, Sensing};
 use super::smoother::{History, Step};
 use super::transition::{Propagation, Stage};
-use crate::Error;
 use crate::noise::Limits;
 use crate::runner::Sample;
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::{Error, Result};
 use quadratic::{Linear, Pass, Pin, Problem, Seen, Solution, carried, corrected};
 
 /// Most Gauss–Newton steps per sample,
@@ -61,16 +61,14 @@ impl Persist for Mhe {
         let count = walk.length(self.rows.len())?;
         self.rows.resize_with(count, Row::default);
         for row in &mut self.rows {
-            // a row that was not there yet has no room
-            row.make_room(self.inputs, states);
-            row.walk(walk, self.sensors)?;
+            row.walk(walk, [self.inputs, states, self.sensors])?;
         }
         Ok(())
     }
 }
 
 impl Mhe {
-    pub fn new(model: &NoisyModel, length: usize, keep: bool) -> Result<Self, Error> {
+    pub fn new(model: &NoisyModel, length: usize, keep: bool) -> Result<Self> {
         if length == 0 {
             return Err(Error::setting("horizon", "at least 1 sample", 0));
         }
@@ -115,14 +113,8 @@ impl Mhe {
     /// The first row leaves. What is known before the second are the states as the window has
     /// them. A bound that was met there told where the state is, and not that it will never leave.
     fn shorten(&mut self, solved: GaussNewtonStep) {
-        let GaussNewtonStep {
-            solution,
-            rows,
-            free,
-            ..
-        } = solved;
-        let passes = solution.passes.unwrap_or(free);
-        let (mut passes, mut rows) = (passes.into_iter(), rows.into_iter().skip(1));
+        let passes = solved.solution.passes.unwrap_or(solved.free);
+        let (mut passes, mut rows) = (passes.into_iter(), solved.rows.into_iter().skip(1));
         let (Some(first), Some(second), Some(linear)) = (passes.next(), passes.next(), rows.next())
         else {
             return;
@@ -153,7 +145,7 @@ impl Mhe {
         &mut self,
         propagation: &mut Propagation,
         sensing: &mut Sensing,
-    ) -> Result<GaussNewtonStep, Error> {
+    ) -> Result<GaussNewtonStep> {
         let mut share = 1.0;
         let mut best: Option<GaussNewtonStep> = None;
         for _ in 0..STEPS {
@@ -191,7 +183,7 @@ impl Mhe {
         &self,
         propagation: &mut Propagation,
         sensing: &mut Sensing,
-    ) -> Result<GaussNewtonStep, Error> {
+    ) -> Result<GaussNewtonStep> {
         let met = self.rows.iter().map(|row| row.met.clone()).collect();
         let problem = self.linearise(propagation, sensing)?;
         let solution = problem.solve(met);
@@ -218,10 +210,9 @@ impl Mhe {
         for ((row, from), (x, met)) in all.zip(tried.solution.x.iter().zip(&tried.solution.met)) {
             for (guess, (from, to)) in row.guess.iter_mut().zip(from.iter().zip(x)) {
                 // all of it without rounding
-                *guess = if share < 1.0 {
-                    from + share * (to - from)
-                } else {
-                    *to
+                *guess = match share < 1.0 {
+                    true => from + share * (to - from),
+                    false => *to,
                 };
             }
             confine(&mut row.guess, &self.bounds);
@@ -247,7 +238,7 @@ impl Mhe {
         &self,
         propagation: &mut Propagation,
         sensing: &mut Sensing,
-    ) -> Result<Problem<'_>, Error> {
+    ) -> Result<Problem<'_>> {
         let count = self.rows.len();
         let mut rows: Vec<Linear> = Vec::with_capacity(count);
         let mut free: Vec<Pass> = Vec::with_capacity(count);
@@ -279,7 +270,7 @@ impl Mhe {
         sensing: &mut Sensing,
         belief: &mut Belief,
         sample: &Sample<'_>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         (self.window, self.left) = (vec![], None);
         let mut taken = vec![];
         sensing.judge_all(belief, sample, &mut taken)?;
@@ -315,12 +306,7 @@ impl Mhe {
 }
 
 /// The way between two rows, about the guess at the first.
-fn between(
-    propagation: &mut Propagation,
-    from: &Row,
-    to: &Row,
-    last: &Pass,
-) -> Result<Stage, Error> {
+fn between(propagation: &mut Propagation, from: &Row, to: &Row, last: &Pass) -> Result<Stage> {
     propagation.driven.start(&from.inputs);
     propagation.driven.aim(from.t, to.t, &to.inputs);
     let about = Belief {
@@ -365,15 +351,15 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    /// Of so many inputs and states, for a walk over it.
-    pub fn make_room(&mut self, inputs: usize, states: usize) {
+    /// Of a plant with so many inputs, states and sensors.
+    pub fn walk(
+        &mut self,
+        walk: &mut Walk<'_>,
+        [inputs, states, sensors]: [usize; 3],
+    ) -> Result<(), Damaged> {
+        // a row that was not there yet has no room
         self.inputs.resize(inputs, 0.0);
         self.guess.resize(states, 0.0);
-    }
-
-    /// Of a plant with so many sensors.
-    pub fn walk(&mut self, walk: &mut Walk<'_>, sensors: usize) -> Result<(), Damaged> {
-        let states = self.guess.len();
         walk.number(&mut self.t)?;
         walk.numbers(&mut self.inputs)?;
         walk.numbers(&mut self.guess)?;
@@ -398,7 +384,7 @@ impl Row {
 }
 
 /// The readings of a row, h linearised at its guess.
-pub(crate) fn seen(sensing: &mut Sensing, row: &Row) -> Result<Vec<Seen>, Error> {
+pub(crate) fn seen(sensing: &mut Sensing, row: &Row) -> Result<Vec<Seen>> {
     let map = &mut sensing.output_map;
     let h = map.linearise(row.t, &row.guess, &row.inputs)?.to_vec();
     let seen = |believed: &Believed| {

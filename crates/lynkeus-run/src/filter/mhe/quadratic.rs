@@ -97,12 +97,8 @@ impl Problem<'_> {
         let mut passes: Vec<Pass> = vec![];
         for ((linear, free), pins) in self.rows.iter().zip(&self.free).zip(pins) {
             let before = carried(linear.stage.as_ref(), self.prior, passes.last());
-            passes.push(corrected(
-                &linear.seen,
-                Some(&free.before.root),
-                pins,
-                before,
-            ));
+            let free = Some(&free.before.root);
+            passes.push(corrected(&linear.seen, free, pins, before));
         }
         passes
     }
@@ -173,10 +169,10 @@ impl Problem<'_> {
             let towards = self.step(&x, &sides, |_| 0.0);
             sides.iter_mut().for_each(|s| s.aim(&x, &towards, 0.0));
             let share = longest(&sides);
-            let left = sides
-                .iter()
-                .map(|s| (s.room + share * s.room_change) * (s.force + share * s.force_change));
-            let centre = (left.sum::<f64>() / gap).clamp(0.0, 1.0).powi(3) * gap / count;
+            let left =
+                |s: &Side| (s.room + share * s.room_change) * (s.force + share * s.force_change);
+            let left: f64 = sides.iter().map(left).sum();
+            let centre = (left / gap).clamp(0.0, 1.0).powi(3) * gap / count;
             let product = |s: &Side| centre - s.room_change * s.force_change;
             let towards = self.step(&x, &sides, product);
             for side in &mut sides {
@@ -254,16 +250,12 @@ impl Problem<'_> {
         product: impl Fn(&Side) -> f64,
     ) -> Vec<Vec<f64>> {
         let mut all = self.single();
-        let mut k = 0;
-        while let Some(first) = sides.get(k) {
-            // both sides of a state draw at it together
-            let mine = sides[k..].iter().take(2);
-            let mine = mine.take_while(|s| (s.row, s.state) == (first.row, first.state));
-            let (mut pull, mut weight) = (0.0, 0.0);
+        // both sides of a state draw at it together
+        for mine in sides.chunk_by(|a, b| (a.row, a.state) == (b.row, b.state)) {
+            let (mut pull, mut weight, first) = (0.0, 0.0, &mine[0]);
             for side in mine {
                 weight += side.force / side.room;
                 pull += side.sign * product(side) / side.room;
-                k += 1;
             }
             all[first.row].push(Pin {
                 state: first.state,

@@ -6,7 +6,7 @@ use lynkeus_expr::Graph;
 
 use crate::filter::tests::{exact, scalar};
 use crate::filter::{FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor};
-use crate::{Estimator, Level};
+use crate::{Blueprint, Estimator, Level};
 
 /// A level that cannot be below zero, read as −1 again and again: the estimate stays at zero
 /// where the filter goes below, and leaves it when the readings do.
@@ -20,9 +20,16 @@ fn the_moving_horizon_keeps_to_the_bounds() {
         ..scalar(0.0, 0.05, 0.1)
     };
     let settings = FilterSettings::of(FilterKind::MovingHorizon(5));
-    let mut horizon = Estimator::filter(&model, settings, exact()).unwrap();
-    let mut filter =
-        Estimator::filter(&model, FilterSettings::of(FilterKind::Extended), exact()).unwrap();
+    let mut horizon = Blueprint::filter(model.clone(), settings, exact())
+        .estimator()
+        .unwrap();
+    let mut filter = Blueprint::filter(
+        model.clone(),
+        FilterSettings::of(FilterKind::Extended),
+        exact(),
+    )
+    .estimator()
+    .unwrap();
     for k in 0..60 {
         let y = if k < 40 { -1.0 } else { 2.0 };
         let x = horizon.push(f64::from(k), &[y]).unwrap()[0];
@@ -61,7 +68,9 @@ fn bounded_cart(ranges: [(f64, f64); 2]) -> Estimator {
         confined: None,
     });
     let settings = FilterSettings::of(FilterKind::MovingHorizon(20));
-    Estimator::filter(&model.unwrap(), settings, exact()).unwrap()
+    Blueprint::filter(model.unwrap(), settings, exact())
+        .estimator()
+        .unwrap()
 }
 
 /// The whole log in the window: the last row of the
@@ -122,7 +131,9 @@ fn a_window_looks_back_as_the_smoother_does() {
             keep_history: true,
             ..FilterSettings::of(kind)
         };
-        let mut filter = Estimator::filter(&scalar(-0.3, 0.2, 0.1), settings, exact()).unwrap();
+        let mut filter = Blueprint::filter(scalar(-0.3, 0.2, 0.1), settings, exact())
+            .estimator()
+            .unwrap();
         for k in 0..15 {
             let y = if k % 4 == 2 {
                 f64::NAN
@@ -165,9 +176,16 @@ fn a_bound_says_where_and_not_how_sure() {
         }],
         ..scalar(-0.1, 1e-3, 0.04)
     };
-    let mut filter = Estimator::filter(&model, settings, exact()).unwrap();
-    let mut free =
-        Estimator::filter(&model, FilterSettings::of(FilterKind::Extended), exact()).unwrap();
+    let mut filter = Blueprint::filter(model.clone(), settings, exact())
+        .estimator()
+        .unwrap();
+    let mut free = Blueprint::filter(
+        model.clone(),
+        FilterSettings::of(FilterKind::Extended),
+        exact(),
+    )
+    .estimator()
+    .unwrap();
     for k in 0..8 {
         for estimator in [&mut filter, &mut free] {
             estimator.push(0.5 * f64::from(k), &[-0.5]).unwrap();

@@ -5,13 +5,12 @@ use std::sync::Arc;
 use super::series::Transition;
 use crate::Evaluation;
 use crate::filter::profile::Profile;
-use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place, Slopes};
+use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place, Result, Slopes};
 
 /// x̂, Φ and W by one integration, for flows with few states.
 #[derive(Clone, Debug)]
 pub(crate) struct Joint {
-    integrator: Integrator,
+    pub integrator: Integrator,
     equation: Equation,
     /// q, the largest entry of Q
     scale: f64,
@@ -20,7 +19,7 @@ pub(crate) struct Joint {
 }
 
 impl Joint {
-    pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self, Error> {
+    pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self> {
         let scale = process_noise.iter().fold(0.0_f64, |m, q| m.max(*q));
         let noise = match scale > 0.0 {
             true => process_noise.iter().map(|q| q / scale).collect(),
@@ -43,7 +42,7 @@ impl Joint {
         to: f64,
         x: &mut [f64],
         transition: &mut Transition<Profile>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let equation = &mut self.equation;
         let (n, width) = (equation.n, equation.width);
         self.z.clear();
@@ -63,12 +62,6 @@ impl Joint {
             noise.fill(columns(n, self.scale));
         }
         Ok(())
-    }
-}
-
-impl Persist for Joint {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        self.integrator.walk(walk)
     }
 }
 
@@ -119,28 +112,21 @@ impl Dynamics for Variational<'_> {
     }
 
     fn derivatives(&mut self, t: f64, z: &[f64], dz: &mut [f64]) {
-        let Equation {
-            n,
-            width,
-            entries,
-            slopes,
-            noise,
-            ..
-        } = &mut *self.equation;
-        let (n, width) = (*n, *width);
+        let equation = &mut *self.equation;
+        let (n, width, slopes) = (equation.n, equation.width, &mut equation.slopes);
         let (x, rows) = z.split_at(n);
         let (dx, drows) = dz.split_at_mut(n);
         self.driven.derivatives(t, x, dx);
         self.driven.outputs(t, x, slopes);
         drows.fill(0.0);
-        for (&(i, j), slope) in entries.iter().zip(&*slopes) {
+        for (&(i, j), slope) in equation.entries.iter().zip(&*slopes) {
             let into = &mut drows[i * width..(i + 1) * width];
             for (into, from) in into.iter_mut().zip(&rows[j * width..(j + 1) * width]) {
                 *into += slope * from;
             }
         }
         // FW is there; its transpose and Q/q are added
-        for (i, q) in noise.iter().enumerate() {
+        for (i, q) in equation.noise.iter().enumerate() {
             for j in 0..i {
                 let (a, b) = (i * width + n + j, j * width + n + i);
                 let sum = drows[a] + drows[b];

@@ -12,7 +12,7 @@ use super::profile::Profile;
 use super::root::{Factor, Root, dot};
 use crate::Evaluation;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Error, EstimatorSettings, Linearised, Method, Step};
+use crate::{EstimatorSettings, Linearised, Method, Result, Step};
 use joint::Joint;
 use piecewise::Piecewise;
 use series::Transition;
@@ -45,11 +45,7 @@ enum Scheme {
 
 impl Propagation {
     /// Of a flow with F, and the densities of the noise on its states.
-    pub fn new(
-        flow: &Linearised,
-        process_noise: &[f64],
-        run: EstimatorSettings,
-    ) -> Result<Self, Error> {
+    pub fn new(flow: &Linearised, process_noise: &[f64], run: EstimatorSettings) -> Result<Self> {
         let method = run.method;
         let n = flow.system().states().len();
         let is_given = matches!(method, Method::Rk4(Step::AtMost(_) | Step::Substeps(_)));
@@ -69,7 +65,7 @@ impl Propagation {
     }
 
     /// The way to the next sample from the belief's estimate, which stays.
-    pub fn advance(&mut self, belief: &Belief, from: f64, to: f64) -> Result<(), Error> {
+    pub fn advance(&mut self, belief: &Belief, from: f64, to: f64) -> Result<()> {
         let (driven, x) = (&mut self.driven, &mut self.end);
         x.clone_from(&belief.x);
         match &mut self.scheme {
@@ -82,7 +78,7 @@ impl Propagation {
     }
 
     /// x̂⁻ and P⁻ = ΦPΦᵀ + W at the next sample. A flow that fails leaves the belief as it was.
-    pub fn predict(&mut self, belief: &mut Belief, from: f64, to: f64) -> Result<(), Error> {
+    pub fn predict(&mut self, belief: &mut Belief, from: f64, to: f64) -> Result<()> {
         self.advance(belief, from, to)?;
         belief.x.clone_from(&self.end);
         self.carry(&mut belief.root);
@@ -100,7 +96,7 @@ impl Propagation {
 
     /// The way from a state, without carrying a belief along it; the root chooses units where there
     /// are many states.
-    pub fn stage(&mut self, about: Belief, from: f64, to: f64) -> Result<Stage, Error> {
+    pub fn stage(&mut self, about: Belief, from: f64, to: f64) -> Result<Stage> {
         self.advance(&about, from, to)?;
         let mut noise = vec![];
         self.push_root(&mut noise);
@@ -144,7 +140,7 @@ impl Persist for Propagation {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.driven.walk(walk)?;
         match &mut self.scheme {
-            Scheme::Joint(joint) => joint.walk(walk),
+            Scheme::Joint(joint) => joint.integrator.walk(walk),
             Scheme::Piecewise(variation) => variation.walk(walk),
         }
     }
@@ -183,14 +179,9 @@ impl Stage {
         let off: Vec<f64> = pairs.map(|(x, a)| x - a).collect();
         let moved = self.end.iter().zip(self.transition.rows());
         let x = moved.map(|(x, (first, row))| x + dot(row, &off[first..]));
-        let mut root = after.root.clone();
+        let (mut root, mut rows) = (after.root.clone(), self.noise.clone());
         let mut sums = vec![0.0; off.len()];
-        carry(
-            &self.transition,
-            &mut root,
-            &mut self.noise.clone(),
-            &mut sums,
-        );
+        carry(&self.transition, &mut root, &mut rows, &mut sums);
         Belief {
             x: x.collect(),
             root,

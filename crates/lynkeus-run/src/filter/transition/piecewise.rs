@@ -12,9 +12,11 @@ use super::series::{Series, Transition, largest_row};
 use crate::Evaluation;
 use crate::filter::belief::Belief;
 use crate::filter::profile::{Entry, Profile};
-use crate::method::resolution;
+use crate::filter::root::largest;
+use crate::integrator::pieces;
+use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place};
+use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place, Result};
 
 /// Tolerance with fixed steps, whose error nobody states.
 const FIXED: f64 = 1e-8;
@@ -24,6 +26,9 @@ const MOST_SERIES: f64 = 64.0;
 
 /// and so is one over which the rates (row sums of F) come to more than this.
 const MOST_RATES: f64 = 200.0;
+
+/// A segment takes more than this share of the time: pieces of it have to be resolved, too.
+const APART: f64 = 256.0 * f64::EPSILON;
 
 /// How much longer the next piece may be.
 const GROWTH: f64 = 1.25;
@@ -37,14 +42,15 @@ pub(crate) struct Piecewise {
     entries: Vec<(usize, usize)>,
     process_noise: Vec<f64>,
     tolerance: f64,
-    lobatto: Lobatto,
+    /// interpolation through Lobatto's three nodes, and through five
+    coarse: Vectors,
+    fine: Vectors,
     series: Series,
     /// the length of the last pieces
     step: f64,
     /// units of the states
     units: Vec<f64>,
     slopes: Vec<f64>,
-    derivatives: Vec<f64>,
 }
 
 /// A piece of an interval.
@@ -55,6 +61,10 @@ struct Piece {
 }
 
 impl Piece {
+    fn new(from: f64, to: f64) -> Self {
+        Self { from, to }
+    }
+
     fn length(self) -> f64 {
         self.to - self.from
     }
@@ -65,7 +75,7 @@ impl Piece {
 }
 
 impl Piecewise {
-    pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self, Error> {
+    pub fn new(flow: &Linearised, process_noise: &[f64], method: Method) -> Result<Self> {
         let n = flow.system().states().len();
         let tolerance = match method {
             Method::Adaptive(t) | Method::Explicit(t) | Method::Stiff(t) => t.relative,
@@ -75,18 +85,17 @@ impl Piecewise {
         Ok(Self {
             integrator: Integrator::new(method, n)?,
             entries: flow.jacobians().state.places().to_vec(),
-            process_noise: if noisy {
-                process_noise.to_vec()
-            } else {
-                vec![]
+            process_noise: match noisy {
+                true => process_noise.to_vec(),
+                false => vec![],
             },
             tolerance,
-            lobatto: Lobatto::new(),
+            coarse: basis(&[FINE[0], FINE[2], FINE[4]]),
+            fine: basis(&FINE),
             series: Series::default(),
             step: f64::INFINITY,
             units: vec![],
             slopes: vec![0.0; flow.system().outputs().len()],
-            derivatives: vec![0.0; n],
         })
     }
 
@@ -98,29 +107,18 @@ impl Piecewise {
         from: f64,
         to: f64,
         x: &mut Vec<f64>,
-    ) -> Result<Transition<Profile>, Error> {
+    ) -> Result<Transition<Profile>> {
         let n = x.len();
         let mut stops = vec![];
         driven.instants(from, to, &mut stops)?;
-        stops.sort_unstable_by(f64::total_cmp);
-        stops.push(to);
         let mut transition = Transition::start(n, !self.process_noise.is_empty());
-        let mut start = from;
-        for end in stops {
-            // two detectors may find one switch, a rounding error apart
-            if end - start <= 16.0 * resolution(end) && end < to {
-                continue;
-            }
-            let segment = Piece {
-                from: start,
-                to: end,
-            };
+        for (start, end) in pieces(from, to, &mut stops, APART) {
+            let segment = Piece::new(start, end);
             driven.enter(segment.at(0.5));
             if start == from {
                 self.choose_units(driven, belief, segment, x)?;
             }
             self.segment(driven, segment, x, &mut transition)?;
-            start = end;
         }
         let units = &self.units;
         transition.matrix.scale(|i| units[i], |j| 1.0 / units[j]);
@@ -137,7 +135,7 @@ impl Piecewise {
         belief: &Belief,
         interval: Piece,
         x: &[f64],
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let n = x.len();
         self.units.clear();
         self.units.extend((0..n).map(|i| belief.root.deviation(i)));
@@ -159,23 +157,16 @@ impl Piecewise {
     }
 
     /// F at (t, x), the values of its entries.
-    fn look(&mut self, driven: &mut Evaluation, t: f64, x: &[f64]) -> Result<(), Error> {
-        driven.derivatives(t, x, &mut self.derivatives);
+    fn look(&mut self, driven: &mut Evaluation, t: f64, x: &[f64]) -> Result<()> {
         driven.outputs(t, x, &mut self.slopes);
-        match self.slopes.iter().all(|s| s.is_finite()) {
+        match are_finite(&self.slopes) {
             true => Ok(()),
             false => Err(driven.not_finite(t, x)),
         }
     }
 
     /// F·h at (t, x) in the states' units.
-    fn scaled(
-        &mut self,
-        driven: &mut Evaluation,
-        t: f64,
-        x: &[f64],
-        h: f64,
-    ) -> Result<Vec<f64>, Error> {
+    fn scaled(&mut self, driven: &mut Evaluation, t: f64, x: &[f64], h: f64) -> Result<Vec<f64>> {
         self.look(driven, t, x)?;
         let pairs = self.entries.iter().zip(&self.slopes);
         let scaled = pairs.map(|(&(i, j), s)| s * h * self.units[j] / self.units[i]);
@@ -199,7 +190,7 @@ impl Piecewise {
         segment: Piece,
         x: &mut Vec<f64>,
         transition: &mut Transition<Profile>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         if self.rates(driven, segment, x)? > MOST_RATES {
             return self.stiff(driven, segment, x, transition);
         }
@@ -211,17 +202,14 @@ impl Piecewise {
                 step if step > 0.5 * left => t + 0.5 * left,
                 step => t + step,
             };
-            let piece = Piece { from: t, to };
+            let piece = Piece::new(t, to);
             let mut end = vec![];
             let polynomial = self.polynomial(driven, piece, x, &mut end)?;
-            let n = x.len();
+            let (n, within) = (x.len(), 0.1 * self.tolerance);
             let drive = self.drive(piece.length());
             let shortest = piece.length() <= 256.0 * resolution(to);
-            if let Some(polynomial) = &polynomial
-                && self
-                    .series
-                    .advance(polynomial, &drive, transition, n, 0.1 * self.tolerance)
-            {
+            let mut advance = |p: &Vec<_>| self.series.advance(p, &drive, transition, n, within);
+            if polynomial.as_ref().is_some_and(&mut advance) {
                 *x = end;
                 t = to;
                 self.step = self.step.max(piece.length()) * GROWTH;
@@ -229,11 +217,8 @@ impl Piecewise {
             }
             let stiff = polynomial.is_some() && piece.length() * MOST_SERIES < segment.length();
             if stiff || shortest {
-                let rest = Piece {
-                    from: t,
-                    to: segment.to,
-                };
                 self.step = f64::INFINITY;
+                let rest = Piece::new(t, segment.to);
                 return self.stiff(driven, rest, x, transition);
             }
             self.step = 0.5 * piece.length();
@@ -242,7 +227,7 @@ impl Piecewise {
     }
 
     /// The largest row sum of F at the start of a segment, times its length.
-    fn rates(&mut self, driven: &mut Evaluation, segment: Piece, x: &[f64]) -> Result<f64, Error> {
+    fn rates(&mut self, driven: &mut Evaluation, segment: Piece, x: &[f64]) -> Result<f64> {
         let values = self.scaled(driven, segment.from, x, segment.length())?;
         Ok(largest_row(x.len(), &self.sparse(&values)))
     }
@@ -277,7 +262,7 @@ impl Piecewise {
         end.extend_from_slice(&middle);
         self.integrator.advance(driven, half, piece.to, end)?;
         values.push(self.scaled(driven, piece.to, end, h)?);
-        let coarse = self.lobatto.coarse(&values, self.tolerance);
+        let coarse = coarse(&self.coarse, &values, self.tolerance);
         let within = self.tolerance / ODD;
         let mut fit = coarse.filter(|fit| meets(fit, FINE[1], &inside, within));
         if fit.is_none() {
@@ -285,7 +270,7 @@ impl Piecewise {
             let node = piece.at(FINE[3]);
             self.integrator.advance(driven, half, node, &mut middle)?;
             values.insert(3, self.scaled(driven, node, &middle, h)?);
-            fit = self.lobatto.fine(&values, self.tolerance);
+            fit = fine(&self.fine, &values, self.tolerance);
         }
         Ok(fit.map(|fit| fit.iter().map(|c| self.sparse(c)).collect()))
     }
@@ -321,13 +306,12 @@ impl Piecewise {
         piece: Piece,
         x: &mut Vec<f64>,
         transition: &mut Transition<Profile>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let n = x.len();
         let whole = self.leaf(driven, piece, x)?;
         let result = self.refined(driven, piece, x, whole, MOST_HALVINGS)?;
-        *transition = Transition::dense(transition, n)
-            .then(&result.result)
-            .into_profiles(n);
+        let before = Transition::dense(transition, n);
+        *transition = before.then(&result.result).into_profiles(n);
         *x = result.end;
         Ok(())
     }
@@ -340,34 +324,26 @@ impl Piecewise {
         x: &[f64],
         coarse: Leaf,
         halvings: usize,
-    ) -> Result<Leaf, Error> {
+    ) -> Result<Leaf> {
         if !coarse.varies || halvings == 0 || piece.length() <= 512.0 * resolution(piece.to) {
             return Ok(coarse);
         }
         let half = piece.at(0.5);
-        let (left, right) = (
-            Piece { to: half, ..piece },
-            Piece {
-                from: half,
-                ..piece
-            },
-        );
+        let (left, right) = (Piece::new(piece.from, half), Piece::new(half, piece.to));
         let first = self.leaf(driven, left, x)?;
         let second = self.leaf(driven, right, &first.end)?;
         let both = first.result.then(&second.result);
         // of a method of order 2, what is better is a quarter as wrong
         let error = both.distance(&coarse.result) / 3.0;
-        let (first, second) = if error <= self.tolerance.max(STIFF) {
-            (first, second)
-        } else {
-            let first = self.refined(driven, left, x, first, halvings - 1)?;
-            let second = self.leaf(driven, right, &first.end)?;
-            let middle = first.end.clone();
-            (
-                first,
-                self.refined(driven, right, &middle, second, halvings - 1)?,
-            )
-        };
+        if error <= self.tolerance.max(STIFF) {
+            return Ok(Leaf {
+                result: both,
+                ..second
+            });
+        }
+        let first = self.refined(driven, left, x, first, halvings - 1)?;
+        let second = self.leaf(driven, right, &first.end)?;
+        let second = self.refined(driven, right, &first.end, second, halvings - 1)?;
         Ok(Leaf {
             result: first.result.then(&second.result),
             varies: true,
@@ -376,7 +352,7 @@ impl Piecewise {
     }
 
     /// A piece with F as it is there on average (Simpson's rule).
-    fn leaf(&mut self, driven: &mut Evaluation, piece: Piece, x: &[f64]) -> Result<Leaf, Error> {
+    fn leaf(&mut self, driven: &mut Evaluation, piece: Piece, x: &[f64]) -> Result<Leaf> {
         let h = piece.length();
         let half = piece.at(0.5);
         let first = self.scaled(driven, piece.from, x, h)?;
@@ -387,13 +363,11 @@ impl Piecewise {
         let mut end = middle.clone();
         self.integrator.advance(driven, half, piece.to, &mut end)?;
         let last = self.scaled(driven, piece.to, &end, h)?;
-        let three = first.iter().zip(&between).zip(&last);
-        let mean = three.map(|((a, b), c)| (a + 4.0 * b + c) / 6.0);
+        let three = || first.iter().zip(&between).zip(&last);
+        let mean = three().map(|((a, b), c)| (a + 4.0 * b + c) / 6.0);
         let mean = self.sparse(&mean.collect::<Vec<f64>>());
-        let ends = first.iter().zip(&between).zip(&last);
-        let varies = ends
-            .map(|((a, b), c)| (a - b).abs().max((a - c).abs()) / a.abs().max(1.0))
-            .any(|change| change > STIFF);
+        let change = |a: f64, b: f64, c: f64| (a - b).abs().max((a - c).abs()) / a.abs().max(1.0);
+        let varies = three().any(|((a, b), c)| change(*a, *b, *c) > STIFF);
         let drive = self.drive(h);
         let result = Transition::constant(x.len(), &mean, &drive, &mut self.series);
         let result = result.ok_or_else(|| driven.not_finite(piece.from, x))?;
@@ -421,43 +395,29 @@ const ODD: f64 = 0.1;
 /// What rounding makes of a value of a polynomial, as a share of it.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
-/// Interpolation of a vector that is known at the nodes.
-#[derive(Clone, Debug)]
-struct Lobatto {
-    /// coefficients of the polynomials that are 1 at one of the nodes and 0 at the others
-    coarse: Vec<Vec<f64>>,
-    fine: Vec<Vec<f64>>,
+/// Vectors, one for each node or for each power.
+type Vectors = Vec<Vec<f64>>;
+
+/// Coefficients of 1, s, s² through three nodes, from their basis and the values there; none where more
+/// nodes are needed for an error of `tolerance`. Legendre's coefficients tell, which of a smooth function
+/// fall geometrically; of one that is odd about the middle there is none of s² to tell by, so that
+/// what is found has to [meet](meets) the function elsewhere, too.
+fn coarse(basis: &Vectors, values: &Vectors, tolerance: f64) -> Option<Vectors> {
+    let fit = combined(basis, values);
+    let last = largest(fit[2].iter().map(|c| c / 6.0));
+    let before = largest(fit[1].iter().zip(&fit[2]).map(|(b, c)| 0.5 * (b + c)));
+    accepted(fit, &[beyond(before, last)], tolerance)
 }
 
-impl Lobatto {
-    pub fn new() -> Self {
-        Self {
-            coarse: basis(&[FINE[0], FINE[2], FINE[4]]),
-            fine: basis(&FINE),
-        }
-    }
-
-    /// Coefficients of 1, s, s² through three nodes; none where more nodes are needed for an
-    /// error of `tolerance`. Legendre's coefficients tell, which of a smooth function fall
-    /// geometrically; of one that is odd about the middle there is none of s² to tell by, so that
-    /// what is found has to [meet](meets) the function elsewhere, too.
-    pub fn coarse(&self, values: &[Vec<f64>], tolerance: f64) -> Option<Vec<Vec<f64>>> {
-        let fit = combined(&self.coarse, values);
-        let last = largest(fit[2].iter().map(|c| c / 6.0));
-        let before = largest(fit[1].iter().zip(&fit[2]).map(|(b, c)| 0.5 * (b + c)));
-        accepted(fit, &[beyond(before, last)], tolerance)
-    }
-
-    /// … of 1 … s⁴ through five nodes. Of an odd function every other coefficient falls.
-    pub fn fine(&self, values: &[Vec<f64>], tolerance: f64) -> Option<Vec<Vec<f64>>> {
-        let fit = combined(&self.fine, values);
-        let last = largest(fit[4].iter().map(|c| c / 70.0));
-        let before = largest(fit[3].iter().zip(&fit[4]).map(|(b, c)| b / 20.0 + c / 10.0));
-        let pairs = (fit[1].iter().zip(&fit[2])).zip(fit[3].iter().zip(&fit[4]));
-        let first = largest(pairs.map(|((a, b), (c, d))| 0.5 * (a + b) + 0.45 * c + 0.4 * d));
-        let next = [beyond(before, last), ODD * beyond(first, before)];
-        accepted(fit, &next, tolerance)
-    }
+/// … of 1 … s⁴ through five nodes. Of an odd function every other coefficient falls.
+fn fine(basis: &Vectors, values: &Vectors, tolerance: f64) -> Option<Vectors> {
+    let fit = combined(basis, values);
+    let last = largest(fit[4].iter().map(|c| c / 70.0));
+    let before = largest(fit[3].iter().zip(&fit[4]).map(|(b, c)| b / 20.0 + c / 10.0));
+    let pairs = (fit[1].iter().zip(&fit[2])).zip(fit[3].iter().zip(&fit[4]));
+    let first = largest(pairs.map(|((a, b), (c, d))| 0.5 * (a + b) + 0.45 * c + 0.4 * d));
+    let next = [beyond(before, last), ODD * beyond(first, before)];
+    accepted(fit, &next, tolerance)
 }
 
 /// Whether a polynomial of s is this close to the values at s.
@@ -477,7 +437,7 @@ fn beyond(before: f64, last: f64) -> f64 {
 }
 
 /// The polynomial, where what is left out of it is within the tolerance.
-fn accepted(mut fit: Vec<Vec<f64>>, next: &[f64], tolerance: f64) -> Option<Vec<Vec<f64>>> {
+fn accepted(mut fit: Vectors, next: &[f64], tolerance: f64) -> Option<Vectors> {
     // false of what is not a number
     if !next.iter().all(|next| *next <= tolerance) {
         return None;
@@ -494,11 +454,7 @@ fn accepted(mut fit: Vec<Vec<f64>>, next: &[f64], tolerance: f64) -> Option<Vec<
     Some(fit)
 }
 
-fn largest(values: impl Iterator<Item = f64>) -> f64 {
-    values.fold(0.0, |m: f64, v| if v.abs() <= m { m } else { v.abs() })
-}
-
-fn combined(basis: &[Vec<f64>], values: &[Vec<f64>]) -> Vec<Vec<f64>> {
+fn combined(basis: &Vectors, values: &Vectors) -> Vectors {
     let size = values.first().map_or(0, Vec::len);
     let mut fit = vec![vec![0.0; size]; basis.len()];
     for (polynomial, values) in basis.iter().zip(values) {
@@ -511,16 +467,11 @@ fn combined(basis: &[Vec<f64>], values: &[Vec<f64>]) -> Vec<Vec<f64>> {
     fit
 }
 
-/// Π (s − c_j)/(c_i − c_j) over j ≠ i, for each node c_i.
-fn basis(nodes: &[f64]) -> Vec<Vec<f64>> {
+/// Π (s − c_j)/(c_i − c_j) over j ≠ i, for each node c_i: 1 there and 0 at the others.
+fn basis(nodes: &[f64]) -> Vectors {
     let one = |i: usize| {
         let mut polynomial = vec![1.0];
-        for c in nodes
-            .iter()
-            .enumerate()
-            .filter(|(j, _)| *j != i)
-            .map(|n| n.1)
-        {
+        for (_, c) in nodes.iter().enumerate().filter(|(j, _)| *j != i) {
             let scale = 1.0 / (nodes[i] - c);
             polynomial.push(0.0);
             for k in (0..polynomial.len()).rev() {

@@ -4,6 +4,7 @@
 use nalgebra::DMatrix;
 
 use crate::filter::profile::{Entry, Profile};
+use crate::filter::root::largest;
 
 /// Terms after which a series is given up.
 const MOST_TERMS: usize = 60;
@@ -46,20 +47,12 @@ impl Transition<Profile> {
 
     /// The larger of both norms; not a number where one is none.
     fn norm(&self) -> f64 {
-        let norms = self.both().map(Profile::norm);
-        norms.fold(0.0, |m: f64, s| if s <= m { m } else { s })
-    }
-
-    fn copy_from(&mut self, other: &Self) {
-        self.both_mut()
-            .zip(other.both())
-            .for_each(|(a, b)| a.copy_from(b));
+        largest(self.both().map(Profile::norm))
     }
 
     fn add(&mut self, other: &Self) {
-        self.both_mut()
-            .zip(other.both())
-            .for_each(|(a, b)| a.add(b));
+        let pairs = self.both_mut().zip(other.both());
+        pairs.for_each(|(a, b)| a.add(b));
     }
 }
 
@@ -85,10 +78,9 @@ impl Series {
         tolerance: f64,
     ) -> bool {
         let size = transition.norm().max(1.0);
-        let mut sum = self.empty(transition, n);
-        sum.copy_from(transition);
-        let mut first = self.empty(transition, n);
-        first.copy_from(transition);
+        let [mut sum, mut first] = [0, 1].map(|_| self.empty(transition, n));
+        sum.add(transition);
+        first.add(transition);
         self.recent.push(first);
         let mut small = 0;
         let mut converged = false;
@@ -101,10 +93,9 @@ impl Series {
                 break;
             }
             sum.add(&next);
-            small = if term <= tolerance * size {
-                small + 1
-            } else {
-                0
+            small = match term <= tolerance * size {
+                true => small + 1,
+                false => 0,
             };
             converged = small >= polynomial.len();
             self.recent.insert(0, next);
@@ -149,10 +140,8 @@ impl Series {
         if let Some(noise) = &mut next.noise {
             noise.add_transpose();
             if k == 0 {
-                drive
-                    .iter()
-                    .enumerate()
-                    .for_each(|(i, v)| noise.add_at(i, i, *v));
+                let diagonal = drive.iter().enumerate();
+                diagonal.for_each(|(i, v)| noise.add_at(i, i, *v));
             }
         }
     }

@@ -6,10 +6,10 @@
 use lynkeus_expr::Graph;
 use nalgebra::{DMatrix, DVector};
 
-use crate::filter::root::factor;
+use crate::filter::root::Factor;
 use crate::filter::tests::exact;
 use crate::filter::{FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor};
-use crate::{Estimator, Level};
+use crate::{Blueprint, Estimator, Level};
 
 /// Xorshift.
 struct Random(u64);
@@ -146,7 +146,9 @@ impl Case {
             confined: None,
         });
         let kind = FilterKind::MovingHorizon(20);
-        Estimator::filter(&model.unwrap(), FilterSettings::of(kind), exact()).unwrap()
+        Blueprint::filter(model.unwrap(), FilterSettings::of(kind), exact())
+            .estimator()
+            .unwrap()
     }
 
     /// Φ and a root of W over a time (C. Van Loan's exponential).
@@ -167,7 +169,7 @@ impl Case {
             .collect();
         (
             transition,
-            DMatrix::from_row_slice(n, n, &factor(&entries, n)),
+            DMatrix::from_row_slice(n, n, Factor::default().of(&entries, n)),
         )
     }
 

@@ -152,48 +152,40 @@ fn at(nodes: &[f64], f: impl Fn(f64) -> f64) -> Vec<Vec<f64>> {
 
 #[test]
 fn polynomials_are_found_and_others_refused() {
-    let lobatto = Lobatto::new();
-    let line = lobatto.coarse(&at(&[0.0, 0.5, 1.0], |s| 2.0 - 3.0 * s), 1e-12);
+    let (of_three, of_five) = (basis(&[FINE[0], FINE[2], FINE[4]]), basis(&FINE));
+    let line = coarse(&of_three, &at(&[0.0, 0.5, 1.0], |s| 2.0 - 3.0 * s), 1e-12);
     let line = line.unwrap();
     assert_eq!(line.len(), 2);
     assert!((line[0][0] - 2.0).abs() < 1e-15 && (line[1][0] + 3.0).abs() < 1e-14);
-    assert!(
-        lobatto
-            .coarse(&at(&[0.0, 0.5, 1.0], f64::exp), 1e-3)
-            .is_none()
-    );
+    assert!(coarse(&of_three, &at(&[0.0, 0.5, 1.0], f64::exp), 1e-3).is_none());
     let wave = |s: f64| (0.2 * s).sin();
-    let fit = lobatto.fine(&at(&FINE, wave), 1e-8).unwrap();
+    let fit = fine(&of_five, &at(&FINE, wave), 1e-8).unwrap();
     for k in 0..=10 {
         let s = 0.1 * f64::from(k);
         let value: f64 = fit.iter().rev().fold(0.0, |sum, c| sum * s + c[0]);
         assert!((value - wave(s)).abs() < 1e-8, "{s}");
     }
-    assert!(
-        lobatto
-            .fine(&at(&FINE, |s| (s - 0.4).abs()), 1e-3)
-            .is_none()
-    );
-    assert!(lobatto.fine(&at(&FINE, |_| f64::NAN), 1e-3).is_none());
+    assert!(fine(&of_five, &at(&FINE, |s| (s - 0.4).abs()), 1e-3).is_none());
+    assert!(fine(&of_five, &at(&FINE, |_| f64::NAN), 1e-3).is_none());
 }
 
 /// What is odd about the middle has no even coefficients to fall: its own tell, and what three
 /// nodes take for a line does not meet it elsewhere.
 #[test]
 fn a_wave_that_is_odd_about_the_middle_is_no_line() {
-    let lobatto = Lobatto::new();
+    let (of_three, of_five) = (basis(&[FINE[0], FINE[2], FINE[4]]), basis(&FINE));
     let three = [FINE[0], FINE[2], FINE[4]];
     for rate in [1.0, std::f64::consts::TAU] {
         let wave = |s: f64| (rate * (s - 0.5)).sin();
-        let line = lobatto.coarse(&at(&three, wave), 1e-9).unwrap();
+        let line = coarse(&of_three, &at(&three, wave), 1e-9).unwrap();
         assert!(line.len() <= 2);
         assert!(!meets(&line, FINE[1], &[wave(FINE[1])], 1e-4));
-        assert!(lobatto.fine(&at(&FINE, wave), 1e-6).is_none());
+        assert!(fine(&of_five, &at(&FINE, wave), 1e-6).is_none());
     }
     let slow = |s: f64| (0.02 * (s - 0.5)).sin();
-    let line = lobatto.coarse(&at(&three, slow), 1e-6).unwrap();
+    let line = coarse(&of_three, &at(&three, slow), 1e-6).unwrap();
     assert!(meets(&line, FINE[1], &[slow(FINE[1])], 1e-6));
-    let fit = lobatto.fine(&at(&FINE, slow), 1e-9).unwrap();
+    let fit = fine(&of_five, &at(&FINE, slow), 1e-9).unwrap();
     assert!(meets(&fit, 0.3, &[slow(0.3)], 1e-9));
     assert!(!meets(&fit, 0.3, &[f64::NAN], 1e-9));
 }
