@@ -18,7 +18,7 @@ use lynkeus_run::filter::{FilterKind, SigmaPoints};
 use lynkeus_structure::AugmentedPlant;
 
 use crate::estimate::{PlantCopy, Speed, limited, no_such_estimate};
-use crate::family::lasting;
+use crate::paper::lasting;
 use crate::tuning::is_or_has;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, Family, FilterTuning, KeySpec,

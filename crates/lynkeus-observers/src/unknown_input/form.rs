@@ -23,7 +23,7 @@ use super::said::{Said, Shape};
 use super::settings::{Settings, wrong_size};
 use crate::conditions::{lipschitz, names, output_slope};
 use crate::design::Found;
-use crate::family::Settings as _;
+use crate::paper::Settings as _;
 use crate::statement::{proved, standing, sufficient};
 use crate::{Check, DesignError, Examination, Farza, Reason, Statement, TuningError};
 
