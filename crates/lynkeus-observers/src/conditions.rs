@@ -281,13 +281,18 @@ impl GainedChain<'_> {
     /// The partials `a` as a witness that the chain is not stable: its value is the largest real
     /// part there, or the zero that it is at least, where it is not found.
     pub fn witness(&self, a: &[f64]) -> Point {
-        let name = |j: usize| format!("a{}", j + 1);
         let rightmost = self.eigenvalues(a).first().map_or(0.0, |λ| λ.0.max(0.0));
-        let coordinates = a.iter().enumerate();
-        Point {
-            coordinates: coordinates.map(|(j, &a)| (name(j), a).into()).collect(),
-            value: rightmost,
-        }
+        at_partials(a, rightmost)
+    }
+}
+
+/// A value at the partials a_1, a_2, … along a chain.
+pub(crate) fn at_partials(a: &[f64], value: f64) -> Point {
+    let named = a.iter().enumerate();
+    let coordinates = named.map(|(j, &a)| (format!("a{}", j + 1), a).into());
+    Point {
+        coordinates: coordinates.collect(),
+        value,
     }
 }
 

@@ -1,12 +1,98 @@
-//! What a family makes of a plant: an examination of its conditions, and an observer with
-//! everything that led to it, or why there is none.
+//! What a family is, and what it makes of a plant: an examination of its conditions, and an observer
+//! with everything that led to it, or why there is none.
+
+use std::fmt;
 
 use derive_more::From;
 use lynkeus_expr::{MissingInput, Spent};
 use lynkeus_structure::{AugmentedPlant, Region, Standing};
 
 use crate::statement::standing;
-use crate::{Check, Family, Observer, Reason, Statement, TuningError};
+use crate::{
+    Assumptions, Certificate, Check, KeySpec, Observer, Reason, Statement, Tuning, TuningError,
+};
+
+/// A published observer design.
+pub trait Family: Sync {
+    /// name in studies
+    fn name(&self) -> &'static str;
+    /// where it was published
+    fn paper(&self) -> &'static str;
+    /// the study keys it reads beside those of every family
+    fn keys(&self) -> Vec<&'static KeySpec>;
+    /// Whether a key is one of them.
+    fn owns(&self, key: &str) -> bool {
+        self.keys().iter().any(|spec| spec.name == key)
+    }
+    /// How the entries of `theta` stand to one another where it is a list of so many, the last one
+    /// the rate at which the error decays; empty where it is one number.
+    fn speeds(&self) -> &'static [f64] {
+        &[]
+    }
+    /// Whether it is a filter: it takes any plant, and no theorem stands behind it.
+    fn is_filter(&self) -> bool {
+        false
+    }
+    /// Whether what it estimates over a log can be smoothed.
+    fn smooths(&self) -> bool {
+        false
+    }
+    /// Whether every key has a value that can be used; a required one may be absent.
+    ///
+    /// # Errors
+    /// The first key that cannot be used.
+    fn verify(&self, augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<(), TuningError>;
+    /// Does the plant have the form, and do the conditions hold on the box?
+    ///
+    /// # Errors
+    /// Tuning keys that cannot be used; parameters without value.
+    fn examine(
+        &'static self,
+        augmented: &AugmentedPlant<'_>,
+        tuning: &Tuning,
+    ) -> Result<Examination, DesignError>;
+    /// The observer.
+    ///
+    /// # Errors
+    /// [`DesignError::Refused`] where the family does not fit; tuning keys that
+    /// cannot be used.
+    fn design(
+        &'static self,
+        augmented: &AugmentedPlant<'_>,
+        tuning: &Tuning,
+    ) -> Result<Design, DesignError>;
+    /// What the paper's theorem guarantees for this plant and tuning: its
+    /// hypotheses with verdicts, its constants (θ0 among them), and where all hold
+    /// the rate and the ultimate bound.
+    ///
+    /// # Errors
+    /// As [`Family::design`].
+    fn theorem(
+        &self,
+        augmented: &AugmentedPlant<'_>,
+        tuning: &Tuning,
+        assumptions: &Assumptions,
+    ) -> Result<Certificate, DesignError>;
+}
+
+impl PartialEq for dyn Family {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name()
+    }
+}
+
+impl fmt::Debug for dyn Family {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Its name.
+impl fmt::Display for dyn Family {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
 
 /// Whether a family fits, in the words of reports: it does where every condition is proved, and
 /// does not where the form is another or a condition is refuted.

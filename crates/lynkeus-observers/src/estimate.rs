@@ -97,9 +97,7 @@ impl<'e, 'p> PlantCopy<'e, 'p> {
             .keys()
             .find(|n| !self.hats.iter().any(|hat| is_or_has(n, &hat.name)))
         {
-            let names: Vec<&str> = self.hats.iter().map(|h| h.name.as_str()).collect();
-            let expected = format!("names of estimated quantities ({})", names.join(", "));
-            return Err(TuningError::new("initial", expected, format!("\"{name}\"")));
+            return Err(no_such_estimate(self.augmented, "initial", name));
         }
         let start = |variable: &Variable| {
             initial
@@ -124,6 +122,17 @@ impl<'e, 'p> PlantCopy<'e, 'p> {
         };
         pairs.map(estimate).collect()
     }
+}
+
+/// The error that a key names what is not estimated.
+pub(crate) fn no_such_estimate(
+    augmented: &AugmentedPlant<'_>,
+    key: &str,
+    name: &str,
+) -> TuningError {
+    let names: Vec<&str> = augmented.states.iter().map(|s| s.name.as_str()).collect();
+    let expected = format!("names of estimated quantities ({})", names.join(", "));
+    TuningError::new(key, expected, format!("\"{name}\""))
 }
 
 impl PlantCopy<'_, '_> {

@@ -17,8 +17,8 @@ use lynkeus_model::Variable;
 use lynkeus_run::filter::{FilterKind, SigmaPoints};
 use lynkeus_structure::AugmentedPlant;
 
-use crate::estimate::{PlantCopy, Speed, limited};
-use crate::family::lasting;
+use crate::estimate::{PlantCopy, Speed, limited, no_such_estimate};
+use crate::paper::lasting;
 use crate::tuning::is_or_has;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, Family, FilterTuning, KeySpec,
@@ -88,27 +88,21 @@ pub const MHE: &dyn Family = &Filter {
 };
 
 impl Filter {
-    fn read(
-        &self,
-        augmented: &AugmentedPlant<'_>,
-        tuning: &Tuning,
-    ) -> Result<Settings, TuningError> {
-        Ok(Settings {
-            kind: (self.kind)(tuning)?,
-            common: tuning.checked()?,
-            gate: tuning.positive(GATE.name)?,
-            projects: tuning.meant(&BOUNDS[0], [true])?.is_some(),
-            variance: variances(augmented, tuning)?,
-        })
+    fn check(&self, augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<(), TuningError> {
+        (self.kind)(tuning)?;
+        tuning.checked()?;
+        tuning.positive(GATE.name)?;
+        projects(tuning)?;
+        variances(augmented, tuning).map(drop)
     }
 
     fn designed(
         &self,
         augmented: &AugmentedPlant<'_>,
-        settings: &Settings,
+        tuning: &Tuning,
         examination: Examination,
     ) -> Result<Design, DesignError> {
-        let copy = PlantCopy::new(augmented, &settings.common);
+        let copy = PlantCopy::new(augmented, tuning);
         let derivatives = copy.at_estimate(&augmented.derivatives);
         let outputs: Vec<_> = augmented.outputs.iter().map(|o| o.variable.node).collect();
         let limits = copy.hats.iter().zip(&augmented.states);
@@ -121,16 +115,17 @@ impl Filter {
         let scale = Speed::new(&copy, NOISE_SCALE, 1.0, NOISE_MEANING.to_owned());
         observer = observer.tuned_by([&scale]);
         let starts = observer.states.iter().map(|(_, start)| *start);
-        let given = settings.variance.iter().zip(&augmented.states);
+        let given = variances(augmented, tuning)?;
+        let given = given.iter().zip(&augmented.states);
         let variance = given
             .clone()
             .zip(starts)
             .map(|((given, state), start)| given.unwrap_or_else(|| prior_variance(state, start)));
         let variance: Vec<f64> = variance.collect();
         observer.filter = Some(FilterTuning {
-            kind: settings.kind.clone(),
-            gate: settings.gate,
-            projects: settings.projects,
+            kind: (self.kind)(tuning)?,
+            gate: tuning.positive(GATE.name)?,
+            projects: projects(tuning)?,
             outputs: copy.at_estimate(&outputs),
             confined,
             initial_variance: variance.clone(),
@@ -177,7 +172,7 @@ impl Family for Filter {
     }
 
     fn verify(&self, augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<(), TuningError> {
-        self.read(augmented, tuning).map(drop)
+        self.check(augmented, tuning)
     }
 
     fn examine(
@@ -185,7 +180,7 @@ impl Family for Filter {
         augmented: &AugmentedPlant<'_>,
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
-        self.read(augmented, tuning)?;
+        self.check(augmented, tuning)?;
         Ok(Examination::of_any_plant(self, self.called))
     }
 
@@ -194,11 +189,9 @@ impl Family for Filter {
         augmented: &AugmentedPlant<'_>,
         tuning: &Tuning,
     ) -> Result<Design, DesignError> {
-        let settings = self.read(augmented, tuning)?;
+        self.check(augmented, tuning)?;
         let examination = Examination::of_any_plant(self, self.called);
-        lasting(augmented, || {
-            self.designed(augmented, &settings, examination)
-        })
+        lasting(augmented, || self.designed(augmented, tuning, examination))
     }
 
     fn theorem(
@@ -272,15 +265,9 @@ const WINDOW: [KeySpec; 1] = [KeySpec {
     meaning: "samples over which the states are estimated anew at each sample, within `[min, max]`",
 }];
 
-/// The keys, read.
-struct Settings {
-    common: Tuning,
-    kind: FilterKind,
-    gate: Option<f64>,
-    /// the estimate is kept in the declared ranges
-    projects: bool,
-    /// as given, by augmented state
-    variance: Vec<Option<f64>>,
+/// Whether the estimate is kept in the declared ranges.
+fn projects(tuning: &Tuning) -> Result<bool, TuningError> {
+    Ok(tuning.meant(&BOUNDS[0], [true])?.is_some())
 }
 
 /// The square of a quarter of the range: two standard deviations reach its ends. Without a range, that of
@@ -293,6 +280,7 @@ pub fn prior_variance(state: &Variable, start: f64) -> f64 {
     }
 }
 
+/// The variances as given, by augmented state.
 fn variances(
     augmented: &AugmentedPlant<'_>,
     tuning: &Tuning,
@@ -318,13 +306,7 @@ fn variances(
             }
         }
         if meant == 0 {
-            let names: Vec<&str> = augmented.states.iter().map(|s| s.name.as_str()).collect();
-            let expected = format!("names of estimated quantities ({})", names.join(", "));
-            return Err(TuningError::new(
-                VARIANCE.name,
-                expected,
-                format!("\"{name}\""),
-            ));
+            return Err(no_such_estimate(augmented, VARIANCE.name, name));
         }
     }
     Ok(found)

@@ -17,11 +17,11 @@ mod conditions;
 mod design;
 pub mod drift_observable;
 mod estimate;
-mod family;
 mod generator;
 pub mod guarantee;
 pub mod kalman;
 mod observer;
+mod paper;
 mod peaking;
 mod printed;
 mod sparse;
@@ -34,8 +34,9 @@ pub mod unknown_input;
 
 pub use block_triangular::Lee;
 pub use certificate::{Assumptions, Bounds, Certificate, Constant, UltimateBound};
-pub use design::{ChainGain, Design, DesignError, Examination, ParameterValue, Shown, fit_word};
-pub use family::Family;
+pub use design::{
+    ChainGain, Design, DesignError, Examination, Family, ParameterValue, Shown, fit_word,
+};
 pub use generator::{Generator, GeneratorError};
 pub use guarantee::{Claim, Correction, Inequality, Injection, certify, is_certified_gain};
 pub use lynkeus_gain::integrators::Pole;

@@ -139,9 +139,7 @@ impl Observer {
         }
         Ok(found)
     }
-}
 
-impl Observer {
     /// Whether its states are the estimate itself, of so many quantities.
     pub(crate) fn is_the_estimate(&self, count: usize) -> bool {
         let pairs = self.states.iter().zip(&self.estimates);

@@ -89,12 +89,13 @@ pub(crate) fn undeclared(
     nodes: &[Node],
     region: &Region,
 ) -> Vec<String> {
-    let used = region.restricted(&augmented.graph().symbols_of(nodes));
-    let time = augmented.plant.time;
-    let open = used
-        .dimensions
-        .into_iter()
-        .filter(|d| d.symbol != time && !(d.min.is_finite() && d.max.is_finite()));
+    open_sides(augmented.graph(), nodes, augmented.plant.time, region)
+}
+
+fn open_sides(graph: &Graph, nodes: &[Node], time: Node, region: &Region) -> Vec<String> {
+    let sides = region.restricted(&graph.symbols_of(nodes)).dimensions;
+    let is_open = |d: &Dimension| !(d.min.is_finite() && d.max.is_finite());
+    let open = sides.into_iter().filter(|d| d.symbol != time && is_open(d));
     open.map(|d| d.name).collect()
 }
 
@@ -342,10 +343,7 @@ impl<'g> Enclosure<'g> {
     }
 
     fn note(&self, node: Node) {
-        let used = self.region.restricted(&self.graph.symbols_of(&[node]));
-        let sides = used.dimensions.iter().filter(|d| d.symbol != self.time);
-        let open = sides.filter(|d| !(d.min.is_finite() && d.max.is_finite()));
-        let names: Vec<String> = open.map(|d| d.name.clone()).collect();
+        let names = open_sides(self.graph, &[node], self.time, &self.region);
         let mut noted = self.open.borrow_mut();
         match names.is_empty() {
             true => {

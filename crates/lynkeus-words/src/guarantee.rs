@@ -1,6 +1,6 @@
 //! The certificate by linear matrix inequalities.
 
-use crate::{counted, short};
+use crate::{counted, declare, short};
 use lynkeus_observers::Inequality;
 use lynkeus_observers::guarantee::{Obstacle, Said};
 
@@ -27,10 +27,7 @@ impl Words for Said {
             ),
             Self::SlopesEnclosed(count) => format!("{} enclosed", counted(*count, "slope")),
             Self::Unbounded { term, undeclared } => {
-                let cure = match undeclared.is_empty() {
-                    true => "it jumps or its derivative is infinite at the edge of the box: tighten min and max".to_owned(),
-                    false => format!("declare min and max of {}", undeclared.join(", ")),
-                };
+                let cure = declare(undeclared, "it jumps or its derivative is infinite at the edge of the box: tighten min and max");
                 format!("the slope of {term} has no bound; {cure}")
             }
             Self::Holds { rate, slopes } => format!(
@@ -57,10 +54,7 @@ impl Words for Said {
             Self::GrowsEverywhere => "whatever the plant does, the error obeys e' = A e with the same A everywhere, which has an eigenvalue with a positive real part, by interval arithmetic".to_owned(),
             Self::Repelling => "the plant can rest at this point, with these inputs, and there the error's Jacobian has an eigenvalue with a positive real part, both by interval arithmetic: the estimate leaves the plant, however close it starts".to_owned(),
             Self::NoGainUnbounded { term, undeclared } => {
-                let cure = match undeclared.is_empty() {
-                    true => "tighten its range".to_owned(),
-                    false => format!("declare min and max of {}", undeclared.join(", ")),
-                };
+                let cure = declare(undeclared, "tighten its range");
                 format!("the slope of {term} has no bound on the box; {cure}")
             }
             Self::BeyondLimit { rate, limit, least } => format!(

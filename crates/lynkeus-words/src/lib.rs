@@ -31,3 +31,11 @@ fn arrows(lists: &[Vec<String>]) -> String {
         .collect();
     each.join(" → ")
 }
+
+/// To declare the ends of these, or else something else.
+fn declare(names: &[String], otherwise: &str) -> String {
+    match names.is_empty() {
+        true => otherwise.to_owned(),
+        false => format!("declare min and max of {}", names.join(", ")),
+    }
+}

@@ -1,6 +1,6 @@
 //! The family `state-affine`, after Ltaief, Maatoug, Farza, Ménard, M'Saad and Koubaa.
 
-use crate::short;
+use crate::{declare, short};
 use lynkeus_observers::state_affine::{Ltaief, Said};
 
 use crate::{Words, arrows};
@@ -37,10 +37,10 @@ impl Words for Said {
             ),
             Self::Enclosed => "every entry enclosed".into(),
             Self::NoBound { entry, undeclared } => {
-                let advice = match undeclared.is_empty() {
-                    true => "mind divisions and roots at the edges of the box".to_owned(),
-                    false => format!("declare min and max of {}", undeclared.join(", ")),
-                };
+                let advice = declare(
+                    undeclared,
+                    "mind divisions and roots at the edges of the box",
+                );
                 format!("{entry} has no bound: {advice}")
             }
             Self::Drift { constant } => match constant.is_empty() {

@@ -1,6 +1,6 @@
 //! The family `triangular`, after Hammouri, Targui and Armanet.
 
-use crate::short;
+use crate::{declare, short};
 use lynkeus_observers::Hammouri;
 use lynkeus_observers::triangular::{Loose, Said};
 
@@ -73,10 +73,7 @@ impl Words for Said {
             }
             Self::GainVaries => "partials = true divides it by the partials at the estimate, which vary on the box, and the theorem covers a constant gain only: missing is a bound of how fast they change and of how much they differ from the plant's".to_owned(),
             Self::NoBounds { partial, undeclared } => {
-                let advice = match undeclared.is_empty() {
-                    true => "narrow min and max so that it keeps away from zero and infinity".to_owned(),
-                    false => format!("declare min and max of {}", undeclared.join(", ")),
-                };
+                let advice = declare(undeclared, "narrow min and max so that it keeps away from zero and infinity");
                 format!("{partial} has no positive lower and finite upper bound on the box: {advice}")
             }
             Self::BoundsKnown { known, all } => format!("Known so far: {known} of {all} partials along the chains have bounds; without the others there is no S by Lemma 1 and no θ0."),

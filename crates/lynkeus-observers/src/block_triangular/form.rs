@@ -16,7 +16,7 @@ use super::said::{Correction, Lee, Said};
 use super::settings::Settings;
 use crate::conditions::{GainedChain, Partial, lipschitz, names, output_slope, partials};
 use crate::design::{Found, first_fit};
-use crate::family::Settings as _;
+use crate::paper::Settings as _;
 use crate::statement::{proved, refuted, undecided};
 use crate::{Check, DesignError, Examination, Reason, TuningError};
 

@@ -21,7 +21,8 @@ mod settings;
 mod theorem;
 mod transformed;
 
-use crate::family::{self, Family, Paper, usable};
+use crate::Family;
+use crate::paper::{self, Paper, usable};
 pub use said::{Correction, Lee, Said};
 use settings::Settings;
 
@@ -40,7 +41,7 @@ pub const BLOCK_TRIANGULAR: &dyn Family = &Paper {
     theorem: theorem::certificate,
 };
 
-impl family::Settings for Settings {
+impl paper::Settings for Settings {
     type Form<'e> = form::Form;
     const FAMILY: &'static dyn Family = BLOCK_TRIANGULAR;
 }

@@ -22,11 +22,9 @@ pub(super) fn design(
     found: Found<Form>,
 ) -> Result<Design, DesignError> {
     match (settings.lmi()?, settings.remedies.low_power) {
-        (Some(lmi), _) => {
-            guarantee::design_lmi(augmented, &settings.common, lmi, found.examination)
-        }
-        (None, true) => low_power(augmented, settings, found),
-        (None, false) => observer(augmented, settings, found),
+        (true, _) => guarantee::design_lmi(augmented, &settings.common, found.examination),
+        (false, true) => low_power(augmented, settings, found),
+        (false, false) => observer(augmented, settings, found),
     }
 }
 

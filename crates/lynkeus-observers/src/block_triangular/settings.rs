@@ -5,7 +5,7 @@ use lynkeus_structure::{AugmentedPlant, ChainRequest};
 use super::said::Correction;
 use crate::conditions::{CHAINS, chain_request, output_names};
 use crate::estimate::PROLONG;
-use crate::guarantee::{LMI, LMI_KEYS, Lmi};
+use crate::guarantee::{self, LMI, LMI_KEYS};
 use crate::peaking::Remedies;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value, peaking};
 
@@ -108,10 +108,10 @@ impl Settings {
         self.given_θ()?.ok_or_else(missing)
     }
 
-    /// The certified gain, where the study asks for one.
-    pub fn lmi(&self) -> Result<Option<Lmi>, TuningError> {
+    /// Whether the gain is a certified one.
+    pub fn lmi(&self) -> Result<bool, TuningError> {
         let asked = self.common.meant(&GAIN, [true])?;
-        Lmi::read(&self.common, asked.is_some())
+        guarantee::is_asked(&self.common, asked.is_some())
     }
 
     /// K for chains of these lengths, every eigenvalue of A − KC at −1 by default.

@@ -34,7 +34,7 @@ pub(super) fn certificate(
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
     let (lmi, blocks) = (settings.lmi()?, &form.blocks);
-    if let Some(check) = departure(Lee::Observer, lmi.as_ref(), &settings.remedies) {
+    if let Some(check) = departure(Lee::Observer, lmi, &settings.remedies) {
         return Ok(Certificate::new(BASIS, assumptions, vec![check]));
     }
     let order: Vec<usize> = blocks.order.iter().map(|(output, _)| *output).collect();

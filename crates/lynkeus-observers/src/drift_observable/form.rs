@@ -14,7 +14,7 @@ use super::said::Said;
 use super::settings::{Settings, Variant};
 use crate::conditions::{lasts, lipschitz, names};
 use crate::design::Found;
-use crate::family::Settings as _;
+use crate::paper::Settings as _;
 use crate::statement::{sufficient, undecided};
 use crate::{Check, DesignError, Examination, Germani, Reason, Statement};
 

@@ -24,7 +24,8 @@ mod said;
 mod settings;
 mod theorem;
 
-use crate::family::{self, Family, Paper};
+use crate::Family;
+use crate::paper::{self, Paper};
 pub use said::{Germani, Known, Others, Said};
 use settings::Settings;
 
@@ -45,7 +46,7 @@ pub const DRIFT_OBSERVABLE: &dyn Family = &Paper {
     theorem: theorem::certificate,
 };
 
-impl family::Settings for Settings {
+impl paper::Settings for Settings {
     type Form<'e> = form::Form;
     const FAMILY: &'static dyn Family = DRIFT_OBSERVABLE;
 }

@@ -44,9 +44,6 @@ const MINIMISE: KeySpec = KeySpec {
     meaning: "what the gain makes small at that rate, with `\"lmi\"`",
 };
 
-/// What the words of [`MINIMISE`] stand for.
-const AIMS: [Aim; 3] = [Aim::Noise, Aim::Gain, Aim::Peak];
-
 /// The word under the key `gain` that asks for it.
 pub(crate) const LMI: &str = "lmi";
 
@@ -58,48 +55,36 @@ pub fn is_certified_gain(tuning: &Tuning) -> bool {
 /// The keys of this gain, for every family that has it.
 pub(crate) const LMI_KEYS: [KeySpec; 3] = [RATE, LIMIT, MINIMISE];
 
-/// The gain that the study asks for.
-#[derive(Clone, Debug)]
-pub struct Lmi {
-    rate: Option<f64>,
-    limit: Option<f64>,
-    aim: Aim,
-    /// declared standard deviations, by output
-    noise: BTreeMap<String, f64>,
+/// Whether the study asks for it, as the family's key `gain` says.
+///
+/// # Errors
+/// Wrong values, or keys of this gain where it is not asked for.
+pub(crate) fn is_asked(tuning: &Tuning, asked: bool) -> Result<bool, TuningError> {
+    let given = |key: &&KeySpec| tuning.values.contains_key(key.name);
+    if let (false, Some(key)) = (asked, LMI_KEYS.iter().find(given)) {
+        let expected = "this key only with gain = \"lmi\"";
+        return Err(TuningError::new(key.name, expected, "another gain"));
+    }
+    tuning.positive(RATE.name)?;
+    tuning.positive(LIMIT.name)?;
+    aim(tuning)?;
+    Ok(asked)
 }
 
-impl Lmi {
-    /// None where the key `gain` does not ask for it.
-    ///
-    /// # Errors
-    /// Wrong values, or keys of this gain where it is not asked for.
-    pub fn read(tuning: &Tuning, asked: bool) -> Result<Option<Self>, TuningError> {
-        let given = |key: &&KeySpec| tuning.values.contains_key(key.name);
-        match (asked, LMI_KEYS.iter().find(given)) {
-            (false, Some(key)) => {
-                let expected = "this key only with gain = \"lmi\"";
-                Err(TuningError::new(key.name, expected, "another gain"))
-            }
-            (false, None) => Ok(None),
-            (true, _) => Ok(Some(Self {
-                rate: tuning.positive(RATE.name)?,
-                limit: tuning.positive(LIMIT.name)?,
-                aim: tuning.meant(&MINIMISE, AIMS)?.unwrap_or(Aim::Noise),
-                noise: tuning.noise.clone(),
-            })),
-        }
-    }
+fn aim(tuning: &Tuning) -> Result<Aim, TuningError> {
+    let chosen = tuning.meant(&MINIMISE, [Aim::Noise, Aim::Gain, Aim::Peak])?;
+    Ok(chosen.unwrap_or(Aim::Noise))
 }
 
 /// The observer with a certified gain, for the family that asked.
 pub(crate) fn design_lmi(
     augmented: &AugmentedPlant<'_>,
-    common: &Tuning,
-    asked: Lmi,
+    tuning: &Tuning,
     examination: Examination,
 ) -> Result<Design, DesignError> {
-    estimate::refuse(common, "gain = \"lmi\"")?;
-    let copy = PlantCopy::new(augmented, common);
+    estimate::refuse(tuning, "gain = \"lmi\"")?;
+    let (rate, limit) = (tuning.positive(RATE.name)?, tuning.positive(LIMIT.name)?);
+    let copy = PlantCopy::new(augmented, tuning);
     let (measured, slopes) = shown(augmented)?;
     let system = ErrorSystem::open_loop(augmented, &augmented.region())?;
     if let Some((slope, undeclared)) = system.slopes.unbounded(&system.region) {
@@ -107,16 +92,16 @@ pub(crate) fn design_lmi(
         return Err(none("gain", Said::NoGainUnbounded { term, undeclared }));
     }
     let request = Request {
-        rate: asked.rate.unwrap_or(0.0),
-        noise: weights(augmented, &asked.noise),
+        rate: rate.unwrap_or(0.0),
+        noise: weights(augmented, &tuning.noise),
         measured,
         slopes,
         scale: system.scale.clone(),
-        aim: asked.aim,
-        limit: asked.limit,
+        aim: aim(tuning)?,
+        limit,
         budget: augmented.graph().budget(),
     };
-    let gain = match (asked.rate, asked.limit) {
+    let gain = match (rate, limit) {
         (Some(_), _) => decay::design(&system.models, &request)
             .map_err(|error| refusal(&system, &request, error))?,
         (None, Some(_)) => fastest(&system, request.clone())?,

@@ -29,7 +29,7 @@ mod said;
 
 pub use correction::{Correction, Injection};
 pub use lmi::is_certified_gain;
-pub(crate) use lmi::{LMI, LMI_KEYS, Lmi, design_lmi};
+pub(crate) use lmi::{LMI, LMI_KEYS, design_lmi, is_asked};
 use lynkeus_expr::{Budget, Interval};
 use lynkeus_proof::chain::settled;
 use lynkeus_proof::decay::Proof;

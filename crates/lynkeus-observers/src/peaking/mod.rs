@@ -13,7 +13,6 @@ pub(crate) use transient::{Transient, gains};
 
 use crate::conditions::Partial;
 use crate::estimate::{PlantCopy, Speed};
-use crate::guarantee::Lmi;
 use crate::statement::undecided;
 use crate::{
     Check, Design, Examination, KeySpec, ParameterValue, Reason, Shape, Statement, Tuning,
@@ -109,14 +108,14 @@ pub(super) const LIMIT: KeySpec = KeySpec {
 };
 
 /// The hypothesis that the observer is the paper's, which is open where a key of the study makes
-/// another one; `gain` is that of a linear matrix inequality.
+/// another one, as a certified gain does.
 pub(crate) fn departure(
     statement: impl Into<Statement>,
-    gain: Option<&Lmi>,
+    is_certified: bool,
     remedies: &Remedies,
 ) -> Option<Check> {
     let departures = [
-        (gain.is_some(), "gain"),
+        (is_certified, "gain"),
         (remedies.low_power, FORM.name),
         (remedies.transient.is_some(), transient::TRANSIENT.name),
         (remedies.limit.is_some(), LIMIT.name),

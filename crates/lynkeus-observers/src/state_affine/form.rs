@@ -7,7 +7,7 @@ use super::said::{Ltaief, Said};
 use super::settings::Settings;
 use crate::conditions::{lipschitz, names};
 use crate::design::Found;
-use crate::family::Settings as _;
+use crate::paper::Settings as _;
 use crate::statement::standing;
 use crate::{DesignError, Examination, Reason, Statement};
 

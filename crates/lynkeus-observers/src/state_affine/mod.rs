@@ -21,7 +21,8 @@ mod said;
 mod settings;
 mod theorem;
 
-use crate::family::{self, Family, Paper};
+use crate::Family;
+use crate::paper::{self, Paper};
 pub use said::{Ltaief, Said};
 use settings::Settings;
 
@@ -40,7 +41,7 @@ pub const STATE_AFFINE: &dyn Family = &Paper {
     theorem: theorem::certificate,
 };
 
-impl family::Settings for Settings {
+impl paper::Settings for Settings {
     type Form<'e> = form::Form;
     const FAMILY: &'static dyn Family = STATE_AFFINE;
 }

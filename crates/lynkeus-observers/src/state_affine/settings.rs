@@ -5,7 +5,7 @@ use lynkeus_proof::matrix::square;
 use lynkeus_structure::AugmentedPlant;
 
 use crate::estimate::PROLONG;
-use crate::family::usable;
+use crate::paper::usable;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 
 const THETA: KeySpec = KeySpec {

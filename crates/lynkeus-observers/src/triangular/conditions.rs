@@ -12,7 +12,7 @@ use super::said::{Hammouri, Loose, Said};
 use super::settings::Settings;
 use crate::conditions::{GainedChain, along, lipschitz, names};
 use crate::design::{Found, first_fit};
-use crate::family::Settings as _;
+use crate::paper::Settings as _;
 use crate::statement::undecided;
 use crate::{DesignError, Examination, Reason};
 

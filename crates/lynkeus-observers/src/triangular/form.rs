@@ -89,8 +89,7 @@ fn lemma1_matrices(
     form: &Form,
     divided: bool,
 ) -> Result<(Vec<Tridiagonal>, Option<f64>), TuningError> {
-    let mut ρ = None;
-    let mut matrix = |chain: &Vec<Partial>| {
+    let found = |chain: &Vec<Partial>| {
         let bounds = |p: &Partial| match divided {
             // dividing by the partials leaves a chain of integrators
             true => Bounds {
@@ -103,19 +102,14 @@ fn lemma1_matrices(
             },
         };
         let bounds: Vec<Bounds> = chain.iter().map(bounds).collect();
-        let found = lemma1::construct(&bounds).map_err(|error| {
+        lemma1::construct(&bounds).map_err(|error| {
             let expected = "partial derivatives with known positive bounds for Lemma 1; declare min and max in the model, give S, or set partials = true";
             TuningError::new("gain", expected, error)
-        })?;
-        ρ = Some(found.ρ);
-        Ok(found.S)
+        })
     };
-    let S = form
-        .partials
-        .iter()
-        .map(&mut matrix)
-        .collect::<Result<_, _>>()?;
-    Ok((S, ρ))
+    let found: Vec<_> = form.partials.iter().map(found).collect::<Result<_, _>>()?;
+    let ρ = found.last().map(|found| found.ρ);
+    Ok((found.into_iter().map(|found| found.S).collect(), ρ))
 }
 
 /// δ: given, or δ = 1 for the leading chain and 2n₁/(2nᵢ−1) for another, the middle of Theorem 2's window. Two of

@@ -16,7 +16,8 @@ mod said;
 mod settings;
 mod theorem;
 
-use crate::family::{self, Family, Paper, usable};
+use crate::Family;
+use crate::paper::{self, Paper, usable};
 pub use said::{Hammouri, Loose, Said};
 use settings::Settings;
 
@@ -35,7 +36,7 @@ pub const TRIANGULAR: &dyn Family = &Paper {
     theorem: theorem::certificate,
 };
 
-impl family::Settings for Settings {
+impl paper::Settings for Settings {
     type Form<'e> = form::Form;
     const FAMILY: &'static dyn Family = TRIANGULAR;
 }

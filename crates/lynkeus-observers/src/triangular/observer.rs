@@ -21,8 +21,8 @@ pub(super) fn design(
     settings: &Settings,
     found: Found<Form>,
 ) -> Result<Design, DesignError> {
-    if let Some(lmi) = settings.lmi.clone() {
-        return guarantee::design_lmi(augmented, &settings.common, lmi, found.examination);
+    if settings.lmi {
+        return guarantee::design_lmi(augmented, &settings.common, found.examination);
     }
     if settings.remedies.low_power {
         return Ok(low_power(augmented, settings, found)?);

@@ -5,7 +5,7 @@ use lynkeus_structure::{AugmentedPlant, ChainRequest};
 
 use crate::conditions::{CHAINS, chain_request, output_names};
 use crate::estimate::PROLONG;
-use crate::guarantee::{LMI, LMI_KEYS, Lmi};
+use crate::guarantee::{self, LMI, LMI_KEYS};
 use crate::peaking::Remedies;
 use crate::tuning::numbers;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value, peaking};
@@ -96,7 +96,8 @@ pub struct Settings {
     pub request: ChainRequest,
     /// the output whose chain leads
     pub leading: Option<usize>,
-    pub lmi: Option<Lmi>,
+    /// the gain is a certified one
+    pub lmi: bool,
     pub remedies: Remedies,
     /// measured outputs
     outputs: usize,
@@ -109,10 +110,11 @@ impl Settings {
         let sizes = S
             .as_ref()
             .map(|S| S.iter().map(Tridiagonal::size).collect());
-        let lmi = Lmi::read(tuning, tuning.meant(&GAIN, [false, true])?.unwrap_or(false))?;
+        let asked = tuning.meant(&GAIN, [false, true])?.unwrap_or(false);
+        let lmi = guarantee::is_asked(tuning, asked)?;
         let of_standard: &[KeySpec] = match lmi {
-            Some(_) => &[],
-            None => &[MATRICES, FACTOR, GAIN],
+            true => &[],
+            false => &[MATRICES, FACTOR, GAIN],
         };
         Ok(Self {
             common: tuning.checked()?,

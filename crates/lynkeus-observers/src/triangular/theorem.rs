@@ -17,13 +17,13 @@ use lynkeus_gain::{Tridiagonal, lemma1};
 use lynkeus_proof::chain::{Chain, Comparison, Disturbance, Slope, ultimate};
 use lynkeus_proof::matrix::sum;
 use lynkeus_proof::search::{first, lightest};
-use lynkeus_structure::{AugmentedPlant, Coordinate, Point, Region, Standing};
+use lynkeus_structure::{AugmentedPlant, Region, Standing};
 
 use super::form::{Form, Gains, Window};
 use super::observer::observer;
 use super::said::{Hammouri, Said};
 use super::settings::Settings;
-use crate::conditions::{along, names};
+use crate::conditions::{along, at_partials, names};
 use crate::design::Found;
 use crate::peaking::departure;
 use crate::statement::{proved, refuted, standing, sufficient, undecided};
@@ -53,11 +53,7 @@ pub(super) fn certificate(
         1 | 2 => BASIS,
         _ => MANY,
     };
-    if let Some(check) = departure(
-        Hammouri::Observer,
-        settings.lmi.as_ref(),
-        &settings.remedies,
-    ) {
+    if let Some(check) = departure(Hammouri::Observer, settings.lmi, &settings.remedies) {
         checks.push(check);
         return Ok(Certificate::new(basis, assumptions, checks));
     }
@@ -428,13 +424,7 @@ fn breaks(title: Hammouri, S: &Tridiagonal, found: &Breaking, names: &[String]) 
     if !certain {
         return undecided(title, said);
     }
-    let name = |j: usize| format!("a{}", j + 1);
-    let coordinates = found.a.iter().enumerate().map(|(j, &a)| (name(j), a));
-    let point = Point {
-        coordinates: coordinates.map(Coordinate::from).collect(),
-        value: found.eigenvalue,
-    };
-    refuted(title, point, said)
+    refuted(title, at_partials(&found.a, found.eigenvalue), said)
 }
 
 /// vᵀ(AᵀS + SA)v, rounding included: a proof that the form is positive somewhere.

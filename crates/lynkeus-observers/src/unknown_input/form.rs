@@ -23,7 +23,7 @@ use super::said::{Said, Shape};
 use super::settings::{Settings, wrong_size};
 use crate::conditions::{lipschitz, names, output_slope};
 use crate::design::Found;
-use crate::family::Settings as _;
+use crate::paper::Settings as _;
 use crate::statement::{proved, standing, sufficient};
 use crate::{Check, DesignError, Examination, Farza, Reason, Statement, TuningError};
 
@@ -178,12 +178,8 @@ pub(super) fn search<'e, 'p>(
             return Err(Examination::unfit(Settings::FAMILY, Reason::from(why), vec![]).into());
         }
     };
-    let given = given(augmented, &layers, settings)?;
+    let candidates = candidates(augmented, &layers, settings)?;
     let shared = shared(augmented, &layers, region)?;
-    let candidates = match &given {
-        Some(first) => vec![first.clone()],
-        None => candidates(augmented, &layers),
-    };
     let (mut undecided, mut refuted) = (None, vec![]);
     for first in candidates {
         let form = form(augmented, &layers, first);
@@ -225,30 +221,23 @@ fn sizes(augmented: &AugmentedPlant<'_>, layers: &Layers<'_>) -> std::ops::Range
     layers.factors.columns..=p.saturating_sub(n2.max(1))
 }
 
-fn candidates(augmented: &AugmentedPlant<'_>, layers: &Layers<'_>) -> Vec<Vec<usize>> {
-    let p = augmented.outputs.len();
-    let mut all = vec![];
-    for size in sizes(augmented, layers) {
-        all.extend(rank::subsets(p, size, MAX_PARTITIONS).unwrap_or_default());
-    }
-    all.truncate(MAX_PARTITIONS);
-    all
-}
-
-/// The outputs of x₁¹ that the study asks for.
-fn given(
+/// The outputs of x₁¹ that the study asks for, else every choice of them.
+fn candidates(
     augmented: &AugmentedPlant<'_>,
     layers: &Layers<'_>,
     settings: &Settings,
-) -> Result<Option<Vec<usize>>, TuningError> {
-    let Some(first) = &settings.partition else {
-        return Ok(None);
-    };
-    let sizes = sizes(augmented, layers);
-    match sizes.contains(&first.len()) {
-        true => Ok(Some(first.clone())),
-        false => Err(wrong_size(&sizes, augmented.outputs.len(), first.len())),
+) -> Result<Vec<Vec<usize>>, TuningError> {
+    let (p, sizes) = (augmented.outputs.len(), sizes(augmented, layers));
+    if let Some(first) = &settings.partition {
+        return match sizes.contains(&first.len()) {
+            true => Ok(vec![first.clone()]),
+            false => Err(wrong_size(&sizes, p, first.len())),
+        };
     }
+    let of_size = |size| rank::subsets(p, size, MAX_PARTITIONS).unwrap_or_default();
+    let mut all: Vec<Vec<usize>> = sizes.flat_map(of_size).collect();
+    all.truncate(MAX_PARTITIONS);
+    Ok(all)
 }
 
 /// A partition that meets (H4) and makes every block of Λ₂ square: its outputs.

@@ -25,7 +25,8 @@ mod said;
 mod settings;
 mod theorem;
 
-use crate::family::{self, Family, Paper, usable};
+use crate::Family;
+use crate::paper::{self, Paper, usable};
 pub use said::{Farza, Said, Shape};
 use settings::Settings;
 
@@ -45,7 +46,7 @@ pub const UNKNOWN_INPUT: &dyn Family = &Paper {
     theorem: theorem::certificate,
 };
 
-impl family::Settings for Settings {
+impl paper::Settings for Settings {
     type Form<'e> = form::Form<'e, 'e>;
     const FAMILY: &'static dyn Family = UNKNOWN_INPUT;
 }
