@@ -87,6 +87,12 @@ impl Problem {
         self
     }
 
+    /// A hint where there is none yet.
+    pub(crate) fn or_hint(mut self, hint: impl Into<String>) -> Self {
+        self.0.hint.get_or_insert_with(|| hint.into());
+        self
+    }
+
     pub(crate) fn into_details(self) -> Details {
         *self.0
     }

@@ -4,12 +4,27 @@ use std::collections::{BTreeMap, HashMap};
 
 use lynkeus_expr::Node;
 
-use super::parser::{ParsedModel, Role, is_elementary};
+use super::parser::Equations;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::{Budget, MAX_SCALARS};
 use crate::names::did_you_mean;
-use crate::syntax::ast::Ast;
+use crate::syntax::ODE_MODEL;
+use crate::syntax::ast::{Ast, Expression, Kind};
 use crate::{LoadOptions, Model, Plant, elaborate};
+
+/// Whether the name is that of a function of numbers.
+fn is_elementary(name: &str) -> bool {
+    ODE_MODEL.functions.contains(&name)
+}
+
+/// What a name is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    State,
+    Output,
+    Input,
+    Parameter,
+}
 
 /// What the names of a model are.
 struct Names<'s> {
@@ -22,21 +37,32 @@ struct Names<'s> {
 }
 
 impl<'s> Names<'s> {
-    /// Says what every name is.
-    fn new(source: &'s str, model: &ParsedModel<'_>) -> Result<Self> {
+    /// Says what every name is. Functions of time become names in the tree.
+    fn new(source: &'s str, equations: &Equations, ast: &mut Ast) -> Result<Self> {
         let mut names = Self {
             source,
             found: vec![],
             places: HashMap::new(),
             budget: Budget::new(MAX_SCALARS, "variables and parameters"),
         };
-        for &(name, role, _) in &model.equations {
-            names.define(name, role)?;
+        for &(left, _) in equations {
+            names.define(ast.expression(left))?;
         }
-        for &(name, role) in &model.mentions {
-            names.mention(name, role)?;
+        for &(_, right) in equations {
+            for id in ast.ids(right) {
+                names.mention(&mut ast.expressions[id.0 as usize])?;
+            }
         }
         Ok(names)
+    }
+
+    /// The name that an expression is, without its primes; and how many these are.
+    fn primed(&self, expression: &Expression) -> (Span, usize) {
+        let text = expression.span.text(self.source);
+        let length = text.find(|character| !(ODE_MODEL.continues_name)(character));
+        let start = expression.span.start as usize;
+        let name = Span::new(start, start + length.unwrap_or(text.len()));
+        (name, text.matches('\'').count())
     }
 
     /// Names of one role, each with its place.
@@ -62,13 +88,24 @@ impl<'s> Names<'s> {
         Ok(())
     }
 
-    /// A name on a left side.
-    fn define(&mut self, name: Span, role: Role) -> Result<()> {
+    /// A left side.
+    fn define(&mut self, left: &Expression) -> Result<()> {
+        let (name, primes) = self.primed(left);
         let text = name.text(self.source);
         if text == "t" || is_elementary(text) {
             let problem = Problem::new(name, format!("`{text}` cannot be the name of a variable"));
             return Err(problem.hint("choose another name"));
         }
+        if primes > 1 {
+            let message = "derivatives of higher order are not supported";
+            let hint = format!("add a state for the velocity: `{text}'(t) = v(t)` and `v'(t) = …`");
+            return Err(Problem::new(left.span, message).hint(hint));
+        }
+        let role = if primes == 0 {
+            Role::Output
+        } else {
+            Role::State
+        };
         let Some((place, other)) = self.known(text) else {
             return self.insert(name, role);
         };
@@ -86,10 +123,24 @@ impl<'s> Names<'s> {
         Err(Problem::new(name, message).label(label).hint(hint))
     }
 
-    /// A name on a right side.
-    fn mention(&mut self, name: Span, role: Role) -> Result<()> {
+    /// A part of a right side.
+    fn mention(&mut self, part: &mut Expression) -> Result<()> {
+        let role = match &part.kind {
+            Kind::Name => Role::Parameter,
+            Kind::Call(call) if is_elementary(call.function.text(self.source)) => return Ok(()),
+            Kind::Call(_) => Role::Input,
+            _ => return Ok(()),
+        };
+        let (name, primes) = self.primed(part);
         let text = name.text(self.source);
+        if primes > 0 {
+            let message = "a derivative on a right side is not supported";
+            let hint = format!("write what `{text}'(t)` is equal to, from its own equation");
+            return Err(Problem::new(part.span, message).hint(hint));
+        }
+        part.kind = Kind::Name;
         match self.known(text) {
+            None if text == "t" && role == Role::Parameter => Ok(()),
             None if text == "t" => Err(Problem::new(name, "`t` is the time, not a function of it")),
             None => self.insert(name, role),
             Some((_, Role::Output)) => {
@@ -114,12 +165,13 @@ impl<'s> Names<'s> {
 pub(super) fn plant(
     source: &str,
     name: &str,
-    syntax: &ParsedModel<'_>,
-    ast: &Ast,
+    head: Span,
+    equations: &Equations,
+    mut ast: Ast,
     options: &LoadOptions,
 ) -> Result<Plant> {
-    let names = Names::new(source, syntax)?;
-    check_given(syntax.head, &names, options)?;
+    let names = Names::new(source, equations, &mut ast)?;
+    check_given(head, &names, options)?;
     let model = Model::new(name);
     let mut nodes: HashMap<&str, Node> = HashMap::from([("t", model.time().node())]);
     for (text, _) in names.of(Role::State) {
@@ -143,25 +195,26 @@ pub(super) fn plant(
         };
         nodes.insert(text, node);
     }
-    equations(source, syntax, ast, &model, &nodes)?;
+    equate(&names, equations, &ast, &model, &nodes)?;
     model
         .finish()
-        .map_err(|error| Problem::new(syntax.head, error.to_string()))
+        .map_err(|error| Problem::new(head, error.to_string()))
 }
 
 /// Evaluates the right sides.
-fn equations(
-    source: &str,
-    syntax: &ParsedModel<'_>,
+fn equate(
+    names: &Names<'_>,
+    equations: &Equations,
     ast: &Ast,
     model: &Model,
     nodes: &HashMap<&str, Node>,
 ) -> Result<()> {
     let graph = model.graph();
-    let names = &|name: &str| nodes.get(name).copied();
-    elaborate::evaluated(source, ast, graph, names, |evaluator| {
-        for &(name, role, right) in &syntax.equations {
-            let text = name.text(source);
+    let known = &|name: &str| nodes.get(name).copied();
+    elaborate::evaluated(names.source, ast, graph, known, |evaluator| {
+        // what stands on the left sides was found first, in their order
+        for (&(name, role), &(_, right)) in names.found.iter().zip(equations) {
+            let text = name.text(names.source);
             let value = evaluator.scalar(right)?.real(graph);
             let expected = || Problem::new(ast.expression(right).span, "expected a number");
             let value = graph.expr(value.ok_or_else(expected)?);

@@ -1,12 +1,12 @@
 //! Models in the notation of `@ODEmodel`, as StructuralIdentifiability.jl reads them.
 //!
-//! A file is a Julia script. [`lexer`] finds where its models begin; one of them is parsed into
+//! A file is a Julia script. [`script`] finds where its models begin; one of them is parsed into
 //! the syntax tree that Modelica has as well, so that its expressions are evaluated by the same
 //! rules. [`build`] says what its names are and makes the plant.
 
 mod build;
-mod lexer;
 mod parser;
+mod script;
 
 use std::path::Path;
 
@@ -30,8 +30,8 @@ pub(crate) fn plant(source: &str, file_name: &str, options: &LoadOptions) -> Res
         let hint = "give each a name of its own: `name = @ODEmodel(…)`";
         return Err(Problem::new(*other, message).hint(hint));
     }
-    let (model, ast) = parser::parse(source, head)?;
-    build::plant(source, chosen, &model, &ast, options)
+    let (equations, ast) = parser::parse(source, head)?;
+    build::plant(source, chosen, head, &equations, ast, options)
 }
 
 /// The models of a text, in its order: their names, and where they begin. One that is assigned to
@@ -39,7 +39,7 @@ pub(crate) fn plant(source: &str, file_name: &str, options: &LoadOptions) -> Res
 pub(crate) fn models<'s>(source: &'s str, file_name: &'s str) -> Result<Vec<(&'s str, Span)>> {
     check_length(source)?;
     let stem = Path::new(file_name).file_stem();
-    lexer::heads(
+    script::heads(
         source,
         stem.and_then(|stem| stem.to_str()).unwrap_or("model"),
     )

@@ -1,52 +1,17 @@
 //! Expressions, by precedence; names with what stands behind them: parts, subscripts, arguments.
 
+use lynkeus_expr::Binary;
+
 use super::ast::{Call, ExprId, Kind, PathPart};
-use super::lexer::{Lexer, Token, is_fixed, shortened};
-use super::parser::{Language, POWER, PRODUCT, Parser, RELATION, SUM};
+use super::lexer::{Token, shortened};
+use super::parser::{NOT, OR, POWER, PRODUCT, Parser};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_RANK;
-
-/// How tightly operators of Modelica alone bind.
-const OR: u8 = 0;
-const AND: u8 = 1;
-const NOT: u8 = 2;
-
-impl<'s> Language<'s> for Lexer<'s> {
-    const NESTED: &'static str = "name the inner parts with variables of their own";
-
-    fn next(&mut self) -> Result<(Token, Span)> {
-        self.token()
-    }
-
-    fn is_fixed(text: &str) -> bool {
-        is_fixed(text)
-    }
-
-    fn level(operator: &str) -> Option<u8> {
-        Some(match operator {
-            "or" => OR,
-            "and" => AND,
-            "<" | "<=" | ">" | ">=" | "==" | "<>" => RELATION,
-            "+" | "-" | ".+" | ".-" => SUM,
-            "*" | "/" | ".*" | "./" => PRODUCT,
-            "^" | ".^" => POWER,
-            _ => return None,
-        })
-    }
-
-    fn operand(parser: &mut Parser<'s, Self>, least: u8) -> Result<ExprId> {
-        parser.prefixed(least)
-    }
-
-    fn too_large(&self, limit: &str, span: Span) -> Problem {
-        let message = format!("the text has more than {limit} operands and operators");
-        Problem::new(span, message).hint("write repetition as `for` loops")
-    }
-}
+use crate::names::did_you_mean;
 
 impl Parser<'_> {
     /// Any expression.
-    pub(super) fn expression(&mut self) -> Result<ExprId> {
+    pub(crate) fn expression(&mut self) -> Result<ExprId> {
         if self.at("if") {
             return self.nested(Self::if_expression);
         }
@@ -96,12 +61,14 @@ impl Parser<'_> {
     }
 
     /// An operand, or `not` or a sign with what it applies to: `-a*b` is −(a b), `2*-a^2` is
-    /// 2 (−(a²)).
-    fn prefixed(&mut self, least: u8) -> Result<ExprId> {
+    /// 2 (−(a²)). On paper `-a*b` is (−a) b.
+    pub(super) fn prefixed(&mut self, least: u8) -> Result<ExprId> {
+        let on_paper = self.lexer.language.on_paper;
+        let signed = least.max(if on_paper { POWER } else { PRODUCT });
         let (kind, level): (fn(ExprId) -> Kind, u8) = match self.token {
             Token::Fixed("not") if least <= NOT => (Kind::Not, NOT),
-            Token::Fixed("-" | ".-") => (Kind::Minus, least.max(PRODUCT)),
-            Token::Fixed("+" | ".+") => (Kind::Plus, least.max(PRODUCT)),
+            Token::Fixed("-" | ".-") => (Kind::Minus, signed),
+            Token::Fixed("+" | ".+") => (Kind::Plus, signed),
             _ => return self.primary(),
         };
         let (start, first) = (self.advance()?, self.next_id());
@@ -115,6 +82,8 @@ impl Parser<'_> {
     fn primary(&mut self) -> Result<ExprId> {
         let (start, first) = (self.span, self.next_id());
         let kind = match self.token {
+            Token::Real if self.lexer.language.on_paper => return self.coefficient(),
+            Token::Identifier if self.lexer.language.on_paper => return self.function_of_time(),
             Token::Integer => Kind::Integer(self.integer_value()?),
             Token::Real => Kind::Real(self.real_value()?),
             Token::Text => Kind::Text,
@@ -138,6 +107,21 @@ impl Parser<'_> {
         self.push(kind, start, first)
     }
 
+    /// A number; or one directly before its factor, where it binds tighter than any operator but
+    /// the power: `1/2x^2` is 1/(2x²).
+    fn coefficient(&mut self) -> Result<ExprId> {
+        let (start, first) = (self.span, self.next_id());
+        let value = self.real_value()?;
+        self.advance()?;
+        let number = self.push(Kind::Real(value), start, first)?;
+        let is_adjacent = self.last.end == self.span.start;
+        if !is_adjacent || !(self.token == Token::Identifier || self.at("(")) {
+            return Ok(number);
+        }
+        let factor = (Binary::Mul, false, self.operators(POWER)?);
+        self.push(Kind::Chain(number, vec![factor]), start, first)
+    }
+
     fn integer_value(&self) -> Result<i64> {
         let text = self.span.text(self.source);
         text.parse().map_err(|_| {
@@ -149,7 +133,7 @@ impl Parser<'_> {
     fn parenthesised(&mut self) -> Result<ExprId> {
         self.advance()?;
         let inner = self.expression()?;
-        if self.at(",") {
+        if self.at(",") && !self.lexer.language.on_paper {
             let hint = "write one equation for each component";
             return Err(self.refuse("a list in parentheses", hint));
         }
@@ -256,6 +240,52 @@ impl Parser<'_> {
             self.identifier("a name after `.`")?;
         }
         Ok(start.to(self.last))
+    }
+
+    /// `a`, `x(t)`, `x'(t)` or `exp(…)`, where functions of time are written so: those are calls
+    /// without arguments, of a name that ends with its primes.
+    pub(crate) fn function_of_time(&mut self) -> Result<ExprId> {
+        let (name, first) = (self.advance()?, self.next_id());
+        while self.accept("'")? {}
+        let function = name.to(self.last);
+        if !self.at("(") {
+            return self.push(Kind::Name, name, first);
+        }
+        let known = self.lexer.language.functions;
+        if known.contains(&function.text(self.source)) {
+            return self.call(function);
+        }
+        self.advance()?;
+        let is_time = self.token == Token::Identifier && self.span.text(self.source) == "t";
+        if !is_time && function == name {
+            return Err(self.unknown_function(name));
+        }
+        if is_time {
+            self.advance()?;
+        }
+        if !is_time || !self.at(")") {
+            let text = name.text(self.source);
+            let problem = self.unexpected(&format!("`{text}(t)`"));
+            let hint = "functions have the argument `t` alone: no delays, no discrete time";
+            return Err(problem.hint(hint));
+        }
+        self.advance()?;
+        let call = Call {
+            function,
+            ..Call::default()
+        };
+        self.push_at(Kind::Call(call), function, first)
+    }
+
+    fn unknown_function(&self, name: Span) -> Problem {
+        let text = name.text(self.source);
+        let known = self.lexer.language.functions;
+        let hint = did_you_mean(text, known.iter().copied()).unwrap_or_else(|| {
+            let known = known.join(" ");
+            format!("functions of time read `{text}(t)`, products `{text}*(…)`; there are {known}")
+        });
+        let message = format!("unknown function `{}`", shortened(text));
+        Problem::new(name, message).hint(hint)
     }
 
     fn call(&mut self, function: Span) -> Result<ExprId> {

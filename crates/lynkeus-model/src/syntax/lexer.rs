@@ -2,9 +2,8 @@
 //! of a token means.
 
 use std::borrow::Cow;
-use std::collections::HashSet;
-use std::sync::LazyLock;
 
+use super::language::Language;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_NAME;
 
@@ -33,38 +32,12 @@ impl Token {
     }
 }
 
-/// Words of Modelica that cannot be names.
-static RESERVED: LazyLock<HashSet<&str>> = LazyLock::new(|| {
-    "algorithm and annotation block break class connect connector constant constrainedby der \
-     discrete each else elseif elsewhen encapsulated end enumeration equation expandable extends \
-     external false final flow for function if import impure in initial inner input loop model \
-     not operator or outer output package parameter partial protected public pure record \
-     redeclare replaceable return stream then true type when while within"
-        .split_whitespace()
-        .collect()
-});
-
-/// Operators and punctuation; longer ones first.
-const SYMBOLS: [&str; 28] = [
-    ".+", ".-", ".*", "./", ".^", ":=", "<>", "<=", ">=", "==", "+", "-", "*", "/", "^", "=", "<",
-    ">", "(", ")", "[", "]", "{", "}", ",", ";", ":", ".",
-];
-
 /// At most 40 characters of a text.
 pub(crate) fn shortened(text: &str) -> String {
     match text.char_indices().nth(40) {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text.to_owned(),
     }
-}
-
-/// Refuses names beyond the limit.
-pub(crate) fn check_name(span: Span) -> Result<()> {
-    if (span.end - span.start) as usize <= MAX_NAME {
-        return Ok(());
-    }
-    let message = format!("this name is longer than {MAX_NAME} characters");
-    Err(Problem::new(span, message).hint("choose a shorter name"))
 }
 
 /// The text of a string token without quotes and escapes.
@@ -86,103 +59,86 @@ pub(crate) fn unquoted(token: &str) -> String {
     text
 }
 
-/// Whether Modelica has a token that is always written so.
-pub(super) fn is_fixed(text: &str) -> bool {
-    RESERVED.contains(text) || SYMBOLS.contains(&text)
-}
-
 /// Reads tokens from a text.
 #[derive(Clone)]
 pub(crate) struct Lexer<'s> {
     pub(crate) source: &'s str,
+    pub(crate) language: &'static Language,
     pub(crate) position: usize,
 }
 
-/// What all languages have.
 impl<'s> Lexer<'s> {
+    pub(crate) fn new(source: &'s str, language: &'static Language) -> Self {
+        // A byte order mark is not part of the text.
+        let position = if source.starts_with('\u{feff}') { 3 } else { 0 };
+        Self {
+            source,
+            language,
+            position,
+        }
+    }
+
     pub(crate) fn rest(&self) -> &'s str {
         self.source.get(self.position..).unwrap_or_default()
     }
 
-    pub(crate) fn byte(&self, ahead: usize) -> Option<u8> {
+    fn byte(&self, ahead: usize) -> Option<u8> {
         self.source.as_bytes().get(self.position + ahead).copied()
     }
 
-    pub(crate) fn digit_at(&self, ahead: usize) -> bool {
+    fn digit_at(&self, ahead: usize) -> bool {
         self.byte(ahead).is_some_and(|byte| byte.is_ascii_digit())
     }
 
-    /// Digits, with what may separate them.
-    fn digits(&mut self, separators: &[char]) {
-        while self.digit_at(0) || (self.rest().starts_with(separators) && self.digit_at(1)) {
-            self.position += 1;
-        }
-    }
-
-    /// Digits, with a point and an exponent behind one of these letters.
-    pub(crate) fn number(&mut self, exponents: &[char], separators: &[char]) -> Token {
-        let mut token = Token::Integer;
-        self.digits(separators);
-        // `2.*x` is the elementwise product `2 .* x`, not `2.` times `x`.
-        let elementwise = matches!(self.byte(1), Some(b'*' | b'/' | b'^' | b'+' | b'-'));
-        if self.byte(0) == Some(b'.') && !elementwise {
-            token = Token::Real;
-            self.position += 1;
-            self.digits(separators);
-        }
-        let sign = usize::from(matches!(self.byte(1), Some(b'+' | b'-')));
-        if self.rest().starts_with(exponents) && self.digit_at(1 + sign) {
-            token = Token::Real;
-            self.position += 1 + sign;
-            self.digits(separators);
-        }
-        token
-    }
-
-    /// One of the operators; for other characters a refusal with what to write instead.
-    pub(crate) fn symbol(
-        &mut self,
-        known: &[&'static str],
-        hint: fn(char) -> Option<&'static str>,
-    ) -> Result<Token> {
+    /// Passes over the characters of a name; returns them.
+    pub(crate) fn name(&mut self) -> &'s str {
         let rest = self.rest();
-        if let Some(text) = known.iter().find(|text| rest.starts_with(**text)) {
-            self.position += text.len();
-            return Ok(Token::Fixed(text));
-        }
-        let found = rest.chars().next().unwrap_or_default();
-        let span = Span::new(self.position, self.position + found.len_utf8());
-        let zero = (found == '\0').then_some("the text holds a zero byte: is this a text file?");
-        let problem = Problem::new(span, format!("unexpected character {found:?}"));
-        Err(problem.maybe_hint(hint(found).or(zero)))
-    }
-}
-
-/// Those of Modelica.
-impl<'s> Lexer<'s> {
-    pub(crate) fn new(source: &'s str) -> Self {
-        // A byte order mark is not part of the text.
-        let position = if source.starts_with('\u{feff}') { 3 } else { 0 };
-        Self { source, position }
+        let length = rest.find(|character| !(self.language.continues_name)(character));
+        let name = &rest[..length.unwrap_or(rest.len())];
+        self.position += name.len();
+        name
     }
 
-    fn take_while(&mut self, accept: impl Fn(u8) -> bool) {
-        while self.byte(0).is_some_and(&accept) {
-            self.position += 1;
+    /// Passes over the comment that begins here; false where none does.
+    pub(crate) fn comment(&mut self) -> Result<bool> {
+        let rest = self.rest();
+        if rest.starts_with(self.language.comment[0]) {
+            return self.comment_within().map(|()| true);
         }
+        let found = rest.starts_with(self.language.line_comment);
+        if found {
+            self.position += rest.find('\n').unwrap_or(rest.len());
+        }
+        Ok(found)
+    }
+
+    fn comment_within(&mut self) -> Result<()> {
+        let [opening, closing] = self.language.comment;
+        let (start, bytes) = (self.position, self.source.as_bytes());
+        let mut open = 1usize;
+        self.position += opening.len();
+        while open > 0 {
+            let rest = bytes.get(self.position..).unwrap_or_default();
+            if rest.is_empty() {
+                return Err(no_end("comment", start, opening, closing));
+            } else if rest.starts_with(closing.as_bytes()) {
+                open -= 1;
+                self.position += closing.len();
+            } else if self.language.nests && rest.starts_with(opening.as_bytes()) {
+                open += 1;
+                self.position += opening.len();
+            } else {
+                self.position += 1;
+            }
+        }
+        Ok(())
     }
 
     fn skip_blank(&mut self) -> Result<()> {
         loop {
-            self.take_while(|byte| byte.is_ascii_whitespace() || byte == 0x0b);
-            if self.rest().starts_with("//") {
-                self.take_while(|byte| byte != b'\n');
-            } else if self.rest().starts_with("/*") {
-                let behind = self.position + 2;
-                let length = self.source[behind..].find("*/");
-                let length = length.ok_or_else(|| no_end("comment", self.position, "/*", "*/"))?;
-                self.position = behind + length + 2;
-            } else {
+            let rest = self.rest();
+            self.position += rest.len() - rest.trim_start_matches(self.language.is_blank).len();
+            if !self.comment()? {
                 return Ok(());
             }
         }
@@ -191,83 +147,120 @@ impl<'s> Lexer<'s> {
     /// The next token; `Token::End` from the end of the text on.
     pub(crate) fn token(&mut self) -> Result<(Token, Span)> {
         self.skip_blank()?;
-        let start = self.position;
-        let token = match self.byte(0) {
+        let (start, rest, language) = (self.position, self.rest(), self.language);
+        let token = match rest.chars().next() {
             None => Token::End,
-            Some(byte) if is_name_start(byte) => self.word(),
-            Some(byte) if byte.is_ascii_digit() => self.number_alone()?,
-            Some(b'"') => self.quoted("\"", "string", Token::Text)?,
-            Some(b'\'') => self.quoted("'", "quoted name", Token::Identifier)?,
-            Some(_) => self.symbol(&SYMBOLS, character_hint)?,
+            Some(character) if (language.starts_name)(character) => self.word()?,
+            Some(character) if character.is_ascii_digit() => self.number()?,
+            Some('.') if language.on_paper && self.digit_at(1) => self.number()?,
+            Some(_) => match self.quoted()? {
+                Some(token) => token,
+                None => self.symbol()?,
+            },
         };
         let span = Span::new(start, self.position);
-        if token == Token::Identifier {
-            check_name(span)?;
+        if token == Token::Identifier && self.position - start > MAX_NAME {
+            let message = format!("this name is longer than {MAX_NAME} characters");
+            return Err(Problem::new(span, message).hint("choose a shorter name"));
         }
         Ok((token, span))
     }
 
-    fn word(&mut self) -> Token {
+    fn word(&mut self) -> Result<Token> {
         let start = self.position;
-        self.take_while(is_name_part);
-        let reserved = RESERVED.get(&self.source[start..self.position]);
-        reserved.map_or(Token::Identifier, |text| Token::Fixed(text))
-    }
-
-    fn number_alone(&mut self) -> Result<Token> {
-        let start = self.position;
-        let token = self.number(&['e', 'E'], &[]);
-        let end = self.position;
-        self.take_while(is_name_part);
-        if self.position == end {
-            return Ok(token);
-        }
+        let Some(word) = (self.language.reserved)(self.name()) else {
+            return Ok(Token::Identifier);
+        };
+        let Some(instead) = self.language.instead else {
+            return Ok(Token::Fixed(word));
+        };
         let span = Span::new(start, self.position);
-        Err(Problem::new(span, "a number runs into a name")
-            .hint("write a product with `*`; a name starts with a letter"))
+        let message = format!("`{word}` is not supported in a model");
+        Err(Problem::new(span, message).hint(instead))
     }
 
-    fn quoted(&mut self, quote: &str, what: &str, token: Token) -> Result<Token> {
-        let start = self.position;
-        self.position += 1;
-        while let Some(byte) = self.byte(0) {
+    /// Digits, with what may separate them.
+    fn digits(&mut self) {
+        let separators = self.language.separators;
+        while self.digit_at(0) || (self.rest().starts_with(separators) && self.digit_at(1)) {
             self.position += 1;
-            match byte {
-                b'\\' => self.position = self.source.len().min(self.position + 1),
-                _ if quote.as_bytes() == [byte] => return Ok(token),
-                _ => {}
+        }
+    }
+
+    /// Digits, with a point and an exponent.
+    fn number(&mut self) -> Result<Token> {
+        let (start, language) = (self.position, self.language);
+        let mut is_whole = !language.on_paper;
+        self.digits();
+        // `2.*x` is the elementwise product `2 .* x`, not `2.` times `x`.
+        let elementwise = matches!(self.byte(1), Some(b'*' | b'/' | b'^' | b'+' | b'-'));
+        if self.byte(0) == Some(b'.') && !elementwise {
+            is_whole = false;
+            self.position += 1;
+            self.digits();
+        }
+        let sign = usize::from(matches!(self.byte(1), Some(b'+' | b'-')));
+        if self.rest().starts_with(language.exponents) && self.digit_at(1 + sign) {
+            is_whole = false;
+            self.position += 1 + sign;
+            self.digits();
+        }
+        let end = self.position;
+        let wrong = (language.wrong_number)(&self.source[start..end], self.name());
+        if let Some([message, hint]) = wrong {
+            return Err(Problem::new(Span::new(start, self.position), message).hint(hint));
+        }
+        self.position = end;
+        Ok(if is_whole {
+            Token::Integer
+        } else {
+            Token::Real
+        })
+    }
+
+    /// What stands between quotes, where some begin here.
+    pub(crate) fn quoted(&mut self) -> Result<Option<Token>> {
+        let (start, rest) = (self.position, self.rest());
+        let mut quotes = self.language.quotes.iter();
+        let Some(&(quote, what)) = quotes.find(|(quote, _)| rest.starts_with(quote)) else {
+            return Ok(None);
+        };
+        self.position += quote.len();
+        while let Some(byte) = self.byte(0) {
+            if self.rest().starts_with(quote) {
+                self.position += quote.len();
+                let is_text = quote.starts_with('"');
+                return Ok(Some(if is_text {
+                    Token::Text
+                } else {
+                    Token::Identifier
+                }));
             }
+            self.position += if byte == b'\\' { 2 } else { 1 };
         }
         Err(no_end(what, start, quote, quote))
+    }
+
+    /// An operator; for other characters a refusal with what to write instead.
+    fn symbol(&mut self) -> Result<Token> {
+        let rest = self.rest();
+        let mut symbols = self.language.symbols.iter();
+        if let Some(text) = symbols.find(|text| rest.starts_with(**text)) {
+            self.position += text.len();
+            return Ok(Token::Fixed(text));
+        }
+        let found = rest.chars().next().unwrap_or_default();
+        let span = Span::new(self.position, self.position + found.len_utf8());
+        let zero = (found == '\0').then_some("the text holds a zero byte: is this a text file?");
+        let problem = Problem::new(span, format!("unexpected character {found:?}"));
+        Err(problem.maybe_hint((self.language.hint)(found).or(zero)))
     }
 }
 
 /// The refusal of what begins somewhere and does not end.
-pub(crate) fn no_end(what: &str, start: usize, opening: &str, closing: &str) -> Problem {
+fn no_end(what: &str, start: usize, opening: &str, closing: &str) -> Problem {
     let span = Span::new(start, start + opening.len());
     Problem::new(span, format!("this {what} has no end")).hint(format!("close it with `{closing}`"))
-}
-
-fn character_hint(found: char) -> Option<&'static str> {
-    Some(match found {
-        '!' => "write `not a`, or `<>` for \"not equal\"",
-        '&' => "write `and`",
-        '|' => "write `or`",
-        '%' => "write `mod(a, b)` or `rem(a, b)`",
-        _ if found.is_alphabetic() => {
-            "names are ASCII letters, digits and `_`; put other names in single quotes"
-        }
-        _ => return None,
-    })
-}
-
-fn is_name_start(byte: u8) -> bool {
-    // compilers name what they add with `$`
-    byte.is_ascii_alphabetic() || byte == b'_' || byte == b'$'
-}
-
-fn is_name_part(byte: u8) -> bool {
-    byte.is_ascii_alphanumeric() || byte == b'_' || byte == b'$'
 }
 
 /// A name without quotes, blanks and a leading dot: `'r1.p.v'`, `'r1'.'p'.v` and `r1.p.v` are
@@ -303,10 +296,15 @@ fn without_quotes(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::language::{MODELICA, ODE_MODEL};
     use super::*;
 
     fn tokens(text: &str) -> Vec<(Token, &str)> {
-        let mut lexer = Lexer::new(text);
+        all(text, &MODELICA)
+    }
+
+    fn all<'s>(text: &'s str, language: &'static Language) -> Vec<(Token, &'s str)> {
+        let mut lexer = Lexer::new(text, language);
         let mut all = vec![];
         loop {
             let (token, span) = lexer.token().unwrap();
@@ -352,7 +350,7 @@ mod tests {
     #[test]
     fn unterminated() {
         for text in ["/* x", "\"x", "'x", "\"x\\"] {
-            let refused = Lexer::new(text).token().unwrap_err();
+            let refused = Lexer::new(text, &MODELICA).token().unwrap_err();
             assert!(refused.into_details().message.contains("no end"));
         }
     }
@@ -360,7 +358,7 @@ mod tests {
     #[test]
     fn refuses_strange_characters() {
         for text in ["\0", "θ", "#", "2x"] {
-            assert!(Lexer::new(text).token().is_err(), "{text:?}");
+            assert!(Lexer::new(text, &MODELICA).token().is_err(), "{text:?}");
         }
     }
 
@@ -378,5 +376,34 @@ mod tests {
         assert_eq!(plain("'m[1].x'"), "m[1].x");
         assert_eq!(plain("m[1] .x"), "m[1].x");
         assert_eq!(plain("'a b'"), "a b");
+    }
+
+    #[test]
+    fn numbers_of_ode_models() {
+        for text in ["1", "1_000", "1.5", ".5", "2.", "1.0e-3", "1e6", "2E+3"] {
+            assert_eq!(all(text, &ODE_MODEL), [(Token::Real, text)]);
+        }
+        let factor = [(Token::Real, "2"), (Token::Identifier, "e")];
+        assert_eq!(all("2e", &ODE_MODEL), factor);
+        for text in ["1f0", "0x1f", "0b1", "0o7"] {
+            assert!(Lexer::new(text, &ODE_MODEL).token().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn names_and_comments_of_ode_models() {
+        for name in ["β", "x₁", "_a", "ẋ", "x\u{302}", "In", "δₜ"] {
+            assert_eq!(all(name, &ODE_MODEL), [(Token::Identifier, name)]);
+        }
+        assert_eq!(all("a # b\n #= c #= d =# =# e", &ODE_MODEL).len(), 2);
+    }
+
+    #[test]
+    fn refuses_what_no_ode_model_has() {
+        for text in ["\0", "[", "!", "\"", "2.*x", "begin", "#=", ";"] {
+            let mut lexer = Lexer::new(text, &ODE_MODEL);
+            let first = lexer.token();
+            assert!(first.and_then(|_| lexer.token()).is_err(), "{text:?}");
+        }
     }
 }

@@ -3,46 +3,26 @@
 use lynkeus_expr::Binary;
 
 use super::ast::{Ast, Class, ExprId, Expression, Kind, Term};
+use super::language::{MODELICA, is_fixed};
 use super::lexer::{Lexer, Token, shortened, unquoted};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::{MAX_NESTING, MAX_SOURCE_BYTES, MAX_SYNTAX_NODES, grouped};
 
-/// How tightly operators bind that languages share, loosest first.
-pub(crate) const RELATION: u8 = 3;
-pub(crate) const SUM: u8 = 4;
-pub(crate) const PRODUCT: u8 = 5;
-pub(crate) const POWER: u8 = 7;
-
-/// What the parser asks of a language.
-pub(crate) trait Language<'s>: Sized {
-    /// What to do about parts that are nested too deep.
-    const NESTED: &'static str;
-
-    /// The next token; `Token::End` from the end of the text on.
-    fn next(&mut self) -> Result<(Token, Span)>;
-
-    /// Whether there is a token that is always written so.
-    fn is_fixed(text: &str) -> bool;
-
-    /// How tightly an operator between two operands binds.
-    fn level(operator: &str) -> Option<u8>;
-
-    /// What stands before an operator, behind one of the level `least`.
-    fn operand(parser: &mut Parser<'s, Self>, least: u8) -> Result<ExprId>;
-
-    /// The refusal of more than so many parts.
-    fn too_large(&self, limit: &str, span: Span) -> Problem;
-
-    /// What to do where the text ends too early.
-    fn hint_at_end(&self) -> Option<String> {
-        None
-    }
-}
+/// How tightly operators bind.
+pub(super) const OR: u8 = 0;
+pub(super) const AND: u8 = 1;
+pub(super) const NOT: u8 = 2;
+pub(super) const RELATION: u8 = 3;
+pub(super) const SUM: u8 = 4;
+pub(super) const PRODUCT: u8 = 5;
+/// of `//`: `1/2//3` is `1/(2//3)`
+pub(super) const RATIONAL: u8 = 6;
+pub(super) const POWER: u8 = 7;
 
 /// Recursive-descent parser with one token of lookahead.
-pub(crate) struct Parser<'s, L = Lexer<'s>> {
+pub(crate) struct Parser<'s> {
     pub(crate) source: &'s str,
-    pub(crate) language: L,
+    pub(super) lexer: Lexer<'s>,
     pub(crate) token: Token,
     pub(crate) span: Span,
     /// the token before the current one
@@ -86,37 +66,37 @@ pub(crate) fn parse_single_expression(source: &str) -> Result<(Ast, ExprId)> {
 
 fn modelica(source: &str) -> Result<Parser<'_>> {
     check_length(source)?;
-    let mut parser = Parser::behind(Span::default(), source, Lexer::new(source));
-    parser.advance()?;
-    Ok(parser)
+    Parser::at_first(Lexer::new(source, &MODELICA))
 }
 
-impl<'s, L: Language<'s>> Parser<'s, L> {
-    /// A parser whose first token is behind `place`.
-    pub(crate) fn behind(place: Span, source: &'s str, language: L) -> Self {
-        Self {
-            source,
-            language,
+impl<'s> Parser<'s> {
+    /// A parser at the first token of the lexer.
+    pub(crate) fn at_first(lexer: Lexer<'s>) -> Result<Self> {
+        let mut parser = Self {
+            source: lexer.source,
+            lexer,
             token: Token::End,
-            span: place,
-            last: place,
+            span: Span::default(),
+            last: Span::default(),
             depth: 0,
             nodes: 0,
             ast: Ast::default(),
             classes: vec![],
-        }
+        };
+        parser.advance()?;
+        Ok(parser)
     }
 
     /// Moves to the next token; returns the span of the one left behind.
     pub(crate) fn advance(&mut self) -> Result<Span> {
         self.last = self.span;
-        (self.token, self.span) = self.language.next()?;
+        (self.token, self.span) = self.lexer.token()?;
         Ok(self.last)
     }
 
     /// True at what is always written so.
     pub(crate) fn at(&self, text: &'static str) -> bool {
-        debug_assert!(L::is_fixed(text), "nothing is always written `{text}`");
+        debug_assert!(is_fixed(text), "nothing is always written `{text}`");
         self.token == Token::Fixed(text)
     }
 
@@ -169,9 +149,10 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
     /// "expected …, found …" at the current token.
     pub(crate) fn unexpected(&self, expected: &str) -> Problem {
         let found = self.token.describe(self.span.text(self.source));
-        let problem = Problem::new(self.span, format!("expected {expected}, found {found}"));
-        let is_end = self.token == Token::End;
-        problem.maybe_hint(is_end.then(|| self.language.hint_at_end()).flatten())
+        let mut advice = self.lexer.language.advice.iter();
+        let advice = advice.find(|(sign, _)| self.token == Token::Fixed(sign));
+        Problem::new(self.span, format!("expected {expected}, found {found}"))
+            .maybe_hint(advice.map(|(_, what)| *what))
     }
 
     /// Operands joined by operators that bind at least as tightly as `least`.
@@ -182,7 +163,7 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
     /// The operator that stands here, and how tightly it binds.
     fn operator(&self) -> Option<(&'static str, u8)> {
         match self.token {
-            Token::Fixed(text) => Some((text, L::level(text)?)),
+            Token::Fixed(text) => Some((text, level(text)?)),
             _ => None,
         }
     }
@@ -191,13 +172,17 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
     /// the tree does not grow with its length.
     fn operators_here(&mut self, least: u8) -> Result<ExprId> {
         let (start, first) = (self.span, self.next_id());
-        let mut left = L::operand(self, least)?;
+        let mut left = self.prefixed(least)?;
         while let Some((text, level)) = self.operator().filter(|(_, level)| *level >= least) {
             let kind = match level {
                 RELATION => {
                     let right =
                         self.only_operand(RELATION, "comparison", "join comparisons with `and`")?;
                     Kind::Relation(text, left, right)
+                }
+                POWER if self.lexer.language.on_paper => {
+                    self.advance()?;
+                    Kind::Power(left, self.operators(POWER)?, false)
                 }
                 POWER => {
                     let hint = "write `(a^b)^c` or `a^(b^c)`: `^` has no order of its own";
@@ -250,9 +235,11 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
     /// Modelica has no sign behind `^` or behind another sign.
     pub(super) fn refuse_sign(&self, expected: &str, example: &str) -> Result<()> {
         match self.token {
-            Token::Fixed("-" | ".-" | "+" | ".+") => Err(self.unexpected(expected).hint(format!(
-                "Modelica takes no sign here: put it in parentheses, {example}"
-            ))),
+            Token::Fixed("-" | ".-" | "+" | ".+") if !self.lexer.language.on_paper => {
+                Err(self.unexpected(expected).hint(format!(
+                    "Modelica takes no sign here: put it in parentheses, {example}"
+                )))
+            }
             _ => Ok(()),
         }
     }
@@ -261,7 +248,7 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
     pub(crate) fn nested<T>(&mut self, parse: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
         if self.depth >= MAX_NESTING {
             let message = format!("nested more than {MAX_NESTING} levels deep");
-            return Err(Problem::new(self.span, message).hint(L::NESTED));
+            return Err(Problem::new(self.span, message).hint(self.lexer.language.too_deep));
         }
         self.depth += 1;
         let result = parse(self);
@@ -274,7 +261,9 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
         self.nodes += weight;
         if self.nodes > MAX_SYNTAX_NODES {
             let limit = grouped(MAX_SYNTAX_NODES as u64);
-            return Err(self.language.too_large(&limit, self.span));
+            let message = format!("the text has more than {limit} operands and operators");
+            let hint = self.lexer.language.too_large;
+            return Err(Problem::new(self.span, message).maybe_hint(hint));
         }
         Ok(())
     }
@@ -310,10 +299,24 @@ impl<'s, L: Language<'s>> Parser<'s, L> {
     }
 }
 
+/// How tightly an operator between two operands binds.
+fn level(operator: &str) -> Option<u8> {
+    Some(match operator {
+        "or" => OR,
+        "and" => AND,
+        "<" | "<=" | ">" | ">=" | "==" | "<>" => RELATION,
+        "+" | "-" | ".+" | ".-" => SUM,
+        "*" | "/" | ".*" | "./" => PRODUCT,
+        "//" => RATIONAL,
+        "^" | ".^" => POWER,
+        _ => return None,
+    })
+}
+
 impl Parser<'_> {
     /// So many tokens behind the current one.
     fn ahead(&self, count: usize) -> impl Iterator<Item = Token> {
-        let mut lexer = self.language.clone();
+        let mut lexer = self.lexer.clone();
         let tokens = std::iter::from_fn(move || Some(lexer.token().ok()?.0));
         tokens.take(count).take_while(|token| *token != Token::End)
     }

@@ -38,7 +38,7 @@ fn equations() {
         t'(t) = 1 ⟶ 1 `t` cannot be the name of a variable (choose another name)
         time'(t) = 1 ⟶ 1 `time` cannot be the name of a variable (the time is `t`; choose another name for anything else)
         x'(t) = 1 y(t) = 2 ⟶ 11 expected an operator, `,` or `)`, found `y`
-        x'(t) = a = b ⟶ 11 expected an operator, `,` or `)`, found `=`
+        x'(t) = a = b ⟶ 11 expected an operator, `,` or `)`, found `=` (an equation has one `=`)
         x'(t) = 1; y(t) = 2 ⟶ 10 unexpected character ';' (separate equations by commas)
         x'(t) = 1,, ⟶ 11 expected an equation or `)`, found `,` (equations read `x'(t) = …` for a state, `y(t) = …` for an output)
         ",
@@ -63,7 +63,7 @@ fn right_sides() {
         x'(t) = (1 2) ⟶ 12 expected `)`, found `2`
         x'(t) = ⟶ 8 expected an operand, found `)`
         x'(t) = 1 + ⟶ 12 expected an operand, found `)`
-        x'(t) = 1 == a ⟶ 11 expected an operator, `,` or `)`, found `=`
+        x'(t) = 1 == a ⟶ 11 expected an operator, `,` or `)`, found `=` (an equation has one `=`)
         x'(t) = x(t) < 1 ⟶ 14 unexpected character '<' (conditions are not supported in this notation)
         x'(t) = a[1] ⟶ 10 unexpected character '[' (arrays are not supported: write every element as a function of its own)
         x'(t) = 2 .* a ⟶ 11 unexpected character '.' (operators on arrays are not supported: write the operator without `.`)
