@@ -68,6 +68,9 @@ fn right_sides() {
         x'(t) = a[1] ⟶ 10 unexpected character '[' (arrays are not supported: write every element as a function of its own)
         x'(t) = 2 .* a ⟶ 11 unexpected character '.' (operators on arrays are not supported: write the operator without `.`)
         x'(t) = if a b end ⟶ 9 `if` is not supported in a model (a model holds equations such as `x'(t) = …` only)
+        x'(t) = \"a\" ⟶ 9 a string here is not supported (use numbers)
+        x'(t) = (1, 2) ⟶ 11 expected `)`, found `,`
+        x'(t) = x(t)' ⟶ 13 expected an operator, `,` or `)`, found `'` (a derivative reads `x'(t)`)
         x'(t) = 1f0 ⟶ 9 this form of number is not supported (numbers read `12`, `1_000`, `1//2`, `0.5` or `1.0e-3`)
         x'(t) = 1e999 ⟶ 9 the number 1e999 is too large
         x'(t) = time ⟶ 9 `time` cannot be the name of a variable (the time is `t`; choose another name for anything else)
