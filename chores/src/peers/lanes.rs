@@ -93,6 +93,6 @@ pub(super) fn seconds(own: bool) -> Result<f64, Error> {
         return Ok(f64::INFINITY);
     };
     let clock = Clock::start();
-    while batch.advance(1, 1)? {}
+    while batch.advance(1, 1, &|| false)? {}
     Ok(clock.seconds() / (RUNS as f64 * (UNTIL / STEP)))
 }

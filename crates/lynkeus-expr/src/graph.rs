@@ -22,7 +22,6 @@ const MOST: usize = 20_000;
 #[derive(Clone, PartialEq, Eq, Hash)]
 enum Key {
     Constant(u64),
-    Symbol(u32),
     Unary(Unary, Node),
     Powi(Node, i32),
     Binary(Binary, Node, Node),
@@ -54,7 +53,7 @@ impl Inner {
         if let Some(&node) = self.known.get(&key) {
             return node;
         }
-        if !matches!(op, Op::Constant(_) | Op::Symbol(_)) && self.is_spent() {
+        if !matches!(op, Op::Constant(_)) && self.is_spent() {
             return self.nothing();
         }
         let node = self.push(op);
@@ -205,7 +204,7 @@ impl Graph {
         let mut inner = self.inner.borrow_mut();
         let index = inner.names.len() as u32;
         inner.names.push(label.into());
-        let node = inner.intern(Key::Symbol(index), Op::Symbol(index));
+        let node = inner.push(Op::Symbol(index));
         Expr::new(self, node)
     }
 

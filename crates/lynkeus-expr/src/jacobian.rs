@@ -8,10 +8,6 @@ use crate::{Binary, Call, Graph, Node, Op, Unary};
 /// A sparse matrix of expressions ∂(outputs)/∂(inputs).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Jacobian {
-    /// number of outputs
-    pub rows: usize,
-    /// number of inputs
-    pub columns: usize,
     /// (row, column, expression), sorted; entries left out are zero everywhere
     pub entries: Vec<(usize, usize, Node)>,
 }
@@ -42,27 +38,30 @@ fn times(graph: &Graph, a: Node, b: Node) -> Node {
     graph.binary(Binary::Mul, a, b)
 }
 
-fn plus(graph: &Graph, a: Option<Node>, b: Node) -> Node {
-    match a {
-        Some(a) => graph.binary(Binary::Add, a, b),
-        None => b,
-    }
-}
-
-/// sum − slope·d; without a slope, which is then −1, sum + d.
-fn less(graph: &Graph, sum: Option<Node>, slope: Option<Node>, d: Node) -> Node {
+/// Takes slope·d from a sum; without a slope, which is then −1, d is added.
+fn take_from<K: Ord>(
+    graph: &Graph,
+    sums: &mut BTreeMap<K, Node>,
+    key: K,
+    slope: Option<Node>,
+    d: Node,
+) {
     let Some(slope) = slope else {
-        return plus(graph, sum, d);
+        return add_to(graph, sums, key, d);
     };
     let term = times(graph, slope, d);
-    match sum {
-        Some(sum) => graph.binary(Binary::Sub, sum, term),
+    let less = match sums.get(&key) {
+        Some(&sum) => graph.binary(Binary::Sub, sum, term),
         None => graph.unary(Unary::Neg, term),
-    }
+    };
+    sums.insert(key, less);
 }
 
 fn add_to<K: Ord>(graph: &Graph, sums: &mut BTreeMap<K, Node>, key: K, term: Node) {
-    let sum = plus(graph, sums.get(&key).copied(), term);
+    let sum = match sums.get(&key) {
+        Some(&sum) => graph.binary(Binary::Add, sum, term),
+        None => term,
+    };
     sums.insert(key, sum);
 }
 
@@ -78,14 +77,10 @@ pub fn forward(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Jacobian {
     let seeds = seeds.map(|(column, &input)| (input, Tangent::from([(column, one)])));
     let tangents = accumulated(graph, outputs, seeds.collect(), None);
     let entries = outputs.iter().enumerate().flat_map(|(row, output)| {
-        let tangent = tangents.get(output).cloned().unwrap_or_default();
-        tangent
-            .into_iter()
-            .map(move |(column, node)| (row, column, node))
+        let tangent = tangents.get(output).into_iter().flatten();
+        tangent.map(move |(&column, &node)| (row, column, node))
     });
     Jacobian {
-        rows: outputs.len(),
-        columns: inputs.len(),
         entries: entries.collect(),
     }
 }
@@ -175,8 +170,7 @@ fn system_tangents(
     for (row, argument, slope) in call.slopes(graph, node) {
         for (&column, &dp) in tangents.get(&argument).into_iter().flatten() {
             let sums = right.entry(column).or_default();
-            let sum = less(graph, sums.get(&row).copied(), slope, dp);
-            sums.insert(row, sum);
+            take_from(graph, sums, row, slope, dp);
         }
     }
     let matrix = call.matrix(graph, node);
@@ -187,22 +181,14 @@ fn system_tangents(
         .collect()
 }
 
-/// The Jacobian by reverse accumulation: cheap where outputs are few.
-pub fn reverse(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Jacobian {
-    let mut jacobian = Jacobian {
-        rows: outputs.len(),
-        columns: inputs.len(),
-        entries: vec![],
-    };
-    for (row, &output) in outputs.iter().enumerate() {
-        let adjoints = adjoints(graph, output, inputs);
-        for (column, input) in inputs.iter().enumerate() {
-            if let Some(&adjoint) = adjoints.get(input) {
-                jacobian.entries.push((row, column, adjoint));
-            }
-        }
-    }
-    jacobian
+/// The inputs that an output depends on, each with the slope by it, by reverse accumulation: cheap
+/// however many inputs there are.
+pub fn gradient(graph: &Graph, output: Node, inputs: &[Node]) -> Vec<(Node, Node)> {
+    let adjoints = adjoints(graph, output, inputs);
+    let slopes = inputs
+        .iter()
+        .map(|&input| Some((input, *adjoints.get(&input)?)));
+    slopes.flatten().collect()
 }
 
 /// ∂(output)/∂(node) for every node that the output depends on; inputs count as
@@ -256,8 +242,7 @@ fn system_adjoints(
     let transposed: Vec<Node> = (0..n * n).map(|k| matrix[k % n * n + k / n]).collect();
     let λ = solve(graph, call, &transposed, results);
     for (row, argument, slope) in call.slopes(graph, node) {
-        let sum = less(graph, adjoints.get(&argument).copied(), slope, λ[row]);
-        adjoints.insert(argument, sum);
+        take_from(graph, adjoints, argument, slope, λ[row]);
     }
 }
 

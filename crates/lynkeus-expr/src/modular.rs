@@ -298,6 +298,19 @@ impl Random {
     }
 }
 
+/// The vector with 1 in one place and 0 in the others.
+pub fn unit(width: usize, place: usize) -> Vec<Modular> {
+    let mut unit = vec![Modular::ZERO; width];
+    unit[place] = Modular::ONE;
+    unit
+}
+
+/// Σ a_k b_k, over as many as both have.
+pub fn dot(a: &[Modular], b: &[Modular]) -> Modular {
+    let terms = a.iter().zip(b).map(|(a, b)| *a * *b);
+    terms.fold(Modular::ZERO, |sum, term| sum + term)
+}
+
 /// Row echelon form, row by row: the row space of the rows added so far.
 #[derive(Clone, Debug)]
 pub struct Echelon {
@@ -311,6 +324,15 @@ impl Echelon {
     pub fn new(width: usize) -> Self {
         let rows = vec![];
         Self { width, rows }
+    }
+
+    /// The space that rows of that many columns span.
+    pub fn of<R: AsRef<[Modular]>>(width: usize, rows: impl IntoIterator<Item = R>) -> Self {
+        let mut space = Self::new(width);
+        for row in rows {
+            space.add(row.as_ref());
+        }
+        space
     }
 
     /// Number of independent rows.
@@ -387,8 +409,7 @@ impl Echelon {
         let rows = self.reduced_rows();
         let free = (0..self.width).filter(|j| rows.iter().all(|(pivot, _)| pivot != j));
         let direction = |j: usize| {
-            let mut direction = vec![Modular::ZERO; self.width];
-            direction[j] = Modular::ONE;
+            let mut direction = unit(self.width, j);
             for (pivot, row) in &rows {
                 direction[*pivot] = -row[j];
             }

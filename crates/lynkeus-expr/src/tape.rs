@@ -122,6 +122,16 @@ impl<A: Algebra> Evaluator<A> {
             output.clone_from(&self.registers[register as usize]);
         }
     }
+
+    /// The value at `inputs` of a tape's first output, or only one.
+    ///
+    /// # Panics
+    /// If `inputs` has not [`Tape::inputs`] entries, or the tape has no output.
+    pub fn value(&mut self, inputs: &[A::Value]) -> A::Value {
+        let code = &*self.tape.code;
+        code.run(&self.algebra, &mut self.registers, inputs);
+        self.registers[code.outputs[0] as usize].clone()
+    }
 }
 
 /// Linear-scan register allocation over the reachable nodes.

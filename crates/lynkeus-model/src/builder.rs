@@ -1,7 +1,7 @@
 //! Plants written in Rust: functions over expressions with overloaded operators.
 
 use std::cell::RefCell;
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::{Expr, Graph, Node};
 
@@ -152,18 +152,12 @@ impl Model {
         let time = graph.symbol("time").node();
         parts.check_symbols(&graph, time, &derivatives)?;
         Ok(Plant {
-            table_points: BTreeSet::new(),
-            assertions: vec![],
-            warnings: vec![],
-            name,
-            graph,
-            time,
             states: parts.states,
             derivatives,
             inputs: parts.inputs,
             outputs: parts.outputs,
-            algebraics: vec![],
             parameters: parts.parameters,
+            ..Plant::empty(name, graph, time)
         })
     }
 }
@@ -233,19 +227,7 @@ impl Parts {
 }
 
 fn variable(name: &str, node: Node, describe: impl FnOnce(&mut Variable)) -> Variable {
-    let mut variable = Variable {
-        name: name.to_owned(),
-        node,
-        unit: None,
-        description: None,
-        start: None,
-        start_node: None,
-        min: f64::NEG_INFINITY,
-        max: f64::INFINITY,
-        nominal: None,
-        integer: false,
-        fixed: false,
-    };
+    let mut variable = Variable::new(name.to_owned(), node);
     describe(&mut variable);
     variable
 }

@@ -187,12 +187,7 @@ impl Diagnostic {
         text.replace('\n', " ")
     }
 
-    /// The rendered form with terminal colours.
-    pub fn colored(&self) -> String {
-        self.render(&Renderer::styled())
-    }
-
-    fn render(&self, renderer: &Renderer) -> String {
+    fn render(&self) -> String {
         let marked = AnnotationKind::Primary
             .span(self.excerpt.marked.clone())
             .label(self.label.as_deref());
@@ -215,13 +210,13 @@ impl Diagnostic {
         let hint = self.hint.as_deref();
         let hint = hint.map(|hint| Group::with_title(Level::HELP.secondary_title(hint)));
         let report: Vec<Group<'_>> = std::iter::once(group).chain(hint).collect();
-        renderer.render(&report)
+        Renderer::plain().render(&report)
     }
 }
 
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.render(&Renderer::plain()))
+        f.write_str(&self.render())
     }
 }
 

@@ -39,6 +39,26 @@ pub struct Plant {
     pub warnings: Vec<Diagnostic>,
 }
 
+impl Plant {
+    /// A plant without variables.
+    pub(crate) fn empty(name: String, graph: Graph, time: Node) -> Self {
+        Self {
+            name,
+            graph,
+            time,
+            states: vec![],
+            derivatives: vec![],
+            inputs: vec![],
+            outputs: vec![],
+            algebraics: vec![],
+            parameters: vec![],
+            table_points: BTreeSet::new(),
+            assertions: vec![],
+            warnings: vec![],
+        }
+    }
+}
+
 /// An `assert` of the model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assertion {
@@ -78,6 +98,25 @@ pub struct Variable {
     pub integer: bool,
     /// declared with `fixed = true`: the value at the start is known, 0 where `start` is absent
     pub fixed: bool,
+}
+
+impl Variable {
+    /// A variable of which nothing is declared.
+    pub(crate) fn new(name: String, node: Node) -> Self {
+        Self {
+            name,
+            node,
+            unit: None,
+            description: None,
+            start: None,
+            start_node: None,
+            min: f64::NEG_INFINITY,
+            max: f64::INFINITY,
+            nominal: None,
+            integer: false,
+            fixed: false,
+        }
+    }
 }
 
 /// A parameter and its value; `None` where the model gives none.

@@ -241,13 +241,9 @@ pub(crate) fn check(source: &str, ast: &Ast, model: &FlatModel) -> Vec<Problem> 
             let span = ast.expression(attribute.value?).span;
             Some(unquoted(span.text(source)))
         });
-        let library = model
-            .library
-            .get(&declaration.label)
-            .map(|known| known.unit.to_owned());
+        let library = declaration.library.map(|known| known.unit.to_owned());
         if let Some(unit) = text.or(library).and_then(|text| BaseUnit::of(&text)) {
-            let label = declaration.label.as_str();
-            declared.insert(label.strip_prefix('.').unwrap_or(label), unit);
+            declared.insert(declaration.written(), unit);
         }
     }
     if declared.is_empty() {

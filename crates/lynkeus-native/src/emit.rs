@@ -66,39 +66,25 @@ impl<const LANES: usize> Emitter<'_, LANES> {
 
     fn unary(&mut self, id: Id, op: Unary, x: Id) {
         let from = self.register(x);
-        let [zero, one] = [0.0, 1.0].map(|c| self.constant(c));
+        // it may be the same register
+        let to = self.result(id, &[x]);
+        let [zero, one, sign, magnitude] = [0.0, 1.0, -0.0, MAGNITUDE].map(|c| self.constant(c));
         match op {
             Unary::Sign => {
                 let minus_one = self.constant(-1.0);
                 self.assembler.compare(Relation::Greater, MASK, from, zero);
                 self.assembler.compare(Relation::Less, OTHER, from, zero);
-                let to = self.result(id, &[x]);
                 self.assembler.blend(to, from, one, MASK);
                 self.assembler.blend(to, to, minus_one, OTHER);
             }
             Unary::Not => {
                 self.assembler.compare(Relation::Equal, MASK, from, zero);
-                let to = self.result(id, &[x]);
                 self.assembler.apply(Opcode::And, to, MASK, one);
             }
-            Unary::Sqrt => {
-                let to = self.result(id, &[x]);
-                self.assembler.sqrt(to, from);
-            }
-            Unary::Floor => {
-                let to = self.result(id, &[x]);
-                self.assembler.floor(to, from);
-            }
-            Unary::Abs => {
-                let magnitude = self.constant(MAGNITUDE);
-                let to = self.result(id, &[x]);
-                self.assembler.apply(Opcode::And, to, from, magnitude);
-            }
-            Unary::Neg => {
-                let sign = self.constant(-0.0);
-                let to = self.result(id, &[x]);
-                self.assembler.apply(Opcode::Xor, to, from, sign);
-            }
+            Unary::Sqrt => self.assembler.sqrt(to, from),
+            Unary::Floor => self.assembler.floor(to, from),
+            Unary::Abs => self.assembler.apply(Opcode::And, to, from, magnitude),
+            Unary::Neg => self.assembler.apply(Opcode::Xor, to, from, sign),
             // called, as `library` has them; named, so that a new operation does not compile before it has a place
             Unary::Exp
             | Unary::Ln
@@ -211,8 +197,7 @@ impl<const LANES: usize> Emitter<'_, LANES> {
 
     /// Number of unknowns of a system, which has n² + n arguments.
     fn size(&self, system: u32) -> usize {
-        let count = self.program.systems[system as usize].len();
-        (0..=count).find(|n| n * n + n >= count).unwrap_or(0)
+        self.program.systems[system as usize].len().isqrt()
     }
 
     fn solve(&mut self, id: Id, system: u32) {

@@ -188,6 +188,9 @@ impl Vector for Avx {
 
     #[inline(always)]
     fn rescued(self, inside: Self, arguments: [Self; 2], f: fn(f64, f64) -> f64) -> Self {
+        if inside.all() {
+            return self;
+        }
         let [mut values, x, y] = [self, arguments[0], arguments[1]].map(Self::numbers);
         // SAFETY: the processor has AVX2
         let inside = unsafe { _mm256_movemask_pd(inside.0) };

@@ -5,7 +5,7 @@ use lynkeus_model::Plant;
 
 use crate::branches::{Branch, Choices, Reference};
 use crate::expansion::{Affine, Columns, Start};
-use crate::hidden::{Hidden, beside, joined, steady_from, symmetries};
+use crate::hidden::{Hidden, beside, is_steady, joined, symmetries};
 use crate::model::{Model, check_names, expressions, measured};
 use crate::search::Search;
 use crate::series::Stop;
@@ -54,39 +54,35 @@ fn combined(
     in_branch: &dyn Fn(Option<&Branch>, &[Node]) -> Answer,
 ) -> Answer {
     let left_out = branches.split_off(branches.len().min(BRANCHES + 1));
-    let is_hidden = |answer: &Answer| {
-        let quantities = answer.quantities.iter().map(|(asked, _)| asked);
-        let mut all = quantities.chain(&answer.about);
-        all.any(|asked| asked.verdict == Verdict::Unobservable)
-    };
-    let mut answers = vec![];
+    let verdicts = |answer: &Answer| answer.asked().map(|asked| asked.verdict).collect();
+    let mut verdicts_in: Vec<Vec<Verdict>> = vec![];
     let mut guarded = vec![];
     for (k, branch) in branches.iter().enumerate() {
         // the first is the model's own
         let other = Some(branch).filter(|_| k > 0);
-        let answer = other.map_or_else(|| own.clone(), |_| in_branch(other, &[]));
-        // what is seen without the guards is seen with them
-        guarded.push(is_hidden(&answer).then(|| in_branch(other, &choices.guards)));
-        answers.push(answer);
-    }
-    let mut found = own;
-    let (quantities, about) = (found.quantities.len(), found.about.len());
-    let mut doubted = vec![];
-    for place in 0..quantities + about {
-        let at = |answer: &Answer| match place.checked_sub(quantities) {
-            None => answer.quantities[place].0.clone(),
-            Some(place) => answer.about[place].clone(),
+        let found: Vec<Verdict> = match other {
+            Some(_) => verdicts(&in_branch(other, &[])),
+            None => verdicts(&own),
         };
-        let own = at(&found);
-        let seen: Vec<bool> = answers
+        // what is seen without the guards is seen with them
+        let is_hidden = found.contains(&Verdict::Unobservable);
+        guarded.push(is_hidden.then(|| in_branch(other, &choices.guards)));
+        verdicts_in.push(found);
+    }
+    let guarded_in: Option<Vec<Vec<Verdict>>> = guarded
+        .iter()
+        .map(|answer| Some(verdicts(answer.as_ref()?)))
+        .collect();
+    let mut found = own;
+    let (mut doubted, mut partial) = (vec![], vec![]);
+    for (place, own) in found.asked_mut().enumerate() {
+        let seen = verdicts_in
             .iter()
-            .map(|answer| at(answer).verdict == Verdict::Observable)
-            .collect();
+            .map(|all| all[place] == Verdict::Observable);
+        let seen: Vec<bool> = seen.collect();
         let is_hidden = || {
-            guarded.iter().all(|answer| {
-                let verdict = answer.as_ref().map(|answer| at(answer).verdict);
-                verdict == Some(Verdict::Unobservable)
-            })
+            let hides = |all: &Vec<Verdict>| all[place] == Verdict::Unobservable;
+            guarded_in.as_ref().is_some_and(|all| all.iter().all(hides))
         };
         let verdict = match seen.contains(&true) {
             true => Verdict::Observable,
@@ -99,26 +95,22 @@ fn combined(
         if own.verdict == Verdict::Unobservable && verdict == Verdict::Undecided {
             doubted.push(own.name.clone());
         }
-        match place.checked_sub(quantities) {
-            None => found.quantities[place].0.verdict = verdict,
-            Some(place) => found.about[place].verdict = verdict,
-        }
+        own.verdict = verdict;
         if let Some(first) = seen.iter().position(|seen| !seen)
             && verdict == Verdict::Observable
         {
             let hides = seen.iter().zip(&branches).filter(|(seen, _)| !**seen);
-            found.partial.push(Partial {
-                name: own.name,
+            partial.push(Partial {
+                name: own.name.clone(),
                 share: hides.map(|(_, branch)| branch.share).sum(),
                 at: named(plant, choices, &branches[first].reference),
             });
         }
     }
+    found.partial = partial;
     // what is told of the model's own branch goes for all
-    let is_changed = answers[0].quantities.iter().zip(&found.quantities);
-    if is_changed
-        .into_iter()
-        .any(|(was, is)| was.0.verdict != is.0.verdict)
+    let mut quantities = found.quantities.iter().zip(&verdicts_in[0]);
+    if quantities.any(|((asked, _), own)| asked.verdict != *own)
         && let Some(answer) = guarded.into_iter().next()
     {
         found.symmetries = answer.map_or(vec![], |answer| answer.symmetries);
@@ -322,7 +314,7 @@ impl<'a> Analysis<'a> {
         if search.rank() >= generic.rank() {
             return Ok(vec![Hidden::all(search)]);
         }
-        let fields = self.fields(set)?;
+        let fields = lie::directions(self.model, set, &self.start)?;
         let proved = joined(search, beside(search, &generic), &fields);
         if search.is_complete() || proved.iter().any(|hidden| hidden.among.is_none()) {
             return Ok(proved);
@@ -334,11 +326,6 @@ impl<'a> Analysis<'a> {
         })
     }
 
-    /// Directions along which verified symmetries move the unknowns at the start.
-    fn fields(&self, set: &Affine) -> Result<Vec<Vec<Modular>>, Stop> {
-        lie::directions(self.model, set, &self.start)
-    }
-
     fn steady(&self, set: &Affine, search: &mut Search<'_>) -> Result<Vec<Hidden>, Stop> {
         let last = self.last_order();
         search.until(None, last)?;
@@ -347,10 +334,12 @@ impl<'a> Analysis<'a> {
             return Ok(vec![]);
         };
         let starts = (&self.start, &elsewhere);
-        let steady = steady_from(self.model, starts, set, last)?;
-        Ok(match steady {
-            Some(_) => vec![Hidden::all(search)],
-            None => joined(search, vec![], &self.fields(set)?),
+        Ok(match is_steady(self.model, starts, set, last)? {
+            true => vec![Hidden::all(search)],
+            false => {
+                let fields = lie::directions(self.model, set, &self.start)?;
+                joined(search, vec![], &fields)
+            }
         })
     }
 

@@ -147,16 +147,10 @@ impl Choices {
 /// A point of the box; what is given stays.
 fn spread(plant: &Plant, own: &Reference, random: &mut Random) -> Reference {
     let mut point = own.clone();
-    for variable in plant
-        .states
-        .iter()
-        .chain(&plant.inputs)
-        .filter(|v| !v.fixed)
-    {
-        point.insert(
-            variable.node,
-            in_range(variable, own[&variable.node], random),
-        );
+    let variables = plant.states.iter().chain(&plant.inputs);
+    for variable in variables.filter(|v| !v.fixed) {
+        let value = in_range(variable, own[&variable.node], random);
+        point.insert(variable.node, value);
     }
     point
 }
@@ -184,14 +178,10 @@ const BESIDE: f64 = 1e-6;
 /// Values of every symbol: the model's own where it gives them, else inside the range.
 pub(crate) fn reference(plant: &Plant, random: &mut Random) -> HashMap<Node, f64> {
     let mut values = HashMap::new();
-    for variable in plant.states.iter().chain(&plant.inputs) {
-        values.insert(variable.node, inside(variable, None, random));
-    }
-    for parameter in &plant.parameters {
-        values.insert(
-            parameter.variable.node,
-            inside(&parameter.variable, parameter.value, random),
-        );
+    let variables = plant.states.iter().chain(&plant.inputs).map(|v| (v, None));
+    let parameters = plant.parameters.iter().map(|p| (&p.variable, p.value));
+    for (variable, value) in variables.chain(parameters) {
+        values.insert(variable.node, inside(variable, value, random));
     }
     values.insert(plant.time, 0.1 + random.unit());
     values
@@ -207,16 +197,9 @@ fn inside(variable: &Variable, value: Option<f64>, random: &mut Random) -> f64 {
     if let Some(given) = given {
         return given;
     }
-    let low = if variable.min.is_finite() {
-        variable.min
-    } else {
-        0.0
-    };
-    let high = if variable.max.is_finite() {
-        variable.max.max(low)
-    } else {
-        low + 2.0
-    };
+    let end = |end: f64| Some(end).filter(|end| end.is_finite());
+    let low = end(variable.min).unwrap_or(0.0);
+    let high = end(variable.max).map_or(low + 2.0, |high| high.max(low));
     low + (0.1 + 0.8 * random.unit()) * (high - low)
 }
 
@@ -225,7 +208,6 @@ pub(crate) fn value(graph: &Graph, node: Node, values: &HashMap<Node, f64>) -> O
     let symbols = graph.symbols_of(&[node]);
     let inputs: Option<Vec<f64>> = symbols.iter().map(|s| values.get(s).copied()).collect();
     let tape = Tape::new(graph, &symbols, &[node]).ok()?;
-    let mut out = [0.0];
-    tape.evaluator().eval(&inputs?, &mut out);
-    out[0].is_finite().then_some(out[0])
+    let value = tape.evaluator().value(&inputs?);
+    value.is_finite().then_some(value)
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::model::{First, Model, Role};
 use crate::series::{Functions, Run, Stop};
-use lynkeus_expr::modular::{Modular, Random};
+use lynkeus_expr::modular::{Modular, Random, unit};
 
 /// The unknowns with respect to which a series is differentiated, as columns: the named
 /// quantities, the derivatives of unknown inputs, directions in which known starts move.
@@ -55,13 +55,7 @@ impl Columns {
     }
 
     pub fn unit(&self, column: usize) -> Vec<Modular> {
-        let mut unit = vec![Modular::ZERO; self.width()];
-        unit[column] = Modular::ONE;
-        unit
-    }
-
-    fn first_of_moving(&self) -> usize {
-        self.width() - self.moving.len()
+        unit(self.width(), column)
     }
 }
 
@@ -113,14 +107,9 @@ impl<'a> Expansion<'a> {
             .advance(&|place| (self.coefficients[place].0, vec![]))
     }
 
-    /// The latest coefficient of a state's derivative with its sensitivities.
-    pub fn derivative(&self, state: usize) -> (Modular, Vec<Modular>) {
-        self.run.root(state)
-    }
-
-    /// Sensitivities of the latest coefficient of a root.
-    pub fn root(&self, root: usize) -> Vec<Modular> {
-        self.run.root(root).1
+    /// The latest coefficient of a root, as the derivative of the state of that number is one, with its sensitivities.
+    pub fn root(&self, root: usize) -> (Modular, Vec<Modular>) {
+        self.run.root(root)
     }
 
     /// Sensitivities of the latest coefficient of a symbol; empty where nothing moves it.
@@ -130,13 +119,13 @@ impl<'a> Expansion<'a> {
 
     /// Sensitivities of the latest coefficient of an output.
     pub fn output(&self, output: usize) -> Vec<Modular> {
-        self.root(self.model.states + output)
+        self.root(self.model.states + output).1
     }
 
     /// Sensitivities of the latest coefficient of an expression asked about.
     pub fn about(&self, expression: usize) -> Vec<Modular> {
         let first = self.model.states + self.model.outputs;
-        self.root(first + expression)
+        self.root(first + expression).1
     }
 
     /// The next coefficient of every symbol: of states from the derivative's last one.
@@ -213,7 +202,7 @@ impl<'a> Expansion<'a> {
 
     /// A row of sensitivities with those to the directions in which known starts move.
     fn moved(&self, place: usize, mut row: Vec<Modular>) -> Vec<Modular> {
-        let first = self.columns.first_of_moving();
+        let first = self.columns.width() - self.columns.moving.len();
         for (i, direction) in self.columns.moving.iter().enumerate() {
             if !direction[place].is_zero() {
                 row.resize(self.columns.width(), Modular::ZERO);

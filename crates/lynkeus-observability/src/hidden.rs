@@ -8,7 +8,7 @@ use crate::model::Model;
 use crate::search::Search;
 use crate::series::Stop;
 use crate::{Kind, Symmetry};
-use lynkeus_expr::modular::{Echelon, Modular};
+use lynkeus_expr::modular::{Echelon, Modular, dot};
 
 /// A direction of the named quantities, with the column that moves in no other one.
 pub(crate) type Direction = (usize, Vec<Modular>);
@@ -30,24 +30,34 @@ impl Hidden {
         }
     }
 
+    /// These, among the quantities that they move.
+    fn among(directions: &[&Direction]) -> Self {
+        Self {
+            among: Some(moved(directions).into_iter().collect()),
+            directions: directions.iter().map(|d| (*d).clone()).collect(),
+        }
+    }
+
     /// Whether a combination of the unknowns changes along one of the directions.
     pub fn moves(&self, row: &[Modular]) -> bool {
-        let change = |direction: &[Modular]| {
-            let terms = row.iter().zip(direction);
-            terms.fold(Modular::ZERO, |sum, (a, b)| sum + *a * *b)
-        };
-        self.directions.iter().any(|(_, d)| !change(d).is_zero())
+        let mut directions = self.directions.iter();
+        directions.any(|(_, direction)| !dot(row, direction).is_zero())
     }
 }
 
 /// The columns that a direction moves.
-pub(crate) fn columns(direction: &Direction) -> impl Iterator<Item = usize> + '_ {
+fn columns(direction: &Direction) -> impl Iterator<Item = usize> + '_ {
     let moving = |&c: &usize| !direction.1[c].is_zero();
     (0..direction.1.len()).filter(moving)
 }
 
+/// The columns that some directions move.
+fn moved(directions: &[&Direction]) -> BTreeSet<usize> {
+    directions.iter().flat_map(|d| columns(d)).collect()
+}
+
 /// Directions that share quantities, directly or by others.
-pub(crate) fn groups(directions: &[Direction]) -> Vec<Vec<&Direction>> {
+fn groups(directions: &[Direction]) -> Vec<Vec<&Direction>> {
     let mut groups: Vec<(BTreeSet<usize>, Vec<&Direction>)> = vec![];
     for direction in directions {
         let mut joined: (BTreeSet<usize>, Vec<&Direction>) = (columns(direction).collect(), vec![]);
@@ -69,16 +79,11 @@ pub(crate) fn groups(directions: &[Direction]) -> Vec<Vec<&Direction>> {
 /// set around it: of some quantities, that rank bounds the one at the start, all derivatives
 /// counted. Where the rows so far reach it, what they leave of these quantities stays.
 pub(crate) fn beside(special: &Search<'_>, generic: &Search<'_>) -> Vec<Hidden> {
-    let closed =
-        |among: &[usize]| special.restricted(among).rank() >= generic.restricted(among).rank();
     let unseen = special.unseen();
     let hidden = |directions: &[&Direction]| {
-        let among: BTreeSet<usize> = directions.iter().flat_map(|d| columns(d)).collect();
-        let among: Vec<usize> = among.into_iter().collect();
-        closed(&among).then(|| Hidden {
-            among: Some(among),
-            directions: directions.iter().map(|d| (*d).clone()).collect(),
-        })
+        let among: Vec<usize> = moved(directions).into_iter().collect();
+        let rank = |search: &Search<'_>| search.restricted(&among).rank();
+        (rank(special) >= rank(generic)).then(|| Hidden::among(directions))
     };
     let one_by_one = |group: Vec<&Direction>| -> Vec<Hidden> {
         match hidden(&group) {
@@ -96,31 +101,16 @@ pub(crate) fn joined(
     mut proved: Vec<Hidden>,
     found: &[Vec<Modular>],
 ) -> Vec<Hidden> {
-    let mut span = Echelon::new(search.columns().named);
-    for (_, direction) in proved.iter().flat_map(|hidden| &hidden.directions) {
-        span.add(direction);
+    let named = search.columns().named;
+    let known = proved.iter().flat_map(|hidden| &hidden.directions);
+    let mut span = Echelon::of(named, known.map(|(_, direction)| direction));
+    let fresh = found.iter().filter(|direction| span.add(direction));
+    let fresh = Echelon::of(named, fresh).reduced_rows();
+    let all = Hidden::all(search);
+    if span.rank() == all.directions.len() {
+        return vec![all];
     }
-    let mut fresh = Echelon::new(search.columns().named);
-    for direction in found {
-        if span.add(direction) {
-            fresh.add(direction);
-        }
-    }
-    let unseen = search.unseen();
-    if span.rank() == unseen.len() {
-        return vec![Hidden {
-            among: None,
-            directions: unseen,
-        }];
-    }
-    let fresh = fresh.reduced_rows();
-    for group in groups(&fresh) {
-        let among: BTreeSet<usize> = group.iter().flat_map(|d| columns(d)).collect();
-        proved.push(Hidden {
-            among: Some(among.into_iter().collect()),
-            directions: group.into_iter().cloned().collect(),
-        });
-    }
+    proved.extend(groups(&fresh).iter().map(|group| Hidden::among(group)));
     proved
 }
 
@@ -157,20 +147,20 @@ impl Ranks {
     }
 }
 
-/// The order from which on the rows at a special start bring nothing new about states,
-/// parameters and present unknown inputs, with unknown inputs; none where that cannot be said.
+/// Whether from some order on the rows at a special start bring nothing new about states,
+/// parameters and present unknown inputs, with unknown inputs. False may also mean: not known.
 ///
 /// At a generic point of the invariant set `settled` decides. Let the ranks at the start agree
 /// with those there after order k, sorted by the highest derivative of an unknown input
 /// in a row; and let order k + 1 add there as many rows as have only the inputs themselves in
 /// them. Then each row's derivative has the derivative of the same leading term, at the start as well, so
 /// that the ranks agree for all higher orders too: the settled part, which never shrinks, cannot grow.
-pub(crate) fn steady_from(
+pub(crate) fn is_steady(
     model: &Model,
     (special, generic): (&Start, &Start),
     set: &Affine,
     last: usize,
-) -> Result<Option<usize>, Stop> {
+) -> Result<bool, Stop> {
     let columns = Columns::new(model, last).moving(set);
     let begin = |start| Search::new(model, start, columns.clone());
     let (mut here, mut there) = (begin(special), begin(generic));
@@ -182,25 +172,12 @@ pub(crate) fn steady_from(
         if let Some((here, there)) = before {
             let added = now.1.of_inputs() - there.of_inputs();
             if here == there && now.1.settled == there.settled && added == there.by_derivative[0] {
-                return Ok(Some(k - 1));
+                return Ok(true);
             }
         }
         before = Some(now);
     }
-    Ok(None)
-}
-
-/// A basis of the directions among some quantities that no row sees.
-pub(crate) fn kernel_among(rows: &Echelon, among: &[usize], named: usize) -> Vec<Direction> {
-    let mut unseen = Echelon::new(named);
-    for direction in rows.kernel() {
-        let mut whole = vec![Modular::ZERO; named];
-        for (&column, x) in among.iter().zip(direction) {
-            whole[column] = x;
-        }
-        unseen.add(&whole);
-    }
-    unseen.reduced_rows()
+    Ok(false)
 }
 
 /// Weights of a scaling, and steps of a shift, are fractions with parts up to this.
@@ -211,13 +188,19 @@ type Weights = Vec<(usize, i64, i64)>;
 
 /// What is hidden at another start among the same quantities.
 fn hidden_at(search: &Search<'_>, hidden: &Hidden) -> Vec<Direction> {
-    match &hidden.among {
-        None => search.unseen(),
-        Some(among) => {
-            let rows = search.restricted(among);
-            kernel_among(&rows, among, search.columns().named)
+    let Some(among) = &hidden.among else {
+        return search.unseen();
+    };
+    let named = search.columns().named;
+    let whole = |direction: Vec<Modular>| {
+        let mut whole = vec![Modular::ZERO; named];
+        for (&column, x) in among.iter().zip(direction) {
+            whole[column] = x;
         }
-    }
+        whole
+    };
+    let unseen = search.restricted(among).kernel();
+    Echelon::of(named, unseen.into_iter().map(whole)).reduced_rows()
 }
 
 /// The groups of quantities that the hidden directions move; `twin` is a second start, which confirms what
@@ -229,6 +212,7 @@ pub(crate) fn symmetries(
     twin: Option<&Search<'_>>,
 ) -> Vec<Symmetry> {
     let names: Vec<&str> = model.named.iter().map(|(name, _)| name.as_str()).collect();
+    let name = |column: usize| names[column].to_owned();
     let others = twin.map(|twin| hidden_at(twin, hidden));
     let described = |group: Vec<&Direction>| {
         let of = |kind: Kind| {
@@ -245,7 +229,7 @@ pub(crate) fn symmetries(
         match kinds.into_iter().find_map(|kind| Some((kind, of(kind)?))) {
             Some((kind, weights)) => named(kind, &group, &weights, &names),
             None => Symmetry {
-                moves: moved(&group, &names),
+                moves: moved(&group).into_iter().map(name).collect(),
                 directions: group.len(),
                 kind: None,
                 invariants: vec![],
@@ -280,17 +264,11 @@ fn weights(direction: &Direction, kind: Kind, point: &[Modular]) -> Option<Weigh
     columns(direction).map(fraction).collect()
 }
 
-fn moved(group: &[&Direction], names: &[&str]) -> Vec<String> {
-    let all: BTreeSet<usize> = group.iter().flat_map(|d| columns(d)).collect();
-    all.into_iter()
-        .map(|column| names[column].to_owned())
-        .collect()
-}
-
 /// A scaling x_i → s^{w_i}·x_i leaves products of powers with Σ m_i w_i = 0 alone, a shift
 /// x_i → x_i + s·w_i sums. Own columns move in one direction each, so that every other
 /// column c gives one: x_c with what its weights take back from the own columns.
 fn named(kind: Kind, group: &[&Direction], weights: &[Weights], names: &[&str]) -> Symmetry {
+    let name = |column: usize| names[column].to_owned();
     let own: BTreeSet<usize> = group.iter().map(|d| d.0).collect();
     let all: BTreeSet<usize> = weights.iter().flatten().map(|w| w.0).collect();
     let invariants: Vec<String> = all
@@ -313,7 +291,7 @@ fn named(kind: Kind, group: &[&Direction], weights: &[Weights], names: &[&str]) 
         })
         .collect();
     Symmetry {
-        moves: moved(group, names),
+        moves: moved(group).into_iter().map(name).collect(),
         directions: group.len(),
         kind: Some(kind),
         invariants,

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use crate::expansion::{Affine, Columns, Expansion, Start};
 use crate::model::{Model, Role};
 use crate::series::Stop;
-use lynkeus_expr::modular::{Echelon, Modular, Random};
+use lynkeus_expr::modular::{Echelon, Modular, Random, unit};
 
 /// Seed of the points at which the flow is looked at.
 const FIRST: u64 = 9001;
@@ -55,7 +55,7 @@ fn velocity(model: &Model, start: Start, moving: &[usize]) -> Result<Vec<Modular
     let mut velocity = vec![Modular::ZERO; model.symbols.len()];
     for &place in moving {
         velocity[place] = match model.symbols[place].role {
-            Role::State(i) => expansion.derivative(i).0,
+            Role::State(i) => expansion.root(i).0,
             _ => Modular::ONE,
         };
     }
@@ -64,12 +64,8 @@ fn velocity(model: &Model, start: Start, moving: &[usize]) -> Result<Vec<Modular
 
 /// Every known start free: invariant, whatever the flow.
 pub(crate) fn everywhere(model: &Model, moving: &[usize]) -> Affine {
-    let unit = |&place: &usize| {
-        let mut unit = vec![Modular::ZERO; model.symbols.len()];
-        unit[place] = Modular::ONE;
-        unit
-    };
-    moving.iter().map(unit).collect()
+    let count = model.symbols.len();
+    moving.iter().map(|&place| unit(count, place)).collect()
 }
 
 /// Points tried before the model counts as singular everywhere.

@@ -121,7 +121,7 @@ impl Place {
             let unnamed = known.iter().position(|&k| k == place);
             let coordinate = symbol.column.or(unnamed.map(|i| model.named.len() + i));
             if let Some(coordinate) = coordinate {
-                let (value, gradient) = expansion.derivative(state);
+                let (value, gradient) = expansion.root(state);
                 flow[coordinate] = value;
                 gradients[coordinate] = Some(gradient);
             }

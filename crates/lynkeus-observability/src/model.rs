@@ -46,6 +46,7 @@ pub(crate) struct Symbol {
 
 /// A plant with a question. The roots of the program are the states' derivatives, the
 /// outputs and the expressions asked about.
+#[derive(Default)]
 pub(crate) struct Model {
     pub symbols: Vec<Symbol>,
     /// name and kind of each of the leading columns
@@ -74,38 +75,32 @@ impl Model {
         (outputs, about): (&[Node], &[Node]),
         reference: Option<&Reference>,
     ) -> Result<Self, (Vec<(String, Quantity)>, Note)> {
-        let Symbols {
-            mut symbols,
-            named,
-            starts,
-        } = Symbols::new(plant, question);
+        let mut model = Self {
+            states: plant.states.len(),
+            outputs: outputs.len(),
+            about: about.len(),
+            budget: question.budget.clone(),
+            ..Self::default()
+        };
+        let starts = model.add_symbols(plant, question);
         let roots = [&plant.derivatives[..], outputs, about].concat();
-        let nodes: Vec<Node> = symbols.iter().map(|s| s.node).collect();
+        let nodes: Vec<Node> = model.symbols.iter().map(|s| s.node).collect();
         let own = || branches::reference(plant, &mut Random::new(1));
         let reference = reference.cloned().unwrap_or_else(own);
-        for symbol in &mut symbols {
+        for symbol in &mut model.symbols {
             symbol.negative = reference.get(&symbol.node).is_some_and(|x| *x < 0.0);
         }
         let branch = |node: Node| branches::value(&plant.graph, node, &reference);
         let compiled = |roots: &[Node]| Program::new(&plant.graph, &nodes, roots, &branch);
         let programs = compiled(&roots).and_then(|program| Ok((program, compiled(&starts)?)));
-        let (program, starts) = match programs {
+        (model.program, model.starts) = match programs {
             Ok(programs) => programs,
-            Err(note) => return Err((named, note)),
+            Err(note) => return Err((model.named, note)),
         };
-        let of_kind = |kind: Quantity| named.iter().filter(|(_, k)| *k == kind).count();
-        Ok(Self {
-            unknown_inputs: of_kind(Quantity::UnknownInput),
-            depth: plant.states.len() + of_kind(Quantity::Parameter) + 1,
-            states: plant.states.len(),
-            outputs: outputs.len(),
-            about: about.len(),
-            budget: question.budget.clone(),
-            symbols,
-            named,
-            program,
-            starts,
-        })
+        let of_kind = |kind: Quantity| model.named.iter().filter(|(_, k)| *k == kind).count();
+        model.unknown_inputs = of_kind(Quantity::UnknownInput);
+        model.depth = model.states + of_kind(Quantity::Parameter) + 1;
+        Ok(model)
     }
 
     /// Places of the states whose start is known.
@@ -190,31 +185,24 @@ pub(crate) fn measured(plant: &Plant, question: &Question) -> Result<Vec<Node>, 
         .collect()
 }
 
-/// Every symbol with its role, and the quantities that have a column of their own.
-#[derive(Default)]
-struct Symbols {
-    symbols: Vec<Symbol>,
-    named: Vec<(String, Quantity)>,
-    /// start values that are expressions
-    starts: Vec<Node>,
-}
-
-impl Symbols {
-    fn new(plant: &Plant, question: &Question) -> Self {
-        let mut all = Self::default();
+impl Model {
+    /// Adds every symbol with its role, and the quantities that have a column of their own; the
+    /// start values that are expressions.
+    fn add_symbols(&mut self, plant: &Plant, question: &Question) -> Vec<Node> {
+        let mut starts = vec![];
         for (i, state) in plant.states.iter().enumerate() {
-            all.state(i, state, question);
+            self.add_state(i, state, question, &mut starts);
         }
         for parameter in &plant.parameters {
             let column = question
                 .parameters
-                .then(|| all.column(&parameter.variable, Quantity::Parameter));
+                .then(|| self.column(&parameter.variable, Quantity::Parameter));
             let value = parameter.value.and_then(Modular::from_f64);
             let first = match value {
                 Some(value) if !question.parameters => First::Given(value),
                 _ => First::Free,
             };
-            all.push(parameter.variable.node, Role::Constant, column, first);
+            self.push(parameter.variable.node, Role::Constant, column, first);
         }
         for input in &plant.inputs {
             let among = |names: &[String]| names.contains(&input.name);
@@ -226,24 +214,30 @@ impl Symbols {
                 Role::Known
             };
             let column =
-                matches!(role, Role::Unknown).then(|| all.column(input, Quantity::UnknownInput));
-            all.push(input.node, role, column, First::Free);
+                matches!(role, Role::Unknown).then(|| self.column(input, Quantity::UnknownInput));
+            self.push(input.node, role, column, First::Free);
         }
-        all.push(plant.time, Role::Time, None, First::Free);
-        all
+        self.push(plant.time, Role::Time, None, First::Free);
+        starts
     }
 
     /// The start value of a state is known by its declaration or by the question; what
     /// the declaration says may be an expression in parameters that are unknown themselves.
-    fn state(&mut self, i: usize, state: &Variable, question: &Question) {
+    fn add_state(
+        &mut self,
+        i: usize,
+        state: &Variable,
+        question: &Question,
+        starts: &mut Vec<Node>,
+    ) {
         let known = state.fixed || question.known_starts.contains(&state.name);
         let column = (!known).then(|| self.column(state, Quantity::State));
         let computed = state.start_node.filter(|_| state.fixed);
         let first = match (known, computed) {
             (false, _) => First::Free,
             (true, Some(node)) => {
-                self.starts.push(node);
-                First::Computed(self.starts.len() - 1)
+                starts.push(node);
+                First::Computed(starts.len() - 1)
             }
             (true, None) => {
                 let value = Modular::from_f64(state.start.unwrap_or(0.0));

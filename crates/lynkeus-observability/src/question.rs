@@ -187,6 +187,18 @@ impl Answer {
             .map(|(q, _)| q.verdict)
     }
 
+    /// Every quantity, then every expression asked about.
+    pub fn asked(&self) -> impl Iterator<Item = &Asked> {
+        let quantities = self.quantities.iter().map(|(asked, _)| asked);
+        quantities.chain(&self.about)
+    }
+
+    /// The same, to be changed.
+    pub(crate) fn asked_mut(&mut self) -> impl Iterator<Item = &mut Asked> {
+        let quantities = self.quantities.iter_mut().map(|(asked, _)| asked);
+        quantities.chain(&mut self.about)
+    }
+
     /// Whether every quantity is observable.
     pub fn is_complete(&self) -> bool {
         self.quantities

@@ -47,14 +47,16 @@ impl<'a> Search<'a> {
             let expressions = 0..self.model.about;
             self.about = expressions.map(|i| self.expansion.about(i)).collect();
             if self.is_large() {
-                self.succession = Some(self.follow());
+                let gradient = |root: usize| self.expansion.root(root).1;
+                self.succession = Some(Succession::new(self.model, &gradient));
             }
         }
-        self.add_outputs();
+        for output in 0..self.model.outputs {
+            self.add(self.expansion.output(output));
+        }
         let places = self.succession.as_ref().map(|s| s.places.clone());
         for place in places.into_iter().flatten() {
-            let row = self.expansion.symbol(place).to_vec();
-            self.add(row);
+            self.add(self.expansion.symbol(place).to_vec());
         }
         Ok(())
     }
@@ -89,11 +91,6 @@ impl<'a> Search<'a> {
         let products = self.model.depth.saturating_mul(self.model.depth) / 2;
         let sensitivities = self.model.program.len() * self.columns().width();
         products.saturating_mul(sensitivities) > WORK
-    }
-
-    /// What follows one after another from the coefficients taken last, the first ones.
-    fn follow(&self) -> Succession<'a> {
-        Succession::new(self.model, &|root| self.expansion.root(root))
     }
 
     /// Derivatives of the outputs from which all is known.
@@ -137,13 +134,6 @@ impl<'a> Search<'a> {
         self.rows.rank() - self.signals.rank()
     }
 
-    fn add_outputs(&mut self) {
-        for output in 0..self.model.outputs {
-            let row = self.expansion.output(output);
-            self.add(row);
-        }
-    }
-
     fn add(&mut self, mut row: Vec<Modular>) {
         self.rows.add(&row);
         if self.model.unknown_inputs == 0 {
@@ -167,32 +157,26 @@ impl<'a> Search<'a> {
     /// Directions of the named quantities that no row so far sees, each with the
     /// column that moves in no other of them.
     pub fn unseen(&self) -> Vec<(usize, Vec<Modular>)> {
-        let named = self.columns().named;
-        let mut unseen = Echelon::new(named);
-        for direction in self.rows.kernel() {
-            unseen.add(&direction[..named]);
-        }
-        unseen.reduced_rows()
+        let (named, unseen) = (self.columns().named, self.rows.kernel());
+        let of_named = unseen.iter().map(|direction| &direction[..named]);
+        Echelon::of(named, of_named).reduced_rows()
     }
 
     /// The rows in some of the columns alone.
     pub fn restricted(&self, columns: &[usize]) -> Echelon {
-        let mut restricted = Echelon::new(columns.len());
-        for row in self.rows.rows() {
-            let row: Vec<Modular> = columns.iter().map(|&column| row[column]).collect();
-            restricted.add(&row);
-        }
-        restricted
+        let rows = self.rows.rows();
+        let part = |row: &[Modular]| -> Vec<Modular> { columns.iter().map(|&c| row[c]).collect() };
+        Echelon::of(columns.len(), rows.map(part))
     }
 }
 
 /// What follows one after another from the outputs, and from how much.
-pub(crate) struct Succession<'a> {
+struct Succession<'a> {
     model: &'a Model,
     /// places of the symbols, in the order in which they are found
-    pub places: Vec<usize>,
+    places: Vec<usize>,
     /// derivatives of the outputs that they are found from
-    pub order: usize,
+    order: usize,
     /// of each root the places of symbols that are not known so far
     missing: Vec<BTreeSet<usize>>,
     /// of each place the roots that depend on it
@@ -207,7 +191,27 @@ impl<'a> Succession<'a> {
     /// What follows at a start, where `gradient` has the sensitivities of a root's first
     /// coefficient.
     fn new(model: &'a Model, gradient: &dyn Fn(usize) -> Vec<Modular>) -> Self {
-        let mut all = Self::unsought(model);
+        let is_unknown = |place: &usize| {
+            let symbol = &model.symbols[*place];
+            // a given start says nothing of later values
+            symbol.column.is_some() || matches!(symbol.role, Role::State(_))
+        };
+        let roots = model.states + model.outputs;
+        let read = |root: usize| model.program.inputs(root).into_iter().filter(is_unknown);
+        let missing: Vec<BTreeSet<usize>> = (0..roots).map(|root| read(root).collect()).collect();
+        let mut readers = vec![vec![]; model.symbols.len()];
+        for (root, places) in missing.iter().enumerate() {
+            places.iter().for_each(|&place| readers[place].push(root));
+        }
+        let mut all = Self {
+            known: vec![None; roots],
+            ready: VecDeque::new(),
+            places: vec![],
+            order: 0,
+            missing,
+            readers,
+            model,
+        };
         for output in model.states..model.states + model.outputs {
             all.know(output, 0);
         }
@@ -222,38 +226,6 @@ impl<'a> Succession<'a> {
             }
         }
         all
-    }
-
-    fn unsought(model: &'a Model) -> Self {
-        let is_unknown = |place: &usize| {
-            let symbol = &model.symbols[*place];
-            // a given start says nothing of later values
-            symbol.column.is_some() || matches!(symbol.role, Role::State(_))
-        };
-        let roots = model.states + model.outputs;
-        let missing: Vec<BTreeSet<usize>> = (0..roots)
-            .map(|root| {
-                model
-                    .program
-                    .inputs(root)
-                    .into_iter()
-                    .filter(is_unknown)
-                    .collect()
-            })
-            .collect();
-        let mut readers = vec![vec![]; model.symbols.len()];
-        for (root, places) in missing.iter().enumerate() {
-            places.iter().for_each(|&place| readers[place].push(root));
-        }
-        Self {
-            known: vec![None; roots],
-            ready: VecDeque::new(),
-            places: vec![],
-            order: 0,
-            missing,
-            readers,
-            model,
-        }
     }
 
     /// A root is known from so many derivatives of the outputs.
@@ -310,7 +282,8 @@ mod tests {
         let columns = Columns::new(&model, model.depth);
         let mut search = Search::new(&model, &start, columns);
         search.advance().unwrap();
-        let found = search.follow();
+        let gradient = |root: usize| search.expansion.root(root).1;
+        let found = Succession::new(&model, &gradient);
         search.until(None, model.depth).unwrap();
         assert!(search.succession.is_none());
         let name = |place: &usize| {

@@ -65,12 +65,9 @@ impl Tail {
         let off = difference(o.hi(), middle)
             .hi()
             .max(difference(middle, o.lo()).hi());
-        let ratio = (p.lo() / d.lo()).sqrt();
-        let ratio = if ratio.is_finite() && ratio > 0.0 {
-            ratio
-        } else {
-            1.0
-        };
+        let ratio = Some((p.lo() / d.lo()).sqrt());
+        let ratio = ratio.filter(|ratio| ratio.is_finite() && *ratio > 0.0);
+        let ratio = ratio.unwrap_or(1.0);
         let less = |x: f64, share: f64| {
             (Interval::point(x) - Interval::point(off) * Interval::point(share)).lo()
         };

@@ -215,15 +215,12 @@ impl System {
     /// Its equations, without what jumps.
     pub fn expressions(&self) -> Expressions<'_> {
         let equations = &*self.code.equations;
-        let Both {
-            derivatives,
-            outputs,
-        } = &equations.roots.free;
+        let roots = &equations.roots.free;
         Expressions {
             graph: equations.graph().clone(),
             inputs: &equations.inputs[..equations.smooth_inputs()],
-            derivatives,
-            outputs,
+            derivatives: &roots.derivatives,
+            outputs: &roots.outputs,
         }
     }
 

@@ -9,7 +9,7 @@
 
 use std::collections::HashSet;
 
-use crate::chains::{ChainRequest, grown, heads, imbalance, names};
+use crate::chains::{ChainRequest, grown, heads, imbalance, named, names};
 use crate::{AugmentedPlant, Chain, Misfit};
 
 /// Chains in the order in which the observer uses them.
@@ -20,28 +20,23 @@ pub struct Blocks {
 }
 
 impl Blocks {
+    /// The chains, in the order of the measured outputs.
+    pub fn chains(&self) -> Vec<Chain> {
+        let mut chains = vec![vec![]; self.order.len()];
+        for (output, chain) in &self.order {
+            chains[*output] = chain.clone();
+        }
+        chains
+    }
+
     /// Lengths of the chains, in the order of the measured outputs.
     pub fn lengths(&self) -> Vec<usize> {
-        let mut lengths = vec![0; self.order.len()];
-        for (output, chain) in &self.order {
-            lengths[*output] = chain.len();
-        }
-        lengths
+        self.chains().iter().map(Vec::len).collect()
     }
 
     /// Names of the states of each chain, in the order of the measured outputs.
     pub fn names(&self, augmented: &AugmentedPlant<'_>) -> Vec<Vec<String>> {
-        let mut all = vec![vec![]; self.order.len()];
-        for (output, chain) in &self.order {
-            all[*output] = names(augmented, chain.clone());
-        }
-        all
-    }
-
-    /// Names of the states of each chain, first block first.
-    fn named(&self, augmented: &AugmentedPlant<'_>) -> Vec<Vec<String>> {
-        let chains = self.order.iter();
-        chains.map(|(_, c)| names(augmented, c.clone())).collect()
+        named(augmented, &self.chains())
     }
 }
 
@@ -86,12 +81,13 @@ pub fn find(
     }
     let (mut fits, other): (Vec<Blocks>, Vec<_>) = found
         .into_iter()
-        .partition(|b| request.is_met(&b.lengths(), || b.names(augmented)));
+        .partition(|b| request.is_met(augmented, &b.chains()));
     if fits.is_empty() {
-        let shown = other.iter().take(SHOWN).map(|b| b.named(augmented));
+        let in_order = |b: &Blocks| named(augmented, b.order.iter().map(|(_, chain)| chain));
+        let shown = other.iter().take(SHOWN).map(in_order);
         return Err(Misfit::OtherBlocks(shown.collect()));
     }
-    fits.sort_by_key(|blocks| imbalance(&blocks.lengths()));
+    fits.sort_by_key(|blocks| imbalance(&blocks.chains()));
     Ok(fits)
 }
 

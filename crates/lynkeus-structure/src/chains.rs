@@ -42,9 +42,9 @@ impl Assignment {
 }
 
 /// Difference between the longest and the shortest.
-pub(crate) fn imbalance(lengths: &[usize]) -> usize {
-    let longest = lengths.iter().max().copied().unwrap_or(0);
-    longest - lengths.iter().min().copied().unwrap_or(0)
+pub(crate) fn imbalance(chains: &[Chain]) -> usize {
+    let lengths = || chains.iter().map(Vec::len);
+    lengths().max().unwrap_or(0) - lengths().min().unwrap_or(0)
 }
 
 /// What the user asks of the assignment.
@@ -57,15 +57,11 @@ pub struct ChainRequest {
 }
 
 impl ChainRequest {
-    /// Whether chains of these lengths and of states with these names are what is asked for.
-    pub(crate) fn is_met(
-        &self,
-        lengths: &[usize],
-        names: impl FnOnce() -> Vec<Vec<String>>,
-    ) -> bool {
-        let are = |asked: &Vec<usize>| asked == lengths;
-        let named = |asked: &Vec<Vec<String>>| *asked == names();
-        self.lengths.as_ref().is_none_or(are) && self.names.as_ref().is_none_or(named)
+    /// Whether these chains are what is asked for.
+    pub(crate) fn is_met(&self, augmented: &AugmentedPlant<'_>, chains: &[Chain]) -> bool {
+        let lengths = |asked: &Vec<usize>| chains.iter().map(Vec::len).eq(asked.iter().copied());
+        let names = |asked: &Vec<Vec<String>>| *asked == named(augmented, chains);
+        self.lengths.as_ref().is_none_or(lengths) && self.names.as_ref().is_none_or(names)
     }
 }
 
@@ -78,25 +74,16 @@ pub fn find(
     augmented: &AugmentedPlant<'_>,
     request: &ChainRequest,
 ) -> Result<Vec<Assignment>, Misfit> {
-    let heads = heads(augmented)?;
-    let found = match heads[..] {
-        [head] => vec![single(augmented, head)?],
-        _ => cuts(augmented, &heads)?,
-    };
-    let named = |a: &Assignment| -> Vec<Vec<String>> {
-        let chains = a.chains.iter();
-        chains
-            .map(|chain| names(augmented, chain.clone()))
-            .collect()
-    };
+    let found = cuts(augmented, &heads(augmented)?)?;
     let (mut fits, other): (Vec<Assignment>, Vec<_>) = found
         .into_iter()
-        .partition(|a| request.is_met(&a.lengths(), || named(a)));
+        .partition(|a| request.is_met(augmented, &a.chains));
     if fits.is_empty() {
-        let allowed = other.iter().take(NAMED).map(named);
+        let allowed = other.iter().take(NAMED);
+        let allowed = allowed.map(|a| named(augmented, &a.chains));
         return Err(Misfit::OtherChains(allowed.collect()));
     }
-    fits.sort_by_key(|a| (imbalance(&a.lengths()), a.leading));
+    fits.sort_by_key(|a| (imbalance(&a.chains), a.leading));
     fits.truncate(MOST);
     Ok(fits)
 }
@@ -147,16 +134,15 @@ pub(crate) fn names(
     names.collect()
 }
 
-fn single(augmented: &AugmentedPlant<'_>, head: usize) -> Result<Assignment, Misfit> {
-    let (chain, new) = grown(augmented, head, |_| false);
-    if chain.len() < augmented.states.len() {
-        return Err(stuck(augmented, &chain, new));
-    }
-    Ok(Assignment {
-        chains: vec![chain],
-        leading: 0,
-        leads: vec![0],
-    })
+/// Names of the states of each chain.
+pub(crate) fn named<'c>(
+    augmented: &AugmentedPlant<'_>,
+    chains: impl IntoIterator<Item = &'c Chain>,
+) -> Vec<Vec<String>> {
+    let chains = chains.into_iter();
+    chains
+        .map(|chain| names(augmented, chain.iter().copied()))
+        .collect()
 }
 
 /// Why a chain does not reach every state.
@@ -175,7 +161,7 @@ fn stuck(augmented: &AugmentedPlant<'_>, chain: &[usize], new: Vec<usize>) -> Mi
     }
 }
 
-/// Every cut into a leading chain and following ones.
+/// Every cut into a leading chain and following ones; of one output its chain.
 fn cuts(augmented: &AugmentedPlant<'_>, heads: &[usize]) -> Result<Vec<Assignment>, Misfit> {
     let grown = |&head: &usize| grown(augmented, head, |_| false);
     let paths: Vec<_> = heads.iter().map(grown).collect();
@@ -214,7 +200,11 @@ fn cuts(augmented: &AugmentedPlant<'_>, heads: &[usize]) -> Result<Vec<Assignmen
     if found.is_empty() {
         let reasons = paths.into_iter();
         let reasons = reasons.map(|(chain, new)| stuck(augmented, &chain, new));
-        return Err(Misfit::NoCut(reasons.collect()));
+        let mut reasons: Vec<Misfit> = reasons.collect();
+        return Err(match reasons.len() {
+            1 => reasons.remove(0),
+            _ => Misfit::NoCut(reasons),
+        });
     }
     Ok(found)
 }

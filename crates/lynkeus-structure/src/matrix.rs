@@ -182,9 +182,15 @@ impl<'g> Matrix<'g> {
 
     /// The determinant by expansion along the rows; none where it is zero everywhere. For small square matrices only.
     pub fn determinant(&self) -> Option<Node> {
+        let determinant = self.expanded();
+        determinant.filter(|&found| !is_zero(self.graph, found))
+    }
+
+    /// The same as it is expanded; none where it is zero by its pattern.
+    pub(crate) fn expanded(&self) -> Option<Node> {
         let row = |i: usize| (0..self.columns).map(move |j| self.get(i, j)).collect();
         let rows: Rows = (0..self.rows).map(row).collect();
-        determinant(self.graph, &rows).filter(|&found| !is_zero(self.graph, found))
+        determinant(self.graph, &rows)
     }
 }
 

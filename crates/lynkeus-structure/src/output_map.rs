@@ -181,31 +181,26 @@ pub fn relative_degree(
     region: &Region,
 ) -> Result<Degree, MissingInput> {
     let graph = augmented.graph();
-    let input = &augmented.inputs[j].name;
-    let mut proved = true;
+    let mut degree = Degree {
+        r: rows.len(),
+        proved: true,
+        input: augmented.inputs[j].name.clone(),
+        witness: None,
+    };
     for (k, row) in rows.iter().enumerate() {
         let Some(node) = along_column(graph, row, &form.input_columns[j]) else {
             continue;
         };
         match vanishes(graph, node, region)? {
             Verdict::Proved => {}
-            Verdict::Undecided(_) => proved = false,
+            Verdict::Undecided(_) => degree.proved = false,
             Verdict::Refuted(witness) => {
-                return Ok(Degree {
-                    r: k + 1,
-                    proved,
-                    input: input.clone(),
-                    witness: Some(witness),
-                });
+                (degree.r, degree.witness) = (k + 1, Some(witness));
+                break;
             }
         }
     }
-    Ok(Degree {
-        r: rows.len(),
-        proved,
-        input: input.clone(),
-        witness: None,
-    })
+    Ok(degree)
 }
 
 /// Points at which the rank of the rows is tried.
@@ -258,11 +253,9 @@ impl Codistribution {
     /// no point shows more.
     pub fn krener_respondek(&mut self) -> Vec<usize> {
         let mut best = vec![0; self.lengths.len()];
-        for point in 0..POINTS {
-            let Some(values) = self.at(point) else {
-                continue;
-            };
-            let indices = self.indices_at(&values);
+        let points: Vec<Vec<f64>> = (0..POINTS).filter_map(|p| self.at(p)).collect();
+        for values in &points {
+            let indices = self.indices_at(values);
             if indices.iter().sum::<usize>() > best.iter().sum() {
                 best = indices;
             }
@@ -298,15 +291,14 @@ impl Codistribution {
     /// Whether the determinant of the chosen rows is seen with both signs: such indices
     /// are singular somewhere, unless the box falls apart.
     pub fn changes_sign(&mut self, indices: &[usize]) -> bool {
+        let (rows, n) = (self.chosen(indices), self.n);
+        if rows.len() != n {
+            return false;
+        }
         let (mut positive, mut negative) = (false, false);
-        for point in 0..SIGNS {
-            let Some(values) = self.at(point) else {
-                continue;
-            };
-            let rows = self.chosen(indices);
-            let square = rows.len() == self.n;
-            let matrix = DMatrix::from_fn(rows.len(), self.n, |i, j| values[rows[i] * self.n + j]);
-            let det = if square { matrix.determinant() } else { 0.0 };
+        for values in (0..SIGNS).filter_map(|point| self.at(point)) {
+            let matrix = DMatrix::from_fn(n, n, |i, j| values[rows[i] * n + j]);
+            let det = matrix.determinant();
             positive |= det > 0.0;
             negative |= det < 0.0;
         }

@@ -324,11 +324,9 @@ impl<'a> Search<'a> {
     }
 
     fn add(&mut self, cell: Cell, shared: Option<End>) {
-        let mut values = [Interval::ENTIRE];
-        self.bounds.eval(&cell, &mut values);
         self.tree.push(Branch {
+            values: self.bounds.value(&cell),
             cell,
-            values: values[0],
             halves: None,
             sampled: false,
             shared,
@@ -391,16 +389,11 @@ impl<'a> Search<'a> {
         if !(at.iter().all(|x| x.is_finite()) && self.asked.region.reaches(at)) {
             return;
         }
-        let mut out = [0.0];
-        self.evaluator.eval(at, &mut out);
-        let [value] = out;
+        let value = self.evaluator.value(at);
         if value.is_nan() {
             return;
         }
-        let attained = || Point {
-            coordinates: self.asked.region.coordinates(at),
-            value,
-        };
+        let attained = || self.asked.region.point(at, value);
         if self.lowest.as_ref().is_none_or(|best| value < best.value) {
             self.lowest = Some(attained());
         }

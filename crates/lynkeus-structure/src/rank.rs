@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 use lynkeus_expr::interval::{Intervals, solve};
 use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Tape, jacobian};
 
-use crate::matrix::{blocks, determinant};
+use crate::matrix::blocks;
 use crate::region::Cell;
 use crate::{
     Dimension, Finding, Matrix, Point, Reason, Region, Verdict, Witness, regularity, sign, steps,
@@ -196,12 +196,11 @@ pub fn subsets(n: usize, k: usize, limit: usize) -> Option<Vec<Vec<usize>>> {
 fn may_keep_sign(graph: &Graph, node: Node, region: &Region) -> Result<bool, MissingInput> {
     let region = region.restricted(&graph.symbols_of(&[node]));
     let mut evaluator = Tape::new(graph, &region.symbols(), &[node])?.evaluator();
-    let mut out = [0.0];
     let (mut positive, mut negative) = (true, true);
     for point in region.samples(&region.cell()) {
-        evaluator.eval(&point, &mut out);
-        positive &= out[0] > 0.0;
-        negative &= out[0] < 0.0;
+        let value = evaluator.value(&point);
+        positive &= value > 0.0;
+        negative &= value < 0.0;
     }
     Ok(positive || negative)
 }
@@ -232,27 +231,24 @@ pub fn regular(matrix: &Matrix<'_>, region: &Region) -> Result<Finding, MissingI
                 let reason = Reason::DeterminantVanishes;
                 return Ok(Finding { reason, ..found });
             }
-            (Verdict::Undecided(_), _) => open = open.or(Some(found)),
             (Verdict::Proved, Reason::Determinant { low, high, .. }) => {
                 product = product.map(|all| (all.0 * low, all.1 * high));
             }
-            (Verdict::Proved, reason) => {
+            (Verdict::Proved, Reason::RegularParts(more)) => {
                 product = None;
-                parts += match reason {
-                    Reason::RegularParts(parts) => *parts,
-                    _ => 0,
-                };
+                parts += more;
             }
+            _ => open = open.or(Some(found)),
         }
     }
     Ok(open.unwrap_or(Finding::proved(match product {
-        Some((low, high)) => determinant_in((low, high), false),
+        Some((low, high)) => Reason::Determinant {
+            low,
+            high,
+            open: false,
+        },
         None => Reason::RegularParts(parts),
     })))
-}
-
-fn determinant_in((low, high): (f64, f64), open: bool) -> Reason {
-    Reason::Determinant { low, high, open }
 }
 
 /// Of an irreducible block: proved by [`Reason::Determinant`] where that was expanded, else by
@@ -262,10 +258,8 @@ fn decide(block: &Matrix<'_>, region: &Region) -> Result<Finding, MissingInput> 
         return by_parts(block, region);
     }
     let graph = block.graph();
-    let rows: Vec<Vec<_>> = (0..block.rows)
-        .map(|i| (0..block.columns).map(|j| block.get(i, j)).collect())
-        .collect();
-    let det = determinant(graph, &rows).unwrap_or_else(|| graph.constant(0.0).node());
+    let zero = || graph.constant(0.0).node();
+    let det = block.expanded().unwrap_or_else(zero);
     let found = sign::keeps_sign(graph, det, region)?;
     let verdict = found.finding.verdict;
     let open = matches!(verdict, Verdict::Undecided(_));
@@ -275,7 +269,8 @@ fn decide(block: &Matrix<'_>, region: &Region) -> Result<Finding, MissingInput> 
             return Ok(second);
         }
     }
-    let reason = determinant_in(found.bounds, open);
+    let (low, high) = found.bounds;
+    let reason = Reason::Determinant { low, high, open };
     Ok(Finding { verdict, reason })
 }
 
@@ -290,7 +285,8 @@ fn by_parts(block: &Matrix<'_>, region: &Region) -> Result<Finding, MissingInput
         let entries = tape.eval_in(&Intervals, cell);
         entries.iter().all(|e| e.is_defined() && !e.is_empty()) && solve(&entries, &zeros).1
     };
-    let (mut negative, mut positive): (Option<Point>, Option<Point>) = (None, None);
+    // points with a negative and with a positive determinant
+    let mut seen: [Option<Point>; 2] = [None, None];
     let mut open = VecDeque::from([region.cell()]);
     let mut parts = 0;
     let mut looked = 0;
@@ -303,19 +299,10 @@ fn by_parts(block: &Matrix<'_>, region: &Region) -> Result<Finding, MissingInput
         let middle = region.middle_point(&cell);
         let at: Cell = middle.iter().map(|&x| Interval::point(x)).collect();
         if let Some(value) = sure_determinant(tape.eval_in(&Intervals, &at), block.rows) {
-            let seen = if value > 0.0 {
-                &mut positive
-            } else {
-                &mut negative
-            };
-            *seen = Some(Point {
-                coordinates: region.coordinates(&middle),
-                value,
-            });
+            let place = usize::from(value > 0.0);
+            seen[place] = Some(region.point(&middle, value));
         }
-        // determinants of either sign
-        let both = negative.iter().chain(&positive).cloned();
-        let witness = Some(both.collect::<Vec<Point>>()).filter(|points| points.len() == 2);
+        let witness: Option<Vec<Point>> = seen.iter().cloned().collect();
         let halves = region
             .split(&cell)
             .filter(|_| looked < CELLS && graph.spent().is_none());

@@ -47,6 +47,15 @@ impl From<(String, f64)> for Coordinate {
     }
 }
 
+/// A point of the box and the value of the expression in question there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// of every variable the expression depends on
+    pub coordinates: Vec<Coordinate>,
+    /// value of the expression at the point
+    pub value: f64,
+}
+
 /// A part of the box; without sides where none says more than the whole box.
 pub type Place = Vec<Dimension>;
 
@@ -109,16 +118,22 @@ impl Region {
     }
 
     /// Names of the dimensions without a declared end.
-    pub fn open(&self) -> Vec<&str> {
-        let open = |d: &&Dimension| d.min.is_infinite() || d.max.is_infinite();
-        let open = self.dimensions.iter().filter(open);
-        open.map(|d| d.name.as_str()).collect()
+    pub fn open(&self) -> Vec<String> {
+        undeclared(&self.dimensions)
     }
 
     /// A point by the names of the sides.
     pub fn coordinates(&self, point: &[f64]) -> Vec<Coordinate> {
         let sides = self.dimensions.iter().zip(point);
         sides.map(|(d, &x)| (d.name.clone(), x).into()).collect()
+    }
+
+    /// The same with the value there.
+    pub(crate) fn point(&self, at: &[f64], value: f64) -> Point {
+        Point {
+            coordinates: self.coordinates(at),
+            value,
+        }
     }
 
     /// Whether a point is not absurdly far where no end is declared.
@@ -162,16 +177,10 @@ impl Region {
     /// The cell cut along one side; none where that has nothing between its ends.
     pub(crate) fn halves(&self, cell: &Cell, side: usize) -> Option<[Cell; 2]> {
         let (low, high) = (cell[side].lo(), cell[side].hi());
-        let (left, right) = if self.dimensions[side].integer {
-            let middle = self.middle(side, &cell[side]);
-            (middle, (middle + 1.0).min(high))
-        } else {
-            let middle = between(low, high);
-            (middle, middle)
-        };
-        let splits = match self.dimensions[side].integer {
-            true => low < high,
-            false => low < left && right < high,
+        let left = self.middle(side, &cell[side]);
+        let (right, splits) = match self.dimensions[side].integer {
+            true => ((left + 1.0).min(high), low < high),
+            false => (left, low < left && left < high),
         };
         if !splits {
             return None;
@@ -243,6 +252,13 @@ impl Region {
         let sides = self.dimensions.iter().zip(p.iter().zip(q));
         sides.into_iter().all(|(d, (p, q))| !d.integer || p == q)
     }
+}
+
+/// Names of the sides without a declared end.
+pub(crate) fn undeclared(sides: &[Dimension]) -> Vec<String> {
+    let open = |side: &&Dimension| side.min.is_infinite() || side.max.is_infinite();
+    let open = sides.iter().filter(open);
+    open.map(|side| side.name.clone()).collect()
 }
 
 /// Every side of a cell at its lower end.

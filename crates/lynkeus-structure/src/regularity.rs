@@ -10,7 +10,7 @@
 use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::interval::Intervals;
-use lynkeus_expr::{Algebra, Binary, Call, Graph, Interval, MissingInput, Node, Op, Tape, Unary};
+use lynkeus_expr::{Binary, Evaluator, Graph, Interval, MissingInput, Node, Op, Tape};
 
 use crate::jumps::{meets, without_removable_jumps};
 use crate::region::{Cell, Question};
@@ -179,19 +179,11 @@ fn told(graph: &Graph, region: &Region, cell: &Cell, culprit: Node, values: Inte
 /// in the box: what has no derivative in a symbol may still depend on it.
 pub fn steps(graph: &Graph, node: Node, symbols: &[Node]) -> bool {
     let depends = |n: Node| graph.symbols_of(&[n]).iter().any(|s| symbols.contains(s));
-    graph
-        .reachable(&[node])
-        .into_iter()
-        .any(|n| match graph.op(n) {
-            Op::Unary(Unary::Sign | Unary::Floor | Unary::Not, a) => depends(a),
-            Op::Binary(
-                Binary::Less | Binary::LessEq | Binary::Equal | Binary::And | Binary::Or,
-                ..,
-            ) => depends(n),
-            Op::Select(condition, ..) => depends(condition),
-            Op::System(_) => graph.jumps(n) && depends(n),
-            _ => false,
-        })
+    let is_step = |&n: &Node| match graph.op(n) {
+        Op::Select(condition, ..) => depends(condition),
+        _ => graph.jumps(n) && depends(n),
+    };
+    graph.reachable(&[node]).iter().any(is_step)
 }
 
 /// What is known of a node on a cell.
@@ -208,8 +200,6 @@ struct Step {
     node: Node,
     op: Op,
     arguments: Vec<usize>,
-    /// of a symbol: its side of the region
-    side: usize,
     /// depends on a symbol that moves
     moves: bool,
     /// a selection whose branches agree where it changes from one to the other
@@ -222,10 +212,9 @@ struct Walk<'g> {
     steps: Vec<Step>,
     /// places of the roots
     roots: Vec<usize>,
+    /// of every node but the systems, in that order
+    values: Evaluator<Intervals>,
     known: Vec<Known>,
-    /// per step, for the systems on this cell: enclosures of their entries, of a linear one also
-    /// of the condition estimate, which comes last
-    solved: Vec<Vec<Interval>>,
 }
 
 impl<'g> Walk<'g> {
@@ -239,14 +228,9 @@ impl<'g> Walk<'g> {
     ) -> Result<Self, MissingInput> {
         let nodes = graph.reachable(roots);
         let place: HashMap<Node, usize> = nodes.iter().enumerate().map(|(i, &n)| (n, i)).collect();
-        let sides: HashMap<Node, usize> = region
-            .dimensions
-            .iter()
-            .enumerate()
-            .map(|(i, d)| (d.symbol, i))
-            .collect();
-        // refuses symbols outside the region
-        Tape::new(graph, &region.symbols(), roots)?;
+        let valued = nodes.iter().filter(|node| !graph.op(**node).is_system());
+        let valued: Vec<Node> = valued.copied().collect();
+        let values = Tape::new(graph, &region.symbols(), &valued)?;
         let moving: HashSet<Node> = moving.iter().copied().collect();
         let mut steps: Vec<Step> = vec![];
         for &node in &nodes {
@@ -256,7 +240,6 @@ impl<'g> Walk<'g> {
                 node,
                 op: graph.op(node),
                 arguments,
-                side: sides.get(&node).copied().unwrap_or_default(),
                 moves,
                 glued: meets(graph, node, region),
             });
@@ -264,8 +247,8 @@ impl<'g> Walk<'g> {
         Ok(Self {
             graph,
             roots: roots.iter().map(|root| place[root]).collect(),
+            values: values.evaluator_in(Intervals),
             known: Vec::with_capacity(steps.len()),
-            solved: vec![vec![]; steps.len()],
             steps,
         })
     }
@@ -273,17 +256,28 @@ impl<'g> Walk<'g> {
     /// The first node that may lack a value or jump on the cell, with what is known of it;
     /// none where every root has a value everywhere and does not jump.
     fn trouble(&mut self, cell: &[Interval]) -> Option<(Node, Known)> {
+        // one cell may take long where systems are large
+        let mut steps = self.steps.iter();
+        if let Some(entry) = steps.find(|step| matches!(step.op, Op::Entry(..)))
+            && self.graph.spent().is_some()
+        {
+            let (values, continuous) = (Interval::UNKNOWN, false);
+            return Some((entry.node, Known { values, continuous }));
+        }
+        let mut values = vec![Interval::ENTIRE; self.values.tape().outputs()];
+        self.values.eval(cell, &mut values);
+        let mut values = values.into_iter();
         self.known.clear();
-        for i in 0..self.steps.len() {
-            let known = self.one(i, cell);
-            self.known.push(known);
-            // one cell may take long where systems are large
-            if self.steps[i].op.is_system() {
-                self.solved[i] = match self.graph.spent() {
-                    None => self.solve(i),
-                    Some(_) => vec![],
-                };
-            }
+        for step in &self.steps {
+            let values = match step.op.is_system() {
+                // it has no value of its own, and must not pass for a constant
+                true => Interval::ENTIRE,
+                false => values.next().unwrap_or(Interval::UNKNOWN),
+            };
+            // whatever it is made of: a constant does not jump
+            let constant = values.is_defined() && values.is_point();
+            let continuous = constant || !step.moves || self.continuous(step, values);
+            self.known.push(Known { values, continuous });
         }
         let fails = |k: Known| !(k.continuous && k.values.is_defined());
         if !self.roots.iter().any(|&root| fails(self.known[root])) {
@@ -296,10 +290,8 @@ impl<'g> Walk<'g> {
 
     /// Whether every operation is needed wherever the roots are: none is chosen.
     fn needs_all(&self) -> bool {
-        !self
-            .steps
-            .iter()
-            .any(|step| matches!(step.op, Op::Select(..)))
+        let mut steps = self.steps.iter();
+        !steps.any(|step| matches!(step.op, Op::Select(..)))
     }
 
     /// The nodes behind the roots' troubles: a branch that is not taken is none.
@@ -313,11 +305,9 @@ impl<'g> Walk<'g> {
                 continue;
             }
             let untaken = match (step.op, &step.arguments[..]) {
-                (Op::Select(..), &[c, a, b]) => match decided(self.known[c].values) {
-                    Some(true) => Some(b),
-                    Some(false) => Some(a),
-                    None => None,
-                },
+                (Op::Select(..), &[c, a, b]) => {
+                    decided(self.known[c].values).map(|taken| if taken { b } else { a })
+                }
                 _ => None,
             };
             for &argument in &step.arguments {
@@ -327,66 +317,13 @@ impl<'g> Walk<'g> {
         needed
     }
 
-    fn one(&self, i: usize, cell: &[Interval]) -> Known {
-        let step = &self.steps[i];
-        let values = self.values(step, cell);
-        // whatever it is made of: a constant does not jump
-        let constant = values.is_defined() && values.is_point();
-        Known {
-            values,
-            continuous: constant || !step.moves || self.continuous(step, values),
-        }
-    }
-
-    /// What is known of an argument.
-    fn of(&self, step: &Step, argument: usize) -> Known {
-        self.known[step.arguments[argument]]
-    }
-
-    fn values(&self, step: &Step, cell: &[Interval]) -> Interval {
-        let of = |argument: usize| self.of(step, argument).values;
-        match step.op {
-            Op::Constant(x) => Interval::point(x),
-            Op::Symbol(_) => cell[step.side],
-            Op::Unary(op, _) => Intervals.unary(op, &of(0)),
-            Op::Powi(_, n) => Intervals.powi(&of(0), n),
-            Op::Binary(op, ..) => Intervals.binary(op, &of(0), &of(1)),
-            Op::Select(..) => Intervals.select(&of(0), &of(1), &of(2)),
-            // a system has no value of its own, and must not pass for a constant
-            Op::System(_) => Interval::ENTIRE,
-            Op::Entry(_, i) => {
-                let entry = self.solved[step.arguments[0]].get(i as usize);
-                entry.copied().unwrap_or(Interval::UNKNOWN)
-            }
-        }
-    }
-
-    fn solve(&self, i: usize) -> Vec<Interval> {
-        let step = &self.steps[i];
-        let arguments = step.arguments.iter();
-        let values: Vec<Interval> = arguments.map(|&a| self.known[a].values).collect();
-        let call = self.graph.system(step.node);
-        if let Some(function) = call.as_ref().and_then(Call::function) {
-            return Intervals.implicit(function, &values);
-        }
-        let n = call.map_or(0, |call| call.size());
-        let (A, b) = values.split_at(n * n);
-        let (mut x, condition) = Intervals.solve(A, b);
-        x.push(condition);
-        x
-    }
-
     fn continuous(&self, step: &Step, values: Interval) -> bool {
-        let of = |argument: usize| self.of(step, argument);
+        let of = |argument: usize| self.known[step.arguments[argument]];
         let moves = |argument: usize| self.steps[step.arguments[argument]].moves;
         match step.op {
             Op::Constant(_) | Op::Symbol(_) => true,
             // they step where their values differ
-            Op::Unary(Unary::Sign | Unary::Floor | Unary::Not, _)
-            | Op::Binary(
-                Binary::Less | Binary::LessEq | Binary::Equal | Binary::And | Binary::Or,
-                ..,
-            ) => false,
+            Op::Unary(..) | Op::Binary(..) if self.graph.jumps(step.node) => false,
             Op::Binary(Binary::Atan2, ..) => {
                 let cut = of(0).values.contains_zero() && of(1).values.lo() < 0.0;
                 of(0).continuous && of(1).continuous && !(cut && moves(0))

@@ -4,7 +4,7 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 
 use crate::jumps::without_removable_jumps;
-use crate::region::Cell;
+use crate::region::{Cell, undeclared};
 use crate::regularity::is_regular;
 use crate::{
     Dimension, Finding, Point, Range, Reason, Region, Verdict, Witness, range, range_within,
@@ -53,27 +53,16 @@ pub fn keeps_sign(graph: &Graph, node: Node, region: &Region) -> Result<Sign, Mi
             false => regular,
             true => Finding {
                 verdict: Verdict::Undecided(found.weakest.clone()),
-                reason: lies(true, undeclared(&found)),
+                reason: lies(true, undeclared(&found.weakest)),
             },
         }
     };
     let sample = found.highest.as_ref().map_or(1.0, |p| p.value);
-    let sign = if high < 0.0 || (low <= 0.0 && sample < 0.0) {
-        -1.0
-    } else {
-        1.0
-    };
-    let bounds = if low > 0.0 {
-        (low, high)
-    } else if high < 0.0 {
-        (-high, -low)
-    } else {
-        (0.0, high.max(-low))
-    };
+    let is_negative = high < 0.0 || (low <= 0.0 && sample < 0.0);
     Ok(Sign {
         finding,
-        sign,
-        bounds,
+        sign: if is_negative { -1.0 } else { 1.0 },
+        bounds: (found.enclosure.mignitude(), found.enclosure.magnitude()),
     })
 }
 
@@ -83,8 +72,9 @@ pub fn keeps_sign(graph: &Graph, node: Node, region: &Region) -> Result<Sign, Mi
 /// # Errors
 /// [`MissingInput`] where the node depends on a symbol outside the region.
 pub fn bounded(graph: &Graph, node: Node, region: &Region) -> Result<bool, MissingInput> {
-    let found = range_within(graph, node, region, GLANCE)?.enclosure;
-    Ok(found.is_defined() && found.lo().is_finite() && found.hi().is_finite())
+    Ok(range_within(graph, node, region, GLANCE)?
+        .enclosure
+        .is_bounded())
 }
 
 /// Which of the expressions the whole box proves [bounded], without halving it: one
@@ -99,15 +89,7 @@ pub fn bounded_at_once(
 ) -> Result<Vec<bool>, MissingInput> {
     let tape = Tape::new(graph, &region.symbols(), nodes)?;
     let values = tape.eval_in(&Intervals, &region.cell());
-    let is_bounded = |x: &Interval| x.is_defined() && x.magnitude().is_finite();
-    Ok(values.iter().map(is_bounded).collect())
-}
-
-/// Names of the sides of the weakest cell that have no declared end.
-fn undeclared(found: &Range) -> Vec<String> {
-    let open = |side: &&Dimension| side.min.is_infinite() || side.max.is_infinite();
-    let open = found.weakest.iter().filter(open);
-    open.map(|side| side.name.clone()).collect()
+    Ok(values.iter().map(|x| x.is_bounded()).collect())
 }
 
 fn witness(
@@ -126,10 +108,8 @@ fn witness(
     let at = |point: &Point| -> Vec<f64> { point.coordinates.iter().map(|c| c.value).collect() };
     let (low, high) = (at(lowest), at(highest));
     for (point, at) in [(lowest, &low), (highest, &high)] {
-        let value = enclosure(&tape, at);
         // where it jumps, the value between is no zero
-        if value.lo() == 0.0
-            && value.hi() == 0.0
+        if enclosure(&tape, at).is_zero()
             && is_regular(graph, smooth, &region, &around(at, &region))?
         {
             return Ok(Some(point.clone().into()));
@@ -196,10 +176,7 @@ fn along(from: &[f64], to: &[f64], halvings: i32) -> Vec<f64> {
 /// The place with the value there.
 fn told(tape: &Tape, region: &Region, place: &[f64]) -> Point {
     let value = enclosure(tape, place);
-    Point {
-        coordinates: region.coordinates(place),
-        value: f64::midpoint(value.lo(), value.hi()),
-    }
+    region.point(place, f64::midpoint(value.lo(), value.hi()))
 }
 
 /// A small cell of the region around a point.

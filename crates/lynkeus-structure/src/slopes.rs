@@ -23,6 +23,7 @@ use std::collections::{BTreeMap, HashMap};
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Tape, Unary, jacobian};
 use lynkeus_proof::decay::{ErrorModel, Sector};
+use lynkeus_proof::matrix::IntervalMatrix;
 
 use crate::jumps::without_removable_jumps;
 use crate::{Place, Region, range_within, regularity};
@@ -113,8 +114,7 @@ impl Slopes {
     /// The first slope without bound, and the variables without bound that it depends
     /// on (none where the slope is unbounded by itself, as that of √ at 0 is).
     pub fn unbounded(&self, region: &Region) -> Option<(&Slope, Vec<String>)> {
-        let infinite = |s: &&Slope| !s.range.magnitude().is_finite() || !s.range.is_defined();
-        let slope = self.slopes.iter().find(infinite)?;
+        let slope = self.slopes.iter().find(|s| !s.range.is_bounded())?;
         let open = |name: &&String| {
             let mut sides = region.dimensions.iter();
             sides.any(|d| d.name == **name && !(d.min.is_finite() && d.max.is_finite()))
@@ -202,18 +202,16 @@ fn model(
     region: &Region,
 ) -> Result<(ErrorModel, Vec<Slope>), MissingInput> {
     let n = derivatives.len();
-    let model = ErrorModel {
-        constant: vec![vec![Interval::ZERO; n]; n],
-        sectors: vec![],
-    };
-    let mut found = (model, vec![]);
+    let mut found = (vec![vec![Interval::ZERO; n]; n], vec![]);
     let columns: Vec<Column> = states.iter().copied().zip(0..).collect();
     let read: Vec<Column> = innovations.iter().map(|i| (i.symbol, i.state)).collect();
     let vanishing: Vec<Node> = read.iter().map(|column| column.0).collect();
     let right = at_rest(region, &vanishing);
     contribute(graph, derivatives, &columns, &vanishing, &right, &mut found)?;
     contribute(graph, derivatives, &read, &[], region, &mut found)?;
-    Ok(found)
+    let (constant, found) = found;
+    let (sectors, slopes) = found.into_iter().unzip();
+    Ok((ErrorModel { constant, sectors }, slopes))
 }
 
 /// The region where these symbols are 0.
@@ -229,17 +227,13 @@ fn at_rest(region: &Region, vanishing: &[Node]) -> Region {
 
 /// Slopes of the same state with the same weights count together: θ₁ + θ₂ is one
 /// uncertain number.
-fn add(sectors: &mut Vec<Sector>, slopes: &mut Vec<Slope>, sector: Sector, slope: Slope) {
-    let same = |s: &Sector| s.column == sector.column && s.direction == sector.direction;
-    let Some(place) = sectors.iter().position(same) else {
-        sectors.push(sector);
-        slopes.push(slope);
-        return;
+fn add(found: &mut Vec<(Sector, Slope)>, sector: Sector, slope: Slope) {
+    let is_same = |own: &Sector| own.column == sector.column && own.direction == sector.direction;
+    let Some((own, mine)) = found.iter_mut().find(|(own, _)| is_same(own)) else {
+        return found.push((sector, slope));
     };
-    let range = sectors[place].range + sector.range;
-    sectors[place].range = range;
-    let mine = &mut slopes[place];
-    mine.range = range;
+    own.range = own.range + sector.range;
+    mine.range = own.range;
     mine.term = format!("{} and {}", mine.term, slope.term);
     for name in slope.variables {
         if !mine.variables.contains(&name) {
@@ -256,7 +250,7 @@ fn contribute(
     columns: &[Column],
     vanishing: &[Node],
     region: &Region,
-    (model, slopes): &mut (ErrorModel, Vec<Slope>),
+    (constant, found): &mut (IntervalMatrix, Vec<(Sector, Slope)>),
 ) -> Result<(), MissingInput> {
     if columns.is_empty() {
         return Ok(());
@@ -267,7 +261,7 @@ fn contribute(
         for (term, coefficient) in splitter.split(f)?.terms {
             match columns.iter().find(|(symbol, _)| *symbol == term) {
                 Some(&(_, state)) => {
-                    let entry = &mut model.constant[row][state];
+                    let entry = &mut constant[row][state];
                     *entry = *entry + coefficient;
                 }
                 None => {
@@ -291,7 +285,7 @@ fn contribute(
         let regular = regularity(graph, &terms, &moving, region)?.is_proved();
         for &column in columns {
             if let Some((sector, slope)) = sector(graph, &group, column, regular, region)? {
-                add(&mut model.sectors, slopes, sector, slope);
+                add(found, sector, slope);
             }
         }
     }
@@ -309,8 +303,7 @@ fn is_idle(
     if !vanishing.iter().any(|symbol| used.contains(symbol)) {
         return Ok(false);
     }
-    let found = range_within(graph, term, region, 0)?;
-    Ok(found.enclosure.is_defined() && found.enclosure == Interval::ZERO)
+    Ok(range_within(graph, term, region, 0)?.enclosure == Interval::ZERO)
 }
 
 fn sector(
@@ -392,10 +385,8 @@ fn slope(
         // the coefficient's middle enters the sum, what rounding left of it the rest
         let middle = coefficient.midpoint();
         let weighted = graph.binary(Binary::Mul, graph.constant(middle).node(), partial);
-        sum = Some(match sum {
-            Some(sum) => graph.binary(Binary::Add, sum, weighted),
-            None => weighted,
-        });
+        let added = |sum| graph.binary(Binary::Add, sum, weighted);
+        sum = Some(sum.map_or(weighted, added));
         let left = coefficient - Interval::point(middle);
         if left != Interval::ZERO {
             rest = rest + left * range_within(graph, partial, region, 0)?.enclosure;

@@ -190,9 +190,7 @@ impl Factor {
         }
         self.entries.sort_unstable();
     }
-}
 
-impl Factor {
     /// Has F_k full column rank everywhere on the box? Then x^{k+1} shows in x^k
     /// whatever the input. Refuted, with the direction ξ that F_k ξ = 0 hides,
     /// only where F_k is a matrix of numbers: anything that moves may turn the

@@ -88,12 +88,7 @@ pub fn uniformity(
         regular,
         singular,
         share,
-        undeclared: region
-            .restricted(&graph.symbols_of(&[node]))
-            .open()
-            .into_iter()
-            .map(str::to_owned)
-            .collect(),
+        undeclared: region.restricted(&graph.symbols_of(&[node])).open(),
         sides: region.dimensions[..n].to_vec(),
     }))
 }
@@ -237,9 +232,7 @@ fn cells(graph: &Graph, node: Node, region: &Region) -> Result<(Vec<Place>, f64)
     let tape = Tape::new(graph, &region.symbols(), &[node])?;
     let mut bounds = tape.evaluator_in(Intervals);
     let mut may_vanish = |cell: &Cell| {
-        let mut values = [lynkeus_expr::Interval::ENTIRE];
-        bounds.eval(cell, &mut values);
-        let [value] = values;
+        let value = bounds.value(cell);
         value.contains_zero() || !value.is_defined()
     };
     let mut open = vec![(region.cell(), 1.0_f64)];
@@ -293,15 +286,13 @@ fn blind(
     let graph = augmented.graph();
     let mut found = vec![];
     for input in &augmented.inputs {
-        let ends = [
-            0.0,
-            input.min,
-            input.max,
-            match input.integer {
-                true => f64::midpoint(input.min, input.max).floor(),
-                false => f64::midpoint(input.min, input.max),
-            },
-        ];
+        let middle = f64::midpoint(input.min, input.max);
+        let middle = if input.integer {
+            middle.floor()
+        } else {
+            middle
+        };
+        let ends = [0.0, input.min, input.max, middle];
         let inside = |x: &f64| {
             let whole = !input.integer || x.fract() == 0.0;
             x.is_finite() && *x >= input.min && *x <= input.max && whole

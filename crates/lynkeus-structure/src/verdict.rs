@@ -1,15 +1,6 @@
 //! Verdicts.
 
-use crate::{Coordinate, Misfit, Place};
-
-/// A point of the box and the value of the expression in question there.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Point {
-    /// of every variable the expression depends on
-    pub coordinates: Vec<Coordinate>,
-    /// value of the expression at the point
-    pub value: f64,
-}
+use crate::{Misfit, Place, Point};
 
 /// Points that refute a condition.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,7 +4,7 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 
 use crate::region::{inside, spread};
-use crate::{Point, Region, Verdict, Witness};
+use crate::{Region, Verdict};
 
 /// Points tried beside those on the edges of the box.
 const POINTS: usize = 12;
@@ -18,14 +18,8 @@ pub fn vanishes(graph: &Graph, node: Node, region: &Region) -> Result<Verdict, M
     let region = region.restricted(&graph.symbols_of(&[node]));
     let tape = Tape::new(graph, &region.symbols(), &[node])?;
     let mut bounds = tape.evaluator_in(Intervals);
-    let mut value = |cell: &[Interval]| {
-        let mut values = [Interval::ENTIRE];
-        bounds.eval(cell, &mut values);
-        values[0]
-    };
     let whole = region.cell();
-    let enclosure = value(&whole);
-    if enclosure.lo() == 0.0 && enclosure.hi() == 0.0 {
+    if bounds.value(&whole).is_zero() {
         return Ok(Verdict::Proved);
     }
     let mut points: Vec<Vec<f64>> = (0..POINTS).map(|p| generic(&region, p)).collect();
@@ -35,13 +29,11 @@ pub fn vanishes(graph: &Graph, node: Node, region: &Region) -> Result<Verdict, M
             break;
         }
         let cell: Vec<Interval> = point.iter().map(|&x| Interval::point(x)).collect();
-        let enclosure = value(&cell);
+        let enclosure = bounds.value(&cell);
         let sure = enclosure.is_positive() || enclosure.is_negative();
-        if sure && enclosure.lo().is_finite() && enclosure.hi().is_finite() {
-            return Ok(Verdict::Refuted(Witness::from(Point {
-                coordinates: region.coordinates(&point),
-                value: enclosure.lo() + (enclosure.hi() - enclosure.lo()) / 2.0,
-            })));
+        if sure && enclosure.magnitude().is_finite() {
+            let value = enclosure.lo() + (enclosure.hi() - enclosure.lo()) / 2.0;
+            return Ok(Verdict::Refuted(region.point(&point, value).into()));
         }
     }
     Ok(Verdict::open())

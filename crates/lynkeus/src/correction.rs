@@ -130,10 +130,9 @@ fn at_start(study: &Study, plant: &Plant, observer: &Observer, node: Node) -> Op
     symbols.extend(observer.states.iter().map(|(s, _)| s.symbol));
     let mut values = vec![study.simulate.as_ref().map_or(0.0, |s| s.start)];
     values.extend(observer.states.iter().map(|(_, start)| *start));
-    let mut value = [0.0];
     let tape = Tape::new(&plant.graph, &symbols, &[node]).ok()?;
-    tape.evaluator().eval(&values, &mut value);
-    Some(value[0]).filter(|x| x.is_finite())
+    let value = tape.evaluator().value(&values);
+    value.is_finite().then_some(value)
 }
 
 impl Correction {

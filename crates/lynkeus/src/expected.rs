@@ -50,15 +50,13 @@ fn evaluated(
     let tape = Tape::new(augmented.graph(), symbols, &[node]).ok()?;
     let mut evaluator = tape.evaluator();
     let mut values = vec![0.0; columns.len()];
-    let mut value = [0.0];
     let time = columns.first()?;
     let mut rows: Vec<Iter<'_>> = columns.iter().map(|c| c.iter()).collect();
     let at = |_| {
         for (value, column) in values.iter_mut().zip(&mut rows) {
             *value = column.next().unwrap_or(f64::NAN);
         }
-        evaluator.eval(&values, &mut value);
-        value[0]
+        evaluator.value(&values)
     };
     Some(Series::gathered(time.store(), (0..time.len()).map(at)))
 }

@@ -146,8 +146,13 @@ impl Interval {
     }
 
     /// Whether zero is the only member.
-    const fn is_zero(self) -> bool {
+    pub const fn is_zero(self) -> bool {
         self.lo == 0.0 && self.hi == 0.0
+    }
+
+    /// Whether it encloses an expression that has a value everywhere, between two finite numbers.
+    pub const fn is_bounded(self) -> bool {
+        self.defined && self.lo.is_finite() && self.hi.is_finite()
     }
 }
 

@@ -40,17 +40,11 @@ fn reduced<V: Vector>(x: V) -> Reduced<V> {
 }
 
 impl<V: Vector> Reduced<V> {
-    /// Whether k is odd, as a mask's sign.
+    /// Whether k is odd, as a mask's sign, and the sign of the quadrant; k counted from `first`.
     #[inline(always)]
-    fn is_odd(&self) -> V {
-        self.shifted.up::<63>()
-    }
-
-    /// The sign of the quadrant, counted from `first`.
-    #[inline(always)]
-    fn sign(&self, first: u64) -> V {
+    fn quadrant(&self, first: u64) -> [V; 2] {
         let quadrant = self.shifted.plus_bits(V::splat(f64::from_bits(first)));
-        quadrant.up::<62>().signs()
+        [quadrant.up::<63>(), quadrant.up::<62>().signs()]
     }
 
     /// sin(r − over).
@@ -101,26 +95,25 @@ impl<V: Vector> Reduced<V> {
     }
 }
 
+/// The sine, begun at that quarter of a turn.
+#[inline(always)]
+fn wave<V: Vector>(x: V, first: u64, library: fn(f64, f64) -> f64) -> V {
+    let reduced = reduced(x);
+    let [odd, sign] = reduced.quadrant(first);
+    let y = V::choose(odd, reduced.cos(), reduced.sin()).xor(sign);
+    y.rescued(reduced.inside, [x, x], library)
+}
+
 /// The sine; of huge arguments, and next to its zeros, the library's.
 #[inline(always)]
 pub fn sin<V: Vector>(x: V) -> V {
-    let reduced = reduced(x);
-    let y = V::choose(reduced.is_odd(), reduced.cos(), reduced.sin()).xor(reduced.sign(0));
-    if reduced.inside.all() {
-        return y;
-    }
-    y.rescued(reduced.inside, [x, x], |x, _| x.sin())
+    wave(x, 0, |x, _| x.sin())
 }
 
 /// The cosine; of huge arguments, and next to its zeros, the library's.
 #[inline(always)]
 pub fn cos<V: Vector>(x: V) -> V {
-    let reduced = reduced(x);
-    let y = V::choose(reduced.is_odd(), reduced.sin(), reduced.cos()).xor(reduced.sign(1));
-    if reduced.inside.all() {
-        return y;
-    }
-    y.rescued(reduced.inside, [x, x], |x, _| x.cos())
+    wave(x, 1, |x, _| x.cos())
 }
 
 /// The tangent; of huge arguments, and next to its zeros and poles, the library's.
@@ -128,12 +121,9 @@ pub fn cos<V: Vector>(x: V) -> V {
 pub fn tan<V: Vector>(x: V) -> V {
     let reduced = reduced(x);
     let (sin, cos) = (reduced.sin(), reduced.cos());
-    let odd = reduced.is_odd();
+    let [odd, _] = reduced.quadrant(0);
     let quotient = V::choose(odd, cos, sin) / V::choose(odd, sin, cos);
     let y = quotient.xor(odd.signs());
-    if reduced.inside.all() {
-        return y;
-    }
     y.rescued(reduced.inside, [x, x], |x, _| x.tan())
 }
 
@@ -228,9 +218,6 @@ pub fn atan2<V: Vector>(y: V, x: V) -> V {
         .below(x)
         .and(large)
         .and(V::splat(1e-150).at_most(den)));
-    if inside.all() {
-        return angle;
-    }
     angle.rescued(inside, [y, x], f64::atan2)
 }
 

@@ -199,9 +199,6 @@ pub fn ln<V: Vector>(x: V) -> V {
     let half = V::splat(0.5) * f * f;
     let curve = s.mul_add(half + rest, k * V::splat(LN_2[1]));
     let y = k.mul_add(V::splat(LN_2[0]), f - (half - curve));
-    if inside.all() {
-        return y;
-    }
     y.rescued(inside, [x, x], |x, _| x.ln())
 }
 
@@ -303,8 +300,5 @@ pub fn pow<V: Vector>(x: V, y: V) -> V {
     let power = joined([r, shifted], 1.0);
     let is_normal = exponent.high.abs().below(V::splat(708.0));
     let inside = inside.and(is_normal);
-    if inside.all() {
-        return power;
-    }
     power.rescued(inside, [x, y], f64::powf)
 }

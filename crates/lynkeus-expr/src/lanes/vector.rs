@@ -195,6 +195,9 @@ impl<const N: usize> Vector for Portable<N> {
 
     #[inline(always)]
     fn rescued(self, inside: Self, arguments: [Self; 2], f: fn(f64, f64) -> f64) -> Self {
+        if inside.all() {
+            return self;
+        }
         let [x, y] = arguments;
         Self(from_fn(|i| match inside.0[i].is_sign_negative() {
             true => self.0[i],

@@ -173,11 +173,12 @@ fn series(known: &Known, x: [f64; 2]) {
 fn jacobians(known: &Known, x: [f64; 2]) {
     let [roots, exact] =
         [&known.roots, &known.exact].map(|nodes| jacobian::forward(&known.graph, nodes, &known.x));
-    let reverse = jacobian::reverse(&known.graph, &known.roots, &known.x);
     for &(i, j, node) in &exact.entries {
         let exact = known.tape(&[node]).eval_in(&SPACE, &big(&x)).remove(0);
-        for found in [&roots, &reverse] {
-            let node = found.get(i, j).expect("it is well-formed");
+        let reverse = jacobian::gradient(&known.graph, known.roots[i], &known.x);
+        let reverse = reverse.iter().find(|(input, _)| *input == known.x[j]);
+        for found in [roots.get(i, j), reverse.map(|(_, slope)| *slope)] {
+            let node = found.expect("it is well-formed");
             let value = known.tape(&[node]).eval_in(&Reals, &x)[0];
             assert!(error(value, &exact, 0.1) < 1e-12, "{value} for {exact}");
         }

@@ -232,13 +232,18 @@ proptest! {
         let (inputs, outputs) = (symbols(&graph), &nodes[STEPS - 4..]);
         let tape = Tape::new(&graph, &inputs, outputs).expect("symbols are inputs");
         let pattern = jacobian::pattern(&graph, outputs, &inputs);
-        for build in [jacobian::forward, jacobian::reverse] {
-            let found = build(&graph, outputs, &inputs);
-            let entries: Vec<Node> = found.entries.iter().map(|&(.., node)| node).collect();
+        let mut reverse = vec![];
+        for (row, &output) in outputs.iter().enumerate() {
+            let column = |input: Node| inputs.iter().position(|i| *i == input).expect("an input");
+            let slopes = jacobian::gradient(&graph, output, &inputs).into_iter();
+            reverse.extend(slopes.map(|(input, slope)| (row, column(input), slope)));
+        }
+        for found in [jacobian::forward(&graph, outputs, &inputs).entries, reverse] {
+            let entries: Vec<Node> = found.iter().map(|&(.., node)| node).collect();
             let values = Tape::new(&graph, &inputs, &entries).expect("symbols are inputs")
                 .eval_in(&SPACE, &big(&x));
             let mut dense = vec![vec![0.0; INPUTS]; outputs.len()];
-            for (&(row, column, _), value) in found.entries.iter().zip(&values) {
+            for (&(row, column, _), value) in found.iter().zip(&values) {
                 prop_assert!(pattern[row].contains(&column));
                 dense[row][column] = to_f64(value);
             }

@@ -146,10 +146,8 @@ impl Reduction<'_> {
             let residual = graph.binary(Binary::Sub, equation.left, equation.right);
             let mut symbols = graph.symbols_of(&[residual]);
             symbols.retain(|symbol| states.contains_key(symbol));
-            let slopes = jacobian::reverse(graph, &[residual], &symbols);
-            for (column, slope) in slopes.row(0) {
-                let slope = graph.constant_value(slope);
-                let (state, key) = (symbols[column], states[&symbols[column]]);
+            for (state, slope) in jacobian::gradient(graph, residual, &symbols) {
+                let (slope, key) = (graph.constant_value(slope), states[&state]);
                 if slope.is_some_and(|value| value != 0.0)
                     && best.is_none_or(|(least, _)| key < least)
                 {
@@ -194,12 +192,11 @@ pub(crate) fn total_derivative(
     derivative: impl Fn(Node) -> Result<Option<Node>>,
 ) -> Result<Node> {
     let symbols = graph.symbols_of(&[expression]);
-    let slopes = jacobian::reverse(graph, &[expression], &symbols);
     let mut sum: Option<Node> = None;
-    for (column, slope) in slopes.row(0) {
-        let term = match derivative(symbols[column])? {
+    for (symbol, slope) in jacobian::gradient(graph, expression, &symbols) {
+        let term = match derivative(symbol)? {
             Some(derivative) => graph.binary(Binary::Mul, slope, derivative),
-            None if symbols[column] == time => slope,
+            None if symbol == time => slope,
             None => continue,
         };
         sum = Some(sum.map_or(term, |sum| graph.binary(Binary::Add, sum, term)));

@@ -3,13 +3,13 @@
 use lynkeus_expr::{Binary, Expr, Node, Unary};
 
 use super::evaluate::Evaluator;
-use super::value::{Scalar, Value, describe_dims, expected_number, unequal_sizes};
+use super::value::{Scalar, Value, describe_dims, expected_number};
 use crate::diagnostic::{Problem, Result, Span};
 
 impl Evaluator<'_> {
     /// A number as a Real expression.
-    pub(super) fn real(&self, scalar: Scalar, span: Span) -> Result<Node> {
-        let expected = || expected_number(span);
+    pub(super) fn real(&self, scalar: Scalar) -> Result<Node> {
+        let expected = || expected_number(self.at);
         scalar.real(self.graph).ok_or_else(expected)
     }
 
@@ -26,12 +26,11 @@ impl Evaluator<'_> {
     pub(super) fn map(
         &self,
         mut value: Value,
-        span: Span,
-        operation: impl Fn(&Self, Scalar, Span) -> Result<Scalar>,
+        operation: impl Fn(Scalar) -> Result<Scalar>,
     ) -> Result<Value> {
-        self.budget.charge(value.elements.len() as u64, span)?;
+        self.charge(value.elements.len() as u64)?;
         for element in &mut value.elements {
-            *element = operation(self, *element, span)?;
+            *element = operation(*element)?;
         }
         Ok(value)
     }
@@ -42,27 +41,33 @@ impl Evaluator<'_> {
         &self,
         left: Value,
         right: Value,
-        span: Span,
-        operation: impl Fn(&Self, Scalar, Scalar, Span) -> Result<Scalar>,
+        operation: impl Fn(Scalar, Scalar) -> Result<Scalar>,
     ) -> Result<Value> {
         if !left.dims.is_empty() && !right.dims.is_empty() && left.dims != right.dims {
-            return Err(unequal_sizes(&left.dims, &right.dims, span));
+            return Err(self.unequal_sizes(&left.dims, &right.dims));
         }
         let (dims, count) = match left.dims[..] {
             [] => (&right.dims, right.elements.len()),
             _ => (&left.dims, left.elements.len()),
         };
-        self.budget.charge(count as u64, span)?;
+        self.charge(count as u64)?;
         let at = |value: &Value, i: usize| match value.dims[..] {
             [] => value.elements[0],
             _ => value.elements[i],
         };
         let pairs = (0..count).map(|i| (at(&left, i), at(&right, i)));
-        let elements = pairs.map(|(a, b)| operation(self, a, b, span));
+        let elements = pairs.map(|(a, b)| operation(a, b));
         Ok(Value {
             elements: elements.collect::<Result<_>>()?,
             dims: dims.clone(),
         })
+    }
+
+    pub(super) fn unequal_sizes(&self, left: &[usize], right: &[usize]) -> Problem {
+        let (left, right) = (describe_dims(left), describe_dims(right));
+        self.problem(format!(
+            "the sizes differ: left is {left}, right is {right}"
+        ))
     }
 
     pub(super) fn binary(
@@ -71,37 +76,39 @@ impl Evaluator<'_> {
         elementwise: bool,
         left: Value,
         right: Value,
-        span: Span,
     ) -> Result<Value> {
         match operation {
             Binary::And | Binary::Or => {
-                let (left, right) = (self.boolean(&left, span)?, self.boolean(&right, span)?);
+                let (left, right) = (
+                    self.boolean(&left, self.at)?,
+                    self.boolean(&right, self.at)?,
+                );
                 let node = self.graph.binary(operation, left, right);
                 return Ok(Scalar::Boolean(node).into());
             }
             _ if elementwise => {}
             Binary::Add | Binary::Sub if left.dims != right.dims => {
-                let problem = unequal_sizes(&left.dims, &right.dims, span);
+                let problem = self.unequal_sizes(&left.dims, &right.dims);
                 return Err(match left.dims.is_empty() || right.dims.is_empty() {
                     true => problem.hint("`.+` and `.-` take a scalar with every element"),
                     false => problem,
                 });
             }
             Binary::Mul if !left.dims.is_empty() && !right.dims.is_empty() => {
-                return self.product(&left, &right, span);
+                return self.product(&left, &right);
             }
             Binary::Div if !right.dims.is_empty() => {
-                return Err(Problem::new(span, "division by an array")
+                return Err(self
+                    .problem("division by an array")
                     .hint("`./` divides by every element"));
             }
             _ => {}
         }
         if let (Some(a), Some(b)) = (left.as_scalar(), right.as_scalar()) {
-            return Ok(self.scalar_binary(operation, a, b, span)?.into());
+            return Ok(self.scalar_binary(operation, a, b)?.into());
         }
-        self.elementwise(left, right, span, |evaluator, a, b, span| {
-            evaluator.scalar_binary(operation, a, b, span)
-        })
+        let of_two = |a, b| self.scalar_binary(operation, a, b);
+        self.elementwise(left, right, of_two)
     }
 
     pub(super) fn scalar_binary(
@@ -109,38 +116,41 @@ impl Evaluator<'_> {
         operation: Binary,
         left: Scalar,
         right: Scalar,
-        span: Span,
     ) -> Result<Scalar> {
         match operation {
-            Binary::Add => self.of_two(left, right, span, i64::checked_add, |a, b| a + b),
-            Binary::Sub => self.of_two(left, right, span, i64::checked_sub, |a, b| a - b),
-            Binary::Mul => self.of_two(left, right, span, i64::checked_mul, |a, b| a * b),
+            Binary::Add => self.of_two(left, right, i64::checked_add, |a, b| a + b),
+            Binary::Sub => self.of_two(left, right, i64::checked_sub, |a, b| a - b),
+            Binary::Mul => self.of_two(left, right, i64::checked_mul, |a, b| a * b),
             _ => {
-                let (left, right) = (self.real(left, span)?, self.real(right, span)?);
+                let (left, right) = (self.real(left)?, self.real(right)?);
                 if self.graph.constant_value(right) == Some(0.0) {
-                    return Err(Problem::new(span, "division by zero"));
+                    return Err(self.problem("division by zero"));
                 }
                 Ok(Scalar::Real(self.graph.binary(Binary::Div, left, right)))
             }
         }
     }
 
-    pub(super) fn negated(&self, scalar: Scalar, span: Span) -> Result<Scalar> {
-        self.of_one(scalar, span, i64::checked_neg, |a| -a)
+    pub(super) fn negated(&self, scalar: Scalar) -> Result<Scalar> {
+        self.of_one(scalar, i64::checked_neg, |a| -a)
+    }
+
+    pub(super) fn overflow(&self) -> Problem {
+        let problem = self.problem("this Integer does not fit in 64 bits");
+        problem.hint("use Real numbers")
     }
 
     /// Of an Integer the exact result, which must fit; else that of a Real.
     pub(super) fn of_one(
         &self,
         a: Scalar,
-        span: Span,
         exact: impl Fn(i64) -> Option<i64>,
         real: impl for<'g> Fn(Expr<'g>) -> Expr<'g>,
     ) -> Result<Scalar> {
         if let Scalar::Integer(a) = a {
-            return exact(a).map(Scalar::Integer).ok_or_else(|| overflow(span));
+            return exact(a).map(Scalar::Integer).ok_or_else(|| self.overflow());
         }
-        let a = self.graph.expr(self.real(a, span)?);
+        let a = self.graph.expr(self.real(a)?);
         Ok(Scalar::Real(real(a).node()))
     }
 
@@ -149,59 +159,46 @@ impl Evaluator<'_> {
         &self,
         a: Scalar,
         b: Scalar,
-        span: Span,
         exact: impl Fn(i64, i64) -> Option<i64>,
         real: impl for<'g> Fn(Expr<'g>, Expr<'g>) -> Expr<'g>,
     ) -> Result<Scalar> {
         if let (Scalar::Integer(a), Scalar::Integer(b)) = (a, b) {
             let exact = exact(a, b).map(Scalar::Integer);
-            return exact.ok_or_else(|| overflow(span));
+            return exact.ok_or_else(|| self.overflow());
         }
-        let (a, b) = (self.real(a, span)?, self.real(b, span)?);
+        let (a, b) = (self.real(a)?, self.real(b)?);
         Ok(Scalar::Real(
             real(self.graph.expr(a), self.graph.expr(b)).node(),
         ))
     }
 
-    pub(super) fn power(
-        &self,
-        base: Value,
-        exponent: Value,
-        elementwise: bool,
-        span: Span,
-    ) -> Result<Value> {
+    pub(super) fn power(&self, base: Value, exponent: Value, elementwise: bool) -> Result<Value> {
         let are_scalars = base.dims.is_empty() && exponent.dims.is_empty();
         if !elementwise && !are_scalars {
-            return Err(Problem::new(span, "powers of arrays are not supported")
+            return Err(self
+                .problem("powers of arrays are not supported")
                 .hint("`.^` takes the power of every element"));
         }
-        self.elementwise(base, exponent, span, Self::scalar_power)
+        let power = |base, exponent| self.scalar_power(base, exponent);
+        self.elementwise(base, exponent, power)
     }
 
     /// A known whole exponent gives an integer power, which takes any base.
-    fn scalar_power(&self, base: Scalar, exponent: Scalar, span: Span) -> Result<Scalar> {
-        let node = self.real(base, span)?;
+    fn scalar_power(&self, base: Scalar, exponent: Scalar) -> Result<Scalar> {
+        let node = self.real(base)?;
         let whole = exponent
             .number(self.graph)
             .filter(|value| value.fract() == 0.0 && value.abs() <= f64::from(i32::MAX));
         let power = match whole {
             Some(exponent) => self.graph.powi(node, exponent as i32),
-            None => self
-                .graph
-                .binary(Binary::Pow, node, self.real(exponent, span)?),
+            None => self.graph.binary(Binary::Pow, node, self.real(exponent)?),
         };
         Ok(Scalar::Real(power))
     }
 
-    pub(super) fn compare(
-        &self,
-        relation: &str,
-        left: Scalar,
-        right: Scalar,
-        span: Span,
-    ) -> Result<Node> {
+    pub(super) fn compare(&self, relation: &str, left: Scalar, right: Scalar) -> Result<Node> {
         let sides = left.with(right, self.graph);
-        let (left, right) = sides.ok_or_else(|| expected_number(span))?;
+        let (left, right) = sides.ok_or_else(|| expected_number(self.at))?;
         Ok(match relation {
             "<" => self.graph.binary(Binary::Less, left, right),
             "<=" => self.graph.binary(Binary::LessEq, left, right),
@@ -216,8 +213,8 @@ impl Evaluator<'_> {
     }
 
     /// Scalar product, or product of matrices and vectors.
-    fn product(&self, left: &Value, right: &Value, span: Span) -> Result<Value> {
-        let no_product = || no_product(&left.dims, &right.dims, span);
+    fn product(&self, left: &Value, right: &Value) -> Result<Value> {
+        let no_product = || no_product(&left.dims, &right.dims, self.at);
         let [.., inner] = left.dims[..] else {
             return Err(no_product());
         };
@@ -232,25 +229,20 @@ impl Evaluator<'_> {
         let work = (rows as u64)
             .saturating_mul(inner as u64)
             .saturating_mul(columns as u64);
-        self.budget
-            .charge(work.max(rows as u64 * columns as u64), span)?;
+        self.charge(work.max(rows as u64 * columns as u64))?;
         let mut elements = Vec::with_capacity(rows * columns);
         for row in 0..rows {
             for column in 0..columns {
                 let left = left.elements[row * inner..].iter().take(inner);
                 let right = right.elements.iter().skip(column).step_by(columns);
                 let terms = left.copied().zip(right.copied());
-                elements.push(self.sum_of_products(terms, span)?);
+                elements.push(self.sum_of_products(terms)?);
             }
         }
         Ok(Value { dims, elements })
     }
 
-    fn sum_of_products(
-        &self,
-        terms: impl Iterator<Item = (Scalar, Scalar)>,
-        span: Span,
-    ) -> Result<Scalar> {
+    fn sum_of_products(&self, terms: impl Iterator<Item = (Scalar, Scalar)>) -> Result<Scalar> {
         let mut sum = None;
         for (a, b) in terms {
             // A zero entry of a matrix says that there is no such term. Keeping `0*x` would
@@ -258,18 +250,14 @@ impl Evaluator<'_> {
             if a.number(self.graph) == Some(0.0) || b.number(self.graph) == Some(0.0) {
                 continue;
             }
-            let term = self.scalar_binary(Binary::Mul, a, b, span)?;
+            let term = self.scalar_binary(Binary::Mul, a, b)?;
             sum = Some(match sum {
-                Some(sum) => self.scalar_binary(Binary::Add, sum, term, span)?,
+                Some(sum) => self.scalar_binary(Binary::Add, sum, term)?,
                 None => term,
             });
         }
         Ok(sum.unwrap_or(Scalar::Integer(0)))
     }
-}
-
-pub(super) fn overflow(span: Span) -> Problem {
-    Problem::new(span, "this Integer does not fit in 64 bits").hint("use Real numbers")
 }
 
 fn no_product(left: &[usize], right: &[usize], span: Span) -> Problem {

@@ -5,7 +5,7 @@ use lynkeus_expr::Binary;
 
 use super::evaluate::{Evaluator, HOW_TO_BE_WHOLE};
 use super::scope::Named;
-use super::value::{Scalar, Value, describe_dims, element_count, unequal_sizes};
+use super::value::{Scalar, Value, describe_dims, element_count};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_RANK;
 use crate::syntax::ast::{Call, ExprId, ForIndex, Kind};
@@ -13,32 +13,32 @@ use crate::syntax::{plain, too_many_dimensions};
 
 impl<'a> Evaluator<'a> {
     /// `{a, b, c}`
-    pub(super) fn array(&mut self, elements: &'a [ExprId], span: Span) -> Result<Value> {
+    pub(super) fn array(&mut self, elements: &'a [ExprId]) -> Result<Value> {
         let values: Result<Vec<Value>> = elements.iter().map(|&id| self.value(id)).collect();
-        self.stack(values?, span)
+        self.stack(values?)
     }
 
     /// Values of one size, side by side along a new first dimension.
-    pub(super) fn stack(&self, values: Vec<Value>, span: Span) -> Result<Value> {
+    pub(super) fn stack(&self, values: Vec<Value>) -> Result<Value> {
         let Some(first) = values.first() else {
             return Ok(Value::vector(vec![]));
         };
         if let Some(other) = values.iter().find(|value| value.dims != first.dims) {
             let (one, two) = (describe_dims(&first.dims), describe_dims(&other.dims));
             let message = format!("the elements differ in size: {one} and {two}");
-            return Err(Problem::new(span, message));
+            return Err(self.problem(message));
         }
         let dims = [&[values.len()], &first.dims[..]].concat();
         let mut elements = Vec::with_capacity(values.len());
         for value in &values {
-            self.budget.charge(value.elements.len() as u64, span)?;
+            self.charge(value.elements.len() as u64)?;
             elements.extend_from_slice(&value.elements);
         }
         Ok(Value { dims, elements })
     }
 
     /// `[a, b; c, d]`
-    pub(super) fn matrix(&mut self, rows: &'a [Vec<ExprId>], span: Span) -> Result<Value> {
+    pub(super) fn matrix(&mut self, rows: &'a [Vec<ExprId>]) -> Result<Value> {
         let mut stacked = vec![];
         for row in rows {
             let mut parts = vec![];
@@ -49,13 +49,13 @@ impl<'a> Evaluator<'a> {
                 let dims = dims.ok_or_else(|| Problem::new(self.span(id), message))?;
                 parts.push(Value { dims, ..part });
             }
-            stacked.push(self.concatenate(1, parts, span)?);
+            stacked.push(self.concatenate(1, parts)?);
         }
-        self.concatenate(0, stacked, span)
+        self.concatenate(0, stacked)
     }
 
     /// Joins arrays along an axis (from 0); the other sizes must agree.
-    fn concatenate(&self, axis: usize, parts: Vec<Value>, span: Span) -> Result<Value> {
+    fn concatenate(&self, axis: usize, parts: Vec<Value>) -> Result<Value> {
         let Some(first) = parts.first() else {
             return Ok(Value::vector(vec![]));
         };
@@ -64,12 +64,12 @@ impl<'a> Evaluator<'a> {
         for part in &parts[1..] {
             dims[axis] = part.dims.get(axis).copied().unwrap_or_default();
             if part.dims != dims {
-                return Err(unequal_sizes(&first.dims, &part.dims, span));
+                return Err(self.unequal_sizes(&first.dims, &part.dims));
             }
         }
         dims[axis] = parts.iter().map(|part| part.dims[axis]).sum();
         let total: usize = parts.iter().map(|part| part.elements.len()).sum();
-        self.budget.charge(total as u64, span)?;
+        self.charge(total as u64)?;
         let outer: usize = dims.iter().take(axis).product();
         let mut elements = Vec::with_capacity(total);
         for row in 0..outer {
@@ -86,20 +86,19 @@ impl<'a> Evaluator<'a> {
         &mut self,
         body: ExprId,
         iterators: &'a [ForIndex],
-        span: Span,
     ) -> Result<Value> {
         let Some((outer, inner)) = iterators.split_last() else {
             return self.value(body);
         };
         let mut values = vec![];
         for turn in self.turns(outer)? {
-            self.budget.charge(1, span)?;
+            self.charge(1)?;
             self.loops.push((self.text(outer.name), turn));
-            let value = self.comprehension(body, inner, span);
+            let value = self.comprehension(body, inner);
             self.loops.pop();
             values.push(value?);
         }
-        self.stack(values, span)
+        self.stack(values)
     }
 
     /// The values an iterator takes.
@@ -124,7 +123,6 @@ impl<'a> Evaluator<'a> {
         start: ExprId,
         step: Option<ExprId>,
         stop: ExprId,
-        span: Span,
     ) -> Result<Value> {
         let mut bound = |id: ExprId| {
             let scalar = self.structural(id)?.as_scalar();
@@ -133,38 +131,38 @@ impl<'a> Evaluator<'a> {
         let step = step.map_or(Ok(Scalar::Integer(1)), &mut bound)?;
         let (start, stop) = (bound(start)?, bound(stop)?);
         match (start, step, stop) {
-            (_, Scalar::Integer(0), _) => Err(Problem::new(span, "the step of a range is zero")),
+            (_, Scalar::Integer(0), _) => Err(self.problem("the step of a range is zero")),
             (Scalar::Integer(start), Scalar::Integer(step), Scalar::Integer(stop)) => {
-                self.integer_range(start, step, stop, span)
+                self.integer_range(start, step, stop)
             }
-            _ => self.real_range(start, step, stop, span),
+            _ => self.real_range(start, step, stop),
         }
     }
 
-    fn integer_range(&self, start: i64, step: i64, stop: i64, span: Span) -> Result<Value> {
+    fn integer_range(&self, start: i64, step: i64, stop: i64) -> Result<Value> {
         let [start, step, stop] = [start, step, stop].map(i128::from);
         let turns = ((stop - start) * step.signum()).div_euclid(step.abs()) + 1;
         let count = u64::try_from(turns.max(0)).unwrap_or(u64::MAX);
-        self.budget.charge(count, span)?;
+        self.charge(count)?;
         // between the bounds, and so in 64 bits
         let value = |turn: u64| Scalar::Integer((start + i128::from(turn) * step) as i64);
         Ok(Value::vector((0..count).map(value).collect()))
     }
 
-    fn real_range(&self, start: Scalar, step: Scalar, stop: Scalar, span: Span) -> Result<Value> {
+    fn real_range(&self, start: Scalar, step: Scalar, stop: Scalar) -> Result<Value> {
         let known = |scalar: Scalar| {
             let message = "the bounds of a range must be known numbers";
             let number = scalar.number(self.graph);
-            number.ok_or_else(|| Problem::new(span, message))
+            number.ok_or_else(|| self.problem(message))
         };
         let (start, step, stop) = (known(start)?, known(step)?, known(stop)?);
         let turns = ((stop - start) / step).floor() + 1.0;
         if step == 0.0 || turns.is_nan() {
-            return Err(Problem::new(span, "the step of a range is zero"));
+            return Err(self.problem("the step of a range is zero"));
         }
         // A saturating cast: anything too large is refused by the budget.
         let count = turns.max(0.0) as u64;
-        self.budget.charge(count, span)?;
+        self.charge(count)?;
         let value = |turn: u64| self.graph.constant(start + turn as f64 * step);
         let values = (0..count).map(|turn| Scalar::Real(value(turn).node()));
         Ok(Value::vector(values.collect()))
@@ -173,27 +171,21 @@ impl<'a> Evaluator<'a> {
 
 impl<'a> Evaluator<'a> {
     /// `sum` and `product`: all elements joined by an operator; `empty` where there are none.
-    pub(super) fn fold(
-        &mut self,
-        call: &'a Call,
-        span: Span,
-        operator: Binary,
-        empty: i64,
-    ) -> Result<Value> {
-        let elements = self.reduced(call, span)?;
-        self.budget.charge(elements.len() as u64, span)?;
+    pub(super) fn fold(&mut self, call: &'a Call, operator: Binary, empty: i64) -> Result<Value> {
+        let elements = self.reduced(call)?;
+        self.charge(elements.len() as u64)?;
         let Some((&first, rest)) = elements.split_first() else {
             return Ok(Scalar::Integer(empty).into());
         };
-        let join = |sum, &next| self.scalar_binary(operator, sum, next, span);
+        let join = |sum, &next| self.scalar_binary(operator, sum, next);
         rest.iter().try_fold(first, join).map(Value::from)
     }
 
     /// `array(a, b)` or `array(e for i in r)`
-    pub(super) fn array_of(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn array_of(&mut self, call: &'a Call) -> Result<Value> {
         match call.iterators.is_empty() {
-            true => self.array(&call.arguments, span),
-            false => self.iterated(call, span),
+            true => self.array(&call.arguments),
+            false => self.iterated(call),
         }
     }
 
@@ -203,18 +195,18 @@ impl<'a> Evaluator<'a> {
     }
 
     /// The elements that `sum(A)` or `sum(e for i in r)` goes over.
-    pub(super) fn reduced(&mut self, call: &'a Call, span: Span) -> Result<Vec<Scalar>> {
+    pub(super) fn reduced(&mut self, call: &'a Call) -> Result<Vec<Scalar>> {
         let value = match call.iterators.is_empty() {
             true => self.only_argument(call)?,
-            false => self.iterated(call, span)?,
+            false => self.iterated(call)?,
         };
         Ok(value.elements)
     }
 
-    fn iterated(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    fn iterated(&mut self, call: &'a Call) -> Result<Value> {
         match call.arguments.first() {
-            Some(&body) => self.comprehension(body, &call.iterators, span),
-            None => Err(Problem::new(span, "expected an expression before `for`")),
+            Some(&body) => self.comprehension(body, &call.iterators),
+            None => Err(self.problem("expected an expression before `for`")),
         }
     }
 
@@ -250,37 +242,31 @@ impl<'a> Evaluator<'a> {
         dim.ok_or_else(|| self.no_dimension(number, &dims, axis))
     }
 
-    pub(super) fn fill(&mut self, call: &'a Call, span: Span) -> Result<Value> {
-        match call.arguments.split_first() {
-            Some((&value, sizes)) if !sizes.is_empty() => {
-                let value = self.scalar(value)?;
-                self.with_all(value, sizes, span)
-            }
-            _ => {
-                let message = "`fill` takes a value and at least one size";
-                Err(Problem::new(span, message))
-            }
-        }
+    pub(super) fn fill(&mut self, call: &'a Call) -> Result<Value> {
+        let Some((&value, sizes @ [_, ..])) = call.arguments.split_first() else {
+            return Err(self.problem("`fill` takes a value and at least one size"));
+        };
+        let value = self.scalar(value)?;
+        self.with_all(value, sizes)
     }
 
     /// `zeros(2, 3)` and `ones(2, 3)`
-    pub(super) fn filled(&mut self, value: i64, call: &Call, span: Span) -> Result<Value> {
-        self.with_all(Scalar::Integer(value), &call.arguments, span)
+    pub(super) fn filled(&mut self, value: i64, call: &Call) -> Result<Value> {
+        self.with_all(Scalar::Integer(value), &call.arguments)
     }
 
-    fn with_all(&mut self, value: Scalar, sizes: &[ExprId], span: Span) -> Result<Value> {
+    fn with_all(&mut self, value: Scalar, sizes: &[ExprId]) -> Result<Value> {
         let dims: Result<Vec<usize>> = sizes.iter().map(|&size| self.length(size)).collect();
         let dims = dims?;
         if dims.is_empty() {
-            return Err(Problem::new(span, "expected at least one size"));
+            return Err(self.problem("expected at least one size"));
         }
         if dims.len() > MAX_RANK {
-            return Err(too_many_dimensions(span));
+            return Err(too_many_dimensions(self.at));
         }
         // Sizes beside a size of zero count too: other functions walk along them.
         let walked: Vec<usize> = dims.iter().map(|&dim| dim.max(1)).collect();
-        self.budget
-            .charge(element_count(&walked).unwrap_or(u64::MAX), span)?;
+        self.charge(element_count(&walked))?;
         let elements = vec![value; dims.iter().product()];
         Ok(Value { dims, elements })
     }
@@ -308,15 +294,15 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    pub(super) fn linspace(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn linspace(&mut self, call: &'a Call) -> Result<Value> {
         let [from, to, count] = self.arguments(call)?;
         let (from, to) = (self.scalar(from)?, self.scalar(to)?);
-        let (from, to) = (self.real(from, span)?, self.real(to, span)?);
+        let (from, to) = (self.real(from)?, self.real(to)?);
         let count = self.length(count)?;
         if count < 2 {
-            return Err(Problem::new(span, "`linspace` takes at least two points"));
+            return Err(self.problem("`linspace` takes at least two points"));
         }
-        self.budget.charge(count as u64, span)?;
+        self.charge(count as u64)?;
         let (from, to) = (self.graph.expr(from), self.graph.expr(to));
         let point = |i: usize| {
             let fraction = i as f64 / (count - 1) as f64;
@@ -325,22 +311,22 @@ impl<'a> Evaluator<'a> {
         Ok(Value::vector((0..count).map(point).collect()))
     }
 
-    pub(super) fn identity(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn identity(&mut self, call: &'a Call) -> Result<Value> {
         let [argument] = self.arguments(call)?;
         let n = self.length(argument)?;
-        self.budget.charge(n as u64, span)?;
-        self.with_diagonal(vec![Scalar::Integer(1); n], span)
+        self.charge(n as u64)?;
+        self.with_diagonal(vec![Scalar::Integer(1); n])
     }
 
-    pub(super) fn diagonal(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn diagonal(&mut self, call: &'a Call) -> Result<Value> {
         let entries = self.only_argument(call)?.elements;
-        self.with_diagonal(entries, span)
+        self.with_diagonal(entries)
     }
 
-    fn with_diagonal(&self, entries: Vec<Scalar>, span: Span) -> Result<Value> {
+    fn with_diagonal(&self, entries: Vec<Scalar>) -> Result<Value> {
         let n = entries.len();
-        let count = element_count(&[n, n]).unwrap_or(u64::MAX);
-        self.budget.charge(count, span)?;
+        let count = element_count(&[n, n]);
+        self.charge(count)?;
         let mut elements = vec![Scalar::Integer(0); count as usize];
         for (place, entry) in elements.iter_mut().step_by(n + 1).zip(entries) {
             *place = entry;
@@ -349,13 +335,13 @@ impl<'a> Evaluator<'a> {
         Ok(Value { dims, elements })
     }
 
-    pub(super) fn transpose(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn transpose(&mut self, call: &'a Call) -> Result<Value> {
         let Value { dims, elements } = self.only_argument(call)?;
         let [rows, columns] = dims[..] else {
             let message = format!("`transpose` takes a matrix, found {}", describe_dims(&dims));
-            return Err(Problem::new(span, message));
+            return Err(self.problem(message));
         };
-        self.budget.charge(elements.len() as u64, span)?;
+        self.charge(elements.len() as u64)?;
         let places = (0..columns).flat_map(|j| (0..rows).map(move |i| i * columns + j));
         Ok(Value {
             dims: vec![columns, rows],
@@ -363,9 +349,9 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    pub(super) fn cat(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn cat(&mut self, call: &'a Call) -> Result<Value> {
         let Some((&axis, parts)) = call.arguments.split_first() else {
-            return Err(Problem::new(span, "`cat` takes a dimension and arrays"));
+            return Err(self.problem("`cat` takes a dimension and arrays"));
         };
         let axis = self.length(axis)?;
         let mut arrays = vec![];
@@ -376,7 +362,7 @@ impl<'a> Evaluator<'a> {
             }
             arrays.push(array);
         }
-        self.concatenate(axis.saturating_sub(1), arrays, span)
+        self.concatenate(axis.saturating_sub(1), arrays)
     }
 
     fn no_dimension(&self, axis: i64, dims: &[usize], at: ExprId) -> Problem {
@@ -390,13 +376,12 @@ impl<'a> Evaluator<'a> {
     pub(super) fn reshaped(
         &mut self,
         call: &'a Call,
-        span: Span,
         reshape: impl Fn(&[usize]) -> Option<Vec<usize>>,
     ) -> Result<Value> {
         let mut value = self.only_argument(call)?;
         let dims = reshape(&value.dims).ok_or_else(|| {
             let (name, found) = (self.function_name(call), describe_dims(&value.dims));
-            Problem::new(span, format!("`{name}` of an array of size {found}"))
+            self.problem(format!("`{name}` of an array of size {found}"))
         })?;
         value.dims = dims;
         Ok(value)
@@ -422,22 +407,17 @@ pub(super) fn matrix_dims(dims: &[usize]) -> Option<Vec<usize>> {
 }
 
 impl<'a> Evaluator<'a> {
-    pub(super) fn index(
-        &mut self,
-        base: ExprId,
-        subscripts: &'a [ExprId],
-        span: Span,
-    ) -> Result<Value> {
+    pub(super) fn index(&mut self, base: ExprId, subscripts: &'a [ExprId]) -> Result<Value> {
         let name = self.span(base);
         if !matches!(self.ast.expression(base).kind, Kind::Name) {
             let Value { dims, elements } = self.value(base)?;
-            return self.gather("the array", &dims, &elements, subscripts, span);
+            return self.gather("the array", &dims, &elements, subscripts);
         }
         let text = plain(self.text(name));
         if self.iterator(&text).is_some() {
             return Err(not_an_array(&text, name));
         }
-        self.index_named(&text, subscripts, name, span)
+        self.index_named(&text, subscripts, name)
     }
 
     /// Elements of the array of this name.
@@ -446,11 +426,10 @@ impl<'a> Evaluator<'a> {
         text: &str,
         subscripts: &[ExprId],
         name: Span,
-        span: Span,
     ) -> Result<Value> {
         if let Some(local) = self.local(text) {
             let dims = local.dims.clone();
-            let (dims, offsets) = self.selected(text, &dims, subscripts, span)?;
+            let (dims, offsets) = self.selected(text, &dims, subscripts)?;
             let local = self.local(text);
             let element = |&offset: &usize| local?.elements[offset];
             let elements: Option<Vec<Scalar>> = offsets.iter().map(element).collect();
@@ -458,7 +437,7 @@ impl<'a> Evaluator<'a> {
             return Ok(Value { dims, elements });
         }
         match self.named(text) {
-            Named::Array(dims, elements) => self.gather(text, dims, elements, subscripts, span),
+            Named::Array(dims, elements) => self.gather(text, dims, elements, subscripts),
             Named::Scalar(_) => Err(not_an_array(text, name)),
             Named::Unknown => self.index_by_full_name(text, name, subscripts),
             found => self.meant(found, name),
@@ -486,9 +465,8 @@ impl<'a> Evaluator<'a> {
         dims: &[usize],
         elements: &[Scalar],
         subscripts: &[ExprId],
-        span: Span,
     ) -> Result<Value> {
-        let (dims, offsets) = self.selected(text, dims, subscripts, span)?;
+        let (dims, offsets) = self.selected(text, dims, subscripts)?;
         let elements = offsets.into_iter().map(|offset| elements[offset]).collect();
         Ok(Value { dims, elements })
     }
@@ -499,15 +477,14 @@ impl<'a> Evaluator<'a> {
         text: &str,
         dims: &[usize],
         subscripts: &[ExprId],
-        span: Span,
     ) -> Result<(Vec<usize>, Vec<usize>)> {
         if dims.is_empty() && !subscripts.is_empty() {
-            return Err(not_an_array(text, span));
+            return Err(not_an_array(text, self.at));
         }
         if subscripts.len() > dims.len() {
             let (given, has) = (subscripts.len(), describe_dims(dims));
             let message = format!("{given} subscripts, but `{text}` has the size {has}");
-            return Err(Problem::new(span, message));
+            return Err(self.problem(message));
         }
         let (mut kept, mut offsets) = (vec![], vec![0usize]);
         for (axis, &dim) in dims.iter().enumerate() {
@@ -518,11 +495,11 @@ impl<'a> Evaluator<'a> {
                     self.ends.pop();
                     places?
                 }
-                None => self.all_places(dim, span)?,
+                None => self.all_places(dim, self.at)?,
             };
             kept.extend(size);
-            let count = element_count(&[offsets.len(), places.len()]).unwrap_or(u64::MAX);
-            self.budget.charge(count, span)?;
+            let count = element_count(&[offsets.len(), places.len()]);
+            self.charge(count)?;
             let step = |&offset: &usize| places.iter().map(move |place| offset * dim + place);
             offsets = offsets.iter().flat_map(step).collect();
         }

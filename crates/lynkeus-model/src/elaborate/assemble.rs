@@ -1,7 +1,7 @@
 //! The parts of a plant, from the declared names and the solved equations: variables with their
 //! attributes, start values, assertions.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::{Binary, Graph, Interval, Node, Tape, Unary, jacobian};
 
@@ -24,20 +24,7 @@ pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec
     let time = symbols.time();
     let system = System::new(graph, symbols.source, equations, unknowns, &inputs, time);
     let solution = balance::solve(system, model.name)?;
-    let mut plant = Plant {
-        name: model.title.clone(),
-        graph: Graph::new(),
-        time,
-        states: vec![],
-        derivatives: vec![],
-        inputs: vec![],
-        outputs: vec![],
-        algebraics: vec![],
-        parameters: vec![],
-        table_points: BTreeSet::new(),
-        assertions: vec![],
-        warnings: vec![],
-    };
+    let mut plant = Plant::empty(model.title.clone(), Graph::new(), time);
     let inputs: HashSet<Node> = inputs.into_iter().collect();
     for (place, declaration, component) in symbols.all() {
         if declaration.package.is_some() {
@@ -186,25 +173,22 @@ fn elements(
     declaration: &Declaration,
     component: &Component,
 ) -> Result<Vec<Variable>> {
-    let library = symbols.model.library.get(&declaration.label);
-    let element = |(offset, scalar): (usize, &Scalar)| Variable {
-        name: element_name(&declaration.label, &component.dims, offset),
-        node: match *scalar {
+    let library = declaration.library;
+    let element = |(offset, scalar): (usize, &Scalar)| {
+        let name = element_name(&declaration.label, &component.dims, offset);
+        let node = match *scalar {
             Scalar::Real(node) | Scalar::Boolean(node) => node,
             // only a parameter may be one; these get their symbols later
             Scalar::Integer(_) => symbols.time(),
-        },
-        unit: library.map(|library| library.unit.to_owned()),
-        description: declaration.description.clone(),
-        start: None,
-        start_node: None,
-        min: library
-            .and_then(|library| library.min)
-            .unwrap_or(f64::NEG_INFINITY),
-        max: f64::INFINITY,
-        nominal: None,
-        integer: declaration.is_integer(),
-        fixed: false,
+        };
+        let least = library.and_then(|library| library.min);
+        Variable {
+            unit: library.map(|library| library.unit.to_owned()),
+            description: declaration.description.clone(),
+            min: least.unwrap_or(f64::NEG_INFINITY),
+            integer: declaration.is_integer(),
+            ..Variable::new(name, node)
+        }
     };
     let elements = component.elements.iter().enumerate().map(element);
     let mut elements: Vec<Variable> = elements.collect();
@@ -408,7 +392,7 @@ fn start_fixed(
 
 /// Where a residual vanishes that is linear in a symbol.
 fn root(graph: &Graph, residual: Node, symbol: Node) -> Option<Node> {
-    let slope = jacobian::reverse(graph, &[residual], &[symbol]).get(0, 0)?;
+    let (_, slope) = *jacobian::gradient(graph, residual, &[symbol]).first()?;
     if graph.symbols_of(&[slope]).contains(&symbol) {
         return None;
     }
@@ -427,9 +411,7 @@ fn computed(graph: &Graph, node: Node, value: impl Fn(Node) -> Option<f64>) -> O
     let symbols = graph.symbols_of(&[node]);
     let values: Option<Vec<f64>> = symbols.iter().map(|&symbol| value(symbol)).collect();
     let tape = Tape::new(graph, &symbols, &[node]).ok()?;
-    let mut out = [f64::NAN];
-    tape.evaluator().eval(&values?, &mut out);
-    Some(out[0])
+    Some(tape.evaluator().value(&values?))
 }
 
 const UNREAD: &str = "an initial equation of a derivative has no effect";

@@ -23,17 +23,17 @@ impl<'a> Evaluator<'a> {
     }
 
     /// The value of a call of a function of the text; `None` where there is no such function.
-    pub(super) fn own_function(&mut self, call: &'a Call, span: Span) -> Result<Option<Value>> {
+    pub(super) fn own_function(&mut self, call: &'a Call) -> Result<Option<Value>> {
         let class = self.class_called(call);
         let Some(class) = class.filter(|class| class.kind == ClassKind::Function) else {
             return Ok(None);
         };
-        let mut outcomes = self.inlined(class, call, span)?.into_iter();
+        let mut outcomes = self.inlined(class, call)?.into_iter();
         let first = outcomes.next().ok_or_else(|| {
             let message = format!("function `{}` has no output", class.path);
-            Problem::new(span, message).hint("declare one: `output Real y;`")
+            self.problem(message).hint("declare one: `output Real y;`")
         })?;
-        let no_number = |_| Problem::new(span, "expected a number, found a record");
+        let no_number = |_| self.problem("expected a number, found a record");
         number(first).map(Some).map_err(no_number)
     }
 
@@ -48,7 +48,7 @@ impl<'a> Evaluator<'a> {
             let message = format!("the text has no function `{name}` with several outputs");
             return Err(Problem::new(call.function, message));
         };
-        let outcomes = self.inlined(class, call, span)?;
+        let outcomes = self.standing(span, |evaluator| evaluator.inlined(class, call))?;
         if outcomes.len() < wanted {
             let (name, has) = (&class.path, outcomes.len());
             let message = format!("function `{name}` has {has} outputs, {wanted} are taken here");
@@ -92,11 +92,11 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Carries out a function for the arguments of a call; gives its outputs in order.
-    fn inlined(&mut self, class: &'a Class, call: &'a Call, span: Span) -> Result<Vec<Members>> {
-        self.check_callable(class, span)?;
+    fn inlined(&mut self, class: &'a Class, call: &'a Call) -> Result<Vec<Members>> {
+        self.check_callable(class)?;
         let parts = self.with_bases(class)?;
         let declarations = self.declarations_of(class)?;
-        let mut given = self.given(&declarations, class, call, span)?.into_iter();
+        let mut given = self.given(&declarations, class, call)?.into_iter();
         self.calls.push(&class.path);
         let done = self.inside(class, |evaluator| {
             for declaration in &declarations {
@@ -104,7 +104,7 @@ impl<'a> Evaluator<'a> {
                     Causality::Input => given.next().flatten(),
                     _ => None,
                 };
-                evaluator.introduce(class, declaration, value, span)?;
+                evaluator.introduce(class, declaration, value)?;
             }
             for algorithm in parts.iter().flat_map(|part| &part.algorithms) {
                 evaluator.execute(algorithm)?;
@@ -125,7 +125,7 @@ impl<'a> Evaluator<'a> {
     ) -> Result<T> {
         let scopes = std::mem::replace(&mut self.scopes, vec![&class.path]);
         let loops = std::mem::take(&mut self.loops);
-        let outside = self.frame.replace(Frame::closed());
+        let outside = std::mem::replace(&mut self.frame, Frame::closed());
         let done = run(self);
         self.frame = outside;
         self.loops = loops;
@@ -133,21 +133,23 @@ impl<'a> Evaluator<'a> {
         done
     }
 
-    fn check_callable(&self, class: &Class, span: Span) -> Result<()> {
+    fn check_callable(&self, class: &Class) -> Result<()> {
         let name = class.path.as_str();
         if self.calls.contains(&name) {
             let message = format!("function `{name}` calls itself");
-            return Err(Problem::new(span, message)
+            return Err(self
+                .problem(message)
                 .hint("a recursion has no end when it is written out: use a `for` loop"));
         }
         if self.calls.len() >= MAX_CALLS {
             let message =
                 format!("functions stand in each other more than {MAX_CALLS} levels deep");
-            return Err(Problem::new(span, message));
+            return Err(self.problem(message));
         }
         if class.is_external || class.is_partial || class.alias.is_some() {
             let message = format!("function `{name}` has no algorithm in this text");
-            return Err(Problem::new(span, message)
+            return Err(self
+                .problem(message)
                 .hint("write it in Modelica, or the formula where it is used"));
         }
         Ok(())
@@ -159,11 +161,10 @@ impl<'a> Evaluator<'a> {
         declarations: &[&'a Declaration],
         class: &'a Class,
         call: &'a Call,
-        span: Span,
     ) -> Result<Vec<Option<Members>>> {
         let inputs: Vec<_> = with_causality(declarations, Causality::Input).collect();
         let mut found = vec![];
-        let arguments = self.arguments_of(class, &inputs, call, span)?;
+        let arguments = self.arguments_of(class, &inputs, call)?;
         for (input, id) in inputs.into_iter().zip(arguments) {
             found.push(match (id, self.record_type(input, class)) {
                 (Some(id), Some(_)) => Some(self.members(id)?),
@@ -181,7 +182,6 @@ impl<'a> Evaluator<'a> {
         class: &Class,
         declarations: &[&Declaration],
         call: &Call,
-        span: Span,
     ) -> Result<Vec<Option<ExprId>>> {
         let (kind, part) = match class.kind {
             ClassKind::Function => ("function", "input"),
@@ -190,7 +190,7 @@ impl<'a> Evaluator<'a> {
         let (name, takes, given) = (&class.path, declarations.len(), call.arguments.len());
         if given > takes {
             let message = format!("{kind} `{name}` takes {takes} arguments, found {given}");
-            return Err(Problem::new(span, message));
+            return Err(self.problem(message));
         }
         let positional = call.arguments.iter().map(|&id| Some(id));
         let mut found: Vec<Option<ExprId>> = positional.collect();
@@ -212,13 +212,13 @@ impl<'a> Evaluator<'a> {
 
     fn outcome(&self, class: &Class, output: &Declaration) -> Result<Members> {
         let label = &output.label;
-        let frame = self.frame.as_ref();
+        let frame = &self.frame;
         let of_number = [String::new()];
-        let names = frame.and_then(|frame| frame.records.get(label));
+        let names = frame.records.get(label);
         let names = names.map_or(&of_number[..], Vec::as_slice);
         let member = |name: &String| {
             let full = member_name(label, name);
-            let local = frame.and_then(|frame| frame.locals.get(&full));
+            let local = frame.locals.get(&full);
             let value = local.and_then(Local::value).ok_or_else(|| {
                 let function = &class.path;
                 let message =
@@ -254,13 +254,12 @@ impl<'a> Evaluator<'a> {
         class: &'a Class,
         declaration: &'a Declaration,
         given: Option<Members>,
-        span: Span,
     ) -> Result<()> {
         let name = &declaration.label;
         let type_name = declaration.type_name;
         match (self.type_of(declaration, class), type_name) {
             (Some(record), _) if record.kind == ClassKind::Record => {
-                return self.introduce_record(class, declaration, record, given, span);
+                return self.introduce_record(class, declaration, record, given);
             }
             (Some(other), TypeName::Named(at)) if other.kind != ClassKind::Type => {
                 let message = format!("`{}` is not a type of numbers", plain(self.text(at)));
@@ -272,27 +271,25 @@ impl<'a> Evaluator<'a> {
             (Some(Ok(value)), _) => Some(value),
             (Some(Err(_)), _) => {
                 let message = format!("`{name}` takes a number, found a record");
-                return Err(Problem::new(span, message));
+                return Err(self.problem(message));
             }
             (None, Some(id)) => Some(self.value(id)?),
             (None, None) => {
-                check_given(class, declaration, span)?;
+                self.check_given(class, declaration)?;
                 None
             }
         };
-        let dims = self.dims_declared(declaration, value.as_ref(), span)?;
+        let dims = self.dims_declared(declaration, value.as_ref())?;
         let mut local = Local::without_value(dims, declaration.is_integer());
         if let Some(value) = value {
-            check_size(name, &local.dims, &value.dims, span)?;
+            check_size(name, &local.dims, &value.dims, self.at)?;
             let elements = value.elements.into_iter();
             local.elements = elements
                 .map(|scalar| Some(local.converted(scalar, self.graph)))
                 .collect();
         }
-        self.budget.charge(local.elements.len() as u64, span)?;
-        if let Some(frame) = self.frame.as_mut() {
-            frame.locals.insert(name.clone(), local);
-        }
+        self.charge(local.elements.len() as u64)?;
+        self.frame.locals.insert(name.clone(), local);
         Ok(())
     }
 
@@ -302,7 +299,6 @@ impl<'a> Evaluator<'a> {
         declaration: &'a Declaration,
         record: &'a Class,
         given: Option<Members>,
-        span: Span,
     ) -> Result<()> {
         let name = &declaration.label;
         let no_record = |span| {
@@ -310,7 +306,7 @@ impl<'a> Evaluator<'a> {
             Problem::new(span, message)
         };
         let value = match (given, declaration.binding) {
-            (Some(given), _) => Some(number(given).err().ok_or_else(|| no_record(span))?),
+            (Some(given), _) => Some(number(given).err().ok_or_else(|| no_record(self.at))?),
             (None, Some(id)) => {
                 let record = self.record(id)?;
                 Some(record.ok_or_else(|| no_record(self.span(id)))?)
@@ -324,20 +320,18 @@ impl<'a> Evaluator<'a> {
                 members.extend(known.map(|(member, value)| (member, Local::of(value))));
             }
             None => {
-                check_given(class, declaration, span)?;
+                self.check_given(class, declaration)?;
                 for member in self.declarations_of(record)? {
-                    let dims = self.dims_declared(member, None, member.name)?;
+                    let dims = self.standing(member.name, |e| e.dims_declared(member, None))?;
                     let local = Local::without_value(dims, member.is_integer());
                     members.push((member.label.clone(), local));
                 }
             }
         }
-        if let Some(frame) = self.frame.as_mut() {
-            let names = members.iter().map(|(member, _)| member.clone());
-            frame.records.insert(name.clone(), names.collect());
-            let full = |(member, local)| (format!("{name}.{member}"), local);
-            frame.locals.extend(members.into_iter().map(full));
-        }
+        let names = members.iter().map(|(member, _)| member.clone()).collect();
+        self.frame.records.insert(name.clone(), names);
+        let full = |(member, local)| (format!("{name}.{member}"), local);
+        self.frame.locals.extend(members.into_iter().map(full));
         Ok(())
     }
 
@@ -346,7 +340,6 @@ impl<'a> Evaluator<'a> {
         &mut self,
         declaration: &'a Declaration,
         value: Option<&Value>,
-        span: Span,
     ) -> Result<Vec<usize>> {
         let dims = self.sizes(&declaration.dimensions, |axis| {
             let found = value.and_then(|value| value.dims.get(axis));
@@ -356,20 +349,20 @@ impl<'a> Evaluator<'a> {
                 Problem::new(declaration.name, message)
             })
         })?;
-        let count = element_count(&dims).unwrap_or(u64::MAX);
-        self.budget.charge(count, span)?;
+        self.charge(element_count(&dims))?;
         Ok(dims)
     }
-}
 
-/// Refuses an input that has no value; other variables are given theirs by statements.
-fn check_given(class: &Class, declaration: &Declaration, span: Span) -> Result<()> {
-    if declaration.causality != Causality::Input {
-        return Ok(());
+    /// Refuses an input that has no value; other variables are given theirs by statements.
+    fn check_given(&self, class: &Class, declaration: &Declaration) -> Result<()> {
+        if declaration.causality != Causality::Input {
+            return Ok(());
+        }
+        let (name, function) = (&declaration.label, &class.path);
+        Err(self.problem(format!(
+            "input `{name}` of function `{function}` is not given"
+        )))
     }
-    let (name, function) = (&declaration.label, &class.path);
-    let message = format!("input `{name}` of function `{function}` is not given");
-    Err(Problem::new(span, message))
 }
 
 impl<'a> Evaluator<'a> {
@@ -386,15 +379,15 @@ impl<'a> Evaluator<'a> {
                 let record = self.record(*record)?;
                 Ok(record.and_then(|record| inner(&record, name)))
             }
-            Kind::Call(call) => self.record_of_call(call, span),
-            Kind::Array(elements) => self.array_of_records(elements, span),
+            Kind::Call(call) => self.record_of_call(call),
+            Kind::Array(elements) => self.array_of_records(elements),
             _ => {
                 let Some((name, subscripts)) = reference(self.source, self.ast, id) else {
                     return Ok(None);
                 };
                 let whole = plain(self.text(span));
-                match self.record_named(&whole, &[], span)? {
-                    None if whole != name => self.record_named(&name, &subscripts, span),
+                match self.record_named(&whole, &[])? {
+                    None if whole != name => self.record_named(&name, &subscripts),
                     found => Ok(found),
                 }
             }
@@ -410,19 +403,16 @@ impl<'a> Evaluator<'a> {
     }
 
     /// The member of a record, as `Kind::Member` has it.
-    pub(super) fn member(&mut self, record: ExprId, name: &str, span: Span) -> Result<Value> {
+    pub(super) fn member(&mut self, record: ExprId, name: &str) -> Result<Value> {
         let found = self.record(record)?;
         let value = found.as_ref().and_then(|record| member(record, name));
-        value.cloned().ok_or_else(|| {
-            Problem::new(span, format!("expected a record with the member `{name}`"))
-        })
+        value
+            .cloned()
+            .ok_or_else(|| self.problem(format!("expected a record with the member `{name}`")))
     }
 
     fn members_of(&self, name: &str) -> Option<Vec<String>> {
-        let of_frame = self
-            .frame
-            .as_ref()
-            .and_then(|frame| frame.records.get(name));
+        let of_frame = self.frame.records.get(name);
         let records = &self.symbols.model.records;
         let of_model = || records.get(name).filter(|_| !self.is_closed());
         let of_package = || {
@@ -433,34 +423,29 @@ impl<'a> Evaluator<'a> {
         of_frame.or_else(of_model).or_else(of_package).cloned()
     }
 
-    fn record_named(
-        &mut self,
-        name: &str,
-        subscripts: &[ExprId],
-        span: Span,
-    ) -> Result<Option<Members>> {
+    fn record_named(&mut self, name: &str, subscripts: &[ExprId]) -> Result<Option<Members>> {
         let Some(names) = self.members_of(name) else {
             return Ok(None);
         };
         let mut members = vec![];
         for member in names {
             let full = format!("{name}.{member}");
-            self.budget.charge(1, span)?;
-            if let Some(inner) = self.record_named(&full, subscripts, span)? {
+            self.charge(1)?;
+            if let Some(inner) = self.record_named(&full, subscripts)? {
                 let inner = inner.into_iter();
                 members.extend(inner.map(|(rest, value)| (member_name(&member, &rest), value)));
                 continue;
             }
             let value = match subscripts {
-                [] => self.value_named(&full, span)?,
-                _ => self.index_named(&full, subscripts, span, span)?,
+                [] => self.value_named(&full, self.at)?,
+                _ => self.index_named(&full, subscripts, self.at)?,
             };
             members.push((member, value));
         }
         Ok(Some(members))
     }
 
-    fn array_of_records(&mut self, elements: &'a [ExprId], span: Span) -> Result<Option<Members>> {
+    fn array_of_records(&mut self, elements: &'a [ExprId]) -> Result<Option<Members>> {
         let Some((&first, rest)) = elements.split_first() else {
             return Ok(None);
         };
@@ -481,27 +466,27 @@ impl<'a> Evaluator<'a> {
         }
         let stacked = columns
             .into_iter()
-            .map(|(name, values)| Ok((name, self.stack(values, span)?)));
+            .map(|(name, values)| Ok((name, self.stack(values)?)));
         stacked.collect::<Result<_>>().map(Some)
     }
 
     /// `R(1, 2)`, or a function whose first output is a record.
-    fn record_of_call(&mut self, call: &'a Call, span: Span) -> Result<Option<Members>> {
+    fn record_of_call(&mut self, call: &'a Call) -> Result<Option<Members>> {
         match self.class_called(call) {
             Some(class) if class.kind == ClassKind::Record => {
-                self.constructed(class, call, span).map(Some)
+                self.constructed(class, call).map(Some)
             }
             Some(class) if class.kind == ClassKind::Function && self.gives_record(class) => {
-                let mut outcomes = self.inlined(class, call, span)?.into_iter();
+                let mut outcomes = self.inlined(class, call)?.into_iter();
                 Ok(outcomes.next().and_then(|first| number(first).err()))
             }
             _ => Ok(None),
         }
     }
 
-    fn constructed(&mut self, class: &'a Class, call: &'a Call, span: Span) -> Result<Members> {
+    fn constructed(&mut self, class: &'a Class, call: &'a Call) -> Result<Members> {
         let declarations = self.declarations_of(class)?;
-        let given = self.arguments_of(class, &declarations, call, span)?;
+        let given = self.arguments_of(class, &declarations, call)?;
         let mut found = vec![];
         for (declaration, id) in declarations.iter().zip(&given) {
             let value = id.map(|id| self.member_value(declaration, id));
@@ -523,7 +508,7 @@ impl<'a> Evaluator<'a> {
                     (None, None) => {
                         let label = &declaration.label;
                         let message = format!("the member `{label}` of the record is not given");
-                        return Err(Problem::new(span, message));
+                        return Err(evaluator.problem(message));
                     }
                 });
             }
@@ -544,11 +529,9 @@ impl<'a> Evaluator<'a> {
 
     /// Makes values known by their names to what is evaluated next.
     fn know(&mut self, members: &Members) {
-        let Some(frame) = &mut self.frame else {
-            return;
-        };
         for (name, value) in members {
-            frame.locals.insert(name.clone(), Local::of(value.clone()));
+            let local = Local::of(value.clone());
+            self.frame.locals.insert(name.clone(), local);
         }
     }
 }

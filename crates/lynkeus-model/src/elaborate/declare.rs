@@ -88,7 +88,7 @@ impl<'a> Symbols<'a> {
     fn charge(&self, dims: &[usize], declaration: &Declaration) -> Result<()> {
         // A size beside a size of zero counts as well: slices walk along it.
         let walked: Vec<usize> = dims.iter().map(|&dim| dim.max(1)).collect();
-        let count = element_count(&walked).unwrap_or(u64::MAX);
+        let count = element_count(&walked);
         self.scalars.charge(count, declaration.name)?;
         let description = declaration.description.as_ref().map_or(0, String::len);
         let values = declaration.attributes.iter().filter_map(|a| a.value);
@@ -269,8 +269,7 @@ impl<'a> Symbols<'a> {
         dependent: bool,
         given: &[Given],
     ) -> Result<Component> {
-        let label = declaration.label.as_str();
-        let name = label.strip_prefix('.').unwrap_or(label);
+        let name = declaration.written();
         if declaration.causality == Causality::Input {
             let message = format!("`{name}` is both a parameter and an input");
             return Err(Problem::new(declaration.name, message).hint("choose one of the two"));
@@ -285,27 +284,36 @@ impl<'a> Symbols<'a> {
             })
         })?;
         self.charge(&dims, declaration)?;
-        let parts = Parts {
-            symbols: self,
-            declaration,
-            name,
-            given: &by_offset(given, name, &dims, declaration.name)?,
-            dims: &dims,
+        let given = by_offset(given, name, &dims, declaration.name)?;
+        let filled = |binding: Option<(Value, Span)>, must_be_known: bool| {
+            let mut elements = self.bound(declaration, &dims, binding, must_be_known)?;
+            for &(offset, value) in &given {
+                elements[offset] = Some(self.converted(declaration, value)?);
+            }
+            Ok(elements.into_iter().collect::<Option<Vec<Scalar>>>())
         };
-        let values = parts.elements(known, true)?;
+        let element_name = |offset: usize| element_name(name, &dims, offset);
+        let symbol = |offset| Scalar::Real(self.graph.symbol(&element_name(offset)).node());
+        let symbols = || (0..dims.iter().product()).map(symbol).collect();
+        let values = filled(known, true)?;
+        let is_symbolic = self.options.symbolic_parameters;
         let is_parameter = declaration.variability == Variability::Parameter;
         let keeps_symbols = declaration.is_settable() && declaration.type_name == TypeName::Real;
         let elements = match &values {
-            _ if dependent && self.options.symbolic_parameters => {
+            _ if dependent && is_symbolic => {
                 let symbolic = self.binding(declaration, Mode::Parametric)?;
-                let elements = parts.elements(symbolic, false)?;
-                elements.unwrap_or_else(|| parts.all_symbols())
+                filled(symbolic, false)?.unwrap_or_else(symbols)
             }
-            Some(values) if keeps_symbols && self.options.symbolic_parameters => {
-                parts.symbols_but(values)
+            Some(values) if keeps_symbols && is_symbolic => {
+                let is_number = |offset| self.options.numbers.contains(&element_name(offset));
+                let element = |(offset, value): (usize, &Scalar)| match is_number(offset) {
+                    true => *value,
+                    false => symbol(offset),
+                };
+                values.iter().enumerate().map(element).collect()
             }
             Some(values) => values.clone(),
-            None if is_parameter && self.options.symbolic_parameters => parts.all_symbols(),
+            None if is_parameter && is_symbolic => symbols(),
             None => {
                 let message = format!("parameter `{name}` has no value");
                 let hint = format!("write `{name} = …` here, or give the value on loading");
@@ -330,100 +338,69 @@ impl<'a> Symbols<'a> {
         let value = evaluator.value_if_known(id)?;
         Ok(value.map(|value| (value, evaluator.span(id))))
     }
-}
 
-/// One declaration with what is known about it.
-struct Parts<'p> {
-    symbols: &'p Symbols<'p>,
-    declaration: &'p Declaration,
-    name: &'p str,
-    dims: &'p [usize],
-    given: &'p [(usize, f64)],
-}
-
-impl Parts<'_> {
-    /// What the declaration and the caller say of all elements; `None` where some are left open.
-    fn elements(
+    /// What the declaration equation says of the elements.
+    fn bound(
         &self,
+        declaration: &Declaration,
+        dims: &[usize],
         binding: Option<(Value, Span)>,
         must_be_known: bool,
-    ) -> Result<Option<Vec<Scalar>>> {
-        let mut elements = vec![None; self.dims.iter().product()];
-        if let Some((value, span)) = binding {
-            let checked = check_size(self.name, self.dims, &value.dims, span);
-            checked.map_err(|problem| match value.dims.is_empty() {
-                true => problem.hint("use `fill(value, size)`"),
-                false => problem,
-            })?;
-            for (slot, element) in elements.iter_mut().zip(value.elements) {
-                *slot = Some(self.typed(element, must_be_known, span)?);
-            }
-        }
-        for &(offset, value) in self.given {
-            elements[offset] = Some(self.converted(value)?);
-        }
-        Ok(elements.into_iter().collect())
-    }
-
-    fn element_name(&self, offset: usize) -> String {
-        element_name(self.name, self.dims, offset)
-    }
-
-    fn all_symbols(&self) -> Vec<Scalar> {
-        let symbol = |offset| {
-            let symbol = self.symbols.graph.symbol(&self.element_name(offset));
-            Scalar::Real(symbol.node())
+    ) -> Result<Vec<Option<Scalar>>> {
+        let Some((value, span)) = binding else {
+            return Ok(vec![None; dims.iter().product()]);
         };
-        (0..self.dims.iter().product()).map(symbol).collect()
-    }
-
-    /// Symbols, but for elements that are to be numbers.
-    fn symbols_but(&self, values: &[Scalar]) -> Vec<Scalar> {
-        let numbers = &self.symbols.options.numbers;
-        let mut elements = self.all_symbols();
-        for (offset, (element, value)) in elements.iter_mut().zip(values).enumerate() {
-            if numbers.contains(&self.element_name(offset)) {
-                *element = *value;
-            }
-        }
-        elements
+        let checked = check_size(declaration.written(), dims, &value.dims, span);
+        checked.map_err(|problem| match value.dims.is_empty() {
+            true => problem.hint("use `fill(value, size)`"),
+            false => problem,
+        })?;
+        let elements = value.elements.into_iter();
+        let typed = |element| self.typed(declaration, element, must_be_known, span);
+        elements.map(|element| typed(element).map(Some)).collect()
     }
 
     /// A value of the declared type, or an expression over other parameters.
-    fn typed(&self, element: Scalar, must_be_known: bool, span: Span) -> Result<Scalar> {
-        let graph = self.symbols.graph;
+    fn typed(
+        &self,
+        declaration: &Declaration,
+        element: Scalar,
+        must_be_known: bool,
+        span: Span,
+    ) -> Result<Scalar> {
+        let (graph, name) = (self.graph, declaration.written());
         let is_known = |node| !must_be_known || graph.constant_value(node).is_some();
-        if self.declaration.type_name == TypeName::Boolean {
+        if declaration.type_name == TypeName::Boolean {
             return match element {
                 Scalar::Boolean(node) if is_known(node) => Ok(element),
                 _ => Err(Problem::new(span, "expected `true` or `false`")),
             };
         }
         let node = element.real(graph).ok_or_else(|| expected_number(span))?;
-        let is_integer = must_be_known && self.declaration.is_integer();
+        let is_integer = must_be_known && declaration.is_integer();
         match element {
             Scalar::Integer(_) if is_integer => Ok(element),
             _ if is_integer => {
-                let message = format!("`{}` is an Integer, its value is a Real", self.name);
+                let message = format!("`{name}` is an Integer, its value is a Real");
                 Err(Problem::new(span, message).hint("use `div(a, b)` or `integer(a)`"))
             }
             _ if is_known(node) => Ok(Scalar::Real(node)),
             _ => {
-                let message = format!("the value of `{}` is not a finite number", self.name);
+                let message = format!("the value of `{name}` is not a finite number");
                 Err(Problem::new(span, message))
             }
         }
     }
 
     /// A number from outside as a value of the declared type.
-    fn converted(&self, value: f64) -> Result<Scalar> {
-        let constant = |value: f64| self.symbols.graph.constant(value).node();
-        match self.declaration.type_name {
+    fn converted(&self, declaration: &Declaration, value: f64) -> Result<Scalar> {
+        let constant = |value: f64| self.graph.constant(value).node();
+        match declaration.type_name {
             TypeName::Boolean => Ok(Scalar::Boolean(constant(f64::from(value != 0.0)))),
             TypeName::Integer if value.fract() != 0.0 || value.abs() > 2f64.powi(53) => {
-                let name = self.name;
+                let name = declaration.written();
                 let message = format!("`{name}` is an Integer and is given the value {value}");
-                Err(Problem::new(self.declaration.name, message).hint("give a whole number"))
+                Err(Problem::new(declaration.name, message).hint("give a whole number"))
             }
             TypeName::Integer => Ok(Scalar::Integer(value as i64)),
             _ => Ok(Scalar::Real(constant(value))),
@@ -440,15 +417,15 @@ impl Symbols<'_> {
         let model = self.model;
         let mut by_place: HashMap<usize, Vec<Given>> = HashMap::new();
         for (key, &value) in &self.options.parameters {
-            let (name, subscripts) = split(key).ok_or_else(|| {
-                let message = format!("`{key}` is not the name of a parameter");
-                Problem::new(model.name, message)
-                    .hint("names of parameters read `k`, `H[3]` or `A[1,2]`")
-            })?;
+            let key = key.trim();
             // an element may be declared by itself: `x[3]`
-            let (name, subscripts) = match self.by_name.contains_key(key.trim()) {
-                true => (key.trim(), vec![]),
-                false => (name, subscripts),
+            let (name, subscripts) = match self.by_name.contains_key(key) {
+                true => (key, vec![]),
+                false => split(key).ok_or_else(|| {
+                    let message = format!("`{key}` is not the name of a parameter");
+                    Problem::new(model.name, message)
+                        .hint("names of parameters read `k`, `H[3]` or `A[1,2]`")
+                })?,
             };
             let place = self.by_name.get(name);
             let &place = place.ok_or_else(|| unknown(model, name))?;
@@ -504,13 +481,14 @@ fn unknown(model: &FlatModel, name: &str) -> Problem {
     Problem::new(model.name, message).hint(hint)
 }
 
-/// `H[3]` as `H` and 3.
+/// `H[3]` as `H` and 3. Subscripts of other parts than the last belong to the name, as in `a[1].b`.
 fn split(key: &str) -> Option<(&str, Vec<usize>)> {
-    match key.trim().split_once('[') {
-        None => Some((key.trim(), vec![])),
+    let last = key.rsplit('.').next().unwrap_or_default();
+    match last.split_once('[') {
+        None => Some((key, vec![])),
         // one pair of brackets
         Some((_, rest)) if rest.contains('[') => None,
-        Some(_) => literal_subscripts(key.trim()),
+        Some(_) => literal_subscripts(key),
     }
 }
 
@@ -532,7 +510,10 @@ mod tests {
     #[test]
     fn splits_names() {
         assert_eq!(split("H[3]"), Some(("H", vec![3])));
-        assert_eq!(split(" A[1, 2]"), Some(("A", vec![1, 2])));
+        assert_eq!(split("A[1, 2]"), Some(("A", vec![1, 2])));
+        assert_eq!(split("a[1].b"), Some(("a[1].b", vec![])));
+        assert_eq!(split("a[1].b[2]"), Some(("a[1].b", vec![2])));
+        assert_eq!(split("a[1].b[2][3]"), None);
         assert_eq!(split("k"), Some(("k", vec![])));
         assert_eq!(split("H[3"), None);
         assert_eq!(split("H[-1]"), None);

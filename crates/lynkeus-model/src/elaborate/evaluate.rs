@@ -4,7 +4,7 @@ use lynkeus_expr::{Graph, Node, Unary};
 
 use super::scope::{Frame, Local, Mode, Named};
 use super::symbols::Symbols;
-use super::value::{Scalar, Value, describe_dims, expected_number, unequal_sizes};
+use super::value::{Scalar, Value, describe_dims, expected_number};
 use crate::Assertion;
 use crate::balance::FlatEquation;
 use crate::diagnostic::{Problem, Result, Span};
@@ -27,6 +27,8 @@ pub(crate) struct Evaluator<'a> {
     pub(super) budget: &'a Budget,
     pub(super) symbols: &'a Symbols<'a>,
     pub(super) mode: Mode,
+    /// where what is read now stands: an expression, an equation, a statement
+    pub(super) at: Span,
     /// iterators of the loops around, innermost last
     pub(super) loops: Vec<(&'a str, Scalar)>,
     /// what `end` means in the subscripts around, innermost last
@@ -36,7 +38,7 @@ pub(crate) struct Evaluator<'a> {
     /// where names of classes are looked up
     pub(super) scopes: Vec<&'a str>,
     /// variables of the function or algorithm around
-    pub(super) frame: Option<Frame>,
+    pub(super) frame: Frame,
     /// names of the functions around, innermost last
     pub(super) calls: Vec<&'a str>,
     /// expressions and statements around, those of the callers included
@@ -58,11 +60,12 @@ impl<'a> Evaluator<'a> {
             budget: &symbols.budget,
             symbols,
             mode,
+            at: Span::default(),
             loops: vec![],
             ends: vec![],
             valueless: false,
             scopes: scopes.map(String::as_str).collect(),
-            frame: None,
+            frame: Frame::default(),
             calls: vec![],
             depth: 0,
             conditions: vec![],
@@ -76,7 +79,7 @@ impl<'a> Evaluator<'a> {
         let mut evaluator = Self::new(symbols, mode);
         if let Some(package) = &declaration.package {
             evaluator.scopes = vec![package];
-            evaluator.frame = Some(Frame::closed());
+            evaluator.frame = Frame::closed();
         }
         evaluator
     }
@@ -89,7 +92,29 @@ impl<'a> Evaluator<'a> {
         span.text(self.source)
     }
 
-    /// Goes one level deeper.
+    /// What is wrong here.
+    pub(super) fn problem(&self, message: impl Into<String>) -> Problem {
+        Problem::new(self.at, message)
+    }
+
+    /// Takes what is written out here from the budget.
+    pub(super) fn charge(&self, count: u64) -> Result<()> {
+        self.budget.charge(count, self.at)
+    }
+
+    /// Reads what stands at another place.
+    pub(super) fn standing<T>(
+        &mut self,
+        at: Span,
+        run: impl FnOnce(&mut Self) -> Result<T>,
+    ) -> Result<T> {
+        let around = std::mem::replace(&mut self.at, at);
+        let done = run(self);
+        self.at = around;
+        done
+    }
+
+    /// Reads what stands there, one level deeper.
     pub(super) fn deeper<T>(
         &mut self,
         span: Span,
@@ -103,7 +128,7 @@ impl<'a> Evaluator<'a> {
                 .hint("name the inner parts with variables of their own"));
         }
         self.depth += 1;
-        let done = run(self);
+        let done = self.standing(span, run);
         self.depth -= 1;
         done
     }
@@ -115,8 +140,7 @@ impl<'a> Evaluator<'a> {
 
     fn value_here(&mut self, id: ExprId) -> Result<Value> {
         let expression = self.ast.expression(id);
-        let span = expression.span;
-        self.budget.charge(1, span)?;
+        self.charge(1)?;
         match &expression.kind {
             Kind::Integer(value) => Ok(Scalar::Integer(*value).into()),
             Kind::Real(value) => Ok(Scalar::Real(self.graph.constant(*value).node()).into()),
@@ -124,39 +148,41 @@ impl<'a> Evaluator<'a> {
                 let truth = self.graph.constant(f64::from(*value));
                 Ok(Scalar::Boolean(truth.node()).into())
             }
-            Kind::Text => {
-                Err(Problem::new(span, "a string here is not supported").hint("use numbers"))
-            }
-            Kind::Path(parts) => self.path(id, parts, span),
-            Kind::Member(record, name) => self.member(*record, name, span),
-            Kind::All => Err(Problem::new(span, "`:` stands only in subscripts")),
-            Kind::End => self.end(span),
-            Kind::Name => self.name(span),
-            Kind::Index(base, subscripts) => self.index(*base, subscripts, span),
-            Kind::Call(call) => self.call(call, span),
-            Kind::Array(elements) => self.array(elements, span),
-            Kind::Matrix(rows) => self.matrix(rows, span),
-            Kind::Comprehension(body, iterators) => self.comprehension(*body, iterators, span),
+            Kind::Text => Err(self
+                .problem("a string here is not supported")
+                .hint("use numbers")),
+            Kind::Path(parts) => self.path(id, parts),
+            Kind::Member(record, name) => self.member(*record, name),
+            Kind::All => Err(self.problem("`:` stands only in subscripts")),
+            Kind::End => self.end(),
+            Kind::Name => self.name(),
+            Kind::Index(base, subscripts) => self.index(*base, subscripts),
+            Kind::Call(call) => self.call(call),
+            Kind::Array(elements) => self.array(elements),
+            Kind::Matrix(rows) => self.matrix(rows),
+            Kind::Comprehension(body, iterators) => self.comprehension(*body, iterators),
             Kind::Not(operand) => {
                 let node = self.condition(*operand)?;
                 Ok(Scalar::Boolean(self.graph.unary(Unary::Not, node)).into())
             }
             Kind::Plus(operand) => {
                 let value = self.value(*operand)?;
-                self.map(value, self.span(*operand), |_, scalar, _| Ok(scalar))
+                self.at = self.span(*operand);
+                self.map(value, Ok)
             }
             Kind::Minus(operand) => {
                 let value = self.value(*operand)?;
-                self.map(value, self.span(*operand), Self::negated)
+                self.at = self.span(*operand);
+                self.map(value, |scalar| self.negated(scalar))
             }
             Kind::Chain(head, rest) => self.chain(*head, rest),
             Kind::Power(base, exponent, elementwise) => {
                 let (base, exponent) = (self.value(*base)?, self.value(*exponent)?);
-                self.power(base, exponent, *elementwise, span)
+                self.power(base, exponent, *elementwise)
             }
             Kind::Relation(relation, left, right) => self.relation(relation, *left, *right),
             Kind::If(branches, otherwise) => self.conditional(branches, *otherwise),
-            Kind::Range(start, step, stop) => self.range(*start, *step, *stop, span),
+            Kind::Range(start, step, stop) => self.range(*start, *step, *stop),
         }
     }
 
@@ -201,9 +227,9 @@ impl<'a> Evaluator<'a> {
         Err(Problem::new(self.span(id), message).maybe_hint(hint.map(str::to_owned)))
     }
 
-    fn end(&self, span: Span) -> Result<Value> {
+    fn end(&self) -> Result<Value> {
         let size = self.ends.last().map(|&size| Scalar::of_size(size).into());
-        size.ok_or_else(|| Problem::new(span, "`end` stands only in subscripts"))
+        size.ok_or_else(|| self.problem("`end` stands only in subscripts"))
     }
 
     pub(super) fn varying(&self, span: Span) -> Problem {
@@ -250,16 +276,16 @@ impl<'a> Evaluator<'a> {
         let start = self.span(head);
         for &(operation, elementwise, operand) in rest {
             let right = self.value(operand)?;
-            let span = start.to(self.span(operand));
-            value = self.binary(operation, elementwise, value, right, span)?;
+            self.at = start.to(self.span(operand));
+            value = self.binary(operation, elementwise, value, right)?;
         }
         Ok(value)
     }
 
     fn relation(&mut self, relation: &str, left: ExprId, right: ExprId) -> Result<Value> {
-        let span = self.span(left).to(self.span(right));
+        self.at = self.span(left).to(self.span(right));
         let (left, right) = (self.scalar(left)?, self.scalar(right)?);
-        let holds = self.compare(relation, left, right, span)?;
+        let holds = self.compare(relation, left, right)?;
         Ok(Scalar::Boolean(holds).into())
     }
 
@@ -277,14 +303,15 @@ impl<'a> Evaluator<'a> {
         let take = |evaluator: &mut Self, id| Ok((evaluator.value(id)?, evaluator.span(id)));
         let join = |evaluator: &mut Self, condition, (yes, span): (Value, Span), no| {
             let (no, _): (Value, Span) = no;
+            evaluator.at = span;
             if yes.dims != no.dims {
-                return Err(unequal_sizes(&yes.dims, &no.dims, span));
+                return Err(evaluator.unequal_sizes(&yes.dims, &no.dims));
             }
-            let select = |evaluator: &Self, a: Scalar, b, span| {
+            let select = |a: Scalar, b| {
                 let chosen = a.select(condition, b, evaluator.graph);
-                chosen.ok_or_else(|| expected_number(span))
+                chosen.ok_or_else(|| expected_number(evaluator.at))
             };
-            Ok((evaluator.elementwise(yes, no, span, select)?, span))
+            Ok((evaluator.elementwise(yes, no, select)?, span))
         };
         let chosen = self.chosen(branches.iter().copied(), otherwise, take, join);
         chosen.map(|(value, _)| value)
@@ -331,13 +358,15 @@ impl<'a> Evaluator<'a> {
 }
 
 impl<'a> Evaluator<'a> {
-    pub(super) fn name(&mut self, span: Span) -> Result<Value> {
+    /// What the name that stands here means.
+    pub(super) fn name(&mut self) -> Result<Value> {
+        let span = self.at;
         let name = plain(self.text(span));
         if let Some(scalar) = self.iterator(&name) {
             return Ok(scalar.into());
         }
         if let Some(local) = self.local(&name) {
-            self.budget.charge(local.elements.len() as u64, span)?;
+            self.charge(local.elements.len() as u64)?;
             return local.value().ok_or_else(|| self.unassigned(&name, span));
         }
         // names in a function lead to its own variables, and to constants
@@ -349,7 +378,7 @@ impl<'a> Evaluator<'a> {
         };
         let found = self.named_in(mode, &name);
         if let Named::Array([_, ..], elements) = found {
-            self.budget.charge(elements.len() as u64, span)?;
+            self.charge(elements.len() as u64)?;
         }
         match found {
             Named::Array(..) | Named::Scalar(_) => return self.meant(found, span),
@@ -360,7 +389,7 @@ impl<'a> Evaluator<'a> {
         builtin.ok_or_else(|| match is_closed && self.symbols.dims(&name).is_some() {
             true => {
                 let message = format!("`{name}` is not a variable of this function");
-                Problem::new(span, message)
+                self.problem(message)
                     .hint("functions read their own variables and constants: add an input")
             }
             false => self.unknown_name(span),
@@ -411,7 +440,7 @@ impl<'a> Evaluator<'a> {
 
     /// In a function the model's own names mean nothing.
     pub(super) fn is_closed(&self) -> bool {
-        self.frame.as_ref().is_some_and(|frame| frame.is_function)
+        self.frame.is_function
     }
 
     pub(super) fn full_names(&self, name: &str) -> Vec<String> {
@@ -440,17 +469,18 @@ impl<'a> Evaluator<'a> {
     }
 
     /// `a[1].b[2].c`: a name as it is written, or the member `a.b.c` with all subscripts.
-    fn path(&mut self, id: ExprId, parts: &'a [PathPart], span: Span) -> Result<Value> {
+    fn path(&mut self, id: ExprId, parts: &'a [PathPart]) -> Result<Value> {
+        let span = self.at;
         let whole = plain(self.text(span));
         if self.is_known(&whole) {
-            return self.name(span);
+            return self.name();
         }
         let literal = self.with_numbers(parts);
         if let Some(literal) = literal.filter(|literal| self.is_known(literal)) {
             return self.value_named(&literal, span);
         }
         let (name, subscripts) = reference(self.source, self.ast, id).unwrap_or_default();
-        self.index_named(&name, &subscripts, span, span)
+        self.index_named(&name, &subscripts, span)
     }
 
     fn is_known(&self, name: &str) -> bool {
@@ -489,7 +519,7 @@ impl<'a> Evaluator<'a> {
 
     /// A variable of the function or algorithm around.
     pub(super) fn local(&self, name: &str) -> Option<&Local> {
-        self.frame.as_ref()?.locals.get(name)
+        self.frame.locals.get(name)
     }
 }
 

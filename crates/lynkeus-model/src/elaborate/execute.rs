@@ -6,7 +6,7 @@ use super::evaluate::{Evaluator, reference};
 use super::scope::Frame;
 use super::value::{Value, describe_dims, member_name};
 use crate::Assertion;
-use crate::diagnostic::{Problem, Result, Span};
+use crate::diagnostic::{Problem, Result};
 use crate::syntax::ast::{Assert, Ast, ExprId, ForIndex, Statement, StatementKind};
 
 /// How a list of statements ended.
@@ -53,17 +53,16 @@ impl<'a> Evaluator<'a> {
     }
 
     fn statement(&mut self, statement: &'a Statement) -> Result<Ended> {
-        let span = statement.span;
         match &statement.kind {
-            StatementKind::Assign(targets, value) => self.assign_all(targets, *value, span)?,
+            StatementKind::Assign(targets, value) => self.assign_all(targets, *value)?,
             StatementKind::For(iterators, body) => {
                 return self.repeated(iterators, Self::value, &mut |e| e.execute(body));
             }
             StatementKind::While(condition, body) => return self.repeated_while(*condition, body),
             StatementKind::If(branches, otherwise) => {
-                return self.branched(branches, otherwise, span);
+                return self.branched(branches, otherwise);
             }
-            StatementKind::Assert(assert) => self.claim(assert, span)?,
+            StatementKind::Assert(assert) => self.claim(assert)?,
             StatementKind::Break => return Ok(Ended::ByBreak),
             StatementKind::Return => return Ok(Ended::ByReturn),
         }
@@ -71,9 +70,9 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Notes an `assert`; one that is known to fail is refused.
-    pub(super) fn claim(&mut self, assert: &Assert, span: Span) -> Result<()> {
+    pub(super) fn claim(&mut self, assert: &Assert) -> Result<()> {
         let mut condition = self.condition(assert.condition)?;
-        self.budget.charge(self.conditions.len() as u64, span)?;
+        self.charge(self.conditions.len() as u64)?;
         for &(on_path, holds) in &self.conditions {
             let elsewhere = match holds {
                 true => self.graph.unary(Unary::Not, on_path),
@@ -84,17 +83,19 @@ impl<'a> Evaluator<'a> {
         match self.graph.constant_value(condition) {
             Some(0.0) if !assert.is_warning => {
                 let message = format!("this assertion does not hold: {}", assert.message);
-                Err(Problem::new(span, message).hint("change the parameters that it is about"))
+                Err(self
+                    .problem(message)
+                    .hint("change the parameters that it is about"))
             }
             Some(value) if value != 0.0 => Ok(()),
             _ => {
                 let claim = Assertion {
                     condition,
                     message: assert.message.clone(),
-                    line: span.line(self.source),
+                    line: self.at.line(self.source),
                     is_warning: assert.is_warning,
                 };
-                self.claims.push((claim, span));
+                self.claims.push((claim, self.at));
                 Ok(())
             }
         }
@@ -153,26 +154,22 @@ impl<'a> Evaluator<'a> {
         &mut self,
         branches: &'a [(ExprId, Vec<Statement>)],
         otherwise: &'a [Statement],
-        span: Span,
     ) -> Result<Ended> {
         let around = self.conditions.len();
         let take = |evaluator: &mut Self, body: &'a [Statement]| {
             if evaluator.conditions.len() == around {
                 let ended = evaluator.execute(body)?;
-                return Ok((ended, evaluator.frame.take()));
+                return Ok((ended, std::mem::take(&mut evaluator.frame)));
             }
             let before = evaluator.frame.clone();
-            evaluator.whole(body, span)?;
+            evaluator.whole(body)?;
             let after = std::mem::replace(&mut evaluator.frame, before);
             Ok((Ended::AtItsEnd, after))
         };
-        let join = |evaluator: &mut Self, condition: Node, (_, yes): (_, Option<Frame>), no| {
-            let (ended, no): (Ended, Option<Frame>) = no;
-            let size = yes.as_ref().map_or(0, Frame::size);
-            evaluator.budget.charge(size as u64, span)?;
-            let frames = yes.zip(no);
-            let joined = |(yes, no)| Frame::joined(condition, yes, no, evaluator.graph);
-            Ok((ended, frames.map(joined)))
+        let join = |evaluator: &mut Self, condition: Node, (_, yes): (_, Frame), no| {
+            let (ended, no): (Ended, Frame) = no;
+            evaluator.charge(yes.size() as u64)?;
+            Ok((ended, Frame::joined(condition, yes, no, evaluator.graph)))
         };
         let pairs = branches.iter().map(|(c, body)| (*c, body.as_slice()));
         let (ended, frame) = self.chosen(pairs, otherwise, take, join)?;
@@ -181,22 +178,17 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Statements from which nothing leads away.
-    fn whole(&mut self, statements: &'a [Statement], span: Span) -> Result<()> {
+    fn whole(&mut self, statements: &'a [Statement]) -> Result<()> {
         match self.execute(statements)? {
             Ended::AtItsEnd => Ok(()),
             Ended::ByBreak | Ended::ByReturn => {
                 let message = "`break` or `return` under a condition that depends on variables";
-                Err(Problem::new(span, message).hint("use `if … else …` without them"))
+                Err(self.problem(message).hint("use `if … else …` without them"))
             }
         }
     }
 
-    fn assign_all(
-        &mut self,
-        targets: &'a [Option<ExprId>],
-        value: ExprId,
-        span: Span,
-    ) -> Result<()> {
+    fn assign_all(&mut self, targets: &'a [Option<ExprId>], value: ExprId) -> Result<()> {
         let outcomes = match targets {
             [Some(_)] => vec![self.members(value)?],
             _ => self.outcomes(value, targets.len())?,
@@ -214,36 +206,30 @@ impl<'a> Evaluator<'a> {
                     "" => &subscripts[..],
                     _ => &[],
                 };
-                self.assign_to(&member_name(&name, &member), subscripts, value, span)?;
+                self.assign_to(&member_name(&name, &member), subscripts, value)?;
             }
         }
         Ok(())
     }
 
-    fn assign_to(
-        &mut self,
-        name: &str,
-        subscripts: &[ExprId],
-        value: Value,
-        span: Span,
-    ) -> Result<()> {
+    fn assign_to(&mut self, name: &str, subscripts: &[ExprId], value: Value) -> Result<()> {
+        let at = self.at;
         let unknown = || {
             let message = format!("`{name}` cannot be given a value here");
-            Problem::new(span, message)
+            Problem::new(at, message)
                 .hint("an algorithm assigns its own variables: outputs and protected ones")
         };
         let dims = self.local(name).ok_or_else(unknown)?.dims.clone();
-        let (kept, offsets) = self.selected(name, &dims, subscripts, span)?;
+        let (kept, offsets) = self.selected(name, &dims, subscripts)?;
         let Value { dims, elements } = value;
         if kept != dims {
             let (has, found) = (describe_dims(&kept), describe_dims(&dims));
             let message = format!("`{name}` takes {has} here, its value has {found}");
-            return Err(Problem::new(span, message));
+            return Err(self.problem(message));
         }
-        self.budget.charge(offsets.len() as u64, span)?;
+        self.charge(offsets.len() as u64)?;
         let graph = self.graph;
-        let frame = self.frame.as_mut();
-        let local = frame.and_then(|frame| frame.locals.get_mut(name));
+        let local = self.frame.locals.get_mut(name);
         let local = local.ok_or_else(unknown)?;
         for (offset, scalar) in offsets.into_iter().zip(elements) {
             local.elements[offset] = Some(local.converted(scalar, graph));

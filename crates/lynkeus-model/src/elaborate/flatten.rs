@@ -11,7 +11,7 @@ use super::value::{
 };
 use crate::Assertion;
 use crate::balance::FlatEquation;
-use crate::diagnostic::{Problem, Result, Span};
+use crate::diagnostic::{Result, Span};
 use crate::syntax::ast::{Equation, EquationKind, ExprId, Kind, Statement, Variability};
 use crate::syntax::plain;
 
@@ -40,7 +40,8 @@ pub(super) fn flatten(symbols: &Symbols<'_>) -> Result<Flat> {
                 dims: component.dims.clone(),
                 elements: component.elements.clone(),
             };
-            evaluator.equate(&variable, &value, declaration.name.to(at))?;
+            evaluator.at = declaration.name.to(at);
+            evaluator.equate(&variable, &value)?;
         }
     }
     evaluator.write_out(&model.equations)?;
@@ -91,9 +92,9 @@ impl<'a> Evaluator<'a> {
                 frame.locals.insert(name.clone(), local);
             }
         }
-        self.frame = Some(frame);
+        self.frame = frame;
         let done = self.execute(statements);
-        let frame = self.frame.take().unwrap_or_default();
+        let frame = std::mem::take(&mut self.frame);
         done?;
         let spans = || statements.iter().map(|statement| statement.span);
         for name in names {
@@ -110,12 +111,13 @@ impl<'a> Evaluator<'a> {
         else {
             return Ok(());
         };
+        self.at = span;
         for (offset, (&variable, value)) in elements.iter().zip(&local.elements).enumerate() {
             let Some(value) = *value else {
                 let full = element_name(name, dims, offset);
                 return Err(self.unassigned(&full, span));
             };
-            self.equate(&variable.into(), &value.into(), span)?;
+            self.equate(&variable.into(), &value.into())?;
         }
         Ok(())
     }
@@ -126,30 +128,32 @@ impl<'a> Evaluator<'a> {
     }
 
     fn equation(&mut self, equation: &'a Equation) -> Result<()> {
-        self.budget.charge(1, equation.span)?;
+        self.standing(equation.span, |evaluator| evaluator.equation_here(equation))
+    }
+
+    fn equation_here(&mut self, equation: &'a Equation) -> Result<()> {
+        self.charge(1)?;
         match &equation.kind {
             EquationKind::Equality(left, right) => {
                 let left = self.members(*left)?;
-                self.equate_members(left, *right, equation.span)
+                self.equate_members(left, *right)
             }
-            EquationKind::Several(targets, call) => self.several(targets, *call, equation.span),
-            EquationKind::Assert(assert) => self.claim(assert, equation.span),
+            EquationKind::Several(targets, call) => self.several(targets, *call),
+            EquationKind::Assert(assert) => self.claim(assert),
             EquationKind::For(iterators, body) => {
                 let mut body = |e: &mut Self| e.write_out(body).map(|()| Ended::AtItsEnd);
                 let ended = self.repeated(iterators, Self::structural, &mut body);
                 ended.map(|_| ())
             }
-            EquationKind::If(branches, otherwise) => {
-                self.choose(branches, otherwise, equation.span)
-            }
+            EquationKind::If(branches, otherwise) => self.choose(branches, otherwise),
         }
     }
 
-    fn equate_members(&mut self, left: Members, right: ExprId, span: Span) -> Result<()> {
+    fn equate_members(&mut self, left: Members, right: ExprId) -> Result<()> {
         let left = match number(left) {
             Ok(left) => {
                 let right = self.value(right)?;
-                return self.equate(&left, &right, span);
+                return self.equate(&left, &right);
             }
             Err(members) => members,
         };
@@ -157,14 +161,14 @@ impl<'a> Evaluator<'a> {
         for (name, value) in left {
             let other = member(&right, &name).ok_or_else(|| {
                 let message = format!("expected a record with the member `{name}` on both sides");
-                Problem::new(span, message)
+                self.problem(message)
             })?;
-            self.equate(&value, other, span)?;
+            self.equate(&value, other)?;
         }
         Ok(())
     }
 
-    fn several(&mut self, targets: &[Option<ExprId>], call: ExprId, span: Span) -> Result<()> {
+    fn several(&mut self, targets: &[Option<ExprId>], call: ExprId) -> Result<()> {
         let outcomes = self.outcomes(call, targets.len())?;
         for (target, outcome) in targets.iter().zip(outcomes) {
             let Some(target) = *target else {
@@ -173,24 +177,24 @@ impl<'a> Evaluator<'a> {
             match number(outcome) {
                 Ok(value) => {
                     let left = self.value(target)?;
-                    self.equate(&left, &value, span)?;
+                    self.equate(&left, &value)?;
                 }
-                Err(record) => self.equate_members(record, target, span)?,
+                Err(record) => self.equate_members(record, target)?,
             }
         }
         Ok(())
     }
 
-    fn equate(&mut self, left: &Value, right: &Value, span: Span) -> Result<()> {
+    fn equate(&mut self, left: &Value, right: &Value) -> Result<()> {
         if left.dims != right.dims {
             let (left, right) = (describe_dims(&left.dims), describe_dims(&right.dims));
             let message = format!("the sides differ in size: left is {left}, right is {right}");
-            return Err(Problem::new(span, message));
+            return Err(self.problem(message));
         }
-        self.budget.charge(left.elements.len() as u64, span)?;
+        self.charge(left.elements.len() as u64)?;
         for (offset, (&a, &b)) in left.elements.iter().zip(&right.elements).enumerate() {
             let (a, b) = a.with(b, self.graph).ok_or_else(|| {
-                Problem::new(span, "an equation between a Boolean and a number")
+                self.problem("an equation between a Boolean and a number")
                     .hint("write `if a then 1 else 0` for the number of a condition")
             })?;
             let is_array = !left.dims.is_empty();
@@ -198,7 +202,7 @@ impl<'a> Evaluator<'a> {
             self.equations.push(FlatEquation {
                 left: a,
                 right: b,
-                span,
+                span: self.at,
                 element,
             });
         }
@@ -211,14 +215,14 @@ impl<'a> Evaluator<'a> {
         &mut self,
         branches: &'a [(ExprId, Vec<Equation>)],
         otherwise: &'a [Equation],
-        span: Span,
     ) -> Result<()> {
         let pairs = branches.iter().map(|(c, body)| (*c, body.as_slice()));
         let join = |evaluator: &mut Self, condition, yes: Vec<FlatEquation>, no: Vec<_>| {
             if yes.len() != no.len() {
                 let (one, two) = (yes.len(), no.len());
                 let message = format!("the branches have {one} and {two} equations");
-                return Err(Problem::new(span, message)
+                return Err(evaluator
+                    .problem(message)
                     .hint("every branch, `else` included, needs the same number of equations"));
             }
             let pairs = yes.into_iter().zip(no);
@@ -226,7 +230,7 @@ impl<'a> Evaluator<'a> {
             Ok(pairs.map(join).collect())
         };
         let joined = self.chosen(pairs, otherwise, Self::apart, join)?;
-        self.budget.charge(joined.len() as u64, span)?;
+        self.charge(joined.len() as u64)?;
         self.equations.extend(joined);
         Ok(())
     }

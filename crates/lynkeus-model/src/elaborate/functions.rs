@@ -3,7 +3,6 @@
 
 use lynkeus_expr::{Binary, Expr, Node, Unary};
 
-use super::arithmetic::overflow;
 use super::arrays::{matrix_dims, scalar_dims, vector_dims};
 use super::evaluate::{Evaluator, reference};
 use super::value::{Scalar, Value, expected_number};
@@ -18,60 +17,58 @@ const LIBRARY: &str = "Modelica.Math.";
 
 const INTERPOLATE: &str = "Modelica.Math.Vectors.interpolate";
 
-/// What a function makes of a call, which stands at the span.
-type Function = for<'e, 'a> fn(&'e mut Evaluator<'a>, &'a Call, Span) -> Result<Value>;
+/// What a function makes of a call.
+type Function = for<'e, 'a> fn(&'e mut Evaluator<'a>, &'a Call) -> Result<Value>;
 
-/// By name: what an evaluator `e` makes of a call `c` at the span `s`.
+/// By name: what an evaluator `e` makes of a call `c`.
 const FUNCTIONS: [(&str, Function); 47] = [
-    ("sqrt", |e, c, s| e.each(c, s, |x| x.sqrt())),
-    ("exp", |e, c, s| e.each(c, s, |x| x.exp())),
-    ("log", |e, c, s| e.each(c, s, |x| x.ln())),
-    ("log10", |e, c, s| e.each(c, s, |x| x.log10())),
-    ("sin", |e, c, s| e.each(c, s, |x| x.sin())),
-    ("cos", |e, c, s| e.each(c, s, |x| x.cos())),
-    ("tan", |e, c, s| e.each(c, s, |x| x.tan())),
-    ("asin", |e, c, s| e.each(c, s, |x| x.asin())),
-    ("acos", |e, c, s| e.each(c, s, |x| x.acos())),
-    ("atan", |e, c, s| e.each(c, s, |x| x.atan())),
-    ("atan2", |e, c, s| e.atan2(c, s)),
-    ("sinh", |e, c, s| e.each(c, s, |x| x.sinh())),
-    ("cosh", |e, c, s| e.each(c, s, |x| x.cosh())),
-    ("tanh", |e, c, s| e.each(c, s, |x| x.tanh())),
-    ("abs", |e, c, s| {
-        e.exact(c, s, i64::checked_abs, |x| x.abs())
-    }),
-    ("sign", |e, c, s| e.exact(c, s, signum, |x| x.sign())),
-    ("floor", |e, c, s| e.each(c, s, |x| x.floor())),
-    ("ceil", |e, c, s| e.each(c, s, |x| -(-x).floor())),
-    ("integer", |e, c, s| e.integer(c, s)),
-    ("div", |e, c, s| e.divided(c, s, i64::checked_div, quotient)),
-    ("rem", |e, c, s| e.divided(c, s, i64::checked_rem, rest)),
-    ("mod", |e, c, s| e.divided(c, s, exact_modulus, modulus)),
-    ("min", |e, c, s| e.extreme(c, s, i64::min, |a, b| a.min(b))),
-    ("max", |e, c, s| e.extreme(c, s, i64::max, |a, b| a.max(b))),
-    ("der", |e, c, _| e.der(c)),
-    ("noEvent", |e, c, _| e.only_argument(c)),
-    ("smooth", |e, c, _| Ok(e.two_arguments(c)?.1)),
-    ("homotopy", |e, c, _| Ok(e.two_arguments(c)?.0)),
-    ("semiLinear", |e, c, s| e.semi_linear(c, s)),
-    ("cross", |e, c, s| e.cross(c, s)),
-    (INTERPOLATE, |e, c, s| e.interpolate(c, s)),
-    ("sum", |e, c, s| e.fold(c, s, Binary::Add, 0)),
-    ("product", |e, c, s| e.fold(c, s, Binary::Mul, 1)),
-    ("array", |e, c, s| e.array_of(c, s)),
-    ("size", |e, c, _| e.size(c)),
-    ("ndims", |e, c, _| e.ndims(c)),
-    ("zeros", |e, c, s| e.filled(0, c, s)),
-    ("ones", |e, c, s| e.filled(1, c, s)),
-    ("fill", |e, c, s| e.fill(c, s)),
-    ("linspace", |e, c, s| e.linspace(c, s)),
-    ("identity", |e, c, s| e.identity(c, s)),
-    ("diagonal", |e, c, s| e.diagonal(c, s)),
-    ("transpose", |e, c, s| e.transpose(c, s)),
-    ("cat", |e, c, s| e.cat(c, s)),
-    ("scalar", |e, c, s| e.reshaped(c, s, scalar_dims)),
-    ("vector", |e, c, s| e.reshaped(c, s, vector_dims)),
-    ("matrix", |e, c, s| e.reshaped(c, s, matrix_dims)),
+    ("sqrt", |e, c| e.each(c, |x| x.sqrt())),
+    ("exp", |e, c| e.each(c, |x| x.exp())),
+    ("log", |e, c| e.each(c, |x| x.ln())),
+    ("log10", |e, c| e.each(c, |x| x.log10())),
+    ("sin", |e, c| e.each(c, |x| x.sin())),
+    ("cos", |e, c| e.each(c, |x| x.cos())),
+    ("tan", |e, c| e.each(c, |x| x.tan())),
+    ("asin", |e, c| e.each(c, |x| x.asin())),
+    ("acos", |e, c| e.each(c, |x| x.acos())),
+    ("atan", |e, c| e.each(c, |x| x.atan())),
+    ("atan2", |e, c| e.atan2(c)),
+    ("sinh", |e, c| e.each(c, |x| x.sinh())),
+    ("cosh", |e, c| e.each(c, |x| x.cosh())),
+    ("tanh", |e, c| e.each(c, |x| x.tanh())),
+    ("abs", |e, c| e.exact(c, i64::checked_abs, |x| x.abs())),
+    ("sign", |e, c| e.exact(c, signum, |x| x.sign())),
+    ("floor", |e, c| e.each(c, |x| x.floor())),
+    ("ceil", |e, c| e.each(c, |x| -(-x).floor())),
+    ("integer", |e, c| e.integer(c)),
+    ("div", |e, c| e.divided(c, i64::checked_div, quotient)),
+    ("rem", |e, c| e.divided(c, i64::checked_rem, rest)),
+    ("mod", |e, c| e.divided(c, exact_modulus, modulus)),
+    ("min", |e, c| e.extreme(c, i64::min, |a, b| a.min(b))),
+    ("max", |e, c| e.extreme(c, i64::max, |a, b| a.max(b))),
+    ("der", |e, c| e.der(c)),
+    ("noEvent", |e, c| e.only_argument(c)),
+    ("smooth", |e, c| Ok(e.two_arguments(c)?.1)),
+    ("homotopy", |e, c| Ok(e.two_arguments(c)?.0)),
+    ("semiLinear", |e, c| e.semi_linear(c)),
+    ("cross", |e, c| e.cross(c)),
+    (INTERPOLATE, |e, c| e.interpolate(c)),
+    ("sum", |e, c| e.fold(c, Binary::Add, 0)),
+    ("product", |e, c| e.fold(c, Binary::Mul, 1)),
+    ("array", |e, c| e.array_of(c)),
+    ("size", |e, c| e.size(c)),
+    ("ndims", |e, c| e.ndims(c)),
+    ("zeros", |e, c| e.filled(0, c)),
+    ("ones", |e, c| e.filled(1, c)),
+    ("fill", |e, c| e.fill(c)),
+    ("linspace", |e, c| e.linspace(c)),
+    ("identity", |e, c| e.identity(c)),
+    ("diagonal", |e, c| e.diagonal(c)),
+    ("transpose", |e, c| e.transpose(c)),
+    ("cat", |e, c| e.cat(c)),
+    ("scalar", |e, c| e.reshaped(c, scalar_dims)),
+    ("vector", |e, c| e.reshaped(c, vector_dims)),
+    ("matrix", |e, c| e.reshaped(c, matrix_dims)),
 ];
 
 const NO_EVENTS: &str = "models with events are not supported: use `if` expressions";
@@ -94,8 +91,8 @@ const REFUSED: [(&str, &str); 10] = [
 ];
 
 impl<'a> Evaluator<'a> {
-    pub(super) fn call(&mut self, call: &'a Call, span: Span) -> Result<Value> {
-        if let Some(value) = self.own_function(call, span)? {
+    pub(super) fn call(&mut self, call: &'a Call) -> Result<Value> {
+        if let Some(value) = self.own_function(call)? {
             return Ok(value);
         }
         if let Some((name, _)) = call.named.first() {
@@ -105,7 +102,7 @@ impl<'a> Evaluator<'a> {
         let name = self.function_name(call);
         let is_called = |known: &str| known.strip_prefix(LIBRARY).unwrap_or(known) == name;
         match FUNCTIONS.iter().find(|(known, _)| is_called(known)) {
-            Some((_, function)) => function(self, call, span),
+            Some((_, function)) => function(self, call),
             None => Err(self.unknown_function(call.function, name)),
         }
     }
@@ -159,12 +156,11 @@ impl<'a> Evaluator<'a> {
     fn each(
         &mut self,
         call: &Call,
-        span: Span,
         function: impl for<'g> Fn(Expr<'g>) -> Expr<'g>,
     ) -> Result<Value> {
         let value = self.only_argument(call)?;
-        self.map(value, span, |evaluator, scalar, span| {
-            let argument = evaluator.graph.expr(evaluator.real(scalar, span)?);
+        self.map(value, |scalar| {
+            let argument = self.graph.expr(self.real(scalar)?);
             Ok(Scalar::Real(function(argument).node()))
         })
     }
@@ -173,60 +169,46 @@ impl<'a> Evaluator<'a> {
     fn exact(
         &mut self,
         call: &Call,
-        span: Span,
         exact: impl Fn(i64) -> Option<i64>,
         real: impl for<'g> Fn(Expr<'g>) -> Expr<'g>,
     ) -> Result<Value> {
         let value = self.only_argument(call)?;
-        self.map(value, span, |evaluator, scalar, span| {
-            evaluator.of_one(scalar, span, &exact, &real)
-        })
+        let of_one = |scalar| self.of_one(scalar, &exact, &real);
+        self.map(value, of_one)
     }
 
-    fn integer(&mut self, call: &Call, span: Span) -> Result<Value> {
+    fn integer(&mut self, call: &Call) -> Result<Value> {
         let value = self.only_argument(call)?;
-        self.map(value, span, |evaluator, scalar, span| {
-            let node = evaluator.real(scalar, span)?;
-            let floor = evaluator.graph.unary(Unary::Floor, node);
-            match evaluator.graph.constant_value(floor) {
-                Some(value) if value.abs() > 2f64.powi(53) => Err(overflow(span)),
+        self.map(value, |scalar| {
+            let node = self.real(scalar)?;
+            let floor = self.graph.unary(Unary::Floor, node);
+            match self.graph.constant_value(floor) {
+                Some(value) if value.abs() > 2f64.powi(53) => Err(self.overflow()),
                 Some(value) => Ok(Scalar::Integer(value as i64)),
                 None => Ok(Scalar::Real(floor)),
             }
         })
     }
 
-    fn atan2(&mut self, call: &Call, span: Span) -> Result<Value> {
-        self.pairs(call, span, |evaluator, a, b, span| {
-            let (a, b) = (evaluator.real(a, span)?, evaluator.real(b, span)?);
-            Ok(Scalar::Real(evaluator.graph.binary(Binary::Atan2, a, b)))
-        })
-    }
-
-    /// A function of the elements of two arguments.
-    fn pairs(
-        &mut self,
-        call: &Call,
-        span: Span,
-        function: impl Fn(&Self, Scalar, Scalar, Span) -> Result<Scalar>,
-    ) -> Result<Value> {
+    fn atan2(&mut self, call: &Call) -> Result<Value> {
         let (left, right) = self.two_arguments(call)?;
-        self.elementwise(left, right, span, function)
+        self.elementwise(left, right, |a, b| {
+            let (a, b) = (self.real(a)?, self.real(b)?);
+            Ok(Scalar::Real(self.graph.binary(Binary::Atan2, a, b)))
+        })
     }
 
     /// What is left of a division: of Integers `exact`, where it fits.
     fn divided(
         &mut self,
         call: &Call,
-        span: Span,
         exact: impl Fn(i64, i64) -> Option<i64>,
         real: impl for<'g> Fn(Expr<'g>, Expr<'g>) -> Expr<'g>,
     ) -> Result<Value> {
-        self.pairs(call, span, |evaluator, a, b, span| {
-            match b.number(evaluator.graph) {
-                Some(0.0) => Err(Problem::new(span, "division by zero")),
-                _ => evaluator.of_two(a, b, span, &exact, &real),
-            }
+        let (left, right) = self.two_arguments(call)?;
+        self.elementwise(left, right, |a, b| match b.number(self.graph) {
+            Some(0.0) => Err(self.problem("division by zero")),
+            _ => self.of_two(a, b, &exact, &real),
         })
     }
 
@@ -234,23 +216,22 @@ impl<'a> Evaluator<'a> {
     fn extreme(
         &mut self,
         call: &'a Call,
-        span: Span,
         exact: impl Fn(i64, i64) -> i64,
         real: impl for<'g> Fn(Expr<'g>, Expr<'g>) -> Expr<'g>,
     ) -> Result<Value> {
-        let of_two = |evaluator: &Self, a, b, span| {
-            evaluator.of_two(a, b, span, |a, b| Some(exact(a, b)), &real)
-        };
+        let exact = |a, b| Some(exact(a, b));
         if call.arguments.len() == 2 {
-            return self.pairs(call, span, of_two);
+            let (left, right) = self.two_arguments(call)?;
+            let of_two = |a, b| self.of_two(a, b, exact, &real);
+            return self.elementwise(left, right, of_two);
         }
-        let elements = self.reduced(call, span)?;
-        self.budget.charge(elements.len() as u64, span)?;
+        let elements = self.reduced(call)?;
+        self.charge(elements.len() as u64)?;
         let Some((&first, rest)) = elements.split_first() else {
             let name = self.function_name(call);
-            return Err(Problem::new(span, format!("`{name}` of no elements")));
+            return Err(self.problem(format!("`{name}` of no elements")));
         };
-        let better = |best, &next| of_two(self, best, next, span);
+        let better = |best, &next| self.of_two(best, next, exact, &real);
         rest.iter().try_fold(first, better).map(Value::from)
     }
 }
@@ -285,32 +266,32 @@ impl<'a> Evaluator<'a> {
     /// `der(x)` of a variable, an element or a slice, and of an expression by the chain rule.
     pub(super) fn der(&mut self, call: &'a Call) -> Result<Value> {
         let [argument] = self.arguments(call)?;
-        let span = self.span(argument);
         let is_variable = reference(self.source, self.ast, argument).is_some();
         let value = self.value(argument)?;
-        self.map(value, span, |evaluator, scalar, span| {
+        self.at = self.span(argument);
+        self.map(value, |scalar| {
             let derivative = match scalar {
-                Scalar::Real(node) if is_variable => evaluator.symbols.derivative(node),
-                Scalar::Real(node) => Some(evaluator.total_derivative(node, span)?),
+                Scalar::Real(node) if is_variable => self.symbols.derivative(node),
+                Scalar::Real(node) => Some(self.total_derivative(node)?),
                 _ => None,
             };
             let derivative = derivative.map(Scalar::Real);
-            derivative.ok_or_else(|| evaluator.no_derivative(span))
+            derivative.ok_or_else(|| self.no_derivative())
         })
     }
 
-    fn no_derivative(&self, span: Span) -> Problem {
-        let name = self.text(span);
+    fn no_derivative(&self) -> Problem {
+        let name = self.text(self.at);
         let message = format!("`der({name})`: `{name}` is not a Real variable");
-        Problem::new(span, message)
+        self.problem(message)
             .hint("inputs and parameters have no derivative in the equations")
     }
 
     /// Σ ∂e/∂v der(v) over the variables of e, and ∂e/∂t.
-    fn total_derivative(&self, node: Node, span: Span) -> Result<Node> {
+    fn total_derivative(&self, node: Node) -> Result<Node> {
         let graph = self.graph;
         let symbols = graph.symbols_of(&[node]).len();
-        self.budget.charge(symbols as u64, span)?;
+        self.charge(symbols as u64)?;
         let time = self.symbols.time();
         total_derivative(graph, node, time, |symbol| {
             let derivative = self.symbols.derivative(symbol);
@@ -319,35 +300,36 @@ impl<'a> Evaluator<'a> {
             }
             let name = graph.symbol_name(symbol).unwrap_or_default();
             let message = format!("`der` of an expression with `{name}`, which has none");
-            Err(Problem::new(span, message)
+            Err(self
+                .problem(message)
                 .hint("inputs and parameters have no derivative in the equations"))
         })
     }
 
     /// `semiLinear(x, a, b)`: a x where x ≥ 0, else b x.
-    pub(super) fn semi_linear(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn semi_linear(&mut self, call: &'a Call) -> Result<Value> {
         let [x, above, below] = self.arguments(call)?;
         let x = self.scalar(x)?;
         let (above, below) = (self.scalar(above)?, self.scalar(below)?);
         let zero = Scalar::Integer(0);
-        let positive = self.compare(">=", x, zero, span)?;
+        let positive = self.compare(">=", x, zero)?;
         let slope = above.select(positive, below, self.graph);
-        let slope = slope.ok_or_else(|| expected_number(span))?;
-        let product = self.scalar_binary(Binary::Mul, slope, x, span)?;
+        let slope = slope.ok_or_else(|| expected_number(self.at))?;
+        let product = self.scalar_binary(Binary::Mul, slope, x)?;
         Ok(product.into())
     }
 
     /// The cross product of two vectors of three elements.
-    pub(super) fn cross(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn cross(&mut self, call: &'a Call) -> Result<Value> {
         let (a, b) = self.two_arguments(call)?;
         let ([a1, a2, a3], [b1, b2, b3]) = (&a.elements[..], &b.elements[..]) else {
             let message = "`cross` takes two vectors of three elements";
-            return Err(Problem::new(span, message));
+            return Err(self.problem(message));
         };
         let term = |p: &Scalar, q: &Scalar, r: &Scalar, s: &Scalar| {
-            let first = self.scalar_binary(Binary::Mul, *p, *q, span)?;
-            let second = self.scalar_binary(Binary::Mul, *r, *s, span)?;
-            self.scalar_binary(Binary::Sub, first, second, span)
+            let first = self.scalar_binary(Binary::Mul, *p, *q)?;
+            let second = self.scalar_binary(Binary::Mul, *r, *s)?;
+            self.scalar_binary(Binary::Sub, first, second)
         };
         let elements = vec![
             term(a2, b3, a3, b2)?,

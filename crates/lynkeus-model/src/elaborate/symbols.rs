@@ -146,9 +146,8 @@ impl Symbols<'_> {
     }
 
     fn named_by(&self, names: Names<'_>, name: &str, mode: Mode) -> Named<'_> {
-        let unquoted = || name.strip_prefix('\'')?.strip_suffix('\'');
         let pi = || (name == "pi").then(|| self.graph.constant(std::f64::consts::PI).node());
-        let node = names(name).or_else(|| names(unquoted()?)).or_else(pi);
+        let node = names(name).or_else(pi);
         match node {
             Some(node) if mode != Mode::Continuous && self.graph.constant_value(node).is_none() => {
                 Named::Varying

@@ -7,16 +7,16 @@
 use lynkeus_expr::{Expr, Graph, Node};
 
 use super::evaluate::Evaluator;
-use super::value::{Scalar, Value};
+use super::value::{Scalar, Value, expected_number};
 use crate::Tables;
-use crate::diagnostic::{Problem, Result, Span};
+use crate::diagnostic::{Problem, Result};
 use crate::syntax::ast::{Call, ExprId};
 
 impl<'a> Evaluator<'a> {
     /// `Vectors.interpolate(x, y, xi)`: linear between the points (x[i], y[i]) and, as the
     /// Modelica library has it, along the first and the last piece outside of them; or, where
     /// the options ask for it, the monotone cubic.
-    pub(super) fn interpolate(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+    pub(super) fn interpolate(&mut self, call: &'a Call) -> Result<Value> {
         let [abscissas, ordinates, at] = match call.arguments.len() {
             // the index of the piece found last is a hint for the library's search
             4 => [call.arguments[0], call.arguments[1], call.arguments[2]],
@@ -30,18 +30,18 @@ impl<'a> Evaluator<'a> {
                 "a table needs as many values as points, at least one: found {points} points and \
                  {values} values"
             );
-            return Err(Problem::new(span, message));
+            return Err(self.problem(message));
         }
         self.increasing(&x, abscissas)?;
         let made_of = self.graph.symbols_of(&x);
         self.symbols.table_points.borrow_mut().extend(made_of);
-        self.budget.charge(x.len() as u64, span)?;
+        self.charge(x.len() as u64)?;
         let at = self.value(at)?;
-        self.map(at, span, |evaluator, at, span| {
-            let at = evaluator.real(at, span)?;
-            Ok(Scalar::Real(match evaluator.symbols.options.tables {
-                Tables::Linear => evaluator.piecewise_linear(&x, &y, at),
-                Tables::Monotone => monotone_cubic(evaluator.graph, &x, &y, at),
+        self.map(at, |at| {
+            let at = self.real(at)?;
+            Ok(Scalar::Real(match self.symbols.options.tables {
+                Tables::Linear => self.piecewise_linear(&x, &y, at),
+                Tables::Monotone => monotone_cubic(self.graph, &x, &y, at),
             }))
         })
     }
@@ -49,7 +49,8 @@ impl<'a> Evaluator<'a> {
     fn points(&mut self, argument: ExprId) -> Result<Vec<Node>> {
         let span = self.span(argument);
         let elements = self.value(argument)?.elements;
-        elements.into_iter().map(|e| self.real(e, span)).collect()
+        let node = |e: Scalar| e.real(self.graph).ok_or_else(|| expected_number(span));
+        elements.into_iter().map(node).collect()
     }
 
     fn increasing(&self, x: &[Node], argument: ExprId) -> Result<()> {

@@ -86,10 +86,11 @@ impl Value {
     }
 }
 
-/// Number of elements, where it fits.
-pub(crate) fn element_count(dims: &[usize]) -> Option<u64> {
-    dims.iter()
-        .try_fold(1u64, |count, &dim| count.checked_mul(dim as u64))
+/// Number of elements; the largest of all numbers where it does not fit.
+pub(crate) fn element_count(dims: &[usize]) -> u64 {
+    let mut dims = dims.iter();
+    let count = dims.try_fold(1u64, |count, &dim| count.checked_mul(dim as u64));
+    count.unwrap_or(u64::MAX)
 }
 
 /// "a scalar", "[3]" or "[2, 3]".
@@ -114,12 +115,6 @@ pub(crate) fn element_name(name: &str, dims: &[usize], offset: usize) -> String 
     }
     subscripts.reverse();
     format!("{name}[{}]", subscripts.join(","))
-}
-
-pub(super) fn unequal_sizes(left: &[usize], right: &[usize], span: Span) -> Problem {
-    let (left, right) = (describe_dims(left), describe_dims(right));
-    let message = format!("the sizes differ: left is {left}, right is {right}");
-    Problem::new(span, message)
 }
 
 /// The members of a record, those of inner records by their names in full, as `z.re`; a number or

@@ -1,11 +1,6 @@
 //! What is known here of the Modelica library: physical types and constants.
 
-/// A type of `Modelica.Units.SI`.
-#[derive(Debug, PartialEq)]
-pub(crate) struct LibraryType {
-    pub unit: &'static str,
-    pub min: Option<f64>,
-}
+use crate::syntax::ast::LibraryType;
 
 /// The type of this full name.
 pub(crate) fn type_named(full: &str) -> Option<LibraryType> {

@@ -13,7 +13,7 @@ use crate::syntax::ast::{
 };
 use crate::syntax::{HOW_TO_FLATTEN, plain, shortened};
 
-pub(crate) use library::{LibraryType, constant};
+pub(crate) use library::constant;
 
 /// Most classes that one may be made from.
 const MAX_BASES: usize = 100;
@@ -26,8 +26,6 @@ pub(crate) struct FlatModel {
     /// the class and its bases: where names of functions and types are looked up
     pub scopes: Vec<String>,
     pub declarations: Vec<Declaration>,
-    /// of declarations, by label: what the library's type says of them
-    pub library: HashMap<String, LibraryType>,
     /// names of the members of each record, by its label
     pub records: HashMap<String, Vec<String>>,
     /// labels of constants that the text may not mean
@@ -174,7 +172,7 @@ impl<'a> Flattening<'a> {
         let full = self.classes.full_names(text, &[path]);
         if let Some(found) = full.iter().find_map(|full| library::type_named(full)) {
             declaration.type_name = TypeName::Real;
-            self.model.library.insert(declaration.label.clone(), found);
+            declaration.library = Some(found);
             return self.scalar_or_array(declaration);
         }
         if matches!(text, "StateSelect" | "AssertionLevel") {

@@ -191,6 +191,13 @@ pub(crate) enum TypeName {
     Named(Span),
 }
 
+/// A type of `Modelica.Units.SI`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LibraryType {
+    pub unit: &'static str,
+    pub min: Option<f64>,
+}
+
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Declaration {
     pub is_final: bool,
@@ -199,6 +206,8 @@ pub(crate) struct Declaration {
     /// `flow` or `stream`, where it is written
     pub of_connector: Option<Span>,
     pub type_name: TypeName,
+    /// where its type is one of the library's
+    pub library: Option<LibraryType>,
     pub name: Span,
     /// the name without quotes, members of records in full: `r1.p.v`, `x[3]`
     pub label: String,
@@ -212,6 +221,11 @@ pub(crate) struct Declaration {
 }
 
 impl Declaration {
+    /// The label as a text has it: that of a constant of a package without the dot before it.
+    pub(crate) fn written(&self) -> &str {
+        self.label.strip_prefix('.').unwrap_or(&self.label)
+    }
+
     pub(crate) fn is_integer(&self) -> bool {
         self.type_name == TypeName::Integer
     }

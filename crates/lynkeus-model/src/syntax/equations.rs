@@ -161,15 +161,10 @@ impl Parser<'_> {
     /// Equations or statements up to `end` or `else`.
     fn until_end<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<Vec<T>> {
         let mut found = vec![];
-        let end = Token::Fixed("end");
-        while ![
-            end,
-            Token::Fixed("else"),
-            Token::Fixed("elseif"),
-            Token::End,
-        ]
-        .contains(&self.token)
-        {
+        while !matches!(
+            self.token,
+            Token::Fixed("end" | "else" | "elseif") | Token::End
+        ) {
             found.push(one(self)?);
         }
         Ok(found)

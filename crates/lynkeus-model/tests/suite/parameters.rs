@@ -52,6 +52,31 @@ fn sizes_follow() {
 }
 
 #[test]
+fn parameters_of_parts_are_given_by_their_names_in_full() {
+    let text = "model M
+      parameter Real part[1].k = 2;
+      parameter Real part[1].H[2] = {3, 4};
+      Real x(start = 1);
+    equation
+      der(x) = part[1].k + sum(part[1].H);
+    end M;";
+    let given = [("part[1].k", 10.0), ("part[1].H[2]", 0.5)];
+    let plant = load(text, &given, false).unwrap();
+    assert_eq!(slopes(&plant, &[]), [13.5]);
+    for (name, expected) in [
+        ("part[1].q", "model `M` has no parameter `part[1].q`"),
+        ("part[1].H[3]", "`part[1].H` [3], which has the size [2]"),
+        (
+            "part[1].H[2",
+            "`part[1].H[2` is not the name of a parameter",
+        ),
+    ] {
+        let found = load(text, &[(name, 1.0)], false).unwrap_err().one_line();
+        assert!(found.contains(expected), "{name}: {found}");
+    }
+}
+
+#[test]
 fn listed_parameters() {
     for symbolic in [false, true] {
         let plant = load(TEXT, &[("H[2]", 4.0)], symbolic).unwrap();

@@ -77,7 +77,9 @@ pub(super) fn of(
     budget: &Budget,
 ) -> Option<Judged> {
     let count = scales.len();
-    let (factor, lengths, accuracy) = balance(information, accuracy);
+    let mut factor = information.triangle.clone();
+    let gross: Vec<f64> = information.gross.iter().map(|sum| sum.sqrt()).collect();
+    let (lengths, accuracy) = balance(&mut factor, &gross, accuracy);
     let (values, directions) = singular(factor, budget)?;
     let rank = decide(&values, accuracy);
     // errors in units of the scales, one column per direction
@@ -149,23 +151,22 @@ impl Split<'_> {
     }
 }
 
-/// The factor with columns of length one, the lengths that they had, and their accuracy. A column whose terms cancel
-/// down to their rounding becomes zero, its length 1.
-fn balance(information: &Information, accuracy: f64) -> (DMatrix<f64>, Vec<f64>, f64) {
-    let mut factor = information.triangle().clone();
-    let mut lengths = vec![1.0; factor.ncols()];
+/// Makes columns one long: the lengths that they had, and their accuracy. A column whose terms, `gross` without
+/// cancelling, cancel down to their rounding becomes zero, its length 1.
+pub(super) fn balance(factor: &mut DMatrix<f64>, gross: &[f64], accuracy: f64) -> (Vec<f64>, f64) {
+    let mut lengths = vec![1.0; gross.len()];
     let mut worst: f64 = 1.0;
-    for (j, gross) in information.gross().enumerate() {
-        let length = factor.column(j).norm();
+    for (mut column, (own, gross)) in factor.column_iter_mut().zip(lengths.iter_mut().zip(gross)) {
+        let length = column.norm();
         if length > accuracy * gross {
-            lengths[j] = length;
+            *own = length;
             worst = worst.max(gross / length);
-            factor.column_mut(j).unscale_mut(length);
+            column.unscale_mut(length);
         } else {
-            factor.column_mut(j).fill(0.0);
+            column.fill(0.0);
         }
     }
-    (factor, lengths, accuracy * worst)
+    (lengths, accuracy * worst)
 }
 
 fn decide(values: &[f64], accuracy: f64) -> Rank {
@@ -238,25 +239,21 @@ impl Information {
         if self.pending.is_empty() || columns == 0 {
             return;
         }
-        let old = self.triangle.nrows();
-        let rows = old + self.pending.len() / columns;
-        let stacked = DMatrix::from_fn(rows, columns, |i, j| match i.checked_sub(old) {
-            None => self.triangle[(i, j)],
-            Some(i) => self.pending[i * columns + j],
-        });
-        self.triangle = stacked.qr().r();
+        let rows = self.pending.len() / columns;
+        let pending = DMatrix::from_row_slice(rows, columns, &self.pending);
+        self.triangle = stacked(&self.triangle, &pending).qr().r();
         self.pending.clear();
     }
+}
 
-    /// R, once everything is [settled](Self::settle).
-    pub fn triangle(&self) -> &DMatrix<f64> {
-        &self.triangle
-    }
-
-    /// Norms of the columns, had nothing cancelled within a row.
-    pub fn gross(&self) -> impl Iterator<Item = f64> + '_ {
-        self.gross.iter().map(|sum| sum.sqrt())
-    }
+pub(super) fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
+    let first = above.nrows();
+    DMatrix::from_fn(first + below.nrows(), below.ncols(), |i, j| {
+        match i.checked_sub(first) {
+            None => above[(i, j)],
+            Some(i) => below[(i, j)],
+        }
+    })
 }
 
 /// Sweeps over all pairs of columns; a handful suffices.

@@ -9,7 +9,7 @@
 use lynkeus_expr::Budget;
 use nalgebra::DMatrix;
 
-use super::deviations::singular;
+use super::deviations::{balance, singular, stacked};
 
 /// What is seen must stand out from errors by this factor.
 const MARGIN: f64 = 10.0;
@@ -69,14 +69,7 @@ impl Forward {
         let parts = set.iter().filter_map(|&s| self.of.get(s));
         let empty = DMatrix::zeros(0, wide);
         let mut factor = parts.fold(empty, |all, part| stacked(&all, part));
-        let mut lengths = vec![1.0; wide];
-        for (j, length) in lengths.iter_mut().enumerate() {
-            let own = factor.column(j).norm();
-            if own > 0.0 {
-                *length = own;
-                factor.column_mut(j).unscale_mut(own);
-            }
-        }
+        let (lengths, _) = balance(&mut factor, &vec![0.0; wide], 0.0);
         let (values, directions) = singular(factor, budget)?;
         let present = DMatrix::from_fn(wide, wide, |i, j| directions[(i, j)] / lengths[i]);
         let doubt = &self.errors * &present;
@@ -100,14 +93,4 @@ impl Forward {
         };
         Some([of(&start), of(&present)])
     }
-}
-
-fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
-    let first = above.nrows();
-    DMatrix::from_fn(first + below.nrows(), below.ncols(), |i, j| {
-        match i.checked_sub(first) {
-            None => above[(i, j)],
-            Some(i) => below[(i, j)],
-        }
-    })
 }

@@ -359,6 +359,27 @@ impl Precision {
     }
 }
 
+/// Work on parts of some things, each in a thread of its own, in order.
+fn side_by_side<P: Send, R: Send>(
+    parts: impl Iterator<Item = P>,
+    work: impl Fn(P) -> R + Sync,
+) -> Vec<R> {
+    let work = &work;
+    std::thread::scope(|scope| {
+        let start = |part| scope.spawn(move || work(part));
+        let crew: Vec<_> = parts.map(start).collect();
+        let done = crew.into_iter().map(|worker| worker.join());
+        done.map(|done| done.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+            .collect()
+    })
+}
+
+/// How many of these make the part of one thread.
+fn share(count: usize) -> usize {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    count.div_ceil(threads).max(1)
+}
+
 fn setting(what: impl Into<String>, expected: impl Into<String>, found: impl ToString) -> Error {
     Error::Setting {
         what: what.into(),

@@ -1,6 +1,6 @@
 //! Which sensors help most.
 
-use super::{Deviations, Precision};
+use super::{Deviations, Precision, share, side_by_side};
 
 /// Sets of one size that are all tried; beyond, only exchanges of one sensor are.
 const MOST_SETS: usize = 20_000;
@@ -98,8 +98,6 @@ impl Precision {
 
     /// Judges sets in parallel: fewest unseen first, then by score.
     fn ranked(&self, sets: Vec<Vec<usize>>) -> Vec<SensorSet> {
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        let share = sets.len().div_ceil(threads).max(1);
         let work = |some: &[Vec<usize>]| -> Vec<SensorSet> {
             let judged = some.iter().map(|set| self.judge(set));
             // what comes after the end does not count
@@ -107,19 +105,7 @@ impl Precision {
                 .take_while(|_| self.budget.spent().is_none())
                 .collect()
         };
-        let work = &work;
-        let mut judged: Vec<SensorSet> = std::thread::scope(|scope| {
-            let crew: Vec<_> = sets
-                .chunks(share)
-                .map(|some| scope.spawn(move || work(some)))
-                .collect();
-            crew.into_iter()
-                .flat_map(|worker| match worker.join() {
-                    Ok(done) => done,
-                    Err(panic) => std::panic::resume_unwind(panic),
-                })
-                .collect()
-        });
+        let mut judged = side_by_side(sets.chunks(share(sets.len())), work).concat();
         judged.sort_by(|a, b| a.unseen.cmp(&b.unseen).then(a.score.total_cmp(&b.score)));
         judged
     }

@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 
 use super::deviations::Information;
 use super::forward::{Forward, WIDE};
-use super::{Checkpoint, Experiment, Precision};
+use super::{Checkpoint, Experiment, Precision, share, side_by_side};
 
 /// Samples gathered before they are worked into the information.
 const CHUNK: usize = 256;
@@ -251,26 +251,12 @@ fn reach(
 
 /// Takes all batches over the instants, side by side.
 fn advance(batches: &mut [Batch<'_>], instants: &[f64]) -> Result<Vec<Piece>, Error> {
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let share = batches.len().div_ceil(threads).max(1);
-    let work = |some: &mut [Batch<'_>]| -> Result<Vec<Piece>, Error> {
+    let work = |some: &mut [Batch<'_>]| -> Vec<Result<Piece, Error>> {
         some.iter_mut().map(|batch| batch.run(instants)).collect()
     };
-    let work = &work;
-    std::thread::scope(|scope| {
-        let crew: Vec<_> = batches
-            .chunks_mut(share)
-            .map(|some| scope.spawn(move || work(some)))
-            .collect();
-        let mut pieces = vec![];
-        for worker in crew {
-            match worker.join() {
-                Ok(done) => pieces.extend(done?),
-                Err(panic) => std::panic::resume_unwind(panic),
-            }
-        }
-        Ok(pieces)
-    })
+    let share = share(batches.len());
+    let pieces = side_by_side(batches.chunks_mut(share), work);
+    pieces.into_iter().flatten().collect()
 }
 
 /// Puts the columns of the batches together, sample by sample and sensor by sensor.
@@ -299,8 +285,7 @@ fn transition(tangent: &Tangent, batches: &[Batch<'_>]) -> DMatrix<f64> {
     let mut matrix = DMatrix::zeros(wide, wide);
     for batch in batches {
         for (place, &j) in batch.dynamics.columns.iter().enumerate() {
-            let column = batch.column(place);
-            for (i, value) in column.enumerate() {
+            for (i, value) in batch.column(place).enumerate() {
                 matrix[(i, j)] = value;
             }
         }
@@ -318,8 +303,6 @@ struct Batch<'t> {
     integrator: Integrator,
     /// states, then one column after the other, in units
     x: Vec<f64>,
-    /// states as they are
-    states: Vec<f64>,
     t: f64,
 }
 
@@ -347,11 +330,9 @@ impl<'t> Batch<'t> {
         experiment: &Experiment<'_>,
     ) -> Result<Self, Error> {
         let n = tangent.states;
-        let mut x = vec![0.0; n * (1 + columns.len())];
         let start = tangent.flow.system().start().iter().zip(&tangent.units);
-        x.iter_mut()
-            .zip(start)
-            .for_each(|(x, (start, unit))| *x = start / unit);
+        let mut x: Vec<f64> = start.map(|(start, unit)| start / unit).collect();
+        x.resize(n * (1 + columns.len()), 0.0);
         let mut batch = Self {
             dynamics: Variation {
                 tangent,
@@ -364,7 +345,6 @@ impl<'t> Batch<'t> {
             sight: tangent.sight.system().evaluation(),
             integrator: Integrator::new(experiment.method, x.len())?,
             x,
-            states: vec![0.0; n],
             t: experiment.window.start,
         };
         batch.restart();
@@ -376,14 +356,10 @@ impl<'t> Batch<'t> {
         let tangent = self.dynamics.tangent;
         let n = tangent.states;
         self.x[n..].fill(0.0);
-        let own = self
-            .dynamics
-            .columns
-            .iter()
-            .enumerate()
-            .filter(|(_, j)| **j < n);
-        for (place, &j) in own {
-            self.x[n + place * n + j] = tangent.scales[j] / tangent.units[j];
+        for (place, &j) in self.dynamics.columns.iter().enumerate() {
+            if j < n {
+                self.x[n + place * n + j] = tangent.scales[j] / tangent.units[j];
+            }
         }
     }
 
@@ -417,8 +393,8 @@ impl<'t> Batch<'t> {
     fn look(&mut self, piece: &mut Piece) -> Result<(), Error> {
         let (tangent, own) = (self.dynamics.tangent, &self.dynamics.columns);
         let (states, columns) = self.x.split_at(tangent.states);
-        tangent.in_own_units(states, &mut self.states);
-        let states = &self.states;
+        tangent.in_own_units(states, &mut self.dynamics.states);
+        let states = &self.dynamics.states;
         let mut seen = vec![0.0; self.sight.system().outputs().len()];
         self.sight.enter(self.t);
         self.sight.outputs(self.t, states, &mut seen);

@@ -15,20 +15,22 @@ const LARGEST: u64 = 24;
 /// Powers looked for under a logarithm.
 const POWERS: u64 = 6;
 
-/// Inverse functions: with a given derivative, and any value at the start.
+/// Functions by their derivatives, with any value at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Inverse {
+pub(super) enum Function {
+    /// its own derivative
+    Exponential,
     Logarithm,
-    /// of the sine
-    Sine,
+    /// the inverse of the sine
+    Arcsine,
     /// of the tangent
-    Tangent,
+    Arctangent,
 }
 
 /// A value of an inverse function, with its sine and cosine.
 #[derive(Clone, Copy, Debug)]
 struct Known {
-    of: Inverse,
+    of: Function,
     argument: Modular,
     value: Modular,
     angle: Option<Angle>,
@@ -68,11 +70,6 @@ impl Functions {
     /// Numbers that depend on the argument: another point, another value.
     fn random(&self, a: Modular) -> Random {
         a.random(self.seed)
-    }
-
-    /// Whether a logarithm has its powers and roots, or need not.
-    pub(super) fn may_have_logarithm(&self, slot: usize, a: Modular) -> bool {
-        a.is_positive() || self.is_turned(slot)
     }
 
     pub(super) fn is_turned(&self, slot: usize) -> bool {
@@ -190,12 +187,12 @@ impl Functions {
     }
 
     /// The inverse sine or tangent of a, `cosine` being that of the value where it is known.
-    pub(super) fn arc(&mut self, of: Inverse, a: Modular, cosine: Option<Modular>) -> Modular {
+    pub(super) fn arc(&mut self, of: Function, a: Modular, cosine: Option<Modular>) -> Modular {
         if a.is_zero() {
             return a;
         }
         let angle = cosine.map(|cosine| match of {
-            Inverse::Tangent => Angle(a * cosine, cosine),
+            Function::Arctangent => Angle(a * cosine, cosine),
             _ => Angle(a, cosine),
         });
         if let Some(value) = self.known_arc(of, a, angle) {
@@ -215,7 +212,7 @@ impl Functions {
     }
 
     /// An arc met before, be it of the other function, its negative or its complement.
-    fn known_arc(&self, of: Inverse, a: Modular, angle: Option<Angle>) -> Option<Modular> {
+    fn known_arc(&self, of: Function, a: Modular, angle: Option<Angle>) -> Option<Modular> {
         let right = Modular::from_f64(std::f64::consts::PI).unwrap_or_default() * Modular::half();
         self.arcs.iter().find_map(|known| {
             let same = |x: Modular| known.of == of && known.argument == x;
@@ -226,7 +223,7 @@ impl Functions {
             };
             let one = Modular::ONE;
             // atan(1/a) is the complement of atan a on the same side of zero
-            let inverse = of == Inverse::Tangent && known.of == of && known.argument * a == one;
+            let inverse = of == Function::Arctangent && known.of == of && known.argument * a == one;
             match () {
                 () if same(a) || alike(one, one) => Some(known.value),
                 () if same(-a) || alike(-one, one) => Some(-known.value),
@@ -418,16 +415,16 @@ mod tests {
         assert_eq!(s * s + c * c, Modular::ONE);
         assert_eq!(f.angle(&[x + x]), (s * c + s * c, c * c - s * s));
         assert_eq!(f.angle(&[-x]), (-s, c));
-        let arc = f.arc(Inverse::Tangent, x, None);
-        assert_eq!(f.arc(Inverse::Tangent, -x, None), -arc);
+        let arc = f.arc(Function::Arctangent, x, None);
+        assert_eq!(f.arc(Function::Arctangent, -x, None), -arc);
         let third = f.exponential(&[x * Modular::new(3).inverse().unwrap()]);
         assert_eq!(third * third * third, ex);
         let cosine = Modular::ONE - s * s;
         let (_, back) = (
-            f.arc(Inverse::Sine, s, cosine.root()),
+            f.arc(Function::Arcsine, s, cosine.root()),
             cosine.root().unwrap(),
         );
-        let value = f.arc(Inverse::Sine, s, Some(back));
+        let value = f.arc(Function::Arcsine, s, Some(back));
         assert_eq!(f.angle(&[value]), (s, back));
         assert_eq!(f.angle(&[Modular::ZERO]), (Modular::ZERO, Modular::ONE));
     }

@@ -6,7 +6,7 @@ use std::f64::consts::{E, LN_2, LN_10, PI};
 use lynkeus_expr::{Binary, Call, Graph, Node, Op, Unary};
 
 use crate::Note;
-use crate::series::functions::Inverse;
+use crate::series::functions::Function;
 use lynkeus_expr::modular::Modular;
 
 /// One operation; slots are numbered in order.
@@ -21,7 +21,6 @@ pub(super) enum Step {
     Mul(usize, usize),
     Div(usize, usize),
     Sqrt(usize),
-    Exp(usize),
     /// sin, with its cosine in the next slot
     Sin(usize),
     Cos,
@@ -29,7 +28,7 @@ pub(super) enum Step {
     Integral {
         a: usize,
         h: usize,
-        of: Inverse,
+        of: Function,
     },
 }
 
@@ -74,9 +73,7 @@ impl Program {
         builder.program.roots = roots.ok_or(Note::System)?;
         Ok(builder.program)
     }
-}
 
-impl Program {
     /// Number of operations.
     pub fn len(&self) -> usize {
         self.steps.len()
@@ -96,9 +93,9 @@ impl Program {
     /// Slots of roots and logarithms, which not every value has.
     pub fn partial(&self) -> impl Iterator<Item = usize> + '_ {
         let partial = |step: &Step| {
-            let of = Inverse::Logarithm;
+            let of_logarithm = |of: Function| of == Function::Logarithm;
             matches!(step, Step::Sqrt(_))
-                || matches!(step, Step::Integral { of: found, .. } if *found == of)
+                || matches!(step, Step::Integral { of, .. } if of_logarithm(*of))
         };
         let steps = self.steps.iter().enumerate();
         steps.filter_map(move |(slot, step)| partial(step).then_some(slot))
@@ -128,7 +125,7 @@ impl Program {
                 continue;
             }
             match self.steps.get(slot).copied() {
-                Some(Step::Neg(a) | Step::Sqrt(a) | Step::Exp(a) | Step::Sin(a)) => open.push(a),
+                Some(Step::Neg(a) | Step::Sqrt(a) | Step::Sin(a)) => open.push(a),
                 Some(Step::Add(a, b) | Step::Sub(a, b) | Step::Mul(a, b) | Step::Div(a, b)) => {
                     open.extend([a, b]);
                 }
@@ -143,6 +140,9 @@ impl Program {
         seen
     }
 }
+
+/// What stands for all inverse functions of angles in the list of functions.
+const ARCS: &str = "asin";
 
 struct Builder<'a> {
     graph: &'a Graph,
@@ -259,7 +259,7 @@ impl Builder<'_> {
                 self.function("power");
                 let logarithm = self.logarithm(a)?;
                 let exponent = self.push(Step::Mul(b, logarithm));
-                self.push(Step::Exp(exponent))
+                self.exponential(exponent)
             }
             Binary::Atan2 => self.angle_of(a, b, node)?,
             Binary::Min | Binary::Max => {
@@ -320,12 +320,7 @@ impl Builder<'_> {
         self.solutions.insert(node, solution);
         Ok(())
     }
-}
 
-/// Parts of a right angle's multiples that are looked for.
-const PARTS: [f64; 7] = [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 180.0];
-
-impl Builder<'_> {
     /// A number: e and the logarithms of 2 and 10 by what they are, fractions of π as such.
     pub(super) fn number(&mut self, x: f64) -> Result<usize, Note> {
         let natural = [(LN_2, 2.0), (LN_10, 10.0)];
@@ -335,32 +330,13 @@ impl Builder<'_> {
         }
         if x == E {
             let one = self.number(1.0)?;
-            return Ok(self.push(Step::Exp(one)));
+            return Ok(self.exponential(one));
         }
         let value = fraction_of_pi(x).or_else(|| Modular::from_f64(x));
         let value = value.ok_or(Note::Number(x))?;
         Ok(self.push(Step::Constant(value)))
     }
-}
 
-fn fraction_of_pi(x: f64) -> Option<Modular> {
-    PARTS.into_iter().find_map(|part| {
-        let times = (x * part / PI).round();
-        if times == 0.0
-            || times.abs() > 1000.0
-            || (times * PI / part != x && times / part * PI != x)
-        {
-            return None;
-        }
-        let part = Modular::from_f64(part)?.inverse()?;
-        Some(Modular::from_f64(PI)? * Modular::from_f64(times)? * part)
-    })
-}
-
-/// What stands for all inverse functions of angles in the list of functions.
-const ARCS: &str = "asin";
-
-impl Builder<'_> {
     /// The slots of (sin, cos).
     fn pair(&mut self, a: usize) -> (usize, usize) {
         if let Some(&slot) = self.pairs.get(&a) {
@@ -382,7 +358,7 @@ impl Builder<'_> {
             let Step::Integral { h, of, .. } = self.program.steps[slot] else {
                 continue;
             };
-            if let (Inverse::Tangent, Step::Div(_, sum)) = (of, self.program.steps[h])
+            if let (Function::Arctangent, Step::Div(_, sum)) = (of, self.program.steps[h])
                 && self.rooted.insert(sum)
             {
                 self.push(Step::Sqrt(sum));
@@ -443,7 +419,7 @@ impl Builder<'_> {
     /// e^a + e^−a and e^a − e^−a
     fn hyperbolic(&mut self, a: usize) -> Result<(usize, usize), Note> {
         let one = self.number(1.0)?;
-        let up = self.push(Step::Exp(a));
+        let up = self.exponential(a);
         let down = self.push(Step::Div(one, up));
         Ok((
             self.push(Step::Add(up, down)),
@@ -456,9 +432,15 @@ impl Builder<'_> {
         Ok(self.push(Step::Mul(half, a)))
     }
 
+    /// y with y' = y·a'
+    fn exponential(&mut self, a: usize) -> usize {
+        let (h, of) = (self.program.steps.len(), Function::Exponential);
+        self.push(Step::Integral { a, h, of })
+    }
+
     pub(super) fn logarithm(&mut self, a: usize) -> Result<usize, Note> {
         let one = self.number(1.0)?;
-        Ok(self.integral(a, (one, a), Inverse::Logarithm))
+        Ok(self.integral(a, (one, a), Function::Logarithm))
     }
 
     fn arc_sine(&mut self, a: usize) -> Result<usize, Note> {
@@ -466,11 +448,11 @@ impl Builder<'_> {
         let square = self.push(Step::Mul(a, a));
         let rest = self.push(Step::Sub(one, square));
         let root = self.push(Step::Sqrt(rest));
-        Ok(self.integral(a, (one, root), Inverse::Sine))
+        Ok(self.integral(a, (one, root), Function::Arcsine))
     }
 
     /// y with y' = h·a' for h = above/below
-    fn integral(&mut self, a: usize, (above, below): (usize, usize), of: Inverse) -> usize {
+    fn integral(&mut self, a: usize, (above, below): (usize, usize), of: Function) -> usize {
         let h = self.push(Step::Div(above, below));
         self.push(Step::Integral { a, h, of })
     }
@@ -508,7 +490,7 @@ impl Builder<'_> {
                 self.number(x)?
             }
             Unary::Sqrt => self.push(Step::Sqrt(a)),
-            Unary::Exp => self.push(Step::Exp(a)),
+            Unary::Exp => self.exponential(a),
             Unary::Ln => self.logarithm(a)?,
             Unary::Sin => self.pair(a).0,
             Unary::Cos => self.pair(a).1,
@@ -539,6 +521,23 @@ impl Builder<'_> {
         let one = self.number(1.0)?;
         let square = self.push(Step::Mul(a, a));
         let sum = self.push(Step::Add(one, square));
-        Ok(self.integral(a, (one, sum), Inverse::Tangent))
+        Ok(self.integral(a, (one, sum), Function::Arctangent))
     }
+}
+
+/// Parts of a right angle's multiples that are looked for.
+const PARTS: [f64; 7] = [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 180.0];
+
+fn fraction_of_pi(x: f64) -> Option<Modular> {
+    PARTS.into_iter().find_map(|part| {
+        let times = (x * part / PI).round();
+        if times == 0.0
+            || times.abs() > 1000.0
+            || (times * PI / part != x && times / part * PI != x)
+        {
+            return None;
+        }
+        let part = Modular::from_f64(part)?.inverse()?;
+        Some(Modular::from_f64(PI)? * Modular::from_f64(times)? * part)
+    })
 }

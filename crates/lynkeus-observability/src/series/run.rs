@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use lynkeus_expr::{Budget, Spent};
 
-use crate::series::functions::Inverse;
+use crate::series::functions::Function;
 use crate::series::program::Step;
 use crate::series::{Functions, Program};
 use lynkeus_expr::modular::{Modular, Wide};
@@ -156,7 +156,6 @@ impl<'a> Run<'a> {
             Step::Mul(a, b) => self.product(&mut tangent, a, b, k),
             Step::Div(a, b) => self.quotient(&mut tangent, slot, a, b, k)?,
             Step::Sqrt(a) => self.root_of(&mut tangent, slot, a, k)?,
-            Step::Exp(a) => self.exponential(&mut tangent, slot, a, k),
             Step::Integral { a, h, of } => self.integral(&mut tangent, slot, (a, h), of, k)?,
             _ => Modular::ZERO,
         };
@@ -281,57 +280,53 @@ impl<'a> Run<'a> {
         matches!(self.program.steps[slot], Step::Constant(_))
     }
 
-    fn exponential(&mut self, tangent: &mut Sum, y: usize, a: usize, k: usize) -> Modular {
-        let value = match k {
-            0 => self.functions.exponential(&self.terms(a)),
-            _ => self.integrated(a, y, k),
-        };
-        let h = |j: usize| if j == k { value } else { self.value(y, j) };
-        self.chained(tangent, a, &h, k);
-        value
-    }
-
     fn integral(
         &mut self,
         tangent: &mut Sum,
         slot: usize,
         (a, h): (usize, usize),
-        of: Inverse,
+        of: Function,
         k: usize,
     ) -> Result<Modular, Stop> {
         let value = match k {
-            0 => self.first_of_inverse(slot, self.value(a, 0), self.value(h, 0), of)?,
+            0 => self.first_value(slot, (a, h), of)?,
             _ => self.integrated(a, h, k),
         };
-        self.chained(tangent, a, &|j| self.value(h, j), k);
+        // the exponential is its own derivative: of that the last coefficient is this one
+        let of_h = |j: usize| match (h, j) == (slot, k) {
+            true => value,
+            false => self.value(h, j),
+        };
+        self.chained(tangent, a, &of_h, k);
         Ok(value)
     }
 
     /// The first value, from the argument and the derivative there.
-    fn first_of_inverse(
+    fn first_value(
         &mut self,
         slot: usize,
-        argument: Modular,
-        derivative: Modular,
-        of: Inverse,
+        (a, h): (usize, usize),
+        of: Function,
     ) -> Result<Modular, Stop> {
-        match of {
-            Inverse::Logarithm if !self.functions.may_have_logarithm(slot, argument) => {
-                Err(Stop::Point(slot))
+        let argument = self.value(a, 0);
+        Ok(match of {
+            Function::Exponential => self.functions.exponential(&self.terms(a)),
+            // one has its powers and roots, or need not
+            Function::Logarithm if argument.is_positive() || self.functions.is_turned(slot) => {
+                self.functions.logarithm(argument)
             }
-            Inverse::Logarithm => Ok(self.functions.logarithm(argument)),
+            Function::Logarithm => return Err(Stop::Point(slot)),
             // 1/√(1 − a²) has the cosine below, 1/(1 + a²) is its square
-            Inverse::Sine => {
-                let cosine = derivative.inverse();
-                let root = cosine.is_some_and(|c| c * c + argument * argument == Modular::ONE);
-                let cosine = cosine.filter(|_| root);
-                Ok(self.functions.arc(Inverse::Sine, argument, cosine))
+            Function::Arcsine => {
+                let is_cosine = |c: &Modular| *c * *c + argument * argument == Modular::ONE;
+                let cosine = self.value(h, 0).inverse().filter(is_cosine);
+                self.functions.arc(of, argument, cosine)
             }
-            Inverse::Tangent => {
-                let cosine = derivative.root();
-                Ok(self.functions.arc(Inverse::Tangent, argument, cosine))
+            Function::Arctangent => {
+                let cosine = self.value(h, 0).root();
+                self.functions.arc(of, argument, cosine)
             }
-        }
+        })
     }
 
     /// s' = c·a', c' = −s·a'

@@ -48,11 +48,7 @@ impl Correction {
         let mut constant = edges(graph, &observer.derivatives, &measured).is_empty();
         for &(i, j, node) in &jacobian.entries {
             if graph.symbols_of(&[node]).is_empty() {
-                let mut value = [0.0];
-                Tape::new(graph, &[], &[node])?
-                    .evaluator()
-                    .eval(&[], &mut value);
-                K[(i, j)] = value[0];
+                K[(i, j)] = Tape::new(graph, &[], &[node])?.evaluator().value(&[]);
             } else {
                 constant = false;
             }

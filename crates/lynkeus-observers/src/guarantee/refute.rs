@@ -429,9 +429,8 @@ impl<'a> EquilibriumSearch<'a> {
     fn is_smooth(&self, cell: &[Interval]) -> bool {
         let cell = self.full(cell, Interval::ZERO);
         let values = self.smooth.eval_in(&Intervals, &cell);
-        let defined = |x: &Interval| x.is_defined() && x.magnitude().is_finite();
         let (edges, _) = values.split_at(self.edges);
-        values.iter().all(defined) && !edges.iter().any(|x| x.contains_zero())
+        values.iter().all(|x| x.is_bounded()) && !edges.iter().any(|x| x.contains_zero())
     }
 
     /// A point of few digits where f is exactly 0.

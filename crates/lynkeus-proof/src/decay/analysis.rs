@@ -4,6 +4,8 @@
 //! operations. Where e_j reaches e_i through many others only, P_ij is of little use; without
 //! these entries there are O(n) unknowns. A P that is found so is a P like any other.
 
+use std::collections::BTreeSet;
+
 use lynkeus_expr::Budget;
 use nalgebra::DMatrix;
 
@@ -47,7 +49,8 @@ fn prove_in(
     rate: f64,
     budget: &Budget,
 ) -> Option<Proof> {
-    let scaled: Vec<ErrorModel> = models.iter().map(|m| frame.scaled(m)).collect();
+    let scaled = |m: &ErrorModel| m.scaled(&frame.sizes, frame.unit);
+    let scaled: Vec<ErrorModel> = models.iter().map(scaled).collect();
     let seen: Vec<Seen> = scaled.iter().map(|m| frame.seen(m)).collect();
     let mut problem = Problem::new(budget);
     let P = extent.lyapunov(&mut problem, &scaled);
@@ -150,8 +153,8 @@ impl Extent {
         match self {
             Extent::Full => problem.symmetric(n),
             Extent::Near => {
-                let distances = distances(&coupled(models, n));
-                problem.symmetric_where(n, |i, j| distances[i][j] <= STEPS)
+                let near = near(&coupled(models, n));
+                problem.symmetric_where(n, |i, j| near[i].contains(&j))
             }
         }
     }
@@ -168,29 +171,23 @@ fn coupled(models: &[ErrorModel], n: usize) -> Vec<Vec<usize>> {
     (0..n).map(row).collect()
 }
 
-/// Couplings from each state to each; n where nothing joins them. A state that is coupled to
-/// most others, as one is whose error corrects all, is an end but no way between them.
-fn distances(coupled: &[Vec<usize>]) -> Vec<Vec<usize>> {
+/// The states that few couplings join to each. A state that is coupled to most others, as one is
+/// whose error corrects all, is an end but no way between them.
+fn near(coupled: &[Vec<usize>]) -> Vec<BTreeSet<usize>> {
     let n = coupled.len();
-    let is_hub = |state: usize| 2 * coupled[state].len() > n;
     let from = |start: usize| {
-        let mut distance = vec![n; n];
-        distance[start] = 0;
-        let mut reached = vec![start];
-        let mut next = 0;
-        while let Some(&state) = reached.get(next) {
-            next += 1;
-            if state != start && is_hub(state) {
-                continue;
-            }
-            for &other in &coupled[state] {
-                if distance[other] == n {
-                    distance[other] = distance[state] + 1;
-                    reached.push(other);
-                }
-            }
+        let is_way = |&&state: &&usize| state == start || 2 * coupled[state].len() <= n;
+        let mut near = BTreeSet::from([start]);
+        for _ in 0..STEPS {
+            let next: Vec<usize> = near
+                .iter()
+                .filter(is_way)
+                .flat_map(|&s| &coupled[s])
+                .copied()
+                .collect();
+            near.extend(next);
         }
-        distance
+        near
     };
     (0..n).map(from).collect()
 }
@@ -204,7 +201,7 @@ mod tests {
 
     /// A chain 0 – 1 – … with one more state that only a nonlinear term couples to state 2.
     #[test]
-    fn distances_count_couplings() {
+    fn near_is_what_few_couplings_join() {
         let n = 12;
         let mut constant = vec![vec![Interval::ZERO; n]; n];
         for i in 0..n - 2 {
@@ -218,18 +215,20 @@ mod tests {
             range: Interval::new(-1.0, 1.0).unwrap(),
         }];
         let models = [ErrorModel { constant, sectors }];
-        let found = distances(&coupled(&models, n));
-        for (i, row) in found.iter().enumerate().take(n - 1) {
-            let along: Vec<usize> = (0..n - 1).map(|j| i.abs_diff(j)).collect();
-            assert_eq!(row[..n - 1], along);
-            assert_eq!(row[n - 1], i.abs_diff(2) + 1);
+        for (i, found) in near(&coupled(&models, n)).iter().enumerate().take(n - 1) {
+            let along = (0..n - 1).filter(|&j| i.abs_diff(j) <= STEPS);
+            let beside = (i.abs_diff(2) < STEPS).then_some(n - 1);
+            let expected: Vec<usize> = along.chain(beside).collect();
+            assert_eq!(found.iter().copied().collect::<Vec<_>>(), expected);
         }
         let mut corrected = models.clone();
         for row in 0..n {
             corrected[0].constant[row][0] = Interval::ONE;
         }
-        let around = distances(&coupled(&corrected, n));
-        assert_eq!((around[1][9], around[0][9], around[9][0]), (8, 1, 1));
+        let around = near(&coupled(&corrected, n));
+        // not by way of state 0, to which all are coupled
+        assert!(around[1].contains(&9) && !around[1].contains(&10));
+        assert!(around[0].contains(&10) && around[10].contains(&0));
         let mut problem = Problem::new(&Budget::default());
         let P = Extent::Near.lyapunov(&mut problem, &models);
         let kept = |i: usize, j: usize| P.terms(i, j).next().is_some();

@@ -58,11 +58,6 @@ impl Frame {
         Some(frame)
     }
 
-    /// The model in these sizes and units, along the old axes.
-    pub fn scaled(&self, model: &ErrorModel) -> ErrorModel {
-        model.scaled(&self.sizes, self.unit)
-    }
-
     /// A, B and C of a scaled model e' = (A + B δ C) e in these axes.
     pub fn seen(&self, model: &ErrorModel) -> Seen {
         let q = model.sectors.len();

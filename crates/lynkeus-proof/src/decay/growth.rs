@@ -39,9 +39,8 @@ const SHARES: [f64; 2] = [0.1, 0.35];
 /// ```
 pub fn is_unstable(A: &IntervalMatrix) -> bool {
     let n = A.len();
-    let finite = |x: &Interval| x.is_defined() && x.magnitude().is_finite();
     let is_square = A.iter().all(|row| row.len() == n);
-    if n == 0 || n > STATES || !is_square || !A.iter().flatten().all(finite) {
+    if n == 0 || n > STATES || !is_square || !A.iter().flatten().all(|x| x.is_bounded()) {
         return false;
     }
     let middle = DMatrix::from_fn(n, n, |i, j| A[i][j].midpoint());

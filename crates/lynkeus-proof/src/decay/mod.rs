@@ -151,11 +151,11 @@ impl ErrorModel {
 
     /// Whether every number is finite.
     pub fn is_bounded(&self) -> bool {
-        let finite = |x: &Interval| x.magnitude().is_finite() && x.is_defined();
         let entries = self.constant.iter().flatten();
         let directions = self.sectors.iter().flat_map(|s| &s.direction);
         let ranges = self.sectors.iter().map(|s| &s.range);
-        entries.chain(directions).chain(ranges).all(finite)
+        let mut all = entries.chain(directions).chain(ranges);
+        all.all(|x| x.is_bounded())
     }
 
     /// The model with every range shrunk about its middle, θ_k = m_k + factor_k·(…).
@@ -170,11 +170,10 @@ impl ErrorModel {
     }
 
     fn ranges(&self) -> Vec<Bounds> {
-        let range = |s: &Sector| Bounds {
-            lower: s.range.lo(),
-            upper: s.range.hi(),
-        };
-        self.sectors.iter().map(range).collect()
+        let ranges = self.sectors.iter().map(|s| s.range);
+        ranges
+            .map(|range| (range.lo(), range.hi()).into())
+            .collect()
     }
 
     /// The model with these slopes, exactly enclosed: without sectors.

@@ -146,8 +146,9 @@ impl<'a> Scaled<'a> {
     fn new(models: &[ErrorModel], request: &'a Request) -> Option<Self> {
         let is_sound = !models.is_empty() && models.iter().all(ErrorModel::is_bounded);
         let frame = is_sound.then(|| Frame::plain(models, &request.scale))?;
+        let scaled = |m: &ErrorModel| m.scaled(&frame.sizes, frame.unit);
         Some(Self {
-            models: models.iter().map(|m| frame.scaled(m)).collect(),
+            models: models.iter().map(scaled).collect(),
             rate: request.rate * frame.unit * (1.0 + RESERVE),
             request,
             frame,

@@ -38,16 +38,13 @@ pub struct Problem {
 }
 
 /// Why there is no solution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failure {
     /// no point satisfies every inequality
-    #[error("the inequalities contradict each other")]
     Infeasible,
     /// the arithmetic gave out before a decision
-    #[error("the inequalities could not be decided in double precision; scale the problem")]
     Numerical,
     /// a limit ended the search
-    #[error("undecided: {0}")]
     Spent(Spent),
 }
 
@@ -77,6 +74,15 @@ impl Problem {
             .map_or(Ok(()), |spent| Err(Failure::Spent(spent)))
     }
 
+    fn barrier(&self, blocks: Vec<Block>, cost: DVector<f64>) -> Barrier<'_> {
+        let budget = &self.budget;
+        Barrier {
+            blocks,
+            cost,
+            budget,
+        }
+    }
+
     /// Why the barrier gave no point.
     fn failure(&self) -> Failure {
         self.budget
@@ -84,10 +90,11 @@ impl Problem {
             .map_or(Failure::Numerical, Failure::Spent)
     }
 
-    fn fresh(&mut self, count: usize) -> std::ops::Range<usize> {
+    /// The first of so many more unknowns.
+    fn fresh(&mut self, count: usize) -> usize {
         let first = self.unknowns;
         self.unknowns += count;
-        first..self.unknowns
+        first
     }
 
     /// An unknown symmetric n×n matrix.
@@ -99,7 +106,7 @@ impl Problem {
     /// i ≤ j only.
     pub fn symmetric_where(&mut self, n: usize, kept: impl Fn(usize, usize) -> bool) -> Affine {
         let mut column = |j: usize| {
-            let place = |i: usize| kept(i, j).then(|| self.fresh(1).start);
+            let place = |i: usize| kept(i, j).then(|| self.fresh(1));
             (0..=j).map(place).collect::<Vec<_>>()
         };
         let places: Vec<Vec<Option<usize>>> = (0..n).map(&mut column).collect();
@@ -108,13 +115,13 @@ impl Problem {
 
     /// An unknown matrix.
     pub fn matrix(&mut self, rows: usize, columns: usize) -> Affine {
-        let first = self.fresh(rows * columns).start;
+        let first = self.fresh(rows * columns);
         Affine::unknown(rows, columns, |i, j| Some(first + i * columns + j))
     }
 
     /// An unknown diagonal n×n matrix.
     pub fn diagonal(&mut self, n: usize) -> Affine {
-        let first = self.fresh(n).start;
+        let first = self.fresh(n);
         Affine::unknown(n, n, |i, j| (i == j).then_some(first + i))
     }
 
@@ -163,12 +170,7 @@ impl Problem {
             cost[unknown] = coefficient;
         }
         let blocks = self.inequalities.iter().map(Block::new).collect();
-        let budget = &self.budget;
-        let barrier = Barrier {
-            blocks,
-            cost,
-            budget,
-        };
+        let barrier = self.barrier(blocks, cost);
         if !barrier.is_inside(start) {
             return Err(Failure::Infeasible);
         }
@@ -226,12 +228,7 @@ impl Problem {
         start[s] = 1.0 + norms.fold(0.0, f64::max);
         let mut cost = DVector::zeros(s + 1);
         cost[s] = 1.0;
-        let budget = &self.budget;
-        let barrier = Barrier {
-            blocks,
-            cost,
-            budget,
-        };
+        let barrier = self.barrier(blocks, cost);
         let decided = |x: &DVector<f64>, gap: f64| x[s] - gap > -MARGIN || enough(x[s], gap);
         let ended = barrier.minimise(start, decided);
         let Ended { x, decided } = ended.ok_or_else(|| self.failure())?;

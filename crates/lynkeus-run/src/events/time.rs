@@ -325,9 +325,7 @@ impl Indicator {
     /// The mode at `t`, as computed.
     fn value(&mut self, t: f64) -> f64 {
         self.inputs[0] = t;
-        let mut value = [0.0];
-        self.mode.eval(&self.inputs, &mut value);
-        value[0]
+        self.mode.value(&self.inputs)
     }
 
     /// Whether the mode is certainly the same all over `stretch`.

@@ -11,10 +11,10 @@ use lynkeus_expr::{Evaluator, MissingInput, Node, Tape, jacobian};
 use lynkeus_proof::spectrum;
 use nalgebra::{DMatrix, DVector};
 
+use crate::Region;
 use crate::detectability::exact::{self, Shows};
 use crate::detectability::hidden::{Detectability, Hidden, HiddenErrors, Observability};
-use crate::detectability::modes::{Modes, image, null_space, reached};
-use crate::{AugmentedPlant, Region};
+use crate::detectability::modes::{Modes, beside, image, null_space, reached};
 
 /// States beyond which no modes are looked for.
 const STATES: usize = 60;
@@ -72,18 +72,16 @@ pub(super) fn hidden_errors(hidden: &Hidden<'_, '_>) -> Result<Option<HiddenErro
                 *detectability = Detectability::Undecided;
             }
         }
-        let (mut named, time): (Vec<_>, Vec<_>) = region
-            .coordinates(&point)
-            .into_iter()
-            .zip(&region.dimensions)
-            .partition(|(_, side)| side.symbol != augmented.plant.time);
-        if is_read(augmented, &nodes) {
+        let mut at = region.coordinates(&point);
+        let time = at.pop();
+        let read = augmented.graph().symbols_of(&nodes);
+        if read.contains(&augmented.plant.time) {
             // first, as long points are shown in part
-            named.splice(0..0, time);
+            at.splice(0..0, time);
         }
         return Ok(Some(HiddenErrors {
             of: of.into_iter().map(Some).collect(),
-            point: named.into_iter().map(|(at, _)| at).collect(),
+            point: at,
         }));
     }
     Ok(None)
@@ -92,14 +90,13 @@ pub(super) fn hidden_errors(hidden: &Hidden<'_, '_>) -> Result<Option<HiddenErro
 /// The start, then points inside the ranges.
 fn points(hidden: &Hidden<'_, '_>, region: &Region) -> Vec<Vec<f64>> {
     let augmented = hidden.augmented;
-    let start = |symbol: Node| {
-        let mut variables = augmented.states.iter().chain(&augmented.inputs);
-        variables.find(|v| v.node == symbol).and_then(|v| v.start)
-    };
+    let variables = || augmented.states.iter().chain(&augmented.inputs);
     let of_share = |share: f64, starts: bool| -> Vec<f64> {
-        let sides = region.dimensions.iter();
+        // time comes last
+        let start = variables().map(|v| v.start).chain([None]);
+        let sides = region.dimensions.iter().zip(start);
         sides
-            .map(|d| {
+            .map(|(d, start)| {
                 let inside = match (d.min.is_finite(), d.max.is_finite()) {
                     (true, true) => d.min + share * (d.max - d.min),
                     (true, false) => d.min.max(0.0),
@@ -107,7 +104,7 @@ fn points(hidden: &Hidden<'_, '_>, region: &Region) -> Vec<Vec<f64>> {
                     (false, false) => 0.0,
                 };
                 let inside = if d.integer { inside.round() } else { inside };
-                start(d.symbol).filter(|_| starts).unwrap_or(inside)
+                start.filter(|_| starts).unwrap_or(inside)
             })
             .collect()
     };
@@ -154,18 +151,16 @@ impl Linear {
     /// What can move without a trace: pairs (x, v), one per column, and an orthonormal basis of V. None where no
     /// decomposition is found.
     fn traceless(&self) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
-        let (n, m) = (self.F.nrows(), self.G.ncols());
-        let flow = DMatrix::from_fn(n, n + m, |i, j| match j < n {
-            true => self.F[(i, j)],
-            false => self.G[(i, j - n)],
-        });
+        let n = self.F.nrows();
+        let flow = beside(&self.F, &self.G);
         let seen = equilibrated(&self.outputs, 0.0);
         let mut V = DMatrix::identity(n, n);
         loop {
             // (Fx + Gv) has no part across V
             let across = null_space(&V.transpose(), ZERO)?;
             let stays = equilibrated(&(across.transpose() * &flow), ZERO * flow.amax());
-            let pairs = null_space(&stacked(&stays, &seen), ZERO)?;
+            let all = beside(&stays.transpose(), &seen.transpose()).transpose();
+            let pairs = null_space(&all, ZERO)?;
             // of columns of length one: where no state moves, rounding moves none
             let pairs = pairs.map(|x| if x.abs() > ZERO { x } else { 0.0 });
             let next = image(&pairs.rows(0, n).into_owned(), ZERO)?;
@@ -240,15 +235,6 @@ fn equilibrated(rows: &DMatrix<f64>, least: f64) -> DMatrix<f64> {
     DMatrix::from_fn(kept.len(), rows.ncols(), |i, j| kept[i][j])
 }
 
-fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
-    DMatrix::from_fn(above.nrows() + below.nrows(), below.ncols(), |i, j| match i
-        .checked_sub(above.nrows())
-    {
-        None => above[(i, j)],
-        Some(i) => below[(i, j)],
-    })
-}
-
 /// Newton's steps.
 const STEPS: usize = 40;
 /// Derivatives below this share of their terms are zero.
@@ -281,10 +267,8 @@ impl Rest {
     ) -> Result<Self, MissingInput> {
         let augmented = hidden.augmented;
         let graph = augmented.graph();
-        let is_free = |entry: &&(usize, usize, Node)| {
-            hidden.observability[entry.1] != Observability::Determined
-        };
-        let entries = slopes.entries.iter().filter(is_free);
+        let entries = slopes.entries.iter();
+        let entries = entries.filter(|entry| hidden.is_free(entry.1));
         let mut open: Vec<Node> = entries.map(|entry| entry.2).collect();
         let mut found: Vec<usize> = vec![];
         loop {
@@ -310,16 +294,13 @@ impl Rest {
         for i in 0..states.len() {
             nodes.extend((0..unknowns.len()).map(|j| own.get(i, j).unwrap_or(zero)));
         }
-        let symbols = region.symbols();
-        let place = |unknown: &Node| symbols.iter().position(|symbol| symbol == unknown);
-        let sides = free
-            .iter()
-            .map(|&i| (augmented.states[i].min, augmented.states[i].max));
+        let side = |&i: &usize| (augmented.states[i].min, augmented.states[i].max);
         Ok(Self {
-            places: unknowns.iter().filter_map(place).collect(),
-            sides: sides.collect(),
+            sides: free.iter().map(side).collect(),
+            // the augmented states come first
+            places: free,
             driven: behind(&states, &reads, HashSet::from([augmented.plant.time])),
-            evaluator: Tape::new(graph, &symbols, &nodes)?.evaluator(),
+            evaluator: Tape::new(graph, &region.symbols(), &nodes)?.evaluator(),
             states,
             reads,
         })
@@ -411,12 +392,6 @@ fn behind(states: &[Node], reads: &[Vec<Node>], mut found: HashSet<Node>) -> Has
     }
 }
 
-/// Whether one of these expressions reads the time.
-fn is_read(augmented: &AugmentedPlant<'_>, nodes: &[Node]) -> bool {
-    let symbols = augmented.graph().symbols_of(nodes);
-    symbols.contains(&augmented.plant.time)
-}
-
 /// Per augmented state whether the error in it, if it is hidden, obeys an equation that reads one of these
 /// symbols. `slopes` are those of the equations, then the outputs, by the augmented states.
 fn moved(
@@ -432,22 +407,22 @@ fn moved(
             .any(|s| moving.contains(s))
     };
     let count = hidden.observability.len();
-    let is_free = |i: usize| i < count && hidden.observability[i] != Observability::Determined;
-    let entries = slopes.entries.iter().filter(|entry| is_free(entry.1));
+    let entries = slopes.entries.iter();
+    let entries = entries.filter(|entry| hidden.is_free(entry.1));
     let entries: Vec<(usize, usize, bool)> = entries
         .map(|(i, j, slope)| (*i, *j, reads(*slope)))
         .collect();
-    let is_driven = (0..count).any(|i| is_free(i) && hidden.is_signal(i));
+    let is_driven = !hidden.free().1.is_empty();
     let mut moved = vec![false; count];
     loop {
-        let is_new = |i: usize| !is_free(i) || !moved[i];
+        let is_new = |i: usize| !hidden.is_free(i) || !moved[i];
         let next = entries
             .iter()
             .find(|&&(i, j, own)| is_new(i) && (own || moved[j]));
         match next {
             // what the outputs and the equations of what is known say couples all that is
             // hidden, as do unknown inputs
-            Some(&(i, ..)) if is_driven || !is_free(i) => return vec![true; count],
+            Some(&(i, ..)) if is_driven || !hidden.is_free(i) => return vec![true; count],
             Some(&(i, ..)) => moved[i] = true,
             None => return moved,
         }
@@ -462,11 +437,9 @@ fn weaken(
     sure: &[bool],
     of: &mut [Detectability],
 ) {
-    let count = hidden.observability.len();
-    let is_free = |i: usize| i < count && hidden.observability[i] != Observability::Determined;
-    let entries = slopes.entries.iter();
-    let is_coupled = |i: usize, j: usize| is_free(i) && is_free(j) && !sure[i];
-    let couplings = entries.filter(|entry| is_coupled(entry.0, entry.1));
+    let is_coupled = |i: usize, j: usize| hidden.is_free(i) && hidden.is_free(j) && !sure[i];
+    let couplings = slopes.entries.iter();
+    let couplings = couplings.filter(|entry| is_coupled(entry.0, entry.1));
     let couplings: Vec<(usize, usize)> = couplings.map(|(i, j, _)| (*i, *j)).collect();
     loop {
         let doubted = couplings.iter().find(|(i, j)| match of[*i] {

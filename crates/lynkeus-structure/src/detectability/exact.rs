@@ -3,7 +3,7 @@
 //! The numbers of the Jacobian are rational, every one of them. Their images modulo a prime of 61 bits have the same
 //! ranks, but for accidents of a probability near 2⁻⁵⁰.
 
-use lynkeus_expr::modular::{Echelon, Modular};
+use lynkeus_expr::modular::{Echelon, Modular, dot, unit};
 use nalgebra::DMatrix;
 
 /// What an augmented state shows of what can move without a trace.
@@ -65,20 +65,15 @@ fn traceless(
     wide: usize,
 ) -> Vec<(usize, Vec<Modular>)> {
     let n = flow.len();
-    let unit = |i: usize| {
-        (0..n)
-            .map(move |j| Modular::new(u64::from(i == j)))
-            .collect()
-    };
-    let mut space = spanned(n, (0..n).map(unit));
+    let mut space = Echelon::of(n, (0..n).map(|i| unit(n, i)));
     loop {
         // what has no part across the space
         let across = space.kernel();
         let conditions = across.iter().map(|w| times(w, flow));
-        let pairs = spanned(wide, conditions.chain(outputs.iter().cloned())).kernel();
-        let next = spanned(n, pairs.iter().map(|pair| pair[..n].to_vec()));
+        let pairs = Echelon::of(wide, conditions.chain(outputs.iter().cloned())).kernel();
+        let next = Echelon::of(n, pairs.iter().map(|pair| &pair[..n]));
         if next.rank() >= space.rank() {
-            return spanned(wide, pairs.into_iter()).reduced_rows();
+            return Echelon::of(wide, pairs).reduced_rows();
         }
         space = next;
     }
@@ -86,7 +81,7 @@ fn traceless(
 
 /// The smallest space with these rows that A maps into itself.
 fn reached(A: &[Vec<Modular>], first: Vec<Vec<Modular>>) -> Echelon {
-    let mut space = spanned(A.len(), first.into_iter());
+    let mut space = Echelon::of(A.len(), first);
     let mut open: Vec<Vec<Modular>> = space.rows().map(<[Modular]>::to_vec).collect();
     while let Some(a) = open.pop() {
         let next = times(&a, A);
@@ -97,35 +92,19 @@ fn reached(A: &[Vec<Modular>], first: Vec<Vec<Modular>>) -> Echelon {
     space
 }
 
-fn spanned(width: usize, rows: impl Iterator<Item = Vec<Modular>>) -> Echelon {
-    let mut space = Echelon::new(width);
-    rows.for_each(|row| {
-        space.add(&row);
-    });
-    space
-}
-
-fn dot(a: &[Modular], b: &[Modular]) -> Modular {
-    let terms = a.iter().zip(b).map(|(a, b)| *a * *b);
-    terms.fold(Modular::ZERO, |sum, term| sum + term)
-}
-
 /// Σ aₖ rowₖ
 fn times(a: &[Modular], rows: &[Vec<Modular>]) -> Vec<Modular> {
     let wide = rows.first().map_or(0, Vec::len);
-    let column = |j: usize| {
-        let terms = a.iter().zip(rows).map(|(a, row)| *a * row[j]);
-        terms.fold(Modular::ZERO, |sum, term| sum + term)
-    };
-    (0..wide).map(column).collect()
+    let column = |j: usize| -> Vec<Modular> { rows.iter().map(|row| row[j]).collect() };
+    (0..wide).map(|j| dot(a, &column(j))).collect()
 }
 
 /// a with x = Σ aₖ basisₖ in the leading entries, for a reduced basis with its pivots; none where there is none.
 fn coordinates(basis: &[(usize, Vec<Modular>)], x: &[Modular]) -> Option<Vec<Modular>> {
     let a: Vec<Modular> = basis.iter().map(|(pivot, _)| x[*pivot]).collect();
     let is_same = x.iter().enumerate().all(|(j, x)| {
-        let terms = a.iter().zip(basis).map(|(a, (_, row))| *a * row[j]);
-        terms.fold(Modular::ZERO, |sum, term| sum + term) == *x
+        let column: Vec<Modular> = basis.iter().map(|(_, row)| row[j]).collect();
+        dot(&a, &column) == *x
     });
     is_same.then_some(a)
 }

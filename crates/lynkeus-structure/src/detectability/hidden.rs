@@ -70,9 +70,14 @@ impl Hidden<'_, '_> {
     /// Places of what may differ between two solutions with the same outputs: states, then
     /// unknown inputs that are any functions.
     pub(super) fn free(&self) -> (Vec<usize>, Vec<usize>) {
-        let places = (0..self.observability.len())
-            .filter(|&i| self.observability[i] != Observability::Determined);
+        let places = (0..self.observability.len()).filter(|&i| self.is_free(i));
         places.partition(|&i| !self.is_signal(i))
+    }
+
+    /// Whether it is an augmented state that the outputs are not known to determine.
+    pub(super) fn is_free(&self, place: usize) -> bool {
+        let known = self.observability.get(place);
+        known.is_some_and(|known| *known != Observability::Determined)
     }
 
     /// Whether it is an unknown input without an equation.

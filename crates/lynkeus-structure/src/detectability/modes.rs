@@ -42,12 +42,8 @@ impl Modes {
         }
         let (coarse, found) = (coarse.slowest()?, fine.slowest()?);
         let agree = std::mem::discriminant(&coarse) == std::mem::discriminant(&found);
-        let found = if agree {
-            found
-        } else {
-            Detectability::Undecided
-        };
-        Some((found, fine.A.nrows()))
+        let found = Some(found).filter(|_| agree);
+        Some((found.unwrap_or(Detectability::Undecided), fine.A.nrows()))
     }
 
     /// What shows in a row. In it every eigenvalue has one eigenvector.
@@ -193,6 +189,17 @@ pub(super) fn image(a: &DMatrix<f64>, zero: f64) -> Option<DMatrix<f64>> {
     null_space(&across.transpose(), zero)
 }
 
+/// [left, right]
+pub(super) fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+    let first = left.ncols();
+    DMatrix::from_fn(left.nrows(), first + right.ncols(), |i, j| {
+        match j.checked_sub(first) {
+            None => left[(i, j)],
+            Some(j) => right[(i, j)],
+        }
+    })
+}
+
 /// An orthonormal basis of the smallest A-invariant space that holds the columns of B.
 pub(super) fn reached(A: &DMatrix<f64>, B: &DMatrix<f64>, zero: f64) -> Option<DMatrix<f64>> {
     let n = A.nrows();
@@ -207,14 +214,7 @@ pub(super) fn reached(A: &DMatrix<f64>, B: &DMatrix<f64>, zero: f64) -> Option<D
         zero,
     )?;
     loop {
-        let moved = A * &space / scale;
-        let both = DMatrix::from_fn(n, 2 * space.ncols(), |i, k| {
-            match k.checked_sub(space.ncols()) {
-                None => space[(i, k)],
-                Some(k) => moved[(i, k)],
-            }
-        });
-        let next = image(&both, zero)?;
+        let next = image(&beside(&space, &(A * &space / scale)), zero)?;
         // it never shrinks, but by rounding
         if next.ncols() <= space.ncols() {
             return Some(space);

@@ -2,6 +2,7 @@
 
 use lynkeus_expr::{Budget, Interval, MissingInput, Node, components, jacobian};
 use lynkeus_proof::decay::{ErrorModel, Sector, fastest};
+use lynkeus_proof::matrix::sum;
 use lynkeus_proof::spectrum;
 use nalgebra::DMatrix;
 
@@ -36,8 +37,8 @@ pub(super) fn hidden_errors(
         is_proved: true,
     };
     let of_row = |row: &Row| {
-        let finite = row.a.iter().all(is_bounded);
-        let read = (0..row.a.len()).filter(|&s| !is_zero(&row.a[s]));
+        let finite = row.a.iter().all(|x| x.is_bounded());
+        let read = (0..row.a.len()).filter(|&s| !row.a[s].is_zero());
         let rate = read.map(|s| rates[s]).collect::<Option<Vec<f64>>>()?;
         let rate = rate.into_iter().fold(f64::INFINITY, f64::min);
         (finite && rate.is_finite() && row.is_free_of_inputs()).then(|| decays(rate))
@@ -62,7 +63,7 @@ impl System {
     }
 
     fn reads(&self, s: usize, q: usize) -> bool {
-        self.row(s).is_some_and(|row| !is_zero(&row.a[q]))
+        self.row(s).is_some_and(|row| !row.a[q].is_zero())
     }
 
     /// The rate at which each state's difference is proved to decay.
@@ -100,13 +101,9 @@ impl System {
     fn decay(&self, states: &[usize], rows: &[&Row]) -> Option<f64> {
         let entry = |i: usize, j: usize| rows[i].a[states[j]];
         let n = states.len();
-        let mut entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
         // what comes from outside of the block has to be bounded as well
-        let mut outside = rows.iter().flat_map(|row| &row.a);
-        if n > COUPLED
-            || !entries.all(|(i, j)| is_bounded(&entry(i, j)))
-            || !outside.all(is_bounded)
-        {
+        let mut read = rows.iter().flat_map(|row| &row.a);
+        if n > COUPLED || !read.all(|x| x.is_bounded()) {
             return None;
         }
         if let [_] = states {
@@ -135,10 +132,10 @@ impl System {
         if others.any(|rate| rate.is_none()) {
             return None;
         }
-        let terms = row.b.iter().zip(&self.reach).filter(|(b, _)| !is_zero(b));
+        let terms = row.b.iter().zip(&self.reach).filter(|(b, _)| !b.is_zero());
         let terms =
             terms.map(|(b, width)| Interval::point(b.magnitude()) * Interval::point(*width));
-        let sum = terms.fold(Interval::ZERO, |sum, term| sum + term);
+        let sum = sum(terms);
         let bound = (sum / Interval::point(rate)).hi();
         // the range itself is a bound
         let tells = bound < self.scales[s] && sum.is_defined();
@@ -200,7 +197,7 @@ fn enclosed(hidden: &Hidden<'_, '_>) -> Result<System, MissingInput> {
         rows.push(Row { a: all, b });
     }
     let constraints = rows.split_off(states.len());
-    let is_said = |row: &Row| !row.a.iter().chain(&row.b).all(is_zero);
+    let is_said = |row: &Row| !row.a.iter().chain(&row.b).all(|x| x.is_zero());
     let width = |i: &usize| augmented.states[*i].max - augmented.states[*i].min;
     Ok(System {
         scales: states.iter().map(width).collect(),
@@ -222,15 +219,6 @@ struct Row {
     b: Vec<Interval>,
 }
 
-/// Whether a coefficient is nothing at all.
-fn is_zero(x: &Interval) -> bool {
-    x.lo() == 0.0 && x.hi() == 0.0
-}
-
-fn is_bounded(x: &Interval) -> bool {
-    x.is_defined() && x.lo().is_finite() && x.hi().is_finite()
-}
-
 /// Whether it never vanishes.
 fn has_sign(x: &Interval) -> bool {
     x.is_defined() && (x.lo() > 0.0 || x.hi() < 0.0)
@@ -238,16 +226,25 @@ fn has_sign(x: &Interval) -> bool {
 
 /// factor·by added, where neither is nothing: 0·∞ shall be 0.
 fn add(to: &mut [Interval], factor: Interval, row: &[Interval]) {
-    for (x, y) in to.iter_mut().zip(row).filter(|(_, y)| !is_zero(y)) {
+    for (x, y) in to.iter_mut().zip(row).filter(|(_, y)| !y.is_zero()) {
         *x = *x + factor * *y;
     }
 }
 
 impl Row {
+    /// A row of its size in which nothing stands.
+    fn empty(&self) -> Self {
+        let zeros = |row: &[Interval]| vec![Interval::ZERO; row.len()];
+        Self {
+            a: zeros(&self.a),
+            b: zeros(&self.b),
+        }
+    }
+
     /// The row with δv_u put in from 0 = `given`.
     fn without_input(&mut self, u: usize, given: &Row) {
         let factor = -self.b[u] / given.b[u];
-        if is_zero(&self.b[u]) {
+        if self.b[u].is_zero() {
             return;
         }
         self.b[u] = Interval::ZERO;
@@ -257,7 +254,7 @@ impl Row {
     /// The row with δη_p put in from 0 = `given`, which has no inputs.
     fn without_state(&mut self, p: usize, given: &Row) {
         let factor = -self.a[p] / given.a[p];
-        if is_zero(&self.a[p]) {
+        if self.a[p].is_zero() {
             return;
         }
         let mut others = given.a.clone();
@@ -267,7 +264,7 @@ impl Row {
     }
 
     fn is_free_of_inputs(&self) -> bool {
-        self.b.iter().all(is_zero)
+        self.b.iter().all(|x| x.is_zero())
     }
 }
 
@@ -317,17 +314,14 @@ impl System {
     fn solve_for_input(&mut self, u: usize) {
         let tells = |row: &Row| {
             let mut others = row.b.iter().enumerate().filter(|(j, _)| *j != u);
-            has_sign(&row.b[u]) && others.all(|(_, x)| is_zero(x))
+            has_sign(&row.b[u]) && others.all(|(_, x)| x.is_zero())
         };
         let Some(place) = self.constraints.iter().position(tells) else {
             return;
         };
         let given = self.constraints.remove(place);
         self.rows().for_each(|row| row.without_input(u, &given));
-        let mut own = Row {
-            a: vec![Interval::ZERO; given.a.len()],
-            b: given.b.iter().map(|_| Interval::ZERO).collect(),
-        };
+        let mut own = given.empty();
         own.b[u] = Interval::ONE;
         own.without_input(u, &given);
         self.inputs[u] = Some(own);
@@ -336,7 +330,7 @@ impl System {
     /// An input that acts on one state only: a constraint gives that state, and its equation
     /// is what the input is for.
     fn spend_equation(&mut self, u: usize) {
-        let acts = |row: &Option<Row>| row.as_ref().is_some_and(|row| !is_zero(&row.b[u]));
+        let acts = |row: &Option<Row>| row.as_ref().is_some_and(|row| !row.b[u].is_zero());
         let mut driven = (0..self.flow.len()).filter(|&s| acts(&self.flow[s]));
         if let (Some(p), None) = (driven.next(), driven.next()) {
             self.eliminate_state(Some(p));
@@ -360,10 +354,7 @@ impl System {
         let given = self.constraints.remove(k);
         self.flow[p] = None;
         self.rows().for_each(|row| row.without_state(p, &given));
-        let mut own = Row {
-            a: vec![Interval::ZERO; given.a.len()],
-            b: given.b.clone(),
-        };
+        let mut own = given.empty();
         own.a[p] = Interval::ONE;
         own.without_state(p, &given);
         self.followers.push((p, own));

@@ -181,9 +181,7 @@ impl<'a> Part<'a> {
         let n = self.places.len();
         let mut J = vec![Interval::ENTIRE; self.rows * n];
         slopes.eval(&hull(pair), &mut J);
-        let is_bounded =
-            |x: &Interval| x.is_defined() && !x.is_empty() && x.magnitude().is_finite();
-        if !J.iter().all(is_bounded) {
+        if !J.iter().all(|x| x.is_bounded()) {
             return false;
         }
         let zeros = vec![Interval::ZERO; n];
@@ -288,12 +286,8 @@ impl Part<'_> {
         }
         let is_proved = self.is_proved(&first, &second).unwrap_or(false);
         let value = self.values(&first)[0];
-        let point = |at: Vec<f64>| Point {
-            coordinates: self.region.coordinates(&at),
-            value,
-        };
         Some(Alike {
-            points: [first, second].map(point),
+            points: [first, second].map(|at| self.region.point(&at, value)),
             is_proved,
         })
     }

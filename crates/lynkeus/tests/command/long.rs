@@ -21,6 +21,13 @@ fn log(rows: usize) -> String {
     text
 }
 
+/// The tanks with steps as long as the readings allow: rows are looked at here, not digits.
+fn tanks() -> Folder {
+    let folder = Folder::new();
+    folder.change("study.toml", "substeps = 16", "substeps = 2");
+    folder
+}
+
 /// The most memory that a run held, in KiB, as far as looking at it every few milliseconds tells.
 #[cfg(target_os = "linux")]
 fn peak(folder: &Folder, arguments: &[&str]) -> u64 {
@@ -52,7 +59,7 @@ fn peak(folder: &Folder, arguments: &[&str]) -> u64 {
 fn memory_does_not_grow_with_the_rows() {
     const SHORT: usize = 80_000;
     const LONG: usize = 300_000;
-    let folder = Folder::new();
+    let folder = tanks();
     let columns = ["t", "level", "pump"];
     let peaks = |rows: usize| {
         folder.write("log.csv", &log(rows));
@@ -76,7 +83,7 @@ fn memory_does_not_grow_with_the_rows() {
 
 #[test]
 fn a_long_log_from_a_pipe_gives_the_same() {
-    let folder = Folder::new();
+    let folder = tanks();
     folder.write("log.csv", &log(70_000));
     let ended = folder.run(&["estimate", "study.toml", "log.csv", "-q", "-o", "out.csv"]);
     assert_eq!(ended.code, 0, "{}", ended.err);
@@ -109,7 +116,7 @@ fn a_long_log_from_a_pipe_gives_the_same() {
 
 #[test]
 fn a_fault_far_down_is_told_by_its_line_and_nothing_is_written() {
-    let folder = Folder::new();
+    let folder = tanks();
     let mut text = log(150_000);
     text.push_str("600000,5.1\n600004,5.1,3\n");
     folder.write("log.csv", &text);
@@ -140,7 +147,7 @@ fn a_fault_far_down_is_told_by_its_line_and_nothing_is_written() {
 /// What comes late in a log, and what is missing, over the ends of what is read at a time.
 #[test]
 fn late_rows_and_gaps_far_down_find_their_places() {
-    let folder = Folder::new();
+    let folder = tanks();
     let text = log(70_000);
     let mut rows: Vec<&str> = text.lines().collect();
     rows.swap(32_768, 32_770);

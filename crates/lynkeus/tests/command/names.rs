@@ -106,6 +106,25 @@ fn a_renamed_state_of_the_tanks_changes_no_number() {
     }
 }
 
+/// A parameter of a part, with the subscript of that part in its name, as compilers write it.
+#[test]
+fn a_parameter_of_a_part_takes_its_value_from_the_study() {
+    let simulate = ["simulate", "study.toml", "-o", "o.csv"];
+    let of_part = || renamed("two-tanks", &TANKS, "k4", "pumps[1].gain");
+    let usual = of_part();
+    ran(&usual, &simulate);
+    let written = of_part();
+    let model = written.read("two_tanks.mo");
+    written.write("two_tanks.mo", &model.replace("0.03037", "0.04"));
+    ran(&written, &simulate);
+    let given = of_part();
+    let study = given.read("study.toml") + "\n[parameters]\n\"pumps[1].gain\" = 0.04\n";
+    given.write("study.toml", &study);
+    ran(&given, &simulate);
+    assert_eq!(given.read("o.csv"), written.read("o.csv"));
+    assert_ne!(given.read("o.csv"), usual.read("o.csv"));
+}
+
 #[test]
 fn tuning_judges_by_the_estimate_whatever_the_state_is_called() {
     let tune = ["tune", "study.toml", "--json", "-q"];
