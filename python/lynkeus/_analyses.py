@@ -242,11 +242,11 @@ class CheckEntries:
     symmetries: list[Symmetry]
     """quantities that can change together unseen"""
     derivatives: int
-    """derivatives of the outputs that were taken"""
+    """derivatives of the outputs that were used"""
     rank: int
-    """independent directions that are seen"""
+    """independent directions of the unknowns that are seen"""
     unknowns: int
-    """directions that there are"""
+    """unknowns, derivatives of unknown inputs included"""
     observability_notes: list[str]
     """how far these answers can be trusted"""
     uniform: Uniformity | None
@@ -370,7 +370,7 @@ class Excitation(Record):
     exponent: float | None
     """excitation falls like θ to minus this"""
     vanishes: bool | None
-    """whether the condition can be met by a larger θ"""
+    """whether α(θ)/θ² falls at the largest θ, as the theorem asks; ``None`` where that cannot be told"""
     best: float | None
     """the θ of the smallest error"""
     _ITEMS: ClassVar = {"from": float}
@@ -479,7 +479,7 @@ class SensorUsed(Record):
 
 
 class Rank(Record):
-    """Directions of the start that the readings show."""
+    """Directions of the state that the readings show."""
 
     seen: int
     """how many are seen"""
@@ -501,13 +501,13 @@ class SensorSet(Record):
     sensors: list[str]
     """the outputs"""
     unseen: int
-    """directions that it does not show"""
+    """quantities that it does not show"""
     mean_share: float | None
-    """standard errors as a share of the ranges, their geometric mean"""
+    """standard errors of what is seen as a share of their scales, the geometric mean"""
     worst: str | None
     """the quantity that is known worst"""
     worst_share: float | None
-    """its standard error as a share of its range"""
+    """its standard error as a share of its scale"""
 
 
 class Advice(Record):
@@ -549,7 +549,7 @@ class HowWellEntries:
     standard_error_exact_model: Named[float | None]
     """of the present value were the model exact"""
     filter_sd: Named[float | None]
-    """standard deviation that a filter has at the end"""
+    """standard deviation that an extended Kalman filter has at the end, where it does not break down"""
     counts_process_noise: bool
     """whether ``[process_noise]`` is counted"""
     declared: Declared

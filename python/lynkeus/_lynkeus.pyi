@@ -291,9 +291,8 @@ class Estimator:
         Raises
         ------
         ArgumentError, InputError
-            It is no number, or before the last one.
-        RefusedError
-            The equations have no value there.
+            It is no number or before the last one, there was no sample yet, or the equations have no value on
+            the way.
         """
 
     def update(self, t: float, readings: Mapping[str, float | None]) -> None:
@@ -310,9 +309,8 @@ class Estimator:
         Raises
         ------
         ArgumentError, InputError
-            No signal has such a name, a reading is no number, the time is before the last one.
-        RefusedError
-            The equations have no value there.
+            No signal has such a name, a reading is no number, the time is before the last one, or the equations
+            have no value on the way.
         """
 
     def push(self, t: float, signals: Sequence[float]) -> None:
@@ -328,9 +326,8 @@ class Estimator:
         Raises
         ------
         ArgumentError, InputError
-            There are not as many numbers as signals, the time is before the last one.
-        RefusedError
-            The equations have no value there.
+            There are not as many numbers as signals, the time is before the last one, or the equations have no
+            value on the way.
         """
 
     @property
