@@ -31,8 +31,9 @@ PICTURES: set[str] = set()
 LINK = re.compile(r"(?<=\]\()(?!\w+:|#)([^)\s]+)(?=\))")
 #: what everything else is met through
 FIRST = ["Study", "Model", "Estimator", "Log", "Answer", "Table", "Run"]
-#: what modules have that are imported by themselves
-MODULES = ["ray.campaign", "ray.sweep", "spark.estimate", "spark.follow", "mpc.Estimator", "results.figures"]
+#: what modules have that are imported by themselves, and what `from lynkeus import *` leaves out
+MODULES = ["abs", "ray.campaign", "ray.sweep", "spark.estimate", "spark.follow", "mpc.Estimator", "results.figures"]
+MODULES += ["reports", "sections"]
 ROLE = re.compile(r":(?:attr|class|exc|func|meth|mod):(?=<code>)")
 CODE = re.compile(r"(^(?:```|~~~).*?^(?:```|~~~)\s*?$|`[^`\n]+`)", re.MULTILINE | re.DOTALL)
 

@@ -10,7 +10,9 @@
 
 from ._lynkeus import Estimator, Log
 from .errors import ArgumentError, InputError, LimitError, LogWarning, LynkeusError, NotCredible, RefusedError, TraceError
-from .functions import abs, acos, asin, atan, atan2, ceil, cos, cosh, exp, floor, interp, log, log10
+# not among the names of `from lynkeus import *`: it would hide Python's own
+from .functions import abs as abs
+from .functions import acos, asin, atan, atan2, ceil, cos, cosh, exp, floor, interp, log, log10
 from .functions import maximum, minimum, sign, sin, sinh, sqrt, tan, tanh, where
 from .model import Model
 from .results import (
@@ -61,7 +63,6 @@ __all__ = [
     "Sweep",
     "Table",
     "TraceError",
-    "abs",
     "acos",
     "asin",
     "atan",

@@ -5,8 +5,9 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from . import _lynkeus
 from ._base import Base
 from ._each import Errors, Tell, each
 from ._fleet import is_one, split
@@ -14,9 +15,6 @@ from ._logs import collected, given, log_of
 from ._progress import Progress
 from .errors import InputError, LogWarning, NotCredible
 from .results import Estimation, Run, Simulation
-
-if TYPE_CHECKING:
-    from .study import Study
 
 Keep = Callable[[Any], Any] | None
 Many = list[Any] | dict[Hashable, Any]
@@ -34,7 +32,7 @@ class Options:
     memory_limit: float
 
 
-def estimate_each(study: Study, logs: Any, by: str | None, options: Options) -> Many:
+def estimate_each(study: _lynkeus.Study, logs: Any, by: str | None, options: Options) -> Many:
     """See :meth:`Study.estimate_each`."""
     logs = collected(logs)
     if by is None and not isinstance(logs, Mapping) and is_one(logs):
@@ -49,14 +47,14 @@ def estimate_each(study: Study, logs: Any, by: str | None, options: Options) -> 
     names = [f"the log of {key!r}" for key in keys] if keys is not None else _places("log", logs)
 
     def run(log: Any, tell: Tell) -> Run:
-        found = study._core.estimate(given(log), tell, options.time_limit, options.memory_limit)
+        found = study.estimate(given(log), tell, options.time_limit, options.memory_limit)
         return Estimation(found)
 
     found = _all(run, logs, names, "estimating", options)
     return found if keys is None else dict(zip(keys, found, strict=True))
 
 
-def sweep(study: Study, changes: Iterable[Mapping[str, Any]], log: Any, options: Options) -> list[Any]:
+def sweep(study: _lynkeus.Study, changes: Iterable[Mapping[str, Any]], log: Any, options: Options) -> list[Any]:
     """See :meth:`Study.sweep`."""
     asked = list(changes)
     for place, change in enumerate(asked):
@@ -66,7 +64,7 @@ def sweep(study: Study, changes: Iterable[Mapping[str, Any]], log: Any, options:
                 f"found {type(change).__name__}"
             )
     recorded = None if log is None else log_of(log)
-    base = Base(study._core)
+    base = Base(study)
 
     def run(change: Mapping[str, Any], tell: Tell) -> Run:
         core, limits = base.changed(change), (options.time_limit, options.memory_limit)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ._columns import Given as _Given
 from .errors import LynkeusError
+from .reports import Health as _Health, Innovation as _Innovation
 from .study import Study as _Study
 
 _Column = NDArray[np.float64]
@@ -18,6 +19,8 @@ _Tell = Callable[[float], Any] | None
 MEMORY: float
 
 class Answer:
+    """What a command answers, in the engine."""
+
     def text(self) -> str: ...
     def json(self) -> str: ...
     def headers(self) -> list[str]: ...
@@ -39,28 +42,135 @@ class Log:
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> Log:
-        """A CSV or Parquet file."""
+        """A log in a file.
+
+        Parameters
+        ----------
+        path : path
+            CSV or Parquet.
+
+        Returns
+        -------
+        Log
+            Its columns.
+
+        Raises
+        ------
+        InputError
+            There is no such file, or it cannot be read.
+        """
 
     @staticmethod
     def from_columns(columns: Sequence[tuple[str, _Given]]) -> Log:
-        """Columns in the forms of ``_columns.py``; what is not finite is missing."""
+        """A log of columns.
+
+        Parameters
+        ----------
+        columns : list of pairs
+            Headers with numbers, shape (rows,), or with another of the forms of ``_columns.py``; what is not
+            finite is missing.
+
+        Returns
+        -------
+        Log
+            The columns.
+
+        Raises
+        ------
+        InputError
+            They are not of one length.
+        """
 
     @staticmethod
     def from_arrow(table: Any) -> Log:
-        """Anything with ``__arrow_c_stream__`` or ``__arrow_c_array__`` that is a table. It is not copied where it
-        lies in one piece: by Arrow's contract nobody changes it then, nor the arrays of NumPy that it
-        was made of."""
+        """A log of a table of Arrow. It is not copied where it lies in one piece: by Arrow's contract nobody
+        changes it then, nor the arrays of NumPy that it was made of.
 
-    def headers(self) -> list[str]: ...
-    def column(self, name: str) -> _Column: ...
+        Parameters
+        ----------
+        table : table
+            Anything with ``__arrow_c_stream__`` or ``__arrow_c_array__``.
+
+        Returns
+        -------
+        Log
+            Its columns.
+
+        Raises
+        ------
+        InputError
+            It is no table.
+        """
+
+    def headers(self) -> list[str]:
+        """Headers of the columns.
+
+        Returns
+        -------
+        list of str
+            In the order of the file or table.
+        """
+
+    def column(self, name: str) -> _Column:
+        """A column.
+
+        Parameters
+        ----------
+        name : str
+            Its header.
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape (rows,), as the log has it; NaN where a reading is missing, instants in seconds since the first.
+
+        Raises
+        ------
+        InputError
+            There is no such column, or it cannot be read.
+        """
+
     def values(self, name: str) -> _Column | None:
-        """A column as it is, NaN where a reading is missing; ``None`` where it cannot be read."""
+        """A column as it is.
+
+        Parameters
+        ----------
+        name : str
+            Its header.
+
+        Returns
+        -------
+        numpy.ndarray or None
+            Shape (rows,), NaN where a reading is missing; ``None`` where it cannot be read.
+        """
 
     def refusal(self, name: str) -> str | None:
-        """Why a column cannot be read, where that is so."""
+        """Why a column cannot be read.
+
+        Parameters
+        ----------
+        name : str
+            Its header.
+
+        Returns
+        -------
+        str or None
+            ``None`` where it can.
+        """
 
     def origin(self, name: str) -> str | None:
-        """What stands for zero in a column of dates and times."""
+        """What stands for zero in a column of dates and times.
+
+        Parameters
+        ----------
+        name : str
+            Its header.
+
+        Returns
+        -------
+        str or None
+            An instant; ``None`` of a column of numbers.
+        """
 
     def __len__(self) -> int: ...
 
@@ -144,6 +254,8 @@ class Study:
     def estimator(self, study: _Study) -> Estimator: ...
 
 class Functions:
+    """A system's functions, in the engine."""
+
     @property
     def title(self) -> str: ...
     @property
@@ -169,14 +281,54 @@ class Estimator:
     """A study's estimator, for samples that come one by one. Its pickle is its snapshot."""
 
     def predict(self, t: float) -> None:
-        """Goes to a time at which nothing is read."""
+        """Goes to a time at which nothing is read.
+
+        Parameters
+        ----------
+        t : float
+            The time, in the model's unit, not before the last one.
+
+        Raises
+        ------
+        ArgumentError, InputError
+            It is no number or before the last one, there was no sample yet, or the equations have no value on
+            the way.
+        """
 
     def update(self, t: float, readings: Mapping[str, float | None]) -> None:
-        """Goes to a time and takes what was read there. A sensor that is left out, ``None`` or NaN did
-        not report; of a known input the last value holds."""
+        """Goes to a time and takes what was read there. A call that fails changes nothing.
+
+        Parameters
+        ----------
+        t : float
+            The time, in the model's unit, not before the last one.
+        readings : mapping of str to float
+            By signal, in its unit. A sensor that is left out, ``None`` or NaN did not report; of a known
+            input the last value holds.
+
+        Raises
+        ------
+        ArgumentError, InputError
+            No signal has such a name, a reading is no number, the time is before the last one, or the equations
+            have no value on the way.
+        """
 
     def push(self, t: float, signals: Sequence[float]) -> None:
-        """The same with all signals, in their order."""
+        """The same with all signals, in their order.
+
+        Parameters
+        ----------
+        t : float
+            The time, in the model's unit, not before the last one.
+        signals : list of float
+            One for each of :attr:`signals`, shape (m,); NaN did not report.
+
+        Raises
+        ------
+        ArgumentError, InputError
+            There are not as many numbers as signals, the time is before the last one, or the equations have no
+            value on the way.
+        """
 
     @property
     def signals(self) -> list[str]:
@@ -203,21 +355,44 @@ class Estimator:
         """Standard deviations by name, where the observer has them."""
 
     def to_numpy(self) -> _Column:
-        """What is estimated, in the order of ``names``."""
+        """What is estimated.
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape (n,), in the order of :attr:`names` and in their units.
+        """
 
     @property
-    def innovations(self) -> dict[str, dict[str, Any]]:
+    def innovations(self) -> dict[str, _Innovation]:
         """By sensor what the last reading said beside what the model expected; of a filter."""
 
     @property
-    def health(self) -> dict[str, Any]:
+    def health(self) -> _Health:
         """Counts by sensor, and of what was held, confined or not solved."""
 
     def snapshot(self) -> bytes:
-        """Everything that the future depends on."""
+        """Everything that the future depends on.
+
+        Returns
+        -------
+        bytes
+            For :meth:`restore`.
+        """
 
     def restore(self, snapshot: bytes) -> None:
-        """Goes to where another estimator of the same study was."""
+        """Goes to where another estimator of the same study was.
+
+        Parameters
+        ----------
+        snapshot : bytes
+            What :meth:`snapshot` gave.
+
+        Raises
+        ------
+        InputError
+            It is damaged, or of another study.
+        """
 
 def families() -> list[tuple[str, bool]]:
     """Names of the families, and which are filters."""

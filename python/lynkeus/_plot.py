@@ -78,7 +78,7 @@ def captions(svg: str | None, known: Iterable[str], time: str) -> Captions:
     return found
 
 
-def asked(names: Sequence[str] | None) -> list[str] | None:
+def asked(names: Iterable[str] | None) -> list[str] | None:
     """The names to draw; a single one counts as a list of one."""
     found = optional(words)("names", names)
     if found is not None and not found:

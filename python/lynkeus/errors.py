@@ -22,7 +22,7 @@ class LynkeusError(Exception):
         hint: str | None = None,
     ) -> None:
         super().__init__(text)
-        self.message = text if message is None else message
+        self.message: str = text if message is None else message
         self.place = place
         self.hint = hint
 
@@ -39,7 +39,22 @@ class ArgumentError(InputError, TypeError):
 
     @classmethod
     def of(cls, argument: str, expected: str, found: object) -> ArgumentError:
-        """That of a value that is not what was expected of it."""
+        """The error of a value that is not what was expected of it.
+
+        Parameters
+        ----------
+        argument : str
+            The name of the argument.
+        expected : str
+            What was expected, in words.
+        found : object
+            The value.
+
+        Returns
+        -------
+        ArgumentError
+            To be raised.
+        """
         return cls(f"{argument}: expected {expected}, found {_spoken(found)}")
 
 
@@ -61,7 +76,20 @@ _SHORT = 40
 
 
 def near(name: str, known: Iterable[str]) -> str:
-    """A question after the name that may be meant, empty where none is near."""
+    """A question after the name that may be meant.
+
+    Parameters
+    ----------
+    name : str
+        What was written.
+    known : iterable of str
+        Names that there are.
+
+    Returns
+    -------
+    str
+        ``" (did you mean 'errors'?)"``, empty where no name is near.
+    """
     found = get_close_matches(name, [each for each in known if not each.startswith("_")], n=1)
     return f" (did you mean {found[0]!r}?)" if found else ""
 

@@ -19,22 +19,50 @@ from .systems import Functions
 class Model:
     """A plant's equations, as a text that is Modelica or in the notation of ``@ODEmodel``.
 
-    ``name`` is what messages call the text; one that ends in ``.jl`` is in the notation of
-    ``@ODEmodel``. ``choose`` is the model to take where the text holds several.
+    Parameters
+    ----------
+    text : str
+        The equations.
+    name : str
+        What messages call the text; one that ends in ``.jl`` is in the notation of ``@ODEmodel``.
+    choose : str, optional
+        The model to take where the text holds several.
+
+    Raises
+    ------
+    InputError
+        The text holds half a character.
     """
 
     @takes(text=word, name=word, choose=optional(word))
     def __init__(self, text: str, name: str = "model.mo", choose: str | None = None) -> None:
-        self.text = valid(text)
-        self.name = name
-        self.choose = choose
+        self.text: str = valid(text)
+        self.name: str = name
+        self.choose: str | None = choose
 
     @classmethod
     @takes(path=path_of, choose=optional(word))
     def load(cls, path: str | os.PathLike[str], choose: str | None = None) -> Model:
-        """A file: ``.mo`` or ``.jl``. Where connectors or libraries keep it from being read and the
-        compiler ``rumoca`` is installed (``pip install '.[modelica]'`` from a clone), what that makes of it:
-        names come out dotted, ``r1.p.v``."""
+        """A file. Where connectors or libraries keep it from being read and the compiler ``rumoca`` is installed
+        (``pip install '.[modelica]'`` from a clone), what that makes of it: names come out dotted, ``r1.p.v``.
+
+        Parameters
+        ----------
+        path : path
+            A file of Modelica (``.mo``) or in the notation of ``@ODEmodel`` (``.jl``).
+        choose : str, optional
+            The model to take where the file holds several.
+
+        Returns
+        -------
+        Model
+            The text of the file.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read.
+        """
         name = os.fspath(path)
         try:
             text = Path(name).read_text(encoding="utf-8-sig")
@@ -48,7 +76,20 @@ class Model:
     @classmethod
     @takes(text=word, choose=optional(word))
     def from_modelica(cls, text: str, choose: str | None = None) -> Model:
-        """A text in Modelica."""
+        """A text in Modelica.
+
+        Parameters
+        ----------
+        text : str
+            One model, or several.
+        choose : str, optional
+            The model to take where the text holds several.
+
+        Returns
+        -------
+        Model
+            The text; it is read where something is asked of it.
+        """
         return cls(text, choose=choose)
 
     @classmethod
@@ -65,17 +106,40 @@ class Model:
         name: str | None = None,
         description: str | None = None,
     ) -> Model:
-        """Python functions: ``f(t, x, u, p)`` returns the derivatives of the states, ``h(t, x, u, p)`` the
-        outputs, as lists, tuples, arrays or dictionaries by name. Each is called once, with values that
-        record what is done with them: operators, the functions of this package (``lynkeus.sin``…),
-        NumPy's functions and ``@``; ``lynkeus.where`` in place of ``if``. Both may leave out ``p``, or
-        ``u`` and ``p``. Without ``h`` the outputs are states.
+        """Python functions, each called once, with values that record what is done with them: operators, the
+        functions of this package (``lynkeus.sin``…), NumPy's functions and ``@``; ``lynkeus.where`` in place
+        of ``if``.
 
-        ``states``, ``inputs``, ``outputs`` and ``params`` are lists of names, or dictionaries: name to a
-        number (start or value), an array, or a dictionary of ``start``, ``fixed``, ``min``, ``max``,
-        ``unit``, ``description``, ``size`` (of a parameter: ``value``). In ``f``, states are ``x[0]``,
-        ``x["T"]``, ``x.T`` or ``a, b = x``; inputs and parameters alike.
+        Parameters
+        ----------
+        f : function
+            ``f(t, x, u, p)`` returns the derivatives of the states, as a list, a tuple, an array or a
+            dictionary by name, in the units of the states per unit of time. States are ``x[0]``, ``x["T"]``,
+            ``x.T`` or ``a, b = x``; inputs and parameters alike. It may leave out ``p``, or ``u`` and ``p``.
+        h : function, optional
+            ``h(t, x, u, p)`` returns the outputs likewise; states are the outputs where it is left out.
+        states, inputs, outputs, params : list of str or dict
+            Names, or a dictionary of them: a number (start or value), an array, or a dictionary of ``start``,
+            ``fixed``, ``min``, ``max``, ``unit``, ``description``, ``size`` (of a parameter: ``value``).
+        name : str, optional
+            The name of the model; that of ``f`` where it is left out.
+        description : str, optional
+            What it is.
 
+        Returns
+        -------
+        Model
+            What was recorded, as a text in Modelica.
+
+        Raises
+        ------
+        TraceError
+            A function does what no equation can say; the line is told, and what to write instead.
+        InputError
+            What is declared contradicts itself.
+
+        Examples
+        --------
         >>> import lynkeus
         >>> def tank(t, x, u, p):
         ...     return [u.inflow - p.k * lynkeus.sqrt(x.level)]
@@ -107,8 +171,23 @@ class Model:
 
     @takes(parameters=optional(section))
     def functions(self, parameters: Mapping[str, float] | None = None) -> Functions:
-        """The equations as functions of numbers, x' = f(t, x, u) and y = h(t, x, u); ``parameters``
-        replace those of the model."""
+        """The equations as functions of numbers, x' = f(t, x, u) and y = h(t, x, u).
+
+        Parameters
+        ----------
+        parameters : mapping of str to float, optional
+            Values that replace those of the model, in its units.
+
+        Returns
+        -------
+        Functions
+            ``f``, ``h`` and ``jacobian_x``.
+
+        Raises
+        ------
+        InputError
+            The model cannot be read, a parameter has no value, or there is none of a name.
+        """
         values = ((k, real()(f"parameters.{k}", v)) for k, v in (parameters or {}).items())
         given = "".join(f"{key(str(k))} = {number(v)}\n" for k, v in values)
         text = f"[parameters]\n{given}"

@@ -26,10 +26,24 @@ class _Sample:
 class Estimator:
     """What ``do_mpc.estimator.StateFeedback`` and ``EKF`` are for a loop: ``x0 = estimator.make_step(y0)``.
 
-    ``model`` is the ``do_mpc.model.Model`` of the controller, ``t_step`` the time between calls.
     Measurements, inputs and states are matched by name; of a vector ``T`` the entries are ``T[1]``,
-    ``T[2]``, … as in the study. ``names`` gives the study's name where the model has another. A study
-    with more sensors than the model measures, or that does not estimate a state of it, is refused.
+    ``T[2]``, … as in the study.
+
+    Parameters
+    ----------
+    study : Study
+        What estimates.
+    model : do_mpc.model.Model
+        The model of the controller.
+    t_step : float
+        The time between calls, in the study's unit.
+    names : mapping of str to str, optional
+        The study's name of what the model calls otherwise.
+
+    Raises
+    ------
+    InputError
+        The study has more sensors than the model measures, or does not estimate a state of it.
     """
 
     @takes(study=instance(Study, "a Study"), t_step=real(), names=optional(section))
@@ -80,9 +94,26 @@ class Estimator:
         self.set_initial_guess()
 
     def make_step(self, y0: ArrayLike, u0: ArrayLike | None = None) -> NDArray[np.float64]:
-        """The states from the measurements ``y0`` and, where the study has known inputs, the inputs
-        ``u0`` that were applied since the last call, as do-mpc's ``EKF`` takes them; NaN is a sensor
-        that did not report. A call that fails changes nothing but the time."""
+        """The states from measurements, as do-mpc's ``EKF`` takes them. A call that fails changes nothing but the
+        time.
+
+        Parameters
+        ----------
+        y0 : array_like
+            The measurements in the model's order and units; NaN is a sensor that did not report.
+        u0 : array_like, optional
+            Where the study has known inputs, those that were applied since the last call.
+
+        Returns
+        -------
+        numpy.ndarray
+            The states of the model, shape (n, 1).
+
+        Raises
+        ------
+        InputError
+            There are not as many values as names.
+        """
         t = self._steps * self._t_step
         self._steps += 1
         readings = self._given("y0", self._measured, y0)

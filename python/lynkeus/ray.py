@@ -14,7 +14,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from . import _lynkeus
 from ._arguments import function, instance, optional, section, several, takes, whole, word
@@ -30,7 +30,10 @@ from .study import Study
 if TYPE_CHECKING:
     from ray.data import Dataset
 
-Keep = Callable[[Any], Mapping[str, Any]]
+    from ._types import LogLike
+    from .sections import Changes
+
+Keep: TypeAlias = Callable[[Any], Mapping[str, Any]]
 _CHECKS = {"study": instance(Study, "a Study"), "keep": function, "errors": word, "blocks": optional(whole)}
 
 
@@ -46,13 +49,36 @@ def campaign(
 ) -> Dataset:
     """One row per seed: the study simulated with that seed of noise and starts.
 
-    Columns are ``seed``, ``error`` (why a run failed, else null) and what ``keep`` makes of a run: by
-    default :func:`lynkeus.results.figures`, that is ``credible``, ``refusal`` and ``rms_NAME``; columns of
-    the run where they are asked for: ``keep=lambda run: {"Zf_hat": run["Zf_hat"]}``. Of a run that
-    failed these are null; a block in which every run failed runs the study as it is to know them. With
-    ``errors="raise"`` a run that fails ends the campaign. ``blocks`` is the number of pieces, 200
-    where it is left out; ``options`` are those of ``Dataset.map_batches``
-    (``num_cpus``, ``concurrency``, …)."""
+    Parameters
+    ----------
+    study : Study
+        With ``[simulate]``.
+    seeds : list of int
+        At least one.
+    keep : function
+        Makes a dictionary of each run, the row's further columns; columns of the run where they are asked
+        for: ``keep=lambda run: {"Zf_hat": run["Zf_hat"]}``.
+    errors : str
+        ``"return"``, or ``"raise"``: a run that fails then ends the campaign.
+    blocks : int, optional
+        Number of pieces, 200 where it is left out.
+    **options
+        Those of ``Dataset.map_batches`` (``num_cpus``, ``concurrency``, …).
+
+    Returns
+    -------
+    ray.data.Dataset
+        Columns ``seed``, ``error`` (why a run failed, else null) and what ``keep`` makes of a run: by default
+        :func:`lynkeus.results.figures`, that is ``credible``, ``refusal`` and ``rms_NAME``. Of a run that
+        failed these are null; a block in which every run failed runs the study as it is to know them.
+
+    Raises
+    ------
+    InputError
+        There is nothing to run.
+    ImportError
+        Ray is not installed.
+    """
     chosen(errors)
     asked = [_seed(seed) for seed in seeds]
     data = needed("ray.data", "lynkeus.ray")
@@ -64,19 +90,40 @@ def campaign(
 @takes(changes=several("dictionaries as of Study.replace"), **_CHECKS)
 def sweep(
     study: Study,
-    changes: Iterable[Mapping[str, Any]],
-    log: Any = None,
+    changes: Iterable[Changes],
+    log: LogLike | None = None,
     *,
     keep: Keep = figures,
     errors: Errors = "return",
     blocks: int | None = None,
     **options: Any,
 ) -> Dataset:
-    """One row per change of the study, which is what :meth:`Study.replace` takes, simulated or, with
-    ``log``, estimating from it: thousands of tunings, or values of parameters.
+    """One row per change of the study, simulated or estimating from a log: thousands of tunings, or values of
+    parameters.
 
-    Columns are ``place`` (of the change in the list), ``error`` and what ``keep`` makes of a run. The
-    options are those of :func:`campaign`."""
+    Parameters
+    ----------
+    study : Study
+        What is changed.
+    changes : list of dict
+        What :meth:`Study.replace` takes.
+    log : path, mapping of columns, data frame, table or run, optional
+        What :meth:`Study.estimate` takes; simulated where it is left out.
+    keep, errors, blocks, **options
+        As of :func:`campaign`.
+
+    Returns
+    -------
+    ray.data.Dataset
+        Columns ``place`` (of the change in the list), ``error`` and what ``keep`` makes of a run.
+
+    Raises
+    ------
+    InputError
+        There is nothing to run, or the log cannot be read.
+    ImportError
+        Ray is not installed.
+    """
     chosen(errors)
     data = needed("ray.data", "lynkeus.ray")
     asked = [section(f"changes[{place}]", change) for place, change in enumerate(changes)]

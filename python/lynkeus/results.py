@@ -6,15 +6,16 @@ import json
 import warnings
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _html, _lynkeus, _plot
+from . import _html, _lynkeus, _plot, reports
 from ._kept import Kept
 from ._logs import log_of
 from ._optional import needed
+from ._records import Record as Record, made
 from .errors import InputError, LogWarning, LynkeusError, NotCredible, near
 
 if TYPE_CHECKING:
@@ -23,26 +24,17 @@ if TYPE_CHECKING:
     import pyarrow
     from matplotlib.axes import Axes
 
-Column = NDArray[np.float64]
+    from ._types import LogLike, Names
 
-
-class Record(dict[str, Any]):
-    """An object of a report: its entries are attributes as well."""
-
-    def __getattr__(self, name: str) -> Any:
-        try:
-            return self[name]
-        except KeyError:
-            raise AttributeError(f"no entry {name!r}{near(name, self)}: there are {', '.join(self)}") from None
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *(k for k in self if k.isidentifier())]
+Column: TypeAlias = NDArray[np.float64]
+_Report = TypeVar("_Report", bound=Record)
 
 
 class Answer:
     """What a command answers; ``str(answer)`` is what the command prints.
 
-    ``summary`` is the command's ``--json``; its entries are attributes of the answer as well.
+    ``summary`` is the command's ``--json``; its entries are attributes of the answer as well, of the types
+    that :mod:`lynkeus.reports` declares.
     """
 
     def __init__(self, core: _lynkeus.Answer | Kept) -> None:
@@ -54,11 +46,20 @@ class Answer:
     @cached_property
     def summary(self) -> Record:
         """The answer for programs, as the command's ``--json`` prints it."""
-        found: Record = json.loads(self._core.json(), object_hook=Record)
+        return self._made(Record)
+
+    def _made(self, report: type[_Report]) -> _Report:
+        found: _Report = made(report, json.loads(self._core.json()))
         return found
 
     def to_json(self) -> str:
-        """The same as text."""
+        """The summary as text.
+
+        Returns
+        -------
+        str
+            A JSON object on one line, as the command prints it with ``--json``.
+        """
         return self._core.json()
 
     @cached_property
@@ -72,15 +73,17 @@ class Answer:
         """What speaks against the result although there is one, as an exception to be raised."""
         return self._core.refusal()
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        summary = self.summary
-        if name in summary:
-            return summary[name]
-        kind = type(self).__name__
-        hint = near(name, dir(self))
-        raise AttributeError(f"{kind!r} has no attribute {name!r}{hint}; its summary has {', '.join(summary)}")
+    if not TYPE_CHECKING:  # type checkers see what the answers below declare
+
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("_"):
+                raise AttributeError(name)
+            summary = self.summary
+            if name in summary:
+                return summary[name]
+            kind = type(self).__name__
+            hint = near(name, dir(self))
+            raise AttributeError(f"{kind!r} has no attribute {name!r}{hint}; its summary has {', '.join(summary)}")
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *(k for k in self.summary if k.isidentifier())]
@@ -92,28 +95,54 @@ class Answer:
         return f"<{type(self).__name__}\n{self}>"
 
     def to_svg(self) -> str | None:
-        """The command's picture, where it draws one."""
+        """The command's picture.
+
+        Returns
+        -------
+        str or None
+            An SVG document; ``None`` where the command draws none.
+
+        Raises
+        ------
+        RefusedError
+            There is nothing to be drawn.
+        """
         return self._core.svg()
 
     def _repr_html_(self) -> str:
         return _html.page(self)
 
 
-class Check(Answer):
+class Check(reports.CheckEntries, Answer):
     """Which states, inputs and parameters can be known, and by which observer."""
 
+    @cached_property
+    def summary(self) -> reports.CheckReport:
+        """The answer for programs, as the command\'s ``--json`` prints it."""
+        return self._made(reports.CheckReport)
 
-class Design(Answer):
+
+class Design(reports.DesignEntries, Answer):
     """The observer that the study asks for, with the numbers that led to it."""
 
+    @cached_property
+    def summary(self) -> reports.DesignReport:
+        """The answer for programs, as the command\'s ``--json`` prints it."""
+        return self._made(reports.DesignReport)
 
-class Certificate(Answer):
+
+class Certificate(reports.CertificateEntries, Answer):
     """What is proved of the observer on the declared box."""
 
+    @cached_property
+    def summary(self) -> reports.CertificateReport:
+        """The answer for programs, as the command\'s ``--json`` prints it."""
+        return self._made(reports.CertificateReport)
+
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> reports.Verdict:
         """``proved``, ``refuted`` or ``undecided``."""
-        return str(self.summary["certificate"]["verdict"])
+        return self.certificate.verdict
 
 
 class Table(Answer):
@@ -158,11 +187,23 @@ class Table(Answer):
         return True
 
     def keys(self) -> list[str]:
-        """Headers of the columns: ``dict(result)`` has them all."""
+        """Headers of the columns, so that ``dict(result)`` has them all.
+
+        Returns
+        -------
+        list of str
+            The same as :attr:`columns`.
+        """
         return self.columns
 
     def to_dict(self) -> dict[str, Column]:
-        """All columns by their headers."""
+        """All columns by their headers.
+
+        Returns
+        -------
+        dict of str to numpy.ndarray
+            Arrays of shape (rows,), read-only, in the units of the model; NaN where there is no value.
+        """
         return {name: self[name] for name in self.columns}
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
@@ -185,19 +226,52 @@ class Table(Answer):
         return self._core.arrow_stream()
 
     def to_pandas(self) -> pandas.DataFrame:
-        """As a data frame of pandas."""
+        """As a data frame of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each row, a column for each header.
+
+        Raises
+        ------
+        ImportError
+            pandas is not installed.
+        """
         columns = {name: self._core.column(place) for place, name in enumerate(self.columns)}
         frame: pandas.DataFrame = needed("pandas", "to_pandas").DataFrame(columns, copy=False)
         return frame
 
     def to_polars(self) -> polars.DataFrame:
-        """As a data frame of polars; a NaN is a null."""
+        """As a data frame of polars.
+
+        Returns
+        -------
+        polars.DataFrame
+            A row for each row, a column for each header; a NaN is a null.
+
+        Raises
+        ------
+        ImportError
+            polars is not installed.
+        """
         frame: polars.DataFrame = needed("polars", "to_polars").DataFrame(self)
         return frame
 
     def to_arrow(self) -> pyarrow.Table:
-        """As a table of pyarrow; a NaN is a null. Without the whole in memory:
-        ``pyarrow.RecordBatchReader.from_stream(result)``."""
+        """As a table of pyarrow. Without the whole in memory:
+        ``pyarrow.RecordBatchReader.from_stream(result)``.
+
+        Returns
+        -------
+        pyarrow.Table
+            A row for each row, a column for each header; a NaN is a null.
+
+        Raises
+        ------
+        ImportError
+            pyarrow is not installed.
+        """
         table: pyarrow.Table = needed("pyarrow", "to_arrow").table(self)
         return table
 
@@ -207,7 +281,7 @@ class Run(Table):
 
     @property
     def t(self) -> Column:
-        """The times of the rows."""
+        """The times of the rows, shape (rows,), in the model's unit of time."""
         return self[self.columns[0]]
 
     @property
@@ -218,14 +292,35 @@ class Run(Table):
     def plot(
         self,
         ax: Axes | Sequence[Axes] | None = None,
-        names: Sequence[str] | None = None,
-        truth: Any = None,
+        names: Names | str | None = None,
+        truth: LogLike | None = None,
     ) -> list[Axes]:
-        """Draws the run with matplotlib, a panel for each quantity that the study's ``[plot] show``
-        names, or for each of ``names`` (quantities, or columns): true values dashed, estimates solid with
-        a band of two standard deviations where the run has them. Into ``ax``, one for all or one for
-        each, or into a new figure; these axes are returned. ``truth`` is a log with true values in
-        columns by the quantities' names, one for each row of the run."""
+        """Draws the run with matplotlib, a panel for each quantity: true values dashed, estimates solid with
+        a band of two standard deviations where the run has them.
+
+        Parameters
+        ----------
+        ax : Axes or list of Axes, optional
+            One for all panels or one for each; a new figure where it is left out.
+        names : list of str, optional
+            Quantities, or columns; those that the study's ``[plot] show`` names where it is left out.
+        truth : path, mapping of columns, data frame or table, optional
+            A log with true values in columns by the quantities' names, one for each row of the run.
+
+        Returns
+        -------
+        list of Axes
+            The axes that were drawn into.
+
+        Raises
+        ------
+        KeyError
+            A name is neither a quantity nor a column.
+        InputError
+            There are not as many axes as panels, or the truth has another number of rows.
+        ImportError
+            matplotlib is not installed.
+        """
         panels, time = self._panels(_plot.asked(names), {} if truth is None else self._truth(truth))
         axes = _plot.draw(panels, self.t, time, ax)
         for each in axes if self._is_logarithmic else ():
@@ -252,48 +347,77 @@ class Run(Table):
         return {name: values[order] for name, values in columns.items()}
 
 
-class Simulation(Run):
+class Simulation(reports.RunEntries, Run):
     """The plant with its observer."""
 
     @cached_property
+    def summary(self) -> reports.RunReport:
+        """The answer for programs, as the command\'s ``--json`` prints it."""
+        return self._made(reports.RunReport)
+
+    @cached_property
     def log(self) -> dict[str, Column]:
-        """What a logger would have seen: to be given to ``estimate``."""
+        """What a logger would have seen, arrays of shape (samples,) by header: to be given to ``estimate``."""
         return dict(self._core.log())
 
 
-class Estimation(Run):
+class Estimation(reports.RunEntries, Run):
     """A log through the observer."""
 
+    @cached_property
+    def summary(self) -> reports.RunReport:
+        """The answer for programs, as the command\'s ``--json`` prints it."""
+        return self._made(reports.RunReport)
 
-class MonteCarlo(Run):
+
+class MonteCarlo(reports.MonteCarloEntries, Run):
     """Many runs: mean, quantile bands and the worst."""
+
+    @cached_property
+    def summary(self) -> reports.MonteCarloReport:
+        """The answer for programs, as the command\'s ``--json`` prints it."""
+        return self._made(reports.MonteCarloReport)
 
     def _panels(self, names: Sequence[str] | None, truth: dict[str, Column]) -> tuple[list[_plot.Panel], str]:
         return _plot.of_many(self, names)
 
 
-class Sweep(Table):
+class Sweep(reports.SweepEntries, Table):
     """A tuning over its values."""
 
+    @cached_property
+    def summary(self) -> reports.SweepReport:
+        """The answer for programs, as the command\'s ``--json`` prints it."""
+        return self._made(reports.SweepReport)
 
-class HowWell(Run):
+
+class HowWell(reports.HowWellEntries, Run):
     """Standard errors over the horizon; drawn with both axes logarithmic."""
 
     _is_logarithmic = True
+
+    @cached_property
+    def summary(self) -> reports.HowWellReport:
+        """The answer for programs, as the command\'s ``--json`` prints it."""
+        return self._made(reports.HowWellReport)
 
     def _panels(self, names: Sequence[str] | None, truth: dict[str, Column]) -> tuple[list[_plot.Panel], str]:
         return _plot.of_precision(self, names)
 
 
-class Comparison(Answer):
+class Comparison(reports.ComparisonEntries, Answer):
     """Observer families side by side."""
 
-    def __getitem__(self, family: str) -> Record:
-        for row in self.summary["families"]:
-            if isinstance(family, str) and row["family"] == family:
-                found: Record = row
-                return found
-        names = ", ".join(row["family"] for row in self.summary["families"])
+    @cached_property
+    def summary(self) -> reports.ComparisonReport:
+        """The answer for programs, as the command\'s ``--json`` prints it."""
+        return self._made(reports.ComparisonReport)
+
+    def __getitem__(self, family: str) -> reports.Compared:
+        for row in self.families:
+            if isinstance(family, str) and row.family == family:
+                return row
+        names = ", ".join(row.family for row in self.families)
         raise KeyError(f"{family!r}: expected one of {names}")
 
 
@@ -321,9 +445,20 @@ def warned(answer: _Answer) -> _Answer:
 
 
 def figures(run: Run) -> dict[str, Any]:
-    """What is kept of a run where nothing else is asked for: whether it is ``credible``, what speaks
-    against it (``refusal``, else ``None``), and of a simulation the root mean square error over the
-    last half of its rows by estimated quantity, ``rms_NAME``."""
+    """What is kept of a run where nothing else is asked for.
+
+    Parameters
+    ----------
+    run : Run
+        A simulation or an estimation.
+
+    Returns
+    -------
+    dict
+        ``credible``, whether nothing speaks against it; ``refusal``, what does, or ``None``; and of a simulation
+        ``rms_NAME`` of each estimated quantity, the root mean square error over the last half of its
+        rows in the quantity's unit.
+    """
     refusal: LynkeusError | None = run.refusal
     rms = {f"rms_{name}": error for name, error in run._core.settled()}
     return {"credible": refusal is None, "refusal": None if refusal is None else str(refusal), **rms}

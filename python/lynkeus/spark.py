@@ -34,13 +34,36 @@ _CHECKS = {"study": instance(Study, "a Study"), "by": word, "time": optional(wor
 def estimate(
     study: Study, frame: DataFrame, *, by: str, time: str | None = None, is_partitioned: bool = False
 ) -> DataFrame:
-    """The estimates of each asset that column ``by`` names, over its rows in the order of ``time``
-    (the header of the log's time column, ``[estimate] time`` of the study where it is left out).
+    """The estimates of each asset over its rows.
 
-    Columns are ``by``, ``time`` in seconds, ``NAME_hat`` for each estimate, ``credible``, ``error``. An
-    asset that fails has one row, with the reason under ``error``. Rows are brought together by asset
-    (``applyInArrow``); where each partition holds all rows of its assets already, as after
-    ``repartition(by)``, ``is_partitioned=True`` goes without (``mapInArrow``)."""
+    Parameters
+    ----------
+    study : Study
+        What estimates.
+    frame : pyspark.sql.DataFrame
+        The rows of all assets.
+    by : str
+        The column that names the asset of each row.
+    time : str, optional
+        The column of the time, in whose order rows are taken; ``[estimate] time`` of the study where it is
+        left out.
+    is_partitioned : bool
+        Each partition holds all rows of its assets already, as after ``repartition(by)``: then rows are not
+        brought together (``mapInArrow`` in place of ``applyInArrow``).
+
+    Returns
+    -------
+    pyspark.sql.DataFrame
+        Columns ``by``, ``time`` in seconds, ``NAME_hat`` for each estimate in its unit, ``credible``,
+        ``error``. An asset that fails has one row, with the reason under ``error``.
+
+    Raises
+    ------
+    InputError
+        A column is missing.
+    ImportError
+        Spark or pyarrow is not installed.
+    """
     needed("pyarrow", "lynkeus.spark")
     signals = Signals.recorded(study, by, time)
     taken = _taken(frame, signals)
@@ -55,11 +78,34 @@ def estimate(
 def follow(study: Study, stream: DataFrame, *, by: str, time: str | None = None) -> DataFrame:
     """The estimates after each row of a stream, asset by asset, from where the last batch ended.
 
-    Columns are ``by``, ``time``, ``NAME_hat`` for each estimate, and ``error``: a row that is refused, for
-    example because it comes late, changes nothing and tells why. The rows of a batch are taken in the
-    order of ``time``, which is to be numbers. The state of an asset is the snapshot of its estimator
-    (``transformWithStateInPandas``; Spark wants its RocksDB state store for it, and a checkpoint of the
-    query survives a restart)."""
+    The state of an asset is the snapshot of its estimator (``transformWithStateInPandas``; Spark wants its
+    RocksDB state store for it, and a checkpoint of the query survives a restart).
+
+    Parameters
+    ----------
+    study : Study
+        What estimates.
+    stream : pyspark.sql.DataFrame
+        A stream of the rows of all assets.
+    by : str
+        The column that names the asset of each row.
+    time : str, optional
+        The column of the time, numbers in the model's unit, in whose order the rows of a batch are taken;
+        ``[estimate] time`` of the study where it is left out.
+
+    Returns
+    -------
+    pyspark.sql.DataFrame
+        Columns ``by``, ``time``, ``NAME_hat`` for each estimate in its unit, and ``error``: a row that is
+        refused, for example because it comes late, changes nothing and tells why.
+
+    Raises
+    ------
+    InputError
+        A column is missing, or the time is no number.
+    ImportError
+        Spark is not installed.
+    """
     processor = needed("pyspark.sql.streaming", "lynkeus.spark").StatefulProcessor
     signals = Signals.live(study, by, time)
     taken = _taken(stream, signals)

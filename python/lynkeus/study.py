@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, overload
+from typing import Any, Literal, Unpack, overload
 
-from . import _batches, _lynkeus
-from ._arguments import LIMITS, flag, function, instance, optional, path as path_of, progress as told_of
-from ._arguments import real, several, takes, whole, word, words
+from . import _lynkeus
+from ._arguments import LIMITS, flag, instance, optional, path as path_of, progress as told_of
+from ._arguments import real, takes, whole, word, words
 from ._base import Base, plant_of, spelled
-from ._batches import Options
-from ._each import Errors
+from ._batched import Batched
 from ._export import EXPORT, Export, write
 from ._logs import given
 from ._lynkeus import MEMORY
 from ._progress import Progress, told
 from ._toml import document, valid
+from ._types import LogLike, Names, Number, Numbers
 from .errors import InputError
 from .systems import Functions, Observer
 from .model import Model
@@ -34,56 +34,101 @@ from .results import (
     judged,
     warned,
 )
+from .sections import (
+    BoxSection,
+    CertifySection,
+    Changes,
+    CompareSection,
+    EstimateSection,
+    Family,
+    ObserverSection,
+    ParametersSection,
+    PlotSection,
+    ProcessNoiseSection,
+    SensorsNoise,
+    SensorsSection,
+    SimulateSection,
+    TuneSection,
+)
 
-Section = Mapping[str, Any]
-#: what runs in batches takes
-_BATCH = {"keep": optional(function), "workers": optional(whole), "errors": word, "progress": told_of, **LIMITS}
 
+class Study(Batched):
+    """Everything that is asked of a plant. Sections and keys are those of study files (docs/study.md), and
+    :mod:`lynkeus.sections` has their types.
 
-class Study:
-    """Everything that is asked of a plant. Keys and sections are those of study files (docs/study.md).
+    Parameters
+    ----------
+    model : Model or path
+        The plant's equations.
+    measured, unknown, disturbances : list of str, optional
+        Outputs with sensors; inputs and parameters that nobody measures; inputs that the observer takes as
+        zero. As ``noise`` and ``limits`` they are keys of ``[sensors]``, which stand for themselves.
+    noise : mapping of str to float, str or dict, optional
+        Standard deviations by output, in its unit, ``"5%"`` of its value, or ``{"uniform": 0.1}``.
+    limits : mapping of str to list of float, optional
+        The ranges that sensors can show, ``[lowest, highest]`` in their units.
+    sensors : dict, optional
+        The section ``[sensors]`` as a whole.
+    process_noise : mapping of str to float, optional
+        Spectral densities by state and unknown input: variance per unit of time.
+    parameters : mapping of str to float, optional
+        Values that replace those of the model, in its units.
+    observer : dict or str, optional
+        The section ``[observer]``, or the name of a family.
+    box : mapping of str to float or list of float, optional
+        Ranges narrower than the model's, in its units.
+    certify, simulate, estimate, tune, plot : dict, optional
+        The sections of these names.
+    compare : dict or list of str, optional
+        The section ``[compare]``, or the names of families.
+    tables : str, optional
+        ``"linear"`` or ``"monotone"``: what the model's tables are between their points.
 
-    ``model`` is a :class:`Model`, or the path of one. ``measured``, ``unknown``, ``noise`` and the
-    like are keys of ``[sensors]``; ``observer`` may be the name of a family.
+    Raises
+    ------
+    InputError
+        A section or key that is not known, a value of another kind than its key takes, a model that cannot
+        be read.
 
-    Examples:
-        >>> import lynkeus
-        >>> model = lynkeus.Model.from_modelica('''
-        ...     model Tank
-        ...       input Real inflow(min = 0, max = 5);
-        ...       Real level(start = 4, min = 0.1, max = 10);
-        ...       output Real y = level;
-        ...     equation
-        ...       der(level) = inflow - 0.5*sqrt(level);
-        ...     end Tank;''')
-        >>> study = lynkeus.Study(model, unknown=["inflow"], observer={"theta": 1.0},
-        ...                       simulate={"until": 20, "output_step": 0.5, "inputs": {"inflow": 1.2}})
-        >>> run = study.simulate()
-        >>> float(abs(run["inflow_hat"][-1] - 1.2)) < 1e-3
-        True
+    Examples
+    --------
+    >>> import lynkeus
+    >>> model = lynkeus.Model.from_modelica('''
+    ...     model Tank
+    ...       input Real inflow(min = 0, max = 5);
+    ...       Real level(start = 4, min = 0.1, max = 10);
+    ...       output Real y = level;
+    ...     equation
+    ...       der(level) = inflow - 0.5*sqrt(level);
+    ...     end Tank;''')
+    >>> study = lynkeus.Study(model, unknown=["inflow"], observer={"theta": 1.0},
+    ...                       simulate={"until": 20, "output_step": 0.5, "inputs": {"inflow": 1.2}})
+    >>> run = study.simulate()
+    >>> float(abs(run["inflow_hat"][-1] - 1.2)) < 1e-3
+    True
     """
 
     def __init__(
         self,
         model: Model | str | os.PathLike[str],
         *,
-        measured: Sequence[str] | None = None,
-        unknown: Sequence[str] | None = None,
-        disturbances: Sequence[str] | None = None,
-        noise: Section | None = None,
-        limits: Section | None = None,
-        sensors: Section | None = None,
-        process_noise: Section | None = None,
-        parameters: Section | None = None,
-        observer: Section | str | None = None,
-        box: Section | None = None,
-        certify: Section | None = None,
-        simulate: Section | None = None,
-        estimate: Section | None = None,
-        tune: Section | None = None,
-        compare: Section | Sequence[str] | None = None,
-        plot: Section | None = None,
-        tables: str | None = None,
+        measured: Names | None = None,
+        unknown: Names | None = None,
+        disturbances: Names | None = None,
+        noise: Mapping[str, Number | str | SensorsNoise] | None = None,
+        limits: Mapping[str, Numbers] | None = None,
+        sensors: SensorsSection | None = None,
+        process_noise: ProcessNoiseSection | None = None,
+        parameters: ParametersSection | None = None,
+        observer: ObserverSection | Family | None = None,
+        box: BoxSection | None = None,
+        certify: CertifySection | None = None,
+        simulate: SimulateSection | None = None,
+        estimate: EstimateSection | None = None,
+        tune: TuneSection | None = None,
+        compare: CompareSection | Names | None = None,
+        plot: PlotSection | None = None,
+        tables: Literal["linear", "monotone"] | None = None,
     ) -> None:
         given = {
             "tables": tables,
@@ -117,15 +162,52 @@ class Study:
     @classmethod
     @takes(path=path_of, model=optional(word))
     def load(cls, path: str | os.PathLike[str], model: str | None = None) -> Study:
-        """A study file, or a model, which stands for the study in which every output is measured and
-        every input known; ``model`` chooses among several in its file. The plant's text is read as
-        well: the study goes without files from here on."""
+        """A study file with its plant: the study goes without files from here on.
+
+        Parameters
+        ----------
+        path : path
+            A study in TOML, or a model, which stands for the study in which every output is measured and every
+            input known.
+        model : str, optional
+            The model to take, where the plant's file holds several.
+
+        Returns
+        -------
+        Study
+            What the file says.
+
+        Raises
+        ------
+        InputError
+            There is no such file, or it cannot be read.
+        """
         return cls._of(_lynkeus.Study.load(os.fspath(path), model))
 
     @classmethod
     @takes(text=word, model=instance(Model, "a Model"), file=word)
     def parse(cls, text: str, model: Model, file: str = "study") -> Study:
-        """A study's text in TOML with its model; ``file`` is what messages call it."""
+        """A study's text with its model.
+
+        Parameters
+        ----------
+        text : str
+            The study in TOML.
+        model : Model
+            The plant's equations.
+        file : str
+            What messages call the text.
+
+        Returns
+        -------
+        Study
+            What the text says.
+
+        Raises
+        ------
+        InputError
+            The text is no study; its place is told.
+        """
         return cls._of(_lynkeus.Study.parse(valid(text), file, (model.name, model.text), model.choose))
 
     @property
@@ -142,12 +224,27 @@ class Study:
         name, text = plant
         return Model.load(name, self._core.model) if text is None else Model(text, name, self._core.model)
 
-    def replace(self, **changes: Any) -> Study:
+    def replace(self, **changes: Unpack[Changes]) -> Study:
         """The same study with other keys; those of a section are added to it:
-        ``study.replace(observer={"theta": 2.0}, parameters={"k": 0.1})``. A key that is ``None`` is
-        left out. What :class:`Study` takes briefly is taken here as well (``unknown=["inflow"]``,
-        ``compare=["ekf", "ukf"]``; ``observer="ekf"`` leaves no other tuning); ``plant`` is a :class:`Model` or
-        the path of one, ``model`` the name of the one to take in it."""
+        ``study.replace(observer={"theta": 2.0}, parameters={"k": 0.1})``.
+
+        Parameters
+        ----------
+        **changes
+            What :class:`Study` takes, briefly or not (``unknown=["inflow"]``, ``compare=["ekf", "ukf"]``;
+            ``observer="ekf"`` leaves no other tuning). A key that is ``None`` is left out. ``plant`` is a
+            :class:`Model` or the path of one, ``model`` the name of the one to take in it.
+
+        Returns
+        -------
+        Study
+            Another study; this one stays as it is.
+
+        Raises
+        ------
+        InputError
+            As of :class:`Study`.
+        """
         return Study._of(Base(self._core).changed(changes))
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
@@ -162,24 +259,90 @@ class Study:
         self,
         *,
         parameters: bool = False,
-        about: str | Sequence[str] = (),
+        about: str | Names = (),
         time_limit: float | None = None,
         memory_limit: float = MEMORY,
     ) -> Check:
-        """Which states, unknown inputs and (with ``parameters``) parameters can be known, and which
-        observers fit; ``about``: an expression, or several, to decide on. ``time_limit`` in seconds and ``memory_limit`` in
-        MiB, as everywhere: what a call may take until it ends with what is done by then."""
+        """Which states, unknown inputs and parameters can be known, and which observers fit.
+
+        Parameters
+        ----------
+        parameters : bool
+            Asks about the model's parameters as well.
+        about : str or list of str
+            An expression in Modelica, or several, to decide on as well.
+        time_limit : float, optional
+            What the call may take, in seconds: then it ends with what is done by then. As everywhere.
+        memory_limit : float
+            What it may take, in MiB. As everywhere.
+
+        Returns
+        -------
+        Check
+            ``recommended``, ``families`` with every condition, ``knowledge``, ``observability``.
+
+        Raises
+        ------
+        InputError
+            The study does not fit its model, or an expression cannot be read.
+        LimitError
+            A limit ended it before there was an answer.
+        """
         asked = [valid(x) for x in about]
         return Check(self._core.check(parameters, asked, time_limit, memory_limit))
 
     @takes(**LIMITS)
     def design(self, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Design:
-        """The observer, with its gains and certificate."""
+        """The observer, with its gains and certificate.
+
+        Parameters
+        ----------
+        time_limit : float, optional
+            What the call may take, in seconds.
+        memory_limit : float
+            What it may take, in MiB.
+
+        Returns
+        -------
+        Design
+            ``gain`` or ``injection``, ``parameters``, ``chains``, ``certificate``.
+
+        Raises
+        ------
+        InputError
+            The study does not fit its model.
+        RefusedError
+            No family fits, or a condition of the one that is asked for is refuted.
+        LimitError
+            A limit ended it before there was an answer.
+        """
         return Design(self._core.design(time_limit, memory_limit))
 
     @takes(**LIMITS)
     def certify(self, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Certificate:
-        """What can be proved of the observer."""
+        """What can be proved of the observer on the declared box.
+
+        Parameters
+        ----------
+        time_limit : float, optional
+            What the call may take, in seconds.
+        memory_limit : float
+            What it may take, in MiB.
+
+        Returns
+        -------
+        Certificate
+            ``verdict``, and ``certificate`` with ``rate``, ``ultimate_bound``, ``hypotheses``.
+
+        Raises
+        ------
+        InputError
+            The study does not fit its model.
+        RefusedError
+            No family fits, or a condition of the one that is asked for is refuted.
+        LimitError
+            A limit ended it before there was an answer.
+        """
         return Certificate(self._core.certify(time_limit, memory_limit))
 
     @takes(horizon=optional(real()), sensors=optional(word), **LIMITS)
@@ -187,17 +350,46 @@ class Study:
         self,
         *,
         horizon: float | None = None,
-        sensors: str | None = None,
+        sensors: Literal["outputs", "all"] | None = None,
         time_limit: float | None = None,
         memory_limit: float = MEMORY,
     ) -> HowWell:
-        """Standard errors for the declared noise; ``sensors``: try every ``"outputs"`` of the model, or
-        ``"all"`` with its states."""
+        """Standard errors that any estimate has at least, for the declared noise.
+
+        Parameters
+        ----------
+        horizon : float, optional
+            The longest span of readings, in the model's unit of time; that of ``[simulate]`` where it is
+            left out.
+        sensors : str, optional
+            Tries other sensors: every one of the ``"outputs"`` of the model, or ``"all"`` with its states.
+        time_limit : float, optional
+            What the call may take, in seconds.
+        memory_limit : float
+            What it may take, in MiB.
+
+        Returns
+        -------
+        HowWell
+            ``standard_error``, ``ranked``, ``advice``; columns over the span of readings.
+
+        Raises
+        ------
+        InputError
+            The study does not fit its model, or has no ``[simulate]``.
+        LimitError
+            A limit ended it before there was an answer.
+        """
         return HowWell(self._core.how_well(horizon, sensors, time_limit, memory_limit))
 
     @overload
     def simulate(
-        self, *, progress: Progress = ..., time_limit: float | None = ..., memory_limit: float = ...
+        self,
+        *,
+        runs: None = ...,
+        progress: Progress = ...,
+        time_limit: float | None = ...,
+        memory_limit: float = ...,
     ) -> Simulation: ...
     @overload
     def simulate(
@@ -217,7 +409,33 @@ class Study:
         time_limit: float | None = None,
         memory_limit: float = MEMORY,
     ) -> Simulation | MonteCarlo:
-        """The plant with its observer; ``runs``: so many of them with other noise and starts."""
+        """The plant with its observer, once or many times.
+
+        Parameters
+        ----------
+        runs : int, optional
+            So many runs with other noise and starts, at least 1.
+        progress : bool or function
+            Shows how far it is, or calls the function with the share that is done, from 0 to 1.
+        time_limit : float, optional
+            What the call may take, in seconds.
+        memory_limit : float
+            What it may take, in MiB.
+
+        Returns
+        -------
+        Simulation or MonteCarlo
+            A run, with ``runs`` what they have in common.
+
+        Raises
+        ------
+        InputError
+            The study cannot be run.
+        RefusedError
+            A condition is refuted, or the estimate diverges.
+        LimitError
+            A limit ended it before its first row.
+        """
         if runs is not None and runs < 1:
             raise InputError(f"runs: expected at least 1, found {runs}")
         with told(progress, "simulating") as tell:
@@ -228,163 +446,236 @@ class Study:
     @takes(progress=told_of, **LIMITS)
     def estimate(
         self,
-        log: Any,
+        log: LogLike,
         *,
         progress: Progress = False,
         time_limit: float | None = None,
         memory_limit: float = MEMORY,
     ) -> Estimation:
-        """A log through the observer: a path, a mapping of columns, a data frame, an Arrow table or a
-        simulation."""
+        """A log through the observer.
+
+        Parameters
+        ----------
+        log : path, mapping of columns, data frame, table or run
+            A file (CSV, Parquet), columns of shape (rows,) by their headers, a data frame of pandas or
+            polars, a table of Arrow, a structured array or a simulation.
+        progress : bool or function
+            Shows how far it is, or calls the function with the share that is done, from 0 to 1.
+        time_limit : float, optional
+            What the call may take, in seconds.
+        memory_limit : float
+            What it may take, in MiB.
+
+        Returns
+        -------
+        Estimation
+            Columns of estimates; ``final``, ``errors``, ``innovations``, ``doubts``.
+
+        Raises
+        ------
+        InputError
+            The study cannot be run, or the log lacks what it reads.
+        RefusedError
+            A condition is refuted, or the estimate diverges.
+        LimitError
+            A limit ended it before its first row.
+        """
         with told(progress, "estimating") as tell:
             return judged(Estimation(self._core.estimate(given(log), tell, time_limit, memory_limit)))
-
-    @overload
-    def estimate_each(
-        self,
-        logs: Any,
-        *,
-        by: str,
-        keep: Callable[[Estimation], Any] | None = ...,
-        workers: int | None = ...,
-        errors: Errors = ...,
-        progress: Progress = ...,
-        time_limit: float | None = ...,
-        memory_limit: float = ...,
-    ) -> dict[Hashable, Any]: ...
-    @overload
-    def estimate_each(  # type: ignore[overload-overlap]  # a mapping is no list, but for types
-        self,
-        logs: Mapping[Any, Any],
-        *,
-        keep: Callable[[Estimation], Any] | None = ...,
-        workers: int | None = ...,
-        errors: Errors = ...,
-        progress: Progress = ...,
-        time_limit: float | None = ...,
-        memory_limit: float = ...,
-    ) -> dict[Hashable, Any]: ...
-    @overload
-    def estimate_each(
-        self,
-        logs: Iterable[Any],
-        *,
-        keep: Callable[[Estimation], Any] | None = ...,
-        workers: int | None = ...,
-        errors: Errors = ...,
-        progress: Progress = ...,
-        time_limit: float | None = ...,
-        memory_limit: float = ...,
-    ) -> list[Any]: ...
-    @takes(by=optional(word), **_BATCH)
-    def estimate_each(
-        self,
-        logs: Any,
-        *,
-        by: str | None = None,
-        keep: Callable[[Estimation], Any] | None = None,
-        workers: int | None = None,
-        errors: Errors = "raise",
-        progress: Progress = False,
-        time_limit: float | None = None,
-        memory_limit: float = MEMORY,
-    ) -> list[Any] | dict[Hashable, Any]:
-        """Many logs through the observer, on all cores: what :meth:`estimate` gives for each, in their
-        order.
-
-        ``logs`` is a list of what :meth:`estimate` takes, or a mapping of them by name; with ``by`` one
-        table of all, in which that column names the asset of each row. Mappings and tables give a
-        dictionary by name. ``keep`` makes of each result what is kept of it: so thousands of them need
-        no memory. With ``errors="return"`` the exception of a log that fails stands in its place,
-        instead of ending the rest. ``workers`` are threads, as many as there are cores; ``time_limit``
-        is that of one log, in seconds, ``memory_limit`` that of all that run together, in MiB."""
-        options = Options(keep, workers, errors, progress, time_limit, memory_limit)
-        return _batches.estimate_each(self, logs, by, options)
-
-    @takes(changes=several("dictionaries as of replace"), **_BATCH)
-    def sweep(
-        self,
-        changes: Iterable[Section],
-        log: Any = None,
-        *,
-        keep: Callable[[Any], Any] | None = None,
-        workers: int | None = None,
-        errors: Errors = "raise",
-        progress: Progress = False,
-        time_limit: float | None = None,
-        memory_limit: float = MEMORY,
-    ) -> list[Any]:
-        """The study with each of the changes, simulated, or estimating from ``log``, on all cores.
-
-        A change is what :meth:`replace` takes: ``{"observer": {"theta": 2.0}, "simulate": {"seed": 7}}``.
-        The other options are those of :meth:`estimate_each`."""
-        options = Options(keep, workers, errors, progress, time_limit, memory_limit)
-        return _batches.sweep(self, changes, log, options)
 
     @takes(progress=told_of, **LIMITS)
     def tune(
         self,
-        log: Any = None,
+        log: LogLike | None = None,
         *,
         progress: Progress = False,
         time_limit: float | None = None,
         memory_limit: float = MEMORY,
     ) -> Sweep:
-        """The tuning of ``[tune]`` over its values, judged by simulation or by a log."""
+        """The tuning of ``[tune]`` over its values.
+
+        Parameters
+        ----------
+        log : path, mapping of columns, data frame, table or run, optional
+            What the values are judged by, as of :meth:`estimate`; simulation where it is left out.
+        progress : bool or function
+            Shows how far it is, or calls the function with the share that is done, from 0 to 1.
+        time_limit : float, optional
+            What the call may take, in seconds.
+        memory_limit : float
+            What it may take, in MiB.
+
+        Returns
+        -------
+        Sweep
+            A row for each value; ``knee``, ``nearly_as_good``.
+
+        Raises
+        ------
+        InputError
+            There is nothing to sweep, the study cannot be run, or the log lacks what it reads.
+        LimitError
+            A limit ended it before there was an answer.
+        """
         with told(progress, "tuning") as tell:
             return Sweep(self._core.tune(None if log is None else given(log), tell, time_limit, memory_limit))
 
     @takes(progress=told_of, **LIMITS)
     def compare(
         self,
-        log: Any = None,
+        log: LogLike | None = None,
         *,
         progress: Progress = False,
         time_limit: float | None = None,
         memory_limit: float = MEMORY,
     ) -> Comparison:
-        """Families side by side, on a simulation or on a log."""
+        """Families side by side.
+
+        Parameters
+        ----------
+        log : path, mapping of columns, data frame, table or run, optional
+            What they estimate from, as of :meth:`estimate`; a simulation where it is left out.
+        progress : bool or function
+            Shows how far it is, or calls the function with the share that is done, from 0 to 1.
+        time_limit : float, optional
+            What the call may take, in seconds.
+        memory_limit : float
+            What it may take, in MiB.
+
+        Returns
+        -------
+        Comparison
+            ``comparison["ekf"].rms``, ``families``.
+
+        Raises
+        ------
+        InputError
+            The study cannot be run, or the log lacks what it reads.
+        RefusedError
+            No family can be run.
+        LimitError
+            A limit ended it before there was an answer.
+        """
         with told(progress, "comparing") as tell:
             recorded = None if log is None else given(log)
             return warned(Comparison(self._core.compare(recorded, tell, time_limit, memory_limit)))
 
     def plant(self) -> Functions:
-        """The plant as functions, with the study's parameters and start."""
+        """The plant as functions of numbers.
+
+        Returns
+        -------
+        Functions
+            x' = f(t, x, u) and y = h(t, x, u), with the study's parameters and start.
+
+        Raises
+        ------
+        InputError
+            The plant cannot be read, or a parameter has no value.
+        """
         return Functions(self._core.functions(), (Study.plant, (self,)))
 
     @takes(**LIMITS)
     def observer(self, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Observer:
-        """The observer as functions of numbers, which python-control, CasADi, JAX and SciPy can run."""
+        """The observer as functions of numbers, which python-control, CasADi, JAX and SciPy can run.
+
+        Parameters
+        ----------
+        time_limit : float, optional
+            What the call may take, in seconds.
+        memory_limit : float
+            What it may take, in MiB.
+
+        Returns
+        -------
+        Observer
+            z' = f(t, z, w) and the estimates h(t, z, w).
+
+        Raises
+        ------
+        InputError
+            The study does not fit its model.
+        RefusedError
+            No family fits, or a condition of the one that is asked for is refuted.
+        LimitError
+            A limit ended it before there was an answer.
+        """
         return Observer(self._core.observer(time_limit, memory_limit), (Study.observer, (self,)))
 
     @takes(**EXPORT, **LIMITS)
     def export(
         self,
         folder: str | os.PathLike[str],
-        to: str = "c",
+        to: Literal["c", "js", "rust", "st", "fmu", "html"] = "c",
         *,
-        precision: str = "f64",
+        precision: Literal["f64", "f32"] = "f64",
         step: float | None = None,
         tunable: bool = False,
-        fmi: str = "3",
-        system: str | None = None,
+        fmi: Literal["3", "2"] = "3",
+        system: Literal["estimator", "plant", "observer"] | None = None,
         force: bool = False,
         time_limit: float | None = None,
         memory_limit: float = MEMORY,
     ) -> Export:
-        """The estimator for other machines, as files in a folder that is new or empty (``force``: that
-        may hold other files): ``to`` is ``"c"``, ``"js"``, ``"rust"``, ``"st"``, ``"fmu"`` (``fmi`` its version)
-        or ``"html"``; ``step`` is the longest step of the integration, instead of the study's; with
-        ``tunable`` θ, or what stands for it, may be changed while the estimator runs (an FMU has it
-        anyway). With ``to="fmu"`` the ``system`` is ``"estimator"``, or in continuous time ``"plant"`` or
-        ``"observer"``."""
+        """The estimator for other machines, as files.
+
+        Parameters
+        ----------
+        folder : path
+            A folder that is new or empty.
+        to : str
+            ``"c"``, ``"js"``, ``"rust"``, ``"st"``, ``"fmu"`` or ``"html"``.
+        precision : str
+            ``"f64"``, or ``"f32"``: numbers of 64 or 32 bits.
+        step : float, optional
+            The longest step of the integration in the model's unit of time, instead of the study's.
+        tunable : bool
+            θ, or what stands for it, may be changed while the estimator runs (an FMU has it anyway).
+        fmi : str
+            The version of an FMU, ``"3"`` or ``"2"``.
+        system : str, optional
+            Of an FMU: ``"estimator"``, or in continuous time ``"plant"`` or ``"observer"``.
+        force : bool
+            The folder may hold other files; what has the same names is replaced.
+        time_limit : float, optional
+            What the call may take, in seconds.
+        memory_limit : float
+            What it may take, in MiB.
+
+        Returns
+        -------
+        Export
+            ``files`` that were written, and ``notes``.
+
+        Raises
+        ------
+        InputError
+            The study does not fit its model, the folder holds files, or cannot be written to.
+        RefusedError
+            The observer cannot be exported, or a condition of it is refuted.
+        LimitError
+            A limit ended it before there was an answer.
+        """
         files, notes = self._core.export(
             to, precision, fmi, step, tunable, system, time_limit, memory_limit
         )
         return write(Path(folder), files, notes, force=force)
 
     def estimator(self) -> _lynkeus.Estimator:
-        """An estimator for samples that come one by one."""
+        """An estimator for samples that come one by one.
+
+        Returns
+        -------
+        Estimator
+            At its start, before the first sample.
+
+        Raises
+        ------
+        InputError
+            The study does not fit its model.
+        RefusedError
+            No family fits, or a condition of the one that is asked for is refuted.
+        """
         return self._core.estimator(self)
 
 

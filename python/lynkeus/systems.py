@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,23 +18,27 @@ if TYPE_CHECKING:
     import casadi
     import control
 
-Column = NDArray[np.float64]
-Input = float | Callable[[float], float]
+Column: TypeAlias = NDArray[np.float64]
+Input: TypeAlias = float | Callable[[float], float]
 
 
 class Pair(NamedTuple):
     """The two functions of a system, called alike: ``f(t, x, u)`` and ``h(t, x, u)``."""
 
     f: Any
+    """the derivatives of the states"""
     h: Any
+    """the outputs"""
 
 
 class Functions:
     """x' = f(t, x, u), y = h(t, x, u): a plant, or an observer (:class:`Observer`).
 
     ``states``, ``inputs`` and ``outputs`` are names, in the order of the entries of x, u and y;
-    ``start`` are the states at the start, NaN where the model gives none.
+    ``start`` are the states at the start, NaN where the model gives none. All are in the units of the model.
 
+    Examples
+    --------
     >>> import lynkeus
     >>> tank = lynkeus.Model.from_modelica('''
     ...     model Tank
@@ -53,9 +57,9 @@ class Functions:
     def __init__(self, core: _lynkeus.Functions, origin: tuple[Callable[..., Any], tuple[Any, ...]] | None = None) -> None:
         self._core = core
         self._origin = origin
-        self.states = core.states
-        self.inputs = core.inputs
-        self.outputs = core.outputs
+        self.states: list[str] = core.states
+        self.inputs: list[str] = core.inputs
+        self.outputs: list[str] = core.outputs
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._origin is None:
@@ -68,27 +72,122 @@ class Functions:
         return self._core.start
 
     def f(self, t: float, x: ArrayLike, u: ArrayLike = ()) -> Column:
-        """x', shape (n,)."""
+        """The derivatives of the states.
+
+        Parameters
+        ----------
+        t : float
+            The time, in the model's unit.
+        x : array_like
+            The states, shape (n,).
+        u : array_like
+            The inputs, shape (m,).
+
+        Returns
+        -------
+        numpy.ndarray
+            x', shape (n,).
+
+        Raises
+        ------
+        ArgumentError, InputError
+            A vector has no numbers, or not as many as there are names.
+        """
         return self._core.f(t, _vector("x", x), _vector("u", u))
 
     def h(self, t: float, x: ArrayLike, u: ArrayLike = ()) -> Column:
-        """y, shape (p,)."""
+        """The outputs.
+
+        Parameters
+        ----------
+        t : float
+            The time, in the model's unit.
+        x : array_like
+            The states, shape (n,).
+        u : array_like
+            The inputs, shape (m,).
+
+        Returns
+        -------
+        numpy.ndarray
+            y, shape (p,).
+
+        Raises
+        ------
+        ArgumentError, InputError
+            A vector has no numbers, or not as many as there are names.
+        """
         return self._core.h(t, _vector("x", x), _vector("u", u))
 
     def jacobian_x(self, t: float, x: ArrayLike, u: ArrayLike = ()) -> NDArray[np.float64]:
-        """∂f/∂x, shape (n, n), from the derivatives of the equations."""
+        """The slopes of f, from the derivatives of the equations.
+
+        Parameters
+        ----------
+        t : float
+            The time, in the model's unit.
+        x : array_like
+            The states, shape (n,).
+        u : array_like
+            The inputs, shape (m,).
+
+        Returns
+        -------
+        numpy.ndarray
+            ∂f/∂x, shape (n, n): a row for each derivative, a column for each state.
+
+        Raises
+        ------
+        ArgumentError, InputError
+            A vector has no numbers, or not as many as there are names.
+        """
         return self._core.jacobian_x(t, _vector("x", x), _vector("u", u))
 
     @takes(language=word)
-    def source(self, language: str = "python") -> str:
-        """A module with ``f(xp, t, x, u)`` and ``h(xp, t, x, u)``: in ``"python"`` ``xp`` is ``numpy``
-        or ``jax.numpy``; in ``"casadi"`` it is ``casadi``."""
+    def source(self, language: Literal["python", "casadi"] = "python") -> str:
+        """The text of a module with ``f(xp, t, x, u)`` and ``h(xp, t, x, u)``.
+
+        Parameters
+        ----------
+        language : str
+            In ``"python"`` ``xp`` is ``numpy`` or ``jax.numpy``; in ``"casadi"`` it is ``casadi``.
+
+        Returns
+        -------
+        str
+            The module.
+
+        Raises
+        ------
+        InputError
+            There is no such language.
+        RefusedError
+            An algebraic loop has to be searched for its root.
+        """
         return self._core.source(language)[0]
 
     @takes(inputs=optional(section))
     def driven(self, inputs: Mapping[str, Input] | None = None) -> Driven:
-        """The system with every input given as a number or as a function of time, for SciPy's
-        ``solve_ivp``: ``d = system.driven({"u": math.sin}); solve_ivp(d.rhs, (0, 9), d.start, jac=d.jac)``."""
+        """The system with every input given, for SciPy's ``solve_ivp``:
+        ``d = system.driven({"u": math.sin}); solve_ivp(d.rhs, (0, 9), d.start, jac=d.jac)``.
+
+        Parameters
+        ----------
+        inputs : mapping of str to float or function, optional
+            A number or a function of time for each input.
+
+        Returns
+        -------
+        Driven
+            ``rhs``, ``jac``, ``start``, ``outputs``.
+
+        Raises
+        ------
+        InputError
+            An input is missing, or there is none of a name.
+        RefusedError
+            It is a filter, whose correction is in updates.
+        """
         self._refuse_updates("driven")
         given = dict(inputs or {})
         if strangers := [name for name in given if name not in self.inputs]:
@@ -100,7 +199,25 @@ class Functions:
     @takes(name=optional(word))
     def to_nlsys(self, name: str | None = None) -> control.NonlinearIOSystem:
         """A system of python-control with named signals. Names hold no dot there: ``r1.v`` becomes
-        ``r1_v``."""
+        ``r1_v``.
+
+        Parameters
+        ----------
+        name : str, optional
+            What python-control calls it.
+
+        Returns
+        -------
+        control.NonlinearIOSystem
+            With the states, inputs and outputs of this one.
+
+        Raises
+        ------
+        ImportError
+            python-control is not installed.
+        RefusedError
+            It is a filter, whose correction is in updates.
+        """
         self._refuse_updates("to_nlsys")
         control = needed("control", "to_nlsys")
 
@@ -120,8 +237,20 @@ class Functions:
         )
 
     def to_casadi(self) -> Pair:
-        """``casadi.Function``s f and h of (t, x, u), of scalar operations unless linear systems are
-        solved in them."""
+        """The system in CasADi, of scalar operations unless linear systems are solved in it.
+
+        Returns
+        -------
+        Pair
+            ``casadi.Function``s f and h of (t, x, u).
+
+        Raises
+        ------
+        ImportError
+            CasADi is not installed.
+        RefusedError
+            An algebraic loop has to be searched for its root.
+        """
         casadi = needed("casadi", "to_casadi")
         text, has_systems = self._core.source("casadi")
         module = _executed(text)
@@ -138,8 +267,21 @@ class Functions:
         return Pair(function("f", "der"), function("h", "y"))
 
     def to_jax(self) -> Pair:
-        """Functions f and h of (t, x, u) over ``jax.numpy``, to be given to ``jit``, ``vmap`` and
-        ``grad``; in double precision where ``jax_enable_x64`` is set."""
+        """The system over ``jax.numpy``, to be given to ``jit``, ``vmap`` and ``grad``; in double precision where
+        ``jax_enable_x64`` is set.
+
+        Returns
+        -------
+        Pair
+            Functions f and h of (t, x, u).
+
+        Raises
+        ------
+        ImportError
+            JAX is not installed.
+        RefusedError
+            An algebraic loop has to be searched for its root.
+        """
         jnp = needed("jax.numpy", "to_jax")
         module = _executed(self._core.source("python")[0])
 
@@ -200,29 +342,86 @@ class Driven:
     """A system under inputs that are functions of time."""
 
     system: Functions
+    """the system"""
     inputs: tuple[Callable[[float], float], ...]
+    """its inputs, in their order"""
 
     @property
     def start(self) -> Column:
-        """States at the start."""
+        """States at the start, shape (n,)."""
         return self.system.start
 
     def u(self, t: float) -> Column:
-        """The inputs at a time."""
+        """The inputs at a time.
+
+        Parameters
+        ----------
+        t : float
+            The time, in the model's unit.
+
+        Returns
+        -------
+        numpy.ndarray
+            u, shape (m,).
+
+        Raises
+        ------
+        ArgumentError
+            A function of time gives no number.
+        """
         at = real()("t", t)
         named = zip(self.system.inputs, self.inputs, strict=True)
         return np.array([real(f"a number at t = {at}")(name, value(at)) for name, value in named])
 
     def rhs(self, t: float, x: ArrayLike) -> Column:
-        """x' = f(t, x, u(t)), shape (n,)."""
+        """The derivatives of the states under the inputs.
+
+        Parameters
+        ----------
+        t : float
+            The time, in the model's unit.
+        x : array_like
+            The states, shape (n,).
+
+        Returns
+        -------
+        numpy.ndarray
+            x' = f(t, x, u(t)), shape (n,).
+        """
         return self.system.f(t, x, self.u(t))
 
     def jac(self, t: float, x: ArrayLike) -> NDArray[np.float64]:
-        """∂x'/∂x, shape (n, n)."""
+        """Their slopes.
+
+        Parameters
+        ----------
+        t : float
+            The time, in the model's unit.
+        x : array_like
+            The states, shape (n,).
+
+        Returns
+        -------
+        numpy.ndarray
+            ∂x'/∂x, shape (n, n).
+        """
         return self.system.jacobian_x(t, x, self.u(t))
 
     def outputs(self, t: float, x: ArrayLike) -> Column:
-        """y = h(t, x, u(t)), shape (p,)."""
+        """The outputs under the inputs.
+
+        Parameters
+        ----------
+        t : float
+            The time, in the model's unit.
+        x : array_like
+            The states, shape (n,).
+
+        Returns
+        -------
+        numpy.ndarray
+            y = h(t, x, u(t)), shape (p,).
+        """
         return self.system.h(t, x, self.u(t))
 
 

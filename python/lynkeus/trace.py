@@ -135,11 +135,11 @@ class Value:
     __slots__ = ("arguments", "data", "graph", "op", "place")
 
     def __init__(self, graph: Graph, op: str, arguments: tuple[Value, ...], data: str) -> None:
-        self.graph = graph
-        self.op = op
-        self.arguments = arguments
-        self.data = data
-        self.place = graph.size
+        self.graph: Graph = graph
+        self.op: str = op
+        self.arguments: tuple[Value, ...] = arguments
+        self.data: str = data
+        self.place: int = graph.size
         graph.size += 1
 
     def __hash__(self) -> int:
@@ -263,12 +263,33 @@ class Value:
     def __index__(self) -> int:
         raise self._no_number()
 
-    def _no_rest(self, *_: Any) -> Any:
+    def _no_rest(self) -> Any:
         hint = "write `lynkeus.floor(a/b)` for the quotient, `a - b*lynkeus.floor(a/b)` for the rest"
         raise refusal("`//`, `%`, `divmod`, `round` and `trunc` of a traced value", here(), hint)
 
-    __floordiv__ = __rfloordiv__ = __mod__ = __rmod__ = _no_rest
-    __divmod__ = __rdivmod__ = __round__ = __trunc__ = _no_rest
+    def __floordiv__(self, other: Any) -> Any:
+        return self._no_rest()
+
+    def __rfloordiv__(self, other: Any) -> Any:
+        return self._no_rest()
+
+    def __mod__(self, other: Any) -> Any:
+        return self._no_rest()
+
+    def __rmod__(self, other: Any) -> Any:
+        return self._no_rest()
+
+    def __divmod__(self, other: Any) -> Any:
+        return self._no_rest()
+
+    def __rdivmod__(self, other: Any) -> Any:
+        return self._no_rest()
+
+    def __round__(self, digits: Any = None) -> Any:
+        return self._no_rest()
+
+    def __trunc__(self) -> Any:
+        return self._no_rest()
 
 
 def _infix(op: str, a: Any, b: Any) -> Any:
@@ -283,32 +304,48 @@ class Expr(Value):
     """A traced number."""
 
     __slots__ = ()
-    __hash__ = Value.__hash__
 
-    def _no_condition(self, other: Any) -> Any:
+    def _no_condition(self) -> Any:
         raise refusal("`&`, `|`, `^` and `~` join conditions", here(), "compare: `x > 0`; a power is `x**2`")
 
-    __and__ = __rand__ = __or__ = __ror__ = __xor__ = __rxor__ = _no_condition
+    def __and__(self, other: Any) -> Any:
+        return self._no_condition()
+
+    def __rand__(self, other: Any) -> Any:
+        return self._no_condition()
+
+    def __or__(self, other: Any) -> Any:
+        return self._no_condition()
+
+    def __ror__(self, other: Any) -> Any:
+        return self._no_condition()
+
+    def __xor__(self, other: Any) -> Any:
+        return self._no_condition()
+
+    def __rxor__(self, other: Any) -> Any:
+        return self._no_condition()
 
     def __invert__(self) -> Any:
-        return self._no_condition(None)
+        return self._no_condition()
 
 
 class Condition(Value):
     """A traced comparison, or several of them joined by ``&``, ``|`` and ``~``."""
 
     __slots__ = ()
-    __hash__ = Value.__hash__
 
     def __and__(self, other: Any) -> Any:
         return both(self, other)
 
-    __rand__ = __and__
+    def __rand__(self, other: Any) -> Any:
+        return both(self, other)
 
     def __or__(self, other: Any) -> Any:
         return either(self, other)
 
-    __ror__ = __or__
+    def __ror__(self, other: Any) -> Any:
+        return either(self, other)
 
     def __invert__(self) -> Any:
         return neither(self)

@@ -1,15 +1,21 @@
-"""The commands as functions: of a study, or of its path."""
+"""The commands as functions: of a study, or of its path.
+
+What they take beside the study, what they give and what they raise is that of :class:`Study`'s methods.
+"""
 
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import Literal, TypeAlias, overload
 
+from ._lynkeus import MEMORY
+from ._progress import Progress
+from ._types import LogLike, Names
 from .errors import ArgumentError
 from .results import Certificate, Check, Comparison, Design, Estimation, HowWell, MonteCarlo, Simulation, Sweep
 from .study import Study
 
-_Study = Study | str | os.PathLike[str]
+_Study: TypeAlias = Study | str | os.PathLike[str]
 
 
 def _study(study: _Study) -> Study:
@@ -20,42 +26,315 @@ def _study(study: _Study) -> Study:
     return Study.load(study)
 
 
-def check(study: _Study, **options: Any) -> Check:
-    """:meth:`Study.check`"""
-    return _study(study).check(**options)
+def check(
+    study: _Study,
+    *,
+    parameters: bool = False,
+    about: str | Names = (),
+    time_limit: float | None = None,
+    memory_limit: float = MEMORY,
+) -> Check:
+    """Which states, unknown inputs and parameters can be known, and which observers fit.
+
+    Parameters
+    ----------
+    study : Study or path
+        The study, or its file.
+    parameters : bool
+        Asks about the model's parameters as well.
+    about : str or list of str
+        An expression in Modelica, or several, to decide on as well.
+    time_limit : float, optional
+        What the call may take, in seconds.
+    memory_limit : float
+        What it may take, in MiB.
+
+    Returns
+    -------
+    Check
+        ``recommended``, ``families`` with every condition, ``knowledge``, ``observability``.
+
+    Raises
+    ------
+    InputError
+        The study does not fit its model, or an expression cannot be read.
+    LimitError
+        A limit ended it before there was an answer.
+    """
+    return _study(study).check(parameters=parameters, about=about, time_limit=time_limit, memory_limit=memory_limit)
 
 
-def design(study: _Study, **options: Any) -> Design:
-    """:meth:`Study.design`"""
-    return _study(study).design(**options)
+def design(study: _Study, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Design:
+    """The observer, with its gains and certificate.
+
+    Parameters
+    ----------
+    study : Study or path
+        The study, or its file.
+    time_limit : float, optional
+        What the call may take, in seconds.
+    memory_limit : float
+        What it may take, in MiB.
+
+    Returns
+    -------
+    Design
+        ``gain`` or ``injection``, ``parameters``, ``chains``, ``certificate``.
+
+    Raises
+    ------
+    InputError
+        The study does not fit its model.
+    RefusedError
+        No family fits, or a condition of the one that is asked for is refuted.
+    LimitError
+        A limit ended it before there was an answer.
+    """
+    return _study(study).design(time_limit=time_limit, memory_limit=memory_limit)
 
 
-def certify(study: _Study, **options: Any) -> Certificate:
-    """:meth:`Study.certify`"""
-    return _study(study).certify(**options)
+def certify(study: _Study, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Certificate:
+    """What can be proved of the observer on the declared box.
+
+    Parameters
+    ----------
+    study : Study or path
+        The study, or its file.
+    time_limit : float, optional
+        What the call may take, in seconds.
+    memory_limit : float
+        What it may take, in MiB.
+
+    Returns
+    -------
+    Certificate
+        ``verdict``, and ``certificate`` with ``rate``, ``ultimate_bound``, ``hypotheses``.
+
+    Raises
+    ------
+    InputError
+        The study does not fit its model.
+    RefusedError
+        No family fits, or a condition of the one that is asked for is refuted.
+    LimitError
+        A limit ended it before there was an answer.
+    """
+    return _study(study).certify(time_limit=time_limit, memory_limit=memory_limit)
 
 
-def how_well(study: _Study, **options: Any) -> HowWell:
-    """:meth:`Study.how_well`"""
-    return _study(study).how_well(**options)
+def how_well(
+    study: _Study,
+    *,
+    horizon: float | None = None,
+    sensors: Literal["outputs", "all"] | None = None,
+    time_limit: float | None = None,
+    memory_limit: float = MEMORY,
+) -> HowWell:
+    """Standard errors that any estimate has at least, for the declared noise.
+
+    Parameters
+    ----------
+    study : Study or path
+        The study, or its file.
+    horizon : float, optional
+        The longest span of readings, in the model's unit of time; that of ``[simulate]`` where it is left out.
+    sensors : str, optional
+        Tries other sensors: every one of the ``"outputs"`` of the model, or ``"all"`` with its states.
+    time_limit : float, optional
+        What the call may take, in seconds.
+    memory_limit : float
+        What it may take, in MiB.
+
+    Returns
+    -------
+    HowWell
+        ``standard_error``, ``ranked``, ``advice``; columns over the span of readings.
+
+    Raises
+    ------
+    InputError
+        The study does not fit its model, or has no ``[simulate]``.
+    LimitError
+        A limit ended it before there was an answer.
+    """
+    return _study(study).how_well(horizon=horizon, sensors=sensors, time_limit=time_limit, memory_limit=memory_limit)
 
 
-def simulate(study: _Study, **options: Any) -> Simulation | MonteCarlo:
-    """:meth:`Study.simulate`"""
-    found: Simulation | MonteCarlo = _study(study).simulate(**options)
-    return found
+@overload
+def simulate(
+    study: _Study,
+    *,
+    runs: None = ...,
+    progress: Progress = ...,
+    time_limit: float | None = ...,
+    memory_limit: float = ...,
+) -> Simulation: ...
+@overload
+def simulate(
+    study: _Study,
+    *,
+    runs: int,
+    progress: Progress = ...,
+    time_limit: float | None = ...,
+    memory_limit: float = ...,
+) -> MonteCarlo: ...
+def simulate(
+    study: _Study,
+    *,
+    runs: int | None = None,
+    progress: Progress = False,
+    time_limit: float | None = None,
+    memory_limit: float = MEMORY,
+) -> Simulation | MonteCarlo:
+    """The plant with its observer, once or many times.
+
+    Parameters
+    ----------
+    study : Study or path
+        The study, or its file.
+    runs : int, optional
+        So many runs with other noise and starts, at least 1.
+    progress : bool or function
+        Shows how far it is, or calls the function with the share that is done, from 0 to 1.
+    time_limit : float, optional
+        What the call may take, in seconds.
+    memory_limit : float
+        What it may take, in MiB.
+
+    Returns
+    -------
+    Simulation or MonteCarlo
+        A run, with ``runs`` what they have in common.
+
+    Raises
+    ------
+    InputError
+        The study cannot be run.
+    RefusedError
+        A condition is refuted, or the estimate diverges.
+    LimitError
+        A limit ended it before its first row.
+    """
+    asked = _study(study)
+    if runs is None:
+        return asked.simulate(progress=progress, time_limit=time_limit, memory_limit=memory_limit)
+    return asked.simulate(runs=runs, progress=progress, time_limit=time_limit, memory_limit=memory_limit)
 
 
-def estimate(study: _Study, log: Any, **options: Any) -> Estimation:
-    """:meth:`Study.estimate`"""
-    return _study(study).estimate(log, **options)
+def estimate(
+    study: _Study,
+    log: LogLike,
+    *,
+    progress: Progress = False,
+    time_limit: float | None = None,
+    memory_limit: float = MEMORY,
+) -> Estimation:
+    """A log through the observer.
+
+    Parameters
+    ----------
+    study : Study or path
+        The study, or its file.
+    log : path, mapping of columns, data frame, table or run
+        A file (CSV, Parquet), columns of shape (rows,) by their headers, a data frame of pandas or polars, a
+        table of Arrow, a structured array or a simulation.
+    progress : bool or function
+        Shows how far it is, or calls the function with the share that is done, from 0 to 1.
+    time_limit : float, optional
+        What the call may take, in seconds.
+    memory_limit : float
+        What it may take, in MiB.
+
+    Returns
+    -------
+    Estimation
+        Columns of estimates; ``final``, ``errors``, ``innovations``, ``doubts``.
+
+    Raises
+    ------
+    InputError
+        The study cannot be run, or the log lacks what it reads.
+    RefusedError
+        A condition is refuted, or the estimate diverges.
+    LimitError
+        A limit ended it before its first row.
+    """
+    return _study(study).estimate(log, progress=progress, time_limit=time_limit, memory_limit=memory_limit)
 
 
-def tune(study: _Study, log: Any = None, **options: Any) -> Sweep:
-    """:meth:`Study.tune`"""
-    return _study(study).tune(log, **options)
+def tune(
+    study: _Study,
+    log: LogLike | None = None,
+    *,
+    progress: Progress = False,
+    time_limit: float | None = None,
+    memory_limit: float = MEMORY,
+) -> Sweep:
+    """The tuning of ``[tune]`` over its values.
+
+    Parameters
+    ----------
+    study : Study or path
+        The study, or its file.
+    log : path, mapping of columns, data frame, table or run, optional
+        What the values are judged by; simulation where it is left out.
+    progress : bool or function
+        Shows how far it is, or calls the function with the share that is done, from 0 to 1.
+    time_limit : float, optional
+        What the call may take, in seconds.
+    memory_limit : float
+        What it may take, in MiB.
+
+    Returns
+    -------
+    Sweep
+        A row for each value; ``knee``, ``nearly_as_good``.
+
+    Raises
+    ------
+    InputError
+        There is nothing to sweep, the study cannot be run, or the log lacks what it reads.
+    LimitError
+        A limit ended it before there was an answer.
+    """
+    return _study(study).tune(log, progress=progress, time_limit=time_limit, memory_limit=memory_limit)
 
 
-def compare(study: _Study, log: Any = None, **options: Any) -> Comparison:
-    """:meth:`Study.compare`"""
-    return _study(study).compare(log, **options)
+def compare(
+    study: _Study,
+    log: LogLike | None = None,
+    *,
+    progress: Progress = False,
+    time_limit: float | None = None,
+    memory_limit: float = MEMORY,
+) -> Comparison:
+    """Families side by side.
+
+    Parameters
+    ----------
+    study : Study or path
+        The study, or its file.
+    log : path, mapping of columns, data frame, table or run, optional
+        What they estimate from; a simulation where it is left out.
+    progress : bool or function
+        Shows how far it is, or calls the function with the share that is done, from 0 to 1.
+    time_limit : float, optional
+        What the call may take, in seconds.
+    memory_limit : float
+        What it may take, in MiB.
+
+    Returns
+    -------
+    Comparison
+        ``comparison["ekf"].rms``, ``families``.
+
+    Raises
+    ------
+    InputError
+        The study cannot be run, or the log lacks what it reads.
+    RefusedError
+        No family can be run.
+    LimitError
+        A limit ended it before there was an answer.
+    """
+    return _study(study).compare(log, progress=progress, time_limit=time_limit, memory_limit=memory_limit)

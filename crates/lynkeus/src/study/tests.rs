@@ -50,7 +50,8 @@ fn every_key_arrives() {
     assert_eq!(tuning.initial.default, Some(0.5));
     assert_eq!(tuning.initial.values["x[1]"], 0.9);
     let S = tuning.values["S"].to_string();
-    assert_eq!(S, "[{ diag = [1.5, 2], off = [-0.5] }]");
+    let given = "[{ diag = [1.5, 2], off = [-0.5] }, { diag = [1], off = [] }]";
+    assert_eq!(S, given);
     assert!(tuning.clamp && tuning.flag("partials").unwrap());
     let simulate = study.simulate.unwrap();
     assert_eq!(simulate.method, Method::Rk4(Rk4Step::Length(0.01)));

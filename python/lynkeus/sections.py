@@ -1,0 +1,569 @@
+"""Sections of studies and their keys, for type checkers: what :class:`lynkeus.Study` and its ``replace`` take.
+
+A dictionary that is written in the call is checked by itself. One that is made beforehand says what it is::
+
+    from lynkeus.sections import ObserverSection
+
+    observer: ObserverSection = {"family": "triangular", "theta": 2.0}
+
+A key that is ``None`` is left out. Written by ``python/sections.py`` from the JSON Schema of study files.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Literal, NotRequired, TypeAlias, TypedDict
+
+from ._types import Matrix, Names, Nested, Number, Numbers, Whole
+from .model import Model
+
+#: names of observer families
+Family: TypeAlias = Literal[
+    "auto",
+    "triangular",
+    "block-triangular",
+    "state-affine",
+    "drift-observable",
+    "unknown-input",
+    "ekf",
+    "ukf",
+    "mhe",
+]
+
+
+class SensorsNoise(TypedDict):
+    """A value of ``noise`` in ``[sensors]``."""
+
+    uniform: Number
+    """every error up to ± this, in the output's unit, is equally likely and none is larger (number ≥ 0;
+    default: required)"""
+
+
+class SensorsSection(TypedDict, total=False):
+    """what is measured, what is unknown, how noisy (table; default: none)"""
+
+    limits: Mapping[str, Numbers] | None
+    """the range that a sensor can show. `simulate` shows no more than that, and `certify` proves nothing
+    where readings may leave it. A reading at an end only says "at most" or "at least": the filters take it
+    as a censored one, and `--how-well` counts what a clipped reading tells (Fisher's information); the
+    other families take it as it stands, and a note says how often (table: output = `[lowest, highest]`;
+    default: none)"""
+
+    measured: Names | None
+    """what the sensors see. The order counts: the first entry of `theta`, `S`, … belongs to the chain of the
+    first measured output (list of outputs; default: every output of the model)"""
+
+    unknown: Names | None
+    """inputs that nobody measures, estimated along with the state; and parameters, estimated as constants
+    (list of inputs and parameters; default: none)"""
+
+    disturbances: Names | None
+    """inputs that act on the plant and that the observer takes as zero (list of inputs; default: none)"""
+
+    noise: Mapping[str, Number | str | SensorsNoise] | None
+    """white measurement noise: its standard deviation, in the output's unit or as a share of its present
+    value; or uniform noise, every error up to ± the number (in the output's unit) equally likely and none
+    larger. Used by `simulate`, `tune`, the filters, `check --how-well` and `certify` (table: output =
+    number, text `"5%"`, or `{ uniform = number }`; default: no noise)"""
+
+
+#: spectral density (variance per unit of time) of white noise on a state's derivative; for an unknown input,
+#: how fast it wanders. Read by the filters, `sd` and `--how-well`; `simulate` moves the plant's states by it,
+#: and `certify` then bounds the error in mean square (table: name = number ≥ 0; default: 0; for an unknown
+#: input, from its range and the log's length)
+ProcessNoiseSection: TypeAlias = Mapping[str, Number | None]
+
+
+#: values that replace those of the plant (table: name = number; default: none)
+ParametersSection: TypeAlias = Mapping[str, Number | None]
+
+
+class ObserverS(TypedDict):
+    """A value of ``S`` in ``[observer]``."""
+
+    diag: Numbers
+    """on the diagonal (list of n numbers; default: required)"""
+
+    off: Numbers
+    """beside it (list of n − 1 numbers; default: required)"""
+
+
+class ObserverTransient(TypedDict):
+    """triangular, block-triangular: another θ up to a time, then the study's; `fall` is the time constant of
+    a smooth change (`{ theta = …, until = …, fall = … }`; default: none)"""
+
+    theta: Number | Numbers
+    """θ at the start (number > 0, or one per chain; default: required)"""
+
+    until: Number
+    """the time up to which it holds, on the axis of the study (number; default: required)"""
+
+    fall: NotRequired[Number]
+    """the time constant of the change (number > 0; default: at once)"""
+
+
+class ObserverSection(TypedDict, total=False):
+    """the observer family and its tuning"""
+
+    family: Family | None
+    """the observer family; `auto` takes the first with a theorem that is proved to fit, has its keys and is
+    fast enough for the run, else `ekf` (`"auto"`, `"triangular"`, `"block-triangular"`, `"state-affine"`,
+    `"drift-observable"`, `"unknown-input"`, `"ekf"`, `"ukf"`, `"mhe"`; default: `"auto"`)"""
+
+    initial: Mapping[str, Number] | None
+    """where the estimate starts; `default` holds for everything not listed (table: name = number, and
+    `default`; default: the plant's start values)"""
+
+    clamp: bool | None
+    """the plant's functions see the estimate limited to `[min, max]`; the reported estimate is never altered
+    (true, false; default: false)"""
+
+    theta: Number | Numbers | None
+    """triangular: the speed θ, in 1/(unit of time): larger converges faster, peaks higher and passes more
+    noise (number > 0, or one per chain; default: required); or block-triangular: θᵢ (number > 0, or one
+    per chain; default: required); or state-affine: the speed θ, in 1/(unit of time): the gain of block k
+    grows like θ^k. Theorem 1 is stated for θ ≥ 1, so choose a unit of time in which the entries of F are
+    of the order of 1 (number > 0; default: required); or unknown-input: θ1 for the unknown inputs and x₁¹,
+    θ2 for the rest (list of two numbers > 0, [θ1, θ2]; default: from the proof, where a bound exists)"""
+
+    delta: Number | Numbers | None
+    """triangular: the exponents δ of θ (number > 0, or one per chain; default: 1, and the middle of Theorem
+    2's window)"""
+
+    r: Number | Numbers | None
+    """triangular: the factor r of the gain; with Lemma 1 its ρ/2 (number > 0, or one per chain; default: 1)"""
+
+    gain: Literal["lemma1", "lmi"] | None
+    """triangular: where the gain comes from: Lemma 1's S (unless `S` is given), or a linear matrix inequality
+    (`"lemma1"`, `"lmi"`; default: `"lemma1"`); or block-triangular: a certified gain instead of the
+    paper's (`"lmi"`; default: by `k` or `k_poles`)"""
+
+    S: Sequence[ObserverS] | None
+    """triangular: explicit tridiagonal matrices: n numbers on the diagonal, n − 1 beside it (list of `{ diag
+    = […], off = […] }`, one per chain; default: Lemma 1's)"""
+
+    partials: bool | None
+    """triangular: divide the gain by the chain's partials at the estimate (true, false; default: false)"""
+
+    chains: Sequence[Names] | None
+    """triangular, block-triangular: the states of each chain, from the sensor outward (list of lists of
+    names; default: found)"""
+
+    leading: str | None
+    """triangular: which of several chains plays the first part in Theorem 2, where more than one can (name of
+    a measured output; default: the first chain that can; with `delta`, one for which it lies in the
+    window)"""
+
+    prolong: bool | None
+    """triangular, block-triangular: outside of the declared ranges the plant's functions are prolonged as the
+    papers ask, so that the theorem holds for every start of the estimate (true, false; default: false); or
+    state-affine: the observer runs on F(u, σ(x̂))x̂ + φ(u, σ(x̂)), σ the limits of the declared ranges, as
+    A2 asks: the theorem then holds for every start of the estimate (true, false; default: false)"""
+
+    rate: Number | None
+    """triangular, block-triangular: the decay to be proved, in 1/(unit of time) (number > 0; default:
+    required with `"lmi"` unless `gain_limit` is given)"""
+
+    gain_limit: Number | None
+    """triangular, block-triangular: the largest entry of the gain K on ŷ − y, with `"lmi"` (number > 0;
+    default: none)"""
+
+    minimise: Literal["noise", "gain", "peak"] | None
+    """triangular, block-triangular: what the gain makes small at that rate, with `"lmi"` (`"noise"`,
+    `"gain"`, `"peak"`; default: `"noise"`)"""
+
+    innovation_limit: Number | Numbers | None
+    """triangular, block-triangular: the correction sees the innovation limited to ± this: a remedy against
+    peaking (number > 0, or one per output; default: none)"""
+
+    transient: ObserverTransient | None
+    """triangular, block-triangular: another θ up to a time, then the study's; `fall` is the time constant of
+    a smooth change (`{ theta = …, until = …, fall = … }`; default: none)"""
+
+    form: Literal["standard", "low-power"] | None
+    """triangular, block-triangular: the observer with gains of order θ² at most, with `low_power_poles` or
+    `low_power_k` (`"standard"`, `"low-power"`; default: `"standard"`)"""
+
+    low_power_poles: Matrix | None
+    """triangular, block-triangular: with `form = "low-power"`: the eigenvalues of the form's error system
+    (one list per chain of 2n − 2 negative numbers; default: −1, −1, …)"""
+
+    low_power_k: Sequence[Matrix] | None
+    """triangular, block-triangular: with `form = "low-power"`: its coefficients (one list per chain of a pair
+    `[k1, k2]` per state but the last; default: by `low_power_poles`)"""
+
+    k: Matrix | None
+    """block-triangular: Kᵢ: the coefficients that place the poles of Aᵢ − KᵢCᵢ (list of lists of numbers, one
+    per chain; default: poles at −1)"""
+
+    k_poles: Matrix | None
+    """block-triangular: the eigenvalues of Aᵢ − KᵢCᵢ, instead of `k` (list of lists of negative numbers, one
+    per chain; default: −1, −1, …)"""
+
+    correction: Literal["lee", "classical"] | None
+    """block-triangular: observer (7), or (3) (`"lee"`, `"classical"`; default: `"lee"`)"""
+
+    order: Names | None
+    """block-triangular: the order of the blocks (list of every measured output; default: searched)"""
+
+    S0: Number | Matrix | None
+    """state-affine: S(0) = s·I, or the matrix; rows and columns in the order of the plant's states, then the
+    unknown inputs (number s > 0, or a matrix as a list of rows; default: 1)"""
+
+    alarm: Number | None
+    """state-affine: the flag is raised where `excitation` is below this (number > 0; default: see below)"""
+
+    partition: Names | None
+    """unknown-input: the outputs of x₁¹ (list of measured outputs; default: found)"""
+
+    variant: Literal["bounded", "theoretical", "practical"] | None
+    """drift-observable: which observer (`"bounded"`, `"theoretical"`, `"practical"`; default: see above)"""
+
+    poles: Nested | None
+    """drift-observable: the eigenvalues of A − KC, see below (n poles; for several outputs one list of μ_i
+    each, or the slowest pole of each; default: required, or `alpha`)"""
+
+    alpha: Number | None
+    """drift-observable: the decay α: poles by Lemma 3.2 instead, see below (number > 0; default: required, or
+    `poles`); or ukf: α, the spread of the sigma points: λ = α²(n + κ) − n (number > 0; default: 1)"""
+
+    beta: Number | None
+    """drift-observable: poles by Lemma 3.2 instead, with `alpha`, see below (number > 0; default: 1); or ukf:
+    β, what the first weight of the covariance gets on top (number; default: 0)"""
+
+    gamma: Number | None
+    """drift-observable: poles by Lemma 3.2 instead, with `alpha`, see below (number > 0; default: required
+    with `alpha`)"""
+
+    filter_poles: Number | Numbers | Matrix | Mapping[str, Number | Numbers | Matrix] | None
+    """drift-observable: the eigenvalues of the input filter (n − r poles or the slowest; for several inputs a
+    table `{ u = […], v = […] }`; default: 10 times the slowest pole, each 1.2 times the one before)"""
+
+    filter_initial: Number | Numbers | Mapping[str, Number | Numbers] | None
+    """drift-observable: x̂ₐ(0) (as `filter_poles`; default: the input's start value, then zeros)"""
+
+    indices: Whole | Sequence[Whole] | None
+    """drift-observable: how many derivatives of each output count (a whole number per measured output;
+    default: found)"""
+
+    input_derivatives: Number | Numbers | Mapping[str, Number | Numbers] | None
+    """drift-observable: bounds of |u'|, …, |u^(n−r)|, read by guarantees only (n − r numbers; for several
+    inputs a table; default: those of `[certify]`)"""
+
+    initial_variance: Mapping[str, Number] | None
+    """ekf, ukf, mhe: how uncertain the first estimate is: the variance of each state and unknown input;
+    `default` holds for everything not listed (table: name = number ≥ 0, and `default`; default: the square
+    of a quarter of the declared range (without a range: of the start value, or 1))"""
+
+    gate: Number | None
+    """ekf, ukf, mhe: a reading whose innovation exceeds so many of its standard deviations is rejected and
+    counted; after ten in a row the next is believed (number > 0; default: none)"""
+
+    bounds: Literal["project"] | None
+    """ekf, ukf: "project": the estimate is kept in the declared ranges `[min, max]`: after each prediction
+    and correction it is put to the nearest place inside by the covariance's metric, so that what is
+    correlated moves along; the covariance stays ("project"; default: none)"""
+
+    kappa: Number | None
+    """ukf: κ, with n + κ above 0; the defaults make the cubature filter (number; default: 0)"""
+
+    horizon: Whole | None
+    """mhe: samples over which the states are estimated anew at each sample, within `[min, max]` (whole number
+    ≥ 1; default: 10)"""
+
+
+#: ranges narrower than the model's `min` and `max` (table: name = number, or `[smallest, largest]`; default:
+#: none)
+BoxSection: TypeAlias = Mapping[str, Number | Numbers | None]
+
+
+class CertifySection(TypedDict, total=False):
+    """what a guarantee takes for granted (table; default: none)"""
+
+    tube: Number | None
+    """every state stays within this distance of its start value, too (number > 0; default: none)"""
+
+    slew: Mapping[str, Number] | None
+    """bounds of the rates of change of unknown inputs (table: unknown input = number > 0; default: 0:
+    constant)"""
+
+    input_derivatives: Mapping[str, Number | Numbers] | None
+    """bounds of |u'|, |u''|, …, for theorems that need them (table: known input = number ≥ 0, or a list of
+    them; default: none)"""
+
+
+class SimulateSection(TypedDict, total=False):
+    """how the plant and its observer are run together (table; default: none)"""
+
+    until: Number | None
+    """the last instant (number > `start`; default: required)"""
+
+    start: Number | None
+    """the first instant (number; default: 0)"""
+
+    output_step: Number | None
+    """spacing of the rows of the result (number > 0; default: 500 rows)"""
+
+    sample_step: Number | None
+    """spacing of the sensor's samples where there is noise (number > 0; default: `output_step`)"""
+
+    inputs: Mapping[str, Number | str] | None
+    """the plant's inputs, the unknown ones included; `pi` is known (table: name = number, or Modelica
+    expression of `time` as text; default: the inputs' start values)"""
+
+    initial: Mapping[str, Number] | None
+    """where the *plant* starts (table: name = number; default: the plant's start values)"""
+
+    seed: Whole | None
+    """seed of the noise and of `spread` (whole number ≥ 0; default: 0)"""
+
+    spread: Mapping[str, Number] | None
+    """standard deviation by which `simulate` moves where the plant starts, and the plant's parameters, from
+    run to run (normal, by the seed); the observer keeps the values of the model (table: state or parameter
+    (or an array of them) = number ≥ 0; default: none)"""
+
+    method: Literal["adaptive", "explicit", "stiff", "rk4"] | None
+    """step control with a solver chosen by the tool, with the explicit or the stiff one; or the classical
+    Runge–Kutta method with fixed steps (`"adaptive"`, `"explicit"`, `"stiff"`, `"rk4"`; default:
+    `"adaptive"`)"""
+
+    rtol: Number | None
+    """relative tolerance of the adaptive methods (number in [1e-13, 0.1]; default: 1e-9)"""
+
+    atol: Number | None
+    """absolute tolerance of the adaptive methods (number > 0; default: 1e-12)"""
+
+    step: Number | None
+    """longest step of `rk4` (number > 0; default: `substeps`)"""
+
+    substeps: Whole | None
+    """steps of `rk4` from one row to the next, where `step` is not given (whole number ≥ 1; default: 16)"""
+
+
+class EstimateGeneratorPoles(TypedDict):
+    """A value of ``generator.poles`` in ``[estimate]``."""
+
+    re: Number
+    """real part of both (number < 0; default: required)"""
+
+    im: Number
+    """imaginary part of one of them (number; default: required)"""
+
+
+class EstimateGenerator(TypedDict):
+    """A value of ``generator`` in ``[estimate]``."""
+
+    poles: Number | EstimateGeneratorPoles | Sequence[Number | EstimateGeneratorPoles]
+    """the filter's poles, as many as the observer reads of u, u', … or more; its gain is one (negative
+    number, or a list of them and of pairs `{ re, im }`; default: required)"""
+
+    initial: NotRequired[Number | Numbers]
+    """u, u', … at the first row (number, or list of numbers; default: the input's start value, then zeros)"""
+
+    command: NotRequired[str]
+    """the log's column of what the filter reads (text; default: `"<input>_command"`)"""
+
+
+class EstimateSection(TypedDict, total=False):
+    """how a log is replayed (table; default: none)"""
+
+    late: Number | None
+    """how late a row may come, in units of time: it is put in its place; one that is later says that the
+    clock jumped, and is refused (number > 0; default: ten usual steps)"""
+
+    smooth: bool | None
+    """also `<name>_smooth`, the estimate given all rows, later ones included (filters only) (true, false;
+    default: false)"""
+
+    lag: Whole | None
+    """also `<name>_smooth`, the estimate given so many later rows: causal with that delay (whole number ≥ 1;
+    default: none)"""
+
+    sd: bool | None
+    """also `<name>_sd`, the standard deviation of each estimate; with `smooth` or `lag` also
+    `<name>_smooth_sd` (true, false; default: false)"""
+
+    innovations: bool | None
+    """also `<name>_innovation` and `<name>_innovation_sd` of each measured output: its reading less what was
+    expected of it, and the standard deviation of that (what they are judged by) (true, false; default:
+    false)"""
+
+    between_samples: Literal["hold", "predict", "linear"] | None
+    """what the observer sees between two rows: the latest row, as a live observer would; what the model makes
+    of the latest reading (`w' = L_f h(x̂)`, the inter-sample predictor); or the straight line to the next,
+    which looks ahead one sample (`"hold"`, `"predict"`, `"linear"`; default: `"hold"`)"""
+
+    time: str | None
+    """header of the log's time column (text; default: `"t"`; `"time"` where the log has an output or an input
+    called `t`)"""
+
+    columns: Mapping[str, str] | None
+    """where the log's header names a signal differently (table: name = text; default: the plant's names)"""
+
+    input_derivatives: Mapping[str, str | Names] | None
+    """the log's columns of u', u'', … of a known input, for an observer that reads them (drift-observable,
+    `variant = "theoretical"`) (table: input = text, or list of texts; default: none)"""
+
+    generator: Mapping[str, Number | str | EstimateGenerator] | None
+    """what makes a known input, for an observer that reads u', u'', …: see below (table: input = expression
+    of `time`, or `{ poles, initial, command }`; default: none)"""
+
+    strict: bool | None
+    """refuse a log in which a cell that is read has no number, or whose times do not increase (`true`,
+    `false`; default: `false`)"""
+
+    method: Literal["adaptive", "explicit", "stiff", "rk4"] | None
+    """step control with a solver chosen by the tool, with the explicit or the stiff one; or the classical
+    Runge–Kutta method with fixed steps (`"adaptive"`, `"explicit"`, `"stiff"`, `"rk4"`; default:
+    `"adaptive"`)"""
+
+    rtol: Number | None
+    """relative tolerance of the adaptive methods (number in [1e-13, 0.1]; default: 1e-9)"""
+
+    atol: Number | None
+    """absolute tolerance of the adaptive methods (number > 0; default: 1e-12)"""
+
+    step: Number | None
+    """longest step of `rk4` (number > 0; default: `substeps`)"""
+
+    substeps: Whole | None
+    """steps of `rk4` from one row to the next, where `step` is not given (whole number ≥ 1; default: 16)"""
+
+
+#: A value of ``keys`` in ``[tune]``.
+TuneKeys = TypedDict(
+    "TuneKeys",
+    # from: the first value (number; default: a quarter of the study's value)
+    # to: the last value (number; default: four times the study's value)
+    # points: how many, ends included (whole number ≥ 2; default: 21)
+    # scale: equal ratios, or equal differences (`"log"`, `"linear"`; default: `"log"`)
+    {
+        "from": Number,
+        "to": Number,
+        "points": Whole,
+        "scale": Literal["log", "linear"],
+    },
+    total=False,
+)
+
+
+class TuneSection(TypedDict, total=False):
+    """which keys are swept, and what a value is judged by (table; default: none)"""
+
+    keys: Mapping[str, Numbers | TuneKeys] | None
+    """what is swept; several keys make a grid. The values of a key that is a list are factors on all its
+    numbers. `points` is 21, `scale` `"log"` (or `"linear"`) (table: key of `[observer]`, or an entry of
+    one such as `"theta[1]"` = list of numbers, or `{ from, to, points, scale }`; default: see tuning)"""
+
+    tolerance: Number | None
+    """error, as a share of the range, below which an estimate is settled (number between 0 and 1; default:
+    0.05)"""
+
+    disturbance: Mapping[str, Number | str] | None
+    """added to inputs of the plant, unseen by the observer, for the ultimate bound (table: input = number, or
+    expression of `time`; default: none)"""
+
+    held_out: Number | None
+    """on a log: share of each block that is held out (number between 0 and 1; default: 0.25)"""
+
+    blocks: Whole | None
+    """on a log: number of blocks (whole number ≥ 2; default: 20)"""
+
+
+class CompareSection(TypedDict, total=False):
+    """which families are compared (table; default: none)"""
+
+    families: Names | None
+    """what `compare` runs; each gets the keys of `[observer]` that it owns (list of families; default: every
+    family that is not refuted, and the filters)"""
+
+
+class PlotSection(TypedDict, total=False):
+    """what is drawn (table; default: none)"""
+
+    show: Names | None
+    """the quantities to draw, one panel each (list of names; default: unknown inputs, hidden states, then
+    what is measured; six at most)"""
+
+    time_unit: str | None
+    """the unit on the time axis (text; default: none)"""
+
+
+class Sections(TypedDict, total=False):
+    """What :class:`lynkeus.Study` takes beside its model."""
+
+    measured: Names | None
+    """what the sensors see. The order counts: the first entry of `theta`, `S`, … belongs to the chain of the
+    first measured output (list of outputs; default: every output of the model)"""
+
+    unknown: Names | None
+    """inputs that nobody measures, estimated along with the state; and parameters, estimated as constants
+    (list of inputs and parameters; default: none)"""
+
+    disturbances: Names | None
+    """inputs that act on the plant and that the observer takes as zero (list of inputs; default: none)"""
+
+    noise: Mapping[str, Number | str | SensorsNoise] | None
+    """white measurement noise: its standard deviation, in the output's unit or as a share of its present
+    value; or uniform noise, every error up to ± the number (in the output's unit) equally likely and none
+    larger. Used by `simulate`, `tune`, the filters, `check --how-well` and `certify` (table: output =
+    number, text `"5%"`, or `{ uniform = number }`; default: no noise)"""
+
+    limits: Mapping[str, Numbers] | None
+    """the range that a sensor can show. `simulate` shows no more than that, and `certify` proves nothing
+    where readings may leave it. A reading at an end only says "at most" or "at least": the filters take it
+    as a censored one, and `--how-well` counts what a clipped reading tells (Fisher's information); the
+    other families take it as it stands, and a note says how often (table: output = `[lowest, highest]`;
+    default: none)"""
+
+    sensors: SensorsSection | None
+    """what is measured, what is unknown, how noisy (table; default: none)"""
+
+    process_noise: ProcessNoiseSection | None
+    """spectral density (variance per unit of time) of white noise on a state's derivative; for an unknown
+    input, how fast it wanders. Read by the filters, `sd` and `--how-well`; `simulate` moves the plant's
+    states by it, and `certify` then bounds the error in mean square (table: name = number ≥ 0; default: 0;
+    for an unknown input, from its range and the log's length)"""
+
+    parameters: ParametersSection | None
+    """values that replace those of the plant (table: name = number; default: none)"""
+
+    observer: ObserverSection | Family | None
+    """the observer family and its tuning"""
+
+    box: BoxSection | None
+    """ranges narrower than the model's `min` and `max` (table: name = number, or `[smallest, largest]`;
+    default: none)"""
+
+    certify: CertifySection | None
+    """what a guarantee takes for granted (table; default: none)"""
+
+    simulate: SimulateSection | None
+    """how the plant and its observer are run together (table; default: none)"""
+
+    estimate: EstimateSection | None
+    """how a log is replayed (table; default: none)"""
+
+    tune: TuneSection | None
+    """which keys are swept, and what a value is judged by (table; default: none)"""
+
+    compare: CompareSection | Names | None
+    """which families are compared (table; default: none)"""
+
+    plot: PlotSection | None
+    """what is drawn (table; default: none)"""
+
+    tables: Literal["linear", "monotone"] | None
+    """what the plant's tables are between their points: straight lines, or monotone cubics, whose slopes do
+    not jump (`"linear"`, `"monotone"`; default: `"linear"`)"""
+
+
+class Changes(Sections, total=False):
+    """What :meth:`lynkeus.Study.replace` takes, and each change of :meth:`lynkeus.Study.sweep`."""
+
+    plant: Model | str | os.PathLike[str]
+    """the model, or the path of one"""
+
+    model: str | None
+    """which model, where the text of the plant holds several"""
