@@ -53,7 +53,8 @@ fn main() -> ExitCode {
     let outcome = match (task, arguments.len()) {
         ("test", 1) => test(),
         ("ci", 1) => ci(),
-        ("chores", 1) => run(&mut cargo(&["test", "--package", "chores"])),
+        // with the features of the whole, so that nothing is compiled twice
+        ("chores", 1) => run(&mut cargo(&["test", "--workspace", "--bin", "chores"])),
         ("package", 1) => package::interpreter().and_then(|python| package::test(&python)),
         ("site", 1) => package::site(),
         _ if CHORES.contains(&task) => {
