@@ -75,7 +75,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs every test. `cargo test` comes last, so its summary closes the output.
+/// Runs every test, those of the Python package beside those in Rust.
 fn test() -> Result<(), String> {
     begins("the Python environments");
     let mut tests = cargo(&["test", "--workspace", "--exclude", "chores"]);
@@ -83,11 +83,14 @@ fn test() -> Result<(), String> {
         Some(path) => tests.env(python::VARIABLE, path),
         None => tests.env_remove(python::VARIABLE),
     };
-    if let Some(python) = found(package::interpreter(), "the tests of the Python package")? {
-        package::test(&python)?;
+    let mut rust = || {
+        begins("the tests in Rust");
+        run(&mut tests)
+    };
+    match found(package::interpreter(), "the tests of the Python package")? {
+        Some(python) => package::test_beside(&python, rust),
+        None => rust(),
     }
-    begins("the tests in Rust");
-    run(&mut tests)
 }
 
 /// An interpreter for something; none where that is skipped, with a word.

@@ -1,7 +1,7 @@
 //! The Python package, built as a wheel, installed into an environment of its own and tested there; and the
 //! documentation site, which shows it.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -20,6 +20,45 @@ const COMMAND: &str = "LYNKEUS_COMMAND";
 /// # Errors
 /// What is missing, or what failed.
 pub fn test(python: &Path) -> Result<(), String> {
+    prepare(python)?;
+    begins("the tests of the Python package");
+    run(&mut tests(python))?;
+    types(python)
+}
+
+/// Builds and installs it, then runs its tests while something else is done: they need one core, and what
+/// they print is shown behind that.
+///
+/// # Errors
+/// What is missing, or what failed, of either.
+pub fn test_beside(
+    python: &Path,
+    other: impl FnOnce() -> Result<(), String>,
+) -> Result<(), String> {
+    prepare(python)?;
+    let log = target().join("package").join("tests.log");
+    let cannot = |error: std::io::Error| format!("cannot write {}: {error}", log.display());
+    let file = File::create(&log).map_err(cannot)?;
+    let mut tests = tests(python);
+    tests.stdout(file.try_clone().map_err(cannot)?).stderr(file);
+    let running = tests.spawn();
+    let mut running = running.map_err(|error| format!("cannot start the tests: {error}"))?;
+    let done = other();
+    begins("what the tests of the Python package say, which ran beside");
+    let status = running.wait();
+    eprint!("{}", fs::read_to_string(&log).unwrap_or_default());
+    done?;
+    match status {
+        Ok(status) if status.success() => types(python),
+        Ok(status) => Err(format!(
+            "the tests of the Python package ended with {status}"
+        )),
+        Err(error) => Err(format!("the tests of the Python package: {error}")),
+    }
+}
+
+/// Builds and installs it, and what its tests compare with.
+fn prepare(python: &Path) -> Result<(), String> {
     begins("the Python package, as a wheel");
     let wheel = wheel(python)?;
     let mut install = Command::new(python);
@@ -36,8 +75,10 @@ pub fn test(python: &Path) -> Result<(), String> {
         "--exclude",
         "chores",
         "--no-run",
-    ]))?;
-    begins("the tests of the Python package");
+    ]))
+}
+
+fn tests(python: &Path) -> Command {
     let command = target().join("debug").join("lynkeus");
     let command = command.with_extension(std::env::consts::EXE_EXTENSION);
     let mut tests = Command::new(python);
@@ -45,11 +86,13 @@ pub fn test(python: &Path) -> Result<(), String> {
         .args(["-m", "pytest", "-q", "-p", "no:cacheprovider"])
         .env(COMMAND, command)
         .current_dir(root());
-    run(&mut tests)?;
+    tests
+}
+
+fn types(python: &Path) -> Result<(), String> {
     begins("the types of the Python package");
     let mut types = Command::new(python);
-    types.args(["-m", "mypy"]).current_dir(root());
-    run(&mut types)
+    run(types.args(["-m", "mypy"]).current_dir(root()))
 }
 
 /// The interpreter of its environment.
