@@ -17,8 +17,10 @@ mod head;
 mod target;
 
 pub(crate) use device::{causal, printed};
+#[cfg(feature = "tune")]
+pub(crate) use head::file_name;
 use head::{about, beyond_float};
-pub(crate) use head::{designed, file_name, origin};
+pub(crate) use head::{designed, origin};
 pub use target::{Artifact, Export, ExportOptions, Subject, Target};
 use target::{Declared, Writes};
 

@@ -8,17 +8,20 @@ use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::{Design, Observer};
 use lynkeus_run::{Role, Simulation, System};
 
+#[cfg(feature = "tune")]
+use crate::Table;
 use crate::course::{Course, Samples};
 use crate::crew::within;
 use crate::fixed_steps::unlocated;
-use crate::headers::log_time;
+#[cfg(feature = "tune")]
+use crate::headers::{header, log_time};
 use crate::outcome::{Raw, interrupted, is_answer, measurements, settle};
 use crate::prepare::{Prepared, StudyDesign};
 use crate::recorded::Recorded;
 use crate::spread::Spread;
 use crate::study::SimulateSettings;
 use crate::systems::{self, method, settings};
-use crate::{Error, Outcome, Quantity, Series, Study, Table, estimate, headers, prepare};
+use crate::{Error, Outcome, Quantity, Series, Study, estimate, prepare};
 use noise::{noise, stirred};
 
 /// Runs the study's plant with its observer; `watch` is told the fraction done
@@ -279,7 +282,7 @@ pub(crate) fn recorded(study: &Study, plant: &Plant, step: f64) -> Result<Table,
     let inputs = own(&plant.inputs, Role::Input);
     let seen = own(&plant.outputs, Role::Measured).into_iter();
     let seen = seen.chain(inputs.clone());
-    let seen = seen.map(|(name, values)| (headers::header(settings, &name).to_owned(), values));
+    let seen = seen.map(|(name, values)| (header(settings, &name).to_owned(), values));
     let time = (log_time(plant, settings), run.times().to_vec());
     let truth = own(&plant.states, Role::State).into_iter().chain(inputs);
     let table = Table::from_columns([time].into_iter().chain(seen).collect())?;

@@ -3,7 +3,9 @@
 use std::fmt;
 
 use lynkeus_structure::{self as structure, Blind, Place, Point, Uniformity};
-use lynkeus_words::{Words, counted};
+use lynkeus_words::Words;
+#[cfg(feature = "plot")]
+use lynkeus_words::counted;
 use serde_json::{Map, Value, json};
 
 use crate::words::{number, side};

@@ -50,6 +50,7 @@ impl ObserverSettings {
     }
 
     /// Messages about `key` are to blame another place, where its value comes from.
+    #[cfg(feature = "tune")]
     pub(crate) fn comes_from(&mut self, key: &str, place: &Place) {
         self.places.insert(key.to_owned(), place.clone());
     }
