@@ -77,7 +77,8 @@ fn memory_does_not_grow_with_the_rows() {
     let (short, long) = (peaks(SHORT), peaks(LONG));
     assert_eq!(folder.read("out.csv").lines().count(), LONG + 1);
     for (short, long) in short.into_iter().zip(long) {
-        assert!(long < short + 12 * 1024, "{short} KiB and {long} KiB");
+        // 12 MiB more where the result were held
+        assert!(long < short + 6 * 1024, "{short} KiB and {long} KiB");
     }
 }
 
