@@ -22,6 +22,7 @@ use lynkeus_words::{Words, counted};
 use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
 use crate::study::Name;
+use crate::words::explain;
 use crate::words::{conditions, listed};
 use crate::{Error, ErrorKind, Study, calibrate, estimate, prepare};
 use knowledge::Sorted;
@@ -115,7 +116,7 @@ fn by_which(
     match graph.budgeted(part, examine) {
         Ok(examined) => {
             let examined: Result<_, lynkeus_expr::MissingInput> = examined;
-            let (determined, examined) = examined.map_err(Error::from_source)?;
+            let (determined, examined) = examined.map_err(explain)?;
             known = determined;
             report.uniform =
                 examined.map(|examined| Uniform::new(examined, &report.answer, &report.unknown));
@@ -216,7 +217,7 @@ fn knowledge(
         let of = |(assumption, answer): &mut (Assumption, Answer)| {
             found.settle(augmented, *assumption, answer);
             let known = Knowledge::new(augmented, *assumption, answer, &found);
-            let mut known = known.map_err(Error::from_source)?;
+            let mut known = known.map_err(explain)?;
             view.reserve(&mut known)?;
             Ok(known)
         };

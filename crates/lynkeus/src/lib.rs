@@ -73,7 +73,6 @@ mod course;
 mod crew;
 mod declared;
 mod design;
-mod error;
 mod estimate;
 mod expected;
 mod export;
@@ -95,7 +94,6 @@ mod live;
 mod mentioned;
 mod modes;
 pub mod monte_carlo;
-mod near;
 mod outcome;
 mod outside;
 #[cfg(feature = "plot")]
@@ -121,7 +119,6 @@ mod thrifty;
 mod tunable;
 #[cfg(feature = "tune")]
 pub mod tune;
-pub mod visible;
 mod words;
 
 pub use accuracy::{Accuracy, Coverage, Settling};
@@ -135,7 +132,6 @@ pub use compare::{Against, Compared, Comparison, Interval, Resolution, Run, Sett
 pub use correction::{Correction, GainEntry, InjectionEntry};
 pub use declared::Account;
 pub use design::{DesignReport, design};
-pub use error::{Error, ErrorKind};
 pub use estimate::{estimate, estimate_resumed};
 pub use export::{Artifact, Export, ExportOptions, Subject, Target, export};
 #[cfg(feature = "plot")]
@@ -161,6 +157,9 @@ pub use table::Table;
 #[cfg(feature = "tune")]
 pub use tune::tune;
 
+pub use words::explain;
+
+pub use lynkeus_answer::{Error, ErrorKind, near, visible};
 pub use lynkeus_export::curly::c::Precision;
 pub use lynkeus_export::curly::fmu::Version as FmiVersion;
 

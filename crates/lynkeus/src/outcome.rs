@@ -11,7 +11,6 @@ use crate::accuracy::{self, Accuracy};
 use crate::assertions;
 use crate::course::Course;
 use crate::declared::{Account, Declared};
-use crate::error::in_words;
 use crate::frozen::Frozen;
 use crate::headers::{Headers, log_time};
 use crate::interval::Intervals;
@@ -20,6 +19,7 @@ use crate::outside::{self, Outside, outside};
 use crate::prepare::{Prepared, StudyDesign};
 use crate::study::EstimateSettings;
 use crate::systems::hat;
+use crate::words::in_words;
 use crate::{Error, Quantity, Series, Study, expected, headers, saturated};
 
 /// The trust in an estimate over time, and whether it was ever lost.

@@ -8,7 +8,6 @@ use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::{Design, Observer};
 use lynkeus_run::{Role, Simulation, System};
 
-#[cfg(feature = "tune")]
 use crate::Table;
 use crate::course::{Course, Samples};
 use crate::crew::within;
@@ -21,6 +20,8 @@ use crate::recorded::Recorded;
 use crate::spread::Spread;
 use crate::study::SimulateSettings;
 use crate::systems::{self, method, settings};
+#[cfg(feature = "tune")]
+use crate::words::explain;
 use crate::{Error, Outcome, Quantity, Series, Study, estimate, prepare};
 use noise::{noise, stirred};
 
@@ -93,7 +94,7 @@ impl Spread {
             }
         };
         let start = self.start(&plant, seed);
-        plant.with_start(start).map_err(Error::from_source)
+        plant.with_start(start).map_err(explain)
     }
 }
 
@@ -139,7 +140,7 @@ impl Rig {
         let start = systems::starts(plant, &settings.initial)?;
         let system = self.simulation.plant.with_start(start);
         let mut simulation = Simulation {
-            plant: system.map_err(Error::from_source)?,
+            plant: system.map_err(explain)?,
             noise: noise(study, settings, plant)?,
             ..self.simulation
         };

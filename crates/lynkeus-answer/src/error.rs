@@ -3,8 +3,6 @@
 use std::fmt;
 use std::sync::Arc;
 
-use lynkeus_run::Error as RunError;
-
 use crate::visible;
 
 /// What kind of answer an [`Error`] is; the command's exit code follows from it.
@@ -56,12 +54,7 @@ impl Error {
     /// An error in what the user gave, in the words of the error that tells it; that error
     /// is the [source](std::error::Error::source).
     pub fn from_source(source: impl std::error::Error + Send + Sync + 'static) -> Self {
-        let text = source.to_string();
-        let first: &(dyn std::error::Error + 'static) = &source;
-        let run = std::iter::successors(Some(first), |error| error.source())
-            .filter_map(|error| error.downcast_ref::<RunError>())
-            .find(|error| error.to_string() == text);
-        Self::input(run.map_or(text, in_words)).caused_by(source)
+        Self::input(source.to_string()).caused_by(source)
     }
 
     fn new(kind: ErrorKind, message: String) -> Self {
@@ -127,25 +120,6 @@ impl Error {
     /// What to do about it, when something is known.
     pub fn remedy(&self) -> Option<&str> {
         self.hint.as_deref()
-    }
-}
-
-/// Why a run ended, with what a study can do about it.
-pub(crate) fn in_words(error: &RunError) -> String {
-    match error {
-        RunError::StepBudget {
-            time,
-            until,
-            steps,
-            chatters,
-            state,
-        } => format!(
-            "{steps} steps took the integration only to t = {time}, on the way to {until}: {chatters}a gain is too high or a relay or a threshold of the state chatters; lower the gain, smooth what jumps, loosen `rtol`, or set method = \"stiff\" or \"rk4\"; the state is {state}"
-        ),
-        RunError::DeviationDiverged { .. } => {
-            format!("{error}; give smaller values in initial_variance or [process_noise]")
-        }
-        _ => error.to_string(),
     }
 }
 

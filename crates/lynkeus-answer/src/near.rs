@@ -1,10 +1,7 @@
 //! "Did you mean …?": the nearest of the names that would have been right.
 
 /// The candidate most like `name`, when one is near enough to be a slip of the pen.
-pub(crate) fn nearest<'a>(
-    name: &str,
-    candidates: impl IntoIterator<Item = &'a str>,
-) -> Option<&'a str> {
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let folded = name.to_lowercase();
     // one letter is like any word that begins with it
     let (least, most) = (name.len().div_ceil(2), 2 * name.len());
@@ -18,10 +15,7 @@ pub(crate) fn nearest<'a>(
 }
 
 /// The hint for a name that is none of `candidates`: the nearest, or all of them.
-pub(crate) fn suggest<'a>(
-    name: &str,
-    candidates: impl IntoIterator<Item = &'a str> + Clone,
-) -> String {
+pub fn suggest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str> + Clone) -> String {
     match nearest(name, candidates.clone()) {
         Some(near) => format!("did you mean \"{near}\"?"),
         None => format!("choose from: {}", list(candidates)),
@@ -29,7 +23,7 @@ pub(crate) fn suggest<'a>(
 }
 
 /// Names for a message, cut short when there are many: `a, b, c, … (17 more)`.
-pub(crate) fn list<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+pub fn list<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     const SHOWN: usize = 16;
     let names: Vec<&str> = names.into_iter().collect();
     if names.is_empty() {

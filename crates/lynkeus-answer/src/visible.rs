@@ -5,7 +5,12 @@
 
 use std::borrow::Cow;
 
-use lynkeus_export::is_hidden;
+/// Control characters, line and paragraph separators, and what changes the direction of writing: a
+/// reviewer would not see the code that a compiler reads.
+pub fn is_hidden(c: char) -> bool {
+    let reorders = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    c.is_control() || reorders || matches!(c, '\u{2028}' | '\u{2029}' | '\u{feff}')
+}
 
 /// Text for a terminal: everything but line ends and tabs that has no width of its own is
 /// written as `\u{1b}`.
