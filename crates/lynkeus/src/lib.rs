@@ -57,6 +57,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod accuracy;
+mod answer;
 mod assertions;
 mod calibrate;
 mod certify;
@@ -122,6 +123,7 @@ pub mod tune;
 mod words;
 
 pub use accuracy::{Accuracy, Coverage, Settling};
+pub use answer::Answer;
 pub use certify::{AtTheta, CertifyReport, Excitation, Excited, Strays, certify};
 pub use check::{Assumption, CheckOptions, Knowledge, Known, Next, Report, Reserve, check};
 pub use checkpoint::Checkpoint;
@@ -134,8 +136,6 @@ pub use declared::Account;
 pub use design::{DesignReport, design};
 pub use estimate::{estimate, estimate_resumed};
 pub use export::{Artifact, Export, ExportOptions, Subject, Target, export};
-#[cfg(feature = "plot")]
-pub use figure::figure;
 pub use frozen::Frozen;
 pub use incoming::Incoming;
 pub use interval::{Intervals, Sampled};
@@ -159,7 +159,7 @@ pub use tune::tune;
 
 pub use words::explain;
 
-pub use lynkeus_answer::{Error, ErrorKind, near, visible};
+pub use lynkeus_answer::{Document, Error, ErrorKind, document, near, visible};
 pub use lynkeus_export::curly::c::Precision;
 pub use lynkeus_export::curly::fmu::Version as FmiVersion;
 

@@ -5,11 +5,10 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 
+use lynkeus::Error;
 use lynkeus::precision::{self, Candidates};
-use lynkeus::{Error, Series};
 
 use super::inputs::Source;
-use super::output;
 use super::progress::Alive;
 use super::save::Results;
 
@@ -68,23 +67,9 @@ pub(super) fn how_well(source: &Source, options: &Options, json: bool) -> Result
     let report = lynkeus::precision(&source.study, &asked);
     drop(alive);
     let report = report?;
-    let columns = report.columns();
-    let columns: Vec<(String, Series)> = columns
-        .into_iter()
-        .map(|(name, values)| (name, values.into()))
-        .collect();
-    let columns: Vec<(String, &Series)> = columns
-        .iter()
-        .map(|(name, values)| (name.clone(), values))
-        .collect();
     let mut results = Results::default();
-    if let Some(path) = &options.plot {
-        results.picture(path, report.to_svg())?;
-    }
-    if let Some(path) = &options.output {
-        results.write(path, |to| output::table(path, &columns, to))?;
-    }
-    results.report(json, &report, || report.to_json());
+    results.files(&report, options.plot.as_deref(), options.output.as_deref())?;
+    results.answer(json, &report);
     results.keep()?;
     Ok(match report.is_positive() {
         true => ExitCode::SUCCESS,

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use lynkeus::{Error, Series};
+use lynkeus::Error;
 
 use super::files::Output;
 use super::inputs::Source;
@@ -25,22 +25,8 @@ pub(super) fn monte_carlo(
         found.notes.iter().for_each(|note| output::note(note));
     }
     let mut results = Results::default();
-    if let Some(path) = &output.plot {
-        let figure = found.figure(study.time_unit.as_deref(), study.show.as_deref());
-        results.picture(path, figure.and_then(|figure| figure.to_svg()))?;
-    }
-    if let Some(path) = &output.output {
-        let columns = found.columns().into_iter();
-        let columns: Vec<(String, Series)> = columns
-            .map(|(name, values)| (name, values.to_vec().into()))
-            .collect();
-        let columns: Vec<(String, &Series)> = columns
-            .iter()
-            .map(|(name, values)| (name.clone(), values))
-            .collect();
-        results.write(path, |to| output::table(path, &columns, to))?;
-    }
-    results.report(output.json, &found, || found.to_json());
+    results.files(&found, output.plot.as_deref(), output.output.as_deref())?;
+    results.answer(output.json, &found);
     results.keep()?;
     let code = match found.refusal() {
         None => ExitCode::SUCCESS,

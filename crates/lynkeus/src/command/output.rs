@@ -10,14 +10,14 @@ use serde_json::Value;
 /// Columns as a CSV file, or as a Parquet file if it is called so.
 pub(super) fn table(
     path: &Path,
-    columns: &[(String, &Series)],
+    columns: &[(String, Series)],
     mut to: &mut (dyn Write + Send),
 ) -> io::Result<()> {
     let names: Vec<_> = columns.iter().map(|c| visible::line(&c.0)).collect();
     let named: Vec<(&str, &Series)> = names
         .iter()
         .zip(columns)
-        .map(|(name, (_, values))| (name.as_ref(), *values))
+        .map(|(name, (_, values))| (name.as_ref(), values))
         .collect();
     #[cfg(feature = "parquet")]
     if table::is_parquet(path) {
@@ -30,11 +30,6 @@ pub(super) fn table(
 /// A JSON object as text.
 pub(super) fn json(value: &Value) -> String {
     visible::json(&format!("{value:#}\n")).into_owned()
-}
-
-/// A report as text.
-pub(super) fn text(report: &impl std::fmt::Display) -> String {
-    visible::lines(&report.to_string()).into_owned()
 }
 
 /// Text to standard output; a reader that went away (`| head`) is no error.

@@ -3,8 +3,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use lynkeus::{CheckOptions, Checkpoint, Error, Outcome, Study};
-use serde_json::Value;
+use lynkeus::{Answer, CheckOptions, Checkpoint, Error, Outcome};
 
 use super::files::Output;
 use super::inputs::{self, Source};
@@ -29,7 +28,7 @@ pub(super) fn check(
         let svg = report.picture().and_then(|picture| picture.to_svg());
         results.picture(path, svg)?;
     }
-    results.report(json, &report, || report.to_json());
+    results.answer(json, &report);
     results.keep()?;
     Ok(match report.is_positive() {
         true => ExitCode::SUCCESS,
@@ -43,7 +42,7 @@ pub(super) fn design(source: &Source, file: Option<&Path>, json: bool) -> Result
     let report = lynkeus::design(&source.study);
     drop(alive);
     let report = report?;
-    tell(file, json, &report, || report.to_json())?;
+    tell(file, json, &report)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -53,7 +52,7 @@ pub(super) fn certify(source: &Source, file: Option<&Path>, json: bool) -> Resul
     let report = lynkeus::certify(&source.study);
     drop(alive);
     let report = report?;
-    tell(file, json, &report, || report.to_json())?;
+    tell(file, json, &report)?;
     Ok(match report.is_refuted() {
         true => ExitCode::from(1),
         false => ExitCode::SUCCESS,
@@ -61,17 +60,12 @@ pub(super) fn certify(source: &Source, file: Option<&Path>, json: bool) -> Resul
 }
 
 /// A report as text or as JSON, to a file or to standard output.
-fn tell(
-    file: Option<&Path>,
-    json: bool,
-    report: &impl std::fmt::Display,
-    to_json: impl FnOnce() -> Value,
-) -> Result<(), Error> {
+fn tell(file: Option<&Path>, json: bool, answer: &dyn Answer) -> Result<(), Error> {
     let mut results = Results::default();
     match file {
-        None => results.report(json, report, to_json),
-        Some(path) if json => results.put(path, output::json(&to_json()))?,
-        Some(path) => results.put(path, output::text(report))?,
+        None => results.answer(json, answer),
+        Some(path) if json => results.put(path, output::json(&answer.to_json()))?,
+        Some(path) => results.put(path, answer.text())?,
     }
     results.keep()
 }
@@ -89,11 +83,10 @@ pub(super) fn simulate(
     progress.finish();
     let mut results = Results::default();
     if let Some(path) = log {
-        let columns = outcome.log(&source.study.estimate);
-        let columns = columns.map_err(|e| e.at(&source.study.file))?;
+        let columns = outcome.log()?;
         results.write(path, |to| output::table(path, &columns, to))?;
     }
-    let code = finish(&source.study, output, &outcome, true, results)?;
+    let code = finish(output, &outcome, results)?;
     Ok(limits::code(&source.study, code))
 }
 
@@ -128,7 +121,7 @@ pub(super) fn estimate(
     {
         output::note(&format!("went on after row {}", checkpoint.resumed()));
     }
-    let code = finish(study, output, &outcome, false, Results::default())?;
+    let code = finish(output, &outcome, Results::default())?;
     // a run that a limit ended goes on another time
     if let Some(checkpoint) = checkpoint.filter(|_| study.budget.marked().is_none()) {
         checkpoint.remove()?;
@@ -149,11 +142,8 @@ pub(super) fn compare(
     progress.finish();
     found.warnings().iter().for_each(|text| output::warn(text));
     let mut results = Results::default();
-    if let Some(path) = &output.plot {
-        let picture = found.picture(source.study.time_unit.as_deref());
-        results.picture(path, picture.to_svg())?;
-    }
-    results.report(output.json, &found, || found.to_json());
+    results.files(&found, output.plot.as_deref(), None)?;
+    results.answer(output.json, &found);
     results.keep()?;
     let code = match found.is_positive() {
         true => ExitCode::SUCCESS,
@@ -164,22 +154,15 @@ pub(super) fn compare(
 
 /// Everything is computed before the first file is written. Where nothing is asked for, and where
 /// all that is asked for is a picture that cannot be drawn, the columns are printed.
-fn finish(
-    study: &Study,
-    output: &Output,
-    outcome: &Outcome,
-    simulated: bool,
-    mut results: Results,
-) -> Result<ExitCode, Error> {
+fn finish(output: &Output, outcome: &Outcome, mut results: Results) -> Result<ExitCode, Error> {
     outcome.warnings.iter().for_each(|text| output::warn(text));
     if !output.quiet {
         outcome.notes.iter().for_each(|note| output::note(note));
     }
-    let columns = outcome.columns(simulated);
+    let columns = outcome.columns();
     let mut shown = output.json;
     if let Some(path) = &output.plot {
-        let figure = lynkeus::figure(outcome, study.time_unit.as_deref(), study.show.as_deref());
-        let svg = figure.and_then(|figure| figure.to_svg());
+        let svg = outcome.figure().and_then(|figure| figure.to_svg());
         shown |= svg.is_ok();
         results.picture(path, svg)?;
     }
@@ -192,7 +175,7 @@ fn finish(
         None => {}
     }
     if output.json {
-        results.print(&output::json(&outcome.to_json(simulated)));
+        results.print(&output::json(&outcome.to_json()));
     }
     results.keep()?;
     match outcome.refusal() {

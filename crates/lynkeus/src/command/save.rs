@@ -8,7 +8,7 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
-use lynkeus::{Error, interrupt};
+use lynkeus::{Answer, Error, interrupt};
 use tempfile::{NamedTempFile, SpooledTempFile};
 
 use super::{output, signals};
@@ -120,19 +120,30 @@ impl Results {
         self.printed.push_str(text);
     }
 
-    /// Adds what is told of the whole: JSON, or words for people where nothing else goes to standard
-    /// output.
-    pub fn report(
-        &mut self,
-        json: bool,
-        words: &impl std::fmt::Display,
-        to_json: impl FnOnce() -> serde_json::Value,
-    ) {
+    /// Adds an answer: JSON, or words for people where nothing else goes to standard output.
+    pub fn answer(&mut self, json: bool, answer: &dyn Answer) {
         if json {
-            self.print(&output::json(&to_json()));
+            self.print(&output::json(&answer.to_json()));
         } else if !self.has_printed() {
-            self.print(&output::text(words));
+            self.print(&answer.text());
         }
+    }
+
+    /// Adds the picture and the columns of an answer, where they are asked for.
+    pub fn files(
+        &mut self,
+        answer: &dyn Answer,
+        plot: Option<&Path>,
+        table: Option<&Path>,
+    ) -> Result<(), Error> {
+        if let (Some(path), Some(svg)) = (plot, answer.svg().transpose()) {
+            self.picture(path, svg)?;
+        }
+        if let Some(path) = table {
+            let columns = answer.columns();
+            self.write(path, |to| output::table(path, &columns, to))?;
+        }
+        Ok(())
     }
 
     /// Puts every result in its place.

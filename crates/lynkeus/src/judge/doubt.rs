@@ -49,7 +49,7 @@ pub struct Doubt {
 }
 
 impl Level {
-    fn word(self) -> &'static str {
+    pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Note => "note",
             Self::Warning => "warning",

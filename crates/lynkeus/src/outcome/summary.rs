@@ -6,10 +6,9 @@ use super::Outcome;
 use crate::{Doubt, Frozen, Intervals, Outside, Quantity, Series};
 
 impl Outcome {
-    /// The run in figures, as the command's `--json` prints it; `with_truth` as in
-    /// [`columns`](Self::columns).
-    pub fn to_json(&self, with_truth: bool) -> Value {
-        let columns = self.columns(with_truth);
+    /// The run in figures, as the command's `--json` prints it.
+    pub fn to_json(&self) -> Value {
+        let columns = self.columns();
         let object = |pairs: Vec<(String, Value)>| Value::Object(pairs.into_iter().collect());
         let estimated = || self.quantities.iter().filter(|q| q.estimate.is_some());
         let last = |q: &Quantity| json!(q.estimate.as_ref().and_then(Series::last));
