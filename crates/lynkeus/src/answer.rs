@@ -96,5 +96,4 @@ displayed!(
     crate::monte_carlo::MonteCarlo,
     crate::precision::Report
 );
-#[cfg(feature = "tune")]
 displayed!(crate::Comparison, crate::tune::Sweep);

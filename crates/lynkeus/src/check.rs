@@ -23,11 +23,11 @@ use serde_json::Value;
 
 use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
-use crate::study::Name;
 use crate::words::{condition, explain, listed};
 use crate::{Answer, Error, ErrorKind, Study, calibrate, estimate, prepare};
 use knowledge::Sorted;
 pub use knowledge::{Assumption, Knowledge, Known, Reserve};
+use lynkeus_study::Name;
 pub use next::Next;
 pub use report::{CheckOptions, Report};
 use reserves::View;
@@ -49,7 +49,6 @@ const UNIFORMITY: f64 = 0.2;
 pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
     let symbolic = prepare::symbolic_plant(study, BTreeSet::new())?;
     Declared::new(study, &symbolic)?;
-    #[cfg(feature = "tune")]
     crate::tune::refuse_strange_keys(study, true)?;
     let time = match study.budget.left() {
         Some(_) => study.budget.part(0.5),
@@ -256,7 +255,7 @@ impl Report {
     /// # Errors
     /// Another number of states, or a state without range.
     #[cfg(feature = "plot")]
-    pub fn picture(&self) -> Result<crate::plot::Plane, Error> {
+    pub fn picture(&self) -> Result<lynkeus_plot::Plane, Error> {
         match &self.uniform {
             Some(uniform) => uniform::picture(&self.plant, uniform.examined()),
             None => Err(Error::refused(format!(

@@ -12,10 +12,10 @@ use lynkeus_model::{Plant, Variable};
 use lynkeus_run::filter::Limits;
 use lynkeus_structure::{AugmentedPlant, range};
 
-use crate::study::{Name, Noise};
 use crate::words::explain;
 use crate::{Error, Study, calibrate, near, systems};
 pub use account::Account;
+use lynkeus_study::{Name, Noise};
 
 /// One kind of declaration: what is said of single quantities, by their names.
 #[derive(Clone, Debug, PartialEq)]

@@ -16,12 +16,12 @@ use crate::inputs::{are_logged, refuse_strays, supplied};
 use crate::outcome::{Raw, is_observers_answer, measurements, settle};
 use crate::prepare::{Prepared, StudyDesign};
 use crate::replay::{Watch, refuse_smoothing, replay};
-use crate::study::{BetweenSamples, EstimateSettings};
 use crate::systems::{self, method};
 use crate::words::explain;
 use crate::{
     Error, Outcome, Quantity, Series, Study, Table, filter, interval, lines, prepare, sampled,
 };
+use lynkeus_study::{BetweenSamples, EstimateSettings};
 
 /// Replays a log; `watch` is told the fraction done and may stop the replay.
 ///

@@ -12,10 +12,10 @@ use lynkeus_words::short;
 use crate::course::{Course, Samples};
 use crate::prepare::Prepared;
 use crate::replay::{Watch, replay};
-use crate::series::Store;
-use crate::study::Smoothing;
 use crate::words::explain;
 use crate::{Error, Series, Study};
+use lynkeus_study::Smoothing;
+use lynkeus_table::series::Store;
 
 pub(crate) mod noise;
 

@@ -7,9 +7,9 @@ use crate::course::Samples;
 use crate::estimate::run_settings;
 use crate::inputs::{on_device, refuse_derivatives};
 use crate::prepare::{self, Prepared};
-use crate::study::{BetweenSamples, EstimateSettings};
 use crate::words::explain;
 use crate::{Error, Study, filter, sampled};
+use lynkeus_study::{BetweenSamples, EstimateSettings};
 
 /// The estimator of a study, waiting for its first sample: measured outputs, then known inputs, in
 /// the study's order, then derivatives of inputs where the observer reads any. It runs on its own, as `[estimate]` says, and knows neither files nor graph.

@@ -18,10 +18,10 @@ use crate::interval::Intervals;
 use crate::judge::{self, By, Doubt, Evidence, Innovations, Judged, Trace, innovations};
 use crate::outside::{self, Outside, outside};
 use crate::prepare::{Prepared, StudyDesign};
-use crate::study::{EstimateSettings, Name};
 use crate::systems::hat;
 use crate::words::in_words;
 use crate::{Error, Quantity, Series, Study, expected, headers, saturated};
+use lynkeus_study::{EstimateSettings, Name};
 
 /// The trust in an estimate over time, and whether it was ever lost.
 #[derive(Clone, Debug)]

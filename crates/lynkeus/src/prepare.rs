@@ -15,9 +15,9 @@ use lynkeus_words::Words;
 use crate::choice::Choice;
 use crate::declared::Declared;
 use crate::mentioned::{refuse_strangers, refuse_unknown_states};
-use crate::study::Name;
 use crate::words::explain;
 use crate::{Error, Study, calibrate, declared, systems};
+use lynkeus_study::Name;
 
 /// The plant of a study, with the study's parameters.
 ///
@@ -69,7 +69,7 @@ fn load(study: &Study, symbols_but: Option<BTreeSet<String>>) -> Result<Plant, E
             Plant::from_text(text, &name, &options).map_err(LoadError::from)
         }
         None => {
-            crate::files::must_exist(path, "plant", &study.file)?;
+            lynkeus_table::files::must_exist(path, "plant", &study.file)?;
             Plant::load(path, &options)
         }
     };
@@ -197,7 +197,6 @@ impl<'a> Prepared<'a> {
     ///
     /// # Errors
     /// Declared names that the plant does not have.
-    #[cfg(feature = "tune")]
     pub(crate) fn with_study<'b>(&self, study: &'b Study) -> Result<Prepared<'b>, Error>
     where
         'a: 'b,
@@ -215,7 +214,6 @@ impl<'a> Prepared<'a> {
     ///
     /// # Errors
     /// As [`Prepared::with_study`].
-    #[cfg(feature = "tune")]
     pub(crate) fn run_by<'b>(&self, study: &'b Study) -> Result<Prepared<'b>, Error>
     where
         'a: 'b,

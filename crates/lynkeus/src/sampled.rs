@@ -14,9 +14,9 @@ use crate::filter::noise;
 use crate::judge::Trace;
 use crate::prepare::Prepared;
 use crate::replay::{Watch, replay};
-use crate::study::BetweenSamples;
 use crate::systems::margins;
 use crate::words::explain;
+use lynkeus_study::BetweenSamples;
 
 /// Runs the design's observer over samples; its errors are followed where the study tells deviations
 /// or innovations.

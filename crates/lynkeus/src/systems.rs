@@ -5,9 +5,9 @@ use lynkeus_model::{Plant, Variable, parse_expression};
 use lynkeus_observers::{Monitor, Observer, Signal};
 use lynkeus_run::{Column, Margin, Method, Role, Step, System, Tolerances};
 
-use crate::study::{self, Expression, Name, Rk4Step, SimulateSettings, Solver};
 use crate::words::explain;
 use crate::{Error, Study};
+use lynkeus_study::{self, Expression, Name, Rk4Step, SimulateSettings, Solver};
 
 /// The study's `[simulate]`.
 pub(crate) fn settings(study: &Study) -> Result<&SimulateSettings, Error> {
@@ -262,13 +262,13 @@ pub(crate) fn input_expression(
 }
 
 /// The study's method as the runner has it.
-pub(crate) fn method(method: &study::Method) -> Method {
+pub(crate) fn method(method: &lynkeus_study::Method) -> Method {
     match *method {
-        study::Method::Rk4(Rk4Step::Length(h)) => Method::Rk4(Step::AtMost(h)),
-        study::Method::Rk4(Rk4Step::PerRow(n)) => {
+        lynkeus_study::Method::Rk4(Rk4Step::Length(h)) => Method::Rk4(Step::AtMost(h)),
+        lynkeus_study::Method::Rk4(Rk4Step::PerRow(n)) => {
             Method::Rk4(Step::Substeps(usize::try_from(n).unwrap_or(usize::MAX)))
         }
-        study::Method::Adaptive { solver, rtol, atol } => {
+        lynkeus_study::Method::Adaptive { solver, rtol, atol } => {
             let tolerances = Tolerances {
                 relative: rtol,
                 absolute: atol,

@@ -8,8 +8,8 @@ use lynkeus_structure::{AugmentedPlant, Dimension, Matrix, Region, range};
 use crate::Error;
 use crate::declared::Declared;
 use crate::prepare::Prepared;
-use crate::study::Noise;
 use crate::words::explain;
+use lynkeus_study::Noise;
 
 /// Gaussian measurement errors are taken to stay within this many standard deviations.
 const DEVIATIONS: f64 = 3.0;

@@ -13,10 +13,10 @@ use super::{experiment, packed, quantity, time, units};
 use crate::export::Artifact;
 use crate::fixed_steps::{size, typical, unset};
 use crate::headers::Headers;
-use crate::study::SimulateSettings;
 use crate::systems::{hat, starts};
 use crate::words::explain;
 use crate::{Error, Study};
+use lynkeus_study::SimulateSettings;
 
 /// Equations over a graph, with what is known of their variables.
 #[derive(Debug)]

@@ -3,7 +3,7 @@
 use lynkeus_run::Column;
 
 use crate::Coverage;
-use crate::study::Name;
+use lynkeus_study::Name;
 
 /// What many runs of a study give.
 #[derive(Clone, Debug)]

@@ -10,8 +10,8 @@ use serde_json::{Map, Value, json};
 
 use super::axis::shown;
 use super::{Row, Sweep};
-use crate::table::significant;
 use crate::{Answer, Error, Series};
+use lynkeus_table::significant;
 
 impl Sweep {
     /// The rows as CSV: the keys, the figures (empty where there is none), 1 at the knee, and
