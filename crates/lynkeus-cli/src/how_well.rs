@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use lynkeus::Error;
 use lynkeus::precision::{self, Candidates};
 
+use super::files::Output;
 use super::inputs::Source;
 use super::progress::Alive;
 use super::save::Results;
@@ -50,12 +51,13 @@ impl Options {
 
 /// Everything is computed before the first file is written.
 pub(super) fn how_well(source: &Source, options: &Options, json: bool) -> Result<ExitCode, Error> {
-    source
-        .files()
-        .writes("-o", options.output.as_deref())
-        .draws("--plot", options.plot.as_deref())
-        .prints_json(json)
-        .check()?;
+    let output = Output {
+        output: options.output.clone(),
+        plot: options.plot.clone(),
+        json,
+        quiet: false,
+    };
+    output.added_to(source.files()).check()?;
     let asked = precision::Options {
         horizon: options.horizon,
         sensors: options.sensors.map(|which| match which {
@@ -67,12 +69,5 @@ pub(super) fn how_well(source: &Source, options: &Options, json: bool) -> Result
     let report = lynkeus::precision(&source.study, &asked);
     drop(alive);
     let report = report?;
-    let mut results = Results::default();
-    results.files(&report, options.plot.as_deref(), options.output.as_deref())?;
-    results.answer(json, &report);
-    results.keep()?;
-    Ok(match report.is_positive() {
-        true => ExitCode::SUCCESS,
-        false => ExitCode::from(1),
-    })
+    Results::default().tell(&report, &output)
 }

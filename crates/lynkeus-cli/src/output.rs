@@ -2,9 +2,10 @@
 
 use std::io::{self, Read, Write};
 use std::path::Path;
+use std::process::ExitCode;
 
 use lynkeus::model::Diagnostic;
-use lynkeus::{Error, Series, table, visible};
+use lynkeus::{Answer, Error, Series, table, visible};
 use serde_json::Value;
 
 /// Columns as a CSV file, or as a Parquet file if it is called so.
@@ -59,6 +60,25 @@ pub(super) fn warn(text: &str) {
 pub(super) fn complain(error: &Error) {
     let heading = if brings_heading(error) { "" } else { "error: " };
     say(&format!("{heading}{error}"));
+}
+
+/// Tells what the user should know of an answer.
+pub(super) fn remarks(answer: &dyn Answer, quiet: bool) {
+    answer.warnings().iter().for_each(|text| warn(text));
+    if !quiet {
+        answer.notes().iter().for_each(|text| note(text));
+    }
+}
+
+/// Tells what speaks against an answer; the exit code says the same.
+pub(super) fn verdict(answer: &dyn Answer) -> ExitCode {
+    if let Some(refusal) = answer.refusal() {
+        complain(&refusal);
+    }
+    match answer.is_positive() {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::from(1),
+    }
 }
 
 /// A diagnostic of a model starts with its own "error".

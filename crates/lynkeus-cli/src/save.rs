@@ -7,10 +7,12 @@
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 use lynkeus::{Answer, Error, interrupt};
 use tempfile::{NamedTempFile, SpooledTempFile};
 
+use super::files::Output;
 use super::{output, signals};
 
 /// The name that stands for standard input or output.
@@ -127,6 +129,18 @@ impl Results {
         } else if !self.has_printed() {
             self.print(&answer.text());
         }
+    }
+
+    /// Adds an answer with its files, puts all in its place, and tells what speaks against it.
+    ///
+    /// # Errors
+    /// As [`keep`](Self::keep).
+    pub fn tell(mut self, answer: &dyn Answer, asked: &Output) -> Result<ExitCode, Error> {
+        output::remarks(answer, asked.quiet);
+        self.files(answer, asked.plot.as_deref(), asked.output.as_deref())?;
+        self.answer(asked.json, answer);
+        self.keep()?;
+        Ok(output::verdict(answer))
     }
 
     /// Adds the picture and the columns of an answer, where they are asked for.

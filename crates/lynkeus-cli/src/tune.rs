@@ -65,9 +65,7 @@ pub(super) fn tune(path: &Path, options: &Options, limits: &Limits) -> Result<Ex
         true => rewritten(path, &sweep)?,
         false => (String::new(), vec![]),
     };
-    if !options.quiet {
-        sweep.notes.iter().for_each(|note| output::note(note));
-    }
+    output::remarks(&sweep, options.quiet);
     let mut results = Results::default();
     results.files(&sweep, options.plot.as_deref(), None)?;
     if let Some(file) = &options.output {

@@ -33,6 +33,11 @@ pub trait Answer: Send {
         None
     }
 
+    /// Whether it is yes: nothing speaks against it, or what was asked holds.
+    fn is_positive(&self) -> bool {
+        self.refusal().is_none()
+    }
+
     /// What of a log contradicts itself, or counts nowhere.
     fn warnings(&self) -> &[String] {
         &[]

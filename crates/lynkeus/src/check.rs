@@ -322,6 +322,10 @@ impl Answer for Report {
         Self::to_json(self)
     }
 
+    fn is_positive(&self) -> bool {
+        Self::is_positive(self)
+    }
+
     #[cfg(feature = "plot")]
     fn svg(&self) -> Result<Option<String>, Error> {
         match &self.uniform {

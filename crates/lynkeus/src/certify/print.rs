@@ -64,6 +64,10 @@ impl Answer for CertifyReport {
     fn to_json(&self) -> Value {
         Self::to_json(self)
     }
+
+    fn is_positive(&self) -> bool {
+        !self.is_refuted()
+    }
 }
 
 /// The verdict in a word or two: never "proved" alone where the study is not in the box.

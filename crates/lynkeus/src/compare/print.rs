@@ -89,6 +89,10 @@ impl Answer for Comparison {
         Self::to_json(self)
     }
 
+    fn is_positive(&self) -> bool {
+        Self::is_positive(self)
+    }
+
     #[cfg(feature = "plot")]
     fn svg(&self) -> Result<Option<String>, Error> {
         self.picture().to_svg().map(Some)

@@ -58,6 +58,10 @@ impl Answer for Report {
         Self::to_json(self)
     }
 
+    fn is_positive(&self) -> bool {
+        Self::is_positive(self)
+    }
+
     fn columns(&self) -> Vec<(String, Series)> {
         let columns = Self::columns(self).into_iter();
         columns.map(|(name, x)| (name, x.into())).collect()
