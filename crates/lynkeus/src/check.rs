@@ -2,6 +2,7 @@
 
 mod json;
 mod knowledge;
+mod known;
 mod next;
 mod observability;
 mod report;
@@ -25,13 +26,14 @@ use crate::study::Name;
 use crate::words::explain;
 use crate::words::{conditions, listed};
 use crate::{Error, ErrorKind, Study, calibrate, estimate, prepare};
+#[cfg(test)]
+pub(crate) use json::CheckReport;
 use knowledge::Sorted;
 pub use knowledge::{Assumption, Knowledge, Known, Reserve};
 pub use next::Next;
 pub use report::{CheckOptions, Report};
 use reserves::View;
 pub use uniform::Uniform;
-pub(crate) use uniform::point;
 
 /// The time for what can be known at all, where the study has no limit.
 const OBSERVABILITY: Duration = Duration::from_secs(20);

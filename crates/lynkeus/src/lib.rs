@@ -73,6 +73,7 @@ mod course;
 mod crew;
 mod declared;
 mod design;
+mod entries;
 mod estimate;
 mod expected;
 mod export;

@@ -6,6 +6,7 @@ use lynkeus_expr::Spent;
 use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Monitor, Signal};
 use lynkeus_run::Error as RunError;
+use serde::Serialize;
 
 use crate::accuracy::{self, Accuracy};
 use crate::assertions;
@@ -22,6 +23,9 @@ use crate::systems::hat;
 use crate::words::in_words;
 use crate::{Error, Quantity, Series, Study, expected, headers, saturated};
 
+#[cfg(test)]
+pub(crate) use summary::RunReport;
+
 /// The trust in an estimate over time, and whether it was ever lost.
 #[derive(Clone, Debug)]
 pub struct Watch {
@@ -36,15 +40,18 @@ pub struct Watch {
 }
 
 /// Why a run ended before its last row.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Ended {
     /// in words
     pub message: String,
     /// the study
+    #[serde(skip)]
     pub file: String,
-    /// a limit of time or memory ended it, and nothing is wrong with what there is
+    /// whether a limit of time or memory ended it, and nothing is wrong with what there is
     pub by_limit: bool,
     /// measured outputs of a log that the estimate followed, the one farthest from what was expected first
+    #[serde(skip)]
     pub followed: Vec<String>,
 }
 

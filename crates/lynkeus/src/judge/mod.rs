@@ -18,7 +18,7 @@ pub(crate) use lynkeus_run::credible::By;
 pub use doubt::{Doubt, Kind, Level};
 pub(crate) use evidence::Evidence;
 pub use innovations::Innovations;
-pub(crate) use innovations::innovations;
+pub(crate) use innovations::{InnovationCounts, innovations};
 #[cfg_attr(not(feature = "tune"), allow(unused_imports))]
 pub(crate) use ranges::{RUN_AWAY, Screen};
 pub(crate) use residuals::residuals;

@@ -31,6 +31,8 @@ use std::ops::ControlFlow;
 pub use axis::Axis;
 pub(crate) use axis::refuse_strange_keys;
 pub use measures::Measure;
+#[cfg(test)]
+pub(crate) use report::SweepReport;
 pub(crate) use report::{brief, shortened};
 pub use rewrite::Change;
 pub use row::{Peak, Row};
