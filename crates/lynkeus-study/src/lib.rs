@@ -20,7 +20,9 @@
 //! [estimate]
 //! between_samples = "linear"
 //! ```
-
+//!
+//! A key is declared once (`keys`): reader, default, schema and refusals follow. This crate knows what
+//! a study says and which keys the families have; whether its names are the plant's is seen by who loads both.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod certify;
@@ -33,6 +35,7 @@ mod section;
 mod sensors;
 mod simulate;
 mod source;
+mod swept;
 mod tune;
 mod whole;
 
@@ -50,6 +53,7 @@ pub use schema::schema;
 pub use sensors::{Noise, Sensors};
 pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
+pub use swept::swept;
 pub use tune::{Scale, TuneSettings, Values};
 pub use whole::Whole;
 

@@ -1,6 +1,6 @@
 //! The picture of an outcome.
 
-use crate::mentioned::not_drawn;
+use crate::prepare::mentioned::not_drawn;
 use crate::{Error, Outcome, Quantity, Series};
 use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Panel, Span};
 use lynkeus_study::Name;

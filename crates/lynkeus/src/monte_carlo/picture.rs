@@ -3,7 +3,7 @@
 use super::{MonteCarlo, Scattered};
 use crate::Error;
 use crate::figure::{PANELS, spread};
-use crate::mentioned::not_drawn;
+use crate::prepare::mentioned::not_drawn;
 use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Panel};
 use lynkeus_study::Name;
 

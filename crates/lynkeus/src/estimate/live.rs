@@ -4,11 +4,11 @@ use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Estimator};
 
 use crate::course::Samples;
+use crate::course::inputs::{on_device, refuse_derivatives};
 use crate::estimate::run_settings;
-use crate::inputs::{on_device, refuse_derivatives};
 use crate::prepare::{self, Prepared};
 use crate::words::explain;
-use crate::{Error, Study, filter, sampled};
+use crate::{Error, Study, course::filter, course::sampled};
 use lynkeus_study::{BetweenSamples, EstimateSettings};
 
 /// The estimator of a study, waiting for its first sample: measured outputs, then known inputs, in

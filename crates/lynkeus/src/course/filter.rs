@@ -9,9 +9,9 @@ use lynkeus_run::{Blueprint, EstimatorSettings};
 use lynkeus_structure::AugmentedPlant;
 use lynkeus_words::short;
 
+use crate::course::replay::{Watch, replay};
 use crate::course::{Course, Samples};
 use crate::prepare::Prepared;
-use crate::replay::{Watch, replay};
 use crate::words::explain;
 use crate::{Error, Series, Study};
 use lynkeus_study::Smoothing;

@@ -11,7 +11,7 @@ use lynkeus_structure::AugmentedPlant;
 use lynkeus_words::short;
 use serde_json::{Map, Value, json};
 
-use crate::{Error, Study, systems};
+use crate::{Error, Study, prepare::systems};
 
 /// Characters of an expression that a machine reads.
 const WHOLE: usize = 2000;

@@ -12,8 +12,8 @@ use std::time::{Duration, Instant};
 use lynkeus_run::filter::SensorHealth;
 use lynkeus_run::{Digest, Error as RunError, Estimator};
 
+use crate::course::trace::Trace;
 use crate::course::{Course, Samples};
-use crate::judge::Trace;
 use crate::{Error, Series};
 
 const MAGIC: &[u8; 8] = b"LYNKCHK2";

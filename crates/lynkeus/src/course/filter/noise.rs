@@ -7,8 +7,8 @@ use lynkeus_words::short;
 
 use crate::Series;
 use crate::course::Samples;
-use crate::declared::Declared;
 use crate::prepare::Prepared;
+use crate::prepare::declared::Declared;
 use lynkeus_table::series::{Sorted, steps};
 
 /// The noise of each measured output; without `noise` in the study, how much the log's own

@@ -6,9 +6,9 @@ use lynkeus_expr::Spent;
 use lynkeus_observers::Examination;
 use lynkeus_observers::Value;
 
-use crate::choice::{Proposal, Speed};
-use crate::modes::Start;
 use crate::prepare::Prepared;
+use crate::prepare::choice::{Proposal, Speed};
+use crate::prepare::modes::Start;
 
 /// Values tried in simulation.
 const POINTS: usize = 13;

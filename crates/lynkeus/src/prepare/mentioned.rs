@@ -5,9 +5,9 @@ use std::collections::HashSet;
 use lynkeus_model::Plant;
 use lynkeus_observers::{FAMILIES, Family};
 
-use crate::headers::refuse_stray_columns;
-use crate::spread::Spread;
-use crate::{Error, Study, near, systems};
+use crate::prepare::headers::refuse_stray_columns;
+use crate::prepare::spread::Spread;
+use crate::{Error, Study, near, prepare::systems};
 use lynkeus_study::Name;
 
 /// Refuses a study in which any section names what the plant does not have.
@@ -30,7 +30,7 @@ pub(crate) fn refuse_strangers(study: &Study, plant: &Plant) -> Result<(), Error
     }
     {
         // another observer may have been put in the place of the one that is tuned
-        crate::tune::refuse_strange_keys(study, false)?;
+        study.refuse_strange_keys(false)?;
         asked(study)?;
     }
     Ok(())

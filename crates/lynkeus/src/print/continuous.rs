@@ -5,11 +5,13 @@ mod settable;
 use lynkeus_model::Plant;
 use lynkeus_run::{Method, Step, System, fastest_at};
 
-use crate::export::{Export, ExportOptions, Target, designed, origin};
-use crate::fixed_steps::{Unsaid, bends, sound, steps};
-use crate::fmu::equations::{Equations, Texts};
+use crate::course::fixed_steps::{Unsaid, bends, sound, steps};
 use crate::prepare::{self, Prepared};
-use crate::{Error, FmiVersion, Precision, Study, systems};
+use crate::print::fmu::equations::{Equations, Texts};
+use crate::print::{
+    head::designed, head::origin, target::Export, target::ExportOptions, target::Target,
+};
+use crate::{Error, FmiVersion, Precision, Study, prepare::systems};
 use lynkeus_study::{self, Rk4Step};
 
 use settable::{Settled, settled};

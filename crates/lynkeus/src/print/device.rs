@@ -7,10 +7,10 @@ use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Level, Updates};
 
 use crate::estimate::at_readings;
-use crate::headers::Headers;
 use crate::prepare::Prepared;
-use crate::systems::hat;
-use crate::{Error, Study, tunable};
+use crate::prepare::headers::Headers;
+use crate::prepare::systems::hat;
+use crate::{Error, Study, print::tunable};
 use lynkeus_study::BetweenSamples;
 
 /// What `print` makes of an estimator, with `about` at its head, and of notes on names.

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::course::{Course, Samples};
 use crate::prepare::Prepared;
-use crate::{Quantity, Series, systems};
+use crate::{Quantity, Series, prepare::systems};
 use lynkeus_study::BetweenSamples;
 use lynkeus_table::series::{Sorted, points, steps};
 

@@ -9,12 +9,12 @@ use lynkeus_run::{
 };
 
 use crate::Error;
+use crate::course::filter::noise;
+use crate::course::replay::{Watch, replay};
+use crate::course::trace::Trace;
 use crate::course::{Course, Samples};
-use crate::filter::noise;
-use crate::judge::Trace;
 use crate::prepare::Prepared;
-use crate::replay::{Watch, replay};
-use crate::systems::margins;
+use crate::prepare::systems::margins;
 use crate::words::explain;
 use lynkeus_study::BetweenSamples;
 

@@ -72,7 +72,7 @@ impl Kind {
         }
     }
 
-    pub(super) fn hint(self) -> &'static str {
+    pub(crate) fn hint(self) -> &'static str {
         match self {
             Self::Range => {
                 "see whether `lynkeus certify` proves this tuning, try another `theta` or `clamp = true`, compare the model with the log; if the plant really goes there, declare a wider min and max (the result is written all the same)"
@@ -116,6 +116,6 @@ impl Doubt {
 }
 
 /// A ratio in words.
-pub(super) fn times(ratio: f64) -> String {
+pub(crate) fn times(ratio: f64) -> String {
     format!("{} times", figures(ratio, 2))
 }

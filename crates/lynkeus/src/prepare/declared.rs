@@ -13,7 +13,7 @@ use lynkeus_run::filter::Limits;
 use lynkeus_structure::{AugmentedPlant, range};
 
 use crate::words::explain;
-use crate::{Error, Study, calibrate, near, systems};
+use crate::{Error, Study, near, prepare::calibrate, prepare::systems};
 pub use account::Account;
 use lynkeus_study::{Name, Noise};
 

@@ -6,7 +6,7 @@ use lynkeus_run::{Blueprint, Fastest, Method, Step, System, fastest_mode, first_
 use lynkeus_words::short;
 
 use crate::prepare::Prepared;
-use crate::{Error, Study, systems};
+use crate::{Error, Study, prepare::systems};
 
 /// How many of the steps that the fastest mode needs (|λ|h ≤ ½) are one with which the classical method
 /// is stable for no mode that decays: all of its region left of the axis has |λ|h < 2.97.

@@ -4,7 +4,7 @@ use lynkeus_expr::{Node, Tape};
 use lynkeus_model::{Assertion, Diagnostic, Plant, Variable};
 use lynkeus_words::short;
 
-use crate::outside::{ESTIMATE, Of, PLANT};
+use crate::judge::outside::{ESTIMATE, Of, PLANT};
 use crate::{Quantity, Series};
 use lynkeus_table::series::Iter;
 

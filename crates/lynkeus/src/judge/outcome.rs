@@ -7,19 +7,21 @@ use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Monitor, Signal};
 use lynkeus_run::Error as RunError;
 
-use crate::accuracy::{self, Accuracy};
-use crate::assertions;
 use crate::course::Course;
-use crate::declared::{Account, Declared};
-use crate::frozen::Frozen;
-use crate::headers::{Headers, log_time};
-use crate::interval::Intervals;
-use crate::judge::{self, By, Doubt, Evidence, Innovations, Judged, Trace, innovations};
-use crate::outside::{self, Outside, outside};
+use crate::course::doubt::Doubt;
+use crate::course::trace::Trace;
+use crate::judge::accuracy::{self, Accuracy};
+use crate::judge::assertions;
+use crate::judge::frozen::Frozen;
+use crate::judge::interval::Intervals;
+use crate::judge::outside::{self, Outside, outside};
+use crate::judge::{self, By, Evidence, Innovations, Judged, innovations};
+use crate::prepare::declared::{Account, Declared};
+use crate::prepare::headers::{Headers, log_time};
+use crate::prepare::systems::hat;
 use crate::prepare::{Prepared, StudyDesign};
-use crate::systems::hat;
 use crate::words::in_words;
-use crate::{Error, Quantity, Series, Study, expected, headers, saturated};
+use crate::{Error, Quantity, Series, Study, judge::expected, judge::saturated, prepare::headers};
 use lynkeus_study::EstimateSettings;
 
 /// The trust in an estimate over time, and whether it was ever lost.

@@ -5,11 +5,11 @@ use std::path::Path;
 use lynkeus_run::Blueprint;
 
 use crate::certify::region;
-use crate::fixed_steps::steps;
+use crate::course::fixed_steps::steps;
 use crate::{Study, design};
 
 /// What `float` cannot hold, in words.
-pub(super) fn beyond_float(lost: &[String]) -> Option<String> {
+pub(crate) fn beyond_float(lost: &[String]) -> Option<String> {
     let (first, rest) = lost.split_first()?;
     let more = match rest.len() {
         0 => String::new(),
@@ -22,7 +22,7 @@ pub(super) fn beyond_float(lost: &[String]) -> Option<String> {
 
 /// What stands at the head of the files: where they come from, what is guaranteed, and `hasty`,
 /// for which steps it is not.
-pub(super) fn about(study: &Study, made: &Blueprint, hasty: Option<String>) -> Vec<String> {
+pub(crate) fn about(study: &Study, made: &Blueprint, hasty: Option<String>) -> Vec<String> {
     let step = steps(made.run.method).unwrap_or_default();
     let mut lines = vec![
         origin(study),

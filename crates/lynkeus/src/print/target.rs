@@ -25,7 +25,7 @@ pub enum Target {
 }
 
 /// What is declared of a [`Target`]: all that the command, its refusals and the dispatch know of it.
-pub(super) struct Declared {
+pub(crate) struct Declared {
     /// on the command line and in Python
     word: &'static str,
     /// what is written, in words
@@ -36,7 +36,7 @@ pub(super) struct Declared {
 }
 
 /// What makes the files of a target.
-pub(super) enum Writes {
+pub(crate) enum Writes {
     /// source text
     Sources(fn(&Device<'_>, Precision) -> Result<Sources, Refusal>),
     /// an archive, in which what can be tuned always is
@@ -56,7 +56,7 @@ impl Target {
         Self::Fmu(Version::Three),
     ];
 
-    pub(super) fn declared(self) -> Declared {
+    pub(crate) fn declared(self) -> Declared {
         match self {
             Self::C => Declared {
                 word: "c",

@@ -5,9 +5,9 @@ use std::ops::ControlFlow;
 use lynkeus_run::filter::{Innovation, Reading};
 use lynkeus_run::{Error as RunError, Estimator};
 
-use crate::checkpoint::{Checkpoint, Halfway};
+use crate::course::checkpoint::{Checkpoint, Halfway};
+use crate::course::trace::Trace;
 use crate::course::{Course, Samples, add_row};
-use crate::judge::Trace;
 use crate::{Error, Study};
 
 /// Rows between two looks at whether there is room for them.

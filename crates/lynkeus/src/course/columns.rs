@@ -7,8 +7,8 @@ use std::path::Path;
 use lynkeus_structure::AugmentedPlant;
 
 use crate::course::Samples;
-use crate::headers::{further_headers, header, log_time, refuse_seconds, time_of};
 use crate::prepare::Prepared;
+use crate::prepare::headers::{further_headers, header, log_time, refuse_seconds, time_of};
 use crate::{Error, Series, Study, Table, visible};
 use lynkeus_study::EstimateSettings;
 use lynkeus_table::{APART, Lost, Ordered, Request, is_parquet};

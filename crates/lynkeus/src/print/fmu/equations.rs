@@ -10,10 +10,10 @@ use lynkeus_run::{Method, System};
 
 use super::rate::rate;
 use super::{experiment, packed, quantity, time, units};
-use crate::export::Artifact;
-use crate::fixed_steps::{size, typical, unset};
-use crate::headers::Headers;
-use crate::systems::{hat, starts};
+use crate::course::fixed_steps::{size, typical, unset};
+use crate::prepare::headers::Headers;
+use crate::prepare::systems::{hat, starts};
+use crate::print::target::Artifact;
 use crate::words::explain;
 use crate::{Error, Study};
 use lynkeus_study::SimulateSettings;

@@ -2,11 +2,11 @@
 
 use lynkeus_observers::{Design, Generator, InputDerivative, Signal};
 
-use crate::columns::{Log, held};
-use crate::headers::{command, header};
+use crate::course::columns::{Log, held};
 use crate::near::suggest;
 use crate::prepare::Prepared;
-use crate::{Error, Series, Study, systems};
+use crate::prepare::headers::{command, header};
+use crate::{Error, Series, Study, prepare::systems};
 use lynkeus_study::{self, Name};
 
 /// What a known input of an observer reads.
