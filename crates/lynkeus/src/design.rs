@@ -9,8 +9,8 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::certify::{self, Proof};
-use crate::correction::InjectionEntry;
 use crate::entries::{Fit, Named, finite};
+use crate::prepare::correction::InjectionEntry;
 use crate::{CertifyReport, Error, Study};
 
 /// The answer of `lynkeus design`.

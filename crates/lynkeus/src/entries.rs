@@ -138,5 +138,5 @@ impl From<&Check> for Condition {
     }
 }
 
-#[cfg(all(test, feature = "tune"))]
+#[cfg(test)]
 mod tests;

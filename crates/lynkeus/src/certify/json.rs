@@ -9,10 +9,10 @@ use serde_json::{Value, json};
 
 use super::excited::ExcitationEntry;
 use super::{CertifyReport, Excited, Strays};
-use crate::correction::InjectionEntry;
-use crate::declared::Account;
 use crate::entries::{Condition, Named, Range, Verdict, finite, sides};
-use crate::interval::SamplingLimits;
+use crate::judge::interval::SamplingLimits;
+use crate::prepare::correction::InjectionEntry;
+use crate::prepare::declared::Account;
 
 /// The answer of `certify`.
 #[derive(Debug, Serialize)]

@@ -11,8 +11,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::run::{Compared, Watch, run_all};
-use crate::study::{BetweenSamples, SimulateSettings};
-use crate::{Error, Study, simulate, systems};
+use crate::{Error, Study, prepare::systems, simulate};
+use lynkeus_study::{BetweenSamples, SimulateSettings};
 
 /// How a simulation was sampled.
 #[derive(Clone, Debug, PartialEq, Serialize)]

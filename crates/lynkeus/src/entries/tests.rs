@@ -10,8 +10,8 @@ use crate::certify::CertificateReport;
 use crate::check::CheckReport;
 use crate::compare::ComparisonReport;
 use crate::design::Report as DesignReport;
+use crate::judge::outcome::RunReport;
 use crate::monte_carlo::MonteCarloReport;
-use crate::outcome::RunReport;
 use crate::precision::HowWellReport;
 use crate::tune::SweepReport;
 

@@ -11,10 +11,10 @@ use serde_json::{Value, json};
 use super::statistics::{HIGH, mean, quantile};
 use super::{Again, Failure, MonteCarlo, Scattered};
 use crate::Error;
-use crate::accuracy::Covered;
 use crate::entries::{Named, finite};
-use crate::headers::Headers;
-use crate::outcome::Ended;
+use crate::judge::accuracy::Covered;
+use crate::judge::outcome::Ended;
+use crate::prepare::headers::Headers;
 
 /// Seeds of runs that are told one by one.
 const TOLD: usize = 20;

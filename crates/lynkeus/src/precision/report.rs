@@ -7,9 +7,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::Report;
-use crate::declared::Account;
 use crate::entries::{Named, finite};
-use crate::headers::Headers;
+use crate::prepare::declared::Account;
+use crate::prepare::headers::Headers;
 
 /// The answer of `check --how-well`.
 #[derive(Debug, Serialize)]

@@ -12,9 +12,9 @@ use serde_json::{Value, json};
 use super::axis::shown;
 use super::{Peak, Row, Sweep};
 use crate::Error;
-use crate::declared::Account;
 use crate::entries::Named;
-use crate::table::significant;
+use crate::prepare::declared::Account;
+use lynkeus_table::significant;
 
 /// The answer of `tune`.
 #[derive(Debug, Serialize)]
