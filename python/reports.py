@@ -89,7 +89,7 @@ class Writer:
         """What stands for a schema that has a name."""
         if name in self._kinds:
             return self._kinds[name]
-        schema = self._schemas[name]
+        schema = merged(self._schemas[name])
         if "properties" in schema:
             self._kinds[name] = name
             self._add(name, schema)
@@ -120,7 +120,9 @@ class Writer:
             return self._named(schema["$ref"].rpartition("/")[2])
         words = ["const" in one or "enum" in one for one in schema.get("oneOf", (schema,))]
         if all(words):
-            return literal(word for one in schema.get("oneOf", (schema,)) for word in one.get("enum", [one.get("const")]))
+            return literal(
+                word for one in schema.get("oneOf", (schema,)) for word in one.get("enum", [one.get("const")])
+            )
         if "anyOf" in schema:
             return union(self._kind(one) for one in schema["anyOf"])
         if isinstance(schema["type"], list):
@@ -135,6 +137,23 @@ class Writer:
                 return {"number": "float", "integer": "int", "string": "str", "boolean": "bool", "null": "None"}[plain]
 
 
+def merged(schema: Schema) -> Schema:
+    """Alternatives of objects as one object, whose first entry says which of them it is."""
+    variants = schema.get("oneOf", ())
+    if not variants or not all("properties" in one for one in variants):
+        return schema
+    properties: dict[str, Schema] = {}
+    for one in variants:
+        for name, entry in one["properties"].items():
+            known = properties.setdefault(name, {**entry, "enum": []} if "const" in entry else entry)
+            if "const" in entry:
+                known["enum"].append(entry["const"])
+    for name, entry in properties.items():
+        if not all(name in one["required"] for one in variants):
+            properties[name] = {"anyOf": [entry, {"type": "null"}], "description": entry.get("description", "")}
+    return {**schema, "properties": properties}
+
+
 def is_item(name: str) -> bool:
     """Whether no attribute can have the name."""
     return keyword.iskeyword(name) or hasattr(dict, name)
@@ -142,8 +161,9 @@ def is_item(name: str) -> bool:
 
 def union(kinds: Iterable[str]) -> str:
     """Alternatives, none the last."""
-    each = dict.fromkeys(part for kind in kinds for part in kind.split(" | "))
-    return " | ".join(sorted(each, key=lambda kind: kind == "None"))
+    each = list(kinds)
+    some = dict.fromkeys(kind.removesuffix(" | None") for kind in each if kind != "None")
+    return " | ".join([*some, *(["None"] if any(kind.endswith("None") for kind in each) else [])])
 
 
 def literal(words: Iterable[str]) -> str:
@@ -171,7 +191,7 @@ def written(
     if fields:
         lines.append("\n")
     for key, (kind, words) in plain.items():
-        lines += [entry(key, kind), docstring(words, "    ")]
+        lines += [entry(key, kind), docstring(words, "    ") if words else ""]
     if items:
         kinds = ", ".join(f'"{key}": {kind}' for key, (kind, _) in items.items())
         lines.append(f"    _ITEMS: ClassVar = {{{kinds}}}\n")

@@ -2,10 +2,8 @@
 //! a field is said of the entry, in `docs/answers.schema.json` and in Python.
 
 use lynkeus_observers::Check;
-use lynkeus_structure::{self as structure, Coordinate, Dimension, Standing};
+use lynkeus_structure::{self as structure, Dimension, Standing};
 use lynkeus_words::Words;
-#[cfg(test)]
-use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
 /// Entries by names of the plant, in order.
@@ -26,12 +24,6 @@ pub(crate) fn sides(sides: &[Dimension]) -> Named<Range> {
     sides.map(side).collect()
 }
 
-/// A point by the names of its coordinates.
-pub(crate) fn coordinates(at: &[Coordinate]) -> Named<Option<f64>> {
-    let at = at.iter();
-    at.map(|c| (c.name.clone(), finite(c.value))).collect()
-}
-
 /// Pairs as one object.
 pub(crate) fn pairs<S: Serializer>(
     pairs: &[(impl Serialize, impl Serialize)],
@@ -42,7 +34,7 @@ pub(crate) fn pairs<S: Serializer>(
 
 /// What is proved.
 #[derive(Clone, Copy, Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Verdict {
     Proved,
@@ -62,7 +54,7 @@ impl From<Standing> for Verdict {
 
 /// Whether a theorem holds on the box.
 #[derive(Clone, Copy, Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) enum Fit {
     #[serde(rename = "fits")]
     Fits,
@@ -84,7 +76,7 @@ impl From<Standing> for Fit {
 
 /// A point of the box.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Point {
     /// of what is in question there
     value: Option<f64>,
@@ -94,16 +86,17 @@ pub(crate) struct Point {
 
 impl From<&structure::Point> for Point {
     fn from(point: &structure::Point) -> Self {
+        let at = point.coordinates.iter();
         Self {
             value: finite(point.value),
-            at: coordinates(&point.coordinates),
+            at: at.map(|c| (c.name.clone(), finite(c.value))).collect(),
         }
     }
 }
 
 /// A condition of a theorem.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Condition {
     /// the condition in words
     name: String,

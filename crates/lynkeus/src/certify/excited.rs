@@ -9,8 +9,6 @@ use std::ops::ControlFlow;
 
 use lynkeus_observers::{Family, Tuning, Value};
 use lynkeus_structure::AugmentedPlant;
-#[cfg(test)]
-use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::assumptions;
@@ -187,7 +185,7 @@ impl Excited {
 
 /// Excitation along the study's simulation: measured, no part of a proof.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema), schemars(rename = "Excitation"))]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Excitation"))]
 pub(super) struct ExcitationEntry<'a> {
     /// the first instant
     from: f64,
@@ -205,7 +203,7 @@ pub(super) struct ExcitationEntry<'a> {
 
 /// Excitation measured at a value of θ.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema), schemars(rename = "AtTheta"))]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "AtTheta"))]
 struct AtThetaEntry<'a> {
     /// θ, in 1/(unit of time)
     theta: f64,

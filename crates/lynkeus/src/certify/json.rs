@@ -1,9 +1,7 @@
 //! Certificates for machines.
 
-use lynkeus_observers::{Certificate, Constant, UltimateBound};
+use lynkeus_observers::{Certificate, UltimateBound};
 use lynkeus_words::Words;
-#[cfg(test)]
-use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -16,7 +14,11 @@ use crate::prepare::declared::Account;
 
 /// The answer of `certify`.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema), schemars(rename = "CertificateReport"))]
+#[cfg_attr(
+    test,
+    derive(schemars::JsonSchema),
+    schemars(rename = "CertificateReport")
+)]
 pub(crate) struct Report<'a> {
     /// the name of the model
     plant: &'a str,
@@ -32,7 +34,7 @@ pub(crate) struct Report<'a> {
 
 /// A certificate.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Proof<'a> {
     #[serde(flatten)]
     summary: ProofSummary,
@@ -55,7 +57,7 @@ pub(crate) struct Proof<'a> {
 
 /// What one way of proof gives.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct ProofSummary {
     /// the way of proof
     basis: &'static str,
@@ -80,7 +82,7 @@ struct ProofSummary {
 
 /// A constant of a theorem.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema), schemars(rename = "Constant"))]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Constant"))]
 struct ConstantEntry {
     /// its letter in the paper
     name: String,
@@ -147,6 +149,11 @@ fn summary(report: &CertifyReport) -> ProofSummary {
 impl From<&Certificate> for ProofSummary {
     fn from(certificate: &Certificate) -> Self {
         let mean_square = certificate.mean_square.as_ref();
+        let constants = certificate.constants.iter().map(|c| ConstantEntry {
+            name: c.name.clone(),
+            value: finite(c.value),
+            meaning: c.words(),
+        });
         Self {
             basis: certificate.basis,
             verdict: certificate.verdict().into(),
@@ -156,11 +163,7 @@ impl From<&Certificate> for ProofSummary {
             mean_square_bound: mean_square.map(|b| b.norm),
             mean_square_bounds: bounds(mean_square.map_or(&[], |b| &b.states)),
             region: sides(&certificate.region),
-            constants: certificate
-                .constants
-                .iter()
-                .map(ConstantEntry::from)
-                .collect(),
+            constants: constants.collect(),
         }
     }
 }
@@ -168,14 +171,4 @@ impl From<&Certificate> for ProofSummary {
 fn bounds(each: &[UltimateBound]) -> Named<Option<f64>> {
     let each = each.iter();
     each.map(|b| (b.name.clone(), finite(b.value))).collect()
-}
-
-impl From<&Constant> for ConstantEntry {
-    fn from(constant: &Constant) -> Self {
-        Self {
-            name: constant.name.clone(),
-            value: finite(constant.value),
-            meaning: constant.words(),
-        }
-    }
 }

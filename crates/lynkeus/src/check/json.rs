@@ -5,8 +5,6 @@ use lynkeus_observability as observability;
 use lynkeus_observers::Examination;
 use lynkeus_structure::{self as structure, Place, Uniformity};
 use lynkeus_words::Words;
-#[cfg(test)]
-use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -21,7 +19,7 @@ const LISTED: usize = 256;
 
 /// The answer of `check`.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct CheckReport<'a> {
     /// the name of the model
     plant: &'a str,
@@ -67,7 +65,7 @@ pub(crate) struct CheckReport<'a> {
 
 /// An observer family and its conditions.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct FamilyFit<'a> {
     /// the name of the family
     family: &'static str,
@@ -83,7 +81,7 @@ struct FamilyFit<'a> {
 
 /// Whether a quantity can be known.
 #[derive(Clone, Copy, Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 enum Observability {
     Observable,
@@ -93,7 +91,7 @@ enum Observability {
 
 /// Quantities that can change together without a trace in the outputs.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Symmetry<'a> {
     /// their names
     moves: &'a [String],
@@ -107,7 +105,7 @@ struct Symmetry<'a> {
 
 /// Whether states are told apart under every input.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema), schemars(rename = "Uniformity"))]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Uniformity"))]
 struct UniformityEntry<'a> {
     /// what is proved
     verdict: Verdict,
@@ -125,7 +123,7 @@ struct UniformityEntry<'a> {
 
 /// Whether points far apart are told apart.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct OneToOne {
     /// what is proved
     verdict: Verdict,
@@ -137,7 +135,7 @@ struct OneToOne {
 
 /// A constant input under which a state is not seen.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Blind<'a> {
     /// the input
     input: &'a str,

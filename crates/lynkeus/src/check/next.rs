@@ -20,7 +20,7 @@ use crate::words::number;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Next {
-    /// commands, each with what it does
+    /// commands to type; for people, each with what it does
     #[serde(serialize_with = "lines")]
     #[cfg_attr(test, schemars(with = "Vec<String>"))]
     pub commands: Vec<(String, &'static str)>,

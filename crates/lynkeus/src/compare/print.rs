@@ -3,8 +3,6 @@
 use std::fmt;
 
 use lynkeus_words::figures;
-#[cfg(test)]
-use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -15,7 +13,7 @@ use super::{Against, Compared, Comparison, Interval, Run};
 
 /// The answer of `compare`.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct ComparisonReport<'a> {
     /// the name of the model
     plant: &'a str,
@@ -31,7 +29,7 @@ pub(crate) struct ComparisonReport<'a> {
 
 /// A family in a comparison; one that was refused has `family` and `refused` only.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema), schemars(rename = "Compared"))]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Compared"))]
 struct ComparedEntry<'a> {
     /// its name
     family: &'static str,
@@ -43,7 +41,7 @@ struct ComparedEntry<'a> {
 }
 
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Figures<'a> {
     /// root mean square error of each quantity over the last half of the rows, in its unit
     rms: Named<Option<f64>>,

@@ -6,8 +6,6 @@ use std::time::{Duration, Instant};
 use lynkeus_model::Plant;
 use lynkeus_observers::Family;
 use lynkeus_words::short;
-#[cfg(test)]
-use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::run::{Compared, Watch, run_all};
@@ -16,7 +14,11 @@ use lynkeus_study::{BetweenSamples, SimulateSettings};
 
 /// How a simulation was sampled.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[cfg_attr(test, derive(JsonSchema), schemars(rename = "ComparedSampling"))]
+#[cfg_attr(
+    test,
+    derive(schemars::JsonSchema),
+    schemars(rename = "ComparedSampling")
+)]
 pub struct Interval {
     /// time between two samples
     #[serde(rename = "interval")]
@@ -31,7 +33,7 @@ pub struct Interval {
 
 /// Why a simulation was sampled at its interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub enum Resolution {
     /// the study says so: its sensors have noise, or a `sample_step`
     #[serde(rename = "study")]

@@ -1,13 +1,11 @@
 //! What speaks against an estimate.
 
 use lynkeus_words::figures;
-#[cfg(test)]
-use schemars::JsonSchema;
 use serde::Serialize;
 
 /// How much a doubt weighs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Level {
     /// Worth a look.
@@ -20,7 +18,7 @@ pub enum Level {
 
 /// What a doubt rests on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// The run ended before its last row.
@@ -43,7 +41,7 @@ pub enum Kind {
 
 /// Something that speaks against an estimate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Doubt {
     /// what it rests on
     pub kind: Kind,

@@ -2,8 +2,6 @@
 
 use lynkeus_structure::Dimension;
 use lynkeus_words::figures;
-#[cfg(test)]
-use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
 use crate::entries::finite;
@@ -18,7 +16,7 @@ const TOLD: usize = 6;
 
 /// The error of one estimated quantity against the truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[cfg_attr(test, derive(JsonSchema), schemars(rename = "QuantityError"))]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "QuantityError"))]
 pub struct Accuracy {
     /// its name in the plant
     #[serde(skip)]
@@ -42,7 +40,7 @@ pub struct Accuracy {
 
 /// How true standard deviations are.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Covered {
     /// share of the last half of the rows within two standard deviations, where these are told
     within_2_sd: Option<f64>,
@@ -77,7 +75,7 @@ pub struct Coverage {
 
 /// When an error comes to stay within 5 % of the declared range.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum Settling {
     /// from this time on

@@ -30,7 +30,7 @@ pub struct Frozen {
     pub value: f64,
     /// time of the first of the equal readings
     pub from: f64,
-    /// time of the last of them
+    /// time of the last of the equal readings
     pub to: f64,
     /// number of them
     pub rows: usize,

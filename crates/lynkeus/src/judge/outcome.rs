@@ -29,16 +29,21 @@ use lynkeus_study::EstimateSettings;
 pub(crate) use summary::RunReport;
 
 /// The trust in an estimate over time, and whether it was ever lost.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Monitor"))]
 pub struct Watch {
-    /// the monitor
-    pub monitor: Monitor,
-    /// header of its column: the monitor's name unless the model has that name
-    pub header: String,
-    /// its values
-    pub values: Series,
-    /// first time at which it was below its alarm
+    /// the first time at which it was below its alarm
+    #[serde(rename = "alarm_at")]
     pub alarm: Option<f64>,
+    /// the header of its column: the monitor's name unless the model has that name
+    #[serde(rename = "column")]
+    pub header: String,
+    /// the monitor
+    #[serde(skip)]
+    pub monitor: Monitor,
+    /// its values
+    #[serde(skip)]
+    pub values: Series,
 }
 
 /// Why a run ended before its last row.

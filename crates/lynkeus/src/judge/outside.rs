@@ -4,8 +4,6 @@ use std::ops::RangeInclusive;
 
 use lynkeus_structure::{AugmentedPlant, Dimension};
 use lynkeus_words::figures;
-#[cfg(test)]
-use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
 #[cfg(test)]
@@ -23,7 +21,7 @@ const NAMED: usize = 3;
 
 /// One quantity that leaves its side of the box.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Excursion {
     /// its name in the plant
     #[serde(skip)]
@@ -48,7 +46,7 @@ pub struct Excursion {
 
 /// Where a run is outside of the box.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Outside {
     /// share of the rows at which any quantity is
     #[serde(rename = "rows")]
@@ -63,7 +61,7 @@ pub struct Outside {
 
 /// Where plant and estimate are outside of the box; null where they stay inside.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct OutsideBox<'a> {
     /// of the true values, where they are known
     pub plant: &'a Option<Outside>,

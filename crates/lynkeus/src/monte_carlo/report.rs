@@ -3,8 +3,6 @@
 use std::fmt;
 
 use lynkeus_words::figures;
-#[cfg(test)]
-use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -32,7 +30,7 @@ pub struct Settled {
 
 /// The answer of `simulate` with `runs`.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct MonteCarloReport<'a> {
     /// the name of the model
     plant: &'a str,
@@ -60,7 +58,7 @@ pub(crate) struct MonteCarloReport<'a> {
 
 /// Runs that went another way.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Counted<'a> {
     /// how many
     count: usize,
@@ -72,7 +70,7 @@ struct Counted<'a> {
 
 /// A quantity over many runs.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema), schemars(rename = "Scattered"))]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Scattered"))]
 struct ScatteredEntry<'a> {
     /// its unit
     unit: Option<&'a str>,
@@ -87,7 +85,7 @@ struct ScatteredEntry<'a> {
 
 /// Root mean square errors over the last half of the rows, over many runs.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct SettledErrors {
     /// their mean
     mean: Option<f64>,

@@ -1,8 +1,6 @@
 //! The report for machines: JSON and columns.
 
 use lynkeus_observability::precision::{self, Advice};
-#[cfg(test)]
-use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -13,7 +11,7 @@ use crate::prepare::headers::Headers;
 
 /// The answer of `check --how-well`.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct HowWellReport<'a> {
     /// the name of the model
     plant: &'a str,
@@ -53,7 +51,7 @@ pub(crate) struct HowWellReport<'a> {
 
 /// A sensor.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct SensorUsed<'a> {
     /// the output
     name: &'a str,
@@ -67,7 +65,7 @@ struct SensorUsed<'a> {
 
 /// Directions of the state that the readings show.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Rank {
     /// how many are seen
     seen: usize,
@@ -85,7 +83,7 @@ struct Rank {
 
 /// Which sensors to add or to take.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema), schemars(rename = "Advice"))]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Advice"))]
 struct AdviceEntry<'a> {
     /// the study's sensors
     present: SensorSet<'a>,
@@ -103,7 +101,7 @@ struct AdviceEntry<'a> {
 
 /// A set of sensors.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct SensorSet<'a> {
     /// the outputs
     sensors: Vec<&'a str>,

@@ -5,8 +5,6 @@ use std::fmt;
 use lynkeus_expr::Spent;
 use lynkeus_expr::real::rounded;
 use lynkeus_observers::{Design, Family, Tuning, Value};
-#[cfg(test)]
-use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
 use crate::entries::finite;
@@ -46,7 +44,7 @@ pub enum Grounds {
 
 /// The key that says how fast an observer is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Speed {
     /// `theta`
@@ -85,7 +83,7 @@ impl Speed {
 
 /// A value for a key that the study leaves out.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Proposal {
     /// the key of `[observer]`
     #[serde(rename = "key")]
@@ -103,7 +101,7 @@ pub struct Proposal {
 
 /// Numbers for machines.
 #[derive(Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(untagged)]
 enum Plain {
     One(Option<f64>),
@@ -124,7 +122,7 @@ fn plain<S: Serializer>(value: &Value, to: S) -> Result<S::Ok, S::Error> {
 
 /// Which family is taken, as `family = "auto"` does.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema), schemars(rename = "Choice"))]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Choice"))]
 pub(crate) struct Chosen<'a> {
     /// its name
     family: &'static str,
@@ -142,7 +140,7 @@ pub(crate) struct Chosen<'a> {
 
 /// What stands behind a family, in a word.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema), schemars(rename = "Grounds"))]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Grounds"))]
 #[serde(rename_all = "snake_case")]
 enum Standing {
     Proved,

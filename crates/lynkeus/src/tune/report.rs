@@ -4,8 +4,6 @@ use std::fmt;
 
 use lynkeus_expr::real::rounded;
 use lynkeus_words::counted;
-#[cfg(test)]
-use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -18,7 +16,7 @@ use lynkeus_table::significant;
 
 /// The answer of `tune`.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct SweepReport<'a> {
     /// the name of the model
     plant: &'a str,
@@ -42,7 +40,7 @@ pub(crate) struct SweepReport<'a> {
 
 /// A key that is swept.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct SweptKey<'a> {
     /// the key of `[observer]`
     key: &'a str,
@@ -52,7 +50,7 @@ struct SweptKey<'a> {
 
 /// A tuning and its figures; errors are shares of the declared ranges.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct SweptRow<'a> {
     /// the value of each key that is swept
     keys: Named<f64>,

@@ -1,11 +1,9 @@
 //! A run in figures, for programs.
 
-#[cfg(test)]
-use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::{Ended, Outcome};
+use super::{Ended, Outcome, Watch};
 use crate::entries::Named;
 use crate::judge::InnovationCounts;
 use crate::judge::interval::SamplingLimits;
@@ -15,7 +13,7 @@ use crate::{Accuracy, Doubt, Frozen};
 
 /// The answer of `simulate` and `estimate`.
 #[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct RunReport<'a> {
     /// the name of the model
     plant: &'a str,
@@ -44,7 +42,7 @@ pub(crate) struct RunReport<'a> {
     /// sensors that hang
     frozen: &'a [Frozen],
     /// monitors of the observer
-    monitors: Named<Monitor<'a>>,
+    monitors: Named<&'a Watch>,
     /// where the run leaves the declared ranges
     outside_box: OutsideBox<'a>,
     /// of a filter, by sensor
@@ -61,16 +59,6 @@ pub(crate) struct RunReport<'a> {
     warnings: &'a [String],
     /// what you should know
     notes: &'a [String],
-}
-
-/// A monitor of the observer.
-#[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(JsonSchema))]
-struct Monitor<'a> {
-    /// the first time at which it was below its alarm
-    alarm_at: Option<f64>,
-    /// the header of its column
-    column: &'a str,
 }
 
 impl Outcome {
@@ -105,7 +93,11 @@ impl Outcome {
                 .collect(),
             sampling: self.intervals.map(|intervals| intervals.entry(false)),
             frozen: &self.frozen,
-            monitors: self.monitors(),
+            monitors: self
+                .watches
+                .iter()
+                .map(|w| (w.monitor.name.clone(), w))
+                .collect(),
             outside_box: OutsideBox {
                 plant: &self.plant_outside,
                 estimate: &self.estimate_outside,
@@ -129,14 +121,5 @@ impl Outcome {
         gains
             .map(|gain| (gain.output.clone(), gain.entries.iter().cloned().collect()))
             .collect()
-    }
-
-    fn monitors(&self) -> Named<Monitor<'_>> {
-        let watches = self.watches.iter();
-        let monitors = watches.map(|w| {
-            let (alarm_at, column) = (w.alarm, &*w.header);
-            (w.monitor.name.clone(), Monitor { alarm_at, column })
-        });
-        monitors.collect()
     }
 }
