@@ -52,7 +52,7 @@
 //! samples, and [`check`], [`simulate`] and
 //! [`estimate`] do what the commands of the same names do.
 //!
-//! Features, both on by default: `parquet` reads and writes Parquet, `plot` draws pictures. The program
+//! Features: `plot` (on by default) draws pictures, `parquet` reads and writes Parquet. The program
 //! `lynkeus` is a crate of its own, `lynkeus-cli`.
 //!
 //! The rooms below stand in their order: each uses only those before it, which a test sees to.
