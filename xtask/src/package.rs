@@ -6,7 +6,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use xtask::process::{begins, cargo, root, run, target};
+use xtask::process::{begins, joined, root, run, target};
 use xtask::python;
 
 /// What its tests need, pinned.
@@ -15,67 +15,60 @@ const REQUIREMENTS: &str = include_str!("../../python/requirements.txt");
 /// The tests compare with the command that this names.
 const COMMAND: &str = "LYNKEUS_COMMAND";
 
-/// Builds, installs and tests it.
+/// Builds, installs and tests it; the command is compiled.
 ///
 /// # Errors
 /// What is missing, or what failed.
 pub fn test(python: &Path) -> Result<(), String> {
-    prepare(python)?;
-    begins("the tests of the Python package");
-    run(&mut tests(python))?;
-    types(python)
+    steps(python, None)
 }
 
-/// Builds and installs it, then runs its tests while something else is done: they need one core, and what
-/// they print is shown behind that.
+/// Builds, installs and tests it while the tests in Rust run, which are compiled, and so is the command: each
+/// needs one core and more. What is printed of it is shown behind theirs.
 ///
 /// # Errors
 /// What is missing, or what failed, of either.
-pub fn test_beside(
-    python: &Path,
-    other: impl FnOnce() -> Result<(), String>,
-) -> Result<(), String> {
-    prepare(python)?;
-    let log = target().join("package").join("tests.log");
-    let cannot = |error: std::io::Error| format!("cannot write {}: {error}", log.display());
-    let file = File::create(&log).map_err(cannot)?;
-    let mut tests = tests(python);
-    tests.stdout(file.try_clone().map_err(cannot)?).stderr(file);
-    let running = tests.spawn();
-    let mut running = running.map_err(|error| format!("cannot start the tests: {error}"))?;
-    let done = other();
-    begins("what the tests of the Python package say, which ran beside");
-    let status = running.wait();
-    eprint!("{}", fs::read_to_string(&log).unwrap_or_default());
-    done?;
-    match status {
-        Ok(status) if status.success() => types(python),
-        Ok(status) => Err(format!(
-            "the tests of the Python package ended with {status}"
-        )),
-        Err(error) => Err(format!("the tests of the Python package: {error}")),
-    }
+pub fn test_beside(python: &Path, rust: &mut Command) -> Result<(), String> {
+    begins("the tests in Rust, beside the Python package: a wheel, its tests, its types");
+    let path = target().join("package.log");
+    let cannot = |error: std::io::Error| format!("cannot write {}: {error}", path.display());
+    let log = File::create(&path).map_err(cannot)?;
+    let (package, rust) = std::thread::scope(|scope| {
+        let package = scope.spawn(|| steps(python, Some(&log)));
+        let rust = run(rust);
+        begins("what the tests of the Python package say, which ran beside");
+        (joined(package), rust)
+    });
+    eprint!("{}", fs::read_to_string(&path).unwrap_or_default());
+    rust.and(package)
 }
 
-/// Builds and installs it, and what its tests compare with.
-fn prepare(python: &Path) -> Result<(), String> {
-    begins("the Python package, as a wheel");
-    let wheel = wheel(python)?;
-    let mut install = Command::new(python);
-    install
-        .args(["-m", "pip", "install", "--disable-pip-version-check"])
-        .args(["--quiet", "--force-reinstall", "--no-deps", "--no-index"])
-        .arg(wheel);
-    run(&mut install)?;
-    begins("the tests, compiled");
-    // as all tests are built later, so that nothing is built twice
-    run(&mut cargo(&[
-        "test",
-        "--workspace",
-        "--exclude",
-        "chores",
-        "--no-run",
-    ]))
+/// The wheel, installed, its tests and its types; what they print goes to the log.
+fn steps(python: &Path, log: Option<&File>) -> Result<(), String> {
+    let run = |what: &str, command: &mut Command| {
+        match log {
+            Some(log) => {
+                let copy = || {
+                    log.try_clone()
+                        .map_err(|e| format!("the log of {what}: {e}"))
+                };
+                command.stdout(copy()?).stderr(copy()?);
+            }
+            None => begins(what),
+        }
+        run(command)
+    };
+    let folder = target().join("package");
+    run(
+        "the Python package, as a wheel",
+        &mut build(python, &folder)?,
+    )?;
+    run(
+        "the wheel, installed",
+        &mut install(python, &wheel(&folder)?),
+    )?;
+    run("the tests of the Python package", &mut tests(python))?;
+    run("the types of the Python package", &mut types(python))
 }
 
 fn tests(python: &Path) -> Command {
@@ -89,10 +82,10 @@ fn tests(python: &Path) -> Command {
     tests
 }
 
-fn types(python: &Path) -> Result<(), String> {
-    begins("the types of the Python package");
+fn types(python: &Path) -> Command {
     let mut types = Command::new(python);
-    run(types.args(["-m", "mypy"]).current_dir(root()))
+    types.args(["-m", "mypy"]).current_dir(root());
+    types
 }
 
 /// The interpreter of its environment.
@@ -117,10 +110,9 @@ pub fn site() -> Result<(), String> {
     run(&mut build)
 }
 
-/// The only wheel in a folder that is made anew.
-fn wheel(python: &Path) -> Result<PathBuf, String> {
-    let folder = target().join("package");
-    match fs::remove_dir_all(&folder) {
+/// What builds a wheel into a folder, which is made anew.
+fn build(python: &Path, folder: &Path) -> Result<Command, String> {
+    match fs::remove_dir_all(folder) {
         // there is none at first
         Err(error) if error.kind() != ErrorKind::NotFound => {
             let folder = folder.display();
@@ -132,10 +124,23 @@ fn wheel(python: &Path) -> Result<PathBuf, String> {
     build
         .args(["-m", "maturin", "build", "--profile", "dev"])
         .args(["--auditwheel", "skip", "--out"])
-        .arg(&folder)
+        .arg(folder)
         .current_dir(root());
-    run(&mut build)?;
-    let entries = fs::read_dir(&folder).map_err(|e| format!("cannot read the wheels: {e}"))?;
+    Ok(build)
+}
+
+fn install(python: &Path, wheel: &Path) -> Command {
+    let mut install = Command::new(python);
+    install
+        .args(["-m", "pip", "install", "--disable-pip-version-check"])
+        .args(["--quiet", "--force-reinstall", "--no-deps", "--no-index"])
+        .arg(wheel);
+    install
+}
+
+/// The only wheel in a folder.
+fn wheel(folder: &Path) -> Result<PathBuf, String> {
+    let entries = fs::read_dir(folder).map_err(|e| format!("cannot read the wheels: {e}"))?;
     let mut wheels = entries.flatten().map(|entry| entry.path());
     let wheel = wheels.find(|path| path.extension().is_some_and(|kind| kind == "whl"));
     wheel.ok_or_else(|| format!("no wheel in {}", folder.display()))

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
+use std::thread::ScopedJoinHandle;
 use std::time::Instant;
 
 /// The root of the workspace: the folder above this crate's.
@@ -42,6 +43,13 @@ pub fn run(command: &mut Command) -> Result<(), String> {
     } else {
         Err(format!("{} ended with {status}", shown(command)))
     }
+}
+
+/// What a thread found; its panic is this one's.
+pub fn joined<T>(thread: ScopedJoinHandle<'_, T>) -> T {
+    thread
+        .join()
+        .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
 fn shown(command: &Command) -> String {
