@@ -17,7 +17,6 @@ pub mod python;
 pub(crate) use code::Code;
 pub(crate) use dialect::{Binding, Body, Dialect, Form, Text};
 pub(crate) use names::Names;
-pub use names::is_hidden;
 
 /// What cannot be printed, and what to do about it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -1,13 +1,8 @@
-//! Identifiers out of names that models give, and characters of them that nobody sees.
+//! Identifiers out of names that models give.
 
 use std::collections::HashSet;
 
-/// Control characters, line and paragraph separators, and what changes the direction of writing: a
-/// reviewer would not see the code that a compiler reads.
-pub fn is_hidden(c: char) -> bool {
-    let reorders = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    c.is_control() || reorders || matches!(c, '\u{2028}' | '\u{2029}' | '\u{feff}')
-}
+use lynkeus_answer::visible::is_hidden;
 
 /// Words with blanks for what is hidden.
 pub(crate) fn seen(words: &str) -> String {

@@ -28,7 +28,7 @@ pub fn exception(error: &Error) -> PyErr {
 
 /// The exception for an error of a floor below.
 pub fn from_source(error: impl std::error::Error + Send + Sync + 'static) -> PyErr {
-    exception(&Error::from_source(error))
+    exception(&lynkeus::explain(error))
 }
 
 /// An argument that is not what was expected of it.

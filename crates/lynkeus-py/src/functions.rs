@@ -176,7 +176,7 @@ impl Functions {
     }
 
     fn new(about: About, equations: Equations) -> Result<Self, Error> {
-        let compiled = |values| equations.compiled(values).map_err(Error::from_source);
+        let compiled = |values| equations.compiled(values).map_err(lynkeus::explain);
         let (f, h) = (
             compiled(&equations.derivatives)?,
             compiled(&equations.outputs)?,
@@ -242,7 +242,7 @@ impl Functions {
         let made = away(py, &Terms::default(), |budget, _| {
             let equations = self.equations();
             let made = equations.graph.budgeted(budget, || equations.jacobian());
-            made.map_err(Error::ended)?.map_err(Error::from_source)
+            made.map_err(Error::ended)?.map_err(lynkeus::explain)
         });
         let made = made?;
         Ok(self.jacobian.get_or_init(|| made))

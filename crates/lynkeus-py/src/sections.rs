@@ -1,6 +1,5 @@
 //! A study's text as dictionaries: Python's own reader knows an older TOML than the engine's.
 
-use lynkeus::Error;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyFloat, PyInt, PyList};
 use toml::de::{DeTable, DeValue};
@@ -13,7 +12,7 @@ use crate::errors::exception;
 /// The text is no TOML.
 pub fn of<'py>(py: Python<'py>, text: &str) -> PyResult<Bound<'py, PyDict>> {
     let parsed = DeTable::parse(text);
-    let parsed = parsed.map_err(|error| exception(&Error::from_source(error)))?;
+    let parsed = parsed.map_err(|error| exception(&lynkeus::explain(error)))?;
     table(py, parsed.get_ref())
 }
 

@@ -5,8 +5,8 @@ use lynkeus_model::{Assertion, Diagnostic, Plant, Variable};
 use lynkeus_words::short;
 
 use crate::outside::{ESTIMATE, Of, PLANT};
-use crate::series::Iter;
 use crate::{Quantity, Series};
+use lynkeus_table::series::Iter;
 
 /// The model's warnings, and its assertions that do not hold at every row, in words.
 pub(crate) fn told(plant: &Plant, time: &Series, quantities: &[Quantity]) -> Vec<String> {

@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
 
-use crate::study::Name;
 use crate::{Error, Study};
+use lynkeus_study::Name;
 
 /// Whether the study lists parameters of the plant among what is unknown.
 pub(crate) fn are_asked(study: &Study, plant: &Plant) -> bool {

@@ -21,11 +21,12 @@ use lynkeus_words::{Words, counted};
 
 use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
-use crate::study::Name;
+use crate::words::explain;
 use crate::words::{conditions, listed};
 use crate::{Error, ErrorKind, Study, calibrate, estimate, prepare};
 use knowledge::Sorted;
 pub use knowledge::{Assumption, Knowledge, Known, Reserve};
+use lynkeus_study::Name;
 pub use next::Next;
 pub use report::{CheckOptions, Report};
 use reserves::View;
@@ -47,7 +48,6 @@ const UNIFORMITY: f64 = 0.2;
 pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
     let symbolic = prepare::symbolic_plant(study, BTreeSet::new())?;
     Declared::new(study, &symbolic)?;
-    #[cfg(feature = "tune")]
     crate::tune::refuse_strange_keys(study, true)?;
     let time = match study.budget.left() {
         Some(_) => study.budget.part(0.5),
@@ -115,7 +115,7 @@ fn by_which(
     match graph.budgeted(part, examine) {
         Ok(examined) => {
             let examined: Result<_, lynkeus_expr::MissingInput> = examined;
-            let (determined, examined) = examined.map_err(Error::from_source)?;
+            let (determined, examined) = examined.map_err(explain)?;
             known = determined;
             report.uniform =
                 examined.map(|examined| Uniform::new(examined, &report.answer, &report.unknown));
@@ -216,7 +216,7 @@ fn knowledge(
         let of = |(assumption, answer): &mut (Assumption, Answer)| {
             found.settle(augmented, *assumption, answer);
             let known = Knowledge::new(augmented, *assumption, answer, &found);
-            let mut known = known.map_err(Error::from_source)?;
+            let mut known = known.map_err(explain)?;
             view.reserve(&mut known)?;
             Ok(known)
         };
@@ -254,7 +254,7 @@ impl Report {
     /// # Errors
     /// Another number of states, or a state without range.
     #[cfg(feature = "plot")]
-    pub fn picture(&self) -> Result<crate::plot::Plane, Error> {
+    pub fn picture(&self) -> Result<lynkeus_plot::Plane, Error> {
         match &self.uniform {
             Some(uniform) => uniform::picture(&self.plant, uniform.examined()),
             None => Err(Error::refused(format!(

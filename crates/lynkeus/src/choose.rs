@@ -9,12 +9,13 @@ use lynkeus_expr::Spent;
 use lynkeus_observers::{Design, DesignError, Examination};
 use lynkeus_structure::Standing;
 
+use crate::Error;
 use crate::choice::{Choice, Grounds, Proposal, Speed};
 use crate::modes::decay;
 use crate::prepare::{Prepared, is_certified_gain};
 use crate::propose::{propose, time_scales};
 use crate::words::number;
-use crate::{Error, study::SimulateSettings};
+use lynkeus_study::SimulateSettings;
 
 /// A run is long enough for an error that falls to e^−3 of itself, 5 %.
 const FALLS: f64 = 3.0;

@@ -9,9 +9,9 @@ use lynkeus_structure::AugmentedPlant;
 use crate::course::Samples;
 use crate::headers::{further_headers, header, log_time, refuse_seconds, time_of};
 use crate::prepare::Prepared;
-use crate::study::EstimateSettings;
-use crate::table::{APART, Lost, Ordered, Request, is_parquet};
 use crate::{Error, Series, Study, Table, visible};
+use lynkeus_study::EstimateSettings;
+use lynkeus_table::{APART, Lost, Ordered, Request, is_parquet};
 
 /// The log of a study in a file (CSV, Parquet), read within the study's budget; of a Parquet file only what the
 /// study may ask for.

@@ -9,8 +9,8 @@ use crate::export::{Export, ExportOptions, Target, designed, origin};
 use crate::fixed_steps::{Unsaid, bends, sound, steps};
 use crate::fmu::equations::{Equations, Texts};
 use crate::prepare::{self, Prepared};
-use crate::study::{self, Rk4Step};
 use crate::{Error, FmiVersion, Precision, Study, systems};
+use lynkeus_study::{self, Rk4Step};
 
 use settable::{Settled, settled};
 
@@ -106,7 +106,7 @@ struct Component<'a> {
     study: &'a Study,
     equations: Equations<'a>,
     /// how the study integrates them
-    settings: Option<&'a study::Method>,
+    settings: Option<&'a lynkeus_study::Method>,
     /// of the study, where it says so
     section: Option<&'static str>,
     /// lines for people
@@ -152,7 +152,7 @@ impl Component<'_> {
 
     /// Fixed steps: those of the study, or such as the fastest mode needs.
     fn stepped(&self, system: &System, notes: &mut Vec<String>) -> Result<Method, Error> {
-        if let Some(settings @ study::Method::Rk4(Rk4Step::Length(_))) = self.settings {
+        if let Some(settings @ lynkeus_study::Method::Rk4(Rk4Step::Length(_))) = self.settings {
             return Ok(systems::method(settings));
         }
         let mut evaluation = system.evaluation();

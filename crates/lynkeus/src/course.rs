@@ -7,9 +7,9 @@ use lynkeus_run::{Error as RunError, Role};
 
 use crate::judge::{Doubt, Trace};
 use crate::recorded::Recorded;
-use crate::series::{Iter, Store};
 use crate::systems::monitor_column;
 use crate::{Error, Quantity, Series};
+use lynkeus_table::series::{Iter, Store};
 
 /// Samples for an observer: what each sensor and each known input reads, NaN where it does not.
 #[derive(Clone, Debug, Default)]

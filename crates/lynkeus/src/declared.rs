@@ -12,9 +12,10 @@ use lynkeus_model::{Plant, Variable};
 use lynkeus_run::filter::Limits;
 use lynkeus_structure::{AugmentedPlant, range};
 
-use crate::study::{Name, Noise};
+use crate::words::explain;
 use crate::{Error, Study, calibrate, near, systems};
 pub use account::Account;
+use lynkeus_study::{Name, Noise};
 
 /// One kind of declaration: what is said of single quantities, by their names.
 #[derive(Clone, Debug, PartialEq)]
@@ -215,7 +216,7 @@ pub(crate) fn deviations(
             Noise::Uniform(bound) => bound / 3.0_f64.sqrt(),
             Noise::Relative(share) => {
                 let values = range(augmented.graph(), output.variable.node, &augmented.region());
-                share * values.map_err(Error::from_source)?.enclosure.magnitude()
+                share * values.map_err(explain)?.enclosure.magnitude()
             }
         };
         found.insert(name.clone(), deviation);

@@ -16,11 +16,12 @@ use crate::inputs::{are_logged, refuse_strays, supplied};
 use crate::outcome::{Raw, is_observers_answer, measurements, settle};
 use crate::prepare::{Prepared, StudyDesign};
 use crate::replay::{Watch, refuse_smoothing, replay};
-use crate::study::{BetweenSamples, EstimateSettings};
 use crate::systems::{self, method};
+use crate::words::explain;
 use crate::{
     Error, Outcome, Quantity, Series, Study, Table, filter, interval, lines, prepare, sampled,
 };
+use lynkeus_study::{BetweenSamples, EstimateSettings};
 
 /// Replays a log; `watch` is told the fraction done and may stop the replay.
 ///
@@ -269,7 +270,7 @@ pub(crate) fn refuse_settings(prepared: &Prepared<'_>, design: &Design) -> Resul
     };
     if let FilterKind::Unscented(points) = &filter.kind {
         let states = design.observer.states.len();
-        points.weights(states).map_err(Error::from_source)?;
+        points.weights(states).map_err(explain)?;
     }
     filter::refuse_longer_lag(study, &filter.kind)
 }
@@ -339,7 +340,7 @@ fn plain(
     watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
     let observer = systems::observer(prepared.plant(), &design.observer)?;
-    let mut estimator = Estimator::new(&observer, run).map_err(Error::from_source)?;
+    let mut estimator = Estimator::new(&observer, run).map_err(explain)?;
     let mut course = Course::default();
     let count = design.observer.estimates.len();
     replay(&mut estimator, samples, count, &mut course, watch)?;

@@ -3,8 +3,8 @@
 use lynkeus_expr::{Node, Tape};
 use lynkeus_structure::AugmentedPlant;
 
-use crate::series::Iter;
 use crate::{Quantity, Series};
+use lynkeus_table::series::Iter;
 
 /// Evaluates each measured output that is a quantity of its own at the estimates and the known
 /// inputs. Where one of them is not there, nothing is said.

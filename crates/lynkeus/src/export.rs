@@ -1,9 +1,5 @@
 //! A study's estimator as source code for other machines; what is exported otherwise is in `continuous`.
 
-use lynkeus_export::Refusal;
-use lynkeus_export::curly::c::{self, Precision};
-
-#[cfg(feature = "tune")]
 use crate::ReportOptions;
 use crate::choice::Choice;
 use crate::fixed_steps::{bends, hasty, stepped};
@@ -11,13 +7,14 @@ use crate::inputs::on_device;
 use crate::live::blueprint;
 use crate::prepare::{self, Prepared};
 use crate::{Error, Study, continuous, fmu, tunable};
+use lynkeus_export::Refusal;
+use lynkeus_export::curly::c::{self, Precision};
 
 mod device;
 mod head;
 mod target;
 
 pub(crate) use device::{causal, printed};
-#[cfg(feature = "tune")]
 pub(crate) use head::file_name;
 use head::{about, beyond_float};
 pub(crate) use head::{designed, origin};
@@ -48,12 +45,10 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     }
     let precision = options.precision;
     match writes {
-        #[cfg(feature = "tune")]
         Writes::Page if options.tunable => {
             let message = "what is tunable: expected C, JavaScript, Rust, Structured Text or an FMU, found a page, whose slider moves it";
             Err(Error::input(message))
         }
-        #[cfg(feature = "tune")]
         Writes::Page => page(study, options.step),
         Writes::Sources(write) => written(study, options, options.tunable, |made, notes| {
             let sources = write(made.device, precision)?;
@@ -109,7 +104,6 @@ fn written(
 }
 
 /// The report on the study's simulation.
-#[cfg(feature = "tune")]
 fn page(study: &Study, step: Option<f64>) -> Result<Export, Error> {
     let watch = &mut |_| std::ops::ControlFlow::Continue(());
     let page = crate::report::report(study, None, &ReportOptions { step }, watch)?;

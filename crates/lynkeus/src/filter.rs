@@ -12,9 +12,10 @@ use lynkeus_words::short;
 use crate::course::{Course, Samples};
 use crate::prepare::Prepared;
 use crate::replay::{Watch, replay};
-use crate::series::Store;
-use crate::study::Smoothing;
+use crate::words::explain;
 use crate::{Error, Series, Study};
+use lynkeus_study::Smoothing;
+use lynkeus_table::series::Store;
 
 pub(crate) mod noise;
 
@@ -36,7 +37,7 @@ pub(crate) fn run(
     };
     let notes = &mut course.notes;
     let filter = blueprint(prepared, design, samples, settings, notes)?;
-    let mut filter = filter.estimator().map_err(Error::from_source)?;
+    let mut filter = filter.estimator().map_err(explain)?;
     let n = filter.names().len();
     replay(&mut filter, samples, n, &mut course, watch)?;
     let health = filter.health();
@@ -219,5 +220,5 @@ fn model(
         ranges: augmented.states.iter().map(range).collect(),
         confined: Some(tuning.confined.clone()),
     };
-    NoisyModel::new(&plant).map_err(Error::from_source)
+    NoisyModel::new(&plant).map_err(explain)
 }

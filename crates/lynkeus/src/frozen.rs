@@ -4,9 +4,9 @@ use lynkeus_words::figures;
 use serde_json::{Value, json};
 
 use crate::Series;
-use crate::series::points;
-use crate::study::Noise;
 use crate::words::instant;
+use lynkeus_study::Noise;
+use lynkeus_table::series::points;
 
 /// Fewer equal readings in a row are none of our business.
 const FEWEST: usize = 5;

@@ -6,8 +6,8 @@ use std::collections::HashSet;
 
 use lynkeus_model::{Plant, Variable};
 
-use crate::study::{self, EstimateSettings, Name};
 use crate::{Error, Study, Table};
+use lynkeus_study::{self, EstimateSettings, Name};
 
 /// The header of time, and what it is where a column of data is called so.
 const TIME: &str = "t";
@@ -190,10 +190,10 @@ pub(crate) fn refuse_stray_columns(
 }
 
 /// The header of what a generator reads of a log.
-pub(crate) fn command(name: &Name, generator: &study::Generator) -> Option<String> {
+pub(crate) fn command(name: &Name, generator: &lynkeus_study::Generator) -> Option<String> {
     match generator {
-        study::Generator::Time(_) => None,
-        study::Generator::Prefilter { command, .. } => {
+        lynkeus_study::Generator::Time(_) => None,
+        lynkeus_study::Generator::Prefilter { command, .. } => {
             let own = || format!("{name}_command");
             Some(command.clone().unwrap_or_else(own))
         }

@@ -6,8 +6,8 @@ use crate::columns::{Log, held};
 use crate::headers::{command, header};
 use crate::near::suggest;
 use crate::prepare::Prepared;
-use crate::study::{self, Name};
 use crate::{Error, Series, Study, systems};
+use lynkeus_study::{self, Name};
 
 /// What a known input of an observer reads.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,11 +90,13 @@ fn generated(prepared: &Prepared<'_>, design: &mut Design) -> Result<Vec<Source>
 fn generator(
     prepared: &Prepared<'_>,
     name: &Name,
-    given: &study::Generator,
+    given: &lynkeus_study::Generator,
 ) -> Result<Generator, Error> {
     match given {
-        study::Generator::Time(u) => Ok(Generator::Time(systems::expression(prepared.plant(), u)?)),
-        study::Generator::Prefilter { poles, initial, .. } => {
+        lynkeus_study::Generator::Time(u) => {
+            Ok(Generator::Time(systems::expression(prepared.plant(), u)?))
+        }
+        lynkeus_study::Generator::Prefilter { poles, initial, .. } => {
             let mut inputs = prepared.augmented().inputs.iter();
             let start = inputs.find(|u| u.name == name.text).and_then(|u| u.start);
             let initial = initial.clone();

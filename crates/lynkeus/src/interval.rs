@@ -10,9 +10,9 @@ use serde_json::{Value, json};
 
 use crate::course::{Course, Samples};
 use crate::prepare::Prepared;
-use crate::series::{Sorted, points, steps};
-use crate::study::BetweenSamples;
 use crate::{Quantity, Series, systems};
+use lynkeus_study::BetweenSamples;
+use lynkeus_table::series::{Sorted, points, steps};
 
 /// Rows of the log at which the error is linearised.
 const PLACES: usize = 12;

@@ -65,7 +65,6 @@ mod checkpoint;
 mod choice;
 mod choose;
 mod columns;
-#[cfg(feature = "tune")]
 mod compare;
 mod continuous;
 mod correction;
@@ -73,19 +72,16 @@ mod course;
 mod crew;
 mod declared;
 mod design;
-mod error;
 mod estimate;
 mod expected;
 mod export;
 #[cfg(feature = "plot")]
 mod figure;
-mod files;
 mod filter;
 mod fixed_steps;
 mod fmu;
 mod frozen;
 mod headers;
-mod incoming;
 mod inputs;
 pub mod interrupt;
 mod interval;
@@ -95,33 +91,24 @@ mod live;
 mod mentioned;
 mod modes;
 pub mod monte_carlo;
-mod near;
 mod outcome;
 mod outside;
-#[cfg(feature = "plot")]
-pub mod plot;
 pub mod precision;
 pub mod prepare;
 mod propose;
 mod quantity;
 mod recorded;
 mod replay;
-#[cfg(feature = "tune")]
 mod report;
 mod runner;
 mod sampled;
 mod saturated;
-pub mod series;
 mod simulate;
 mod spread;
-pub mod study;
 mod systems;
-pub mod table;
 mod thrifty;
 mod tunable;
-#[cfg(feature = "tune")]
 pub mod tune;
-pub mod visible;
 mod words;
 
 pub use accuracy::{Accuracy, Coverage, Settling};
@@ -130,18 +117,15 @@ pub use check::{Assumption, CheckOptions, Knowledge, Known, Next, Report, Reserv
 pub use checkpoint::Checkpoint;
 pub use choice::{Choice, Grounds, Proposal, Speed};
 pub use columns::log;
-#[cfg(feature = "tune")]
 pub use compare::{Against, Compared, Comparison, Interval, Resolution, Run, Settled, compare};
 pub use correction::{Correction, GainEntry, InjectionEntry};
 pub use declared::Account;
 pub use design::{DesignReport, design};
-pub use error::{Error, ErrorKind};
 pub use estimate::{estimate, estimate_resumed};
 pub use export::{Artifact, Export, ExportOptions, Subject, Target, export};
 #[cfg(feature = "plot")]
 pub use figure::figure;
 pub use frozen::Frozen;
-pub use incoming::Incoming;
 pub use interval::{Intervals, Sampled};
 pub use judge::{Doubt, Innovations, Kind as DoubtKind, Level as DoubtLevel};
 pub use live::estimator;
@@ -150,25 +134,29 @@ pub use outcome::{Outcome, Watch};
 pub use outside::{Excursion, Outside};
 pub use precision::precision;
 pub use quantity::Quantity;
-#[cfg(feature = "tune")]
 pub use report::{Page, ReportOptions, report};
 pub use runner::{Runner, Runners};
-pub use series::Series;
 pub use simulate::simulate;
-pub use study::{Study, schema};
 pub use systems::observer as observer_system;
-pub use table::Table;
-#[cfg(feature = "tune")]
 pub use tune::tune;
 
+pub use words::explain;
+
+pub use lynkeus_answer::{Error, ErrorKind, near, visible};
 pub use lynkeus_export::curly::c::Precision;
 pub use lynkeus_export::curly::fmu::Version as FmiVersion;
+pub use lynkeus_study::{Study, schema};
+pub use lynkeus_table::{Incoming, Series, Table, series};
 
 pub use lynkeus_expr as expr;
 pub use lynkeus_gain as gain;
 pub use lynkeus_model as model;
 pub use lynkeus_observability as observability;
 pub use lynkeus_observers as observers;
+#[cfg(feature = "plot")]
+pub use lynkeus_plot as plot;
 pub use lynkeus_proof as proof;
 pub use lynkeus_run as run;
 pub use lynkeus_structure as structure;
+pub use lynkeus_study as study;
+pub use lynkeus_table as table;

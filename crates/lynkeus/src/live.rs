@@ -7,8 +7,9 @@ use crate::course::Samples;
 use crate::estimate::run_settings;
 use crate::inputs::{on_device, refuse_derivatives};
 use crate::prepare::{self, Prepared};
-use crate::study::{BetweenSamples, EstimateSettings};
+use crate::words::explain;
 use crate::{Error, Study, filter, sampled};
+use lynkeus_study::{BetweenSamples, EstimateSettings};
 
 /// The estimator of a study, waiting for its first sample: measured outputs, then known inputs, in
 /// the study's order, then derivatives of inputs where the observer reads any. It runs on its own, as `[estimate]` says, and knows neither files nor graph.
@@ -49,7 +50,7 @@ pub fn estimator(study: &Study) -> Result<Estimator, Error> {
     let mut design = prepared.design()?;
     on_device(&prepared, &mut design)?;
     let blueprint = blueprint(&prepared, &design)?;
-    blueprint.estimator().map_err(Error::from_source)
+    blueprint.estimator().map_err(explain)
 }
 
 /// What the estimator of a study is made of.

@@ -3,13 +3,12 @@
 use std::collections::HashSet;
 
 use lynkeus_model::Plant;
-#[cfg(feature = "tune")]
 use lynkeus_observers::{FAMILIES, Family};
 
 use crate::headers::refuse_stray_columns;
 use crate::spread::Spread;
-use crate::study::Name;
 use crate::{Error, Study, near, systems};
+use lynkeus_study::Name;
 
 /// Refuses a study in which any section names what the plant does not have.
 ///
@@ -29,7 +28,6 @@ pub(crate) fn refuse_strangers(study: &Study, plant: &Plant) -> Result<(), Error
         }
         systems::expression(plant, expression)?;
     }
-    #[cfg(feature = "tune")]
     {
         // another observer may have been put in the place of the one that is tuned
         crate::tune::refuse_strange_keys(study, false)?;
@@ -94,7 +92,6 @@ pub(crate) fn not_drawn(name: &Name, nothing: &str, names: &[&str]) -> Error {
 ///
 /// # Errors
 /// One that there is not.
-#[cfg(feature = "tune")]
 pub(crate) fn asked(study: &Study) -> Result<Option<Vec<&'static dyn Family>>, Error> {
     let find = |name: &Name| {
         let found = lynkeus_observers::find(&name.text);

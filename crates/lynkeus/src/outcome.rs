@@ -11,16 +11,16 @@ use crate::accuracy::{self, Accuracy};
 use crate::assertions;
 use crate::course::Course;
 use crate::declared::{Account, Declared};
-use crate::error::in_words;
 use crate::frozen::Frozen;
 use crate::headers::{Headers, log_time};
 use crate::interval::Intervals;
 use crate::judge::{self, By, Doubt, Evidence, Innovations, Judged, Trace, innovations};
 use crate::outside::{self, Outside, outside};
 use crate::prepare::{Prepared, StudyDesign};
-use crate::study::EstimateSettings;
 use crate::systems::hat;
+use crate::words::in_words;
 use crate::{Error, Quantity, Series, Study, expected, headers, saturated};
+use lynkeus_study::EstimateSettings;
 
 /// The trust in an estimate over time, and whether it was ever lost.
 #[derive(Clone, Debug)]

@@ -6,9 +6,9 @@ use lynkeus_structure::{AugmentedPlant, Dimension};
 use lynkeus_words::figures;
 use serde_json::{Map, Value, json};
 
-use crate::series::Iter;
 use crate::words::{instant, number};
 use crate::{Quantity, Series};
+use lynkeus_table::series::Iter;
 
 /// What is beyond an end by no more than this share of the side's width is on it: integration
 /// and noise-free sensors round.

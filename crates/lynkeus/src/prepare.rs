@@ -15,8 +15,9 @@ use lynkeus_words::Words;
 use crate::choice::Choice;
 use crate::declared::Declared;
 use crate::mentioned::{refuse_strangers, refuse_unknown_states};
-use crate::study::Name;
+use crate::words::explain;
 use crate::{Error, Study, calibrate, declared, systems};
+use lynkeus_study::Name;
 
 /// The plant of a study, with the study's parameters.
 ///
@@ -68,7 +69,7 @@ fn load(study: &Study, symbols_but: Option<BTreeSet<String>>) -> Result<Plant, E
             Plant::from_text(text, &name, &options).map_err(LoadError::from)
         }
         None => {
-            crate::files::must_exist(path, "plant", &study.file)?;
+            lynkeus_table::files::must_exist(path, "plant", &study.file)?;
             Plant::load(path, &options)
         }
     };
@@ -76,8 +77,8 @@ fn load(study: &Study, symbols_but: Option<BTreeSet<String>>) -> Result<Plant, E
         return Err(Error::ended(spent).at(path.display()));
     }
     plant.map_err(|error| match error {
-        LoadError::Refused(diagnostic) => Error::from_source(diagnostic),
-        other => Error::from_source(other),
+        LoadError::Refused(diagnostic) => explain(diagnostic),
+        other => explain(other),
     })
 }
 
@@ -104,7 +105,7 @@ pub(crate) fn seen_by<'a>(
     for (name, low, high) in &study.narrower {
         augmented
             .narrow(&name.text, *low, *high)
-            .map_err(|error| name.blame(Error::from_source(error)))?;
+            .map_err(|error| name.blame(explain(error)))?;
     }
     tube(study, &mut augmented)?;
     Ok(augmented)
@@ -196,7 +197,6 @@ impl<'a> Prepared<'a> {
     ///
     /// # Errors
     /// Declared names that the plant does not have.
-    #[cfg(feature = "tune")]
     pub(crate) fn with_study<'b>(&self, study: &'b Study) -> Result<Prepared<'b>, Error>
     where
         'a: 'b,
@@ -214,7 +214,6 @@ impl<'a> Prepared<'a> {
     ///
     /// # Errors
     /// As [`Prepared::with_study`].
-    #[cfg(feature = "tune")]
     pub(crate) fn run_by<'b>(&self, study: &'b Study) -> Result<Prepared<'b>, Error>
     where
         'a: 'b,
@@ -323,7 +322,7 @@ impl<'a> Prepared<'a> {
         let mut narrowed = self.augmented.clone();
         for (name, low, high) in sides {
             let narrow = narrowed.narrow(name, *low, *high);
-            narrow.map_err(|error| Error::from_source(error).at(&self.study.file))?;
+            narrow.map_err(|error| explain(error).at(&self.study.file))?;
         }
         Ok(narrowed)
     }
@@ -344,7 +343,7 @@ impl<'a> Prepared<'a> {
         let inputs = self.augmented.inputs.iter();
         for input in inputs.filter(|input| !is_chosen(&input.name)) {
             let node = systems::input_expression(self.study, plant, settings, input)?;
-            let values = range(&plant.graph, node, &region).map_err(Error::from_source)?;
+            let values = range(&plant.graph, node, &region).map_err(explain)?;
             let (low, high) = (
                 values.enclosure.lo().max(input.min),
                 values.enclosure.hi().min(input.max),
@@ -365,7 +364,7 @@ impl<'a> Prepared<'a> {
                 .caused_by(error)
                 .at(&study.file),
             DesignError::NoGain { key, .. } => study.observer.place(key, &study.file, &error),
-            DesignError::MissingInput(_) => Error::from_source(error).at(&study.file),
+            DesignError::MissingInput(_) => explain(error).at(&study.file),
             DesignError::Spent(spent) => Error::ended(*spent).at(&study.file),
         }
     }
@@ -396,7 +395,7 @@ fn tube(study: &Study, augmented: &mut AugmentedPlant<'_>) -> Result<(), Error> 
             return Err(Error::input(message).at(&study.file));
         };
         let narrowed = augmented.narrow(&state.name, start - radius, start + radius);
-        narrowed.map_err(|error| Error::from_source(error).at(&study.file))?;
+        narrowed.map_err(|error| explain(error).at(&study.file))?;
     }
     Ok(())
 }
@@ -406,7 +405,7 @@ fn blame(study: &Study, error: SensorsError) -> Error {
     let name = match &error {
         SensorsError::NoSuchName { name, .. } | SensorsError::Twice { name, .. } => name,
         _ => {
-            return Error::from_source(error).at(&study.file);
+            return explain(error).at(&study.file);
         }
     };
     let sensors = &study.sensors;
@@ -416,7 +415,7 @@ fn blame(study: &Study, error: SensorsError) -> Error {
         &sensors.disturbances,
     ];
     let found = lists.into_iter().flatten().rfind(|n| n.is_or_has(name));
-    let refusal = Error::from_source(error);
+    let refusal = explain(error);
     match found {
         Some(found) => found.blame(refusal),
         None => refusal.at(&study.file),

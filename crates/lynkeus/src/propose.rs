@@ -4,7 +4,6 @@ use lynkeus_proof::spectrum;
 
 use lynkeus_expr::Spent;
 use lynkeus_observers::Examination;
-#[cfg(feature = "tune")]
 use lynkeus_observers::Value;
 
 use crate::choice::{Proposal, Speed};
@@ -12,20 +11,15 @@ use crate::modes::Start;
 use crate::prepare::Prepared;
 
 /// Values tried in simulation.
-#[cfg(feature = "tune")]
 const POINTS: usize = 13;
 /// They reach from this many decays in a run …
-#[cfg(feature = "tune")]
 const SLOWEST: f64 = 2.0;
 /// … to this many.
 const FASTEST: f64 = 1000.0;
 /// States, and rows of the run, beyond which the time scales have to do.
-#[cfg(feature = "tune")]
 const STATES: usize = 30;
-#[cfg(feature = "tune")]
 const ROWS: f64 = 5000.0;
 /// The time that the runs may take: seldom reached, as what is chosen must not depend on the machine.
-#[cfg(feature = "tune")]
 const TIME: std::time::Duration = std::time::Duration::from_secs(30);
 
 /// The knee of a short sweep where the study has a simulation, else twice the mean rate of the plant.
@@ -37,7 +31,6 @@ pub(crate) fn propose(
     examination: &Examination,
     speed: Speed,
 ) -> Result<Option<Proposal>, Spent> {
-    #[cfg(feature = "tune")]
     if let Some(value) = knee(prepared, examination, speed)? {
         return Ok(Some(Proposal {
             speed,
@@ -48,14 +41,12 @@ pub(crate) fn propose(
     }
     Ok(time_scales(prepared, examination, speed))
 }
-
-#[cfg(feature = "tune")]
 fn knee(
     prepared: &Prepared<'_>,
     examination: &Examination,
     speed: Speed,
 ) -> Result<Option<Value>, Spent> {
-    use crate::study::{Name, Values};
+    use lynkeus_study::{Name, Values};
     use std::ops::ControlFlow;
 
     let study = prepared.study();
@@ -112,10 +103,7 @@ fn knee(
 
 /// From the true start no speed would be too slow: where the study does not say where the estimate
 /// starts, it is off by this share of each range.
-#[cfg(feature = "tune")]
 const OFF: f64 = 0.1;
-
-#[cfg(feature = "tune")]
 fn start_off(own: &mut crate::Study, prepared: &Prepared<'_>) {
     let initial = &mut own.observer.tuning.initial;
     let augmented = prepared.augmented();
@@ -164,7 +152,7 @@ pub(crate) fn time_scales(
     })
 }
 
-#[cfg(all(test, feature = "tune"))]
+#[cfg(test)]
 mod tests {
     use lynkeus_model::{LoadOptions, Plant};
 

@@ -3,7 +3,7 @@
 use lynkeus_run::{Column, Simulation};
 
 use crate::Series;
-use crate::series::Store;
+use lynkeus_table::series::Store;
 
 /// What a [`Trajectory`](lynkeus_run::Trajectory) holds in memory, in columns that may be longer.
 #[derive(Debug)]

@@ -8,8 +8,8 @@ use lynkeus_model::Plant;
 
 use crate::prepare::{Prepared, StudyDesign, is_certified_gain};
 use crate::simulate::{self, Rig};
-use crate::study::SimulateSettings;
 use crate::{Error, Outcome, Study, Table, choose, estimate, prepare, systems};
+use lynkeus_study::SimulateSettings;
 
 /// Runs a study as [`simulate`](crate::simulate()) and [`estimate`](crate::estimate()) do, to the
 /// bit, and keeps its plant and observer for further runs and for studies that

@@ -14,8 +14,9 @@ use crate::filter::noise;
 use crate::judge::Trace;
 use crate::prepare::Prepared;
 use crate::replay::{Watch, replay};
-use crate::study::BetweenSamples;
 use crate::systems::margins;
+use crate::words::explain;
+use lynkeus_study::BetweenSamples;
 
 /// Runs the design's observer over samples; its errors are followed where the study tells deviations
 /// or innovations.
@@ -38,7 +39,7 @@ pub(crate) fn run(
     // what the log's scatter gives judges nobody
     observer.judges = !prepared.study().sensors.noise.is_empty() || course.keeps_innovations;
     observer.run.method = method;
-    let mut estimator = observer.estimator().map_err(Error::from_source)?;
+    let mut estimator = observer.estimator().map_err(explain)?;
     let count = design.observer.estimates.len();
     replay(&mut estimator, samples, count, &mut course, watch)?;
     let sensors = estimator.health().sensors.iter();
@@ -118,7 +119,7 @@ fn followed(
     let mut course = Course::default();
     let mut observer = observer(prepared, design, samples, true, &mut course.notes)?;
     observer.run = run;
-    let mut estimator = observer.estimator().map_err(Error::from_source)?;
+    let mut estimator = observer.estimator().map_err(explain)?;
     let count = design.observer.estimates.len();
     replay(&mut estimator, samples, count, &mut course, watch)?;
     Ok(course)
@@ -137,7 +138,7 @@ pub(crate) fn observer(
 ) -> Result<Blueprint, Error> {
     let (study, augmented) = (prepared.study(), prepared.augmented());
     let sampled = design.observer.sampled(augmented);
-    let mut sampled = sampled.map_err(Error::from_source)?;
+    let mut sampled = sampled.map_err(explain)?;
     let tuned = tuned(augmented.graph(), &mut sampled)?;
     let predict = study.estimate.between_samples == BetweenSamples::Predict;
     let lag = (follows && !predict).then(|| sampled.push_lag(augmented.graph()));
@@ -172,7 +173,7 @@ pub(crate) fn observer(
         &observer.derivatives,
         &reported,
     )
-    .map_err(Error::from_source)?
+    .map_err(explain)?
     .with_margins(margins(&observer));
     let errors = match follows {
         false => None,
@@ -207,7 +208,7 @@ pub(crate) fn observer(
                 confined: None,
             };
             let errors = NoisyModel::of_observer(&observer, &estimates, lag);
-            Some(Box::new(errors.map_err(Error::from_source)?))
+            Some(Box::new(errors.map_err(explain)?))
         }
     };
     Ok(Blueprint {
@@ -256,7 +257,7 @@ fn tuned(
     observer.inputs.extend(read);
     let system = System::new(graph, observer.time, &[], &signals, &[], &made);
     Ok(Some(Tuned {
-        system: system.map_err(Error::from_source)?,
+        system: system.map_err(explain)?,
         values,
     }))
 }

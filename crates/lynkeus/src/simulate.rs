@@ -8,20 +8,19 @@ use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::{Design, Observer};
 use lynkeus_run::{Role, Simulation, System};
 
-#[cfg(feature = "tune")]
 use crate::Table;
 use crate::course::{Course, Samples};
 use crate::crew::within;
 use crate::fixed_steps::unlocated;
-#[cfg(feature = "tune")]
 use crate::headers::{header, log_time};
 use crate::outcome::{Raw, interrupted, is_answer, measurements, settle};
 use crate::prepare::{Prepared, StudyDesign};
 use crate::recorded::Recorded;
 use crate::spread::Spread;
-use crate::study::SimulateSettings;
 use crate::systems::{self, method, settings};
+use crate::words::explain;
 use crate::{Error, Outcome, Quantity, Series, Study, estimate, prepare};
+use lynkeus_study::SimulateSettings;
 use noise::{noise, stirred};
 
 /// Runs the study's plant with its observer; `watch` is told the fraction done
@@ -93,7 +92,7 @@ impl Spread {
             }
         };
         let start = self.start(&plant, seed);
-        plant.with_start(start).map_err(Error::from_source)
+        plant.with_start(start).map_err(explain)
     }
 }
 
@@ -139,7 +138,7 @@ impl Rig {
         let start = systems::starts(plant, &settings.initial)?;
         let system = self.simulation.plant.with_start(start);
         let mut simulation = Simulation {
-            plant: system.map_err(Error::from_source)?,
+            plant: system.map_err(explain)?,
             noise: noise(study, settings, plant)?,
             ..self.simulation
         };
@@ -263,7 +262,6 @@ pub(crate) fn seen(plant: &Plant, observer: &Observer, run: &Recorded) -> Sample
 ///
 /// # Errors
 /// A study that cannot be run.
-#[cfg(feature = "tune")]
 pub(crate) fn recorded(study: &Study, plant: &Plant, step: f64) -> Result<Table, Error> {
     let settings = settings(study)?;
     let mut simulation = open_loop(study, settings, plant)?;

@@ -3,8 +3,8 @@
 use lynkeus_model::Plant;
 use lynkeus_run::{System, deviate};
 
-use crate::study::{Name, SimulateSettings};
 use crate::{Error, Study};
+use lynkeus_study::{Name, SimulateSettings};
 
 /// What a run draws by its seed.
 #[derive(Clone, Debug, Default)]

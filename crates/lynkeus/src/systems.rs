@@ -5,8 +5,9 @@ use lynkeus_model::{Plant, Variable, parse_expression};
 use lynkeus_observers::{Monitor, Observer, Signal};
 use lynkeus_run::{Column, Margin, Method, Role, Step, System, Tolerances};
 
-use crate::study::{self, Expression, Name, Rk4Step, SimulateSettings, Solver};
+use crate::words::explain;
 use crate::{Error, Study};
+use lynkeus_study::{self, Expression, Name, Rk4Step, SimulateSettings, Solver};
 
 /// The study's `[simulate]`.
 pub(crate) fn settings(study: &Study) -> Result<&SimulateSettings, Error> {
@@ -85,7 +86,7 @@ pub fn observer(plant: &Plant, observer: &Observer) -> Result<System, Error> {
         &outputs,
     )
     .map(|system| system.with_margins(margins(observer)))
-    .map_err(Error::from_source)
+    .map_err(explain)
 }
 
 /// The monitors of an observer that say how far a matrix is from singular.
@@ -132,7 +133,7 @@ pub(crate) fn plant_reading(
         &plant.derivatives,
         &named(&plant.outputs),
     )
-    .map_err(Error::from_source)
+    .map_err(explain)
 }
 
 /// Where the plant's states start.
@@ -176,14 +177,14 @@ pub(crate) fn inputs(
     let mut outputs = input_expressions(study, plant, settings)?;
     let derivatives = observer
         .input_derivative_expressions(&plant.graph, &outputs)
-        .map_err(Error::from_source)?;
+        .map_err(explain)?;
     outputs.extend(derivatives);
     of_time(plant, &outputs)
 }
 
 /// Expressions of time as a system.
 pub(crate) fn of_time(plant: &Plant, outputs: &[(String, Node)]) -> Result<System, Error> {
-    System::new(&plant.graph, plant.time, &[], &[], &[], outputs).map_err(Error::from_source)
+    System::new(&plant.graph, plant.time, &[], &[], &[], outputs).map_err(explain)
 }
 
 /// Looks through `inputs` of `[simulate]`, where not every input needs a value.
@@ -261,13 +262,13 @@ pub(crate) fn input_expression(
 }
 
 /// The study's method as the runner has it.
-pub(crate) fn method(method: &study::Method) -> Method {
+pub(crate) fn method(method: &lynkeus_study::Method) -> Method {
     match *method {
-        study::Method::Rk4(Rk4Step::Length(h)) => Method::Rk4(Step::AtMost(h)),
-        study::Method::Rk4(Rk4Step::PerRow(n)) => {
+        lynkeus_study::Method::Rk4(Rk4Step::Length(h)) => Method::Rk4(Step::AtMost(h)),
+        lynkeus_study::Method::Rk4(Rk4Step::PerRow(n)) => {
             Method::Rk4(Step::Substeps(usize::try_from(n).unwrap_or(usize::MAX)))
         }
-        study::Method::Adaptive { solver, rtol, atol } => {
+        lynkeus_study::Method::Adaptive { solver, rtol, atol } => {
             let tolerances = Tolerances {
                 relative: rtol,
                 absolute: atol,

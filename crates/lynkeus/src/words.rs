@@ -1,9 +1,11 @@
-//! Numbers, ranges and verdicts as people read them.
+//! Numbers, ranges, verdicts and failures as people read them.
 
 use std::fmt;
 
+use lynkeus_answer::Error;
 use lynkeus_expr::real::rounded;
 use lynkeus_observers::Check;
+use lynkeus_run::Error as RunError;
 use lynkeus_structure::Verdict;
 use lynkeus_words::{Words, figures};
 
@@ -26,6 +28,36 @@ pub(crate) fn side(name: &str, low: f64, high: f64) -> String {
     match low == high {
         true => format!("{name} = {}", number(low)),
         false => format!("{name} in [{}, {}]", number(low), number(high)),
+    }
+}
+
+/// An error in what the user gave, in the words of the one that tells it; of a run that failed, with what
+/// a study can do about it.
+pub fn explain(source: impl std::error::Error + Send + Sync + 'static) -> Error {
+    let text = source.to_string();
+    let first: &(dyn std::error::Error + 'static) = &source;
+    let run = std::iter::successors(Some(first), |error| error.source())
+        .filter_map(|error| error.downcast_ref::<RunError>())
+        .find(|error| error.to_string() == text);
+    Error::input(run.map_or(text, in_words)).caused_by(source)
+}
+
+/// Why a run ended, with what a study can do about it.
+pub(crate) fn in_words(error: &RunError) -> String {
+    match error {
+        RunError::StepBudget {
+            time,
+            until,
+            steps,
+            chatters,
+            state,
+        } => format!(
+            "{steps} steps took the integration only to t = {time}, on the way to {until}: {chatters}a gain is too high or a relay or a threshold of the state chatters; lower the gain, smooth what jumps, loosen `rtol`, or set method = \"stiff\" or \"rk4\"; the state is {state}"
+        ),
+        RunError::DeviationDiverged { .. } => {
+            format!("{error}; give smaller values in initial_variance or [process_noise]")
+        }
+        _ => error.to_string(),
     }
 }
 

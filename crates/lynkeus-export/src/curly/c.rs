@@ -1,5 +1,6 @@
 //! C99: what the draft becomes there, a header, a source, a bench that replays a log, and how they are built.
 
+use lynkeus_answer::visible::is_hidden;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
@@ -10,7 +11,6 @@ use super::machine::{Field, Machine};
 use super::syntax::Type;
 use super::template::{chosen, exchanged, outside_comments};
 use crate::Refusal;
-use crate::names::is_hidden;
 
 const REPLAY: &str = include_str!("runtime/replay.c");
 const CMAKE: &str = include_str!("runtime/CMakeLists.txt");

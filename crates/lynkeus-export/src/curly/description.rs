@@ -1,8 +1,7 @@
 //! What an archive says of itself: `modelDescription.xml` and `buildDescription.xml`.
 
+use lynkeus_answer::visible::is_hidden;
 use std::collections::HashSet;
-
-use crate::names::is_hidden;
 
 /// Which edition of the standard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

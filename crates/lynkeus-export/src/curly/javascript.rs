@@ -10,7 +10,8 @@ use super::syntax::{
 };
 use super::template::chosen;
 use crate::Refusal;
-use crate::names::{is_hidden, seen};
+use crate::names::seen;
+use lynkeus_answer::visible::is_hidden;
 
 /// What the library of the draft is in JavaScript, where that has it.
 const OWN: [(&str, &str); 3] = [

@@ -8,7 +8,8 @@ use lynkeus_structure::{AugmentedPlant, Dimension, Matrix, Region, range};
 use crate::Error;
 use crate::declared::Declared;
 use crate::prepare::Prepared;
-use crate::study::Noise;
+use crate::words::explain;
+use lynkeus_study::Noise;
 
 /// Gaussian measurement errors are taken to stay within this many standard deviations.
 const DEVIATIONS: f64 = 3.0;
@@ -21,7 +22,7 @@ pub(super) fn of(
     let (declared, plant, region) = (prepared.declared(), augmented.plant, augmented.region());
     let drift = drift(declared, plant, augmented, &region)?;
     let noise = noise(declared, plant, augmented, &region)?;
-    let assumptions = Assumptions::new(augmented, region).map_err(Error::from_source)?;
+    let assumptions = Assumptions::new(augmented, region).map_err(explain)?;
     let shown = |name: &str| {
         let limits = declared.limits.of(name)?;
         Interval::new(limits.low, limits.high).ok()
@@ -51,7 +52,7 @@ pub(super) fn of(
         .with_process_noise(augmented.states.iter().map(density).collect())
         .with_input_derivatives(augmented.inputs.iter().map(derivatives).collect())
         .with_limits(augmented, &limits)
-        .map_err(Error::from_source)
+        .map_err(explain)
 }
 
 /// Per augmented state: what disturbances within their declared ranges add to its
@@ -98,7 +99,7 @@ fn disturbances<'p>(declared: &Declared, plant: &'p Plant) -> impl Iterator<Item
 
 /// The largest absolute value; infinite where the expression has none somewhere.
 fn magnitude(graph: &Graph, node: Node, region: &Region) -> Result<f64, Error> {
-    let found = range(graph, node, region).map_err(Error::from_source)?;
+    let found = range(graph, node, region).map_err(explain)?;
     Ok(found.enclosure.magnitude())
 }
 

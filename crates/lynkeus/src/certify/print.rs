@@ -24,7 +24,6 @@ impl CertifyReport {
     }
 
     /// The verdict of one of its certificates, in a word or two.
-    #[cfg(feature = "tune")]
     pub(crate) fn word(&self, certificate: &Certificate) -> &'static str {
         word(self, certificate)
     }

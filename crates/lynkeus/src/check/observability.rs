@@ -10,6 +10,7 @@ use lynkeus_words::Words;
 use serde_json::{Map, Value, json};
 
 use super::{CheckOptions, Report};
+use crate::words::explain;
 use crate::words::listed;
 use crate::{Error, Study};
 
@@ -38,11 +39,11 @@ pub(super) fn answer(
 /// The place in the study of a name that does not fit.
 fn blame(study: &Study, error: QuestionError) -> Error {
     let name = match error {
-        QuestionError::Expression(_) => return Error::from_source(error),
+        QuestionError::Expression(_) => return explain(error),
         QuestionError::NoSuchName { ref name, .. } => name.clone(),
-        other => return Error::from_source(other).at(&study.file),
+        other => return explain(other).at(&study.file),
     };
-    let refusal = Error::from_source(error);
+    let refusal = explain(error);
     let sensors = &study.sensors;
     let measured = sensors.measured.as_deref().unwrap_or_default();
     let mut names = measured

@@ -14,6 +14,7 @@ use lynkeus_structure::{
 use super::knowledge::{Assumption, Found, Knowledge, Known, Reserve};
 use super::{CheckOptions, observability};
 use crate::prepare::{Prepared, seen_by, sensors};
+use crate::words::explain;
 use crate::{Error, Study, calibrate};
 
 /// Cells examined per end of an output's range.
@@ -84,7 +85,7 @@ impl View<'_> {
             };
             let (node, region) = (output.variable.node, augmented.region());
             let range = range_within(augmented.graph(), node, &region, CELLS);
-            let range = range.map_err(Error::from_source)?.enclosure;
+            let range = range.map_err(explain)?.enclosure;
             let inside =
                 range.is_defined() && range.lo() >= limits.low && range.hi() <= limits.high;
             if !inside {
@@ -144,7 +145,7 @@ impl View<'_> {
             arbitrary: assumption == Assumption::Arbitrary,
             directions: states.len(),
         };
-        let hidden_errors = hidden.hidden_errors().map_err(Error::from_source)?;
+        let hidden_errors = hidden.hidden_errors().map_err(explain)?;
         let names = states.iter().map(|state| state.name.clone());
         let of = |detectability: Option<Detectability>| {
             Known::Hidden(detectability.unwrap_or(Detectability::Undecided))
@@ -176,7 +177,7 @@ impl View<'_> {
             found.settle(&augmented, assumption, &mut answer);
             Knowledge::new(&augmented, assumption, &answer, &found)
         };
-        work().map_err(Error::from_source)
+        work().map_err(explain)
     }
 
     fn answer(
@@ -225,7 +226,7 @@ impl View<'_> {
             let sizes = uncertain(&augmented, &known, &sizes(&augmented, &names))?;
             Ok((left, sizes))
         };
-        let (left, sizes) = work().map_err(Error::from_source)?;
+        let (left, sizes) = work().map_err(explain)?;
         let constant = !augmented.inputs.is_empty();
         for (name, known) in &mut knowledge.quantities {
             let is_firm = firm
@@ -268,7 +269,7 @@ impl View<'_> {
         let inputs = augmented.inputs.iter().filter(|input| among(&input.name));
         let signals: Vec<Node> = inputs.map(|input| input.node).collect();
         let unknown = vec![false; augmented.states.len()];
-        let firm = apart_whatever(&augmented, &signals, &unknown).map_err(Error::from_source)?;
+        let firm = apart_whatever(&augmented, &signals, &unknown).map_err(explain)?;
         let names = augmented.states.iter().map(|s| s.name.clone());
         Ok(names.zip(firm).collect())
     }

@@ -7,9 +7,9 @@ use lynkeus_model::Plant;
 use lynkeus_observers::Family;
 
 use crate::prepare::Prepared;
-use crate::study::{BetweenSamples, Name};
 use crate::tune::errors::Errors;
 use crate::{Error, Outcome, Quantity, Study, Table, estimate};
+use lynkeus_study::{BetweenSamples, Name};
 
 /// Is told the fraction done and may stop the work.
 pub(super) type Watch<'w> = &'w mut dyn FnMut(f64) -> ControlFlow<()>;

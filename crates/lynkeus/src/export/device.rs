@@ -9,9 +9,9 @@ use lynkeus_run::{Blueprint, Level, Updates};
 use crate::estimate::at_readings;
 use crate::headers::Headers;
 use crate::prepare::Prepared;
-use crate::study::BetweenSamples;
 use crate::systems::hat;
 use crate::{Error, Study, tunable};
+use lynkeus_study::BetweenSamples;
 
 /// What `print` makes of an estimator, with `about` at its head, and of notes on names.
 ///

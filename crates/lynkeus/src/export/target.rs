@@ -21,7 +21,6 @@ pub enum Target {
     /// library for this machine; a note says where there is none
     Fmu(Version),
     /// a page that explains the estimates and moves them: [`report()`](crate::report())
-    #[cfg(feature = "tune")]
     Html,
 }
 
@@ -43,7 +42,6 @@ pub(super) enum Writes {
     /// an archive, in which what can be tuned always is
     Archive(Version),
     /// the page of `lynkeus report`
-    #[cfg(feature = "tune")]
     Page,
 }
 
@@ -54,7 +52,6 @@ impl Target {
         Self::JavaScript,
         Self::Rust,
         Self::StructuredText,
-        #[cfg(feature = "tune")]
         Self::Html,
         Self::Fmu(Version::Three),
     ];
@@ -91,7 +88,6 @@ impl Target {
                 has_float: true,
                 writes: Writes::Archive(version),
             },
-            #[cfg(feature = "tune")]
             Self::Html => Declared {
                 word: "html",
                 about: "The page of `lynkeus report`, on the study's simulation",

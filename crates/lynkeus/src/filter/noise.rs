@@ -9,7 +9,7 @@ use crate::Series;
 use crate::course::Samples;
 use crate::declared::Declared;
 use crate::prepare::Prepared;
-use crate::series::{Sorted, steps};
+use lynkeus_table::series::{Sorted, steps};
 
 /// The noise of each measured output; without `noise` in the study, how much the log's own
 /// readings scatter.

@@ -13,9 +13,10 @@ use super::{experiment, packed, quantity, time, units};
 use crate::export::Artifact;
 use crate::fixed_steps::{size, typical, unset};
 use crate::headers::Headers;
-use crate::study::SimulateSettings;
 use crate::systems::{hat, starts};
+use crate::words::explain;
 use crate::{Error, Study};
+use lynkeus_study::SimulateSettings;
 
 /// Equations over a graph, with what is known of their variables.
 #[derive(Debug)]
@@ -245,7 +246,7 @@ impl<'a> Equations<'a> {
             &derivatives,
             &outputs.collect::<Vec<_>>(),
         )
-        .map_err(Error::from_source)
+        .map_err(explain)
     }
 
     /// Values that the system's signals may have, in their order.

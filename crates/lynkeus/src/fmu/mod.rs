@@ -22,7 +22,7 @@ use crate::export::Artifact;
 use crate::fixed_steps::unset;
 use crate::headers::Headers;
 use crate::prepare::Prepared;
-use crate::study::SimulateSettings;
+use lynkeus_study::SimulateSettings;
 
 use library::Missing;
 

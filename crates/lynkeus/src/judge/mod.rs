@@ -19,7 +19,6 @@ pub use doubt::{Doubt, Kind, Level};
 pub(crate) use evidence::Evidence;
 pub use innovations::Innovations;
 pub(crate) use innovations::innovations;
-#[cfg_attr(not(feature = "tune"), allow(unused_imports))]
 pub(crate) use ranges::{RUN_AWAY, Screen};
 pub(crate) use residuals::residuals;
 pub(crate) use sensors::Judged;

@@ -169,7 +169,6 @@ fn beyond(evidence: &Evidence<'_>, quantity: &Quantity) -> Option<Doubt> {
 
 /// The same of one quantity, row by row, without what is measured: an estimate that [`away`] would
 /// find is suspect, and few others are.
-#[cfg_attr(not(feature = "tune"), allow(dead_code))]
 #[derive(Clone, Debug)]
 pub(crate) struct Screen {
     min: f64,

@@ -10,9 +10,9 @@ use super::runs::{Again, Failure, Followed, Track, Whole};
 use super::statistics::of_runs;
 use super::together::{Figures, Screened};
 use crate::crew::{self, Watch};
-use crate::error::in_words;
 use crate::prepare::Prepared;
 use crate::simulate::{self, Rig};
+use crate::words::in_words;
 use crate::{Error, Study};
 
 /// What one run gave.

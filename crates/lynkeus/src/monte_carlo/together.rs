@@ -11,10 +11,11 @@ use super::ends::{Clipped, Sensor};
 use super::runs::{Again, Failure, Followed};
 use super::statistics::{Found, Keep, Scatter};
 use crate::crew::{self, Watch};
-use crate::error::in_words;
 use crate::judge::Screen;
 use crate::prepare::Prepared;
 use crate::simulate::Rig;
+use crate::words::explain;
+use crate::words::in_words;
 use crate::{Error, Study};
 
 /// Bytes of the rows that are in memory at a time.
@@ -170,7 +171,7 @@ impl Together<'_> {
         let study = self.prepared.study();
         let told = match study.budget.marked() {
             Some(spent) => Error::ended(spent),
-            None => Error::from_source(error),
+            None => explain(error),
         };
         told.at(&study.file)
     }

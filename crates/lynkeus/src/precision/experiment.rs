@@ -12,9 +12,9 @@ use crate::crew::within;
 use crate::declared::Declared;
 use crate::outcome::interrupted;
 use crate::prepare::Prepared;
-use crate::study::{Noise, SimulateSettings};
 use crate::words::number;
 use crate::{Error, Study, simulate, systems};
+use lynkeus_study::{Noise, SimulateSettings};
 
 /// Horizons at which the errors are computed.
 const POINTS: usize = 25;

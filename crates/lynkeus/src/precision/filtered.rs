@@ -15,8 +15,9 @@ use crate::course::{Course, Samples};
 use crate::crew::within;
 use crate::prepare::Prepared;
 use crate::replay::{Watch, replay};
-use crate::study::{Name, Noise};
+use crate::words::explain;
 use crate::{Error, Series, Study, estimate, filter};
+use lynkeus_study::{Name, Noise};
 
 /// Nothing is known at the start: a standard deviation of so many ranges.
 const PRIOR: f64 = 1000.0;
@@ -94,7 +95,7 @@ fn foreseen(
     if let Updates::Filter { settings, .. } = &mut blueprint.updates {
         settings.foresees = true;
     }
-    let mut filter = blueprint.estimator().map_err(Error::from_source)?;
+    let mut filter = blueprint.estimator().map_err(explain)?;
     let mut course = Course::default();
     let count = filter.names().len();
     replay(

@@ -16,6 +16,7 @@ use lynkeus_observability::precision::{Advice, Deviations, SensorSet};
 
 use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
+use crate::words::explain;
 use crate::{Error, Study, prepare, simulate, systems};
 pub use experiment::{Assumed, Candidates, Options};
 use experiment::{Setup, ended};
@@ -74,9 +75,10 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
     let setup = Setup::new(&prepared, settings, options)?;
-    let found = setup.experiment.run().map_err(|error| {
-        ended(study).unwrap_or_else(|| Error::from_source(error).at(&study.file))
-    })?;
+    let found = setup
+        .experiment
+        .run()
+        .map_err(|error| ended(study).unwrap_or_else(|| explain(error).at(&study.file)))?;
     let measured: Vec<usize> = (0..setup.measured).collect();
     let at = |horizon: usize| found.deviations(horizon, &measured);
     let candidates: Vec<usize> = (0..found.sensors.len()).collect();

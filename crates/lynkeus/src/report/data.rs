@@ -137,7 +137,7 @@ pub(super) fn in_a_script(value: &Value) -> String {
     let each = |c: char| match c {
         '<' => "\\u003c".to_owned(),
         // a reader of the page sees it; there is none beyond 16 bits
-        c if lynkeus_export::is_hidden(c) => format!("\\u{:04x}", u32::from(c)),
+        c if lynkeus_answer::visible::is_hidden(c) => format!("\\u{:04x}", u32::from(c)),
         c => c.to_string(),
     };
     text.chars().map(each).collect()

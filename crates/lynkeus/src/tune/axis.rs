@@ -6,9 +6,9 @@ use lynkeus_expr::real::rounded;
 use lynkeus_observers::{FAMILIES, Value};
 
 use crate::near::suggest;
-use crate::study::{Name, Place, Scale, Values};
-use crate::table::significant;
 use crate::{Error, Study};
+use lynkeus_study::{Name, Place, Scale, Values};
+use lynkeus_table::significant;
 
 /// The keys that speed belongs to; the first that a study sets is swept where it does not say which.
 const SPEED: &[&str] = &["theta", "poles", "alpha"];

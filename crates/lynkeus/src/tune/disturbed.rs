@@ -7,6 +7,7 @@ use lynkeus_run::Simulation;
 
 use crate::systems::settings;
 use crate::systems::{self, named};
+use crate::words::explain;
 use crate::{Error, Study};
 
 /// A run with `disturbance` of `[tune]` on the plant's inputs; what the observer reads of them
@@ -25,7 +26,7 @@ pub(super) fn disturbed(
     let mut inputs = systems::input_expressions(study, plant, settings)?;
     let derivatives = observer
         .input_derivative_expressions(graph, &inputs)
-        .map_err(Error::from_source)?;
+        .map_err(explain)?;
     let mut signals: Vec<(String, Node)> = named(&plant.inputs);
     for (name, expression) in &study.tune.disturbance {
         let signal = signals.iter_mut().find(|(n, _)| *n == name.text);

@@ -18,6 +18,7 @@ use crate::prepare::Prepared;
 use crate::recorded::Recorded;
 use crate::simulate::{alone, open_loop, seen};
 use crate::systems::settings;
+use crate::words::explain;
 use crate::{Error, ErrorKind, Series};
 
 /// Samples of a simulation, the same for every position.
@@ -229,7 +230,7 @@ fn predicted(
     let symbols = std::iter::once(observer.time).chain(states).chain(inputs);
     let symbols: Vec<Node> = symbols.collect();
     let tape = Tape::new(prepared.augmented().graph(), &symbols, &outputs);
-    let tape = tape.map_err(Error::from_source)?;
+    let tape = tape.map_err(explain)?;
     let mut evaluator = tape.evaluator();
     let columns = std::iter::once(&samples.time)
         .chain(&course.estimates)

@@ -12,6 +12,7 @@ use crate::prepare::Prepared;
 use crate::simulate::{ended_early, open_loop};
 use crate::systems;
 use crate::systems::settings;
+use crate::words::explain;
 use crate::{Error, Study};
 
 /// Noise where the study states none, as a share of what the output spans in the run.
@@ -132,7 +133,7 @@ fn starts(study: &Study, plant: &Plant) -> Result<Vec<f64>, Error> {
     systems::of_time(plant, &inputs)?
         .evaluation()
         .instants(settings.start, settings.until, &mut instants)
-        .map_err(|error| Error::from_source(error).at(&study.file))?;
+        .map_err(|error| explain(error).at(&study.file))?;
     instants.sort_by(f64::total_cmp);
     instants.dedup();
     Ok(instants)

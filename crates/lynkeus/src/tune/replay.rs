@@ -12,8 +12,8 @@ use crate::crew::{Watch, part};
 use crate::estimate::start_at_readings;
 use crate::inputs::supplied;
 use crate::prepare::{Prepared, StudyDesign};
-use crate::series::steps;
 use crate::{Error, Series, systems};
+use lynkeus_table::series::steps;
 
 /// Judges the tuning of an observer or of a filter on a log; an estimate that diverges is a row without figures.
 ///

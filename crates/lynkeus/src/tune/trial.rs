@@ -10,13 +10,13 @@ use super::reference::Reference;
 use super::speed::{longest_step, transparent};
 use crate::Error;
 use crate::crew::Watch;
-use crate::error::in_words;
 use crate::outcome::{interrupted, is_observers_answer};
 use crate::prepare::Prepared;
 use crate::simulate::open_loop;
 use crate::systems::settings;
 use crate::systems::{self, monitor_column};
 pub(super) use crate::thrifty::thrifty;
+use crate::words::in_words;
 
 /// Judges the tuning of a study; an estimate that diverges is a row without figures.
 ///
