@@ -101,7 +101,7 @@ fn test() -> Result<(), String> {
         None => tests.env_remove(python::VARIABLE),
     };
     match found(package, "the tests of the Python package")? {
-        Some(python) => package::test_beside(&python, &mut tests),
+        Some(python) => package::test_beside(&python, &tests),
         None => run(&mut tests),
     }
 }

@@ -6,7 +6,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use xtask::process::{begins, joined, root, run, target};
+use xtask::process::{begins, behind, joined, root, run, target};
 use xtask::python;
 
 /// What its tests need, pinned.
@@ -23,19 +23,20 @@ pub fn test(python: &Path) -> Result<(), String> {
     steps(python, None)
 }
 
-/// Builds, installs and tests it while the tests in Rust run, which are compiled, and so is the command: each
-/// needs one core and more. What is printed of it is shown behind theirs.
+/// Builds, installs and tests it while the tests in Rust run, which are compiled, and so is the command. Its own tests,
+/// one after another, take longer than those on several threads, and go before them. What is printed of it is shown
+/// behind theirs.
 ///
 /// # Errors
 /// What is missing, or what failed, of either.
-pub fn test_beside(python: &Path, rust: &mut Command) -> Result<(), String> {
+pub fn test_beside(python: &Path, rust: &Command) -> Result<(), String> {
     begins("the tests in Rust, beside the Python package: a wheel, its tests, its types");
     let path = target().join("package.log");
     let cannot = |error: std::io::Error| format!("cannot write {}: {error}", path.display());
     let log = File::create(&path).map_err(cannot)?;
     let (package, rust) = std::thread::scope(|scope| {
         let package = scope.spawn(|| steps(python, Some(&log)));
-        let rust = run(rust);
+        let rust = run(&mut behind(rust));
         begins("what the tests of the Python package say, which ran beside");
         (joined(package), rust)
     });

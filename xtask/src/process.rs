@@ -45,6 +45,29 @@ pub fn run(command: &mut Command) -> Result<(), String> {
     }
 }
 
+/// The command with less of the processors than what runs beside it, where the system can do that.
+pub fn behind(command: &Command) -> Command {
+    let mut behind = match cfg!(unix) {
+        true => {
+            let mut nice = Command::new("nice");
+            nice.args(["-n", "5"]).arg(command.get_program());
+            nice
+        }
+        false => Command::new(command.get_program()),
+    };
+    behind.args(command.get_args());
+    for (name, value) in command.get_envs() {
+        match value {
+            Some(value) => behind.env(name, value),
+            None => behind.env_remove(name),
+        };
+    }
+    if let Some(folder) = command.get_current_dir() {
+        behind.current_dir(folder);
+    }
+    behind
+}
+
 /// What a thread found; its panic is this one's.
 pub fn joined<T>(thread: ScopedJoinHandle<'_, T>) -> T {
     thread
