@@ -1,12 +1,12 @@
-//! The Python package: tested as a folder beside the Rust programs, or built as a wheel, installed into an
-//! environment of its own and tested there; and the documentation site, which shows it.
+//! The Python package, built as a wheel, installed into an environment of its own and tested there; and the
+//! documentation site, which shows it.
 
 use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use xtask::process::{begins, cargo, root, run, target};
+use xtask::process::{begins, behind, cargo, joined, root, run, target};
 use xtask::python;
 
 /// What its tests need, pinned.
@@ -15,18 +15,15 @@ const REQUIREMENTS: &str = include_str!("../../python/requirements.txt");
 /// The tests compare with the command that this names.
 const COMMAND: &str = "LYNKEUS_COMMAND";
 
-/// Builds the wheel, installs it and tries it as users have it; `test_beside` runs all tests.
+/// Builds the wheel, installs it, and tries it as users have it; all tests run beside those in Rust.
 ///
 /// # Errors
 /// What is missing, or what failed.
-pub fn test(python: &Path) -> Result<(), String> {
+pub fn wheel(python: &Path) -> Result<(), String> {
     begins("the Python package, as a wheel");
-    let wheel = wheel(python)?;
-    let mut install = pip(python, "install");
-    install
-        .args(["--force-reinstall", "--no-deps", "--no-index"])
-        .arg(wheel);
-    run(&mut install)?;
+    let folder = target().join("package");
+    run(&mut build(python, &folder)?)?;
+    run(&mut install(python, &built(&folder)?))?;
     begins("the command, to compare with");
     run(&mut cargo(&["build", "--package", "lynkeus-cli"]))?;
     begins("what the installed package says");
@@ -36,63 +33,36 @@ pub fn test(python: &Path) -> Result<(), String> {
     ]))
 }
 
-/// Tests it while something else is done, from a folder with the library that the workspace has built, so
-/// that nothing is compiled twice: the tests need one core, and what they print is shown behind that.
+/// Tests it while the tests in Rust run, which are compiled, and so are its library and the command. Its own tests,
+/// one after another, take longer than those on several threads, and go before them. What is printed of it is shown
+/// behind theirs.
 ///
 /// # Errors
 /// What is missing, or what failed, of either.
-pub fn test_beside(
-    python: &Path,
-    other: impl FnOnce() -> Result<(), String>,
-) -> Result<(), String> {
-    compile()?;
-    let folder = folder()?;
-    // a wheel that was installed by hand would be measured where the folder is not asked first
-    run(pip(python, "uninstall").args(["--yes", "lynkeus"]))?;
-    let log = target().join("package").join("tests.log");
-    let cannot = |error: std::io::Error| format!("cannot write {}: {error}", log.display());
-    let file = File::create(&log).map_err(cannot)?;
-    let mut tests = tests(python);
-    tests
-        .env("PYTHONPATH", folder)
-        .stdout(file.try_clone().map_err(cannot)?)
-        .stderr(file);
-    let running = tests.spawn();
-    let mut running = running.map_err(|error| format!("cannot start the tests: {error}"))?;
-    let done = other();
-    begins("what the tests of the Python package say, which ran beside");
-    let status = running.wait();
-    eprint!("{}", fs::read_to_string(&log).unwrap_or_default());
-    done?;
-    match status {
-        Ok(status) if status.success() => types(python),
-        Ok(status) => Err(format!(
-            "the tests of the Python package ended with {status}"
-        )),
-        Err(error) => Err(format!("the tests of the Python package: {error}")),
-    }
+pub fn test_beside(python: &Path, rust: &Command) -> Result<(), String> {
+    begins("the tests in Rust, beside the tests of the Python package and its types");
+    let path = target().join("package.log");
+    let cannot = |error: std::io::Error| format!("cannot write {}: {error}", path.display());
+    let log = File::create(&path).map_err(cannot)?;
+    let (package, rust) = std::thread::scope(|scope| {
+        let package = scope.spawn(|| steps(python, &log));
+        let rust = run(&mut behind(rust));
+        begins("what the tests of the Python package say, which ran beside");
+        (joined(package), rust)
+    });
+    eprint!("{}", fs::read_to_string(&path).unwrap_or_default());
+    rust.and(package)
 }
 
-fn pip(python: &Path, task: &str) -> Command {
-    let mut pip = Command::new(python);
-    pip.args(["-m", "pip", task])
-        .args(["--disable-pip-version-check", "--quiet"]);
-    pip
-}
-
-/// Everything that is tested, in one go: the features of the dependencies are then those of the whole, for
-/// the library of the Python package, too.
-fn compile() -> Result<(), String> {
-    begins("the tests, compiled");
-    run(&mut cargo(&[
-        "build",
-        "--workspace",
-        "--exclude",
-        "chores",
-        "--lib",
-        "--bins",
-        "--tests",
-    ]))
+/// Its tests, from a folder with the library that the workspace has built, and its types; what they print
+/// goes to the log.
+fn steps(python: &Path, log: &File) -> Result<(), String> {
+    let told = |command: &mut Command| {
+        let copy = || log.try_clone().map_err(|e| format!("the log: {e}"));
+        run(command.stdout(copy()?).stderr(copy()?))
+    };
+    told(tests(python).env("PYTHONPATH", folder()?))?;
+    told(&mut types(python))
 }
 
 /// The package as a folder to import it from: its Python files, and the library beside them.
@@ -134,10 +104,10 @@ fn tests(python: &Path) -> Command {
     tests
 }
 
-fn types(python: &Path) -> Result<(), String> {
-    begins("the types of the Python package");
+fn types(python: &Path) -> Command {
     let mut types = Command::new(python);
-    run(types.args(["-m", "mypy"]).current_dir(root()))
+    types.args(["-m", "mypy"]).current_dir(root());
+    types
 }
 
 /// The interpreter of its environment.
@@ -162,10 +132,9 @@ pub fn site() -> Result<(), String> {
     run(&mut build)
 }
 
-/// The only wheel in a folder that is made anew.
-fn wheel(python: &Path) -> Result<PathBuf, String> {
-    let folder = target().join("package");
-    match fs::remove_dir_all(&folder) {
+/// What builds a wheel into a folder, which is made anew.
+fn build(python: &Path, folder: &Path) -> Result<Command, String> {
+    match fs::remove_dir_all(folder) {
         // there is none at first
         Err(error) if error.kind() != ErrorKind::NotFound => {
             let folder = folder.display();
@@ -177,10 +146,23 @@ fn wheel(python: &Path) -> Result<PathBuf, String> {
     build
         .args(["-m", "maturin", "build", "--profile", "dev"])
         .args(["--auditwheel", "skip", "--out"])
-        .arg(&folder)
+        .arg(folder)
         .current_dir(root());
-    run(&mut build)?;
-    let entries = fs::read_dir(&folder).map_err(|e| format!("cannot read the wheels: {e}"))?;
+    Ok(build)
+}
+
+fn install(python: &Path, wheel: &Path) -> Command {
+    let mut install = Command::new(python);
+    install
+        .args(["-m", "pip", "install", "--disable-pip-version-check"])
+        .args(["--quiet", "--force-reinstall", "--no-deps", "--no-index"])
+        .arg(wheel);
+    install
+}
+
+/// The only wheel in a folder.
+fn built(folder: &Path) -> Result<PathBuf, String> {
+    let entries = fs::read_dir(folder).map_err(|e| format!("cannot read the wheels: {e}"))?;
     let mut wheels = entries.flatten().map(|entry| entry.path());
     let wheel = wheels.find(|path| path.extension().is_some_and(|kind| kind == "whl"));
     wheel.ok_or_else(|| format!("no wheel in {}", folder.display()))

@@ -1,5 +1,4 @@
 //! Start values that the model declares as known.
-#![allow(clippy::unwrap_used)]
 
 use lynkeus_model::{LoadOptions, Plant};
 use lynkeus_observability::{Question, Verdict, analyse};

@@ -4,7 +4,7 @@ use lynkeus_expr::Graph;
 use lynkeus_observability::precision::{Deviation, Experiment, Quantity, Sensor, Window};
 use lynkeus_run::System;
 
-use crate::fits::{Bench, Random};
+use super::fits::{Bench, Random};
 
 const NOISE: f64 = 1e-3;
 const STEP: f64 = 0.1;

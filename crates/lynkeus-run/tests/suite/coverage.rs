@@ -1,10 +1,8 @@
 //! How often the truth is within two standard deviations of an estimate: 95.4 % where these are what
 //! they are called.
 //!
-//! `cargo test -p lynkeus-run --test coverage -- --ignored --nocapture` makes the table of
+//! `cargo test -p lynkeus-run --test suite coverage -- --ignored --nocapture` makes the table of
 //! docs/ekf.md from 500 runs of each filter and smoother.
-
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use lynkeus_expr::Graph;
 use lynkeus_run::filter::{

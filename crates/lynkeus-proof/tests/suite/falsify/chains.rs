@@ -8,7 +8,7 @@ use lynkeus_proof::search::largest;
 use lynkeus_proof::{Bounds, lyapunov, matrix, vertices};
 use nalgebra::{DMatrix, DVector};
 
-use crate::Random;
+use super::Random;
 
 /// Two chains of two and three states that couple.
 struct Plant {

@@ -1,8 +1,6 @@
 //! Replays against the closed form of a Luenberger observer.
 
-mod common;
-
-use common::system;
+use crate::common::system;
 use lynkeus_expr::Graph;
 use lynkeus_run::{
     BetweenSamples, Error, Estimator, EstimatorSettings, Method, Step, System, Tolerances,

@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 
 use proptest::prelude::*;
 
-use crate::Random;
+use super::Random;
 
 pub fn around(middle: &DMatrix<f64>, radius: f64) -> IntervalMatrix {
     square(middle.nrows(), |i, j| {

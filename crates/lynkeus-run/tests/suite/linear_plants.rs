@@ -1,8 +1,6 @@
 //! Filters and smoothers on linear plants beside the exact discrete Kalman filter and the smoother of
 //! Rauch, Tung and Striebel, by matrix exponentials: whatever the interval between samples.
 
-#![allow(clippy::unwrap_used)]
-
 use lynkeus_expr::Graph;
 use lynkeus_run::filter::{
     FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints,

@@ -1,5 +1,4 @@
 //! Many runs at once give what each gives alone.
-#![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -2,7 +2,6 @@
 //! numerical linear algebra at random members of the set it speaks of. A single member that
 //! contradicts a proof fails the test, and so does a run in which too little was proved to
 //! attack.
-#![allow(clippy::unwrap_used)]
 
 mod chains;
 mod decay;

@@ -1,7 +1,7 @@
 //! Certified gains on a distillation column of twelve trays, written down by hand: the
 //! slope of each tray's equilibrium curve lies in [1/α, α], and the feed's composition
 //! is the thirteenth state.
-#![allow(clippy::unwrap_used, non_upper_case_globals)]
+#![allow(non_upper_case_globals)]
 
 use lynkeus_expr::{Budget, Interval};
 use lynkeus_proof::decay::{self, Aim, ErrorModel, NoGain, Request, Sector};

@@ -11,7 +11,7 @@ use lynkeus_observability::precision::{
 };
 use lynkeus_run::System;
 
-use crate::fits::{Bench, Random};
+use super::fits::{Bench, Random};
 
 const NOISE: f64 = 0.01;
 

@@ -1,6 +1,5 @@
 //! Models from the literature with verdicts from elsewhere, where they lie beside the
 //! project.
-#![allow(clippy::unwrap_used)]
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,4 @@
 //! Snapshots of estimators whose equations jump with the state, and of large filters.
-#![allow(clippy::unwrap_used)]
 
 use lynkeus_expr::{Expr, Graph};
 use lynkeus_run::filter::{

@@ -1,8 +1,6 @@
 //! Systems that jump with their state: crossed, slid along, left again; against solutions by
 //! hand.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod pulses;
 mod thresholds;
 

@@ -1,7 +1,6 @@
 //! Every shipped model against an independent Modelica compiler: the same free trajectories.
 //!
 //! Needs the environment variable `LYNKEUS_PYTHON`: a Python with the package `rumoca`.
-#![allow(clippy::unwrap_used)]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -1,8 +1,6 @@
 //! Filters and smoother beside an independent implementation, the crate `numeris`, which takes a
 //! discrete plant: here the flow over a sample, by many Runge–Kutta steps of this test's own.
 
-#![allow(clippy::unwrap_used)]
-
 use lynkeus_expr::{Expr, Graph};
 use lynkeus_run::filter::{
     FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints, Smoothed,

@@ -1,14 +1,11 @@
 //! Pulsed inputs: the integral of an expression of time, however short its pulses.
-#![allow(clippy::unwrap_used)]
 
-#[path = "../common/mod.rs"]
-mod common;
 mod random;
 
 use std::f64::consts::{PI, TAU};
 use std::time::{Duration, Instant};
 
-use common::system;
+use crate::common::system;
 use lynkeus_expr::{Expr, Graph};
 use lynkeus_run::{Error, Method, Role, Simulation, Step, Tolerances};
 

@@ -6,8 +6,8 @@ use lynkeus_proof::riccati::Riccati;
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
-use crate::matrices::around;
-use crate::{Random, largest};
+use super::matrices::around;
+use super::{Random, largest};
 
 /// More than the rounding of an eigenvalue of a matrix of size one.
 const ROUNDING: f64 = 1e-11;

@@ -1,10 +1,8 @@
 //! Simulations against closed forms.
 
-mod common;
-
 use std::ops::ControlFlow;
 
-use common::system;
+use crate::common::system;
 use lynkeus_expr::{Expr, Graph};
 use lynkeus_run::{Error, Level, Method, Noise, Role, Simulation, Step, System, Tolerances};
 

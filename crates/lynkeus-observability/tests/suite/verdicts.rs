@@ -1,5 +1,4 @@
 //! Verdicts judged against answers from elsewhere: by hand, planted, or from another method.
-#![allow(clippy::unwrap_used)]
 
 mod independent;
 mod limits;
