@@ -5,6 +5,7 @@ use lynkeus_observers::Observer;
 use lynkeus_run::filter::SensorHealth;
 use lynkeus_run::{Error as RunError, Role};
 
+use crate::corrections::Corrections;
 use crate::judge::{Doubt, Trace};
 use crate::recorded::Recorded;
 use crate::series::{Iter, Store};
@@ -101,6 +102,8 @@ pub(crate) struct Course {
     /// where they are: of each sensor its innovations, then their standard deviations; NaN where it
     /// did not report
     pub innovations: Vec<Series>,
+    /// what the corrections of a filter are made of, where that is asked for
+    pub corrections: Option<Corrections>,
     /// what speaks against the estimates beside what is seen in them
     pub doubts: Vec<Doubt>,
     /// what was chosen for the user

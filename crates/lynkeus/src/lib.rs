@@ -69,6 +69,7 @@ mod columns;
 mod compare;
 mod continuous;
 mod correction;
+mod corrections;
 mod course;
 mod crew;
 mod declared;
@@ -130,6 +131,7 @@ pub use columns::log;
 #[cfg(feature = "tune")]
 pub use compare::{Against, Compared, Comparison, Interval, Resolution, Run, Settled, compare};
 pub use correction::{Correction, GainEntry, InjectionEntry};
+pub use corrections::Corrections;
 pub use declared::Account;
 pub use design::{DesignReport, design};
 pub use estimate::{estimate, estimate_resumed};

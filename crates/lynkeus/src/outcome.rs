@@ -9,6 +9,7 @@ use lynkeus_run::Error as RunError;
 
 use crate::accuracy::{self, Accuracy};
 use crate::assertions;
+use crate::corrections::Corrections;
 use crate::course::Course;
 use crate::declared::{Account, Declared};
 use crate::frozen::Frozen;
@@ -19,6 +20,7 @@ use crate::outside::{self, Outside, outside};
 use crate::prepare::{Prepared, StudyDesign};
 use crate::study::EstimateSettings;
 use crate::systems::hat;
+use crate::table::Instant;
 use crate::words::in_words;
 use crate::{Error, Quantity, Series, Study, expected, headers, saturated};
 
@@ -78,6 +80,10 @@ pub struct Outcome {
     pub innovations: Vec<Innovations>,
     /// these row by row with their standard deviations, where they are asked for, under their headers
     pub innovation_columns: Vec<(String, Series)>,
+    /// what the corrections of a filter are made of, where [`Study::records`] asks for it
+    pub corrections: Option<Corrections>,
+    /// what the log writes for zero where its times are dates
+    pub origin: Option<Instant>,
     /// errors of the estimates whose true values are known
     pub accuracies: Vec<Accuracy>,
     /// sensors whose readings hang
@@ -191,6 +197,8 @@ pub(crate) struct Raw<'r> {
     pub design: StudyDesign,
     /// times of the rows
     pub time: Series,
+    /// what stands for zero where they are dates
+    pub origin: Option<Instant>,
     pub course: Course,
     pub quantities: Vec<Quantity>,
     pub measurements: Vec<(String, Series)>,
@@ -211,6 +219,7 @@ impl Raw<'_> {
             prepared,
             design,
             time,
+            origin,
             mut course,
             mut quantities,
             measurements,
@@ -325,6 +334,8 @@ impl Raw<'_> {
             }),
             innovations,
             innovation_columns,
+            corrections: course.corrections,
+            origin,
             accuracies,
             frozen,
             intervals,
