@@ -12,7 +12,7 @@ const USAGE: &str = "\
 usage: cargo xtask <task>
 
   test      every test of the workspace and of the Python package, with the Python cross-checks
-  package   build the Python package, install it into .venv-package and run its tests
+  package   build the Python package as a wheel, install it into .venv-package and try it there
   ci        format check, lints, documentation, then `test`
   site      build the documentation site into target/site, every link checked
 

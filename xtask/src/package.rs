@@ -1,5 +1,5 @@
-//! The Python package, built as a wheel, installed into an environment of its own and tested there; and the
-//! documentation site, which shows it.
+//! The Python package: tested as a folder beside the Rust programs, or built as a wheel, installed into an
+//! environment of its own and tested there; and the documentation site, which shows it.
 
 use std::fs::{self, File};
 use std::io::ErrorKind;
@@ -15,19 +15,29 @@ const REQUIREMENTS: &str = include_str!("../../python/requirements.txt");
 /// The tests compare with the command that this names.
 const COMMAND: &str = "LYNKEUS_COMMAND";
 
-/// Builds, installs and tests it.
+/// Builds the wheel, installs it and tries it as users have it; `test_beside` runs all tests.
 ///
 /// # Errors
 /// What is missing, or what failed.
 pub fn test(python: &Path) -> Result<(), String> {
-    prepare(python)?;
-    begins("the tests of the Python package");
-    run(&mut tests(python))?;
-    types(python)
+    begins("the Python package, as a wheel");
+    let wheel = wheel(python)?;
+    let mut install = pip(python, "install");
+    install
+        .args(["--force-reinstall", "--no-deps", "--no-index"])
+        .arg(wheel);
+    run(&mut install)?;
+    begins("the command, to compare with");
+    run(&mut cargo(&["build", "--package", "lynkeus-cli"]))?;
+    begins("what the installed package says");
+    run(tests(python).args([
+        "python/tests/test_package.py",
+        "python/tests/test_same_as_the_command.py",
+    ]))
 }
 
-/// Builds and installs it, then runs its tests while something else is done: they need one core, and what
-/// they print is shown behind that.
+/// Tests it while something else is done, from a folder with the library that the workspace has built, so
+/// that nothing is compiled twice: the tests need one core, and what they print is shown behind that.
 ///
 /// # Errors
 /// What is missing, or what failed, of either.
@@ -35,12 +45,18 @@ pub fn test_beside(
     python: &Path,
     other: impl FnOnce() -> Result<(), String>,
 ) -> Result<(), String> {
-    prepare(python)?;
+    compile()?;
+    let folder = folder()?;
+    // a wheel that was installed by hand would be measured where the folder is not asked first
+    run(pip(python, "uninstall").args(["--yes", "lynkeus"]))?;
     let log = target().join("package").join("tests.log");
     let cannot = |error: std::io::Error| format!("cannot write {}: {error}", log.display());
     let file = File::create(&log).map_err(cannot)?;
     let mut tests = tests(python);
-    tests.stdout(file.try_clone().map_err(cannot)?).stderr(file);
+    tests
+        .env("PYTHONPATH", folder)
+        .stdout(file.try_clone().map_err(cannot)?)
+        .stderr(file);
     let running = tests.spawn();
     let mut running = running.map_err(|error| format!("cannot start the tests: {error}"))?;
     let done = other();
@@ -57,25 +73,54 @@ pub fn test_beside(
     }
 }
 
-/// Builds and installs it, and what its tests compare with.
-fn prepare(python: &Path) -> Result<(), String> {
-    begins("the Python package, as a wheel");
-    let wheel = wheel(python)?;
-    let mut install = Command::new(python);
-    install
-        .args(["-m", "pip", "install", "--disable-pip-version-check"])
-        .args(["--quiet", "--force-reinstall", "--no-deps", "--no-index"])
-        .arg(wheel);
-    run(&mut install)?;
+fn pip(python: &Path, task: &str) -> Command {
+    let mut pip = Command::new(python);
+    pip.args(["-m", "pip", task])
+        .args(["--disable-pip-version-check", "--quiet"]);
+    pip
+}
+
+/// Everything that is tested, in one go: the features of the dependencies are then those of the whole, for
+/// the library of the Python package, too.
+fn compile() -> Result<(), String> {
     begins("the tests, compiled");
-    // as all tests are built later, so that nothing is built twice
     run(&mut cargo(&[
-        "test",
+        "build",
         "--workspace",
         "--exclude",
         "chores",
-        "--no-run",
+        "--lib",
+        "--bins",
+        "--tests",
     ]))
+}
+
+/// The package as a folder to import it from: its Python files, and the library beside them.
+fn folder() -> Result<PathBuf, String> {
+    let folder = target().join("package").join("folder");
+    let package = folder.join("lynkeus");
+    let cannot = |error: std::io::Error| format!("cannot make {}: {error}", package.display());
+    match fs::remove_dir_all(&folder) {
+        Err(error) if error.kind() != ErrorKind::NotFound => return Err(cannot(error)),
+        _ => {}
+    }
+    fs::create_dir_all(&package).map_err(cannot)?;
+    for entry in fs::read_dir(root().join("python/lynkeus")).map_err(cannot)? {
+        let file = entry.map_err(cannot)?.path();
+        if let (true, Some(name)) = (file.is_file(), file.file_name()) {
+            fs::copy(&file, package.join(name)).map_err(cannot)?;
+        }
+    }
+    let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    let library = target()
+        .join("debug")
+        .join(format!("{prefix}_lynkeus{suffix}"));
+    let module = match cfg!(windows) {
+        true => "_lynkeus.pyd",
+        false => "_lynkeus.abi3.so",
+    };
+    fs::copy(library, package.join(module)).map_err(cannot)?;
+    Ok(folder)
 }
 
 fn tests(python: &Path) -> Command {

@@ -19,14 +19,14 @@ use lynkeus_observers::{Examination, fit_word};
 use lynkeus_structure::{Sensors, determined, uniformity};
 use lynkeus_words::{Words, counted};
 
-use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
-use crate::study::Name;
+use crate::prepare::declared::{Account, Declared};
 use crate::words::explain;
 use crate::words::{conditions, listed};
-use crate::{Error, ErrorKind, Study, calibrate, estimate, prepare};
+use crate::{Error, ErrorKind, Study, estimate, prepare, prepare::calibrate};
 use knowledge::Sorted;
 pub use knowledge::{Assumption, Knowledge, Known, Reserve};
+use lynkeus_study::Name;
 pub use next::Next;
 pub use report::{CheckOptions, Report};
 use reserves::View;
@@ -48,8 +48,7 @@ const UNIFORMITY: f64 = 0.2;
 pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
     let symbolic = prepare::symbolic_plant(study, BTreeSet::new())?;
     Declared::new(study, &symbolic)?;
-    #[cfg(feature = "tune")]
-    crate::tune::refuse_strange_keys(study, true)?;
+    study.refuse_strange_keys(true)?;
     let time = match study.budget.left() {
         Some(_) => study.budget.part(0.5),
         None => study.budget.within(OBSERVABILITY),
@@ -255,7 +254,7 @@ impl Report {
     /// # Errors
     /// Another number of states, or a state without range.
     #[cfg(feature = "plot")]
-    pub fn picture(&self) -> Result<crate::plot::Plane, Error> {
+    pub fn picture(&self) -> Result<lynkeus_plot::Plane, Error> {
         match &self.uniform {
             Some(uniform) => uniform::picture(&self.plant, uniform.examined()),
             None => Err(Error::refused(format!(

@@ -1,16 +1,31 @@
 //! What an observer makes of samples, whatever kind of observer it is.
 
+pub(crate) mod checkpoint;
+pub(crate) mod columns;
+pub(crate) mod corrections;
+pub(crate) mod doubt;
+pub(crate) mod filter;
+pub(crate) mod fixed_steps;
+pub(crate) mod inputs;
+pub(crate) mod lines;
+pub(crate) mod quantity;
+pub(crate) mod recorded;
+pub(crate) mod replay;
+pub(crate) mod sampled;
+pub(crate) mod trace;
+
 use lynkeus_expr::Spent;
 use lynkeus_observers::Observer;
 use lynkeus_run::filter::SensorHealth;
 use lynkeus_run::{Error as RunError, Role};
 
-use crate::corrections::Corrections;
-use crate::judge::{Doubt, Trace};
-use crate::recorded::Recorded;
-use crate::series::{Iter, Store};
-use crate::systems::monitor_column;
+use crate::course::corrections::Corrections;
+use crate::course::doubt::Doubt;
+use crate::course::recorded::Recorded;
+use crate::course::trace::Trace;
+use crate::prepare::systems::monitor_column;
 use crate::{Error, Quantity, Series};
+use lynkeus_table::series::{Iter, Store};
 
 /// Samples for an observer: what each sensor and each known input reads, NaN where it does not.
 #[derive(Clone, Debug, Default)]

@@ -29,7 +29,6 @@ const STEP: f64 = 0.02;
 pub(crate) type Watch<'a> = dyn FnMut(f64) -> ControlFlow<()> + 'a;
 
 /// Tells `watch` of the k-th of `parts` equal parts of a run.
-#[cfg(feature = "tune")]
 pub(crate) fn part<'w, 'a>(
     watch: &'w mut Watch<'a>,
     k: u32,

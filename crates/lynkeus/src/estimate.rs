@@ -1,27 +1,30 @@
 //! A log through the study's observer.
 
+pub(crate) mod live;
+
 use std::ops::ControlFlow;
 
 use lynkeus_observers::{Design, Observer, Signal};
 use lynkeus_run::filter::FilterKind;
 use lynkeus_run::{Estimator, EstimatorSettings};
 
-use crate::checkpoint::Checkpoint;
-use crate::columns::{self, Log};
+use crate::course::checkpoint::Checkpoint;
+use crate::course::columns::{self, Log};
+use crate::course::fixed_steps::unlocated;
+use crate::course::inputs::{are_logged, refuse_strays, supplied};
+use crate::course::replay::{Watch, refuse_smoothing, replay};
 use crate::course::{Course, Samples};
 use crate::crew::within;
-use crate::fixed_steps::unlocated;
-use crate::frozen::{Channel, Frozen, frozen};
-use crate::inputs::{are_logged, refuse_strays, supplied};
-use crate::outcome::{Raw, is_observers_answer, measurements, settle};
+use crate::judge::frozen::{Channel, Frozen, frozen};
+use crate::judge::outcome::{Raw, is_observers_answer, measurements, settle};
+use crate::prepare::systems::{self, method};
 use crate::prepare::{Prepared, StudyDesign};
-use crate::replay::{Watch, refuse_smoothing, replay};
-use crate::study::{BetweenSamples, EstimateSettings};
-use crate::systems::{self, method};
 use crate::words::explain;
 use crate::{
-    Error, Outcome, Quantity, Series, Study, Table, filter, interval, lines, prepare, sampled,
+    Error, Outcome, Quantity, Series, Study, Table, course::filter, course::lines, course::sampled,
+    judge::interval, prepare,
 };
+use lynkeus_study::{BetweenSamples, EstimateSettings};
 
 /// Replays a log; `watch` is told the fraction done and may stop the replay.
 ///

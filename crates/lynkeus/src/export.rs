@@ -1,28 +1,18 @@
 //! A study's estimator as source code for other machines; what is exported otherwise is in `continuous`.
 
+use crate::ReportOptions;
+use crate::course::fixed_steps::{bends, hasty, stepped};
+use crate::course::inputs::on_device;
+use crate::estimate::live::blueprint;
+use crate::prepare::choice::Choice;
+use crate::prepare::{self, Prepared};
+use crate::{Error, Study, print::continuous, print::fmu, print::tunable};
 use lynkeus_export::Refusal;
 use lynkeus_export::curly::c::{self, Precision};
 
-#[cfg(feature = "tune")]
-use crate::ReportOptions;
-use crate::choice::Choice;
-use crate::fixed_steps::{bends, hasty, stepped};
-use crate::inputs::on_device;
-use crate::live::blueprint;
-use crate::prepare::{self, Prepared};
-use crate::{Error, Study, continuous, fmu, tunable};
-
-mod device;
-mod head;
-mod target;
-
-pub(crate) use device::{causal, printed};
-#[cfg(feature = "tune")]
-pub(crate) use head::file_name;
-use head::{about, beyond_float};
-pub(crate) use head::{designed, origin};
-pub use target::{Artifact, Export, ExportOptions, Subject, Target};
-use target::{Declared, Writes};
+use crate::print::device::{causal, printed};
+use crate::print::head::{about, beyond_float};
+use crate::print::target::{Artifact, Declared, Export, ExportOptions, Subject, Writes};
 
 /// The study's estimator as source code, as `[estimate]` says: with the same fixed step it gives what
 /// [`estimate()`](crate::estimate()) gives. Where the study has no fixed step, one that is short
@@ -48,12 +38,10 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     }
     let precision = options.precision;
     match writes {
-        #[cfg(feature = "tune")]
         Writes::Page if options.tunable => {
             let message = "what is tunable: expected C, JavaScript, Rust, Structured Text or an FMU, found a page, whose slider moves it";
             Err(Error::input(message))
         }
-        #[cfg(feature = "tune")]
         Writes::Page => page(study, options.step),
         Writes::Sources(write) => written(study, options, options.tunable, |made, notes| {
             let sources = write(made.device, precision)?;
@@ -109,7 +97,6 @@ fn written(
 }
 
 /// The report on the study's simulation.
-#[cfg(feature = "tune")]
 fn page(study: &Study, step: Option<f64>) -> Result<Export, Error> {
     let watch = &mut |_| std::ops::ControlFlow::Continue(());
     let page = crate::report::report(study, None, &ReportOptions { step }, watch)?;

@@ -1,9 +1,9 @@
 //! The picture of an outcome.
 
-use crate::mentioned::not_drawn;
-use crate::plot::{Band, Curve, Extent, Figure, Kind, Panel, Span};
-use crate::study::Name;
+use crate::prepare::mentioned::not_drawn;
 use crate::{Error, Outcome, Quantity, Series};
+use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Panel, Span};
+use lynkeus_study::Name;
 
 /// Panels drawn where the study does not say which.
 pub(crate) const PANELS: usize = 6;
@@ -45,8 +45,6 @@ pub fn figure(
         panels,
     })
 }
-
-#[cfg(feature = "tune")]
 impl crate::Comparison {
     /// One panel per family: the quantity that is hardest to see, unknown inputs first.
     #[must_use]

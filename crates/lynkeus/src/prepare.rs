@@ -1,5 +1,15 @@
 //! From a study to its plant and its observer.
 
+pub(crate) mod calibrate;
+pub(crate) mod choice;
+pub(crate) mod correction;
+pub(crate) mod declared;
+pub(crate) mod headers;
+pub(crate) mod mentioned;
+pub(crate) mod modes;
+pub(crate) mod spread;
+pub(crate) mod systems;
+
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
 use std::ops::{Deref, DerefMut};
@@ -12,12 +22,12 @@ use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning};
 use lynkeus_structure::{AugmentedPlant, Dimension, Region, Sensors, SensorsError, range};
 use lynkeus_words::Words;
 
-use crate::choice::Choice;
-use crate::declared::Declared;
-use crate::mentioned::{refuse_strangers, refuse_unknown_states};
-use crate::study::Name;
+use crate::prepare::choice::Choice;
+use crate::prepare::declared::Declared;
+use crate::prepare::mentioned::{refuse_strangers, refuse_unknown_states};
 use crate::words::explain;
-use crate::{Error, Study, calibrate, declared, systems};
+use crate::{Error, Study};
+use lynkeus_study::Name;
 
 /// The plant of a study, with the study's parameters.
 ///
@@ -83,7 +93,7 @@ fn load(study: &Study, symbols_but: Option<BTreeSet<String>>) -> Result<Plant, E
             Plant::from_text(text, &name, &options).map_err(LoadError::from)
         }
         None => {
-            crate::files::must_exist(path, "plant", &study.file)?;
+            lynkeus_table::files::must_exist(path, "plant", &study.file)?;
             Plant::load(path, &options)
         }
     };
@@ -211,7 +221,6 @@ impl<'a> Prepared<'a> {
     ///
     /// # Errors
     /// Declared names that the plant does not have.
-    #[cfg(feature = "tune")]
     pub(crate) fn with_study<'b>(&self, study: &'b Study) -> Result<Prepared<'b>, Error>
     where
         'a: 'b,
@@ -229,7 +238,6 @@ impl<'a> Prepared<'a> {
     ///
     /// # Errors
     /// As [`Prepared::with_study`].
-    #[cfg(feature = "tune")]
     pub(crate) fn run_by<'b>(&self, study: &'b Study) -> Result<Prepared<'b>, Error>
     where
         'a: 'b,

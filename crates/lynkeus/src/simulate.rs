@@ -9,20 +9,18 @@ use lynkeus_observers::{Design, Observer};
 use lynkeus_run::{Role, Simulation, System};
 
 use crate::Table;
+use crate::course::fixed_steps::unlocated;
+use crate::course::recorded::Recorded;
 use crate::course::{Course, Samples};
 use crate::crew::within;
-use crate::fixed_steps::unlocated;
-#[cfg(feature = "tune")]
-use crate::headers::{header, log_time};
-use crate::outcome::{Raw, interrupted, is_answer, measurements, settle};
+use crate::judge::outcome::{Raw, interrupted, is_answer, measurements, settle};
+use crate::prepare::headers::{header, log_time};
+use crate::prepare::spread::Spread;
+use crate::prepare::systems::{self, method, settings};
 use crate::prepare::{Prepared, StudyDesign};
-use crate::recorded::Recorded;
-use crate::spread::Spread;
-use crate::study::SimulateSettings;
-use crate::systems::{self, method, settings};
-#[cfg(feature = "tune")]
 use crate::words::explain;
 use crate::{Error, Outcome, Quantity, Series, Study, estimate, prepare};
+use lynkeus_study::SimulateSettings;
 use noise::{noise, stirred};
 
 /// Runs the study's plant with its observer; `watch` is told the fraction done
@@ -264,7 +262,6 @@ pub(crate) fn seen(plant: &Plant, observer: &Observer, run: &Recorded) -> Sample
 ///
 /// # Errors
 /// A study that cannot be run.
-#[cfg(feature = "tune")]
 pub(crate) fn recorded(study: &Study, plant: &Plant, step: f64) -> Result<Table, Error> {
     let settings = settings(study)?;
     let mut simulation = open_loop(study, settings, plant)?;

@@ -6,10 +6,10 @@ use lynkeus_observers::Assumptions;
 use lynkeus_structure::{AugmentedPlant, Dimension, Matrix, Region, range};
 
 use crate::Error;
-use crate::declared::Declared;
 use crate::prepare::Prepared;
-use crate::study::Noise;
+use crate::prepare::declared::Declared;
 use crate::words::explain;
+use lynkeus_study::Noise;
 
 /// Gaussian measurement errors are taken to stay within this many standard deviations.
 const DEVIATIONS: f64 = 3.0;

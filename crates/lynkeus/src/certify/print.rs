@@ -7,7 +7,7 @@ use lynkeus_structure::Standing;
 use lynkeus_words::Words;
 
 use super::CertifyReport;
-use crate::interval::Intervals;
+use crate::judge::interval::Intervals;
 use crate::words::{conditions, number, side};
 
 /// Where it is guaranteed.
@@ -24,7 +24,6 @@ impl CertifyReport {
     }
 
     /// The verdict of one of its certificates, in a word or two.
-    #[cfg(feature = "tune")]
     pub(crate) fn word(&self, certificate: &Certificate) -> &'static str {
         word(self, certificate)
     }

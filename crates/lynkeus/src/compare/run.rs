@@ -7,9 +7,9 @@ use lynkeus_model::Plant;
 use lynkeus_observers::Family;
 
 use crate::prepare::Prepared;
-use crate::study::{BetweenSamples, Name};
 use crate::tune::errors::Errors;
 use crate::{Error, Outcome, Quantity, Study, Table, estimate};
+use lynkeus_study::{BetweenSamples, Name};
 
 /// Is told the fraction done and may stop the work.
 pub(super) type Watch<'w> = &'w mut dyn FnMut(f64) -> ControlFlow<()>;
@@ -154,7 +154,7 @@ fn judged(prepared: &Prepared<'_>, outcome: Outcome, seconds: f64) -> Run {
     let half = outcome.time.len() / 2;
     let rough = estimated().filter_map(|q| {
         let estimate = q.estimate.as_ref()?;
-        let found = crate::filter::noise::scatter(&outcome.time, estimate, half)?;
+        let found = crate::course::filter::noise::scatter(&outcome.time, estimate, half)?;
         Some(found / width(q))
     });
     Run {

@@ -9,8 +9,8 @@ use lynkeus_words::short;
 use serde_json::{Value, json};
 
 use super::run::{Compared, Watch, run_all};
-use crate::study::{BetweenSamples, SimulateSettings};
-use crate::{Error, Study, simulate, systems};
+use crate::{Error, Study, prepare::systems, simulate};
+use lynkeus_study::{BetweenSamples, SimulateSettings};
 
 /// How a simulation was sampled.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,8 +3,9 @@
 use lynkeus_model::Variable;
 use lynkeus_words::figures;
 
-use super::{Doubt, Evidence, Kind, Level};
-use crate::outside::percent;
+use super::Evidence;
+use crate::course::doubt::{Doubt, Kind, Level};
+use crate::judge::outside::percent;
 use crate::words::{instant, number, side};
 use crate::{Quantity, Series};
 
@@ -169,7 +170,6 @@ fn beyond(evidence: &Evidence<'_>, quantity: &Quantity) -> Option<Doubt> {
 
 /// The same of one quantity, row by row, without what is measured: an estimate that [`away`] would
 /// find is suspect, and few others are.
-#[cfg_attr(not(feature = "tune"), allow(dead_code))]
 #[derive(Clone, Debug)]
 pub(crate) struct Screen {
     min: f64,

@@ -3,9 +3,9 @@
 use super::{MonteCarlo, Scattered};
 use crate::Error;
 use crate::figure::{PANELS, spread};
-use crate::mentioned::not_drawn;
-use crate::plot::{Band, Curve, Extent, Figure, Kind, Panel};
-use crate::study::Name;
+use crate::prepare::mentioned::not_drawn;
+use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Panel};
+use lynkeus_study::Name;
 
 impl MonteCarlo {
     /// The errors of the quantities of `show`, else of unknown inputs and hidden states first, six at

@@ -2,7 +2,7 @@
 
 use super::Report;
 use crate::Error;
-use crate::plot::{Bar, Bars, Chart, Line, Look, Plot, Upright};
+use lynkeus_plot::{Bar, Bars, Chart, Line, Look, Plot, Upright};
 
 /// Bars drawn; what is known better is left out.
 const MOST: usize = 40;

@@ -5,12 +5,12 @@ use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Method, Step};
 
 use super::positions::{Position, Positions};
-use crate::export::printed;
-use crate::fixed_steps::{stepped, steps};
-use crate::live::blueprint;
+use crate::course::fixed_steps::{stepped, steps};
+use crate::estimate::live::blueprint;
 use crate::prepare::Prepared;
-use crate::study::{self, Rk4Step};
+use crate::print::device::printed;
 use crate::{Error, Study};
+use lynkeus_study::{self, Rk4Step};
 
 /// The study's own estimator with fixed steps, as it runs in a page.
 #[derive(Debug)]
@@ -135,10 +135,12 @@ fn variant(prepared: &Prepared<'_>, fixed: &Fixed, position: &Position) -> Resul
 }
 
 /// The method of a run as studies have it.
-fn fixed(method: Method) -> Option<study::Method> {
+fn fixed(method: Method) -> Option<lynkeus_study::Method> {
     match method {
-        Method::Rk4(Step::AtMost(h)) => Some(study::Method::Rk4(Rk4Step::Length(h))),
-        Method::Rk4(Step::Substeps(n)) => Some(study::Method::Rk4(Rk4Step::PerRow(n as u64))),
+        Method::Rk4(Step::AtMost(h)) => Some(lynkeus_study::Method::Rk4(Rk4Step::Length(h))),
+        Method::Rk4(Step::Substeps(n)) => {
+            Some(lynkeus_study::Method::Rk4(Rk4Step::PerRow(n as u64)))
+        }
         _ => None,
     }
 }

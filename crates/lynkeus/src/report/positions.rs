@@ -3,9 +3,9 @@
 use lynkeus_observers::Design;
 
 use crate::prepare::Prepared;
-use crate::study::Name;
 use crate::tune::{Axis, axis};
 use crate::{Error, Study};
+use lynkeus_study::Name;
 
 /// Positions to either side of the study's own.
 const TO_A_SIDE: usize = 5;

@@ -4,9 +4,9 @@ use lynkeus_model::Plant;
 use lynkeus_run::{Level, Simulation, process_draws};
 use lynkeus_words::figures;
 
-use crate::declared::Declared;
-use crate::study::SimulateSettings;
+use crate::prepare::declared::Declared;
 use crate::{Error, Study};
+use lynkeus_study::SimulateSettings;
 
 /// The study's noises, by output and by state, and what its sensors can show. An unknown input has the
 /// course that `inputs` gives it.

@@ -8,8 +8,8 @@ use lynkeus_observers::{Monitor, Observer, Signal};
 
 use super::speed::transparent;
 use crate::course::{Course, Samples};
-use crate::study::TuneSettings;
 use crate::{Error, Series, Study};
+use lynkeus_study::TuneSettings;
 
 /// The signal that is above zero where the measurements are held out; no name in a model's text
 /// has a blank, unless it is in quotes.

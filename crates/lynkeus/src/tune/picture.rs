@@ -3,7 +3,7 @@
 use super::axis::shown;
 use super::{Sweep, measures};
 use crate::Error;
-use crate::plot::{Chart, Line, Look, Plot, Upright};
+use lynkeus_plot::{Chart, Line, Look, Plot, Upright};
 
 impl Sweep {
     /// The figures over the first key's values as SVG text. With several keys, the curve through

@@ -5,8 +5,8 @@ use lynkeus_structure::Standing;
 
 use super::axis;
 use crate::prepare::Prepared;
-use crate::study::Name;
 use crate::{Error, Study};
+use lynkeus_study::Name;
 
 /// A study that names its family.
 pub(super) struct Pinned {

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use super::axis::shown;
 use super::{Row, Sweep};
 use crate::Error;
-use crate::table::significant;
+use lynkeus_table::significant;
 
 impl Sweep {
     /// The rows as CSV: the keys, the figures (empty where there is none), 1 at the knee, and

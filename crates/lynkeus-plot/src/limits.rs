@@ -1,0 +1,201 @@
+//! The limits of a panel's axis, such that a peak does not hide the rest.
+
+use std::ops::Range;
+
+use super::{Band, Extent, Figure, Kind, Panel};
+use lynkeus_table::Series;
+use lynkeus_table::series::{Sorted, Store};
+
+/// A panel is cut when its curves span more than this many times what is worth seeing.
+const TOO_TALL: f64 = 4.0;
+
+/// The axis of a panel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits {
+    /// What the axis shows.
+    pub shown: Range<f64>,
+    /// The extreme value of the estimate that lies farthest outside, where the axis is cut.
+    pub beyond: Option<f64>,
+}
+
+impl Panel {
+    /// The limits of the value axis: everything, unless the estimate peaks.
+    ///
+    /// The core of a panel is the span of its true and measured values together with the middle
+    /// 90 % of the estimate and of the ends of its bands; a band of deviations that is wider elsewhere is cut. Where all values span more than 4 times the core, the axis ends one
+    /// core's height beyond it on either side. `None` when nothing is finite.
+    pub fn limits(&self) -> Option<Limits> {
+        let curves = extremes(self.values(|_| true))?;
+        // sorted once: they may be long
+        let bands: Vec<Range<f64>> = self.bands().collect();
+        let all = bands.iter().fold(curves, |all, b| union(&all, b));
+        let core = self.core(bands).unwrap_or_else(|| all.clone());
+        let height = core.end - core.start;
+        if height > 0.0 && all.end - all.start > TOO_TALL * height {
+            let shown = (core.start - height).max(all.start)..(core.end + height).min(all.end);
+            let beyond = match shown.start - all.start > all.end - shown.end {
+                true => all.start,
+                false => all.end,
+            };
+            return Some(Limits {
+                shown: padded(shown),
+                beyond: Some(beyond),
+            });
+        }
+        let whole = self.quantiles().fold(all.clone(), |all, b| union(&all, &b));
+        let is_too_tall = whole.end - whole.start > TOO_TALL * height;
+        Some(Limits {
+            shown: padded(if is_too_tall { all } else { whole }),
+            beyond: None,
+        })
+    }
+
+    /// What bands of quantiles span: errors that there were, not only what is thought possible.
+    fn quantiles(&self) -> impl Iterator<Item = Range<f64>> {
+        let own = self.bands.iter().filter(|b| b.extent == Extent::Quantiles);
+        own.filter_map(|b| extremes(b.low.iter().chain(&b.high)))
+    }
+
+    fn core(&self, bands: Vec<Range<f64>>) -> Option<Range<f64>> {
+        let peaks = |kind| matches!(kind, Kind::Estimated | Kind::Worst | Kind::Mean);
+        let known = extremes(self.values(|kind| !peaks(kind)));
+        let store = self.curves.first().map(|c| c.values.store());
+        let middle = store.and_then(|store| middle(store, self.values(peaks)));
+        let spans = known.into_iter().chain(middle).chain(bands);
+        spans.reduce(|a, b| union(&a, &b))
+    }
+
+    /// What a band spans at 90 % of the instants.
+    fn bands(&self) -> impl Iterator<Item = Range<f64>> {
+        let span = |band: &Band| {
+            let middle = |edge: &Series| middle(edge.store(), edge.iter());
+            Some(union(&middle(&band.low)?, &middle(&band.high)?))
+        };
+        self.bands.iter().filter_map(span)
+    }
+
+    fn values(&self, of: impl Fn(Kind) -> bool) -> impl Iterator<Item = f64> {
+        self.curves
+            .iter()
+            .filter(move |c| of(c.kind))
+            .flat_map(|c| &c.values)
+            .filter(|v| v.is_finite())
+    }
+}
+
+impl Figure {
+    /// The span of time that all curves cover together.
+    pub(super) fn time_range(&self) -> Option<Range<f64>> {
+        let times = self.panels.iter().flat_map(|p| &p.curves);
+        extremes(times.flat_map(|c| &c.time))
+    }
+}
+
+/// The span of the middle 90 % of the finite values.
+fn middle(store: &Store, values: impl Iterator<Item = f64>) -> Option<Range<f64>> {
+    let sorted = Sorted::new(store, values.filter(|v| v.is_finite()));
+    let cut = sorted.len() / 20;
+    let last = sorted.len().checked_sub(1 + cut)?;
+    Some(sorted.at(cut)?..sorted.at(last)?)
+}
+
+fn union(a: &Range<f64>, b: &Range<f64>) -> Range<f64> {
+    a.start.min(b.start)..a.end.max(b.end)
+}
+
+/// The least and the greatest of the finite values.
+pub(super) fn extremes(values: impl Iterator<Item = f64>) -> Option<Range<f64>> {
+    values.filter(|v| v.is_finite()).fold(None, |range, v| {
+        Some(range.map_or(v..v, |r: Range<f64>| r.start.min(v)..r.end.max(v)))
+    })
+}
+
+/// Some air above and below; a constant gets an axis around it.
+fn padded(range: Range<f64>) -> Range<f64> {
+    let height = range.end - range.start;
+    let scale = range.start.abs().max(range.end.abs());
+    let air = match height > 1e-9 * scale {
+        true => 0.06 * height,
+        false if scale > 0.0 => 0.1 * scale,
+        false => 1.0,
+    };
+    range.start - air..range.end + air
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Curve;
+
+    fn curve(kind: Kind, values: Vec<f64>) -> Curve {
+        Curve {
+            kind,
+            time: (0..values.len())
+                .map(|i| i as f64)
+                .collect::<Vec<_>>()
+                .into(),
+            values: values.into(),
+        }
+    }
+
+    fn panel(curves: Vec<Curve>) -> Panel {
+        Panel {
+            curves,
+            ..Panel::default()
+        }
+    }
+
+    #[test]
+    fn a_peak_is_cut_and_told() {
+        let mut estimate = vec![0.5; 100];
+        estimate[1] = -40.0;
+        let truth = curve(Kind::True, vec![0.0, 1.0]);
+        let limits = panel(vec![truth, curve(Kind::Estimated, estimate)])
+            .limits()
+            .unwrap();
+        assert_eq!(limits.beyond, Some(-40.0));
+        assert!(limits.shown.start > -1.2 && limits.shown.start < -1.0);
+        assert!(limits.shown.end > 1.0 && limits.shown.end < 1.2);
+    }
+
+    #[test]
+    fn a_modest_overshoot_is_shown_whole() {
+        let truth = curve(Kind::True, vec![0.0, 1.0]);
+        let limits = panel(vec![truth, curve(Kind::Estimated, vec![0.0, 3.0, 1.0])])
+            .limits()
+            .unwrap();
+        assert_eq!(limits.beyond, None);
+        assert!(limits.shown.end > 3.0);
+    }
+
+    #[test]
+    fn quantiles_are_shown_whole_and_deviations_are_not() {
+        let limits = |extent: Extent| {
+            let mut high = vec![1.0; 100];
+            high[3] = 1.5;
+            let band = Band {
+                extent,
+                time: (0..100).map(f64::from).collect::<Vec<_>>().into(),
+                low: vec![-1.0; 100].into(),
+                high: high.into(),
+            };
+            let mean = curve(Kind::Mean, vec![0.0; 100]);
+            let panel = Panel {
+                bands: vec![band],
+                ..panel(vec![mean])
+            };
+            panel.limits().unwrap().shown.end
+        };
+        assert!(limits(Extent::Quantiles) > 1.5);
+        assert!(limits(Extent::TwoDeviations) < 1.2);
+    }
+
+    #[test]
+    fn constants_zeros_and_nothing_have_an_axis_or_none() {
+        let of = |values| panel(vec![curve(Kind::True, values)]).limits();
+        assert_eq!(of(vec![5.0, 5.0]).unwrap().shown, 4.5..5.5);
+        assert_eq!(of(vec![0.0]).unwrap().shown, -1.0..1.0);
+        assert_eq!(of(vec![f64::NAN]), None);
+        assert_eq!(of(vec![]), None);
+    }
+}

@@ -1,0 +1,120 @@
+//! `[sensors]`: what is measured, what is unknown, how noisy.
+
+use lynkeus_run::Level;
+
+use super::Name;
+use super::keys::{NOISE, SENSORS};
+use super::section::Entry;
+use lynkeus_answer::Error;
+
+/// What the sensors see of the plant.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sensors {
+    /// The measured outputs, in the order of their chains; `None` means every output.
+    pub measured: Option<Vec<Name>>,
+    /// Inputs nobody measures, estimated along with the state.
+    pub unknown: Vec<Name>,
+    /// Inputs that act on the plant and that the observer takes as zero.
+    pub disturbances: Vec<Name>,
+    /// Measurement noise per measured output: added by `simulate`, counted by the filters.
+    pub noise: Vec<(Name, Noise)>,
+    /// The range that a sensor can show: (output, lowest, highest reading).
+    pub limits: Vec<(Name, f64, f64)>,
+}
+
+/// White measurement noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Noise {
+    /// Standard deviation, in the unit of the output.
+    Absolute(f64),
+    /// Standard deviation as a fraction of the present value: `"5%"` is 0.05.
+    Relative(f64),
+    /// Every error from −a to a is equally likely, none is larger: `{ uniform = a }`.
+    Uniform(f64),
+}
+
+impl Noise {
+    /// The number that says how strong it is: a deviation, a fraction or a bound.
+    #[must_use]
+    pub fn size(self) -> f64 {
+        match self {
+            Noise::Absolute(size) | Noise::Relative(size) | Noise::Uniform(size) => size,
+        }
+    }
+}
+
+impl From<Noise> for Level {
+    fn from(noise: Noise) -> Self {
+        match noise {
+            Noise::Absolute(deviation) => Level::Absolute(deviation),
+            Noise::Relative(share) => Level::Relative(share),
+            Noise::Uniform(bound) => Level::Uniform(bound),
+        }
+    }
+}
+
+pub(super) fn read(entry: Entry<'_>) -> Result<Sensors, Error> {
+    let mut section = entry.section("[sensors]", &SENSORS)?;
+    Ok(Sensors {
+        measured: section.optional("measured", |e| {
+            let refusal = e.wrong("a list with at least one output");
+            let names = e.list_of(Entry::name)?;
+            if names.is_empty() {
+                Err(refusal)
+            } else {
+                Ok(names)
+            }
+        })?,
+        unknown: names(section.take("unknown"))?,
+        disturbances: names(section.take("disturbances"))?,
+        limits: super::simulate::pairs(section.take("limits"), limits)?
+            .into_iter()
+            .map(|(name, (low, high))| (name, low, high))
+            .collect(),
+        noise: match section.take("noise") {
+            None => Vec::new(),
+            Some(table) => table
+                .pairs()?
+                .into_iter()
+                .map(|(name, value)| Ok((name, noise(value)?)))
+                .collect::<Result<_, Error>>()?,
+        },
+    })
+}
+
+fn limits(entry: Entry<'_>) -> Result<(f64, f64), Error> {
+    let refusal = entry.wrong("[lowest, highest reading]");
+    match entry.list_of(Entry::number)?[..] {
+        [low, high] if low < high => Ok((low, high)),
+        _ => Err(refusal),
+    }
+}
+
+fn names(entry: Option<Entry<'_>>) -> Result<Vec<Name>, Error> {
+    entry.map_or(Ok(Vec::new()), |e| e.list_of(Entry::name))
+}
+
+fn noise(entry: Entry<'_>) -> Result<Noise, Error> {
+    let refusal = entry.wrong(
+        "a standard deviation >= 0, a share such as \"5%\", or a bound such as { uniform = 0.05 }",
+    );
+    if entry.is_table() {
+        let mut section = entry.section("noise of [sensors]", &NOISE)?;
+        let bound = section.take("uniform").ok_or(refusal)?;
+        let wrong = bound.wrong("a bound >= 0, in the unit of the output");
+        let bound = bound.number().ok().filter(|a| *a >= 0.0);
+        return bound.map(Noise::Uniform).ok_or(wrong);
+    }
+    let (value, kind): (Option<f64>, fn(f64) -> Noise) = match entry.as_text() {
+        Some(text) => {
+            let share = text.trim().strip_suffix('%');
+            let percent = share.and_then(|p| p.trim().parse::<f64>().ok());
+            (percent.map(|p| p / 100.0), Noise::Relative)
+        }
+        None => (entry.number().ok(), Noise::Absolute),
+    };
+    value
+        .filter(|x| x.is_finite() && *x >= 0.0)
+        .map(kind)
+        .ok_or(refusal)
+}

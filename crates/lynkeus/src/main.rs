@@ -1,7 +1,0 @@
-//! The `lynkeus` command.
-
-mod command;
-
-fn main() -> std::process::ExitCode {
-    command::main()
-}
