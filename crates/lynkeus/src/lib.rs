@@ -111,6 +111,7 @@ pub use choose::runner::{Runner, Runners};
 pub use compare::{Against, Compared, Comparison, Interval, Resolution, Run, Settled, compare};
 pub use course::checkpoint::Checkpoint;
 pub use course::columns::log;
+pub use course::corrections::Corrections;
 pub use course::doubt::{Doubt, Kind as DoubtKind, Level as DoubtLevel};
 pub use course::quantity::Quantity;
 pub use design::{DesignReport, design};
