@@ -55,6 +55,7 @@ impl MonteCarlo {
             values: values.to_vec().into(),
         };
         Panel {
+            name: quantity.name.clone(),
             caption: format!("error of {}{unit}", quantity.name),
             curves: vec![
                 curve(Kind::Worst, &quantity.worst_course),
