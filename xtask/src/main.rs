@@ -13,7 +13,7 @@ usage: cargo xtask <task>
 
   test      every test of the workspace and of the Python package, with the Python cross-checks;
             [--all] then those that take minutes, too, of which these are a sample
-  package   build the Python package, install it into .venv-package and run its tests
+  package   build the Python package as a wheel, install it into .venv-package and try it there
   ci        format check, lints, documentation, then `test`
   site      build the documentation site into target/site, every link checked
 
@@ -57,7 +57,7 @@ fn main() -> ExitCode {
         ("ci", 1) => ci(),
         // with the features of the whole, so that nothing is compiled twice
         ("chores", 1) => run(&mut cargo(&["test", "--workspace", "--bin", "chores"])),
-        ("package", 1) => compiled().and_then(|()| package::test(&package::interpreter()?)),
+        ("package", 1) => package::interpreter().and_then(|python| package::wheel(&python)),
         ("site", 1) => package::site(),
         _ if CHORES.contains(&task) => {
             let mut chore = cargo(&["run", "--release", "--package", "chores", "--"]);
@@ -80,9 +80,11 @@ fn main() -> ExitCode {
 /// Every test in Rust but those of the chores.
 const TESTS: [&str; 4] = ["test", "--workspace", "--exclude", "chores"];
 
-/// Compiles them, and the command, which the tests of the Python package compare with.
+/// Compiles them, the library of the Python package, and the command, which its tests compare with: in one go,
+/// so that the features of dependencies are those of the whole and nothing is compiled twice.
 fn compiled() -> Result<(), String> {
-    run(cargo(&TESTS).arg("--no-run"))
+    run(cargo(&["build", "--workspace", "--exclude", "chores"])
+        .args(["--lib", "--bins", "--tests"]))
 }
 
 /// Runs every test, those of the Python package beside those in Rust.

@@ -6,7 +6,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use xtask::process::{begins, behind, joined, root, run, target};
+use xtask::process::{begins, behind, cargo, joined, root, run, target};
 use xtask::python;
 
 /// What its tests need, pinned.
@@ -15,27 +15,37 @@ const REQUIREMENTS: &str = include_str!("../../python/requirements.txt");
 /// The tests compare with the command that this names.
 const COMMAND: &str = "LYNKEUS_COMMAND";
 
-/// Builds, installs and tests it; the command is compiled.
+/// Builds the wheel, installs it, and tries it as users have it; all tests run beside those in Rust.
 ///
 /// # Errors
 /// What is missing, or what failed.
-pub fn test(python: &Path) -> Result<(), String> {
-    steps(python, None)
+pub fn wheel(python: &Path) -> Result<(), String> {
+    begins("the Python package, as a wheel");
+    let folder = target().join("package");
+    run(&mut build(python, &folder)?)?;
+    run(&mut install(python, &built(&folder)?))?;
+    begins("the command, to compare with");
+    run(&mut cargo(&["build", "--package", "lynkeus-cli"]))?;
+    begins("what the installed package says");
+    run(tests(python).args([
+        "python/tests/test_package.py",
+        "python/tests/test_same_as_the_command.py",
+    ]))
 }
 
-/// Builds, installs and tests it while the tests in Rust run, which are compiled, and so is the command. Its own tests,
+/// Tests it while the tests in Rust run, which are compiled, and so are its library and the command. Its own tests,
 /// one after another, take longer than those on several threads, and go before them. What is printed of it is shown
 /// behind theirs.
 ///
 /// # Errors
 /// What is missing, or what failed, of either.
 pub fn test_beside(python: &Path, rust: &Command) -> Result<(), String> {
-    begins("the tests in Rust, beside the Python package: a wheel, its tests, its types");
+    begins("the tests in Rust, beside the tests of the Python package and its types");
     let path = target().join("package.log");
     let cannot = |error: std::io::Error| format!("cannot write {}: {error}", path.display());
     let log = File::create(&path).map_err(cannot)?;
     let (package, rust) = std::thread::scope(|scope| {
-        let package = scope.spawn(|| steps(python, Some(&log)));
+        let package = scope.spawn(|| steps(python, &log));
         let rust = run(&mut behind(rust));
         begins("what the tests of the Python package say, which ran beside");
         (joined(package), rust)
@@ -44,32 +54,43 @@ pub fn test_beside(python: &Path, rust: &Command) -> Result<(), String> {
     rust.and(package)
 }
 
-/// The wheel, installed, its tests and its types; what they print goes to the log.
-fn steps(python: &Path, log: Option<&File>) -> Result<(), String> {
-    let run = |what: &str, command: &mut Command| {
-        match log {
-            Some(log) => {
-                let copy = || {
-                    log.try_clone()
-                        .map_err(|e| format!("the log of {what}: {e}"))
-                };
-                command.stdout(copy()?).stderr(copy()?);
-            }
-            None => begins(what),
-        }
-        run(command)
+/// Its tests, from a folder with the library that the workspace has built, and its types; what they print
+/// goes to the log.
+fn steps(python: &Path, log: &File) -> Result<(), String> {
+    let told = |command: &mut Command| {
+        let copy = || log.try_clone().map_err(|e| format!("the log: {e}"));
+        run(command.stdout(copy()?).stderr(copy()?))
     };
-    let folder = target().join("package");
-    run(
-        "the Python package, as a wheel",
-        &mut build(python, &folder)?,
-    )?;
-    run(
-        "the wheel, installed",
-        &mut install(python, &wheel(&folder)?),
-    )?;
-    run("the tests of the Python package", &mut tests(python))?;
-    run("the types of the Python package", &mut types(python))
+    told(tests(python).env("PYTHONPATH", folder()?))?;
+    told(&mut types(python))
+}
+
+/// The package as a folder to import it from: its Python files, and the library beside them.
+fn folder() -> Result<PathBuf, String> {
+    let folder = target().join("package").join("folder");
+    let package = folder.join("lynkeus");
+    let cannot = |error: std::io::Error| format!("cannot make {}: {error}", package.display());
+    match fs::remove_dir_all(&folder) {
+        Err(error) if error.kind() != ErrorKind::NotFound => return Err(cannot(error)),
+        _ => {}
+    }
+    fs::create_dir_all(&package).map_err(cannot)?;
+    for entry in fs::read_dir(root().join("python/lynkeus")).map_err(cannot)? {
+        let file = entry.map_err(cannot)?.path();
+        if let (true, Some(name)) = (file.is_file(), file.file_name()) {
+            fs::copy(&file, package.join(name)).map_err(cannot)?;
+        }
+    }
+    let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    let library = target()
+        .join("debug")
+        .join(format!("{prefix}_lynkeus{suffix}"));
+    let module = match cfg!(windows) {
+        true => "_lynkeus.pyd",
+        false => "_lynkeus.abi3.so",
+    };
+    fs::copy(library, package.join(module)).map_err(cannot)?;
+    Ok(folder)
 }
 
 fn tests(python: &Path) -> Command {
@@ -140,7 +161,7 @@ fn install(python: &Path, wheel: &Path) -> Command {
 }
 
 /// The only wheel in a folder.
-fn wheel(folder: &Path) -> Result<PathBuf, String> {
+fn built(folder: &Path) -> Result<PathBuf, String> {
     let entries = fs::read_dir(folder).map_err(|e| format!("cannot read the wheels: {e}"))?;
     let mut wheels = entries.flatten().map(|entry| entry.path());
     let wheel = wheels.find(|path| path.extension().is_some_and(|kind| kind == "whl"));

@@ -6,10 +6,10 @@ use lynkeus_observers::{Bounds, Certificate, Claim, Design, Tuning};
 use lynkeus_structure::{AugmentedPlant, Standing};
 use lynkeus_words::Words;
 
-use crate::declared::{Account, Declared};
-use crate::interval::{self, Intervals};
+use crate::judge::interval::{self, Intervals};
+use crate::prepare::declared::{Account, Declared};
 use crate::prepare::{Prepared, StudyDesign};
-use crate::{Correction, Error, Study, correction, prepare, simulate, words};
+use crate::{Correction, Error, Study, prepare, prepare::correction, simulate, words};
 
 mod assumptions;
 mod excited;

@@ -19,11 +19,11 @@ use lynkeus_observers::{Examination, fit_word};
 use lynkeus_structure::{Sensors, determined, uniformity};
 use lynkeus_words::{Words, counted};
 
-use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
+use crate::prepare::declared::{Account, Declared};
 use crate::words::explain;
 use crate::words::{conditions, listed};
-use crate::{Error, ErrorKind, Study, calibrate, estimate, prepare};
+use crate::{Error, ErrorKind, Study, estimate, prepare, prepare::calibrate};
 use knowledge::Sorted;
 pub use knowledge::{Assumption, Knowledge, Known, Reserve};
 use lynkeus_study::Name;
@@ -48,7 +48,7 @@ const UNIFORMITY: f64 = 0.2;
 pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
     let symbolic = prepare::symbolic_plant(study, BTreeSet::new())?;
     Declared::new(study, &symbolic)?;
-    crate::tune::refuse_strange_keys(study, true)?;
+    study.refuse_strange_keys(true)?;
     let time = match study.budget.left() {
         Some(_) => study.budget.part(0.5),
         None => study.budget.within(OBSERVABILITY),

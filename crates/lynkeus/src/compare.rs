@@ -14,8 +14,8 @@ pub use run::{Compared, Run, Settled};
 use run::{of_family, run_all};
 pub use samples::{Interval, Resolution};
 
-use crate::mentioned::asked;
 use crate::prepare::Prepared;
+use crate::prepare::mentioned::asked;
 use crate::{Error, Study, Table, prepare};
 
 /// The answer of `lynkeus compare`.

@@ -1,6 +1,6 @@
 //! The picture of an outcome.
 
-use crate::mentioned::not_drawn;
+use crate::prepare::mentioned::not_drawn;
 use crate::{Error, Outcome, Quantity, Series};
 use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Panel, Span};
 use lynkeus_study::Name;
@@ -27,6 +27,7 @@ pub fn figure(
     };
     let mut panels: Vec<Panel> = chosen.into_iter().map(|q| panel(outcome, q)).collect();
     panels.extend(outcome.watches.iter().map(|watch| Panel {
+        name: watch.header.clone(),
         caption: format!(
             "{} (alarm below {})",
             watch.header, watch.monitor.alarm_below
@@ -133,6 +134,7 @@ fn panel(outcome: &Outcome, quantity: &Quantity) -> Panel {
         .filter_map(|(kind, values)| Some(curve(outcome, kind, values.as_ref()?)))
         .collect();
     Panel {
+        name: quantity.name.clone(),
         caption,
         curves,
         bands: bands(outcome, quantity),

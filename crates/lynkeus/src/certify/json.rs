@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use super::{CertifyReport, Excited};
 use crate::check::point;
-use crate::interval::Intervals;
+use crate::judge::interval::Intervals;
 
 /// `{verdict, rate, ultimate_bound, mean_square_bound, box, hypotheses, …}`; the hypotheses are those of
 /// the inequality, then those of the theorem.

@@ -7,7 +7,7 @@ use lynkeus_structure::Standing;
 use lynkeus_words::Words;
 
 use super::CertifyReport;
-use crate::interval::Intervals;
+use crate::judge::interval::Intervals;
 use crate::words::{conditions, number, side};
 
 /// Where it is guaranteed.

@@ -5,7 +5,7 @@ use lynkeus_observers::Design;
 use lynkeus_structure::AugmentedPlant;
 use serde_json::{Value, json};
 
-use crate::outside::{self, Outside, outside};
+use crate::judge::outside::{self, Outside, outside};
 use crate::prepare::Prepared;
 use crate::{Error, Outcome, Quantity, Series};
 

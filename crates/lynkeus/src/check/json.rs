@@ -8,7 +8,7 @@ use lynkeus_words::Words;
 use serde_json::{Value, json};
 
 use super::{Knowledge, Next, Report, Uniform, observability, point, uniform};
-use crate::choice::Choice;
+use crate::prepare::choice::Choice;
 
 impl Report {
     /// The report for machines.

@@ -11,8 +11,8 @@ use lynkeus_words::figures;
 use serde_json::{Value, json};
 
 use crate::Study;
-use crate::choice::{Choice, Grounds, Proposal};
 use crate::prepare::Prepared;
+use crate::prepare::choice::{Choice, Grounds, Proposal};
 use crate::words::number;
 
 /// The next steps.
@@ -294,7 +294,7 @@ fn skeleton(prepared: &Prepared<'_>, observer: &str) -> String {
 /// Ten times the slowest time scale of the plant at its start, else 10.
 fn choice_of_span(prepared: &Prepared<'_>) -> f64 {
     let augmented = prepared.augmented();
-    let J = crate::modes::Start::of(augmented).jacobian(augmented);
+    let J = crate::prepare::modes::Start::of(augmented).jacobian(augmented);
     let Some(modes) = J.and_then(spectrum::eigenvalues) else {
         return 10.0;
     };

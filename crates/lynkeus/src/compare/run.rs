@@ -154,7 +154,7 @@ fn judged(prepared: &Prepared<'_>, outcome: Outcome, seconds: f64) -> Run {
     let half = outcome.time.len() / 2;
     let rough = estimated().filter_map(|q| {
         let estimate = q.estimate.as_ref()?;
-        let found = crate::filter::noise::scatter(&outcome.time, estimate, half)?;
+        let found = crate::course::filter::noise::scatter(&outcome.time, estimate, half)?;
         Some(found / width(q))
     });
     Run {

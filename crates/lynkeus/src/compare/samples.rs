@@ -9,7 +9,7 @@ use lynkeus_words::short;
 use serde_json::{Value, json};
 
 use super::run::{Compared, Watch, run_all};
-use crate::{Error, Study, simulate, systems};
+use crate::{Error, Study, prepare::systems, simulate};
 use lynkeus_study::{BetweenSamples, SimulateSettings};
 
 /// How a simulation was sampled.

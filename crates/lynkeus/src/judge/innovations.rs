@@ -5,8 +5,8 @@ use lynkeus_run::filter::SensorHealth;
 use lynkeus_words::figures;
 use serde_json::{Value, json};
 
-use super::Trace;
 use crate::course::Course;
+use crate::course::trace::Trace;
 
 /// The innovations of one measured output.
 #[derive(Clone, Debug, PartialEq)]

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use super::statistics::{HIGH, mean, quantile};
 use super::{Again, Failure, MonteCarlo, Scattered};
 use crate::Error;
-use crate::headers::Headers;
+use crate::prepare::headers::Headers;
 
 /// Seeds of runs that are told one by one.
 const TOLD: usize = 20;

@@ -14,10 +14,10 @@ mod words;
 
 use lynkeus_observability::precision::{Advice, Deviations, SensorSet};
 
-use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
+use crate::prepare::declared::{Account, Declared};
 use crate::words::explain;
-use crate::{Error, Study, prepare, simulate, systems};
+use crate::{Error, Study, prepare, prepare::systems, simulate};
 pub use experiment::{Assumed, Candidates, Options};
 use experiment::{Setup, ended};
 

@@ -4,7 +4,7 @@ use lynkeus_observability::precision::{Advice, SensorSet};
 use serde_json::{Map, Value, json};
 
 use super::Report;
-use crate::headers::Headers;
+use crate::prepare::headers::Headers;
 
 impl Report {
     /// The report as one JSON object; what is not seen is `null`.

@@ -8,7 +8,7 @@ use super::html::{Cell, Html, badge, words};
 use super::proof;
 use super::told::{Told, without_folder};
 use crate::check::{Known, Report};
-use crate::export::file_name;
+use crate::print::head::file_name;
 use crate::words::{instant, number};
 use crate::{Accuracy, Error, Knowledge, Settling};
 
