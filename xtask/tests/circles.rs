@@ -1,4 +1,5 @@
-//! No circles of files: within a crate, what uses stands above what is used.
+//! No circles of files: within a crate, what uses stands above what is used. And no arrow back in the
+//! library: a room uses only those that its `lib.rs` names before it.
 //!
 //! An arrow goes from a file to the one that defines what it names, by `use` or by path; re-exports
 //! are followed to the definition and are no arrows themselves. Tests are left out.
@@ -33,8 +34,10 @@ struct Crate(BTreeMap<Names, Module>);
 impl Crate {
     fn read(source: &Path) -> Self {
         let mut modules = Self::default();
-        let root = source.join("lib.rs");
-        modules.file(&root, source, vec![]);
+        let roots = ["lib.rs", "main.rs"].map(|name| source.join(name));
+        if let Some(root) = roots.iter().find(|root| root.is_file()) {
+            modules.file(root, source, vec![]);
+        }
         modules
     }
 
@@ -260,9 +263,6 @@ fn no_files_use_each_other_in_a_circle() {
     let mut files = 0;
     for folder in fs::read_dir(&crates).expect("the workspace has its crates") {
         let source = folder.expect("a folder can be read").path().join("src");
-        if !source.join("lib.rs").is_file() {
-            continue;
-        }
         let modules = Crate::read(&source);
         let arrows = modules.arrows();
         files += arrows.len();
@@ -283,6 +283,46 @@ fn no_files_use_each_other_in_a_circle() {
     assert!(
         found.is_empty(),
         "files that use each other in a circle; what both need belongs below them:\n{found}"
+    );
+}
+
+/// The rooms of a crate, in the order of its `lib.rs`.
+fn rooms(source: &Path) -> Vec<String> {
+    let text = fs::read_to_string(source.join("lib.rs")).expect("the crate has its front page");
+    let parsed = syn::parse_file(&text).expect("it is Rust");
+    let modules = parsed.items.iter().filter_map(|item| match item {
+        Item::Mod(room) => Some(room.ident.to_string()),
+        _ => None,
+    });
+    modules.collect()
+}
+
+#[test]
+fn no_room_of_the_library_uses_one_above_it() {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/lynkeus/src");
+    let rooms = rooms(&source);
+    let room = |file: &Path| {
+        let inside = file.strip_prefix(&source).ok()?;
+        let first = inside.components().next()?.as_os_str().to_str()?;
+        let name = first.strip_suffix(".rs").unwrap_or(first);
+        rooms.iter().position(|room| room == name)
+    };
+    let modules = Crate::read(&source);
+    let mut back = String::new();
+    for (file, used) in modules.arrows() {
+        for other in used {
+            if let (Some(own), Some(above)) = (room(file), room(other))
+                && above > own
+            {
+                let (file, other) = (file.display(), other.display());
+                back += &format!("{file} uses {other}\n");
+            }
+        }
+    }
+    assert!(rooms.len() > 10, "only {rooms:?} were found");
+    assert!(
+        back.is_empty(),
+        "a room uses one that `lib.rs` names after it; what both need belongs below:\n{back}"
     );
 }
 

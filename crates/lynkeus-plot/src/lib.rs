@@ -7,7 +7,8 @@
 //! an estimate is outside of its declared range the foot of the panel is marked. An estimate that peaks far beyond everything else would flatten the rest of its
 //! panel; the axis is then cut and the panel's caption says how far the peak goes
 //! ([`Panel::limits`] has the rule).
-
+//!
+//! This crate knows curves, bands and bars, and not of what they are.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod axis;

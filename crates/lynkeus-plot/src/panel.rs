@@ -16,6 +16,8 @@ pub struct Figure {
 /// One quantity over time.
 #[derive(Clone, Debug, Default)]
 pub struct Panel {
+    /// The quantity's name, or the monitor's header.
+    pub name: String,
     /// The quantity's name, description and unit.
     pub caption: String,
     /// Its curves.

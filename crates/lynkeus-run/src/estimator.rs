@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::filter::{Filter, Health, Innovation, Smoothed};
+use crate::filter::{Filter, Health, Innovation, Record, Smoothed};
 use crate::runner::{Runner, Sample};
 use crate::sampled::Sampled;
 use crate::snapshot::{self, Damaged, Walk};
@@ -223,6 +223,18 @@ impl Estimator {
         self.runner.health()
     }
 
+    /// From the next update on a filter keeps what its correction is made of: see [`Estimator::record`].
+    pub fn keep_record(&mut self) {
+        self.runner.keep_record();
+    }
+
+    /// What the correction of the last update is made of, NaN before the first and after a call that failed; none
+    /// where no record is kept, and of an observer that is no filter.
+    #[must_use]
+    pub fn record(&self) -> Option<&Record> {
+        self.runner.record()
+    }
+
     /// Time of the last sample or prediction.
     #[must_use]
     pub fn time(&self) -> Option<f64> {
@@ -299,6 +311,10 @@ impl Estimator {
             // the same walk over what it made
             let _ = snapshot::load(&image, |walk| self.walk(walk, false));
             self.image = image;
+            if self.record().is_some() {
+                // that of the sample before is gone
+                self.keep_record();
+            }
             return Err(error);
         }
         if has_signals {

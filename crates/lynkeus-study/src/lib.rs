@@ -20,7 +20,9 @@
 //! [estimate]
 //! between_samples = "linear"
 //! ```
-
+//!
+//! A key is declared once (`keys`): reader, default, schema and refusals follow. This crate knows what
+//! a study says and which keys the families have; whether its names are the plant's is seen by who loads both.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod certify;
@@ -33,6 +35,7 @@ mod section;
 mod sensors;
 mod simulate;
 mod source;
+mod swept;
 mod tune;
 mod whole;
 
@@ -50,6 +53,7 @@ pub use schema::schema;
 pub use sensors::{Noise, Sensors};
 pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
+pub use swept::swept;
 pub use tune::{Scale, TuneSettings, Values};
 pub use whole::Whole;
 
@@ -99,6 +103,8 @@ pub struct Study {
     pub show: Option<Vec<Name>>,
     /// The unit on the time axis.
     pub time_unit: Option<String>,
+    /// Whether a replay keeps what a filter's corrections are made of; no file has it.
+    pub records: bool,
     /// The time and the memory that the work on the study may take; no file has it.
     pub budget: Budget,
 }
@@ -220,6 +226,7 @@ impl Study {
             compare: top.optional("compare", compare)?.flatten(),
             show,
             time_unit,
+            records: false,
             budget: Budget::default(),
         })
     }

@@ -31,7 +31,7 @@ const BATCH: usize = 1024;
 /// assert_eq!(table.origin("t"), Some("1970-01-01T00:00:00Z"));
 /// assert_eq!(table.missing("level"), 1);
 /// assert!(table.readings("note").is_err());
-/// # Ok::<(), lynkeus::Error>(())
+/// # Ok::<(), lynkeus_answer::Error>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Gathering {

@@ -2,8 +2,12 @@
 
 use lynkeus_answer::Document;
 use lynkeus_answer::document::Line;
+#[cfg(feature = "plot")]
+use lynkeus_plot::Figure;
+use lynkeus_table::Instant;
 use serde_json::Value;
 
+use crate::course::corrections::Corrections;
 use crate::{Error, Series};
 
 /// An answer of a command.
@@ -26,6 +30,25 @@ pub trait Answer: Send {
     #[cfg(feature = "plot")]
     fn svg(&self) -> Result<Option<String>, Error> {
         Ok(None)
+    }
+
+    /// The panels of its picture, where that is one over time.
+    ///
+    /// # Errors
+    /// There is nothing to be drawn.
+    #[cfg(feature = "plot")]
+    fn panels(&self) -> Result<Option<Figure>, Error> {
+        Ok(None)
+    }
+
+    /// What a filter's corrections are made of, where it was kept.
+    fn corrections(&self) -> Option<&Corrections> {
+        None
+    }
+
+    /// What stands for zero where its times are dates.
+    fn origin(&self) -> Option<Instant> {
+        None
     }
 
     /// What speaks against it although it is there.
@@ -84,21 +107,13 @@ pub trait Answer: Send {
 
 /// The words of an answer are its text.
 macro_rules! displayed {
-    ($($answer:ty),*) => {$(
+    ($answer:ty) => {
         impl std::fmt::Display for $answer {
             fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str(&Answer::text(self))
+                f.write_str(&$crate::Answer::text(self))
             }
         }
-    )*};
+    };
 }
 
-displayed!(
-    crate::check::Report,
-    crate::DesignReport,
-    crate::CertifyReport,
-    crate::Outcome,
-    crate::monte_carlo::MonteCarlo,
-    crate::precision::Report
-);
-displayed!(crate::Comparison, crate::tune::Sweep);
+pub(crate) use displayed;

@@ -2,6 +2,7 @@
 
 mod json;
 mod knowledge;
+mod known;
 mod next;
 mod observability;
 mod report;
@@ -21,10 +22,12 @@ use lynkeus_structure::{Sensors, determined, uniformity};
 use lynkeus_words::{Words, counted};
 use serde_json::Value;
 
-use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
+use crate::prepare::declared::{Account, Declared};
 use crate::words::{condition, explain, listed};
-use crate::{Answer, Error, ErrorKind, Study, calibrate, estimate, prepare};
+use crate::{Answer, Error, ErrorKind, Study, estimate, prepare, prepare::calibrate};
+#[cfg(test)]
+pub(crate) use json::CheckReport;
 use knowledge::Sorted;
 pub use knowledge::{Assumption, Knowledge, Known, Reserve};
 use lynkeus_study::Name;
@@ -32,7 +35,6 @@ pub use next::Next;
 pub use report::{CheckOptions, Report};
 use reserves::View;
 pub use uniform::Uniform;
-pub(crate) use uniform::point;
 
 /// The time for what can be known at all, where the study has no limit.
 const OBSERVABILITY: Duration = Duration::from_secs(20);
@@ -49,7 +51,7 @@ const UNIFORMITY: f64 = 0.2;
 pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
     let symbolic = prepare::symbolic_plant(study, BTreeSet::new())?;
     Declared::new(study, &symbolic)?;
-    crate::tune::refuse_strange_keys(study, true)?;
+    study.refuse_strange_keys(true)?;
     let time = match study.budget.left() {
         Some(_) => study.budget.part(0.5),
         None => study.budget.within(OBSERVABILITY),
@@ -265,6 +267,8 @@ impl Report {
         }
     }
 }
+
+crate::answer::displayed!(Report);
 
 impl Answer for Report {
     fn document(&self) -> Document {

@@ -5,15 +5,18 @@
 //! the same; else the first filter, for which nothing is asked and nothing is proved. Where a limit of time or memory
 //! ended the examination or the trial of a family that comes before it, the decision says so.
 
+pub(crate) mod propose;
+pub(crate) mod runner;
+
 use lynkeus_expr::Spent;
 use lynkeus_observers::{Design, DesignError, Examination};
 use lynkeus_structure::Standing;
 
 use crate::Error;
-use crate::choice::{Choice, Grounds, Proposal, Speed};
-use crate::modes::decay;
+use crate::choose::propose::{propose, time_scales};
+use crate::prepare::choice::{Choice, Grounds, Proposal, Speed};
+use crate::prepare::modes::decay;
 use crate::prepare::{Prepared, is_certified_gain};
-use crate::propose::{propose, time_scales};
 use crate::words::number;
 use lynkeus_study::SimulateSettings;
 

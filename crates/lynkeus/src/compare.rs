@@ -9,13 +9,16 @@ use std::ops::ControlFlow;
 use lynkeus_model::Plant;
 use lynkeus_observers::{FAMILIES, Family};
 use lynkeus_structure::Standing;
+use serde::Serialize;
 
+#[cfg(test)]
+pub(crate) use print::ComparisonReport;
 pub use run::{Compared, Run, Settled};
 use run::{of_family, run_all};
 pub use samples::{Interval, Resolution};
 
-use crate::mentioned::asked;
 use crate::prepare::Prepared;
+use crate::prepare::mentioned::asked;
 use crate::{Error, Study, Table, prepare};
 
 /// The answer of `lynkeus compare`.
@@ -34,7 +37,9 @@ pub struct Comparison {
 }
 
 /// What errors are measured against.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
 pub enum Against {
     /// the simulated plant
     Simulation,

@@ -1,13 +1,29 @@
 //! What an observer makes of samples, whatever kind of observer it is.
 
+pub(crate) mod checkpoint;
+pub(crate) mod columns;
+pub(crate) mod corrections;
+pub(crate) mod doubt;
+pub(crate) mod filter;
+pub(crate) mod fixed_steps;
+pub(crate) mod inputs;
+pub(crate) mod lines;
+pub(crate) mod quantity;
+pub(crate) mod recorded;
+pub(crate) mod replay;
+pub(crate) mod sampled;
+pub(crate) mod trace;
+
 use lynkeus_expr::Spent;
 use lynkeus_observers::Observer;
 use lynkeus_run::filter::SensorHealth;
 use lynkeus_run::{Error as RunError, Role};
 
-use crate::judge::{Doubt, Trace};
-use crate::recorded::Recorded;
-use crate::systems::monitor_column;
+use crate::course::corrections::Corrections;
+use crate::course::doubt::Doubt;
+use crate::course::recorded::Recorded;
+use crate::course::trace::Trace;
+use crate::prepare::systems::monitor_column;
 use crate::{Error, Quantity, Series};
 use lynkeus_table::series::{Iter, Store};
 
@@ -101,6 +117,8 @@ pub(crate) struct Course {
     /// where they are: of each sensor its innovations, then their standard deviations; NaN where it
     /// did not report
     pub innovations: Vec<Series>,
+    /// what the corrections of a filter are made of, where that is asked for
+    pub corrections: Option<Corrections>,
     /// what speaks against the estimates beside what is seen in them
     pub doubts: Vec<Doubt>,
     /// what was chosen for the user

@@ -1,25 +1,29 @@
 //! A log through the study's observer.
 
+pub(crate) mod live;
+mod told;
+
 use std::ops::ControlFlow;
 
 use lynkeus_observers::{Design, Observer, Signal};
 use lynkeus_run::filter::FilterKind;
 use lynkeus_run::{Estimator, EstimatorSettings};
 
-use crate::checkpoint::Checkpoint;
-use crate::columns::{self, Log};
+use crate::course::checkpoint::Checkpoint;
+use crate::course::columns::{self, Log};
+use crate::course::fixed_steps::unlocated;
+use crate::course::inputs::{are_logged, refuse_strays, supplied};
+use crate::course::replay::{Watch, refuse_smoothing, replay};
 use crate::course::{Course, Samples};
 use crate::crew::within;
-use crate::fixed_steps::unlocated;
-use crate::frozen::{Channel, Frozen, frozen};
-use crate::inputs::{are_logged, refuse_strays, supplied};
-use crate::outcome::{Raw, is_observers_answer, measurements, settle};
+use crate::judge::frozen::{Channel, Frozen, frozen};
+use crate::judge::outcome::{Raw, is_observers_answer, measurements, settle};
+use crate::prepare::systems::{self, method};
 use crate::prepare::{Prepared, StudyDesign};
-use crate::replay::{Watch, refuse_smoothing, replay};
-use crate::systems::{self, method};
 use crate::words::explain;
 use crate::{
-    Error, Outcome, Quantity, Series, Study, Table, filter, interval, lines, prepare, sampled,
+    Error, Outcome, Quantity, Series, Study, Table, course::filter, course::lines, course::sampled,
+    judge::interval, prepare,
 };
 use lynkeus_study::{BetweenSamples, EstimateSettings};
 
@@ -154,6 +158,7 @@ fn watched(
         intervals,
         frozen: hanging(prepared, &design.observer, samples),
         time: samples.time.shortened(rows),
+        origin: log.table.start(&log.time),
         quantities: estimated.into_iter().chain(known).collect(),
         measurements: measurements(&design, |signal| logged(&signal.name)),
         replayed: true,
@@ -263,6 +268,13 @@ pub(crate) fn refuse_settings(prepared: &Prepared<'_>, design: &Design) -> Resul
     refuse_strays(prepared)?;
     let study = prepared.study();
     let Some(filter) = &design.observer.filter else {
+        if study.records {
+            let message = format!(
+                "record: expected a filter (\"ekf\", \"ukf\" or \"mhe\"), found the {} observer, which has neither innovation covariances nor a likelihood",
+                design.examination.family
+            );
+            return Err(Error::input(message).at(&study.file));
+        }
         return match study.estimate.smoothing {
             Some(_) => Err(Error::input("`smooth` and `lag` of [estimate] need a filter (\"ekf\", \"ukf\" or \"mhe\"): this observer has no covariance to smooth with").at(&study.file)),
             None => Ok(()),

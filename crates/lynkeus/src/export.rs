@@ -1,25 +1,18 @@
 //! A study's estimator as source code for other machines; what is exported otherwise is in `continuous`.
 
 use crate::ReportOptions;
-use crate::choice::Choice;
-use crate::fixed_steps::{bends, hasty, stepped};
-use crate::inputs::on_device;
-use crate::live::blueprint;
+use crate::course::fixed_steps::{bends, hasty, stepped};
+use crate::course::inputs::on_device;
+use crate::estimate::live::blueprint;
+use crate::prepare::choice::Choice;
 use crate::prepare::{self, Prepared};
-use crate::{Error, Study, continuous, fmu, tunable};
+use crate::{Error, Study, print::continuous, print::fmu, print::tunable};
 use lynkeus_export::Refusal;
 use lynkeus_export::curly::c::{self, Precision};
 
-mod device;
-mod head;
-mod target;
-
-pub(crate) use device::{causal, printed};
-pub(crate) use head::file_name;
-use head::{about, beyond_float};
-pub(crate) use head::{designed, origin};
-pub use target::{Artifact, Export, ExportOptions, Subject, Target};
-use target::{Declared, Writes};
+use crate::print::device::{causal, printed};
+use crate::print::head::{about, beyond_float};
+use crate::print::target::{Artifact, Declared, Export, ExportOptions, Subject, Writes};
 
 /// The study's estimator as source code, as `[estimate]` says: with the same fixed step it gives what
 /// [`estimate()`](crate::estimate()) gives. Where the study has no fixed step, one that is short

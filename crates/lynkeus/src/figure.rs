@@ -1,6 +1,6 @@
 //! The picture of an outcome.
 
-use crate::mentioned::not_drawn;
+use crate::prepare::mentioned::not_drawn;
 use crate::{Error, Outcome, Quantity, Series};
 use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Panel, Span};
 use lynkeus_study::Name;
@@ -24,6 +24,7 @@ impl Outcome {
         };
         let mut panels: Vec<Panel> = chosen.into_iter().map(|q| panel(self, q)).collect();
         panels.extend(self.watches.iter().map(|watch| Panel {
+            name: watch.header.clone(),
             caption: format!(
                 "{} (alarm below {})",
                 watch.header, watch.monitor.alarm_below
@@ -134,6 +135,7 @@ fn panel(outcome: &Outcome, quantity: &Quantity) -> Panel {
         .filter_map(|(kind, values)| Some(curve(outcome, kind, values.as_ref()?)))
         .collect();
     Panel {
+        name: quantity.name.clone(),
         caption,
         curves,
         bands: bands(outcome, quantity),

@@ -52,92 +52,91 @@
 //! samples, and [`check`], [`simulate`] and
 //! [`estimate`] do what the commands of the same names do.
 //!
-//! Features, all on by default: `plot` draws pictures, `tune` sweeps tunings, and `command` is
-//! the program `lynkeus`.
+//! Features: `plot` (on by default) draws pictures, `parquet` reads and writes Parquet. The program
+//! `lynkeus` is a crate of its own, `lynkeus-cli`.
+//!
+//! The rooms below stand in their order: each uses only those before it, which a test sees to.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-mod accuracy;
-mod answer;
-mod assertions;
-mod calibrate;
-mod certify;
-mod check;
-mod checkpoint;
-mod choice;
-mod choose;
-mod columns;
-mod compare;
-mod continuous;
-mod correction;
-mod course;
+// what all rooms need
 mod crew;
-mod declared;
-mod design;
-mod estimate;
-mod expected;
-mod export;
-#[cfg(feature = "plot")]
-mod figure;
-mod filter;
-mod fixed_steps;
-mod fmu;
-mod frozen;
-mod headers;
-mod inputs;
+mod entries;
 pub mod interrupt;
-mod interval;
-mod judge;
-mod lines;
-mod live;
-mod mentioned;
-mod modes;
-pub mod monte_carlo;
-mod outcome;
-mod outside;
-pub mod precision;
-pub mod prepare;
-mod propose;
-mod quantity;
-mod recorded;
-mod replay;
-mod report;
-mod runner;
-mod sampled;
-mod saturated;
-mod simulate;
-mod spread;
-mod systems;
 mod thrifty;
-mod tunable;
-pub mod tune;
 mod words;
 
-pub use accuracy::{Accuracy, Coverage, Settling};
+// from a study to its plant, its choice of an observer and the design
+pub mod prepare;
+
+// one observer over the rows of a log or a simulation, and what is kept of it
+mod course;
+
+// what an answer tells
+mod answer;
+
+// whether the result is credible, and what is said of it
+mod judge;
+
+// what the commands answer
+mod estimate;
+
+mod simulate;
+
+pub mod tune;
+
+mod check;
+
+mod certify;
+
+mod design;
+
+mod compare;
+
+#[cfg(feature = "plot")]
+mod figure;
+
+pub mod monte_carlo;
+
+pub mod precision;
+
+// estimators for other machines
+mod print;
+
+mod report;
+
+mod export;
+
+// the same study again and again
+mod choose;
+
 pub use answer::Answer;
 pub use certify::{AtTheta, CertifyReport, Excitation, Excited, Strays, certify};
 pub use check::{Assumption, CheckOptions, Knowledge, Known, Next, Report, Reserve, check};
-pub use checkpoint::Checkpoint;
-pub use choice::{Choice, Grounds, Proposal, Speed};
-pub use columns::log;
+pub use choose::runner::{Runner, Runners};
 pub use compare::{Against, Compared, Comparison, Interval, Resolution, Run, Settled, compare};
-pub use correction::{Correction, GainEntry, InjectionEntry};
-pub use declared::Account;
+pub use course::checkpoint::Checkpoint;
+pub use course::columns::log;
+pub use course::corrections::Corrections;
+pub use course::doubt::{Doubt, Kind as DoubtKind, Level as DoubtLevel};
+pub use course::quantity::Quantity;
 pub use design::{DesignReport, design};
+pub use estimate::live::estimator;
 pub use estimate::{estimate, estimate_resumed};
-pub use export::{Artifact, Export, ExportOptions, Subject, Target, export};
-pub use frozen::Frozen;
-pub use interval::{Intervals, Sampled};
-pub use judge::{Doubt, Innovations, Kind as DoubtKind, Level as DoubtLevel};
-pub use live::estimator;
+pub use export::export;
+pub use judge::accuracy::{Accuracy, Coverage, Settling};
+pub use judge::frozen::Frozen;
+pub use judge::interval::{Intervals, Sampled};
+pub use judge::outcome::{Outcome, Watch};
+pub use judge::outside::{Excursion, Outside};
 pub use monte_carlo::monte_carlo;
-pub use outcome::{Outcome, Watch};
-pub use outside::{Excursion, Outside};
 pub use precision::precision;
-pub use quantity::Quantity;
+pub use prepare::choice::{Choice, Grounds, Proposal, Speed};
+pub use prepare::correction::{Correction, GainEntry, InjectionEntry};
+pub use prepare::declared::Account;
+pub use prepare::systems::observer as observer_system;
+pub use print::target::{Artifact, Export, ExportOptions, Subject, Target};
 pub use report::{Page, ReportOptions, report};
-pub use runner::{Runner, Runners};
 pub use simulate::simulate;
-pub use systems::observer as observer_system;
 pub use tune::tune;
 
 pub use words::explain;

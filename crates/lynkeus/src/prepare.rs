@@ -1,5 +1,15 @@
 //! From a study to its plant and its observer.
 
+pub(crate) mod calibrate;
+pub(crate) mod choice;
+pub(crate) mod correction;
+pub(crate) mod declared;
+pub(crate) mod headers;
+pub(crate) mod mentioned;
+pub(crate) mod modes;
+pub(crate) mod spread;
+pub(crate) mod systems;
+
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
 use std::ops::{Deref, DerefMut};
@@ -12,11 +22,11 @@ use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning};
 use lynkeus_structure::{AugmentedPlant, Dimension, Region, Sensors, SensorsError, range};
 use lynkeus_words::Words;
 
-use crate::choice::Choice;
-use crate::declared::Declared;
-use crate::mentioned::{refuse_strangers, refuse_unknown_states};
+use crate::prepare::choice::Choice;
+use crate::prepare::declared::Declared;
+use crate::prepare::mentioned::{refuse_strangers, refuse_unknown_states};
 use crate::words::explain;
-use crate::{Error, Study, calibrate, declared, systems};
+use crate::{Error, Study};
 use lynkeus_study::Name;
 
 /// The plant of a study, with the study's parameters.
@@ -32,6 +42,20 @@ pub fn plant(study: &Study) -> Result<Plant, Error> {
     };
     refuse_strangers(study, &plant)?;
     Ok(plant)
+}
+
+/// That a study names what its plant has. Parameters may have no value yet.
+///
+/// # Errors
+/// As [`plant`] and [`Prepared::new`].
+pub fn refuse_misfits(study: &Study) -> Result<(), Error> {
+    match plant(study) {
+        Ok(plant) => Prepared::new(study, &plant).map(drop),
+        Err(error) => match symbolic_plant(study, BTreeSet::new()) {
+            Ok(_) => Ok(()),
+            Err(_) => Err(error),
+        },
+    }
 }
 
 /// The plant with its parameters as symbols, also those without value, but for those that are to be `numbers`.

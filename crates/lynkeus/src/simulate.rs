@@ -9,15 +9,15 @@ use lynkeus_observers::{Design, Observer};
 use lynkeus_run::{Role, Simulation, System};
 
 use crate::Table;
+use crate::course::fixed_steps::unlocated;
+use crate::course::recorded::Recorded;
 use crate::course::{Course, Samples};
 use crate::crew::within;
-use crate::fixed_steps::unlocated;
-use crate::headers::{header, log_time};
-use crate::outcome::{Raw, interrupted, is_answer, measurements, settle};
+use crate::judge::outcome::{Raw, interrupted, is_answer, measurements, settle};
+use crate::prepare::headers::{header, log_time};
+use crate::prepare::spread::Spread;
+use crate::prepare::systems::{self, method, settings};
 use crate::prepare::{Prepared, StudyDesign};
-use crate::recorded::Recorded;
-use crate::spread::Spread;
-use crate::systems::{self, method, settings};
 use crate::words::explain;
 use crate::{Error, Outcome, Quantity, Series, Study, estimate, prepare};
 use lynkeus_study::SimulateSettings;
@@ -347,6 +347,7 @@ pub(crate) fn outcome(
     };
     Raw {
         time: run.time.clone(),
+        origin: None,
         quantities,
         measurements: measurements(&design, measured),
         replayed: false,

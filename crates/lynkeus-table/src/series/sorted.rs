@@ -37,6 +37,11 @@ impl Sorted {
         self.runs.iter().map(Series::len).sum()
     }
 
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// The number with so many before it.
     pub fn at(&self, place: usize) -> Option<f64> {
         match &self.runs[..] {

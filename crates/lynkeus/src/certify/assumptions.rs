@@ -6,8 +6,8 @@ use lynkeus_observers::Assumptions;
 use lynkeus_structure::{AugmentedPlant, Dimension, Matrix, Region, range};
 
 use crate::Error;
-use crate::declared::Declared;
 use crate::prepare::Prepared;
+use crate::prepare::declared::Declared;
 use crate::words::explain;
 use lynkeus_study::Noise;
 

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::CertifyReport;
 use crate::Answer;
-use crate::interval::Intervals;
+use crate::judge::interval::Intervals;
 use crate::words::{condition, number, side};
 
 /// Where it is guaranteed.
@@ -46,6 +46,8 @@ impl CertifyReport {
         notes.chain(self.declared.told()).collect()
     }
 }
+
+crate::answer::displayed!(CertifyReport);
 
 impl Answer for CertifyReport {
     fn document(&self) -> Document {

@@ -6,8 +6,8 @@ use lynkeus_observability::Answer;
 use lynkeus_observers::Examination;
 
 use super::{Knowledge, Next, Uniform};
-use crate::choice::Choice;
-use crate::declared::Account;
+use crate::prepare::choice::Choice;
+use crate::prepare::declared::Account;
 
 /// What to ask beside "which states, by which observer".
 #[derive(Clone, Debug, Default)]

@@ -15,7 +15,7 @@ use super::knowledge::{Assumption, Found, Knowledge, Known, Reserve};
 use super::{CheckOptions, observability};
 use crate::prepare::{Prepared, seen_by, sensors};
 use crate::words::explain;
-use crate::{Error, Study, calibrate};
+use crate::{Error, Study, prepare::calibrate};
 
 /// Cells examined per end of an output's range.
 const CELLS: usize = 1000;

@@ -6,7 +6,7 @@ use std::time::Instant;
 use lynkeus_model::Plant;
 use lynkeus_observers::Family;
 
-use crate::accuracy::SETTLED;
+use crate::judge::accuracy::SETTLED;
 use crate::prepare::Prepared;
 use crate::tune::errors::Errors;
 use crate::{Error, Outcome, Quantity, Study, Table, estimate};
@@ -152,7 +152,7 @@ fn judged(prepared: &Prepared<'_>, outcome: Outcome, seconds: f64) -> Run {
     let half = outcome.time.len() / 2;
     let rough = estimated().filter_map(|q| {
         let estimate = q.estimate.as_ref()?;
-        let found = crate::filter::noise::scatter(&outcome.time, estimate, half)?;
+        let found = crate::course::filter::noise::scatter(&outcome.time, estimate, half)?;
         Some(found / width(q))
     });
     Run {

@@ -4,28 +4,34 @@
 //! declared ranges, sensors that hang) and returns doubts. One of the level [`Level::Refusal`] is the
 //! answer "not credible". Thresholds and how often they err: `docs/credibility.md`.
 
-mod doubt;
+pub(crate) mod accuracy;
+pub(crate) mod assertions;
+pub(crate) mod expected;
+pub(crate) mod frozen;
+pub(crate) mod interval;
+pub(crate) mod outcome;
+pub(crate) mod outside;
+pub(crate) mod saturated;
+
 mod evidence;
 mod innovations;
 mod quantile;
 mod ranges;
 mod residuals;
 mod sensors;
-mod trace;
 
 pub(crate) use lynkeus_run::credible::By;
 
-pub use doubt::{Doubt, Kind, Level};
 pub(crate) use evidence::Evidence;
 pub use innovations::Innovations;
-pub(crate) use innovations::innovations;
+pub(crate) use innovations::{InnovationCounts, innovations};
 pub(crate) use ranges::{RUN_AWAY, Screen};
 pub(crate) use residuals::residuals;
 pub(crate) use sensors::Judged;
-pub(crate) use trace::Trace;
 
 use crate::Error;
-use crate::outside::percent;
+use crate::course::doubt::{Doubt, Kind, Level};
+use crate::judge::outside::percent;
 
 /// Hanging readings are worth a refusal from this share of a sensor's readings on.
 const HANGS: f64 = 0.25;

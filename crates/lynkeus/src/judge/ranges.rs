@@ -3,8 +3,9 @@
 use lynkeus_model::Variable;
 use lynkeus_words::figures;
 
-use super::{Doubt, Evidence, Kind, Level};
-use crate::outside::percent;
+use super::Evidence;
+use crate::course::doubt::{Doubt, Kind, Level};
+use crate::judge::outside::percent;
 use crate::words::{instant, number, side};
 use crate::{Quantity, Series};
 

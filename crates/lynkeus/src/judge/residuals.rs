@@ -3,8 +3,8 @@
 use lynkeus_model::Plant;
 use lynkeus_run::Level;
 
-use super::Trace;
-use crate::declared::Declared;
+use crate::course::trace::Trace;
+use crate::prepare::declared::Declared;
 use crate::{Quantity, Series};
 
 /// Of each measured output with a declared noise: reading − estimate's output, in deviations of the

@@ -3,10 +3,10 @@
 use lynkeus_run::credible::{By, CLIP, ENOUGH, FEW};
 use lynkeus_run::filter::SensorHealth;
 
-use super::doubt::{Doubt, Kind, Level, times};
 use super::quantile::{largest_sum, smallest_sum};
-use super::trace::{Stretch, Trace};
-use crate::outside::percent;
+use crate::course::doubt::{Doubt, Kind, Level, times};
+use crate::course::trace::{Stretch, Trace};
+use crate::judge::outside::percent;
 use crate::words::instant;
 
 /// A warning from this share of that on.

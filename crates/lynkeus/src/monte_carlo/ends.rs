@@ -7,9 +7,9 @@ use lynkeus_words::figures;
 
 use super::Rig;
 use super::runs::Whole;
+use crate::course::recorded::Recorded;
+use crate::judge::saturated::{Limited, TAKEN, limited};
 use crate::prepare::Prepared;
-use crate::recorded::Recorded;
-use crate::saturated::{Limited, TAKEN, limited};
 
 /// A measured output whose sensor has limits, where runs have its readings.
 #[derive(Clone, Debug)]

@@ -19,13 +19,15 @@ use std::sync::OnceLock;
 
 use lynkeus_model::{Plant, Variable};
 
-use crate::headers::Headers;
 use crate::prepare::Prepared;
+use crate::prepare::headers::Headers;
+use crate::prepare::systems::column_of;
 use crate::simulate::Rig;
-use crate::systems::column_of;
-use crate::{Error, Study, prepare, systems};
+use crate::{Error, Study, prepare, prepare::systems};
 use apart::{Job, room};
 use ends::Sensor;
+#[cfg(test)]
+pub(crate) use report::MonteCarloReport;
 pub use report::Settled;
 use report::headers_of;
 use runs::Followed;

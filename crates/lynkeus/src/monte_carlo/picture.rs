@@ -3,7 +3,7 @@
 use super::{MonteCarlo, Scattered};
 use crate::Error;
 use crate::figure::{PANELS, spread, time_label};
-use crate::mentioned::not_drawn;
+use crate::prepare::mentioned::not_drawn;
 use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Panel};
 use lynkeus_study::Name;
 
@@ -54,6 +54,7 @@ impl MonteCarlo {
             values: values.to_vec().into(),
         };
         Panel {
+            name: quantity.name.clone(),
             caption: format!("error of {}{unit}", quantity.name),
             curves: vec![
                 curve(Kind::Worst, &quantity.worst_course),

@@ -9,11 +9,11 @@ use lynkeus_run::{Method, Tolerances, Trajectory};
 use lynkeus_structure::AugmentedPlant;
 
 use crate::crew::within;
-use crate::declared::Declared;
-use crate::outcome::interrupted;
+use crate::judge::outcome::interrupted;
 use crate::prepare::Prepared;
+use crate::prepare::declared::Declared;
 use crate::words::number;
-use crate::{Error, Study, simulate, systems};
+use crate::{Error, Study, prepare::systems, simulate};
 use lynkeus_study::{Noise, SimulateSettings};
 
 /// Horizons at which the errors are computed.

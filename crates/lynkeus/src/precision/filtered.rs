@@ -11,12 +11,12 @@ use lynkeus_observers::{Design, Initial, Tuning, Value};
 use lynkeus_run::{Role, Simulation, Updates};
 
 use super::experiment::Setup;
+use crate::course::replay::{Watch, replay};
 use crate::course::{Course, Samples};
 use crate::crew::within;
 use crate::prepare::Prepared;
-use crate::replay::{Watch, replay};
 use crate::words::explain;
-use crate::{Error, Series, Study, estimate, filter};
+use crate::{Error, Series, Study, course::filter, estimate};
 use lynkeus_study::{Name, Noise};
 
 /// Nothing is known at the start: a standard deviation of so many ranges.

@@ -14,12 +14,14 @@ mod words;
 
 use lynkeus_observability::precision::{Advice, Deviations, SensorSet};
 
-use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
+use crate::prepare::declared::{Account, Declared};
 use crate::words::explain;
-use crate::{Error, Study, prepare, simulate, systems};
+use crate::{Error, Study, prepare, prepare::systems, simulate};
 pub use experiment::{Assumed, Candidates, Options};
 use experiment::{Setup, ended};
+#[cfg(test)]
+pub(crate) use report::HowWellReport;
 
 /// The answer of `lynkeus check --how-well`.
 #[derive(Clone, Debug)]

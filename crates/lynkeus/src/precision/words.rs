@@ -19,6 +19,8 @@ const COLUMNS: usize = 6;
 /// Sensor sets listed.
 const SETS: usize = 6;
 
+crate::answer::displayed!(Report);
+
 impl Answer for Report {
     fn document(&self) -> Document {
         let span = self.horizons.last().copied().unwrap_or_default();

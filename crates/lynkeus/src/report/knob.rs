@@ -5,10 +5,10 @@ use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Method, Step};
 
 use super::positions::{Position, Positions};
-use crate::export::printed;
-use crate::fixed_steps::{stepped, steps};
-use crate::live::blueprint;
+use crate::course::fixed_steps::{stepped, steps};
+use crate::estimate::live::blueprint;
 use crate::prepare::Prepared;
+use crate::print::device::printed;
 use crate::{Error, Study};
 use lynkeus_study::{self, Rk4Step};
 

@@ -16,11 +16,13 @@ use std::ops::ControlFlow;
 
 use lynkeus_export::curly::c::prefix;
 
-use crate::columns::Log;
-use crate::export::{causal, file_name};
+use crate::course::columns::Log;
 use crate::prepare::Prepared;
+use crate::print::{device::causal, head::file_name};
 use crate::tune::slider::Ground;
-use crate::{CheckOptions, Error, Study, Table, certify, check, estimate, fixed_steps, prepare};
+use crate::{
+    CheckOptions, Error, Study, Table, certify, check, course::fixed_steps, estimate, prepare,
+};
 use knob::Knob;
 use positions::Positions;
 use told::{Told, without_folder};

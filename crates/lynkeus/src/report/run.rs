@@ -11,7 +11,8 @@ use super::data::ROWS;
 use super::knob::Fixed;
 use crate::prepare::Prepared;
 use crate::{
-    Accuracy, Error, ErrorKind, Outcome, Quantity, Study, Table, estimate, simulate, systems,
+    Accuracy, Error, ErrorKind, Outcome, Quantity, Study, Table, estimate, prepare::systems,
+    simulate,
 };
 
 /// Errors that differ by no more than this share of the larger one are the same,

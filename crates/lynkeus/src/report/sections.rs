@@ -8,7 +8,7 @@ use super::data::ROWS;
 use super::html::{element, section, words};
 use super::told::{Told, without_folder};
 use crate::check::tell_examination;
-use crate::export::file_name;
+use crate::print::head::file_name;
 use crate::words::number;
 use crate::{Answer, Error, design};
 

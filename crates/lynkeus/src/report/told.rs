@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::knob::Knob;
 use super::tradeoff::Tradeoff;
-use crate::export::file_name;
+use crate::print::head::file_name;
 use crate::{Error, Outcome, Study, certify, check};
 
 /// All that a page tells.

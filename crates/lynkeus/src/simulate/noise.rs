@@ -4,7 +4,7 @@ use lynkeus_model::Plant;
 use lynkeus_run::{Level, Simulation, process_draws};
 use lynkeus_words::figures;
 
-use crate::declared::Declared;
+use crate::prepare::declared::Declared;
 use crate::{Error, Study};
 use lynkeus_study::SimulateSettings;
 

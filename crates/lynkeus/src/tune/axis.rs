@@ -1,11 +1,8 @@
 //! The keys that are swept and the values that they take.
 
-use std::collections::BTreeSet;
-
 use lynkeus_expr::real::rounded;
-use lynkeus_observers::{FAMILIES, Value};
+use lynkeus_observers::Value;
 
-use crate::near::suggest;
 use crate::{Error, Study};
 use lynkeus_study::{Name, Place, Scale, Values};
 use lynkeus_table::significant;
@@ -165,7 +162,7 @@ pub(super) fn axes(study: &Study) -> Result<Vec<Axis>, Error> {
 /// The keys of `[observer]` that a study sweeps, without indices; none where there is nothing to sweep.
 pub(super) fn swept(study: &Study) -> Vec<String> {
     let given = study.tune.keys.iter().map(|(name, _)| name.text.as_str());
-    let bases = given.filter_map(|key| Some(parsed(key)?.0.to_owned()));
+    let bases = given.filter_map(|key| Some(lynkeus_study::swept(key)?.0.to_owned()));
     let bases: Vec<String> = bases.collect();
     match bases.is_empty() {
         true => speed(study).into_iter().map(str::to_owned).collect(),
@@ -212,42 +209,9 @@ pub(crate) fn grid(study: &Study, axes: &[Axis]) -> Result<Vec<(Vec<f64>, Study)
     Ok(grid)
 }
 
-/// Refuses keys to sweep that no family has; with `of_others` those, too, that none in question has.
-///
-/// # Errors
-/// The first of them.
-pub(crate) fn refuse_strange_keys(study: &Study, of_others: bool) -> Result<(), Error> {
-    let is_elsewhere = |name: &Name| {
-        let base = parsed(&name.text).map(|(base, _)| base);
-        base.is_some_and(|base| FAMILIES.iter().any(|family| family.owns(base)))
-    };
-    let mut keys = study.tune.keys.iter().map(|(name, _)| name);
-    keys.try_for_each(|name| match is_elsewhere(name) && !of_others {
-        true => Ok(()),
-        false => key(study, name).map(drop),
-    })
-}
-
-/// The key of `[observer]` that a name means, and where within its value.
-fn key<'n>(study: &Study, name: &'n Name) -> Result<(&'n str, Vec<usize>), Error> {
-    let (base, path) = parsed(&name.text).ok_or_else(|| {
-        let why =
-            format!("expected a key or an entry of one such as \"theta[1]\", found \"{name}\"");
-        refused(study, name, &why)
-    })?;
-    let known = known(study, base);
-    known.map_err(|(why, hint)| refused(study, name, &why).hint(hint))?;
-    Ok((base, path))
-}
-
-fn refused(study: &Study, name: &Name, why: &str) -> Error {
-    let refusal = Error::input(format!("`keys` of [tune]: {why}")).at(&study.file);
-    name.blame(refusal)
-}
-
 fn axis(study: &Study, name: &Name, values: &Values) -> Result<Axis, Error> {
-    let refuse = |why: String| refused(study, name, &why);
-    let (base, path) = key(study, name)?;
+    let refuse = |why: String| study.refuse_swept(name, &why);
+    let (base, path) = study.swept_key(name)?;
     let present = present(study, base, &path).map_err(&refuse)?;
     let is_factor = matches!(present, Some(Value::List(_)));
     let present = match present {
@@ -270,35 +234,6 @@ fn axis(study: &Study, name: &Name, values: &Values) -> Result<Axis, Error> {
         path,
         place: name.place.clone(),
     })
-}
-
-/// `theta[1]` is the key `theta` and the index 0.
-fn parsed(key: &str) -> Option<(&str, Vec<usize>)> {
-    let Some((base, rest)) = key.split_once('[') else {
-        return Some((key, vec![]));
-    };
-    let indices = rest.strip_suffix(']')?.split("][");
-    let index = |text: &str| text.trim().parse::<usize>().ok()?.checked_sub(1);
-    Some((base.trim(), indices.map(index).collect::<Option<_>>()?))
-}
-
-/// The key belongs to a family that the study allows, or why not and what to do.
-fn known(study: &Study, base: &str) -> Result<(), (String, String)> {
-    let allowed: BTreeSet<&str> = study
-        .observer
-        .families()
-        .flat_map(|family| family.keys())
-        .map(|key| key.name)
-        .collect();
-    if allowed.contains(base) {
-        return Ok(());
-    }
-    let elsewhere = FAMILIES.iter().any(|family| family.owns(base));
-    let why = match elsewhere {
-        true => format!("\"{base}\" belongs to another family than the study's"),
-        false => format!("no family has a key \"{base}\""),
-    };
-    Err((why, suggest(base, allowed)))
 }
 
 /// What stands at the key: a number, or a list in which all entries are numbers in the end.

@@ -5,8 +5,8 @@ use lynkeus_model::Plant;
 use lynkeus_observers::Observer;
 use lynkeus_run::Simulation;
 
-use crate::systems::settings;
-use crate::systems::{self, named};
+use crate::prepare::systems::settings;
+use crate::prepare::systems::{self, named};
 use crate::words::explain;
 use crate::{Error, Study};
 

@@ -1,7 +1,7 @@
 //! Errors of an estimate over time, each as a share of its quantity's scale, and what is read off them.
 
-use crate::accuracy::settled_from;
 use crate::judge::RUN_AWAY;
+use crate::judge::accuracy::settled_from;
 
 /// Scaled errors: estimate minus truth, divided by the quantity's scale.
 #[derive(Clone, Debug, PartialEq)]

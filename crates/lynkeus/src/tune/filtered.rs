@@ -11,13 +11,13 @@ use super::judge::{Judge, Run, Runs, Under};
 use super::record::{Record, course};
 use super::reference::Reference;
 use super::{Row, measures};
+use crate::course::recorded::Recorded;
 use crate::course::{Course, Samples};
 use crate::crew::Watch;
 use crate::crew::within;
 use crate::prepare::Prepared;
-use crate::recorded::Recorded;
+use crate::prepare::systems::settings;
 use crate::simulate::{alone, open_loop, seen};
-use crate::systems::settings;
 use crate::words::explain;
 use crate::{Error, ErrorKind, Series};
 

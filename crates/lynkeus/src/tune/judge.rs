@@ -8,7 +8,7 @@ use super::errors::{Errors, rms, run_away};
 use super::reference::Reference;
 use super::{Peak, Row, measures};
 use crate::crew::{Watch, part};
-use crate::{Error, Study, systems};
+use crate::{Error, Study, prepare::systems};
 
 /// A run of the plant and of what estimates it.
 pub(super) trait Run {

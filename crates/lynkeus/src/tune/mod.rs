@@ -29,15 +29,16 @@ mod whiteness;
 use std::ops::ControlFlow;
 
 pub use axis::Axis;
-pub(crate) use axis::refuse_strange_keys;
 pub use measures::Measure;
+#[cfg(test)]
+pub(crate) use report::SweepReport;
 pub(crate) use report::{brief, shortened};
 pub use rewrite::Change;
 pub use row::{Peak, Row};
 
 use crate::crew::within;
-use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
+use crate::prepare::declared::{Account, Declared};
 use crate::{Error, Study, Table, crew, prepare};
 use bench::{Bench, filter_refused};
 use pinned::pinned;

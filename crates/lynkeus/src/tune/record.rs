@@ -6,16 +6,16 @@ use lynkeus_observers::Design;
 
 use super::errors::rms;
 use super::holdout::{FEWER, Plan};
-use crate::columns::Log;
+use crate::course::columns::Log;
+use crate::course::inputs::{Source, are_logged};
 use crate::course::{Course, Samples};
 use crate::crew::Watch;
 use crate::estimate::{course_of, run_settings};
-use crate::inputs::{Source, are_logged};
-use crate::outcome::{interrupted_on, is_observers_answer};
+use crate::judge::outcome::{interrupted_on, is_observers_answer};
 use crate::prepare::Prepared;
 use crate::thrifty::thrifty;
 use crate::words::in_words;
-use crate::{Error, Series, Table, lines, replay};
+use crate::{Error, Series, Table, course::lines, course::replay};
 use lynkeus_study::BetweenSamples;
 
 /// What is the same for all values.

@@ -9,9 +9,9 @@ use lynkeus_run::{Column, Events, Level, Noise, Role, Trajectory};
 
 use crate::crew::within;
 use crate::prepare::Prepared;
+use crate::prepare::systems;
+use crate::prepare::systems::settings;
 use crate::simulate::{ended_early, open_loop};
-use crate::systems;
-use crate::systems::settings;
 use crate::words::explain;
 use crate::{Error, Study};
 

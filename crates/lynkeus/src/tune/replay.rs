@@ -8,11 +8,11 @@ use super::speed::longest_step;
 use super::whiteness::{Whiteness, whiteness};
 use super::{Row, measures};
 use crate::course::Course;
+use crate::course::inputs::supplied;
 use crate::crew::{Watch, part};
 use crate::estimate::start_at_readings;
-use crate::inputs::supplied;
 use crate::prepare::{Prepared, StudyDesign};
-use crate::{Error, Series, systems};
+use crate::{Error, Series, prepare::systems};
 use lynkeus_table::series::steps;
 
 /// Judges the tuning of an observer or of a filter on a log; an estimate that diverges is a row without figures.

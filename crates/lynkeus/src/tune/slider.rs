@@ -8,9 +8,9 @@ use lynkeus_observers::Design;
 use super::bench::Bench;
 use super::record::Record;
 use super::{Axis, Sweep, filtered, judged};
-use crate::columns::Log;
+use crate::course::columns::Log;
 use crate::prepare::Prepared;
-use crate::{Error, Series, Study, Table, headers};
+use crate::{Error, Series, Study, Table, prepare::headers};
 
 /// Rows of a log that are judged: each is replayed twice for every position.
 pub(crate) const ROWS: usize = 5_000;

@@ -10,11 +10,11 @@ use super::reference::Reference;
 use super::speed::{longest_step, transparent};
 use crate::Error;
 use crate::crew::Watch;
-use crate::outcome::{interrupted, is_observers_answer};
+use crate::judge::outcome::{interrupted, is_observers_answer};
 use crate::prepare::Prepared;
+use crate::prepare::systems::settings;
+use crate::prepare::systems::{self, monitor_column};
 use crate::simulate::open_loop;
-use crate::systems::settings;
-use crate::systems::{self, monitor_column};
 pub(super) use crate::thrifty::thrifty;
 use crate::words::in_words;
 

@@ -35,7 +35,7 @@ fn readings_at_an_end_are_told_in_sum() {
         let sensors = "noise = { y = 0.01 }\nlimits = { y = [0.2, 1.1] }";
         let mut study = super::study(&folder, sensors, simulate);
         study.simulate.as_mut().unwrap().until = 2.0;
-        let expected = expected(&study, crate::saturated::TAKEN);
+        let expected = expected(&study, crate::judge::saturated::TAKEN);
         if has_limit {
             let hour = std::time::Duration::from_secs(3600);
             study.budget = lynkeus_expr::Budget::new(Some(hour), None);

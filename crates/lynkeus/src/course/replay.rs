@@ -1,0 +1,146 @@
+//! Samples through an estimator, row by row, whatever kind of observer it is.
+
+use std::ops::ControlFlow;
+
+use lynkeus_run::filter::{Innovation, Reading};
+use lynkeus_run::{Error as RunError, Estimator};
+
+use crate::course::checkpoint::{Checkpoint, Halfway};
+use crate::course::corrections::Corrections;
+use crate::course::trace::Trace;
+use crate::course::{Course, Samples, add_row};
+use crate::{Error, Study};
+
+/// Rows between two looks at whether there is room for them.
+const LOOK: usize = 1 << 16;
+
+/// Who watches a replay: told the fraction done, and may stop it.
+pub(crate) struct Watch<'w> {
+    pub watch: &'w mut dyn FnMut(f64) -> ControlFlow<()>,
+    /// where the replay goes on after it was killed
+    pub checkpoint: Option<&'w mut Checkpoint>,
+}
+
+impl<'w> Watch<'w> {
+    /// Without a checkpoint.
+    pub fn only(watch: &'w mut dyn FnMut(f64) -> ControlFlow<()>) -> Self {
+        Self {
+            watch,
+            checkpoint: None,
+        }
+    }
+}
+
+/// The start is forgotten once the deviation with it is at most so many times that without it: half of
+/// what the judge allows a settled innovation.
+const FORGOTTEN: f64 = 2.5;
+
+/// Runs an estimator over samples; the first `estimates` of its names are estimates, the rest
+/// monitors. What ends the run early is told in the course.
+///
+/// # Errors
+/// A checkpoint that cannot be used, or no room for the rows.
+pub(crate) fn replay(
+    estimator: &mut Estimator,
+    samples: &Samples,
+    estimates: usize,
+    course: &mut Course,
+    watch: &mut Watch<'_>,
+) -> Result<(), Error> {
+    let rows = samples.time.len();
+    course.estimates = course.columns(estimates);
+    course.monitors = course.columns(estimator.names().len().saturating_sub(estimates));
+    course.deviations = estimator.deviations().map(|d| course.columns(d.len()));
+    course.traces = vec![Trace::default(); estimator.innovations().len()];
+    course.settled = course.traces.clone();
+    if course.keeps_innovations {
+        course.innovations = course.columns(2 * course.traces.len());
+    }
+    course.corrections = Corrections::of(estimator, &course.store);
+    let mut half = Halfway::default();
+    let first = match &mut watch.checkpoint {
+        None => 0,
+        Some(checkpoint) => checkpoint.resume(estimator, samples, course, &mut half)?,
+    };
+    let mut signals = vec![0.0; samples.readings.len() + samples.inputs.len()];
+    let mut left = samples.rows_from(first);
+    for row in first..rows {
+        if row.is_multiple_of(LOOK) {
+            course.check()?;
+        }
+        let Some(time) = left.next(&mut signals) else {
+            break;
+        };
+        if let Err(error) = estimator.push(time, &signals) {
+            // a sample that was lost is no fault of the log
+            samples.check()?;
+            course.ended = Some(error);
+            break;
+        }
+        let (told, monitored) = estimator.estimate().split_at(estimates);
+        add_row(&mut course.estimates, told.iter().copied());
+        add_row(&mut course.monitors, monitored.iter().copied());
+        if let (Some(columns), Some(row)) = (&mut course.deviations, estimator.deviations()) {
+            add_row(columns, row.iter().copied());
+        }
+        let traces = course.traces.iter_mut().zip(&mut course.settled);
+        for ((trace, settled), innovation) in traces.zip(estimator.innovations()) {
+            trace.take(
+                time,
+                innovation.reading,
+                innovation.value / innovation.deviation,
+            );
+            // while the start counts, an innovation says nothing of what is left without it
+            if innovation.deviation <= FORGOTTEN * innovation.settled {
+                let z = innovation.value / innovation.settled;
+                settled.take(time, innovation.reading, z);
+            }
+        }
+        if course.keeps_innovations {
+            let kept = estimator.innovations().iter().flat_map(row_of);
+            add_row(&mut course.innovations, kept);
+        }
+        if let (Some(corrections), Some(record)) = (&mut course.corrections, estimator.record()) {
+            corrections.add(record);
+        }
+        if row == rows / 2 {
+            half = Halfway::at(estimator, watch.checkpoint.is_some());
+        }
+        let stopped = (watch.watch)((row + 1) as f64 / rows as f64).is_break();
+        if let Some(checkpoint) = &mut watch.checkpoint
+            && (stopped || checkpoint.is_due())
+        {
+            checkpoint.keep(estimator, course, &half)?;
+        }
+        if stopped {
+            course.ended = Some(RunError::Cancelled { time });
+            break;
+        }
+    }
+    if !estimator.innovations().is_empty() {
+        course.sensors = estimator.health().sensors.clone();
+        let late = course.sensors.iter().zip(&half.sensors);
+        course.late = late.map(|(all, half)| all.since(half)).collect();
+    }
+    Ok(())
+}
+
+/// An innovation with its standard deviation.
+fn row_of(innovation: &Innovation) -> [f64; 2] {
+    match innovation.reading {
+        Reading::Missing => [f64::NAN; 2],
+        _ => [innovation.value, innovation.deviation],
+    }
+}
+
+/// Later rows would have to be in a checkpoint, too.
+pub(crate) fn refuse_smoothing(study: &Study) -> Result<(), Error> {
+    match study.estimate.smoothing {
+        None => Ok(()),
+        Some(_) => Err(Error::input(
+            "`smooth` and `lag` of [estimate] look at later rows: such a replay has no checkpoint",
+        )
+        .at(&study.file)
+        .hint("leave --checkpoint out, or smooth in a run of its own")),
+    }
+}

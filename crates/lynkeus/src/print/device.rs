@@ -1,0 +1,158 @@
+//! A study's estimator as a device, which every language prints.
+
+use lynkeus_export::Refusal;
+use lynkeus_export::curly::{Device, Entry, FirstReading, Tunable};
+use lynkeus_model::Variable;
+use lynkeus_observers::Design;
+use lynkeus_run::{Blueprint, Level, Updates};
+
+use crate::estimate::at_readings;
+use crate::prepare::Prepared;
+use crate::prepare::headers::Headers;
+use crate::prepare::systems::hat;
+use crate::{Error, Study, print::tunable};
+use lynkeus_study::BetweenSamples;
+
+/// What `print` makes of an estimator, with `about` at its head, and of notes on names.
+///
+/// # Errors
+/// What cannot run elsewhere.
+pub(crate) fn printed<T>(
+    prepared: &Prepared<'_>,
+    design: &Design,
+    made: &Blueprint,
+    about: &[String],
+    print: impl FnOnce(&Device<'_>, Vec<String>) -> Result<T, Refusal>,
+) -> Result<T, Error> {
+    let told = Told::of(prepared, design, made);
+    let first: Vec<FirstReading> = at_readings(prepared)
+        .iter()
+        .map(|at| FirstReading {
+            sensor: at.sensor,
+            state: at.state,
+            slope: at.slope,
+            offset: at.offset,
+        })
+        .collect();
+    let study = prepared.study();
+    let declared = prepared.declared();
+    let measured = design.observer.measured.iter();
+    let noises = measured.map(|signal| declared.noise.of(&signal.name).map(|n| Level::from(*n)));
+    let noises: Vec<Option<Level>> = noises.collect();
+    let device = Device {
+        name: &prepared.plant().name,
+        blueprint: made,
+        first_readings: &first,
+        signals: &told.signals,
+        estimates: &told.estimates,
+        monitors: told.monitors,
+        deviations: study.estimate.deviations,
+        tunables: &told.tunables,
+        noises: &noises,
+        words: &told.words,
+        about,
+    };
+    print(&device, told.notes)
+        .map_err(|refusal| Error::refused(refusal.to_string()).at(&study.file))
+}
+
+/// The study without what looks ahead, which a device cannot.
+pub(crate) fn causal(study: &Study, notes: &mut Vec<String>) -> Study {
+    let mut study = study.clone();
+    let settings = &mut study.estimate;
+    if settings.between_samples == BetweenSamples::Linear {
+        settings.between_samples = BetweenSamples::Hold;
+        notes.push(
+            "between_samples = \"linear\" of [estimate] looks ahead: here signals are held between samples"
+                .to_owned(),
+        );
+    }
+    if settings.smoothing.take().is_some() {
+        notes.push("smoothing looks ahead: the estimates are those of the filter".to_owned());
+    }
+    study
+}
+
+/// What the code says of names.
+struct Told {
+    signals: Vec<Entry>,
+    estimates: Vec<Entry>,
+    monitors: usize,
+    tunables: Vec<Tunable>,
+    words: Vec<Entry>,
+    notes: Vec<String>,
+}
+
+impl Told {
+    fn of(prepared: &Prepared<'_>, design: &Design, made: &Blueprint) -> Self {
+        let plant = prepared.plant();
+        let variables = plant
+            .inputs
+            .iter()
+            .chain(&plant.outputs)
+            .chain(&plant.states);
+        let words: Vec<Entry> = variables.map(entry).collect();
+        let known = |name: &str| {
+            let own = words.iter().find(|entry| entry.name == name);
+            own.cloned().unwrap_or_else(|| Entry::named(name))
+        };
+        let observer = &design.observer;
+        let read = observer.measured.iter().chain(&observer.inputs);
+        let mut headers = Headers::beside(plant).of_variables();
+        // as in the table of estimates, which has a column of time besides
+        let _ = headers.time();
+        headers.notes.clear();
+        let has_deviations = prepared.study().estimate.deviations;
+        let mut deviations = vec![];
+        let mut estimates = vec![];
+        for estimate in &observer.estimates {
+            let name = &estimate.variable.name;
+            let about = known(name).about;
+            let header = headers.free(&hat(name), &format!("the estimate of {name}"));
+            estimates.push(Entry {
+                name: header,
+                about,
+            });
+            if has_deviations {
+                let about = format!("standard deviation of {name}");
+                deviations.push(Entry {
+                    name: headers.free(&format!("{name}_sd"), &format!("the {about}")),
+                    about,
+                });
+            }
+        }
+        let monitors: Vec<Entry> = match made.updates {
+            Updates::Filter { .. } => vec![],
+            Updates::Jumps { .. } => observer
+                .monitors
+                .iter()
+                .map(|monitor| Entry {
+                    name: headers.free(&monitor.name, &monitor.name),
+                    about: format!("{}, where below {}", monitor.meaning, monitor.alarm_below),
+                })
+                .collect(),
+        };
+        Self {
+            signals: read.map(|signal| known(&signal.name)).collect(),
+            monitors: monitors.len(),
+            estimates: estimates
+                .into_iter()
+                .chain(deviations)
+                .chain(monitors)
+                .collect(),
+            tunables: tunable::printed(design, made),
+            words,
+            notes: headers.notes,
+        }
+    }
+}
+
+/// A variable with its unit and what it is.
+fn entry(variable: &Variable) -> Entry {
+    let unit = variable.unit.as_ref().map(|unit| format!("[{unit}]"));
+    let words = [unit, variable.description.clone()];
+    Entry {
+        name: variable.name.clone(),
+        about: words.into_iter().flatten().collect::<Vec<_>>().join(" "),
+    }
+}
