@@ -1,7 +1,5 @@
 //! Long curves reduced to what a screen can show, and cut at the frame.
 
-use std::ops::Range;
-
 use lynkeus_table::Series;
 
 /// A point on a picture's plane.
@@ -60,18 +58,17 @@ impl Kept {
         if is_across || few.corners.is_none() {
             self.points.push((few.first.0, f64::NAN));
         }
-        self.points
-            .extend(few.corners.iter().flat_map(Corners::points));
+        self.points.extend(few.points());
         self.ends_in_gap = is_gap(few.last);
     }
 }
 
-/// The points of a column.
+/// A column: its ends, and what is drawn of it.
 struct Few {
     first: Point,
     last: Point,
-    /// none where all are gaps
-    corners: Option<Corners>,
+    /// the first, lowest, highest and last of its finite points; none where all are gaps
+    corners: Option<[Numbered; 4]>,
 }
 
 impl Few {
@@ -87,49 +84,26 @@ impl Few {
 
     fn take(&mut self, point: Numbered) {
         self.last = point.1;
-        if !is_gap(point.1) {
-            self.corners
-                .get_or_insert_with(|| Corners::new(point))
-                .take(point);
+        if is_gap(point.1) {
+            return;
         }
-    }
-}
-
-/// What is drawn of finite points that are close together.
-struct Corners {
-    first: Numbered,
-    low: Numbered,
-    high: Numbered,
-    last: Numbered,
-}
-
-impl Corners {
-    fn new(point: Numbered) -> Self {
-        Self {
-            first: point,
-            low: point,
-            high: point,
-            last: point,
+        let [_, low, high, last] = self.corners.get_or_insert([point; 4]);
+        let y = point.1.1;
+        if y < low.1.1 {
+            *low = point;
         }
+        if y >= high.1.1 {
+            *high = point;
+        }
+        *last = point;
     }
 
-    fn take(&mut self, point: Numbered) {
-        let y = |p: Numbered| p.1.1;
-        if y(point) < y(self.low) {
-            self.low = point;
-        }
-        if y(point) >= y(self.high) {
-            self.high = point;
-        }
-        self.last = point;
-    }
-
-    /// The first, lowest, highest and last point, in their order, each once.
-    fn points(&self) -> Vec<Point> {
-        let mut kept = vec![self.first, self.low, self.high, self.last];
+    /// The corners in their order, each once.
+    fn points(&self) -> impl Iterator<Item = Point> {
+        let mut kept: Vec<Numbered> = self.corners.into_iter().flatten().collect();
         kept.sort_by_key(|p| p.0);
         kept.dedup_by_key(|p| p.0);
-        kept.into_iter().map(|p| p.1).collect()
+        kept.into_iter().map(|p| p.1)
     }
 }
 
@@ -139,25 +113,25 @@ pub(super) fn stretches(points: &[Point]) -> impl Iterator<Item = &[Point]> {
     all.filter(|stretch| !stretch.is_empty())
 }
 
-/// The pieces of a line inside a band of values: a line that leaves the band ends at its edge. A
-/// point without neighbours is a piece of its own.
-pub(super) fn clipped(points: &[Point], band: &Range<f64>) -> Vec<Vec<Point>> {
+/// The pieces of a line between heights 0 and 1: a line that leaves them ends at the edge. A point without neighbours is a
+/// piece of its own.
+pub(super) fn clipped(points: &[Point]) -> Vec<Vec<Point>> {
     let mut pieces: Vec<Vec<Point>> = Vec::new();
     for stretch in stretches(points) {
         match stretch {
-            [alone] => pieces.extend(band.contains(&alone.1).then(|| vec![*alone])),
-            _ => cut(stretch, band, &mut pieces),
+            [alone] => pieces.extend((0.0..=1.0).contains(&alone.1).then(|| vec![*alone])),
+            _ => cut(stretch, &mut pieces),
         }
     }
     pieces
 }
 
 /// Adds the pieces of a line without gaps.
-fn cut(points: &[Point], band: &Range<f64>, pieces: &mut Vec<Vec<Point>>) {
+fn cut(points: &[Point], pieces: &mut Vec<Vec<Point>>) {
     let mut joined = false;
     for pair in points.windows(2) {
         let &[a, b] = pair else { continue };
-        let Some((from, to)) = segment(a, b, band) else {
+        let Some((from, to)) = segment(a, b) else {
             joined = false;
             continue;
         };
@@ -169,14 +143,13 @@ fn cut(points: &[Point], band: &Range<f64>, pieces: &mut Vec<Vec<Point>>) {
     }
 }
 
-/// The part of a segment inside the band.
-fn segment(a: Point, b: Point, band: &Range<f64>) -> Option<(Point, Point)> {
-    let outside = |edge: fn(f64, f64) -> bool, at: f64| edge(a.1, at) && edge(b.1, at);
-    if outside(|v, e| v < e, band.start) || outside(|v, e| v > e, band.end) {
+/// The part of a segment between heights 0 and 1.
+fn segment(a: Point, b: Point) -> Option<(Point, Point)> {
+    if a.1.max(b.1) < 0.0 || a.1.min(b.1) > 1.0 {
         return None;
     }
     let moved = |p: Point, q: Point| {
-        let edge = p.1.clamp(band.start, band.end);
+        let edge = p.1.clamp(0.0, 1.0);
         if edge == p.1 {
             return p;
         }
@@ -206,20 +179,20 @@ mod tests {
     #[test]
     fn a_line_is_cut_where_it_leaves_and_broken_at_gaps() {
         let points = [
-            (0.0, 0.0),
-            (1.0, 2.0),
-            (2.0, 0.0),
+            (0.0, 0.5),
+            (1.0, 1.5),
+            (2.0, 0.5),
             (3.0, f64::NAN),
-            (4.0, 0.0),
+            (4.0, 0.5),
             (5.0, 1.0),
         ];
-        let pieces = clipped(&points, &(-1.0..1.0));
+        let pieces = clipped(&points);
         assert_eq!(
             pieces,
             [
-                vec![(0.0, 0.0), (0.5, 1.0)],
-                vec![(1.5, 1.0), (2.0, 0.0)],
-                vec![(4.0, 0.0), (5.0, 1.0)]
+                vec![(0.0, 0.5), (0.5, 1.0)],
+                vec![(1.5, 1.0), (2.0, 0.5)],
+                vec![(4.0, 0.5), (5.0, 1.0)]
             ]
         );
     }
@@ -262,12 +235,12 @@ mod tests {
     fn a_point_without_neighbours_is_a_piece() {
         let nan = f64::NAN;
         let points = [(0.0, nan), (1.0, 0.5), (2.0, nan), (3.0, 5.0), (4.0, nan)];
-        assert_eq!(clipped(&points, &(-1.0..1.0)), [vec![(1.0, 0.5)]]);
+        assert_eq!(clipped(&points), [vec![(1.0, 0.5)]]);
     }
 
     #[test]
-    fn a_line_across_the_band_keeps_both_edges() {
-        let pieces = clipped(&[(0.0, -10.0), (1.0, 10.0)], &(-5.0..5.0));
-        assert_eq!(pieces, [vec![(0.25, -5.0), (0.75, 5.0)]]);
+    fn a_line_across_the_frame_keeps_both_edges() {
+        let pieces = clipped(&[(0.0, -0.5), (1.0, 1.5)]);
+        assert_eq!(pieces, [vec![(0.25, 0.0), (0.75, 1.0)]]);
     }
 }

@@ -254,7 +254,7 @@ impl Report {
     /// # Errors
     /// Another number of states, or a state without range.
     #[cfg(feature = "plot")]
-    pub fn picture(&self) -> Result<lynkeus_plot::Plane, Error> {
+    pub fn picture(&self) -> Result<lynkeus_plot::Figure, Error> {
         match &self.uniform {
             Some(uniform) => uniform::picture(&self.plant, uniform.examined()),
             None => Err(Error::refused(format!(

@@ -2,7 +2,7 @@
 
 use crate::prepare::mentioned::not_drawn;
 use crate::{Error, Outcome, Quantity, Series};
-use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Panel, Span};
+use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Mark, Panel};
 use lynkeus_study::Name;
 
 /// Panels drawn where the study does not say which.
@@ -34,21 +34,26 @@ pub fn figure(
         curves: vec![curve(outcome, Kind::Estimated, &watch.values)],
         ..Panel::default()
     }));
-    let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
-    Ok(Figure {
-        title: format!(
-            "{}: {} observer",
-            outcome.plant, outcome.design.examination.family
-        ),
-        time_label: format!("time{unit}"),
-        panels,
-    })
+    let family = outcome.design.examination.family;
+    let title = format!("{}: {family} observer", outcome.plant);
+    Ok(over_time(title, time_unit, panels))
 }
+
+/// Panels over time.
+pub(crate) fn over_time(title: String, time_unit: Option<&str>, panels: Vec<Panel>) -> Figure {
+    let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
+    Figure {
+        title,
+        label: format!("time{unit}"),
+        panels,
+        ..Figure::default()
+    }
+}
+
 impl crate::Comparison {
     /// One panel per family: the quantity that is hardest to see, unknown inputs first.
     #[must_use]
     pub fn picture(&self, time_unit: Option<&str>) -> Figure {
-        let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
         let panels = self.rows.iter().filter_map(|row| {
             let run = row.run.as_ref().ok()?;
             let quantity = *interesting(&run.outcome).first()?;
@@ -56,11 +61,8 @@ impl crate::Comparison {
             panel.caption = format!("{}, {}", row.family, panel.caption);
             Some(panel)
         });
-        Figure {
-            title: format!("{}: families compared", self.plant),
-            time_label: format!("time{unit}"),
-            panels: panels.collect(),
-        }
+        let title = format!("{}: families compared", self.plant);
+        over_time(title, time_unit, panels.collect())
     }
 }
 
@@ -136,7 +138,8 @@ fn panel(outcome: &Outcome, quantity: &Quantity) -> Panel {
         caption,
         curves,
         bands: bands(outcome, quantity),
-        outside: outside(outcome, quantity),
+        marks: outside(outcome, quantity),
+        ..Panel::default()
     }
 }
 
@@ -169,24 +172,17 @@ fn band(outcome: &Outcome, estimate: &Series, deviation: &Series) -> Band {
 }
 
 /// When the estimate is outside of its declared range.
-fn outside(outcome: &Outcome, quantity: &Quantity) -> Vec<Span> {
+fn outside(outcome: &Outcome, quantity: &Quantity) -> Vec<Mark> {
     let excursions = outcome.estimate_outside.iter().flat_map(|o| &o.quantities);
     let mut own = excursions.filter(|e| e.name == quantity.name);
     let stretches = own.next().map_or(&[][..], |e| &e.stretches);
     let at = |row: usize| outcome.time.get(row);
-    let spans = stretches.iter().filter_map(|rows| {
-        Some(Span {
-            from: at(*rows.start())?,
-            to: at(*rows.end())?,
-        })
-    });
+    let spans = stretches
+        .iter()
+        .filter_map(|rows| Some(Mark::Outside(at(*rows.start())?..at(*rows.end())?)));
     spans.collect()
 }
 
 fn curve(outcome: &Outcome, kind: Kind, values: &Series) -> Curve {
-    Curve {
-        kind,
-        time: outcome.time.clone(),
-        values: values.clone(),
-    }
+    Curve::new(kind, outcome.time.clone(), values.clone())
 }

@@ -10,7 +10,10 @@ use serde_json::{Map, Value, json};
 
 use crate::words::{number, side};
 #[cfg(feature = "plot")]
-use crate::{Error, plot::Plane};
+use crate::{
+    Error,
+    plot::{Figure, Mark, Panel, Scale},
+};
 use lynkeus_observability::{Answer, Quantity, Verdict};
 #[cfg(feature = "plot")]
 use lynkeus_structure::Dimension;
@@ -220,7 +223,7 @@ pub(super) fn json(uniformity: &Uniformity) -> Value {
 
 /// The singular set of a plant with two states.
 #[cfg(feature = "plot")]
-pub(super) fn picture(plant: &str, uniformity: &Uniformity) -> Result<Plane, Error> {
+pub(super) fn picture(plant: &str, uniformity: &Uniformity) -> Result<Figure, Error> {
     let [x, y] = &uniformity.sides[..] else {
         let message = format!(
             "{plant} has {} with its unknown inputs: a picture of the singular set needs two; --json lists its parts",
@@ -234,13 +237,18 @@ pub(super) fn picture(plant: &str, uniformity: &Uniformity) -> Result<Plane, Err
         *min..*max
     };
     let parts = uniformity.singular.iter();
-    let parts = parts.map(|part| (along(part, x), along(part, y)));
-    Ok(Plane {
+    let parts = parts.map(|part| Mark::Part(along(part, x), along(part, y)));
+    Ok(Figure {
         title: format!(
             "{plant}: where the outputs' derivatives may not tell neighbouring states apart"
         ),
-        across: (x.name.clone(), x.min..x.max),
-        upwards: (y.name.clone(), y.min..y.max),
-        parts: parts.collect(),
+        label: x.name.clone(),
+        across: Scale::Within(x.min..x.max),
+        panels: vec![Panel {
+            caption: y.name.clone(),
+            upwards: Scale::Within(y.min..y.max),
+            marks: parts.collect(),
+            ..Panel::default()
+        }],
     })
 }

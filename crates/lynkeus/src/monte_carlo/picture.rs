@@ -2,7 +2,7 @@
 
 use super::{MonteCarlo, Scattered};
 use crate::Error;
-use crate::figure::{PANELS, spread};
+use crate::figure::{PANELS, over_time, spread};
 use crate::prepare::mentioned::not_drawn;
 use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Panel};
 use lynkeus_study::Name;
@@ -22,17 +22,10 @@ impl MonteCarlo {
                 spread(all, PANELS)
             }
         };
-        let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
-        Ok(Figure {
-            title: format!(
-                "{}: {} observer, {} runs",
-                self.plant,
-                self.family,
-                self.seeds.len()
-            ),
-            time_label: format!("time{unit}"),
-            panels: chosen.into_iter().map(|q| self.panel(q)).collect(),
-        })
+        let runs = self.seeds.len();
+        let title = format!("{}: {} observer, {runs} runs", self.plant, self.family);
+        let panels = chosen.into_iter().map(|q| self.panel(q));
+        Ok(over_time(title, time_unit, panels.collect()))
     }
 
     fn shown(&self, names: &[Name]) -> Result<Vec<&Scattered>, Error> {
@@ -49,11 +42,7 @@ impl MonteCarlo {
     fn panel(&self, quantity: &Scattered) -> Panel {
         let unit = quantity.unit.as_ref().filter(|unit| *unit != "1");
         let unit = unit.map_or(String::new(), |unit| format!(" ({unit})"));
-        let curve = |kind, values: &[f64]| Curve {
-            kind,
-            time: self.time.clone().into(),
-            values: values.to_vec().into(),
-        };
+        let curve = |kind, values: &[f64]| Curve::new(kind, self.time.clone(), values.to_vec());
         Panel {
             caption: format!("error of {}{unit}", quantity.name),
             curves: vec![
