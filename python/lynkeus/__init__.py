@@ -14,6 +14,7 @@ from .errors import ArgumentError, InputError, LimitError, LogWarning, LynkeusEr
 from .functions import abs as abs
 from .functions import acos, asin, atan, atan2, ceil, cos, cosh, exp, floor, interp, log, log10
 from .functions import maximum, minimum, sign, sin, sinh, sqrt, tan, tanh, where
+from .filtered import Filtered
 from .model import Model
 from .results import (
     Answer,
@@ -44,6 +45,7 @@ __all__ = [
     "Driven",
     "Estimation",
     "Estimator",
+    "Filtered",
     "Functions",
     "HowWell",
     "InputError",

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from . import _lynkeus
 from ._arguments import optional, section, word
 from ._toml import document
-from .errors import ArgumentError
+from .errors import ArgumentError, InputError
 from .model import Model
 
+#: what messages call the text of a study that is made in Python
+FILE = "study"
 #: keys of ``[sensors]`` that stand for themselves in Python
 SENSORS = ("measured", "unknown", "disturbances", "noise", "limits")
 
@@ -27,6 +30,19 @@ def spelled(changes: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(families, Sequence) and not isinstance(families, str):
         found["compare"] = {"families": families}
     return found
+
+
+@contextmanager
+def spoken() -> Iterator[None]:
+    """Errors of a study that is made in Python, whose words do without places in a text that nobody wrote."""
+    try:
+        yield
+    except InputError as error:
+        place = error.place or ""
+        if place.split(":")[0] != FILE:
+            raise
+        text = str(error).replace(f"{place}: ", "", 1)
+        raise type(error)(text, error.message, error.place, error.hint) from None
 
 
 def plant_of(name: str, given: Any) -> Model:

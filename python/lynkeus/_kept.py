@@ -23,6 +23,9 @@ class Kept:
     summary: str
     named: tuple[tuple[str, Column], ...]
     picture: str | LynkeusError | None
+    drawn: tuple[str, list[tuple[str, str]]] | LynkeusError | None
+    corrected: tuple[list[str], list[str], list[tuple[str, Column]]] | None
+    zero: tuple[int, bool] | None
     refused: LynkeusError | None
     warned: tuple[str, ...]
     errors: tuple[tuple[str, float | None], ...]
@@ -39,6 +42,9 @@ class Kept:
             core.json(),
             tuple((name, core.column(place)) for place, name in enumerate(headers)),
             _tried(core.svg),
+            _tried(core.panels),
+            core.corrections(),
+            core.origin(),
             core.refusal(),
             tuple(core.warnings()),
             tuple(core.settled()),
@@ -74,6 +80,16 @@ class Kept:
     def svg(self) -> str | None:
         found: str | None = _given(self.picture)
         return found
+
+    def panels(self) -> tuple[str, list[tuple[str, str]]] | None:
+        found: tuple[str, list[tuple[str, str]]] | None = _given(self.drawn)
+        return found
+
+    def corrections(self) -> tuple[list[str], list[str], list[tuple[str, Column]]] | None:
+        return self.corrected
+
+    def origin(self) -> tuple[int, bool] | None:
+        return self.zero
 
     def refusal(self) -> LynkeusError | None:
         return self.refused

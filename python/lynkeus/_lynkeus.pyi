@@ -29,6 +29,16 @@ class Answer:
     def arrow_schema(self) -> object: ...
     def arrow_stream(self) -> object: ...
     def svg(self) -> str | None: ...
+    def panels(self) -> tuple[str, list[tuple[str, str]]] | None:
+        """The label of the time axis, and name and caption of each panel of the picture, from the top."""
+
+    def corrections(self) -> tuple[list[str], list[str], list[tuple[str, _Column]]] | None:
+        """Names of sensors and states, and by name the entries of what a filter's corrections are made of, row after
+        row."""
+
+    def origin(self) -> tuple[int, bool] | None:
+        """What stands for zero where times are dates: nanoseconds since 1970, and whether that is UTC."""
+
     def refusal(self) -> LynkeusError | None: ...
     def log(self) -> list[tuple[str, _Column]]: ...
     def warnings(self) -> list[str]:
@@ -232,8 +242,16 @@ class Study:
     def monte_carlo(
         self, runs: int, progress: _Tell = None, time_limit: float | None = None, memory_limit: float = ...
     ) -> Answer: ...
+    def refuse_misfits(self) -> None:
+        """Raises where the study names what its plant does not have."""
+
     def estimate(
-        self, log: Log | str, progress: _Tell = None, time_limit: float | None = None, memory_limit: float = ...
+        self,
+        log: Log | str,
+        progress: _Tell = None,
+        time_limit: float | None = None,
+        memory_limit: float = ...,
+        record: bool = False,
     ) -> Answer: ...
     def tune(
         self,
@@ -396,6 +414,9 @@ class Estimator:
 
 def families() -> list[tuple[str, bool]]:
     """Names of the families, and which are filters."""
+
+def model_names(text: str, name: str) -> list[str]:
+    """The models of a text; raises where it cannot be read so far that they are known."""
 
 def schema() -> str:
     """The JSON Schema of study files."""

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +26,6 @@ TRUE, ESTIMATED, SMOOTHED, PLAIN = "#595959", "#0072B2", "#009E73", "#CC79A7"
 BAND = 0.18
 #: a panel is cut where its curves span more than so many times what is worth seeing
 TOO_TALL = 4.0
-TEXT = "{http://www.w3.org/2000/svg}text"
 
 
 @dataclass
@@ -52,30 +50,14 @@ class Panel:
     is_monitor: bool = False
 
 
-@dataclass
-class Captions:
-    """What the command's picture says beside its panels: name, description and unit; and the time."""
-
-    panels: dict[str, str]
-    time: str
-
-
-def captions(svg: str | None, known: Iterable[str], time: str) -> Captions:
-    """The captions of a picture, by the names in ``known`` that they begin with, from the top."""
-    names = sorted(known, key=len, reverse=True)
-    found = Captions({}, time)
-    texts = [] if svg is None else list(ElementTree.fromstring(svg).iter(TEXT))
-    # the time's label stands below everything else
-    for text in sorted(texts, key=lambda text: float(text.get("y", 0))):
-        words = (text.text or "").strip()
-        match text.get("text-anchor"), text.get("font-weight"):
-            case "start", None:
-                name = next((n for n in names if words.startswith((f"{n}:", f"{n} (")) or words == n), None)
-                if name is not None:
-                    found.panels[name] = words
-            case "middle", _:
-                found.time = words
-    return found
+def captions(run: Run) -> tuple[dict[str, str], str]:
+    """The captions of the panels of the command's picture by name, from the top, and the label of its time."""
+    try:
+        told = run._core.panels()
+    except LynkeusError:
+        told = None  # nothing to draw for the command; a column may still be wanted
+    time, panels = told or (run.columns[0], [])
+    return dict(panels), time
 
 
 def asked(names: Iterable[str] | None) -> list[str] | None:
@@ -90,17 +72,10 @@ def of_run(run: Run, names: Sequence[str] | None, truth: Mapping[str, Column]) -
     """The panels of a run, those of its study's ``[plot] show`` where ``names`` says nothing, and the
     label of the time axis."""
     estimates = dict(run.summary.get("estimates", {}))
-    told = captions(_picture(run), {*estimates, *run.columns}, run.columns[0])
-    wanted = list(names if names is not None else (told.panels or estimates or run.columns[1:]))
-    panels = [_panel(run, name, estimates, told.panels.get(name, name), truth) for name in wanted]
-    return panels, told.time
-
-
-def _picture(run: Run) -> str | None:
-    try:
-        return run.to_svg()
-    except LynkeusError:
-        return None  # nothing to draw for the command; a column may still be wanted
+    told, time = captions(run)
+    shown = [name for name in told if name in estimates or name in run.columns]
+    wanted = list(names if names is not None else (shown or estimates or run.columns[1:]))
+    return [_panel(run, name, estimates, told.get(name, name), truth) for name in wanted], time
 
 
 def _panel(run: Run, name: str, estimates: Mapping[str, str], caption: str, truth: Mapping[str, Column]) -> Panel:
@@ -136,10 +111,9 @@ def _derived(run: Run, name: str, estimates: Mapping[str, str], kind: str) -> Co
 def of_many(run: Run, names: Sequence[str] | None) -> tuple[list[Panel], str]:
     """The errors of many runs: the band from 5 to 95 %, the mean, the largest."""
     quantities: dict[str, Any] = run.summary["quantities"]
-    errors = {f"error of {name}": name for name in quantities}
-    told = captions(_picture(run), errors, run.columns[0])
+    told, time = captions(run)
     panels = []
-    for name in names if names is not None else [errors[e] for e in told.panels or errors]:
+    for name in names if names is not None else told or quantities:
         if name not in quantities:
             raise KeyError(f"{name!r}: expected one of {', '.join(quantities)}")
         unit = quantities[name].get("unit")
@@ -152,10 +126,10 @@ def of_many(run: Run, names: Sequence[str] | None) -> tuple[list[Panel], str]:
             Curve("largest of |error|", worst, {"color": TRUE, "linestyle": "--"}),
         ]
         panels.append(panel)
-    return panels, told.time
+    return panels, time
 
 
-def of_precision(run: Run, names: Sequence[str] | None) -> tuple[list[Panel], str]:
+def of_how_well(run: Run, names: Sequence[str] | None) -> tuple[list[Panel], str]:
     """Standard errors over the horizon."""
     panel = Panel("", "standard error")
     for name in names if names is not None else run.columns[1:]:

@@ -12,7 +12,7 @@ from ._arguments import optional, path as path_of, real, section, takes, word
 from ._columns import why
 from ._flatten import flattened, is_read
 from ._toml import key, number, valid
-from .errors import InputError
+from .errors import InputError, near
 from .systems import Functions
 
 
@@ -31,7 +31,7 @@ class Model:
     Raises
     ------
     InputError
-        The text holds half a character.
+        The text cannot be read so far that its models are known, or holds none that is called so.
     """
 
     @takes(text=word, name=word, choose=optional(word))
@@ -39,6 +39,20 @@ class Model:
         self.text: str = valid(text)
         self.name: str = name
         self.choose: str | None = choose
+        self._refuse_faults()
+
+    def _refuse_faults(self) -> None:
+        names = _lynkeus.model_names(self.text, self.name)
+        if self.choose is not None and self.choose not in names:
+            known = ", ".join(names)
+            raise InputError(f"{self.name}: no model is called {self.choose!r}{near(self.choose, names)}: it has {known}")
+
+    @classmethod
+    def _unread(cls, text: str, name: str, choose: str | None) -> Model:
+        """Of a text that is taken as it is."""
+        model = cls.__new__(cls)
+        model.text, model.name, model.choose = text, name, choose
+        return model
 
     @classmethod
     @takes(path=path_of, choose=optional(word))
@@ -88,7 +102,12 @@ class Model:
         Returns
         -------
         Model
-            The text; it is read where something is asked of it.
+            The text; what its equations mean is found where something is asked of it.
+
+        Raises
+        ------
+        InputError
+            Its syntax is wrong.
         """
         return cls(text, choose=choose)
 

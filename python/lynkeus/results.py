@@ -17,6 +17,7 @@ from ._logs import log_of
 from ._optional import needed
 from ._records import Record as Record, made
 from .errors import InputError, LogWarning, LynkeusError, NotCredible, near
+from .filtered import Filtered
 
 if TYPE_CHECKING:
     import pandas
@@ -225,21 +226,34 @@ class Table(Answer):
         ``requested_schema`` is not followed, numbers are of 64 bits."""
         return self._core.arrow_stream()
 
+    def _instants(self) -> tuple[NDArray[np.datetime64], bool] | None:
+        """Dates of the rows, where they have some, and whether these are UTC."""
+        return None
+
+    def _stamp(self) -> str:
+        """What a column of dates is called."""
+        return next(name for name in ("time", "timestamp", "instant", "_time") if name not in self.columns)
+
     def to_pandas(self) -> pandas.DataFrame:
         """As a data frame of pandas.
 
         Returns
         -------
         pandas.DataFrame
-            A row for each row, a column for each header.
+            A row for each row, a column for each header; the index is :attr:`Run.time` where a log had dates,
+            named ``time`` and in UTC where these had a zone.
 
         Raises
         ------
         ImportError
             pandas is not installed.
         """
+        found = needed("pandas", "to_pandas")
         columns = {name: self._core.column(place) for place, name in enumerate(self.columns)}
-        frame: pandas.DataFrame = needed("pandas", "to_pandas").DataFrame(columns, copy=False)
+        index, dates = None, self._instants()
+        if dates is not None:
+            index = found.DatetimeIndex(dates[0], name=self._stamp(), tz="UTC" if dates[1] else None)
+        frame: pandas.DataFrame = found.DataFrame(columns, index=index, copy=False)
         return frame
 
     def to_polars(self) -> polars.DataFrame:
@@ -248,14 +262,20 @@ class Table(Answer):
         Returns
         -------
         polars.DataFrame
-            A row for each row, a column for each header; a NaN is a null.
+            A row for each row, a column for each header; a NaN is a null. Where a log had dates a first
+            column ``time`` has :attr:`Run.time`, in UTC where these had a zone.
 
         Raises
         ------
         ImportError
             polars is not installed.
         """
-        frame: polars.DataFrame = needed("polars", "to_polars").DataFrame(self)
+        found = needed("polars", "to_polars")
+        frame: polars.DataFrame = found.DataFrame(self)
+        dates = self._instants()
+        if dates is not None:
+            time = found.Series(self._stamp(), dates[0])
+            frame.insert_column(0, time.dt.replace_time_zone("UTC") if dates[1] else time)
         return frame
 
     def to_arrow(self) -> pyarrow.Table:
@@ -265,14 +285,21 @@ class Table(Answer):
         Returns
         -------
         pyarrow.Table
-            A row for each row, a column for each header; a NaN is a null.
+            A row for each row, a column for each header; a NaN is a null. Where a log had dates a first
+            column ``time`` has :attr:`Run.time`, in UTC where these had a zone; the stream itself has numbers
+            only.
 
         Raises
         ------
         ImportError
             pyarrow is not installed.
         """
-        table: pyarrow.Table = needed("pyarrow", "to_arrow").table(self)
+        found = needed("pyarrow", "to_arrow")
+        table: pyarrow.Table = found.table(self)
+        dates = self._instants()
+        if dates is not None:
+            kind = found.timestamp("us", tz="UTC" if dates[1] else None)
+            table = table.add_column(0, self._stamp(), found.array(dates[0], type=kind))
         return table
 
 
@@ -283,6 +310,26 @@ class Run(Table):
     def t(self) -> Column:
         """The times of the rows, shape (rows,), in the model's unit of time."""
         return self[self.columns[0]]
+
+    @cached_property
+    def time(self) -> NDArray[np.datetime64] | None:
+        """The times of the rows as dates, ``datetime64[us]`` of shape (rows,), in UTC where the log's had a zone;
+        ``None`` where the log's times are numbers. :attr:`t` counts seconds since the log's first date."""
+        dates = self._instants()
+        return None if dates is None else dates[0]
+
+    def _instants(self) -> tuple[NDArray[np.datetime64], bool] | None:
+        origin = self._core.origin()
+        if origin is None:
+            return None
+        nanoseconds, zoned = origin
+        # a date that is exact to the microsecond comes back exactly: what is nearest to it in seconds is nearer to it
+        # than to its neighbours
+        whole, rest = divmod(nanoseconds, 1000)
+        since = np.rint(self.t * 1e6 + rest / 1000).astype(np.int64)
+        found = (whole + since).astype("datetime64[us]")
+        found.flags.writeable = False
+        return found, zoned
 
     @property
     def is_credible(self) -> bool:
@@ -369,6 +416,20 @@ class Estimation(reports.RunEntries, Run):
         """The answer for programs, as the command\'s ``--json`` prints it."""
         return self._made(reports.RunReport)
 
+    @cached_property
+    def filter(self) -> Filtered:
+        """What a filter (``ekf``, ``ukf``, ``mhe``) made of each row: innovations with their covariances, predicted
+        outputs, gains, covariances and the likelihood. There where ``estimate(log, record=True)`` asked for it;
+        else an :class:`lynkeus.InputError` says so."""
+        kept = self._core.corrections()
+        if kept is None:
+            filters = [name for name, is_filter in _lynkeus.families() if is_filter]
+            hint = "ask for it: estimate(log, record=True)"
+            if self.family not in filters:
+                hint = f"the {self.family} observer is no filter; those are {', '.join(filters)}"
+            raise InputError(f"filter: nothing was recorded of this run; {hint}")
+        return Filtered._of(kept)
+
 
 class MonteCarlo(reports.MonteCarloEntries, Run):
     """Many runs: mean, quantile bands and the worst."""
@@ -402,7 +463,7 @@ class HowWell(reports.HowWellEntries, Run):
         return self._made(reports.HowWellReport)
 
     def _panels(self, names: Sequence[str] | None, truth: dict[str, Column]) -> tuple[list[_plot.Panel], str]:
-        return _plot.of_precision(self, names)
+        return _plot.of_how_well(self, names)
 
 
 class Comparison(reports.ComparisonEntries, Answer):

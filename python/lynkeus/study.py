@@ -10,7 +10,7 @@ from typing import Any, Literal, Unpack, overload
 from . import _lynkeus
 from ._arguments import LIMITS, flag, instance, optional, path as path_of, progress as told_of
 from ._arguments import real, takes, whole, word, words
-from ._base import Base, plant_of, spelled
+from ._base import FILE, Base, plant_of, spelled, spoken
 from ._batched import Batched
 from ._export import EXPORT, Export, write
 from ._logs import given
@@ -18,7 +18,7 @@ from ._lynkeus import MEMORY
 from ._progress import Progress, told
 from ._toml import document, valid
 from ._types import LogLike, Names, Number, Numbers
-from .errors import InputError
+from .errors import InputError, LimitError
 from .systems import Functions, Observer
 from .model import Model
 from .results import (
@@ -87,8 +87,8 @@ class Study(Batched):
     Raises
     ------
     InputError
-        A section or key that is not known, a value of another kind than its key takes, a model that cannot
-        be read.
+        A section or key that is not known, a value of another kind than its key takes, a name that the model
+        does not have, a model that cannot be read.
 
     Examples
     --------
@@ -151,7 +151,12 @@ class Study(Batched):
         }
         text = document(spelled({name: value for name, value in given.items() if value is not None}))
         plant = plant_of("model", model)
-        self._core = _lynkeus.Study.parse(text, "study", (plant.name, plant.text), plant.choose)
+        with spoken():
+            self._core = _lynkeus.Study.parse(text, FILE, (plant.name, plant.text), plant.choose)
+            try:
+                self._core.refuse_misfits()
+            except LimitError:
+                pass  # whoever asks something of it may allow more
 
     @classmethod
     def _of(cls, core: _lynkeus.Study) -> Study:
@@ -222,7 +227,7 @@ class Study(Batched):
         if plant is None:
             raise InputError('the study names no plant: expected `plant = "FILE.mo"`')
         name, text = plant
-        return Model.load(name, self._core.model) if text is None else Model(text, name, self._core.model)
+        return Model.load(name, self._core.model) if text is None else Model._unread(text, name, self._core.model)
 
     def replace(self, **changes: Unpack[Changes]) -> Study:
         """The same study with other keys; those of a section are added to it:
@@ -443,11 +448,12 @@ class Study(Batched):
                 return judged(Simulation(self._core.simulate(tell, time_limit, memory_limit)))
             return judged(MonteCarlo(self._core.monte_carlo(runs, tell, time_limit, memory_limit)))
 
-    @takes(progress=told_of, **LIMITS)
+    @takes(record=flag, progress=told_of, **LIMITS)
     def estimate(
         self,
         log: LogLike,
         *,
+        record: bool = False,
         progress: Progress = False,
         time_limit: float | None = None,
         memory_limit: float = MEMORY,
@@ -459,6 +465,9 @@ class Study(Batched):
         log : path, mapping of columns, data frame, table or run
             A file (CSV, Parquet), columns of shape (rows,) by their headers, a data frame of pandas or
             polars, a table of Arrow, a structured array or a simulation.
+        record : bool
+            Keeps what a filter made of each row, for :attr:`Estimation.filter`: so many numbers as its matrices
+            have, row by row.
         progress : bool or function
             Shows how far it is, or calls the function with the share that is done, from 0 to 1.
         time_limit : float, optional
@@ -474,14 +483,15 @@ class Study(Batched):
         Raises
         ------
         InputError
-            The study cannot be run, or the log lacks what it reads.
+            The study cannot be run, the log lacks what it reads, or ``record`` is asked of an observer that is
+            no filter.
         RefusedError
             A condition is refuted, or the estimate diverges.
         LimitError
             A limit ended it before its first row.
         """
         with told(progress, "estimating") as tell:
-            return judged(Estimation(self._core.estimate(given(log), tell, time_limit, memory_limit)))
+            return judged(Estimation(self._core.estimate(given(log), tell, time_limit, memory_limit, record)))
 
     @takes(progress=told_of, **LIMITS)
     def tune(

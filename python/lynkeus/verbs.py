@@ -225,6 +225,7 @@ def estimate(
     study: _Study,
     log: LogLike,
     *,
+    record: bool = False,
     progress: Progress = False,
     time_limit: float | None = None,
     memory_limit: float = MEMORY,
@@ -238,6 +239,8 @@ def estimate(
     log : path, mapping of columns, data frame, table or run
         A file (CSV, Parquet), columns of shape (rows,) by their headers, a data frame of pandas or polars, a
         table of Arrow, a structured array or a simulation.
+    record : bool
+        Keeps what a filter made of each row, for :attr:`Estimation.filter`.
     progress : bool or function
         Shows how far it is, or calls the function with the share that is done, from 0 to 1.
     time_limit : float, optional
@@ -253,13 +256,16 @@ def estimate(
     Raises
     ------
     InputError
-        The study cannot be run, or the log lacks what it reads.
+        The study cannot be run, the log lacks what it reads, or ``record`` is asked of an observer that is no filter.
     RefusedError
         A condition is refuted, or the estimate diverges.
     LimitError
         A limit ended it before its first row.
     """
-    return _study(study).estimate(log, progress=progress, time_limit=time_limit, memory_limit=memory_limit)
+    asked = _study(study)
+    return asked.estimate(
+        log, record=record, progress=progress, time_limit=time_limit, memory_limit=memory_limit
+    )
 
 
 def tune(

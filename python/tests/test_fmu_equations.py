@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 import re
 import shutil
 import subprocess
@@ -29,7 +30,10 @@ pytestmark = pytest.mark.skipif(
 Array = np.ndarray[Any, Any]
 
 STAIRS = 16
-"""How often the inputs of a run jump; between two jumps they stay, as in co-simulation."""
+"""How often the inputs of a whole run jump; between two jumps they stay, as in co-simulation."""
+
+JUMPS = 6
+"""How many of them are run."""
 
 STUDIES = sorted((ROOT / "examples").glob("*/*.toml"))
 PLANTS = {study.parent / tomllib.loads(study.read_text())["plant"]: study for study in STUDIES}
@@ -73,7 +77,11 @@ def stairs(study: Path) -> tuple[float, dict[str, str]]:
     inputs = ", ".join(
         f"{name} = " + held.sub(f"({length}*floor(time/{length}))", value) for name, value in written.items()
     )
-    return length, {"inputs": f"{{ {inputs} }}", "output_step": repr(length / 2)}
+    return length, {
+        "inputs": f"{{ {inputs} }}",
+        "until": repr(JUMPS * length),
+        "output_step": repr(length / 2),
+    }
 
 
 def signals(model: Any, columns: dict[str, Array]) -> Array | None:
@@ -88,14 +96,37 @@ def signals(model: Any, columns: dict[str, Array]) -> Array | None:
     )
 
 
+class Made:
+    """What several tests take of a model, made once."""
+
+    def __init__(self, command: Path, folder: Path) -> None:
+        self.command, self.folder = command, folder
+        self.file = functools.cache(self._file)
+        self.columns = functools.cache(self._columns)
+
+    def _file(self, name: str, version: int) -> Path:
+        length, _ = stairs(PLANTS[ROOT / name])
+        folder = self.folder / f"{name.replace('/', '-')}-{version}"
+        options = ["--fmi", str(version), "--step", repr(length / 2000)]
+        return export(self.command, folder, ROOT / name, *options)
+
+    def _columns(self, name: str) -> dict[str, Array]:
+        folder = self.folder / name.replace("/", "-")
+        folder.mkdir()
+        study = PLANTS[ROOT / name]
+        return simulated(self.command, folder, study, stairs(study)[1])
+
+
+@pytest.fixture(scope="module")
+def made(command: Path, tmp_path_factory: pytest.TempPathFactory) -> Made:
+    return Made(command, tmp_path_factory.mktemp("made"))
+
+
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("name", NAMES)
-def test_a_plant_runs_as_simulate_runs_it(command: Path, tmp_path: Path, name: str, version: int) -> None:
-    model = ROOT / name
-    length, changes = stairs(PLANTS[model])
-    expected = simulated(command, tmp_path, PLANTS[model], changes)
-    options = ["--fmi", str(version), "--step", repr(length / 2000)]
-    file = export(command, tmp_path, model, *options)
+def test_a_plant_runs_as_simulate_runs_it(made: Made, name: str, version: int) -> None:
+    length, _ = stairs(PLANTS[ROOT / name])
+    expected, file = made.columns(name), made.file(name, version)
     assert len(expected["t"]) > 6
     told = fmpy.read_model_description(str(file))
     assert told.coSimulation is not None and told.modelExchange is not None
@@ -217,10 +248,8 @@ def check_derivatives(file: Path) -> None:
 
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("name", NAMES)
-def test_directional_derivatives_are_those_of_the_plant(
-    command: Path, tmp_path: Path, name: str, version: int
-) -> None:
-    check_derivatives(export(command, tmp_path, ROOT / name, "--fmi", str(version)))
+def test_directional_derivatives_are_those_of_the_plant(made: Made, name: str, version: int) -> None:
+    check_derivatives(made.file(name, version))
 
 
 VAT = """
@@ -331,7 +360,7 @@ def test_plant_and_observer_run_together_as_simulate_runs_them(
     given = ", ".join(f'{name} = "{value}"' for name, value in inputs.items())
     changes = {
         "inputs": f"{{ {given} }}",
-        "until": repr(step * 400),
+        "until": repr(step * 160),
         "output_step": repr(step * 4),
         "method": '"rk4"',
         "step": repr(step),

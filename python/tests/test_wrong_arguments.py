@@ -61,7 +61,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Study.certify": (STUDY.certify, LIMITS),
     "Study.how_well": (STUDY.how_well, {"horizon": None, "sensors": None, **LIMITS}),
     "Study.simulate": (STUDY.simulate, {"runs": None, "progress": False, **LIMITS}),
-    "Study.estimate": (STUDY.estimate, {"log": log(), "progress": False, **LIMITS}),
+    "Study.estimate": (STUDY.estimate, {"log": log(), "record": False, "progress": False, **LIMITS}),
     "Study.estimate_each": (STUDY.estimate_each, {"logs": [log()], "by": None, **BATCH}),
     "Study.sweep": (STUDY.sweep, {"changes": [{}], "log": None, **BATCH}),
     "Study.tune": (STUDY.tune, {"log": None, "progress": False, **LIMITS}),

@@ -5,14 +5,15 @@ mod package;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use xtask::process::{begins, cargo, run};
+use xtask::process::{begins, cargo, joined, run};
 use xtask::python;
 
 const USAGE: &str = "\
 usage: cargo xtask <task>
 
-  test      every test of the workspace and of the Python package, with the Python cross-checks
-  package   build the Python package, install it into .venv-package and run its tests
+  test      every test of the workspace and of the Python package, with the Python cross-checks;
+            [--all] then those that take minutes, too, of which these are a sample
+  package   build the Python package as a wheel, install it into .venv-package and try it there
   ci        format check, lints, documentation, then `test`
   site      build the documentation site into target/site, every link checked
 
@@ -52,10 +53,11 @@ fn main() -> ExitCode {
     let task = arguments.first().map_or("", String::as_str);
     let outcome = match (task, arguments.len()) {
         ("test", 1) => test(),
+        ("test", 2) if arguments[1] == "--all" => test().and_then(|()| long_tests()),
         ("ci", 1) => ci(),
         // with the features of the whole, so that nothing is compiled twice
         ("chores", 1) => run(&mut cargo(&["test", "--workspace", "--bin", "chores"])),
-        ("package", 1) => package::interpreter().and_then(|python| package::test(&python)),
+        ("package", 1) => package::interpreter().and_then(|python| package::wheel(&python)),
         ("site", 1) => package::site(),
         _ if CHORES.contains(&task) => {
             let mut chore = cargo(&["run", "--release", "--package", "chores", "--"]);
@@ -75,22 +77,41 @@ fn main() -> ExitCode {
     }
 }
 
+/// Every test in Rust but those of the chores.
+const TESTS: [&str; 4] = ["test", "--workspace", "--exclude", "chores"];
+
+/// Compiles them, the library of the Python package, and the command, which its tests compare with: in one go,
+/// so that the features of dependencies are those of the whole and nothing is compiled twice.
+fn compiled() -> Result<(), String> {
+    run(cargo(&["build", "--workspace", "--exclude", "chores"])
+        .args(["--lib", "--bins", "--tests"]))
+}
+
 /// Runs every test, those of the Python package beside those in Rust.
 fn test() -> Result<(), String> {
-    begins("the Python environments");
-    let mut tests = cargo(&["test", "--workspace", "--exclude", "chores"]);
-    match found(python::interpreter(), "the Python cross-checks")? {
+    begins("the tests, compiled, beside the Python environments");
+    let ((checks, package), compiled) = std::thread::scope(|scope| {
+        // packages are waited for while the processors compile
+        let environments = scope.spawn(|| (python::interpreter(), package::interpreter()));
+        let compiled = compiled();
+        (joined(environments), compiled)
+    });
+    compiled?;
+    let mut tests = cargo(&TESTS);
+    match found(checks, "the Python cross-checks")? {
         Some(path) => tests.env(python::VARIABLE, path),
         None => tests.env_remove(python::VARIABLE),
     };
-    let mut rust = || {
-        begins("the tests in Rust");
-        run(&mut tests)
-    };
-    match found(package::interpreter(), "the tests of the Python package")? {
-        Some(python) => package::test_beside(&python, rust),
-        None => rust(),
+    match found(package, "the tests of the Python package")? {
+        Some(python) => package::test_beside(&python, &tests),
+        None => run(&mut tests),
     }
+}
+
+/// Runs the tests in Rust that are left out for the time that they take.
+fn long_tests() -> Result<(), String> {
+    begins("the tests that take minutes");
+    run(cargo(&TESTS).args(["--release", "--", "--ignored"]))
 }
 
 /// An interpreter for something; none where that is skipped, with a word.

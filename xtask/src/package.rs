@@ -6,7 +6,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use xtask::process::{begins, cargo, root, run, target};
+use xtask::process::{begins, behind, cargo, joined, root, run, target};
 use xtask::python;
 
 /// What its tests need, pinned.
@@ -15,67 +15,82 @@ const REQUIREMENTS: &str = include_str!("../../python/requirements.txt");
 /// The tests compare with the command that this names.
 const COMMAND: &str = "LYNKEUS_COMMAND";
 
-/// Builds, installs and tests it.
+/// Builds the wheel, installs it, and tries it as users have it; all tests run beside those in Rust.
 ///
 /// # Errors
 /// What is missing, or what failed.
-pub fn test(python: &Path) -> Result<(), String> {
-    prepare(python)?;
-    begins("the tests of the Python package");
-    run(&mut tests(python))?;
-    types(python)
+pub fn wheel(python: &Path) -> Result<(), String> {
+    begins("the Python package, as a wheel");
+    let folder = target().join("package");
+    run(&mut build(python, &folder)?)?;
+    run(&mut install(python, &built(&folder)?))?;
+    begins("the command, to compare with");
+    run(&mut cargo(&["build", "--package", "lynkeus-cli"]))?;
+    begins("what the installed package says");
+    run(tests(python).args([
+        "python/tests/test_package.py",
+        "python/tests/test_same_as_the_command.py",
+    ]))
 }
 
-/// Builds and installs it, then runs its tests while something else is done: they need one core, and what
-/// they print is shown behind that.
+/// Tests it while the tests in Rust run, which are compiled, and so are its library and the command. Its own tests,
+/// one after another, take longer than those on several threads, and go before them. What is printed of it is shown
+/// behind theirs.
 ///
 /// # Errors
 /// What is missing, or what failed, of either.
-pub fn test_beside(
-    python: &Path,
-    other: impl FnOnce() -> Result<(), String>,
-) -> Result<(), String> {
-    prepare(python)?;
-    let log = target().join("package").join("tests.log");
-    let cannot = |error: std::io::Error| format!("cannot write {}: {error}", log.display());
-    let file = File::create(&log).map_err(cannot)?;
-    let mut tests = tests(python);
-    tests.stdout(file.try_clone().map_err(cannot)?).stderr(file);
-    let running = tests.spawn();
-    let mut running = running.map_err(|error| format!("cannot start the tests: {error}"))?;
-    let done = other();
-    begins("what the tests of the Python package say, which ran beside");
-    let status = running.wait();
-    eprint!("{}", fs::read_to_string(&log).unwrap_or_default());
-    done?;
-    match status {
-        Ok(status) if status.success() => types(python),
-        Ok(status) => Err(format!(
-            "the tests of the Python package ended with {status}"
-        )),
-        Err(error) => Err(format!("the tests of the Python package: {error}")),
-    }
+pub fn test_beside(python: &Path, rust: &Command) -> Result<(), String> {
+    begins("the tests in Rust, beside the tests of the Python package and its types");
+    let path = target().join("package.log");
+    let cannot = |error: std::io::Error| format!("cannot write {}: {error}", path.display());
+    let log = File::create(&path).map_err(cannot)?;
+    let (package, rust) = std::thread::scope(|scope| {
+        let package = scope.spawn(|| steps(python, &log));
+        let rust = run(&mut behind(rust));
+        begins("what the tests of the Python package say, which ran beside");
+        (joined(package), rust)
+    });
+    eprint!("{}", fs::read_to_string(&path).unwrap_or_default());
+    rust.and(package)
 }
 
-/// Builds and installs it, and what its tests compare with.
-fn prepare(python: &Path) -> Result<(), String> {
-    begins("the Python package, as a wheel");
-    let wheel = wheel(python)?;
-    let mut install = Command::new(python);
-    install
-        .args(["-m", "pip", "install", "--disable-pip-version-check"])
-        .args(["--quiet", "--force-reinstall", "--no-deps", "--no-index"])
-        .arg(wheel);
-    run(&mut install)?;
-    begins("the tests, compiled");
-    // as all tests are built later, so that nothing is built twice
-    run(&mut cargo(&[
-        "test",
-        "--workspace",
-        "--exclude",
-        "chores",
-        "--no-run",
-    ]))
+/// Its tests, from a folder with the library that the workspace has built, and its types; what they print
+/// goes to the log.
+fn steps(python: &Path, log: &File) -> Result<(), String> {
+    let told = |command: &mut Command| {
+        let copy = || log.try_clone().map_err(|e| format!("the log: {e}"));
+        run(command.stdout(copy()?).stderr(copy()?))
+    };
+    told(tests(python).env("PYTHONPATH", folder()?))?;
+    told(&mut types(python))
+}
+
+/// The package as a folder to import it from: its Python files, and the library beside them.
+fn folder() -> Result<PathBuf, String> {
+    let folder = target().join("package").join("folder");
+    let package = folder.join("lynkeus");
+    let cannot = |error: std::io::Error| format!("cannot make {}: {error}", package.display());
+    match fs::remove_dir_all(&folder) {
+        Err(error) if error.kind() != ErrorKind::NotFound => return Err(cannot(error)),
+        _ => {}
+    }
+    fs::create_dir_all(&package).map_err(cannot)?;
+    for entry in fs::read_dir(root().join("python/lynkeus")).map_err(cannot)? {
+        let file = entry.map_err(cannot)?.path();
+        if let (true, Some(name)) = (file.is_file(), file.file_name()) {
+            fs::copy(&file, package.join(name)).map_err(cannot)?;
+        }
+    }
+    let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    let library = target()
+        .join("debug")
+        .join(format!("{prefix}_lynkeus{suffix}"));
+    let module = match cfg!(windows) {
+        true => "_lynkeus.pyd",
+        false => "_lynkeus.abi3.so",
+    };
+    fs::copy(library, package.join(module)).map_err(cannot)?;
+    Ok(folder)
 }
 
 fn tests(python: &Path) -> Command {
@@ -89,10 +104,10 @@ fn tests(python: &Path) -> Command {
     tests
 }
 
-fn types(python: &Path) -> Result<(), String> {
-    begins("the types of the Python package");
+fn types(python: &Path) -> Command {
     let mut types = Command::new(python);
-    run(types.args(["-m", "mypy"]).current_dir(root()))
+    types.args(["-m", "mypy"]).current_dir(root());
+    types
 }
 
 /// The interpreter of its environment.
@@ -117,10 +132,9 @@ pub fn site() -> Result<(), String> {
     run(&mut build)
 }
 
-/// The only wheel in a folder that is made anew.
-fn wheel(python: &Path) -> Result<PathBuf, String> {
-    let folder = target().join("package");
-    match fs::remove_dir_all(&folder) {
+/// What builds a wheel into a folder, which is made anew.
+fn build(python: &Path, folder: &Path) -> Result<Command, String> {
+    match fs::remove_dir_all(folder) {
         // there is none at first
         Err(error) if error.kind() != ErrorKind::NotFound => {
             let folder = folder.display();
@@ -132,10 +146,23 @@ fn wheel(python: &Path) -> Result<PathBuf, String> {
     build
         .args(["-m", "maturin", "build", "--profile", "dev"])
         .args(["--auditwheel", "skip", "--out"])
-        .arg(&folder)
+        .arg(folder)
         .current_dir(root());
-    run(&mut build)?;
-    let entries = fs::read_dir(&folder).map_err(|e| format!("cannot read the wheels: {e}"))?;
+    Ok(build)
+}
+
+fn install(python: &Path, wheel: &Path) -> Command {
+    let mut install = Command::new(python);
+    install
+        .args(["-m", "pip", "install", "--disable-pip-version-check"])
+        .args(["--quiet", "--force-reinstall", "--no-deps", "--no-index"])
+        .arg(wheel);
+    install
+}
+
+/// The only wheel in a folder.
+fn built(folder: &Path) -> Result<PathBuf, String> {
+    let entries = fs::read_dir(folder).map_err(|e| format!("cannot read the wheels: {e}"))?;
     let mut wheels = entries.flatten().map(|entry| entry.path());
     let wheel = wheels.find(|path| path.extension().is_some_and(|kind| kind == "whl"));
     wheel.ok_or_else(|| format!("no wheel in {}", folder.display()))

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
+use std::thread::ScopedJoinHandle;
 use std::time::Instant;
 
 /// The root of the workspace: the folder above this crate's.
@@ -42,6 +43,36 @@ pub fn run(command: &mut Command) -> Result<(), String> {
     } else {
         Err(format!("{} ended with {status}", shown(command)))
     }
+}
+
+/// The command with less of the processors than what runs beside it, where the system can do that.
+pub fn behind(command: &Command) -> Command {
+    let mut behind = match cfg!(unix) {
+        true => {
+            let mut nice = Command::new("nice");
+            nice.args(["-n", "5"]).arg(command.get_program());
+            nice
+        }
+        false => Command::new(command.get_program()),
+    };
+    behind.args(command.get_args());
+    for (name, value) in command.get_envs() {
+        match value {
+            Some(value) => behind.env(name, value),
+            None => behind.env_remove(name),
+        };
+    }
+    if let Some(folder) = command.get_current_dir() {
+        behind.current_dir(folder);
+    }
+    behind
+}
+
+/// What a thread found; its panic is this one's.
+pub fn joined<T>(thread: ScopedJoinHandle<'_, T>) -> T {
+    thread
+        .join()
+        .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
 fn shown(command: &Command) -> String {

@@ -11,7 +11,7 @@ type Point = (f64, f64);
 /// between columns where a gap reaches from one to the next. A gap within a column is too narrow
 /// to be seen.
 pub(super) fn decimated(time: &Series, values: &Series, columns: usize) -> Vec<Point> {
-    let points = || time.iter().zip(values);
+    let points = time.iter().zip(values);
     let count = time.len().min(values.len());
     let (first, last) = (time.get(0), count.checked_sub(1).and_then(|i| time.get(i)));
     let (Some(first), Some(last)) = (first, last) else {
@@ -19,92 +19,52 @@ pub(super) fn decimated(time: &Series, values: &Series, columns: usize) -> Vec<P
     };
     let width = (last - first) / columns as f64;
     if count <= 4 * columns || width.is_nan() || width <= 0.0 {
-        return points().collect();
+        return points.collect();
     }
     let column = |p: Point| ((p.0 - first) / width).floor();
-    let mut kept = Kept::default();
-    let mut few: Option<Few> = None;
-    for point in points().enumerate() {
-        match &mut few {
-            Some(few) if column(few.last) == column(point.1) => few.take(point),
-            _ => {
-                let done = few.replace(Few::new(point));
-                done.iter().for_each(|done| kept.add(done));
-            }
+    let (mut kept, mut near): (Vec<Point>, Vec<Point>) = (vec![], vec![]);
+    let mut is_after_gap = false;
+    for point in points {
+        if near
+            .last()
+            .is_some_and(|last| column(*last) != column(point))
+        {
+            is_after_gap = keep(&mut kept, &near, is_after_gap);
+            near.clear();
         }
+        near.push(point);
     }
-    few.iter().for_each(|done| kept.add(done));
-    kept.points
+    keep(&mut kept, &near, is_after_gap);
+    kept
 }
 
-/// A point of a curve with its row.
-type Numbered = (usize, Point);
+/// Adds what is drawn of the points of a column. Whether it ends in a gap.
+fn keep(kept: &mut Vec<Point>, near: &[Point], is_after_gap: bool) -> bool {
+    let (Some(first), Some(last)) = (near.first(), near.last()) else {
+        return is_after_gap;
+    };
+    let corners = corners(near);
+    if is_after_gap && is_gap(*first) || corners.is_empty() {
+        kept.push((first.0, f64::NAN));
+    }
+    kept.extend(corners);
+    is_gap(*last)
+}
 
 fn is_gap(point: Point) -> bool {
     !point.0.is_finite() || !point.1.is_finite()
 }
 
-/// What is drawn of the columns so far.
-#[derive(Default)]
-struct Kept {
-    points: Vec<Point>,
-    ends_in_gap: bool,
-}
-
-impl Kept {
-    /// Adds the next column.
-    fn add(&mut self, few: &Few) {
-        let is_across = self.ends_in_gap && is_gap(few.first);
-        if is_across || few.corners.is_none() {
-            self.points.push((few.first.0, f64::NAN));
-        }
-        self.points.extend(few.points());
-        self.ends_in_gap = is_gap(few.last);
-    }
-}
-
-/// A column: its ends, and what is drawn of it.
-struct Few {
-    first: Point,
-    last: Point,
-    /// the first, lowest, highest and last of its finite points; none where all are gaps
-    corners: Option<[Numbered; 4]>,
-}
-
-impl Few {
-    fn new(point: Numbered) -> Self {
-        let mut few = Self {
-            first: point.1,
-            last: point.1,
-            corners: None,
-        };
-        few.take(point);
-        few
-    }
-
-    fn take(&mut self, point: Numbered) {
-        self.last = point.1;
-        if is_gap(point.1) {
-            return;
-        }
-        let [_, low, high, last] = self.corners.get_or_insert([point; 4]);
-        let y = point.1.1;
-        if y < low.1.1 {
-            *low = point;
-        }
-        if y >= high.1.1 {
-            *high = point;
-        }
-        *last = point;
-    }
-
-    /// The corners in their order, each once.
-    fn points(&self) -> impl Iterator<Item = Point> {
-        let mut kept: Vec<Numbered> = self.corners.into_iter().flatten().collect();
-        kept.sort_by_key(|p| p.0);
-        kept.dedup_by_key(|p| p.0);
-        kept.into_iter().map(|p| p.1)
-    }
+/// The first, the lowest, the highest and the last of the finite points, in their order, each once.
+fn corners(points: &[Point]) -> Vec<Point> {
+    let finite = || points.iter().enumerate().filter(|(_, p)| !is_gap(**p));
+    let low = finite().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
+    let high = finite().max_by(|a, b| a.1.1.total_cmp(&b.1.1));
+    let all = [finite().next(), low, high, finite().next_back()];
+    let mut all: Vec<(usize, &Point)> = all.into_iter().flatten().collect();
+    all.sort_by_key(|p| p.0);
+    all.dedup_by_key(|p| p.0);
+    all.into_iter().map(|p| *p.1).collect()
 }
 
 /// The stretches of a curve between gaps.

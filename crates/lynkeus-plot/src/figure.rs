@@ -22,6 +22,8 @@ pub struct Figure {
 /// One quantity.
 #[derive(Clone, Debug, Default)]
 pub struct Panel {
+    /// The quantity's name, or the monitor's header.
+    pub name: String,
     /// The quantity's name, description and unit.
     pub caption: String,
     /// Its curves.

@@ -25,9 +25,9 @@ const CAPTION: i32 = 24;
 const NUMBERED: i32 = 26;
 const LABEL: i32 = 24;
 const TICK: i32 = 5;
-/// A row, and the most that names of rows take.
-const ROW: i32 = 19;
+/// What names of rows, and numbers, take at most on the left, and what is free beside them.
 const NAMES: i32 = 244;
+const BESIDE: i32 = 16;
 
 /// The whole figure as SVG text.
 pub(super) fn svg(figure: &Figure) -> Result<String, Error> {
@@ -101,8 +101,23 @@ impl Sheet {
                 self.bottom += LEGEND;
             }
         }
+        let count = figure.panels.len();
+        let upwards = group
+            .iter()
+            .flat_map(|s| upwards(&s.y, height(s.panel, count)));
+        let widest = upwards.map(|(_, words)| width(&words, NUMBERS)).max();
+        let left = EDGES.0.max(widest.unwrap_or(0).min(NAMES) + BESIDE);
         for (i, shown) in group.iter().enumerate() {
-            let frame = self.frame(shown, x.clone(), figure.panels.len());
+            let top = self.bottom + CAPTION;
+            self.bottom = top + height(shown.panel, count);
+            let frame = Frame {
+                x: x.clone(),
+                y: shown.y.clone(),
+                left,
+                right: EDGES.1 - 1,
+                top,
+                bottom: self.bottom - 1,
+            };
             self.caption(&frame, shown);
             let is_last = i + 1 == group.len();
             if is_last {
@@ -132,31 +147,6 @@ impl Sheet {
         self.bottom = HEAD;
     }
 
-    /// The frame of the next panel, one of so many; it is a box, has rows, or shares the sheet.
-    fn frame(&mut self, shown: &Shown<'_>, x: Axis, count: usize) -> Frame {
-        let (height, names) = match (&shown.panel.upwards, count) {
-            (Scale::Within(_), _) => (514, 0),
-            (Scale::Rows(names), _) => {
-                let widths = names.iter().map(|name| width(name, NUMBERS));
-                (names.len() as i32 * ROW, widths.max().unwrap_or(0))
-            }
-            (_, 0 | 1) => (320, 0),
-            (_, 2) => (220, 0),
-            (_, 3 | 4) => (165, 0),
-            _ => (132, 0),
-        };
-        let top = self.bottom + CAPTION;
-        self.bottom = top + height;
-        Frame {
-            x,
-            y: shown.y.clone(),
-            left: EDGES.0.max(names.min(NAMES) + 4 * TICK),
-            right: EDGES.1 - 1,
-            top,
-            bottom: self.bottom - 1,
-        }
-    }
-
     /// The caption, and on the right how far an estimate peaks.
     fn caption(&mut self, frame: &Frame, shown: &Shown<'_>) {
         let is_worst = shown.panel.curves.iter().any(|c| c.kind == Kind::Worst);
@@ -179,8 +169,7 @@ impl Sheet {
         let across = frame.x.ticks(9).into_iter();
         let across = across.map(|(share, words)| (frame.pixel((share, 0.0)).0, words));
         let across: Vec<(i32, String)> = across.collect();
-        let most = ((bottom - top) as usize / 60).clamp(5, 10);
-        let upwards = frame.y.ticks(most).into_iter();
+        let upwards = upwards(&frame.y, bottom + 1 - top).into_iter();
         let upwards = upwards.map(|(share, words)| (frame.pixel((0.0, share)).1, words));
         let upwards: Vec<(i32, String)> = upwards.collect();
         let svg = &mut self.svg;
@@ -200,9 +189,27 @@ impl Sheet {
             let y = bottom + 1;
             svg.path(&[(left, y), (right, y)], FRAME, 1);
             for (x, words) in across {
-                svg.text(&words, (x, y + 2 * TICK), NUMBERS, ABOVE);
+                let middle = x.min(WIDTH - width(&words, NUMBERS) / 2);
+                svg.text(&words, (middle, y + 2 * TICK), NUMBERS, ABOVE);
                 svg.path(&[(x, y), (x, y + TICK)], FRAME, 1);
             }
         }
     }
+}
+
+/// Pixels from foot to top of a panel, one of so many.
+fn height(panel: &Panel, count: usize) -> i32 {
+    match (&panel.upwards, count) {
+        (Scale::Within(_), _) => 514,
+        (Scale::Rows(names), _) => names.len() as i32 * 19,
+        (_, 0 | 1) => 320,
+        (_, 2) => 220,
+        (_, 3 | 4) => 165,
+        _ => 132,
+    }
+}
+
+/// The ticks of an axis upwards of such a height.
+fn upwards(y: &Axis, height: i32) -> Vec<(f64, String)> {
+    y.ticks((height as usize / 60).clamp(5, 10))
 }

@@ -2,9 +2,11 @@
 
 use std::sync::{Mutex, OnceLock};
 
+use lynkeus::plot::Figure;
 use lynkeus::study::Name;
+use lynkeus::table::Instant;
 use lynkeus::{
-    CertifyReport, Comparison, DesignReport, Error, Outcome, Series, Study,
+    CertifyReport, Comparison, Corrections, DesignReport, Error, Outcome, Series, Study,
     monte_carlo::MonteCarlo, precision, tune::Sweep, visible,
 };
 use numpy::{IntoPyArray, PyArray1};
@@ -28,6 +30,18 @@ pub trait Told: Send {
     /// Its picture, where it has one.
     fn svg(&self) -> Result<Option<String>, Error> {
         Ok(None)
+    }
+    /// The panels of its picture, where that is one over time.
+    fn figure(&self) -> Result<Option<Figure>, Error> {
+        Ok(None)
+    }
+    /// What a filter's corrections are made of, where it was kept.
+    fn corrections(&self) -> Option<&Corrections> {
+        None
+    }
+    /// What stands for zero where its times are dates.
+    fn origin(&self) -> Option<Instant> {
+        None
     }
     /// What speaks against it although it is there.
     fn refusal(&self) -> Option<Error> {
@@ -84,6 +98,42 @@ impl Answer {
 
 /// A column under its header.
 type Named<'py> = (String, Bound<'py, PyArray1<f64>>);
+/// Names of sensors, names of states, and arrays.
+type Kept<'py> = (Vec<String>, Vec<String>, Vec<Named<'py>>);
+
+/// Names of sensors, names of states, and numbers by what they are.
+type Entries = (
+    Vec<String>,
+    Vec<String>,
+    Vec<(&'static str, Result<Vec<f64>, Error>)>,
+);
+
+/// What a filter's corrections are made of, each part row after row.
+fn entries(kept: &Corrections) -> Entries {
+    let likelihood = std::slice::from_ref(&kept.log_likelihood);
+    let parts: [(&str, &[Series]); 6] = [
+        ("predicted", &kept.predicted),
+        ("innovation", &kept.innovation),
+        ("innovation_covariance", &kept.innovation_covariance),
+        ("log_likelihood", likelihood),
+        ("gain", &kept.gain),
+        ("covariance", &kept.covariance),
+    ];
+    let parts = parts.map(|(name, columns)| (name, by_row(columns)));
+    (kept.sensors.clone(), kept.states.clone(), parts.into())
+}
+
+/// The numbers of columns, row after row.
+fn by_row(columns: &[Series]) -> Result<Vec<f64>, Error> {
+    let rows = columns.first().map_or(0, Series::len);
+    let mut cells: Vec<_> = columns.iter().map(Series::iter).collect();
+    let mut values = Vec::with_capacity(rows * columns.len());
+    for _ in 0..rows {
+        values.extend(cells.iter_mut().filter_map(Iterator::next));
+    }
+    columns.iter().try_for_each(Series::check)?;
+    Ok(values)
+}
 
 #[pymethods]
 impl Answer {
@@ -131,6 +181,40 @@ impl Answer {
     /// The columns for Arrow, read as they are asked for.
     fn arrow_stream<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
         export::stream(py, self.columns(py).to_vec())
+    }
+
+    /// The label of the time axis, and name and caption of each panel of the picture, from the top; none where
+    /// the picture is not one over time.
+    #[allow(clippy::type_complexity, reason = "a pair of lists for Python")]
+    fn panels(&self, py: Python<'_>) -> PyResult<Option<(String, Vec<(String, String)>)>> {
+        let figure = self.ask(py, |told| told.figure());
+        let figure = figure.map_err(|e| exception(&e))?;
+        Ok(figure.map(|figure| {
+            let panels = figure.panels.into_iter();
+            let captions = panels.map(|panel| (panel.name, panel.caption)).collect();
+            (figure.label, captions)
+        }))
+    }
+
+    /// Names of sensors and states, and by name the entries of what a filter's corrections are made of, row
+    /// after row; none where nothing was kept.
+    fn corrections<'py>(&self, py: Python<'py>) -> PyResult<Option<Kept<'py>>> {
+        let kept = self.ask(py, |told| told.corrections().map(entries));
+        let Some((sensors, states, parts)) = kept else {
+            return Ok(None);
+        };
+        let parts = parts.into_iter().map(|(name, values)| {
+            let values = values.map_err(|e| exception(&e))?;
+            Ok((name.to_owned(), values.into_pyarray(py)))
+        });
+        Ok(Some((sensors, states, parts.collect::<PyResult<_>>()?)))
+    }
+
+    /// What stands for zero where times are dates: nanoseconds since 1970, and whether that is UTC.
+    fn origin(&self, py: Python<'_>) -> Option<(i64, bool)> {
+        let origin = self.ask(py, |told| told.origin())?;
+        let nanoseconds = i64::try_from(origin.nanoseconds()).ok()?;
+        Some((nanoseconds, origin.is_zoned()))
     }
 
     fn svg(&self, py: Python<'_>) -> PyResult<Option<String>> {
@@ -193,10 +277,20 @@ impl Told for Ran {
     }
 
     fn svg(&self) -> Result<Option<String>, Error> {
+        self.figure()?.map(|figure| figure.to_svg()).transpose()
+    }
+
+    fn figure(&self) -> Result<Option<Figure>, Error> {
         let (unit, show) = drawn(&self.study);
-        lynkeus::figure(&self.outcome, unit, show)?
-            .to_svg()
-            .map(Some)
+        lynkeus::figure(&self.outcome, unit, show).map(Some)
+    }
+
+    fn corrections(&self) -> Option<&Corrections> {
+        self.outcome.corrections.as_ref()
+    }
+
+    fn origin(&self) -> Option<Instant> {
+        self.outcome.origin
     }
 
     fn refusal(&self) -> Option<Error> {
@@ -248,8 +342,12 @@ impl Told for Of<MonteCarlo> {
     }
 
     fn svg(&self) -> Result<Option<String>, Error> {
+        self.figure()?.map(|figure| figure.to_svg()).transpose()
+    }
+
+    fn figure(&self) -> Result<Option<Figure>, Error> {
         let (unit, show) = drawn(&self.study);
-        self.found.figure(unit, show)?.to_svg().map(Some)
+        self.found.figure(unit, show).map(Some)
     }
 
     fn refusal(&self) -> Option<Error> {

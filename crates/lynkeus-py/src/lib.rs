@@ -28,5 +28,5 @@ mod _lynkeus {
     #[pymodule_export]
     use crate::log::Log;
     #[pymodule_export]
-    use crate::study::{Study, schema};
+    use crate::study::{Study, model_names, schema};
 }

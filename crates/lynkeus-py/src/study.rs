@@ -14,7 +14,7 @@ use pyo3::types::{PyBytes, PyDict};
 
 use crate::answer::{Answer, Of, Ran};
 use crate::away::{MEMORY, Terms, Watch, away};
-use crate::errors::exception;
+use crate::errors::{exception, from_source};
 use crate::estimator::Estimator;
 use crate::functions::Functions;
 use crate::log::Given;
@@ -29,6 +29,12 @@ pub struct Study {
     runner: Arc<Runner>,
     /// those of the studies that were made from the same one
     runners: Arc<Runners>,
+}
+
+/// That the text of a model can be read so far that its models are known.
+#[pyfunction]
+pub fn model_names(text: &str, name: &str) -> PyResult<Vec<String>> {
+    lynkeus::model::model_names(text, name).map_err(from_source)
 }
 
 /// The JSON Schema of study files.
@@ -192,7 +198,14 @@ impl Study {
         Ok(Answer::of(self.of(found)))
     }
 
-    #[pyo3(signature = (log, progress=None, time_limit=None, memory_limit=MEMORY))]
+    /// That it names what its plant has.
+    fn refuse_misfits(&self, py: Python<'_>) -> PyResult<()> {
+        self.ask(py, &Terms::default(), |study, _| {
+            lynkeus::prepare::refuse_misfits(study)
+        })
+    }
+
+    #[pyo3(signature = (log, progress=None, time_limit=None, memory_limit=MEMORY, record=false))]
     fn estimate(
         &self,
         py: Python<'_>,
@@ -200,9 +213,14 @@ impl Study {
         progress: Option<Bound<'_, PyAny>>,
         time_limit: Option<f64>,
         memory_limit: f64,
+        record: bool,
     ) -> PyResult<Answer> {
         let terms = Terms::new(progress, time_limit, memory_limit);
         let outcome = self.ask(py, &terms, |study, watch| {
+            let study = &lynkeus::Study {
+                records: record,
+                ..study.clone()
+            };
             self.runner.estimate(study, &*log.table(study)?, watch)
         })?;
         Ok(self.ran(outcome, false))

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::filter::{Filter, Health, Innovation, Smoothed};
+use crate::filter::{Filter, Health, Innovation, Record, Smoothed};
 use crate::runner::{Runner, Sample};
 use crate::sampled::Sampled;
 use crate::snapshot::{self, Damaged, Walk};
@@ -221,6 +221,18 @@ impl Estimator {
     #[must_use]
     pub fn health(&self) -> &Health {
         self.runner.health()
+    }
+
+    /// From the next update on a filter keeps what its correction is made of: see [`Estimator::record`].
+    pub fn keep_record(&mut self) {
+        self.runner.keep_record();
+    }
+
+    /// What the correction of the last update is made of; none where no record is kept, and of an observer that
+    /// is no filter.
+    #[must_use]
+    pub fn record(&self) -> Option<&Record> {
+        self.runner.record()
     }
 
     /// Time of the last sample or prediction.

@@ -2,8 +2,8 @@
 
 use std::fmt::Debug;
 
-use crate::filter::Smoothed;
 use crate::filter::health::{Health, Innovation};
+use crate::filter::{Record, Smoothed};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Result, StepAdvice};
 
@@ -43,6 +43,13 @@ pub(crate) trait Runner: Persist + Debug + Send + Sync {
     fn innovations(&self) -> &[Innovation];
 
     fn health(&self) -> &Health;
+
+    /// From the next update on there is a record; of a filter.
+    fn keep_record(&mut self) {}
+
+    fn record(&self) -> Option<&Record> {
+        None
+    }
 
     /// The state of the observer itself.
     fn state(&self) -> &[f64] {

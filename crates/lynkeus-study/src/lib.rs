@@ -103,6 +103,8 @@ pub struct Study {
     pub show: Option<Vec<Name>>,
     /// The unit on the time axis.
     pub time_unit: Option<String>,
+    /// Whether a replay keeps what a filter's corrections are made of; no file has it.
+    pub records: bool,
     /// The time and the memory that the work on the study may take; no file has it.
     pub budget: Budget,
 }
@@ -224,6 +226,7 @@ impl Study {
             compare: top.optional("compare", compare)?.flatten(),
             show,
             time_unit,
+            records: false,
             budget: Budget::default(),
         })
     }

@@ -38,7 +38,7 @@ impl fmt::Display for Fault {
 #[derive(Clone, Debug)]
 pub(super) struct Origin {
     pub text: String,
-    instant: Instant,
+    pub(super) instant: Instant,
 }
 
 /// A column of a table.

@@ -19,6 +19,18 @@ impl Instant {
         Self { nanoseconds, zoned }
     }
 
+    /// Nanoseconds since 1970-01-01T00:00:00, in UTC where it [has a zone](Self::is_zoned).
+    #[must_use]
+    pub fn nanoseconds(self) -> i128 {
+        self.nanoseconds
+    }
+
+    /// Whether it says how far its clock is from UTC.
+    #[must_use]
+    pub fn is_zoned(self) -> bool {
+        self.zoned
+    }
+
     /// From `origin` to here, rounded once where that is less than 104 days.
     pub(super) fn seconds_since(self, origin: Self) -> f64 {
         seconds(self.nanoseconds - origin.nanoseconds)

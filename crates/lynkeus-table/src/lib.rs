@@ -162,6 +162,12 @@ impl Table {
         column.origin.as_ref().map(|origin| origin.text.as_str())
     }
 
+    /// The same as a point in time.
+    pub fn start(&self, name: &str) -> Option<Instant> {
+        let column = self.called(name).next()?;
+        column.origin.as_ref().map(|origin| origin.instant)
+    }
+
     /// Whether a column holds lengths of time, which are counted in seconds.
     pub fn has_durations(&self, name: &str) -> bool {
         self.called(name).any(|c| c.is_durations)

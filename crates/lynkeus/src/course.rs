@@ -2,6 +2,7 @@
 
 pub(crate) mod checkpoint;
 pub(crate) mod columns;
+pub(crate) mod corrections;
 pub(crate) mod doubt;
 pub(crate) mod filter;
 pub(crate) mod fixed_steps;
@@ -18,6 +19,7 @@ use lynkeus_observers::Observer;
 use lynkeus_run::filter::SensorHealth;
 use lynkeus_run::{Error as RunError, Role};
 
+use crate::course::corrections::Corrections;
 use crate::course::doubt::Doubt;
 use crate::course::recorded::Recorded;
 use crate::course::trace::Trace;
@@ -115,6 +117,8 @@ pub(crate) struct Course {
     /// where they are: of each sensor its innovations, then their standard deviations; NaN where it
     /// did not report
     pub innovations: Vec<Series>,
+    /// what the corrections of a filter are made of, where that is asked for
+    pub corrections: Option<Corrections>,
     /// what speaks against the estimates beside what is seen in them
     pub doubts: Vec<Doubt>,
     /// what was chosen for the user

@@ -157,6 +157,7 @@ fn watched(
         intervals,
         frozen: hanging(prepared, &design.observer, samples),
         time: samples.time.shortened(rows),
+        origin: log.table.start(&log.time),
         quantities: estimated.into_iter().chain(known).collect(),
         measurements: measurements(&design, |signal| logged(&signal.name)),
         replayed: true,
@@ -266,6 +267,13 @@ pub(crate) fn refuse_settings(prepared: &Prepared<'_>, design: &Design) -> Resul
     refuse_strays(prepared)?;
     let study = prepared.study();
     let Some(filter) = &design.observer.filter else {
+        if study.records {
+            let message = format!(
+                "`record` needs a filter (\"ekf\", \"ukf\" or \"mhe\"): the {} observer has neither innovation covariances nor a likelihood",
+                design.examination.family
+            );
+            return Err(Error::input(message).at(&study.file));
+        }
         return match study.estimate.smoothing {
             Some(_) => Err(Error::input("`smooth` and `lag` of [estimate] need a filter (\"ekf\", \"ukf\" or \"mhe\"): this observer has no covariance to smooth with").at(&study.file)),
             None => Ok(()),

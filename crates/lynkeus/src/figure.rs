@@ -19,14 +19,12 @@ pub fn figure(
     show: Option<&[Name]>,
 ) -> Result<Figure, Error> {
     let chosen = match show {
-        Some(names) => names
-            .iter()
-            .map(|name| find(outcome, name))
-            .collect::<Result<Vec<_>, _>>()?,
+        Some(names) => named(&outcome.quantities, names, |q| &q.name, "nothing")?,
         None => interesting(outcome),
     };
     let mut panels: Vec<Panel> = chosen.into_iter().map(|q| panel(outcome, q)).collect();
     panels.extend(outcome.watches.iter().map(|watch| Panel {
+        name: watch.header.clone(),
         caption: format!(
             "{} (alarm below {})",
             watch.header, watch.monitor.alarm_below
@@ -37,6 +35,29 @@ pub fn figure(
     let family = outcome.design.examination.family;
     let title = format!("{}: {family} observer", outcome.plant);
     Ok(over_time(title, time_unit, panels))
+}
+
+/// What `show` asks for. A name that is not there is refused: `nothing`, or nothing of a kind, is called so.
+pub(crate) fn named<'a, T>(
+    all: &'a [T],
+    show: &[Name],
+    name_of: fn(&T) -> &str,
+    nothing: &str,
+) -> Result<Vec<&'a T>, Error> {
+    let find = |name: &Name| {
+        let mut found = all.iter().filter(|x| name_of(x) == name.text);
+        let names = || all.iter().map(name_of).collect::<Vec<_>>();
+        found
+            .next()
+            .ok_or_else(|| not_drawn(name, nothing, &names()))
+    };
+    show.iter().map(find).collect()
+}
+
+/// A unit after a name, "1" is Modelica's of numbers without one.
+pub(crate) fn in_brackets(unit: Option<&str>) -> String {
+    let unit = unit.filter(|unit| *unit != "1");
+    unit.map_or(String::new(), |unit| format!(" ({unit})"))
 }
 
 /// Panels over time.
@@ -66,14 +87,6 @@ impl crate::Comparison {
     }
 }
 
-fn find<'o>(outcome: &'o Outcome, name: &Name) -> Result<&'o Quantity, Error> {
-    let mut quantities = outcome.quantities.iter();
-    quantities.find(|q| q.name == name.text).ok_or_else(|| {
-        let names = outcome.quantities.iter().map(|q| q.name.as_str());
-        not_drawn(name, "nothing", &names.collect::<Vec<_>>())
-    })
-}
-
 fn interesting(outcome: &Outcome) -> Vec<&Quantity> {
     let mut all: Vec<&Quantity> = outcome
         .quantities
@@ -81,23 +94,14 @@ fn interesting(outcome: &Outcome) -> Vec<&Quantity> {
         .filter(|q| q.estimate.is_some() || q.measured.is_some())
         .collect();
     all.sort_by_key(|q| (q.measured.is_some(), !q.unknown_input));
-    if all.len() > PANELS {
-        let measured = all.iter().filter(|q| q.measured.is_some()).count().min(2);
-        let hidden: Vec<&Quantity> = spread(
-            all.iter()
-                .copied()
-                .filter(|q| q.measured.is_none())
-                .collect(),
-            PANELS - measured,
-        );
-        let shown = all
-            .iter()
-            .copied()
-            .filter(|q| q.measured.is_some())
-            .take(measured);
-        return hidden.into_iter().chain(shown).collect();
+    if all.len() <= PANELS {
+        return all;
     }
-    all
+    let (mut measured, hidden): (Vec<_>, Vec<_>) =
+        all.into_iter().partition(|q| q.measured.is_some());
+    measured.truncate(2);
+    let hidden = spread(hidden, PANELS - measured.len());
+    hidden.into_iter().chain(measured).collect()
 }
 
 /// At most `count` of them, evenly spread: of a long chain the ends and the middle.
@@ -111,23 +115,19 @@ pub(crate) fn spread<T: Copy>(all: Vec<T>, count: usize) -> Vec<T> {
 }
 
 fn panel(outcome: &Outcome, quantity: &Quantity) -> Panel {
-    // "1" is Modelica's unit of numbers without one
-    let unit = quantity.unit.as_ref().filter(|unit| *unit != "1");
-    let unit = unit.map_or(String::new(), |unit| format!(" ({unit})"));
-    let mut caption = format!("{}{unit}", quantity.name);
-    if let Some(description) = &quantity.description {
-        caption = format!("{}: {description}{unit}", quantity.name);
-    }
+    let unit = in_brackets(quantity.unit.as_deref());
+    let caption = match &quantity.description {
+        Some(description) => format!("{}: {description}{unit}", quantity.name),
+        None => format!("{}{unit}", quantity.name),
+    };
+    let estimate = match quantity.estimate {
+        Some(_) => &quantity.estimate,
+        None => &quantity.expected,
+    };
     let series = [
         (Kind::True, &quantity.truth),
         (Kind::Measured, &quantity.measured),
-        (
-            Kind::Estimated,
-            quantity
-                .estimate
-                .as_ref()
-                .map_or(&quantity.expected, |_| &quantity.estimate),
-        ),
+        (Kind::Estimated, estimate),
         (Kind::Smoothed, &quantity.smoothed),
     ];
     let curves = series
@@ -135,6 +135,7 @@ fn panel(outcome: &Outcome, quantity: &Quantity) -> Panel {
         .filter_map(|(kind, values)| Some(curve(outcome, kind, values.as_ref()?)))
         .collect();
     Panel {
+        name: quantity.name.clone(),
         caption,
         curves,
         bands: bands(outcome, quantity),

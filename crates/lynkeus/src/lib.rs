@@ -52,7 +52,7 @@
 //! samples, and [`check`], [`simulate`] and
 //! [`estimate`] do what the commands of the same names do.
 //!
-//! Features, both on by default: `parquet` reads and writes Parquet, `plot` draws pictures. The program
+//! Features: `plot` (on by default) draws pictures, `parquet` reads and writes Parquet. The program
 //! `lynkeus` is a crate of its own, `lynkeus-cli`.
 //!
 //! The rooms below stand in their order: each uses only those before it, which a test sees to.
@@ -111,6 +111,7 @@ pub use choose::runner::{Runner, Runners};
 pub use compare::{Against, Compared, Comparison, Interval, Resolution, Run, Settled, compare};
 pub use course::checkpoint::Checkpoint;
 pub use course::columns::log;
+pub use course::corrections::Corrections;
 pub use course::doubt::{Doubt, Kind as DoubtKind, Level as DoubtLevel};
 pub use course::quantity::Quantity;
 pub use design::{DesignReport, design};

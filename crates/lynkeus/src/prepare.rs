@@ -44,6 +44,20 @@ pub fn plant(study: &Study) -> Result<Plant, Error> {
     Ok(plant)
 }
 
+/// That a study names what its plant has. Parameters may have no value yet.
+///
+/// # Errors
+/// As [`plant`] and [`Prepared::new`].
+pub fn refuse_misfits(study: &Study) -> Result<(), Error> {
+    match plant(study) {
+        Ok(plant) => Prepared::new(study, &plant).map(drop),
+        Err(error) => match symbolic_plant(study, BTreeSet::new()) {
+            Ok(_) => Ok(()),
+            Err(_) => Err(error),
+        },
+    }
+}
+
 /// The plant with its parameters as symbols, also those without value, but for those that are to be `numbers`.
 ///
 /// # Errors

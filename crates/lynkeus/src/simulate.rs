@@ -347,6 +347,7 @@ pub(crate) fn outcome(
     };
     Raw {
         time: run.time.clone(),
+        origin: None,
         quantities,
         measurements: measurements(&design, measured),
         replayed: false,

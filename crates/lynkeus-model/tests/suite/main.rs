@@ -11,6 +11,7 @@ mod long_algorithms;
 mod ode_model;
 mod parameters;
 mod refusals;
+mod rumoca;
 mod scopes;
 mod soup;
 mod support;

@@ -45,6 +45,7 @@ pub(crate) mod health;
 mod mhe;
 mod model;
 mod profile;
+mod record;
 pub(crate) mod root;
 mod sensing;
 mod settings;
@@ -57,6 +58,7 @@ pub(crate) use belief::Belief;
 pub use health::{Health, Innovation, Reading, SensorHealth};
 pub(crate) use model::check_counts;
 pub use model::{NoisyModel, NoisyPlant, Sensor};
+pub use record::Record;
 pub use settings::{FilterKind, FilterSettings, SigmaPoints, Weights};
 pub use smoother::Smoothed;
 
@@ -196,6 +198,9 @@ impl Filter {
 
     fn correct_here(&mut self, sample: &Sample<'_>) -> Result<()> {
         let (sensing, belief) = (&mut self.sensing, &mut self.belief);
+        if let Some(record) = &mut sensing.record {
+            record.clear(!matches!(self.engine, Engine::MovingHorizon(_)));
+        }
         match &mut self.engine {
             Engine::Extended(ekf) => ekf.correct(sensing, belief, sample),
             Engine::Unscented(ukf) => ukf.correct(sensing, belief, sample),
@@ -228,6 +233,9 @@ impl Runner for Filter {
         self.propagation.driven.start(sample.inputs);
         self.correct(sample)?;
         self.keep_inside();
+        if let Some(record) = &mut self.sensing.record {
+            record.end(&self.belief);
+        }
         Ok(())
     }
 
@@ -254,6 +262,15 @@ impl Runner for Filter {
 
     fn health(&self) -> &Health {
         &self.sensing.health
+    }
+
+    fn keep_record(&mut self) {
+        let (states, sensors) = (self.belief.x.len(), self.sensing.innovations.len());
+        self.sensing.record = Some(Record::new(states, sensors));
+    }
+
+    fn record(&self) -> Option<&Record> {
+        self.sensing.record.as_ref()
     }
 
     fn remember(&mut self) {

@@ -13,6 +13,7 @@
 use super::belief::Belief;
 use super::health::{Health, Innovation, Reading};
 use super::model::{NoisyModel, Sensor};
+use super::record::Record;
 use super::root::dot;
 use super::settings::FilterSettings;
 use super::smoother::Correction;
@@ -59,6 +60,19 @@ impl Believed {
         }
     }
 
+    /// The logarithm of how likely it is that y is at the end of the range or beyond, as [`Self::weighed`] has
+    /// it; 0 of a reading inside.
+    pub fn log_likelihood(&self, moved: f64, spread: f64) -> f64 {
+        let variance = spread + self.variance;
+        match self.end {
+            Some(end) if variance > 0.0 => {
+                let off = end.sign() * (self.innovation - moved);
+                Tail::beyond(off / variance.sqrt()).log_weight()
+            }
+            _ => 0.0,
+        }
+    }
+
     /// The reading, and the variance of its noise, where the output is taken to be h: one at an end of
     /// its range as the parabola that its likelihood −2 log Φ is like about h, by its slope and
     /// curvature there.
@@ -98,6 +112,8 @@ pub(crate) struct Sensing {
     pub health: Health,
     /// of this sample, where a smoother asks for them
     pub corrections: Option<Vec<Correction>>,
+    /// what the last sample came to, where that is asked for
+    pub record: Option<Record>,
     /// a row of C
     pub slopes: Vec<f64>,
     /// Sᵀ times it
@@ -119,6 +135,7 @@ impl Sensing {
             innovations: vec![Innovation::default(); count],
             health: Health::of(count),
             corrections: keeps_corrections.then(Vec::new),
+            record: None,
             slopes: vec![0.0; n],
             projected: vec![0.0; n],
         }
@@ -144,6 +161,12 @@ impl Sensing {
             let spread = self.project(i, belief);
             let predicted = self.output_map.outputs()[i];
             taken.extend(self.judge(i, *reading, predicted, spread));
+            if let Some(record) = &mut self.record {
+                record.project(&self.projected);
+            }
+        }
+        if let Some(record) = &mut self.record {
+            record.spread_projected();
         }
         Ok(())
     }
@@ -183,6 +206,7 @@ impl Sensing {
             reading: Reading::Missing,
         };
         let mut believed = None;
+        let mut off = f64::NAN;
         if reading.is_finite() {
             innovation.reading = Reading::Taken;
             let (mut shown, mut end) = (reading, None);
@@ -190,7 +214,7 @@ impl Sensing {
                 (shown, end) = (limits.shown(reading), End::of(limits, reading));
             }
             let plain = shown - predicted;
-            innovation.value = plain;
+            (innovation.value, off) = (plain, plain);
             if let Some(limits) = limits {
                 judge_near_an_end(limits, end, &mut innovation);
             }
@@ -213,6 +237,9 @@ impl Sensing {
             }
         }
         innovation.settled = innovation.deviation;
+        if let Some(record) = &mut self.record {
+            record.see(i, predicted, off, variance);
+        }
         self.follow(i, reading, innovation.reading);
         self.health.sensors[i].count(&innovation);
         self.innovations[i] = innovation;
@@ -302,6 +329,15 @@ impl Tail {
             weight,
             mean,
             excess: mean - a,
+        }
+    }
+
+    /// The logarithm of how likely it is, also where that is too small for a number.
+    fn log_weight(&self) -> f64 {
+        let a = self.mean - self.excess;
+        match a > 0.0 {
+            true => -0.5 * (a * a + std::f64::consts::TAU.ln()) - self.mean.ln(),
+            false => self.weight.ln(),
         }
     }
 

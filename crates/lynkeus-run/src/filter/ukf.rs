@@ -97,6 +97,12 @@ impl Ukf {
                 weighed: solved(lower, count, taken.iter().map(|b| b.innovation).collect()),
             });
         }
+        if let Some(record) = &mut sensing.record {
+            for (a, believed) in taken.iter().enumerate() {
+                let column = gain.iter().map(|k| k[a]);
+                record.correct(believed.sensor, believed.innovation, column);
+            }
+        }
         for (x, k) in belief.x.iter_mut().zip(&gain) {
             let parts = taken.iter().zip(k).map(|(b, k)| k * b.innovation);
             *x += parts.sum::<f64>();
@@ -205,6 +211,10 @@ impl Ukf {
                 }
             }
         }
+        if let Some(record) = &mut sensing.record {
+            record.spread(|i, j| self.weights.moment(&self.shown, m, i, j));
+            record.count(&inside);
+        }
         let mut is_moved = false;
         if !inside.is_empty() {
             self.take(sensing, belief, m, &inside);
@@ -218,6 +228,9 @@ impl Ukf {
             let i = believed.sensor;
             let spread = self.weights.moment(&self.shown, m, i, i);
             let moved = self.expected[i] - before;
+            if let Some(record) = &mut sensing.record {
+                record.count_at_end(&believed, moved, spread);
+            }
             if let Some((innovation, noise)) = believed.weighed(moved, spread) {
                 (believed.innovation, believed.variance) = (innovation, noise);
                 self.take(sensing, belief, m, &[believed]);

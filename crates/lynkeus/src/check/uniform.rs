@@ -4,19 +4,10 @@ use std::fmt;
 
 use lynkeus_structure::{self as structure, Blind, Place, Point, Uniformity};
 use lynkeus_words::Words;
-#[cfg(feature = "plot")]
-use lynkeus_words::counted;
 use serde_json::{Map, Value, json};
 
 use crate::words::{number, side};
-#[cfg(feature = "plot")]
-use crate::{
-    Error,
-    plot::{Figure, Mark, Panel, Scale},
-};
 use lynkeus_observability::{Answer, Quantity, Verdict};
-#[cfg(feature = "plot")]
-use lynkeus_structure::Dimension;
 
 /// Parts of the singular set listed for machines.
 const LISTED: usize = 256;
@@ -218,37 +209,5 @@ pub(super) fn json(uniformity: &Uniformity) -> Value {
         "share": uniformity.share,
         "singular": uniformity.singular.iter().take(LISTED).map(part).collect::<Vec<_>>(),
         "blind": blind.collect::<Vec<_>>(),
-    })
-}
-
-/// The singular set of a plant with two states.
-#[cfg(feature = "plot")]
-pub(super) fn picture(plant: &str, uniformity: &Uniformity) -> Result<Figure, Error> {
-    let [x, y] = &uniformity.sides[..] else {
-        let message = format!(
-            "{plant} has {} with its unknown inputs: a picture of the singular set needs two; --json lists its parts",
-            counted(uniformity.sides.len(), "state")
-        );
-        return Err(Error::refused(message));
-    };
-    let along = |part: &Place, whole: &Dimension| {
-        let side = part.iter().find(|side| side.name == whole.name);
-        let Dimension { min, max, .. } = side.unwrap_or(whole);
-        *min..*max
-    };
-    let parts = uniformity.singular.iter();
-    let parts = parts.map(|part| Mark::Part(along(part, x), along(part, y)));
-    Ok(Figure {
-        title: format!(
-            "{plant}: where the outputs' derivatives may not tell neighbouring states apart"
-        ),
-        label: x.name.clone(),
-        across: Scale::Within(x.min..x.max),
-        panels: vec![Panel {
-            caption: y.name.clone(),
-            upwards: Scale::Within(y.min..y.max),
-            marks: parts.collect(),
-            ..Panel::default()
-        }],
     })
 }

@@ -38,6 +38,9 @@ pub(crate) fn run(
     let notes = &mut course.notes;
     let filter = blueprint(prepared, design, samples, settings, notes)?;
     let mut filter = filter.estimator().map_err(explain)?;
+    if study.records {
+        filter.keep_record();
+    }
     let n = filter.names().len();
     replay(&mut filter, samples, n, &mut course, watch)?;
     let health = filter.health();

@@ -6,6 +6,7 @@ use lynkeus_run::filter::{Innovation, Reading};
 use lynkeus_run::{Error as RunError, Estimator};
 
 use crate::course::checkpoint::{Checkpoint, Halfway};
+use crate::course::corrections::Corrections;
 use crate::course::trace::Trace;
 use crate::course::{Course, Samples, add_row};
 use crate::{Error, Study};
@@ -55,6 +56,7 @@ pub(crate) fn replay(
     if course.keeps_innovations {
         course.innovations = course.columns(2 * course.traces.len());
     }
+    course.corrections = Corrections::of(estimator, &course.store);
     let mut half = Halfway::default();
     let first = match &mut watch.checkpoint {
         None => 0,
@@ -97,6 +99,9 @@ pub(crate) fn replay(
         if course.keeps_innovations {
             let kept = estimator.innovations().iter().flat_map(row_of);
             add_row(&mut course.innovations, kept);
+        }
+        if let (Some(corrections), Some(record)) = (&mut course.corrections, estimator.record()) {
+            corrections.add(record);
         }
         if row == rows / 2 {
             half = Halfway::at(estimator, watch.checkpoint.is_some());

@@ -8,6 +8,7 @@ use lynkeus_observers::{Design, Monitor, Signal};
 use lynkeus_run::Error as RunError;
 
 use crate::course::Course;
+use crate::course::corrections::Corrections;
 use crate::course::doubt::Doubt;
 use crate::course::trace::Trace;
 use crate::judge::accuracy::{self, Accuracy};
@@ -23,6 +24,7 @@ use crate::prepare::{Prepared, StudyDesign};
 use crate::words::in_words;
 use crate::{Error, Quantity, Series, Study, judge::expected, judge::saturated, prepare::headers};
 use lynkeus_study::EstimateSettings;
+use lynkeus_table::Instant;
 
 /// The trust in an estimate over time, and whether it was ever lost.
 #[derive(Clone, Debug)]
@@ -80,6 +82,10 @@ pub struct Outcome {
     pub innovations: Vec<Innovations>,
     /// these row by row with their standard deviations, where they are asked for, under their headers
     pub innovation_columns: Vec<(String, Series)>,
+    /// what the corrections of a filter are made of, where [`Study::records`] asks for it
+    pub corrections: Option<Corrections>,
+    /// what the log writes for zero where its times are dates
+    pub origin: Option<Instant>,
     /// errors of the estimates whose true values are known
     pub accuracies: Vec<Accuracy>,
     /// sensors whose readings hang
@@ -193,6 +199,8 @@ pub(crate) struct Raw<'r> {
     pub design: StudyDesign,
     /// times of the rows
     pub time: Series,
+    /// what stands for zero where they are dates
+    pub origin: Option<Instant>,
     pub course: Course,
     pub quantities: Vec<Quantity>,
     pub measurements: Vec<(String, Series)>,
@@ -213,6 +221,7 @@ impl Raw<'_> {
             prepared,
             design,
             time,
+            origin,
             mut course,
             mut quantities,
             measurements,
@@ -327,6 +336,8 @@ impl Raw<'_> {
             }),
             innovations,
             innovation_columns,
+            corrections: course.corrections,
+            origin,
             accuracies,
             frozen,
             intervals,

@@ -2,8 +2,7 @@
 
 use super::{MonteCarlo, Scattered};
 use crate::Error;
-use crate::figure::{PANELS, over_time, spread};
-use crate::prepare::mentioned::not_drawn;
+use crate::figure::{PANELS, in_brackets, named, over_time, spread};
 use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Panel};
 use lynkeus_study::Name;
 
@@ -15,7 +14,7 @@ impl MonteCarlo {
     /// `show` names something that is not estimated.
     pub fn figure(&self, time_unit: Option<&str>, show: Option<&[Name]>) -> Result<Figure, Error> {
         let chosen = match show {
-            Some(names) => self.shown(names)?,
+            Some(names) => named(&self.quantities, names, |q| &q.name, "nothing estimated")?,
             None => {
                 let mut all: Vec<&Scattered> = self.quantities.iter().collect();
                 all.sort_by_key(|q| (q.is_measured, !q.unknown_input));
@@ -28,22 +27,11 @@ impl MonteCarlo {
         Ok(over_time(title, time_unit, panels.collect()))
     }
 
-    fn shown(&self, names: &[Name]) -> Result<Vec<&Scattered>, Error> {
-        let find = |name: &Name| {
-            let mut own = self.quantities.iter().filter(|q| q.name == name.text);
-            own.next().ok_or_else(|| {
-                let names = self.quantities.iter().map(|q| q.name.as_str());
-                not_drawn(name, "nothing estimated", &names.collect::<Vec<_>>())
-            })
-        };
-        names.iter().map(find).collect()
-    }
-
     fn panel(&self, quantity: &Scattered) -> Panel {
-        let unit = quantity.unit.as_ref().filter(|unit| *unit != "1");
-        let unit = unit.map_or(String::new(), |unit| format!(" ({unit})"));
+        let unit = in_brackets(quantity.unit.as_deref());
         let curve = |kind, values: &[f64]| Curve::new(kind, self.time.clone(), values.to_vec());
         Panel {
+            name: quantity.name.clone(),
             caption: format!("error of {}{unit}", quantity.name),
             curves: vec![
                 curve(Kind::Worst, &quantity.worst_course),

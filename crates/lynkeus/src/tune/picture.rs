@@ -17,11 +17,7 @@ impl Sweep {
 
     /// The picture before it is drawn.
     pub fn figure(&self) -> Figure {
-        let marks = self.marks();
         let mut panels = self.panels();
-        for panel in &mut panels {
-            panel.marks.clone_from(&marks);
-        }
         if let Some(first) = panels.first_mut() {
             first.marks.extend(self.failures());
         }
@@ -146,6 +142,7 @@ impl Sweep {
                 _ => Scale::FromZero,
             },
             curves: combinations.iter().map(curve).collect(),
+            marks: self.marks(),
             ..Panel::default()
         }
     }

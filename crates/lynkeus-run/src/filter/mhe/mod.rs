@@ -274,6 +274,14 @@ impl Mhe {
         (self.window, self.left) = (vec![], None);
         let mut taken = vec![];
         sensing.judge_all(belief, sample, &mut taken)?;
+        if let Some(record) = &mut sensing.record {
+            let (inside, at_ends): (Vec<_>, Vec<_>) = taken.iter().partition(|b| b.end.is_none());
+            record.count(&inside);
+            for believed in &at_ends {
+                let spread = record.variance(believed.sensor) - believed.variance;
+                record.count_at_end(believed, 0.0, spread);
+            }
+        }
         let mut guess = belief.x.clone();
         confine(&mut guess, &self.bounds);
         self.rows.push_back(Row {

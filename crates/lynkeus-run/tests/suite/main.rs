@@ -1,0 +1,14 @@
+//! The crate from outside, in one binary; but for its use of memory, which needs an allocator of its own.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+mod batches;
+mod common;
+mod coverage;
+mod integration;
+mod linear_plants;
+mod replay;
+mod second_opinion;
+mod simulation;
+mod snapshots;
+mod state_events;
+mod time_events;
