@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import runpy
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -31,6 +32,13 @@ ASKED: dict[str, Callable[[lynkeus.Study], Answer]] = {
     "simulate": lambda study: study.simulate(time_limit=2),
     "runs": lambda study: study.simulate(runs=2, time_limit=2),
 }
+
+
+def test_the_file_is_what_the_schema_makes() -> None:
+    generator = runpy.run_path(str(ROOT / "python" / "reports.py"))
+    schema = json.loads((ROOT / "docs" / "answers.schema.json").read_text(encoding="utf-8"))
+    written = (ROOT / "python" / "lynkeus" / "reports.py").read_text(encoding="utf-8")
+    assert written == generator["text"](schema), "python python/reports.py writes it again"
 
 
 def odd(answer: Answer) -> list[str]:

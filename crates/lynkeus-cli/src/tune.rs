@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use serde_json::json;
 
 use super::inputs::{self, Source};
 use super::limits::{self, Limits};
@@ -106,7 +105,7 @@ fn show(sweep: &Sweep, changes: &[Change], path: &Path, options: &Options, resul
         let mut answer = sweep.to_json();
         if options.write {
             let words: Vec<String> = changes.iter().map(Change::to_string).collect();
-            answer["written"] = json!(words);
+            answer["written"] = words.into();
         }
         answer
     });

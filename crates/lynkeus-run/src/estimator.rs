@@ -228,8 +228,8 @@ impl Estimator {
         self.runner.keep_record();
     }
 
-    /// What the correction of the last update is made of; none where no record is kept, and of an observer that
-    /// is no filter.
+    /// What the correction of the last update is made of, NaN before the first and after a call that failed; none
+    /// where no record is kept, and of an observer that is no filter.
     #[must_use]
     pub fn record(&self) -> Option<&Record> {
         self.runner.record()
@@ -311,6 +311,10 @@ impl Estimator {
             // the same walk over what it made
             let _ = snapshot::load(&image, |walk| self.walk(walk, false));
             self.image = image;
+            if self.record().is_some() {
+                // that of the sample before is gone
+                self.keep_record();
+            }
             return Err(error);
         }
         if has_signals {

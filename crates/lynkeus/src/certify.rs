@@ -18,7 +18,9 @@ mod print;
 mod strays;
 
 pub use excited::{AtTheta, Excitation, Excited};
-pub(crate) use json::certificate as certificate_json;
+pub(crate) use json::Proof;
+#[cfg(test)]
+pub(crate) use json::Report as CertificateReport;
 pub(crate) use print::region;
 pub use strays::Strays;
 
@@ -281,18 +283,6 @@ impl CertifyReport {
     /// Whether it is shown that there is no decay.
     pub fn is_refuted(&self) -> bool {
         self.verdict() == Standing::Refuted
-    }
-
-    /// The report for machines: the gain by state, then by measured output, or what takes
-    /// its place, and the certificate.
-    pub fn to_json(&self) -> serde_json::Value {
-        serde_json::json!({
-            "plant": self.plant,
-            "family": self.design.examination.family.name(),
-            "gain": self.correction.gain_json(),
-            "injection": self.correction.injection_json(),
-            "certificate": certificate_json(self),
-        })
     }
 
     /// Proved by either way; refuted where the error is shown not to decay; else undecided.

@@ -2,6 +2,7 @@
 
 mod json;
 mod knowledge;
+mod known;
 mod next;
 mod observability;
 #[cfg(feature = "plot")]
@@ -26,6 +27,8 @@ use crate::prepare::declared::{Account, Declared};
 use crate::words::explain;
 use crate::words::{conditions, listed};
 use crate::{Error, ErrorKind, Study, estimate, prepare, prepare::calibrate};
+#[cfg(test)]
+pub(crate) use json::CheckReport;
 use knowledge::Sorted;
 pub use knowledge::{Assumption, Knowledge, Known, Reserve};
 use lynkeus_study::Name;
@@ -33,7 +36,6 @@ pub use next::Next;
 pub use report::{CheckOptions, Report};
 use reserves::View;
 pub use uniform::Uniform;
-pub(crate) use uniform::point;
 
 /// The time for what can be known at all, where the study has no limit.
 const OBSERVABILITY: Duration = Duration::from_secs(20);

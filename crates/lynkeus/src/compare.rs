@@ -9,7 +9,10 @@ use std::ops::ControlFlow;
 use lynkeus_model::Plant;
 use lynkeus_observers::{FAMILIES, Family};
 use lynkeus_structure::Standing;
+use serde::Serialize;
 
+#[cfg(test)]
+pub(crate) use print::ComparisonReport;
 pub use run::{Compared, Run, Settled};
 use run::{of_family, run_all};
 pub use samples::{Interval, Resolution};
@@ -32,7 +35,9 @@ pub struct Comparison {
 }
 
 /// What errors are measured against.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
 pub enum Against {
     /// the simulated plant
     Simulation,

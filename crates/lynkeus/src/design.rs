@@ -2,13 +2,15 @@
 
 use std::fmt;
 
-use lynkeus_observers::{Design, fit_word};
+use lynkeus_observers::Design;
 use lynkeus_structure::Standing;
 use lynkeus_words::{Words, counted};
-use serde_json::{Map, Value, json};
+use serde::Serialize;
+use serde_json::{Value, json};
 
-use crate::certify::{self, certificate_json};
-
+use crate::certify::{self, Proof};
+use crate::entries::{Fit, Named, finite};
+use crate::prepare::correction::InjectionEntry;
 use crate::{CertifyReport, Error, Study};
 
 /// The answer of `lynkeus design`.
@@ -32,6 +34,32 @@ pub fn design(study: &Study) -> Result<DesignReport, Error> {
     })
 }
 
+/// The answer of `design`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "DesignReport"))]
+pub(crate) struct Report<'a> {
+    /// the name of the model
+    plant: &'a str,
+    /// the observer family
+    family: &'static str,
+    /// whether the family's conditions hold
+    fit: Fit,
+    /// the states of each chain, from the sensor outward
+    chains: &'a [Vec<String>],
+    /// the gain by state, then by measured output; none where it is no constant
+    gain: Option<Named<Named<f64>>>,
+    /// what takes its place then
+    injection: Option<Named<Named<&'a InjectionEntry>>>,
+    /// parameters of the observer, as texts
+    parameters: Named<String>,
+    /// the start of each of its states
+    initial: Named<Option<f64>>,
+    /// what is proved
+    certificate: Proof<'a>,
+    /// what you should know
+    notes: &'a [String],
+}
+
 impl DesignReport {
     /// The report for machines; `gain` is by state, then by measured output, and null for a
     /// correction that is no constant gain: then `injection` has its derivatives.
@@ -42,26 +70,23 @@ impl DesignReport {
             parameters,
             ..
         } = &*self.certified.design;
-        let parameters: Map<String, Value> = parameters
-            .iter()
-            .map(|(name, value)| (name.clone(), json!(value.words())))
-            .collect();
-        let starts: Map<String, Value> = observer
-            .states
-            .iter()
-            .map(|(signal, start)| (signal.name.clone(), json!(start)))
-            .collect();
-        json!({
-            "plant": self.plant,
-            "family": examination.family.name(),
-            "fit": fit_word(examination.fit()),
-            "chains": examination.chains,
-            "gain": self.certified.correction.gain_json(),
-            "injection": self.certified.correction.injection_json(),
-            "parameters": parameters,
-            "initial": starts,
-            "certificate": certificate_json(&self.certified),
-            "notes": self.certified.design.notes,
+        let parameters = parameters.iter();
+        let starts = observer.states.iter();
+        json!(Report {
+            plant: &self.plant,
+            family: examination.family.name(),
+            fit: examination.fit().into(),
+            chains: &examination.chains,
+            gain: self.certified.correction.gain(),
+            injection: self.certified.correction.injection(),
+            parameters: parameters
+                .map(|(name, value)| (name.clone(), value.words()))
+                .collect(),
+            initial: starts
+                .map(|(signal, start)| (signal.name.clone(), finite(*start)))
+                .collect(),
+            certificate: Proof::from(&self.certified),
+            notes: &self.certified.design.notes,
         })
     }
 }

@@ -269,7 +269,7 @@ pub(crate) fn refuse_settings(prepared: &Prepared<'_>, design: &Design) -> Resul
     let Some(filter) = &design.observer.filter else {
         if study.records {
             let message = format!(
-                "`record` needs a filter (\"ekf\", \"ukf\" or \"mhe\"): the {} observer has neither innovation covariances nor a likelihood",
+                "record: expected a filter (\"ekf\", \"ukf\" or \"mhe\"), found the {} observer, which has neither innovation covariances nor a likelihood",
                 design.examination.family
             );
             return Err(Error::input(message).at(&study.file));

@@ -60,6 +60,7 @@
 
 // what all rooms need
 mod crew;
+mod entries;
 pub mod interrupt;
 mod thrifty;
 mod words;

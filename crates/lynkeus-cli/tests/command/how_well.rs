@@ -1,5 +1,6 @@
 //! `lynkeus check --how-well`.
 
+use crate::said::said;
 use crate::{Folder, examples};
 
 fn column() -> String {
@@ -135,11 +136,9 @@ fn disturbances_that_are_not_counted_are_named() {
     let folder = Folder::empty();
     folder.write("m.mo", "model M Real x(start = 1, min = -2, max = 2); input Real d(min = -1, max = 1); output Real y = x + d; equation der(x) = 0; end M;");
     folder.write("s.toml", "plant = \"m.mo\"\n[sensors]\ndisturbances = [\"d\"]\nnoise = { y = 0.01 }\n[simulate]\nuntil = 1\noutput_step = 0.1");
-    let ended = folder.run(&["check", "s.toml", "--how-well"]);
-    assert!(
-        ended.out.contains("disturbances (d) are taken as zero"),
-        "{}{}",
-        ended.out,
-        ended.err
+    said(
+        &folder,
+        "how-well-disturbances",
+        &["check", "s.toml", "--how-well"],
     );
 }

@@ -40,10 +40,12 @@ mod refused;
 mod report;
 mod results;
 mod runs;
+mod said;
 mod samples;
 mod scatter;
 mod story;
 mod tables;
+mod texts;
 mod tunable;
 mod tune;
 

@@ -1,7 +1,9 @@
 //! What `check` says of a bare model.
 
-use super::Folder;
 use serde_json::Value;
+
+use crate::Folder;
+use crate::said::said;
 
 const MODELS: &str = "model Decay
   parameter Real k;
@@ -33,6 +35,8 @@ fn check(folder: &Folder, arguments: &[&str]) -> (i32, String, String) {
 #[test]
 fn parameters_and_expressions_in_words() {
     let arguments = [
+        "check",
+        "models.mo",
         "--model",
         "Decay",
         "--parameters",
@@ -41,18 +45,7 @@ fn parameters_and_expressions_in_words() {
         "--about",
         "c",
     ];
-    let (code, text, complaint) = check(&folder(), &arguments);
-    assert_eq!(code, 0, "{complaint}");
-    for line in [
-        "states not observable: x\n",
-        "parameters observable: k\n",
-        "parameters not observable: c\n",
-        "of x, c, which can be scaled together, only c*x can be known",
-        "about c*x: observable\n",
-        "about c: unobservable\n",
-    ] {
-        assert!(text.contains(line), "{line:?} is missing:\n{text}");
-    }
+    said(&folder(), "check-parameters", &arguments);
 }
 
 #[test]
@@ -85,26 +78,20 @@ fn one_object_for_machines() {
 /// Parameters without values are known numbers, whichever, unless they are asked for.
 #[test]
 fn a_parameter_without_value_is_known() {
-    let (code, text, complaint) = check(&folder(), &["--model", "Decay"]);
-    assert_eq!(code, 0, "{complaint}");
-    assert!(text.contains("states observable: x\n"), "{text}");
-    assert!(!text.contains("parameters"), "{text}");
+    let arguments = ["check", "models.mo", "--model", "Decay"];
+    said(&folder(), "check-known-parameters", &arguments);
 }
 
 #[test]
 fn several_models_and_a_missing_output_are_told() {
-    let (code, _, complaint) = check(&folder(), &[]);
-    assert_eq!(code, 2);
-    assert!(
-        complaint.contains("Decay") && complaint.contains("Silent"),
-        "{complaint}"
-    );
-    let (code, _, complaint) = check(&folder(), &["--model", "Silent"]);
-    assert_eq!(code, 2);
-    assert!(complaint.contains("has no output"), "{complaint}");
-    let (code, _, complaint) = check(&folder(), &["--model", "Decay", "--about", "q + 1"]);
-    assert_eq!(code, 2);
-    assert!(complaint.contains('q'), "{complaint}");
+    for (name, more) in [
+        ("which-model", &[][..]),
+        ("no-output", &["--model", "Silent"]),
+        ("no-such-name", &["--model", "Decay", "--about", "q + 1"]),
+    ] {
+        let arguments = [&["check", "models.mo"], more].concat();
+        said(&folder(), &format!("check-{name}"), &arguments);
+    }
 }
 
 #[test]
@@ -163,13 +150,8 @@ fn a_known_start_is_listed_as_such() {
         "Real x;\n  output",
         "Real x(start = 2, fixed = true);\n  output",
     );
-    let (_, text, _) = check(&folder, &["--model", "Decay", "--parameters"]);
-    for line in [
-        "states with a known start: x\n",
-        "parameters observable: k, c\n",
-    ] {
-        assert!(text.contains(line), "{line:?} is missing:\n{text}");
-    }
+    let arguments = ["check", "models.mo", "--model", "Decay", "--parameters"];
+    said(&folder, "check-known-start", &arguments);
 }
 
 const CIRCLE: &str = "model Circle
@@ -266,16 +248,12 @@ fn missing_ranges_are_asked_for() {
         "open.mo",
         "model Open Real a; Real b; output Real y = a; equation der(a) = b^3 - b; der(b) = -b; end Open;",
     );
-    let ended = folder.run(&["check", "open.mo"]);
-    assert!(
-        ended.out.contains("declare min and max of b"),
-        "{}",
-        ended.out
-    );
+    said(&folder, "check-no-ranges", &["check", "open.mo"]);
     let machine = folder.run(&["check", "open.mo", "--json"]).out;
-    for text in [&ended.out, &machine] {
-        assert!(!text.contains("e307") && !text.contains("e308"), "{text}");
-    }
+    assert!(
+        !machine.contains("e307") && !machine.contains("e308"),
+        "{machine}"
+    );
 }
 
 /// What `check` says of a loop, a + a³/2 = z, with that equation of x.
@@ -296,34 +274,14 @@ end M;"
 /// No series is made of a loop; that the map (y, y') is regular on the box is proved all the same.
 #[test]
 fn what_is_proved_on_the_box_is_not_undecided() {
-    let (code, text, complaint) = check(&with_a_loop("a - x"), &[]);
-    assert_eq!(code, 0, "{complaint}");
-    for line in [
-        "states observable: x, z\n",
-        "  x, z: known everywhere (proved on the box)\n",
-        "can be estimated: x, z (by triangular)\n",
-    ] {
-        assert!(text.contains(line), "{line:?} is missing:\n{text}");
-    }
-    assert!(!text.contains("not from the outputs"), "{text}");
+    said(&with_a_loop("a - x"), "check-loop", &["check", "models.mo"]);
 }
 
 /// At z = 0 nothing of z shows, so that the box proves nothing of it; x is measured.
 #[test]
 fn what_is_not_decided_is_not_called_hidden() {
     let folder = with_a_loop("a^2 - x");
-    let (_, text, _) = check(&folder, &[]);
-    for line in [
-        "states observable: x\n",
-        "states undecided: z\n",
-        "  x: known everywhere (proved on the box)\n",
-        "  z: undecided\n",
-        "can be estimated: x (by ekf)\n",
-        "whether the outputs tell z is not decided; ekf gives an estimate all the same\n",
-    ] {
-        assert!(text.contains(line), "{line:?} is missing:\n{text}");
-    }
-    assert!(!text.contains("not from the outputs"), "{text}");
+    said(&folder, "check-loop-undecided", &["check", "models.mo"]);
     let (_, text, _) = check(&folder, &["--json"]);
     let report: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(

@@ -2,7 +2,8 @@
 
 use serde_json::Value;
 
-use super::{Folder, csv};
+use crate::said::said;
+use crate::{Folder, csv};
 
 /// A reactor of which only temperatures are measured, in the shape of a stirred tank: what is not
 /// seen of it decays near its start, and the sign of what it hangs on changes in the box.
@@ -65,15 +66,7 @@ fn what_washes_out_decays_and_what_is_fed_does_not() {
     for name in ["waste", "sum", "w"] {
         assert_eq!(wandering[name]["known"], "no", "{name}: {wandering}");
     }
-    assert_eq!(ended.code, 1);
-    let text = folder.run(&["check", "study.toml"]).out;
-    for words in [
-        "dye: not observable, but its error decays by itself, at 0.2 per unit of time or faster (proved on the box)",
-        "in the end, as errors decay by themselves: dye",
-        "not from the outputs: waste, sum, w",
-    ] {
-        assert!(text.contains(words), "{words:?} is missing:\n{text}");
-    }
+    said(&folder, "check-what-washes-out", &["check", "study.toml"]);
 }
 
 /// Where heat tells b by a, b' = −6b + 2a with a = −(5/13)·b at the start: −6 − 10/13.
@@ -91,17 +84,7 @@ fn an_unknown_feed_leaves_an_error_that_decays_near_the_start() {
     }
     let wandering = known(&ended.json(), "wandering");
     assert_eq!(wandering["a"]["known"], "almost everywhere");
-    // the outputs alone do not tell everything
-    assert_eq!(ended.code, 1);
-    let text = folder.run(&["check", "study.toml"]).out;
-    for words in [
-        "what can be known, whatever feed does",
-        "the same if feed only wanders, as [process_noise] says",
-        "at 6.769 per h (linearised at one point only, see below)",
-        "linearised at a = 2, b = 1",
-    ] {
-        assert!(text.contains(words), "{words:?} is missing:\n{text}");
-    }
+    said(&folder, "check-an-unknown-feed", &["check", "study.toml"]);
     // in a part of the box it is proved
     folder.change(
         "study.toml",
@@ -148,11 +131,7 @@ fn what_constant_inputs_show_moving_ones_may_hide() {
         let word = &found[name]["known"];
         assert_eq!(word, "everywhere while inputs are constant", "{name}");
     }
-    let text = moving.run(&["check", "study.toml"]).out;
-    assert!(
-        text.contains("b, c: known everywhere while inputs are constant (proved on the box)"),
-        "{text}"
-    );
+    said(&moving, "check-moving-inputs", &["check", "study.toml"]);
     // without inputs there is nothing that could move
     let model = model("parameter Real v = 1;")
         .replace("input Real u(min = 1, max = 2);", "parameter Real u = 1;");
@@ -332,16 +311,7 @@ fn the_study_for_a_bare_model_runs() {
 #[test]
 fn a_family_without_a_key_is_named() {
     let gated = folder(CART, &format!("{RUN}[observer]\ngate = 5\n"));
-    let ended = gated.run(&["check", "study.toml"]);
-    assert_eq!(ended.code, 0, "{}", ended.err);
-    assert!(
-        ended
-            .out
-            .contains("not examined, as they do not take gate: triangular, "),
-        "{}",
-        ended.out
-    );
-    assert!(ended.out.contains("by ekf"), "{}", ended.out);
+    said(&gated, "check-gated", &["check", "study.toml"]);
 }
 
 /// y = x + 0.2v fits no chain: the slowest pole is proposed like θ where it can be tried. Where it

@@ -24,8 +24,6 @@ use judge::{Claim, Sides};
 use numbers::Numbers;
 use pair::Pair;
 
-const SYSTEMS: u64 = 1000;
-
 /// How often each verdict was reached, and how much of it was looked at.
 #[derive(Debug, Default)]
 struct Tally {
@@ -101,9 +99,19 @@ impl Drop for Context {
 
 #[test]
 fn every_verdict_on_a_random_system_stands() {
+    stand(400);
+}
+
+#[test]
+#[ignore = "a minute"]
+fn every_verdict_on_very_many_random_systems_stands() {
+    stand(4000);
+}
+
+fn stand(systems: u64) {
     let mut tally = Tally::default();
     let mut failed = vec![];
-    for seed in 1..=SYSTEMS {
+    for seed in 1..=systems {
         let judgement = std::panic::AssertUnwindSafe(|| judged(seed, &mut tally));
         if std::panic::catch_unwind(judgement).is_err() {
             failed.push(seed);
@@ -114,7 +122,9 @@ fn every_verdict_on_a_random_system_stands() {
         "{} systems: {failed:?}; {tally:?}",
         failed.len()
     );
-    assert!(tally.proved >= 150 && tally.refuted >= 50, "{tally:?}");
-    assert!(tally.undecided >= 50, "{tally:?}");
+    let share = |count: usize| count as f64 / systems as f64;
+    assert!(share(tally.proved) >= 0.15, "{tally:?}");
+    assert!(share(tally.refuted) >= 0.05, "{tally:?}");
+    assert!(share(tally.undecided) >= 0.05, "{tally:?}");
     assert!(2 * tally.seen >= tally.proved, "{tally:?}");
 }

@@ -75,6 +75,37 @@ fn the_variance_of_a_scalar_follows_its_formula() {
     }
 }
 
+/// S = P⁻ + R, K = P⁻/S, P⁺ = (1 − K)P⁻, −½(ln 2πS + ν²/S).
+#[test]
+fn a_record_has_what_the_correction_is_made_of() {
+    let (p, r) = (0.5, 0.2);
+    let settings = FilterSettings::of(FilterKind::Extended);
+    let blueprint = Blueprint::filter(scalar(-0.7, 0.3, r), settings, exact());
+    let mut filter = blueprint.estimator().unwrap();
+    assert!(filter.record().is_none());
+    filter.keep_record();
+    filter.push(0.0, &[1.4]).unwrap();
+    let record = filter.record().unwrap();
+    let (s, off) = (p + r, 0.4);
+    let near =
+        |found: f64, expected: f64| assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    near(record.predicted[0], 1.0);
+    near(record.innovation[0], off);
+    near(record.innovation_covariance[0], s);
+    near(record.gain[0], p / s);
+    near(record.covariance[0], p - p * p / s);
+    let whole = (std::f64::consts::TAU * s).ln();
+    near(record.log_likelihood, -0.5 * (whole + off * off / s));
+    filter.push(0.1, &[f64::NAN]).unwrap();
+    let record = filter.record().unwrap();
+    assert!(record.innovation[0].is_nan() && record.innovation_covariance[0].is_nan());
+    assert_eq!((record.gain[0], record.log_likelihood), (0.0, 0.0));
+    // it belongs to no sample that was refused
+    assert!(filter.push(0.2, &[1e300]).is_err());
+    assert!(filter.record().unwrap().log_likelihood == 0.0);
+    assert!(filter.record().unwrap().covariance[0].is_nan());
+}
+
 /// Given everything, a constant's estimate is the same at every sample.
 #[test]
 fn the_smoother_of_a_constant_is_its_last_estimate() {

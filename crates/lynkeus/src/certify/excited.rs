@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 
 use lynkeus_observers::{Family, Tuning, Value};
 use lynkeus_structure::AugmentedPlant;
-use serde_json::{Value as Json, json};
+use serde::Serialize;
 
 use super::assumptions;
 use crate::prepare::Prepared;
@@ -171,26 +171,62 @@ impl Excited {
     }
 
     /// For machines.
-    pub(super) fn to_json(&self) -> Json {
-        let row = |row: &AtTheta| {
-            let figures = row.figures.as_ref();
-            let of = |figure: fn(&Excitation) -> Option<f64>| figures.ok().and_then(figure);
-            json!({
-                "theta": row.theta,
-                "excitation": of(|f| Some(f.excitation)),
-                "condition": of(|f| f.condition),
-                "error": of(|f| f.error),
-                "failure": figures.err(),
-            })
-        };
-        json!({
-            "from": self.window.0,
-            "until": self.window.1,
-            "rows": self.rows.iter().map(row).collect::<Vec<_>>(),
-            "exponent": self.exponent(),
-            "vanishes": self.vanishes(),
-            "best": self.best(),
-        })
+    pub(super) fn entry(&self) -> ExcitationEntry<'_> {
+        ExcitationEntry {
+            from: self.window.0,
+            until: self.window.1,
+            rows: self.rows.iter().map(AtThetaEntry::from).collect(),
+            exponent: self.exponent(),
+            vanishes: self.vanishes(),
+            best: self.best(),
+        }
+    }
+}
+
+/// Excitation along the study's simulation: measured, no part of a proof.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Excitation"))]
+pub(super) struct ExcitationEntry<'a> {
+    /// the first instant
+    from: f64,
+    /// the last instant
+    until: f64,
+    /// one for each value of θ
+    rows: Vec<AtThetaEntry<'a>>,
+    /// excitation falls like θ to minus this
+    exponent: Option<f64>,
+    /// whether α(θ)/θ² falls at the largest θ, as the theorem asks; none where that cannot be told
+    vanishes: Option<bool>,
+    /// the θ of the smallest error
+    best: Option<f64>,
+}
+
+/// Excitation measured at a value of θ.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "AtTheta"))]
+struct AtThetaEntry<'a> {
+    /// θ, in 1/(unit of time)
+    theta: f64,
+    /// the smallest eigenvalue of S
+    excitation: Option<f64>,
+    /// σ_s·L/θ, to be below ½
+    condition: Option<f64>,
+    /// the largest root mean square error, in widths of the declared range
+    error: Option<f64>,
+    /// why there are no figures
+    failure: Option<&'a str>,
+}
+
+impl<'a> From<&'a AtTheta> for AtThetaEntry<'a> {
+    fn from(AtTheta { theta, figures }: &'a AtTheta) -> Self {
+        let found = figures.as_ref().ok();
+        Self {
+            theta: *theta,
+            excitation: found.map(|f| f.excitation),
+            condition: found.and_then(|f| f.condition),
+            error: found.and_then(|f| f.error),
+            failure: figures.as_ref().err().map(String::as_str),
+        }
     }
 }
 

@@ -1,17 +1,138 @@
 //! Certificates for machines.
 
-use lynkeus_observers::{Certificate, Check, UltimateBound};
-use lynkeus_structure::Verdict;
+use lynkeus_observers::{Certificate, UltimateBound};
 use lynkeus_words::Words;
-use serde_json::{Map, Value, json};
+use serde::Serialize;
+use serde_json::{Value, json};
 
-use super::{CertifyReport, Excited};
-use crate::check::point;
-use crate::judge::interval::Intervals;
+use super::excited::ExcitationEntry;
+use super::{CertifyReport, Excited, Strays};
+use crate::entries::{Condition, Named, Range, Verdict, finite, sides};
+use crate::judge::interval::SamplingLimits;
+use crate::prepare::correction::InjectionEntry;
+use crate::prepare::declared::Account;
 
-/// `{verdict, rate, ultimate_bound, mean_square_bound, box, hypotheses, …}`; the hypotheses are those of
-/// the inequality, then those of the theorem.
-pub(crate) fn certificate(report: &CertifyReport) -> Value {
+/// The answer of `certify`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(
+    test,
+    derive(schemars::JsonSchema),
+    schemars(rename = "CertificateReport")
+)]
+pub(crate) struct Report<'a> {
+    /// the name of the model
+    plant: &'a str,
+    /// the observer family
+    family: &'static str,
+    /// the gain by state, then by measured output; none where it is no constant
+    gain: Option<Named<Named<f64>>>,
+    /// what takes its place then
+    injection: Option<Named<Named<&'a InjectionEntry>>>,
+    /// what is proved
+    certificate: Proof<'a>,
+}
+
+/// A certificate.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(crate) struct Proof<'a> {
+    #[serde(flatten)]
+    summary: ProofSummary,
+    /// its hypotheses one by one: those of the inequality, then those of the theorem
+    hypotheses: Vec<Condition>,
+    /// what of the study's declarations was counted
+    declared: &'a Account,
+    /// where the study's own start or simulation leaves the box
+    outside_box: &'a Strays,
+    /// what was measured of it, of observers whose theorem needs it
+    excitation: Option<ExcitationEntry<'a>>,
+    /// the study's samples beside what the observer stands
+    sampling: Option<SamplingLimits>,
+    /// what you should know
+    notes: Vec<String>,
+    /// what the family's theorem gives, where it was asked
+    #[serde(skip_serializing_if = "Option::is_none")]
+    theorem: Option<ProofSummary>,
+}
+
+/// What one way of proof gives.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct ProofSummary {
+    /// the way of proof
+    basis: &'static str,
+    /// whether the error decays
+    verdict: Verdict,
+    /// the decay of the error that is proved, in 1/(unit of time)
+    rate: Option<f64>,
+    /// the norm below which the error ends
+    ultimate_bound: Option<f64>,
+    /// the same for each quantity, in its unit
+    ultimate_bounds: Named<Option<f64>>,
+    /// the norm below which the error ends in the root of the mean square, under noise
+    mean_square_bound: Option<f64>,
+    /// the same for each quantity, in its unit
+    mean_square_bounds: Named<Option<f64>>,
+    /// the ranges on which it holds
+    #[serde(rename = "box")]
+    region: Named<Range>,
+    /// constants of the theorem
+    constants: Vec<ConstantEntry>,
+}
+
+/// A constant of a theorem.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Constant"))]
+struct ConstantEntry {
+    /// its letter in the paper
+    name: String,
+    /// its value
+    value: Option<f64>,
+    /// what it is
+    meaning: String,
+}
+
+impl CertifyReport {
+    /// The report for machines: the gain by state, then by measured output, or what takes
+    /// its place, and the certificate.
+    pub fn to_json(&self) -> Value {
+        json!(Report {
+            plant: &self.plant,
+            family: self.design.examination.family.name(),
+            gain: self.correction.gain(),
+            injection: self.correction.injection(),
+            certificate: Proof::from(self),
+        })
+    }
+}
+
+impl<'a> From<&'a CertifyReport> for Proof<'a> {
+    fn from(report: &'a CertifyReport) -> Self {
+        let theorem = report.theorem.iter().flat_map(|t| &t.hypotheses);
+        let hypotheses = report.certificate.hypotheses.iter().chain(theorem);
+        let both = std::iter::once(&report.certificate).chain(&report.theorem);
+        let strays = report.strays.words(false);
+        let strays =
+            strays.map(|words| format!("the certificate is for the box only, and {words}"));
+        Self {
+            summary: summary(report),
+            hypotheses: hypotheses.map(Condition::from).collect(),
+            declared: &report.declared,
+            outside_box: &report.strays,
+            excitation: report.excited.as_ref().map(Excited::entry),
+            sampling: report.sampling.map(|intervals| intervals.entry(true)),
+            notes: both
+                .flat_map(|certificate| report.notes_of(certificate))
+                .chain(report.assumed.iter().cloned())
+                .chain(strays)
+                .collect(),
+            theorem: report.theorem.as_ref().map(ProofSummary::from),
+        }
+    }
+}
+
+/// The better of the two ways, with the verdict of both.
+fn summary(report: &CertifyReport) -> ProofSummary {
     let mut best = report.best().clone();
     best.mean_square = None;
     if report.is_contradiction() {
@@ -19,79 +140,35 @@ pub(crate) fn certificate(report: &CertifyReport) -> Value {
     } else {
         best.mean_square = report.mean_square().cloned();
     }
-    let theorem = report.theorem.iter().flat_map(|t| &t.hypotheses);
-    let hypotheses: Vec<Value> = report
-        .certificate
-        .hypotheses
-        .iter()
-        .chain(theorem)
-        .map(hypothesis)
-        .collect();
-    let mut object = summary(&best);
-    object["verdict"] = json!(report.verdict().word());
-    object["hypotheses"] = json!(hypotheses);
-    object["declared"] = report.declared.to_json();
-    object["outside_box"] = report.strays.to_json();
-    object["excitation"] = json!(report.excited.as_ref().map(Excited::to_json));
-    object["sampling"] = json!(report.sampling.map(sampling));
-    let strays = report.strays.words(false);
-    let strays = strays.map(|words| format!("the certificate is for the box only, and {words}"));
-    object["notes"] = json!(
-        std::iter::once(&report.certificate)
-            .chain(&report.theorem)
-            .flat_map(|certificate| report.notes_of(certificate))
-            .chain(report.assumed.iter().cloned())
-            .chain(strays)
-            .collect::<Vec<_>>()
-    );
-    if let Some(theorem) = &report.theorem {
-        object["theorem"] = summary(theorem);
+    ProofSummary {
+        verdict: report.verdict().into(),
+        ..ProofSummary::from(&best)
     }
-    object
 }
 
-fn summary(certificate: &Certificate) -> Value {
-    let sides = certificate
-        .region
-        .iter()
-        .map(|s| (s.name.clone(), json!([s.min, s.max])));
-    let bounds = |each: &[UltimateBound]| -> Map<String, Value> {
-        let pairs = each.iter().map(|b| (b.name.clone(), json!(b.value)));
-        pairs.collect()
-    };
-    let mean_square = certificate.mean_square.as_ref();
-    let constants = certificate
-        .constants
-        .iter()
-        .map(|c| json!({ "name": c.name, "value": c.value, "meaning": c.words() }));
-    json!({
-        "basis": certificate.basis,
-        "verdict": certificate.verdict().word(),
-        "rate": certificate.rate,
-        "ultimate_bound": certificate.ultimate_bound,
-        "ultimate_bounds": bounds(&certificate.ultimate),
-        "mean_square_bound": mean_square.map(|b| b.norm),
-        "mean_square_bounds": bounds(mean_square.map_or(&[], |b| &b.states)),
-        "box": sides.collect::<Map<_, _>>(),
-        "constants": constants.collect::<Vec<_>>(),
-    })
-}
-
-/// The study's samples against what the observer stands.
-fn sampling(intervals: Intervals) -> Value {
-    let mut entry = intervals.to_json();
-    entry["beyond"] = json!(intervals.is_beyond());
-    entry
-}
-
-fn hypothesis(check: &Check) -> Value {
-    let mut entry = json!({
-        "name": check.statement.words(),
-        "verdict": check.verdict.word(),
-        "detail": check.reason.words(),
-    });
-    if let Verdict::Refuted(witness) = &check.verdict {
-        entry["witness"] = witness.points.iter().map(point).collect();
+impl From<&Certificate> for ProofSummary {
+    fn from(certificate: &Certificate) -> Self {
+        let mean_square = certificate.mean_square.as_ref();
+        let constants = certificate.constants.iter().map(|c| ConstantEntry {
+            name: c.name.clone(),
+            value: finite(c.value),
+            meaning: c.words(),
+        });
+        Self {
+            basis: certificate.basis,
+            verdict: certificate.verdict().into(),
+            rate: certificate.rate,
+            ultimate_bound: certificate.ultimate_bound,
+            ultimate_bounds: bounds(&certificate.ultimate),
+            mean_square_bound: mean_square.map(|b| b.norm),
+            mean_square_bounds: bounds(mean_square.map_or(&[], |b| &b.states)),
+            region: sides(&certificate.region),
+            constants: constants.collect(),
+        }
     }
-    entry
+}
+
+fn bounds(each: &[UltimateBound]) -> Named<Option<f64>> {
+    let each = each.iter();
+    each.map(|b| (b.name.clone(), finite(b.value))).collect()
 }

@@ -3,24 +3,27 @@
 use lynkeus_model::Variable;
 use lynkeus_observers::Design;
 use lynkeus_structure::AugmentedPlant;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::judge::outside::{self, Outside, outside};
 use crate::prepare::Prepared;
 use crate::{Error, Outcome, Quantity, Series};
 
 /// Where the study's own plant and estimate are outside of the box.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Strays {
-    /// the plant: along the study's `[simulate]`, or where it starts
+    /// whether that is of the study's simulation; else only of the start
+    pub simulated: bool,
+    /// of the plant
     pub plant: Option<Outside>,
-    /// the estimate likewise
+    /// of the estimate
     pub estimate: Option<Outside>,
     /// with `prolong`, the theorem asks nothing of where the estimate is
+    #[serde(skip)]
     prolonged: bool,
-    /// it is the simulated run that was looked at, not only the start
-    pub simulated: bool,
     /// why the study's run could not be looked at
+    #[serde(skip)]
     pub failure: Option<String>,
 }
 
@@ -106,15 +109,5 @@ impl Strays {
         };
         let said: Vec<String> = parts.iter().filter_map(said).collect();
         (!said.is_empty()).then(|| said.join(", and "))
-    }
-
-    /// For machines: null where nothing is outside.
-    pub(super) fn to_json(&self) -> Value {
-        let outside = |outside: &Option<Outside>| json!(outside.as_ref().map(Outside::to_json));
-        json!({
-            "simulated": self.simulated,
-            "plant": outside(&self.plant),
-            "estimate": outside(&self.estimate),
-        })
     }
 }

@@ -6,7 +6,6 @@ use std::fmt;
 use lynkeus_observability::{Answer, Verdict};
 use lynkeus_structure::detectability::{Detectability, Hidden, HiddenErrors, Observability};
 use lynkeus_structure::{self as structure, AugmentedPlant, Coordinate, Uniformity};
-use serde_json::{Map, Value, json};
 
 use crate::words::{listed, number};
 
@@ -179,27 +178,6 @@ impl Knowledge {
             }
         }
     }
-
-    pub(super) fn to_json(&self) -> Value {
-        let quantities = self
-            .quantities
-            .iter()
-            .map(|(name, known)| (name.clone(), known.to_json()));
-        let point = self.point.iter().map(|c| (c.name.clone(), json!(c.value)));
-        json!({
-            "unknown_inputs": match self.assumption {
-                Assumption::NoneUnknown => "none",
-                Assumption::Arbitrary => "arbitrary",
-                Assumption::Wandering { .. } => "wandering",
-            },
-            "words": self.words(),
-            "quantities": Value::Object(quantities.collect::<Map<_, _>>()),
-            "linearised_at": match self.point.is_empty() {
-                true => Value::Null,
-                false => Value::Object(point.collect::<Map<_, _>>()),
-            },
-        })
-    }
 }
 
 impl Found<'_> {
@@ -302,69 +280,6 @@ impl Known {
         }
     }
 
-    fn word(&self) -> &'static str {
-        match self {
-            Known::Everywhere => "everywhere",
-            Known::WhileConstant => "everywhere while inputs are constant",
-            Known::Locally { constant: false } => "locally everywhere",
-            Known::Locally { constant: true } => "locally everywhere while inputs are constant",
-            Known::AlmostEverywhere => "almost everywhere",
-            Known::InPart { .. } => "in part of the box",
-            Known::WhileExcited { .. } => "while excited",
-            Known::Reserved {
-                reserve: Reserve::Limits(_),
-                ..
-            } => "within limits",
-            Known::Reserved {
-                reserve: Reserve::Disturbances { .. },
-                ..
-            } => "up to disturbances",
-            Known::Hidden(Detectability::Decays { .. }) => "decays",
-            Known::Hidden(_) => "no",
-            Known::Undecided => "undecided",
-        }
-    }
-
-    fn to_json(&self) -> Value {
-        let mut entry = json!({ "known": self.word() });
-        match self {
-            Known::WhileExcited { input, value } => {
-                entry["hidden_by"] = json!({ "input": input, "value": value })
-            }
-            Known::InPart { share, at } => {
-                entry["hidden_share"] = json!(share);
-                entry["hidden_at"] = at
-                    .iter()
-                    .map(|(name, x)| (name.clone(), json!(x)))
-                    .collect::<Map<_, _>>()
-                    .into();
-            }
-            Known::Reserved { known, reserve } => {
-                entry["otherwise"] = known.to_json();
-                match reserve {
-                    Reserve::Limits(sensors) => entry["sensors"] = json!(sensors),
-                    Reserve::Disturbances { names, bound } => {
-                        entry["disturbances"] = json!(names);
-                        entry["bound"] = json!(bound);
-                    }
-                }
-            }
-            Known::Hidden(Detectability::Decays { rate, is_proved }) => {
-                entry["rate"] = json!(rate);
-                entry["proved"] = json!(is_proved);
-            }
-            Known::Hidden(Detectability::Bounded { bound, is_kept }) => {
-                entry["bound"] = json!(bound);
-                if !is_kept {
-                    entry["error"] = json!("undecided");
-                }
-            }
-            Known::Hidden(detectability) => entry["error"] = json!(error_word(*detectability)),
-            _ => {}
-        }
-        entry
-    }
-
     /// The line under which it stands; `unit` is that of time.
     pub(crate) fn line(&self, unit: &str) -> String {
         match self {
@@ -438,17 +353,6 @@ impl Reserve {
                 };
                 format!("known up to the disturbance {names}, {size}; were it zero: {otherwise}")
             }
-        }
-    }
-}
-
-fn error_word(detectability: Detectability) -> &'static str {
-    match detectability {
-        Detectability::Stays => "stays",
-        Detectability::Grows { .. } => "grows",
-        Detectability::Moved => "moved by an unknown input",
-        Detectability::Undecided | Detectability::Decays { .. } | Detectability::Bounded { .. } => {
-            "undecided"
         }
     }
 }

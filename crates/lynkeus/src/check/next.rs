@@ -8,17 +8,21 @@ use lynkeus_expr::real::rounded;
 use lynkeus_model::Variable;
 use lynkeus_observers::{Initial, Tuning, Value as Tuned};
 use lynkeus_words::figures;
-use serde_json::{Value, json};
+use serde::{Serialize, Serializer};
+use serde_json::Value;
 
 use crate::Study;
 use crate::prepare::Prepared;
 use crate::prepare::choice::{Choice, Grounds, Proposal};
 use crate::words::number;
 
-/// The next steps.
-#[derive(Clone, Debug, PartialEq)]
+/// What to do next.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Next {
-    /// commands, each with what it does
+    /// commands to type; for people, each with what it does
+    #[serde(serialize_with = "lines")]
+    #[cfg_attr(test, schemars(with = "Vec<String>"))]
     pub commands: Vec<(String, &'static str)>,
     /// `[observer]`, and what else belongs to it, as TOML; none where the study has it all
     pub observer: Option<String>,
@@ -45,11 +49,11 @@ impl Next {
             observer,
         }
     }
+}
 
-    pub(super) fn to_json(&self) -> Value {
-        let commands: Vec<&String> = self.commands.iter().map(|(command, _)| command).collect();
-        json!({ "commands": commands, "observer": self.observer, "study": self.study })
-    }
+/// The commands alone.
+fn lines<S: Serializer>(commands: &[(String, &'static str)], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_seq(commands.iter().map(|(command, _)| command))
 }
 
 impl fmt::Display for Next {

@@ -1,4 +1,4 @@
-//! What can be known at all, in words and for machines.
+//! What can be known at all, in words.
 
 use std::fmt;
 
@@ -7,7 +7,6 @@ use lynkeus_model::Plant;
 use lynkeus_observability::{Answer, Quantity, Question, QuestionError, Verdict, analyse};
 use lynkeus_structure::Sensors;
 use lynkeus_words::Words;
-use serde_json::{Map, Value, json};
 
 use super::{CheckOptions, Report};
 use crate::words::explain;
@@ -54,28 +53,6 @@ fn blame(study: &Study, error: QuestionError) -> Error {
         Some(found) => found.blame(refusal),
         None => refusal.at(&study.file),
     }
-}
-
-/// `observability`, `about` and what explains them.
-pub(super) fn add_json(answer: &Answer, report: &mut Value) {
-    let verdict =
-        |asked: &lynkeus_observability::Asked| (asked.name.clone(), json!(asked.verdict.word()));
-    let quantities = answer.quantities.iter().map(|(asked, _)| verdict(asked));
-    report["observability"] = Value::Object(quantities.collect::<Map<_, _>>());
-    report["about"] = Value::Object(answer.about.iter().map(verdict).collect::<Map<_, _>>());
-    let symmetries = answer.symmetries.iter().map(|symmetry| {
-        json!({
-            "moves": symmetry.moves,
-            "directions": symmetry.directions,
-            "words": symmetry.words(),
-            "invariants": symmetry.invariants,
-        })
-    });
-    report["symmetries"] = symmetries.collect();
-    report["derivatives"] = json!(answer.order);
-    report["rank"] = json!(answer.rank);
-    report["unknowns"] = json!(answer.unknowns);
-    report["observability_notes"] = answer.notes.iter().map(Words::words).collect();
 }
 
 pub(super) fn print(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result {

@@ -1,16 +1,11 @@
-//! For what inputs and where the states can be told apart, in words and for machines.
+//! For what inputs and where the states can be told apart, in words.
 
 use std::fmt;
 
-use lynkeus_structure::{self as structure, Blind, Place, Point, Uniformity};
-use lynkeus_words::Words;
-use serde_json::{Map, Value, json};
+use lynkeus_structure::{self as structure, Blind, Place, Uniformity};
 
 use crate::words::{number, side};
 use lynkeus_observability::{Answer, Quantity, Verdict};
-
-/// Parts of the singular set listed for machines.
-const LISTED: usize = 256;
 
 /// What was found on the box, and how far it may be said beside the verdicts on the
 /// quantities: the box is examined with unknown inputs that stay constant, the verdicts are on
@@ -173,41 +168,4 @@ fn hull(parts: &[Place]) -> String {
         )
     });
     sides.collect::<Vec<_>>().join(", ")
-}
-
-/// A point for machines.
-pub(crate) fn point(point: &Point) -> Value {
-    let at = point
-        .coordinates
-        .iter()
-        .map(|c| (c.name.clone(), json!(c.value)));
-    json!({ "value": point.value, "at": Value::Object(at.collect()) })
-}
-
-/// `{verdict, detail, one_to_one, share, singular, blind}`
-pub(super) fn json(uniformity: &Uniformity) -> Value {
-    let part = |part: &Place| {
-        let sides = part
-            .iter()
-            .map(|side| (side.name.clone(), json!([side.min, side.max])));
-        Value::Object(sides.collect::<Map<_, _>>())
-    };
-    let blind = uniformity
-        .blind
-        .iter()
-        .map(|blind| json!({ "input": blind.input, "value": blind.value, "hidden": blind.hidden }));
-    json!({
-        "verdict": uniformity.regular.verdict.word(),
-        "detail": uniformity.regular.reason.words(),
-        "one_to_one": {
-            "verdict": uniformity.one_to_one.finding.verdict.word(),
-            "detail": uniformity.one_to_one.finding.reason.words(),
-            "alike": uniformity.one_to_one.alike.as_ref().map(|alike| {
-                alike.points.iter().map(point).collect::<Vec<_>>()
-            }),
-        },
-        "share": uniformity.share,
-        "singular": uniformity.singular.iter().take(LISTED).map(part).collect::<Vec<_>>(),
-        "blind": blind.collect::<Vec<_>>(),
-    })
 }

@@ -3,46 +3,97 @@
 use std::fmt;
 
 use lynkeus_words::figures;
-use serde_json::{Map, Value, json};
+use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::Doubt;
+use crate::entries::Named;
 
-use super::{Against, Compared, Comparison, Interval};
+use super::{Against, Compared, Comparison, Interval, Run};
+
+/// The answer of `compare`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(crate) struct ComparisonReport<'a> {
+    /// the name of the model
+    plant: &'a str,
+    /// where the truth comes from
+    against: Against,
+    /// the samples, in simulation
+    sampling: Option<&'a Interval>,
+    /// the families
+    families: Vec<ComparedEntry<'a>>,
+    /// what of the log contradicts itself, or counts nowhere
+    warnings: &'a [String],
+}
+
+/// A family in a comparison; one that was refused has `family` and `refused` only.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Compared"))]
+struct ComparedEntry<'a> {
+    /// its name
+    family: &'static str,
+    #[serde(flatten)]
+    figures: Option<Figures<'a>>,
+    /// why it did not run, where it did not
+    #[serde(skip_serializing_if = "Option::is_none")]
+    refused: Option<&'a str>,
+}
+
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct Figures<'a> {
+    /// root mean square error of each quantity over the last half of the rows, in its unit
+    rms: Named<Option<f64>>,
+    /// the largest error after the first row, in widths of the declared ranges
+    peak: Option<f64>,
+    /// time until every error stays within 5 % of its range; none where it does not
+    settling_time: Option<f64>,
+    /// scatter of the estimates from sample to sample, in widths of the declared ranges
+    roughness: Option<f64>,
+    /// computing time of a sample, in seconds
+    seconds_per_sample: f64,
+    /// whether nothing speaks against it
+    credible: bool,
+    /// what speaks against it
+    doubts: &'a [Doubt],
+}
+
+impl<'a> From<&'a Compared> for ComparedEntry<'a> {
+    fn from(row: &'a Compared) -> Self {
+        Self {
+            family: row.family,
+            figures: row.run.as_ref().ok().map(Figures::from),
+            refused: row.run.as_ref().err().map(String::as_str),
+        }
+    }
+}
+
+impl<'a> From<&'a Run> for Figures<'a> {
+    fn from(run: &'a Run) -> Self {
+        let settled = run.settled.iter();
+        Self {
+            rms: settled.map(|s| (s.quantity.clone(), s.rms)).collect(),
+            peak: run.peak,
+            settling_time: run.settling,
+            roughness: run.roughness,
+            seconds_per_sample: run.per_sample,
+            credible: run.doubt.is_none(),
+            doubts: &run.outcome.doubts,
+        }
+    }
+}
 
 impl Comparison {
     /// For machines.
     #[must_use]
     pub fn to_json(&self) -> Value {
-        let row = |row: &Compared| match &row.run {
-            Err(reason) => json!({ "family": row.family, "refused": reason }),
-            Ok(run) => {
-                let rms: Map<String, Value> = run
-                    .settled
-                    .iter()
-                    .map(|s| (s.quantity.clone(), json!(s.rms)))
-                    .collect();
-                json!({
-                    "family": row.family,
-                    "rms": rms,
-                    "peak": run.peak,
-                    "settling_time": run.settling,
-                    "roughness": run.roughness,
-                    "seconds_per_sample": run.per_sample,
-                    "credible": run.doubt.is_none(),
-                    "doubts": run.outcome.doubts.iter().map(Doubt::to_json).collect::<Vec<_>>(),
-                })
-            }
-        };
-        json!({
-            "plant": self.plant,
-            "against": match self.against {
-                Against::Simulation => "simulation",
-                Against::Log => "log",
-                Against::Nothing => "nothing",
-            },
-            "sampling": self.interval.as_ref().map(Interval::to_json),
-            "families": self.rows.iter().map(row).collect::<Vec<_>>(),
-            "warnings": self.warnings(),
+        json!(ComparisonReport {
+            plant: &self.plant,
+            against: self.against,
+            sampling: self.interval.as_ref(),
+            families: self.rows.iter().map(ComparedEntry::from).collect(),
+            warnings: self.warnings(),
         })
     }
 

@@ -6,31 +6,43 @@ use std::time::{Duration, Instant};
 use lynkeus_model::Plant;
 use lynkeus_observers::Family;
 use lynkeus_words::short;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use super::run::{Compared, Watch, run_all};
 use crate::{Error, Study, prepare::systems, simulate};
 use lynkeus_study::{BetweenSamples, SimulateSettings};
 
 /// How a simulation was sampled.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(
+    test,
+    derive(schemars::JsonSchema),
+    schemars(rename = "ComparedSampling")
+)]
 pub struct Interval {
     /// time between two samples
+    #[serde(rename = "interval")]
     pub step: f64,
     /// why this one
+    #[serde(rename = "chosen_by")]
     pub resolution: Resolution,
     /// unit of time, where the study names it
+    #[serde(skip)]
     pub unit: Option<String>,
 }
 
 /// Why a simulation was sampled at its interval.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub enum Resolution {
     /// the study says so: its sensors have noise, or a `sample_step`
+    #[serde(rename = "study")]
     Study,
     /// at twice the interval every error is nearly the same
+    #[serde(rename = "errors have settled")]
     Settled,
     /// at half the interval there would be too many rows, or it would take too long
+    #[serde(rename = "cost")]
     Cost,
 }
 
@@ -129,20 +141,6 @@ fn is_same(a: Option<f64>, b: Option<f64>, width: f64) -> bool {
     };
     let larger = a.max(b);
     larger <= NONE * width || (a - b).abs() <= SAME * larger
-}
-
-impl Interval {
-    /// For machines.
-    pub(super) fn to_json(&self) -> Value {
-        json!({
-            "interval": self.step,
-            "chosen_by": match self.resolution {
-                Resolution::Study => "study",
-                Resolution::Settled => "errors have settled",
-                Resolution::Cost => "cost",
-            },
-        })
-    }
 }
 
 impl fmt::Display for Interval {

@@ -1,10 +1,12 @@
 //! What speaks against an estimate.
 
 use lynkeus_words::figures;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 /// How much a doubt weighs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
 pub enum Level {
     /// Worth a look.
     Note,
@@ -15,7 +17,9 @@ pub enum Level {
 }
 
 /// What a doubt rests on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// The run ended before its last row.
     Ended,
@@ -36,42 +40,20 @@ pub enum Kind {
 }
 
 /// Something that speaks against an estimate.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Doubt {
-    /// What it rests on.
+    /// what it rests on
     pub kind: Kind,
-    /// The measured output, or the estimated quantity.
+    /// the measured output, or the estimated quantity
     pub name: String,
-    /// In words.
+    /// in words
     pub text: String,
-    /// How much it weighs.
+    /// how much it weighs; a refusal makes the result not credible
     pub level: Level,
 }
 
-impl Level {
-    fn word(self) -> &'static str {
-        match self {
-            Self::Note => "note",
-            Self::Warning => "warning",
-            Self::Refusal => "refusal",
-        }
-    }
-}
-
 impl Kind {
-    fn word(self) -> &'static str {
-        match self {
-            Self::Ended => "ended",
-            Self::Range => "range",
-            Self::Innovations => "innovations",
-            Self::Rejected => "rejected",
-            Self::Frozen => "frozen",
-            Self::Jump => "jump",
-            Self::Noise => "noise",
-            Self::Coloured => "coloured",
-        }
-    }
-
     pub(crate) fn hint(self) -> &'static str {
         match self {
             Self::Range => {
@@ -101,17 +83,6 @@ impl Doubt {
     /// Whether it is worth a line: what refuses is told by the refusal, and what hangs beside the log.
     pub(crate) fn is_told(&self) -> bool {
         self.level != Level::Refusal && self.kind != Kind::Frozen
-    }
-
-    /// For machines.
-    #[must_use]
-    pub fn to_json(&self) -> Value {
-        json!({
-            "kind": self.kind.word(),
-            "name": self.name,
-            "text": self.text,
-            "level": self.level.word(),
-        })
     }
 }
 

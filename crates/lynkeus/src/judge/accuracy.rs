@@ -2,8 +2,9 @@
 
 use lynkeus_structure::Dimension;
 use lynkeus_words::figures;
-use serde_json::{Value, json};
+use serde::{Serialize, Serializer};
 
+use crate::entries::finite;
 use crate::words::instant;
 use crate::{Quantity, Series};
 
@@ -13,22 +14,51 @@ const SETTLED: f64 = 0.05;
 /// Quantities that are told of one by one.
 const TOLD: usize = 6;
 
-/// The error of one estimated quantity.
-#[derive(Clone, Debug, PartialEq)]
+/// The error of one estimated quantity against the truth.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "QuantityError"))]
 pub struct Accuracy {
     /// its name in the plant
+    #[serde(skip)]
     pub quantity: String,
-    /// root of the mean square error over the last half of the rows, in its unit; none where its
+    /// root mean square over the last half of the rows, in the quantity's unit; none where its
     /// true value is known in the first half only
+    #[serde(rename = "rms_last_half")]
     pub rms: Option<f64>,
-    /// largest error after the first row, in its unit
+    /// the largest after the first row, in the quantity's unit
     pub peak: f64,
-    /// time of the largest error
+    /// its time
     pub peak_at: f64,
-    /// when the error is within 5 % of the declared range
+    /// the time from which on it is within 5 % of the declared range; none where it is not up to the end
+    #[serde(rename = "settled_at")]
     pub settling: Settling,
     /// beside its standard deviation; none where that is not told
+    #[serde(flatten, serialize_with = "covered")]
+    #[cfg_attr(test, schemars(with = "Covered"))]
     pub coverage: Option<Coverage>,
+}
+
+/// How true standard deviations are.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(crate) struct Covered {
+    /// share of the last half of the rows within two standard deviations, where these are told
+    within_2_sd: Option<f64>,
+    /// root mean square there in standard deviations: 1 where these are true
+    rms_in_sd: Option<f64>,
+}
+
+impl From<Option<Coverage>> for Covered {
+    fn from(coverage: Option<Coverage>) -> Self {
+        Self {
+            within_2_sd: coverage.map(|c| c.within),
+            rms_in_sd: coverage.and_then(|c| finite(c.ratio)),
+        }
+    }
+}
+
+fn covered<S: Serializer>(coverage: &Option<Coverage>, to: S) -> Result<S::Ok, S::Error> {
+    Covered::from(*coverage).serialize(to)
 }
 
 /// The errors of an estimate beside its standard deviations, over the last half of the rows.
@@ -44,7 +74,9 @@ pub struct Coverage {
 }
 
 /// When an error comes to stay within 5 % of the declared range.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(untagged)]
 pub enum Settling {
     /// from this time on
     From(f64),
@@ -152,23 +184,6 @@ fn settling(errors: impl Iterator<Item = (f64, f64)>, most: f64) -> Settling {
 }
 
 impl Accuracy {
-    /// For machines.
-    #[must_use]
-    pub fn to_json(&self) -> Value {
-        let settled = match self.settling {
-            Settling::From(t) => Some(t),
-            Settling::Never | Settling::NoRange => None,
-        };
-        json!({
-            "rms_last_half": self.rms,
-            "peak": self.peak,
-            "peak_at": self.peak_at,
-            "settled_at": settled,
-            "within_2_sd": self.coverage.map(|c| c.within),
-            "rms_in_sd": self.coverage.map(|c| c.ratio).filter(|r| r.is_finite()),
-        })
-    }
-
     fn words(&self) -> String {
         let settled = match self.settling {
             Settling::From(t) => format!("; within 5 % of its range from t = {} on", instant(t)),
@@ -294,6 +309,6 @@ mod tests {
         let early = accuracy(&time, &quantity([0.0, 1.0, nan, nan, nan, nan]), None).unwrap();
         assert_eq!((early.rms, early.peak), (None, 1.0));
         assert!(early.words().contains("not known in the last half"));
-        assert!(early.to_json()["rms_last_half"].is_null());
+        assert!(serde_json::json!(early)["rms_last_half"].is_null());
     }
 }

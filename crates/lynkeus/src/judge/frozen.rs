@@ -1,7 +1,7 @@
 //! Sensors that hang: readings that repeat although their noise would not let them.
 
 use lynkeus_words::figures;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::Series;
 use crate::words::instant;
@@ -21,19 +21,21 @@ const ENOUGH: usize = 30;
 const LOOKED_AT: usize = 20_000;
 
 /// A sensor whose readings are one number for improbably long.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Frozen {
     /// the measured output
     pub output: String,
-    /// the number
+    /// the number at which it hangs
     pub value: f64,
     /// time of the first of the equal readings
     pub from: f64,
-    /// time of the last
+    /// time of the last of the equal readings
     pub to: f64,
     /// number of them
     pub rows: usize,
     /// no reading of the log is larger, or none smaller: an end of the sensor's range as well
+    #[serde(rename = "at_end_of_range")]
     pub at_end: bool,
 }
 
@@ -255,19 +257,6 @@ impl Differences {
 }
 
 impl Frozen {
-    /// For machines.
-    #[must_use]
-    pub fn to_json(&self) -> Value {
-        json!({
-            "output": self.output,
-            "value": self.value,
-            "from": self.from,
-            "to": self.to,
-            "rows": self.rows,
-            "at_end_of_range": self.at_end,
-        })
-    }
-
     /// In words.
     pub(crate) fn words(&self) -> String {
         let cause = match self.at_end {

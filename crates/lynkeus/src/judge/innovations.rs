@@ -3,7 +3,7 @@
 use lynkeus_observers::Design;
 use lynkeus_run::filter::SensorHealth;
 use lynkeus_words::figures;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::course::Course;
 use crate::course::trace::Trace;
@@ -23,27 +23,38 @@ pub struct Innovations {
     pub(crate) settled: Trace,
 }
 
-impl Innovations {
-    /// For machines; `consistency` is the mean of (innovation/its standard deviation)².
-    #[must_use]
-    pub fn to_json(&self) -> Value {
-        let SensorHealth {
-            taken,
-            missing,
-            rejected,
-            at_limit,
-            ..
-        } = self.all;
-        json!({
-            "taken": taken,
-            "missing": missing,
-            "rejected": rejected,
-            "at_limit": at_limit,
-            "consistency": self.all.consistency(),
-            "consistency_last_half": self.late.consistency(),
-        })
-    }
+/// The readings of a sensor beside what was expected of them.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(crate) struct InnovationCounts {
+    /// readings that were taken
+    taken: usize,
+    /// readings that were missing
+    missing: usize,
+    /// readings that the gate rejected
+    rejected: usize,
+    /// readings at a limit of the sensor
+    at_limit: usize,
+    /// mean of (innovation/its standard deviation)²: 1 where noise is as declared
+    consistency: Option<f64>,
+    /// the same over the last half of the rows
+    consistency_last_half: Option<f64>,
+}
 
+impl From<&Innovations> for InnovationCounts {
+    fn from(Innovations { all, late, .. }: &Innovations) -> Self {
+        Self {
+            taken: all.taken,
+            missing: all.missing,
+            rejected: all.rejected,
+            at_limit: all.at_limit,
+            consistency: all.consistency(),
+            consistency_last_half: late.consistency(),
+        }
+    }
+}
+
+impl Innovations {
     fn words(&self) -> String {
         let SensorHealth {
             taken,

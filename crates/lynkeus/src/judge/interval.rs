@@ -6,9 +6,10 @@ use lynkeus_observers::{Design, Observer};
 use lynkeus_structure::AugmentedPlant;
 use lynkeus_words::figures;
 use nalgebra::DMatrix;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::course::{Course, Samples};
+use crate::entries::finite;
 use crate::prepare::Prepared;
 use crate::{Quantity, Series, prepare::systems};
 use lynkeus_study::BetweenSamples;
@@ -40,6 +41,25 @@ pub struct Intervals {
     pub hold: f64,
     /// how the run went
     between: BetweenSamples,
+}
+
+/// The interval between samples, beside what the observer stands (an estimate, no proof).
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(crate) struct SamplingLimits {
+    /// the interval of the log
+    #[serde(skip_serializing_if = "Option::is_none")]
+    log: Option<f64>,
+    /// the interval of the simulation
+    #[serde(skip_serializing_if = "Option::is_none")]
+    simulation: Option<f64>,
+    /// the largest with `between_samples = "predict"`
+    largest_predict: Option<f64>,
+    /// the largest with held measurements
+    largest_hold: Option<f64>,
+    /// whether the study's is beyond them; of certificates
+    #[serde(skip_serializing_if = "Option::is_none")]
+    beyond: Option<bool>,
 }
 
 /// The interval of a log against the limits along the run.
@@ -211,18 +231,16 @@ impl Intervals {
         })
     }
 
-    /// For machines: the interval is called by what is sampled; a limit that was not found is null.
-    #[must_use]
-    pub fn to_json(&self) -> Value {
-        let of = match self.of {
-            Sampled::Log => "log",
-            Sampled::Simulation => "simulation",
-        };
-        json!({
-            of: self.interval,
-            "largest_predict": Some(self.predict).filter(|x| x.is_finite()),
-            "largest_hold": self.hold,
-        })
+    /// For machines; of a certificate, whether the interval is beyond the limits as well.
+    pub(crate) fn entry(&self, of_certificate: bool) -> SamplingLimits {
+        let of = |sampled| (self.of == sampled).then_some(self.interval);
+        SamplingLimits {
+            log: of(Sampled::Log),
+            simulation: of(Sampled::Simulation),
+            largest_predict: finite(self.predict),
+            largest_hold: finite(self.hold),
+            beyond: of_certificate.then(|| self.is_beyond()),
+        }
     }
 
     /// What is to be said where the log's interval is beyond the limit.

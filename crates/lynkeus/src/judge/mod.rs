@@ -24,7 +24,7 @@ pub(crate) use lynkeus_run::credible::By;
 
 pub(crate) use evidence::Evidence;
 pub use innovations::Innovations;
-pub(crate) use innovations::innovations;
+pub(crate) use innovations::{InnovationCounts, innovations};
 pub(crate) use ranges::{RUN_AWAY, Screen};
 pub(crate) use residuals::residuals;
 pub(crate) use sensors::Judged;

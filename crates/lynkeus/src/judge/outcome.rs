@@ -6,6 +6,7 @@ use lynkeus_expr::Spent;
 use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Monitor, Signal};
 use lynkeus_run::Error as RunError;
+use serde::Serialize;
 
 use crate::course::Course;
 use crate::course::corrections::Corrections;
@@ -26,29 +27,40 @@ use crate::{Error, Quantity, Series, Study, judge::expected, judge::saturated, p
 use lynkeus_study::EstimateSettings;
 use lynkeus_table::Instant;
 
+#[cfg(test)]
+pub(crate) use summary::RunReport;
+
 /// The trust in an estimate over time, and whether it was ever lost.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Monitor"))]
 pub struct Watch {
-    /// the monitor
-    pub monitor: Monitor,
-    /// header of its column: the monitor's name unless the model has that name
-    pub header: String,
-    /// its values
-    pub values: Series,
-    /// first time at which it was below its alarm
+    /// the first time at which it was below its alarm
+    #[serde(rename = "alarm_at")]
     pub alarm: Option<f64>,
+    /// the header of its column: the monitor's name unless the model has that name
+    #[serde(rename = "column")]
+    pub header: String,
+    /// the monitor
+    #[serde(skip)]
+    pub monitor: Monitor,
+    /// its values
+    #[serde(skip)]
+    pub values: Series,
 }
 
 /// Why a run ended before its last row.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Ended {
     /// in words
     pub message: String,
     /// the study
+    #[serde(skip)]
     pub file: String,
-    /// a limit of time or memory ended it, and nothing is wrong with what there is
+    /// whether a limit of time or memory ended it, and nothing is wrong with what there is
     pub by_limit: bool,
     /// measured outputs of a log that the estimate followed, the one farthest from what was expected first
+    #[serde(skip)]
     pub followed: Vec<String>,
 }
 

@@ -4,8 +4,10 @@ use std::ops::RangeInclusive;
 
 use lynkeus_structure::{AugmentedPlant, Dimension};
 use lynkeus_words::figures;
-use serde_json::{Map, Value, json};
+use serde::{Serialize, Serializer};
 
+#[cfg(test)]
+use crate::entries::{Named, Range};
 use crate::words::{instant, number};
 use crate::{Quantity, Series};
 use lynkeus_table::series::Iter;
@@ -18,15 +20,18 @@ const ROUNDING: f64 = 1e-6;
 const NAMED: usize = 3;
 
 /// One quantity that leaves its side of the box.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Excursion {
     /// its name in the plant
+    #[serde(skip)]
     pub name: String,
-    /// smallest value in the box
-    pub min: f64,
-    /// largest value in the box
-    pub max: f64,
+    /// its smallest and largest value in the box
+    #[serde(rename = "box")]
+    #[cfg_attr(test, schemars(with = "Range"))]
+    pub side: [f64; 2],
     /// share of the rows at which it is outside
+    #[serde(rename = "rows")]
     pub share: f64,
     /// time of the first of them
     pub first: f64,
@@ -35,18 +40,37 @@ pub struct Excursion {
     /// the value that is farthest outside
     pub farthest: f64,
     /// first and last row of each stretch of rows at which it is outside
+    #[serde(skip)]
     pub stretches: Vec<RangeInclusive<usize>>,
 }
 
 /// Where a run is outside of the box.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Outside {
     /// share of the rows at which any quantity is
+    #[serde(rename = "rows")]
     pub share: f64,
     /// time of the first of them
     pub first: f64,
     /// the quantities, the one that leaves first first
+    #[serde(serialize_with = "by_name")]
+    #[cfg_attr(test, schemars(with = "Named<Excursion>"))]
     pub quantities: Vec<Excursion>,
+}
+
+/// Where plant and estimate are outside of the box; null where they stay inside.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(crate) struct OutsideBox<'a> {
+    /// of the true values, where they are known
+    pub plant: &'a Option<Outside>,
+    /// of the estimates
+    pub estimate: &'a Option<Outside>,
+}
+
+fn by_name<S: Serializer>(quantities: &[Excursion], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_map(quantities.iter().map(|e| (&e.name, e)))
 }
 
 /// The box, side by side: what the observer knows of, time included, then the disturbances.
@@ -165,8 +189,7 @@ impl<'q> Followed<'q> {
         let (first, value) = self.first?;
         Some(Excursion {
             name: self.side.name.clone(),
-            min: self.side.min,
-            max: self.side.max,
+            side: [self.side.min, self.side.max],
             share: share(self.count, rows),
             first,
             value,
@@ -199,7 +222,8 @@ pub(crate) fn percent(share: f64) -> String {
 
 impl Excursion {
     fn side(&self) -> String {
-        format!("box [{}, {}]", number(self.min), number(self.max))
+        let [min, max] = self.side.map(number);
+        format!("box [{min}, {max}]")
     }
 }
 
@@ -229,22 +253,6 @@ impl Outside {
             all.push(format!("and {more} more"));
         }
         all.join("; ")
-    }
-
-    /// For machines; an end that is not declared is null.
-    pub fn to_json(&self) -> Value {
-        let each = |e: &Excursion| {
-            let entry = json!({
-                "box": [e.min, e.max],
-                "rows": e.share,
-                "first": e.first,
-                "value": e.value,
-                "farthest": e.farthest,
-            });
-            (e.name.clone(), entry)
-        };
-        let quantities: Map<String, Value> = self.quantities.iter().map(each).collect();
-        json!({ "rows": self.share, "first": self.first, "quantities": quantities })
     }
 }
 
@@ -289,7 +297,7 @@ mod tests {
             found.words(),
             "at 50 % of the rows, first at t = 1 (x reaches -4, box [-1, 2])"
         );
-        assert_eq!(found.to_json()["quantities"]["x"]["rows"], 0.5);
+        assert_eq!(serde_json::json!(found)["quantities"]["x"]["rows"], 0.5);
     }
 
     #[test]
@@ -299,6 +307,6 @@ mod tests {
         assert_eq!(found("", &[1e30, -1e30]), None);
         assert_eq!(found("(min = 0)", &[1e9, -1e-3]), None);
         let found = found("(min = 0)", &[1.0, -1e-3]).unwrap();
-        assert!(found.to_json()["quantities"]["x"]["box"][1].is_null());
+        assert!(serde_json::json!(found)["quantities"]["x"]["box"][1].is_null());
     }
 }

@@ -26,6 +26,8 @@ use crate::simulate::Rig;
 use crate::{Error, Study, prepare, prepare::systems};
 use apart::{Job, room};
 use ends::Sensor;
+#[cfg(test)]
+pub(crate) use report::MonteCarloReport;
 pub use report::Settled;
 use report::headers_of;
 use runs::Followed;

@@ -3,11 +3,15 @@
 use std::fmt;
 
 use lynkeus_words::figures;
-use serde_json::{Map, Value, json};
+use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::statistics::{HIGH, mean, quantile};
 use super::{Again, Failure, MonteCarlo, Scattered};
 use crate::Error;
+use crate::entries::{Named, finite};
+use crate::judge::accuracy::Covered;
+use crate::judge::outcome::Ended;
 use crate::prepare::headers::Headers;
 
 /// Seeds of runs that are told one by one.
@@ -22,6 +26,85 @@ pub struct Settled {
     pub q95: f64,
     /// The worst run.
     pub worst: f64,
+}
+
+/// The answer of `simulate` with `runs`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(crate) struct MonteCarloReport<'a> {
+    /// the name of the model
+    plant: &'a str,
+    /// the observer family
+    family: &'static str,
+    /// runs that were asked for
+    runs: usize,
+    /// runs that came to their end
+    completed: usize,
+    /// runs that did not
+    failed: Counted<'a>,
+    /// runs against which something speaks
+    not_credible: Counted<'a>,
+    /// whether nothing speaks against the whole
+    credible: bool,
+    /// why there are no more runs, where a limit ended them
+    ended: Option<Ended>,
+    /// number of rows
+    rows: usize,
+    /// each estimated quantity
+    quantities: Named<ScatteredEntry<'a>>,
+    /// what you should know
+    notes: &'a [String],
+}
+
+/// Runs that went another way.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct Counted<'a> {
+    /// how many
+    count: usize,
+    /// their seeds
+    seeds: Vec<u64>,
+    /// why the first of them did
+    first_reason: Option<&'a str>,
+}
+
+/// A quantity over many runs.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Scattered"))]
+struct ScatteredEntry<'a> {
+    /// its unit
+    unit: Option<&'a str>,
+    /// headers of its columns
+    columns: &'a [String],
+    /// errors over the last half of the rows, in its unit
+    rms_last_half: SettledErrors,
+    /// these beside standard deviations
+    #[serde(flatten)]
+    covered: Covered,
+}
+
+/// Root mean square errors over the last half of the rows, over many runs.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct SettledErrors {
+    /// their mean
+    mean: Option<f64>,
+    /// 95 % of the runs are below
+    q95: Option<f64>,
+    /// the worst
+    worst: Option<f64>,
+    /// the seed of the worst run
+    worst_seed: Option<u64>,
+}
+
+impl<'a> From<&'a [Failure]> for Counted<'a> {
+    fn from(runs: &'a [Failure]) -> Self {
+        Self {
+            count: runs.len(),
+            seeds: runs.iter().map(|f| f.seed).collect(),
+            first_reason: runs.first().map(|f| &*f.reason),
+        }
+    }
 }
 
 impl Scattered {
@@ -117,42 +200,42 @@ impl MonteCarlo {
     /// For machines.
     #[must_use]
     pub fn to_json(&self) -> Value {
-        let quantities = self.quantities.iter().map(|q| {
-            let Settled { mean, q95, worst } = q.settled();
-            let entry = json!({
-                "unit": q.unit,
-                "columns": q.headers,
-                "rms_last_half": {
-                    "mean": mean,
-                    "q95": q95,
-                    "worst": worst,
-                    "worst_seed": self.worst_seed(q),
-                },
-                "within_2_sd": q.coverage.map(|c| c.within),
-                "rms_in_sd": q.coverage.map(|c| c.ratio).filter(|r| r.is_finite()),
-            });
-            (q.name.clone(), entry)
-        });
-        let counted = |runs: &[Failure]| {
-            json!({
-                "count": runs.len(),
-                "seeds": runs.iter().map(|f| f.seed).collect::<Vec<_>>(),
-                "first_reason": runs.first().map(|f| &f.reason),
-            })
-        };
-        json!({
-            "plant": self.plant,
-            "family": self.family,
-            "runs": self.asked,
-            "completed": self.seeds.len(),
-            "failed": counted(&self.failures),
-            "not_credible": counted(&self.doubtful),
-            "credible": self.refusal().is_none(),
-            "ended": self.limit.as_ref().map(|message| json!({ "message": message, "by_limit": true })),
-            "rows": self.time.len(),
-            "quantities": Value::Object(quantities.collect::<Map<_, _>>()),
-            "notes": self.notes,
+        let quantities = self.quantities.iter();
+        json!(MonteCarloReport {
+            plant: &self.plant,
+            family: self.family,
+            runs: self.asked,
+            completed: self.seeds.len(),
+            failed: Counted::from(&*self.failures),
+            not_credible: Counted::from(&*self.doubtful),
+            credible: self.refusal().is_none(),
+            ended: self.limit.as_ref().map(|message| Ended {
+                message: message.clone(),
+                file: self.file.clone(),
+                by_limit: true,
+                followed: vec![],
+            }),
+            rows: self.time.len(),
+            quantities: quantities
+                .map(|q| (q.name.clone(), self.entry(q)))
+                .collect(),
+            notes: &self.notes,
         })
+    }
+
+    fn entry<'a>(&self, q: &'a Scattered) -> ScatteredEntry<'a> {
+        let Settled { mean, q95, worst } = q.settled();
+        ScatteredEntry {
+            unit: q.unit.as_deref(),
+            columns: &q.headers,
+            rms_last_half: SettledErrors {
+                mean: finite(mean),
+                q95: finite(q95),
+                worst: finite(worst),
+                worst_seed: self.worst_seed(q),
+            },
+            covered: Covered::from(q.coverage),
+        }
     }
 }
 

@@ -20,6 +20,8 @@ use crate::words::explain;
 use crate::{Error, Study, prepare, prepare::systems, simulate};
 pub use experiment::{Assumed, Candidates, Options};
 use experiment::{Setup, ended};
+#[cfg(test)]
+pub(crate) use report::HowWellReport;
 
 /// The answer of `lynkeus check --how-well`.
 #[derive(Clone, Debug)]

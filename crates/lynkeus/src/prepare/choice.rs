@@ -5,7 +5,9 @@ use std::fmt;
 use lynkeus_expr::Spent;
 use lynkeus_expr::real::rounded;
 use lynkeus_observers::{Design, Family, Tuning, Value};
-use serde_json::{Value as Json, json};
+use serde::{Serialize, Serializer};
+
+use crate::entries::finite;
 
 /// The family to use.
 #[derive(Clone, Debug)]
@@ -41,7 +43,9 @@ pub enum Grounds {
 }
 
 /// The key that says how fast an observer is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
 pub enum Speed {
     /// `theta`
     Theta,
@@ -77,34 +81,87 @@ impl Speed {
     }
 }
 
-/// A value that the study leaves out.
-#[derive(Clone, Debug, PartialEq)]
+/// A value for a key that the study leaves out.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Proposal {
-    /// what it is of
+    /// the key of `[observer]`
+    #[serde(rename = "key")]
     pub speed: Speed,
     /// a number or a list of them, in 1/(unit of time)
+    #[serde(serialize_with = "plain")]
+    #[cfg_attr(test, schemars(with = "Plain"))]
     pub value: Value,
     /// where it comes from
     pub why: String,
     /// the best of values that were tried in simulation
+    #[serde(skip)]
     pub is_tried: bool,
 }
 
-impl Proposal {
-    pub(crate) fn to_json(&self) -> Json {
-        let value = match &self.value {
-            Value::List(values) => values.iter().map(plain).collect(),
-            one => plain(one),
-        };
-        json!({ "key": self.speed.key(), "value": value, "why": self.why })
-    }
+/// Numbers for machines.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(untagged)]
+enum Plain {
+    One(Option<f64>),
+    Several(Vec<Option<f64>>),
 }
 
-/// A number for machines.
-fn plain(value: &Value) -> Json {
-    match value {
-        Value::Number(x) => json!(x),
-        _ => Json::Null,
+fn plain<S: Serializer>(value: &Value, to: S) -> Result<S::Ok, S::Error> {
+    let number = |value: &Value| match value {
+        Value::Number(x) => finite(*x),
+        _ => None,
+    };
+    let plain = match value {
+        Value::List(values) => Plain::Several(values.iter().map(number).collect()),
+        one => Plain::One(number(one)),
+    };
+    plain.serialize(to)
+}
+
+/// Which family is taken, as `family = "auto"` does.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Choice"))]
+pub(crate) struct Chosen<'a> {
+    /// its name
+    family: &'static str,
+    /// whether the study names it
+    asked_for: bool,
+    /// what speaks for it
+    grounds: Standing,
+    /// a value for a key that the study leaves out
+    proposed: Option<&'a Proposal>,
+    /// families that may fit and are not taken, with the reason
+    passed_over: &'a [String],
+    /// what ended the search, where a limit did
+    ended: Option<String>,
+}
+
+/// What stands behind a family, in a word.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Grounds"))]
+#[serde(rename_all = "snake_case")]
+enum Standing {
+    Proved,
+    Undecided,
+    Filter,
+}
+
+impl<'a> From<&'a Choice> for Chosen<'a> {
+    fn from(choice: &'a Choice) -> Self {
+        Self {
+            family: choice.family.name(),
+            asked_for: choice.is_asked_for,
+            grounds: match choice.grounds {
+                Grounds::Proved { .. } => Standing::Proved,
+                Grounds::Undecided => Standing::Undecided,
+                Grounds::Filter => Standing::Filter,
+            },
+            proposed: choice.proposal.as_ref(),
+            passed_over: &choice.passed,
+            ended: choice.ended.map(|spent| spent.to_string()),
+        }
     }
 }
 
@@ -128,22 +185,6 @@ impl Choice {
             slot.or_insert_with(|| value.clone());
         }
         tuned
-    }
-
-    /// For machines.
-    pub(crate) fn to_json(&self) -> Json {
-        json!({
-            "family": self.family.name(),
-            "asked_for": self.is_asked_for,
-            "grounds": match self.grounds {
-                Grounds::Proved { .. } => "proved",
-                Grounds::Undecided => "undecided",
-                Grounds::Filter => "filter",
-            },
-            "proposed": self.proposal.as_ref().map(Proposal::to_json),
-            "passed_over": self.passed,
-            "ended": self.ended.map(|spent| spent.to_string()),
-        })
     }
 
     /// What a run says of the decision.

@@ -9,8 +9,9 @@ use lynkeus_observers as observers;
 use lynkeus_observers::Observer;
 use lynkeus_structure::AugmentedPlant;
 use lynkeus_words::short;
-use serde_json::{Map, Value, json};
+use serde::Serialize;
 
+use crate::entries::Named;
 use crate::{Error, Study, prepare::systems};
 
 /// Characters of an expression that a machine reads.
@@ -38,12 +39,15 @@ pub struct GainEntry {
     pub value: f64,
 }
 
-/// An entry of ∂F/∂y.
-#[derive(Clone, Debug, PartialEq)]
+/// The correction of a state by an output, an entry of ∂F/∂y, where it is no constant gain.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Injection"))]
 pub struct InjectionEntry {
     /// name of the observer's state
+    #[serde(skip)]
     pub state: String,
     /// name of the measured output
+    #[serde(skip)]
     pub output: String,
     /// the derivative, cut with `…` where it is very long
     pub expression: String,
@@ -136,27 +140,22 @@ fn at_start(study: &Study, plant: &Plant, observer: &Observer, node: Node) -> Op
 }
 
 impl Correction {
-    /// K by state, then by measured output; null where the correction is another.
-    pub fn gain_json(&self) -> Value {
-        match self {
-            Self::Gain(entries) => nested(
-                entries
-                    .iter()
-                    .map(|e| (&*e.state, &*e.output, json!(e.value))),
-            ),
-            Self::Varying(_) => Value::Null,
-        }
+    /// K by state, then by measured output; none where the correction is another.
+    pub(crate) fn gain(&self) -> Option<Named<Named<f64>>> {
+        let Self::Gain(entries) = self else {
+            return None;
+        };
+        let entries = entries.iter();
+        Some(nested(entries.map(|e| (&*e.state, &*e.output, e.value))))
     }
 
-    /// ∂F/∂y by state, then by measured output; null where it is K.
-    pub fn injection_json(&self) -> Value {
+    /// ∂F/∂y by state, then by measured output; none where it is K.
+    pub(crate) fn injection(&self) -> Option<Named<Named<&InjectionEntry>>> {
         let Self::Varying(entries) = self else {
-            return Value::Null;
+            return None;
         };
-        nested(entries.iter().map(|e| {
-            let value = json!({ "expression": e.expression, "at_start": e.at_start });
-            (&*e.state, &*e.output, value)
-        }))
+        let entries = entries.iter();
+        Some(nested(entries.map(|e| (&*e.state, &*e.output, e))))
     }
 
     fn outputs(&self) -> Vec<&str> {
@@ -170,12 +169,13 @@ impl Correction {
     }
 }
 
-fn nested<'a>(entries: impl Iterator<Item = (&'a str, &'a str, Value)>) -> Value {
-    let mut rows: Map<String, Value> = Map::new();
+fn nested<'a, T>(entries: impl Iterator<Item = (&'a str, &'a str, T)>) -> Named<Named<T>> {
+    let mut rows: Named<Named<T>> = Named::new();
     for (state, output, value) in entries {
-        rows.entry(state).or_insert_with(|| json!({}))[output] = value;
+        let row = rows.entry(state.to_owned()).or_default();
+        row.insert(output.to_owned(), value);
     }
-    Value::Object(rows)
+    rows
 }
 
 impl fmt::Display for Correction {

@@ -3,11 +3,12 @@
 use std::ops::ControlFlow;
 
 use lynkeus_observers::Design;
-use serde_json::{Map, Value, json};
+use serde::Serialize;
 
 use super::html::{Cell, Html, words};
 use super::positions::Positions;
 use crate::Error;
+use crate::entries::Named;
 use crate::prepare::Prepared;
 use crate::tune::slider::{self, Ground};
 use crate::tune::{Axis, Row, Sweep, axis, brief, shortened};
@@ -32,6 +33,17 @@ pub(super) struct Tradeoff {
     has_truth: bool,
     /// samples that are judged, where the log has more
     first: Option<usize>,
+}
+
+/// What is drawn of it.
+#[derive(Debug, Serialize)]
+pub(super) struct Drawn {
+    label: String,
+    values: Vec<Option<f64>>,
+    own: Option<usize>,
+    knee: Option<usize>,
+    good: Option<[f64; 2]>,
+    figures: Named<Vec<Option<f64>>>,
 }
 
 impl Tradeoff {
@@ -70,26 +82,24 @@ impl Tradeoff {
     }
 
     /// For the pictures; none where no position has a figure.
-    pub fn json(&self) -> Option<Value> {
+    pub fn drawn(&self) -> Option<Drawn> {
         let sweep = self.sweep.as_ref().ok()?;
         sweep.knee?;
         let measures = sweep.measures.iter().enumerate();
         let drawn = measures.filter(|(_, m)| DRAWN.contains(&m.name));
         let figures = drawn.filter(|(place, _)| has(sweep, *place));
-        let figures: Map<String, Value> = figures
-            .map(|(place, measure)| {
-                let values = sweep.rows.iter().map(|row| json!(row.figure(place)));
-                (measure.name.to_owned(), values.collect())
-            })
-            .collect();
-        Some(json!({
-            "label": swept(sweep),
-            "values": sweep.rows.iter().map(|row| row.values.first()).collect::<Vec<_>>(),
-            "own": self.own(),
-            "knee": sweep.knee,
-            "good": sweep.good().map(|good| [*good.start(), *good.end()]),
-            "figures": figures,
-        }))
+        let column = |place| sweep.rows.iter().map(|row| row.figure(place)).collect();
+        let values = sweep.rows.iter();
+        Some(Drawn {
+            label: swept(sweep),
+            values: values.map(|row| row.values.first().copied()).collect(),
+            own: self.own(),
+            knee: sweep.knee,
+            good: sweep.good().map(|good| [*good.start(), *good.end()]),
+            figures: figures
+                .map(|(place, measure)| (measure.name.to_owned(), column(place)))
+                .collect(),
+        })
     }
 
     /// The row of the study's own position.

@@ -61,3 +61,34 @@ pub(super) const LOG_MARGIN: usize = 4;
 
 /// The figure that is made least: the first of either list.
 pub(super) const OBJECTIVE: usize = 0;
+
+/// The figures of a row as entries: those of both lists. A test holds them together.
+#[cfg(test)]
+#[derive(schemars::JsonSchema)]
+#[allow(dead_code)]
+pub(super) struct Figures {
+    /// mean error, noise included; in simulation
+    mean_error: Option<f64>,
+    /// mean error without noise
+    mean_error_exact: Option<f64>,
+    /// mean error that the noise makes
+    mean_error_noise: Option<f64>,
+    /// the time from which on the error is small
+    settling_time: Option<f64>,
+    /// the largest error
+    peak_error: Option<f64>,
+    /// noise of the estimates beside that of the sensors
+    noise_gain: Option<f64>,
+    /// the error in the end under `disturbance`
+    ultimate_bound: Option<f64>,
+    /// the longest stable step beside the step of the samples
+    sampling_margin: Option<f64>,
+    /// error on samples that were held out; on a log
+    held_out_error: Option<f64>,
+    /// innovation, root mean square
+    innovation: Option<f64>,
+    /// Ljung–Box statistic per lag; of white innovations 1
+    ljung_box: Option<f64>,
+    /// share of autocorrelations outside of the 95 % band
+    outside_band: Option<f64>,
+}

@@ -30,6 +30,8 @@ use std::ops::ControlFlow;
 
 pub use axis::Axis;
 pub use measures::Measure;
+#[cfg(test)]
+pub(crate) use report::SweepReport;
 pub(crate) use report::{brief, shortened};
 pub use rewrite::Change;
 pub use row::{Peak, Row};

@@ -4,12 +4,67 @@ use std::fmt;
 
 use lynkeus_expr::real::rounded;
 use lynkeus_words::counted;
-use serde_json::{Map, Value, json};
+use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::axis::shown;
-use super::{Row, Sweep};
+use super::{Peak, Row, Sweep};
 use crate::Error;
+use crate::entries::Named;
+use crate::prepare::declared::Account;
 use lynkeus_table::significant;
+
+/// The answer of `tune`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(crate) struct SweepReport<'a> {
+    /// the name of the model
+    plant: &'a str,
+    /// the log by which it was judged; none in simulation
+    log: Option<&'a str>,
+    /// the keys that are swept
+    keys: Vec<SweptKey<'a>>,
+    /// the study's own value of each key
+    present: Named<Option<f64>>,
+    /// the tuning of the least error
+    knee: Option<SweptRow<'a>>,
+    /// values of the first key whose error is within 10 % of that, `[smallest, largest]`
+    nearly_as_good: Option<[f64; 2]>,
+    /// each tuning
+    rows: Vec<SweptRow<'a>>,
+    /// what of the study's declarations was counted
+    declared: &'a Account,
+    /// what you should know
+    notes: &'a [String],
+}
+
+/// A key that is swept.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct SweptKey<'a> {
+    /// the key of `[observer]`
+    key: &'a str,
+    /// whether its values are factors on all numbers of a list
+    factor: bool,
+}
+
+/// A tuning and its figures; errors are shares of the declared ranges.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct SweptRow<'a> {
+    /// the value of each key that is swept
+    keys: Named<f64>,
+    /// by the names of the measures
+    #[serde(flatten)]
+    #[cfg_attr(test, schemars(with = "super::measures::Figures"))]
+    figures: Named<Option<f64>>,
+    /// the largest error, where it is known
+    #[serde(skip_serializing_if = "Option::is_none")]
+    peak: Option<&'a Peak>,
+    /// why there are no figures
+    #[serde(skip_serializing_if = "Option::is_none")]
+    failure: Option<&'a str>,
+}
 
 impl Sweep {
     /// The rows as CSV: the keys, the figures (empty where there is none), 1 at the knee, and
@@ -38,36 +93,34 @@ impl Sweep {
 
     /// The sweep for machines.
     pub fn to_json(&self) -> Value {
-        let good = self.good().map(|range| [*range.start(), *range.end()]);
-        let present = self.axes.iter().map(|a| (a.key.clone(), json!(a.present)));
-        json!({
-            "plant": self.plant,
-            "log": self.log,
-            "keys": self.axes.iter().map(|a| json!({ "key": a.key, "factor": a.is_factor })).collect::<Vec<_>>(),
-            "present": present.collect::<Map<_, _>>(),
-            "knee": self.chosen().map(|row| self.row_to_json(row)),
-            "nearly_as_good": good,
-            "rows": self.rows.iter().map(|row| self.row_to_json(row)).collect::<Vec<_>>(),
-            "declared": self.declared.to_json(),
-            "notes": self.notes,
+        let axes = || self.axes.iter();
+        json!(SweepReport {
+            plant: &self.plant,
+            log: self.log.as_deref(),
+            keys: axes()
+                .map(|axis| SweptKey {
+                    key: &axis.key,
+                    factor: axis.is_factor,
+                })
+                .collect(),
+            present: axes().map(|a| (a.key.clone(), a.present)).collect(),
+            knee: self.chosen().map(|row| self.entry(row)),
+            nearly_as_good: self.good().map(|range| [*range.start(), *range.end()]),
+            rows: self.rows.iter().map(|row| self.entry(row)).collect(),
+            declared: &self.declared,
+            notes: &self.notes,
         })
     }
 
-    fn row_to_json(&self, row: &Row) -> Value {
+    fn entry<'a>(&self, row: &'a Row) -> SweptRow<'a> {
         let keys = self.axes.iter().zip(&row.values);
-        let keys: Map<_, _> = keys.map(|(a, x)| (a.key.clone(), json!(x))).collect();
         let figures = self.measures.iter().zip(&row.figures);
-        let mut object: Map<String, Value> = Map::new();
-        object.insert("keys".to_owned(), keys.into());
-        object.extend(figures.map(|(m, x)| (m.name.to_owned(), json!(x))));
-        if let Some(peak) = &row.peak {
-            let peak = json!({ "name": peak.name, "estimate": peak.estimate, "time": peak.time });
-            object.insert("peak".to_owned(), peak);
+        SweptRow {
+            keys: keys.map(|(axis, x)| (axis.key.clone(), *x)).collect(),
+            figures: figures.map(|(m, x)| (m.name.to_owned(), *x)).collect(),
+            peak: row.peak.as_ref(),
+            failure: row.failure.as_deref(),
         }
-        if let Some(failure) = &row.failure {
-            object.insert("failure".to_owned(), json!(failure));
-        }
-        object.into()
     }
 
     /// The knee in a sentence.

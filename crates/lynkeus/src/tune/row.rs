@@ -1,5 +1,7 @@
 //! A combination of values, and what came of it.
 
+use serde::Serialize;
+
 /// One combination of values and what came of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
@@ -14,13 +16,14 @@ pub struct Row {
 }
 
 /// The largest error of a run after its start.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Peak {
-    /// The quantity.
+    /// the quantity
     pub name: String,
-    /// Its estimate there, in its unit.
+    /// its estimate there, in its unit
     pub estimate: f64,
-    /// When, in the plant's unit of time.
+    /// the time
     pub time: f64,
 }
 

@@ -2,7 +2,7 @@
 //! observer gives what `estimate` gives.
 
 mod browser;
-mod markup;
+pub(crate) mod markup;
 mod tradeoff;
 
 use std::process::Command;

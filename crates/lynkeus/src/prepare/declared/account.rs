@@ -2,17 +2,21 @@
 
 use std::fmt;
 
-use serde_json::{Map, Value, json};
+use serde::Serialize;
 
 use super::Kind;
+use crate::entries;
 
 /// What a claim counts of what the study declares, and what it leaves aside, with the reason. What is not
 /// declared is in neither.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Declared"))]
 pub struct Account {
-    /// kinds of declarations that it counts
+    /// kinds of declarations that it counts, `ranges` for example
     pub counted: Vec<&'static str>,
-    /// those that it leaves aside, and why
+    /// kinds that it leaves aside, with the reason
+    #[serde(serialize_with = "entries::pairs")]
+    #[cfg_attr(test, schemars(with = "entries::Named<String>"))]
     pub left_aside: Vec<(&'static str, &'static str)>,
 }
 
@@ -36,15 +40,6 @@ impl Account {
             true => self.counts(kind),
             false => self.leaves(kind, why),
         }
-    }
-
-    /// `{counted: […], left_aside: {kind: why}}`
-    pub(crate) fn to_json(&self) -> Value {
-        let left = self
-            .left_aside
-            .iter()
-            .map(|(kind, why)| ((*kind).to_owned(), json!(why)));
-        json!({ "counted": self.counted, "left_aside": left.collect::<Map<_, _>>() })
     }
 
     /// The sentence; none where nothing is left aside.
