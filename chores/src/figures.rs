@@ -49,12 +49,7 @@ struct Published {
 
 /// Draws every figure.
 pub fn draw() -> Result<(), String> {
-    run(&mut cargo(&[
-        "build",
-        "--release",
-        "--package",
-        "lynkeus-cli",
-    ]))?;
+    run(&mut cargo(&["build", "--release", "-p", "lynkeus-cli"]))?;
     let folder = target().join("figures");
     fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let mut tables = HashMap::new();

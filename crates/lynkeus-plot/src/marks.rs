@@ -38,9 +38,9 @@ pub(super) fn stroke(kind: Kind) -> (Ink, u32) {
 }
 
 /// Where a panel's values are on the sheet.
-pub(super) struct Frame {
-    pub x: Axis,
-    pub y: Axis,
+pub(super) struct Frame<'f> {
+    pub x: &'f Axis,
+    pub y: &'f Axis,
     pub left: i32,
     pub right: i32,
     pub top: i32,
@@ -54,7 +54,7 @@ fn is_inside(share: &Share) -> bool {
     (0.0..=1.0).contains(&share.1)
 }
 
-impl Frame {
+impl Frame<'_> {
     /// The pixel of shares of the frame, the last one that is not beyond.
     pub fn pixel(&self, (x, y): Share) -> Pixel {
         let steps = |pixels: i32, share: f64| (f64::from(pixels) * share + 1e-3).floor() as i32;
@@ -100,10 +100,8 @@ impl Frame {
 
     /// A band, cut where the axis ends.
     fn band(&self, svg: &mut Svg, band: &Band) {
-        let (low, high) = (
-            self.shares(&band.time, &band.low),
-            self.shares(&band.time, &band.high),
-        );
+        let low = self.shares(&band.time, &band.low);
+        let high = self.shares(&band.time, &band.high);
         for (low, high) in stretches(&low).zip(stretches(&high)) {
             let outline = high.iter().chain(low.iter().rev());
             let outline: Vec<Share> = outline.map(|p| (p.0, p.1.clamp(0.0, 1.0))).collect();
@@ -186,21 +184,20 @@ impl Frame {
 
     fn line(&self, svg: &mut Svg, shares: &[Share], (ink, width): (Ink, u32)) {
         for piece in clipped(shares) {
-            match piece.first().filter(|_| is_dot(&piece)) {
-                Some(at) => svg.dot(self.pixel(*at), 1 + width / 2, ink),
+            match dot(&piece) {
+                Some(at) => svg.dot(self.pixel(at), 1 + width / 2, ink),
                 None => svg.path(&self.pixels(&piece), ink, width),
             }
         }
     }
 }
 
-/// Whether a piece of a curve is too small for a line.
-fn is_dot(piece: &[Share]) -> bool {
-    let is_near = |pair: &[Share]| {
-        (pair[1].0 - pair[0].0).abs() < WIDTH_OF_DOT
-            && (pair[1].1 - pair[0].1).abs() < HEIGHT_OF_DOT
-    };
-    piece.iter().all(|p| is_near(&[piece[0], *p]))
+/// Where a piece of a curve is that is too small for a line.
+fn dot(piece: &[Share]) -> Option<Share> {
+    let first = *piece.first()?;
+    let is_near =
+        |p: &Share| (p.0 - first.0).abs() < WIDTH_OF_DOT && (p.1 - first.1).abs() < HEIGHT_OF_DOT;
+    piece.iter().all(is_near).then_some(first)
 }
 
 /// Spans in their order, with gaps shorter than `gap` closed.

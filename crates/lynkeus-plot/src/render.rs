@@ -93,26 +93,18 @@ impl Sheet {
             .find_map(|p| Some((p.across.as_ref()?, &p.caption)));
         let (scale, name) = own.unwrap_or((&figure.across, &figure.label));
         let x = across(scale, name, &panels)?;
-        let legend = Legend::of(&panels);
-        match self.bottom {
-            0 => self.head(&figure.title, &legend),
-            top => {
-                legend.draw(&mut self.svg, EDGES, top + LEGEND / 2);
-                self.bottom += LEGEND;
-            }
-        }
+        self.head(&figure.title, &Legend::of(&panels));
         let count = figure.panels.len();
-        let upwards = group
-            .iter()
-            .flat_map(|s| upwards(&s.y, height(s.panel, count)));
-        let widest = upwards.map(|(_, words)| width(&words, NUMBERS)).max();
+        let ticks = |shown: &Shown<'_>| upwards(&shown.y, height(shown.panel, count));
+        let numbers = group.iter().flat_map(ticks);
+        let widest = numbers.map(|(_, words)| width(&words, NUMBERS)).max();
         let left = EDGES.0.max(widest.unwrap_or(0).min(NAMES) + BESIDE);
         for (i, shown) in group.iter().enumerate() {
             let top = self.bottom + CAPTION;
             self.bottom = top + height(shown.panel, count);
             let frame = Frame {
-                x: x.clone(),
-                y: shown.y.clone(),
+                x: &x,
+                y: &shown.y,
                 left,
                 right: EDGES.1 - 1,
                 top,
@@ -121,13 +113,7 @@ impl Sheet {
             self.caption(&frame, shown);
             let is_last = i + 1 == group.len();
             if is_last {
-                self.bottom += NUMBERED;
-            }
-            if is_last && own.is_none() {
-                self.bottom += LABEL;
-                let at = ((EDGES.0 + EDGES.1) / 2, self.bottom);
-                let label = fitted(&figure.label, WORDS, ROOM);
-                self.svg.text(&label, at, WORDS, BELOW);
+                self.foot(own.is_none().then_some(&figure.label));
             }
             self.axes(&frame, is_last);
             frame.draw(&mut self.svg, shown.panel);
@@ -135,8 +121,13 @@ impl Sheet {
         Ok(())
     }
 
-    /// The title on the left, the legend on the right, under the title where it does not fit.
+    /// The legend of the panels that follow. At the top it is at the right of the title, under it where it does not fit.
     fn head(&mut self, title: &str, legend: &Legend) {
+        if self.bottom > 0 {
+            legend.draw(&mut self.svg, EDGES, self.bottom + LEGEND / 2);
+            self.bottom += LEGEND;
+            return;
+        }
         let (title_at, legend_at) = match width(title, TITLE) + legend.width() <= ROOM {
             true => (16, 26),
             false => (8, 38),
@@ -147,8 +138,19 @@ impl Sheet {
         self.bottom = HEAD;
     }
 
+    /// Room for the numbers of an axis across, and its label.
+    fn foot(&mut self, label: Option<&String>) {
+        self.bottom += NUMBERED;
+        if let Some(label) = label {
+            self.bottom += LABEL;
+            let at = ((EDGES.0 + EDGES.1) / 2, self.bottom);
+            let words = fitted(label, WORDS, ROOM);
+            self.svg.text(&words, at, WORDS, BELOW);
+        }
+    }
+
     /// The caption, and on the right how far an estimate peaks.
-    fn caption(&mut self, frame: &Frame, shown: &Shown<'_>) {
+    fn caption(&mut self, frame: &Frame<'_>, shown: &Shown<'_>) {
         let is_worst = shown.panel.curves.iter().any(|c| c.kind == Kind::Worst);
         let who = if is_worst { "worst run" } else { "estimate" };
         let note = shown.beyond.map_or(String::new(), |beyond| {
@@ -164,12 +166,12 @@ impl Sheet {
     }
 
     /// Grid, axes and numbers; those across where they are asked for.
-    fn axes(&mut self, frame: &Frame, has_across: bool) {
+    fn axes(&mut self, frame: &Frame<'_>, has_across: bool) {
         let (left, right, top, bottom) = (frame.left, frame.right, frame.top, frame.bottom);
         let across = frame.x.ticks(9).into_iter();
         let across = across.map(|(share, words)| (frame.pixel((share, 0.0)).0, words));
         let across: Vec<(i32, String)> = across.collect();
-        let upwards = upwards(&frame.y, bottom + 1 - top).into_iter();
+        let upwards = upwards(frame.y, bottom + 1 - top).into_iter();
         let upwards = upwards.map(|(share, words)| (frame.pixel((0.0, share)).1, words));
         let upwards: Vec<(i32, String)> = upwards.collect();
         let svg = &mut self.svg;
