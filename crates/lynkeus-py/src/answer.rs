@@ -150,7 +150,7 @@ impl Answer {
         Ok(figure.map(|figure| {
             let panels = figure.panels.into_iter();
             let captions = panels.map(|panel| (panel.name, panel.caption)).collect();
-            (figure.time_label, captions)
+            (figure.label, captions)
         }))
     }
 

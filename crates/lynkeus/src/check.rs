@@ -5,6 +5,8 @@ mod knowledge;
 mod known;
 mod next;
 mod observability;
+#[cfg(feature = "plot")]
+mod picture;
 mod report;
 mod reserves;
 mod uniform;
@@ -250,21 +252,6 @@ impl Report {
             || self.examinations.iter().any(|e| e.spent().is_some())
             || with_theorem
             || (chosen.is_some() && !self.answer.quantities.iter().any(hidden))
-    }
-
-    /// The singular set inside the box, for a plant with two states.
-    ///
-    /// # Errors
-    /// Another number of states, or a state without range.
-    #[cfg(feature = "plot")]
-    pub fn picture(&self) -> Result<lynkeus_plot::Plane, Error> {
-        match &self.uniform {
-            Some(uniform) => uniform::picture(&self.plant, uniform.examined()),
-            None => Err(Error::refused(format!(
-                "{}: the singular set was not examined: it needs values for all parameters, at most six states, and outputs that show them",
-                self.plant
-            ))),
-        }
     }
 }
 

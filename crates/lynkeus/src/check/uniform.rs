@@ -2,15 +2,9 @@
 
 use lynkeus_answer::Document;
 use lynkeus_structure::{self as structure, Blind, Coordinate, Place, Uniformity};
-#[cfg(feature = "plot")]
-use lynkeus_words::counted;
 
 use crate::words::{number, side};
-#[cfg(feature = "plot")]
-use crate::{Error, plot::Plane};
 use lynkeus_observability::{Answer, Quantity, Verdict};
-#[cfg(feature = "plot")]
-use lynkeus_structure::Dimension;
 
 /// What was found on the box, and how far it may be said beside the verdicts on the
 /// quantities: the box is examined with unknown inputs that stay constant, the verdicts are on
@@ -159,31 +153,4 @@ fn hull(parts: &[Place]) -> String {
         )
     });
     sides.collect::<Vec<_>>().join(", ")
-}
-
-/// The singular set of a plant with two states.
-#[cfg(feature = "plot")]
-pub(super) fn picture(plant: &str, uniformity: &Uniformity) -> Result<Plane, Error> {
-    let [x, y] = &uniformity.sides[..] else {
-        let message = format!(
-            "{plant} has {} with its unknown inputs: a picture of the singular set needs two; --json lists its parts",
-            counted(uniformity.sides.len(), "state")
-        );
-        return Err(Error::refused(message));
-    };
-    let along = |part: &Place, whole: &Dimension| {
-        let side = part.iter().find(|side| side.name == whole.name);
-        let Dimension { min, max, .. } = side.unwrap_or(whole);
-        *min..*max
-    };
-    let parts = uniformity.singular.iter();
-    let parts = parts.map(|part| (along(part, x), along(part, y)));
-    Ok(Plane {
-        title: format!(
-            "{plant}: where the outputs' derivatives may not tell neighbouring states apart"
-        ),
-        across: (x.name.clone(), x.min..x.max),
-        upwards: (y.name.clone(), y.min..y.max),
-        parts: parts.collect(),
-    })
 }
