@@ -29,7 +29,6 @@ class Kept:
     zero: tuple[int, bool] | None
     refused: LynkeusError | None
     warned: tuple[str, ...]
-    errors: tuple[tuple[str, float | None], ...]
     seen: tuple[tuple[str, Column], ...] | LynkeusError
 
     @classmethod
@@ -49,7 +48,6 @@ class Kept:
             core.origin(),
             core.refusal(),
             tuple(core.warnings()),
-            tuple(core.settled()),
             _tried(lambda: tuple(core.log())),
         )
 
@@ -101,9 +99,6 @@ class Kept:
 
     def warnings(self) -> list[str]:
         return list(self.warned)
-
-    def settled(self) -> list[tuple[str, float | None]]:
-        return list(self.errors)
 
     def log(self) -> list[tuple[str, Column]]:
         return list(_given(self.seen))

@@ -45,8 +45,6 @@ class Answer:
     def warnings(self) -> list[str]:
         """What of a log contradicts itself, or counts nowhere."""
 
-    def settled(self) -> list[tuple[str, float | None]]:
-        """Root mean square errors over the last half of the rows, by name."""
 
 class Log:
     """A table of named columns of equal length."""

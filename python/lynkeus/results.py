@@ -527,5 +527,5 @@ def figures(run: Run) -> dict[str, Any]:
         rows in the quantity's unit.
     """
     refusal: LynkeusError | None = run.refusal
-    rms = {f"rms_{name}": error for name, error in run._core.settled()}
+    rms = {f"rms_{name}": error for name, error in run.summary["rms_error_last_half"].items()}
     return {"credible": refusal is None, "refusal": None if refusal is None else str(refusal), **rms}

@@ -188,14 +188,6 @@ impl Answer {
         self.ask(py, |found| found.warnings().to_vec())
     }
 
-    /// By name; none where one is no number.
-    fn settled(&self, py: Python<'_>) -> Vec<(String, Option<f64>)> {
-        let errors = self.ask(py, |found| found.settled()).into_iter();
-        errors
-            .map(|(name, error)| (name, Some(error).filter(|x| x.is_finite())))
-            .collect()
-    }
-
     fn log<'py>(&self, py: Python<'py>) -> PyResult<Vec<Named<'py>>> {
         let columns = self
             .ask(py, |found| found.log())

@@ -71,11 +71,6 @@ pub trait Answer: Send {
         &[]
     }
 
-    /// Root mean square errors over the last half of the rows, of what is estimated.
-    fn settled(&self) -> Vec<(String, f64)> {
-        vec![]
-    }
-
     /// What a logger would have seen, in its columns.
     ///
     /// # Errors

@@ -81,12 +81,6 @@ impl Answer for Outcome {
         &self.notes
     }
 
-    fn settled(&self) -> Vec<(String, f64)> {
-        let estimated = self.quantities.iter().filter(|q| q.estimate.is_some());
-        let errors = estimated.filter_map(|q| Some((q.name.clone(), q.settled_error()?)));
-        errors.collect()
-    }
-
     fn log(&self) -> Result<Vec<(String, Series)>, Error> {
         Self::log(self)
     }
