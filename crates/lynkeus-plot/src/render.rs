@@ -213,5 +213,5 @@ fn height(panel: &Panel, count: usize) -> i32 {
 
 /// The ticks of an axis upwards of such a height.
 fn upwards(y: &Axis, height: i32) -> Vec<(f64, String)> {
-    y.ticks((height as usize / 60).clamp(5, 10))
+    y.ticks((height as usize / 55).clamp(5, 10))
 }
