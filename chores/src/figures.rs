@@ -1,14 +1,13 @@
 //! The papers' figures, drawn again by the tool from the shipped studies: `target/figures/<paper>-<n>.svg`.
 //!
-//! Grey is the plant or, of an error, zero; black the estimate, dashed the observer that the paper compares with. Rings
-//! are a trajectory that was computed apart from this project, where it is at hand. What a figure shows of two
-//! simulations belongs together: starts and inputs are the same.
+//! What a figure shows of two simulations belongs together: starts and inputs are the same. A trajectory that was computed
+//! apart from this project is shown where it is at hand.
 
 use std::collections::HashMap;
-use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use lynkeus::plot::{Figure, Kind, Panel, Scale};
 use xtask::process::{cargo, root, run, target};
 
 /// What a curve shows.
@@ -20,37 +19,37 @@ enum Shown {
     Error(&'static str),
 }
 
-/// A curve, or the rings of a trajectory that was computed apart.
+/// A curve, or the points of a trajectory that was computed apart.
 #[derive(Clone, Copy)]
 struct Curve {
     /// a study below `examples`, or a table of reference trajectories
     source: &'static str,
     shown: Shown,
-    style: Style,
+    kind: Kind,
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum Style {
-    Grey,
-    Solid,
-    Dashed,
-    Rings,
-}
+/// The kinds of curves with their words.
+const KINDS: [(Kind, &str); 4] = [
+    (PLANT, "plant"),
+    (ESTIMATE, "estimate"),
+    (COMPARED, "compared with"),
+    (APART, "computed apart"),
+];
+const PLANT: Kind = Kind::True;
+const ESTIMATE: Kind = Kind::Estimated;
+const COMPARED: Kind = Kind::Smoothed;
+const APART: Kind = Kind::Measured;
 
 /// One figure of a paper.
-struct Figure {
+struct Published {
     file: String,
     title: String,
     curves: Vec<Curve>,
 }
 
-const WIDTH: f64 = 640.0;
-const HEIGHT: f64 = 320.0;
-const MARGIN: f64 = 48.0;
-
 /// Draws every figure.
 pub fn draw() -> Result<(), String> {
-    run(&mut cargo(&["build", "--release", "--package", "lynkeus"]))?;
+    run(&mut cargo(&["build", "--release", "-p", "lynkeus-cli"]))?;
     let folder = target().join("figures");
     fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let mut tables = HashMap::new();
@@ -64,10 +63,10 @@ pub fn draw() -> Result<(), String> {
                 }
             };
             let Some(table) = table else { continue };
-            drawn.push((curve.style, points(table, curve.shown)?));
+            drawn.push((curve.kind, points(table, curve.shown)?));
         }
         let path = folder.join(format!("{}.svg", figure.file));
-        let text = svg(&figure.title, &drawn);
+        let text = svg(figure.title, &drawn)?;
         fs::write(&path, text).map_err(|error| format!("{}: {error}", path.display()))?;
         eprintln!("drew {}", path.display());
     }
@@ -75,15 +74,15 @@ pub fn draw() -> Result<(), String> {
 }
 
 /// The figures of the five papers, by paper and number.
-fn figures() -> Vec<Figure> {
-    let curve = |source, shown, style| Curve {
+fn figures() -> Vec<Published> {
+    let curve = |source, shown, kind| Curve {
         source,
         shown,
-        style,
+        kind,
     };
     let mut all = vec![];
     let mut add = |file: String, title: String, curves: Vec<Curve>| {
-        all.push(Figure {
+        all.push(Published {
             file,
             title,
             curves,
@@ -93,14 +92,14 @@ fn figures() -> Vec<Figure> {
         add(
             format!("lee-{}", i + 1),
             format!(
-                "Lee, Yee, Park, figure {}: error of {x}; (7) solid, (3) dashed",
+                "Lee, Yee, Park, figure {}: error of {x} by (7), compared with (3)",
                 i + 1
             ),
             vec![
-                curve("lee/study.toml", Shown::Error(x), Style::Solid),
-                curve("lee/classical.toml", Shown::Error(x), Style::Dashed),
-                curve("lee_observer7.csv", Shown::Error(x), Style::Rings),
-                curve("lee_observer3.csv", Shown::Error(x), Style::Rings),
+                curve("lee/study.toml", Shown::Error(x), ESTIMATE),
+                curve("lee/classical.toml", Shown::Error(x), COMPARED),
+                curve("lee_observer7.csv", Shown::Error(x), APART),
+                curve("lee_observer3.csv", Shown::Error(x), APART),
             ],
         );
     }
@@ -110,18 +109,18 @@ fn figures() -> Vec<Figure> {
         add(
             format!("germani-manes-{}", i + 1),
             format!(
-                "Germani, Manes, figure {}: {x} and its estimate by (4.22); (4.1) dashed",
+                "Germani, Manes, figure {}: {x} and its estimate by (4.22), compared with (4.1)",
                 i + 1
             ),
             vec![
-                curve(practical, Shown::Column(x), Style::Grey),
-                curve(practical, Shown::Column(hat), Style::Solid),
+                curve(practical, Shown::Column(x), PLANT),
+                curve(practical, Shown::Column(hat), ESTIMATE),
                 curve(
                     "germani-manes/theoretical.toml",
                     Shown::Column(hat),
-                    Style::Dashed,
+                    COMPARED,
                 ),
-                curve("germani_theoretical.csv", Shown::Column(hat), Style::Rings),
+                curve("germani_theoretical.csv", Shown::Column(hat), APART),
             ],
         );
     }
@@ -131,9 +130,9 @@ fn figures() -> Vec<Figure> {
             format!("farza-1-{x}"),
             format!("Farza et al., figure 1: {x} and its estimate, with noise"),
             vec![
-                curve(noisy, Shown::Column(x), Style::Grey),
-                curve(noisy, Shown::Column(hat), Style::Solid),
-                curve("farza_a1.csv", Shown::Column(hat), Style::Rings),
+                curve(noisy, Shown::Column(x), PLANT),
+                curve(noisy, Shown::Column(hat), ESTIMATE),
+                curve("farza_a1.csv", Shown::Column(hat), APART),
             ],
         );
     }
@@ -142,13 +141,13 @@ fn figures() -> Vec<Figure> {
         add(
             format!("ltaief-2-{x}"),
             format!(
-                "Ltaief et al., figure 2: {x} and its estimate, with noise (theta = 1); theta = 10 without noise dashed"
+                "Ltaief et al., figure 2: {x} and its estimate, with noise (theta = 1), compared with theta = 10"
             ),
             vec![
-                curve(noisy, Shown::Column(x), Style::Grey),
-                curve(noisy, Shown::Column(hat), Style::Solid),
-                curve("ltaief/study.toml", Shown::Column(hat), Style::Dashed),
-                curve("ltaief_theta10.csv", Shown::Column(hat), Style::Rings),
+                curve(noisy, Shown::Column(x), PLANT),
+                curve(noisy, Shown::Column(hat), ESTIMATE),
+                curve("ltaief/study.toml", Shown::Column(hat), COMPARED),
+                curve("ltaief_theta10.csv", Shown::Column(hat), APART),
             ],
         );
     }
@@ -161,15 +160,15 @@ fn figures() -> Vec<Figure> {
     for (number, study, what) in column {
         for (name, x, hat) in [("x6", "x[6]", "x[6]_hat"), ("Zf", "Zf", "Zf_hat")] {
             let mut curves = vec![
-                curve(study, Shown::Column(x), Style::Grey),
-                curve(study, Shown::Column(hat), Style::Solid),
+                curve(study, Shown::Column(x), PLANT),
+                curve(study, Shown::Column(hat), ESTIMATE),
             ];
             if number == 5 {
                 let reference = if name == "x6" { "x6_hat" } else { "Zf_hat" };
                 curves.push(curve(
                     "hammouri_theta3.5.csv",
                     Shown::Column(reference),
-                    Style::Rings,
+                    APART,
                 ));
             }
             add(
@@ -245,66 +244,28 @@ fn points((header, rows): &Table, shown: Shown) -> Result<Vec<(f64, f64)>, Strin
         .collect())
 }
 
-/// A picture with axes from the least to the largest value.
-fn svg(title: &str, curves: &[(Style, Vec<(f64, f64)>)]) -> String {
-    let all = || curves.iter().flat_map(|(_, points)| points);
-    let ends = |values: &mut dyn Iterator<Item = f64>| {
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
-            (low.min(x), high.max(x))
-        })
+/// A picture whose axis reaches from the least to the largest value.
+fn svg(title: String, curves: &[(Kind, Vec<(f64, f64)>)]) -> Result<String, String> {
+    let values = || curves.iter().flat_map(|(_, points)| points).map(|p| p.1);
+    let low = values().fold(f64::INFINITY, f64::min);
+    let high = values().fold(f64::NEG_INFINITY, f64::max);
+    let curves = curves.iter().map(|(kind, points)| {
+        let mut named = KINDS.iter().filter(|(known, _)| known == kind);
+        let name = named.next().map_or("", |(_, name)| *name);
+        lynkeus::plot::Curve::through(*kind, points.iter().copied()).named(name)
+    });
+    let panel = Panel {
+        curves: curves.collect(),
+        upwards: Scale::Within(low..high),
+        ..Panel::default()
     };
-    let (from, to) = ends(&mut all().map(|p| p.0));
-    let (low, high) = ends(&mut all().map(|p| p.1));
-    let along =
-        |t: f64| MARGIN + (t - from) / (to - from).max(f64::MIN_POSITIVE) * (WIDTH - 2.0 * MARGIN);
-    let up = |y: f64| {
-        HEIGHT - MARGIN - (y - low) / (high - low).max(f64::MIN_POSITIVE) * (HEIGHT - 2.0 * MARGIN)
+    let figure = Figure {
+        title,
+        label: "time".to_owned(),
+        panels: vec![panel],
+        ..Figure::default()
     };
-    let mut text = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" font-size=\"11\">\n<rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"white\"/>\n<text x=\"{MARGIN}\" y=\"20\">{title}</text>\n"
-    );
-    let (left, right, bottom, top) = (MARGIN, WIDTH - MARGIN, HEIGHT - MARGIN, MARGIN);
-    // writing to a String does not fail
-    let _ = writeln!(
-        text,
-        "<path d=\"M{left} {top}V{bottom}H{right}\" fill=\"none\" stroke=\"#888\"/>"
-    );
-    for (x, y, label) in [
-        (left, bottom + 16.0, from),
-        (right - 16.0, bottom + 16.0, to),
-        (4.0, bottom, low),
-        (4.0, top + 8.0, high),
-    ] {
-        let _ = writeln!(text, "<text x=\"{x}\" y=\"{y}\">{label:.3}</text>");
-    }
-    for (style, points) in curves {
-        if *style == Style::Rings {
-            for (t, y) in points {
-                let _ = writeln!(
-                    text,
-                    "<circle cx=\"{:.2}\" cy=\"{:.2}\" r=\"2.5\" fill=\"none\" stroke=\"#c33\"/>",
-                    along(*t),
-                    up(*y)
-                );
-            }
-            continue;
-        }
-        let path: Vec<String> = points
-            .iter()
-            .map(|(t, y)| format!("{:.2},{:.2}", along(*t), up(*y)))
-            .collect();
-        let (colour, dashes) = match style {
-            Style::Grey => ("#999", ""),
-            Style::Dashed => ("black", " stroke-dasharray=\"5 3\""),
-            _ => ("black", ""),
-        };
-        let _ = writeln!(
-            text,
-            "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\"{dashes}/>",
-            path.join(" ")
-        );
-    }
-    text + "</svg>\n"
+    figure.to_svg().map_err(|error| error.to_string())
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ const REFUSED: i32 = 1;
 pub fn draw() -> Result<(), String> {
     let pictures = root().join("docs").join("pictures");
     fs::create_dir_all(&pictures).map_err(|error| at(&pictures, &error))?;
-    run(&mut cargo(&["build", "--release", "--package", "lynkeus"]))?;
+    run(&mut cargo(&["build", "--release", "-p", "lynkeus-cli"]))?;
     for folder in sorted(&root().join("examples"))? {
         let plant = name_of(&folder);
         for study in sorted(&folder)? {
@@ -47,7 +47,7 @@ fn title(plant: &str, study: &Path) -> String {
 }
 
 fn draw_study(study: &Path, picture: &Path) -> Result<(), String> {
-    let mut tool = cargo(&["run", "--release", "--quiet", "--package", "lynkeus", "--"]);
+    let mut tool = cargo(&["run", "--release", "--quiet", "-p", "lynkeus-cli", "--"]);
     let log = study.with_file_name("log.csv");
     if log.exists() {
         tool.arg("estimate").arg(study).arg(log);

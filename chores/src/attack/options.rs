@@ -58,7 +58,9 @@ impl Options {
             true => (&[], "debug"),
             false => (&["--release"], "release"),
         };
-        run(&mut cargo(&[&["build", "-p", "lynkeus"], profile].concat()))?;
+        run(&mut cargo(
+            &[&["build", "-p", "lynkeus-cli"], profile].concat(),
+        ))?;
         let name = format!("lynkeus{}", std::env::consts::EXE_SUFFIX);
         Ok(target().join(folder).join(name))
     }

@@ -27,7 +27,7 @@ const HEAD: &str = "\
 
 /// Computes the table again; only rows whose study contains `only`, the others stay.
 pub fn tabulate(only: Option<&str>) -> Result<(), String> {
-    run(&mut cargo(&["build", "--release", "--package", "lynkeus"]))?;
+    run(&mut cargo(&["build", "--release", "-p", "lynkeus-cli"]))?;
     let page = root().join("docs").join("gap.md");
     let text = fs::read_to_string(&page).map_err(|e| format!("{}: {e}", page.display()))?;
     let (before, rest) = text

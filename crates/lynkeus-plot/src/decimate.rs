@@ -1,7 +1,5 @@
 //! Long curves reduced to what a screen can show, and cut at the frame.
 
-use std::ops::Range;
-
 use lynkeus_table::Series;
 
 /// A point on a picture's plane.
@@ -13,7 +11,7 @@ type Point = (f64, f64);
 /// between columns where a gap reaches from one to the next. A gap within a column is too narrow
 /// to be seen.
 pub(super) fn decimated(time: &Series, values: &Series, columns: usize) -> Vec<Point> {
-    let points = || time.iter().zip(values);
+    let points = time.iter().zip(values);
     let count = time.len().min(values.len());
     let (first, last) = (time.get(0), count.checked_sub(1).and_then(|i| time.get(i)));
     let (Some(first), Some(last)) = (first, last) else {
@@ -21,116 +19,52 @@ pub(super) fn decimated(time: &Series, values: &Series, columns: usize) -> Vec<P
     };
     let width = (last - first) / columns as f64;
     if count <= 4 * columns || width.is_nan() || width <= 0.0 {
-        return points().collect();
+        return points.collect();
     }
     let column = |p: Point| ((p.0 - first) / width).floor();
-    let mut kept = Kept::default();
-    let mut few: Option<Few> = None;
-    for point in points().enumerate() {
-        match &mut few {
-            Some(few) if column(few.last) == column(point.1) => few.take(point),
-            _ => {
-                let done = few.replace(Few::new(point));
-                done.iter().for_each(|done| kept.add(done));
-            }
+    let (mut kept, mut near): (Vec<Point>, Vec<Point>) = (vec![], vec![]);
+    let mut is_after_gap = false;
+    for point in points {
+        if near
+            .last()
+            .is_some_and(|last| column(*last) != column(point))
+        {
+            is_after_gap = keep(&mut kept, &near, is_after_gap);
+            near.clear();
         }
+        near.push(point);
     }
-    few.iter().for_each(|done| kept.add(done));
-    kept.points
+    keep(&mut kept, &near, is_after_gap);
+    kept
 }
 
-/// A point of a curve with its row.
-type Numbered = (usize, Point);
+/// Adds what is drawn of the points of a column. Whether it ends in a gap.
+fn keep(kept: &mut Vec<Point>, near: &[Point], is_after_gap: bool) -> bool {
+    let (Some(first), Some(last)) = (near.first(), near.last()) else {
+        return is_after_gap;
+    };
+    let corners = corners(near);
+    if is_after_gap && is_gap(*first) || corners.is_empty() {
+        kept.push((first.0, f64::NAN));
+    }
+    kept.extend(corners);
+    is_gap(*last)
+}
 
 fn is_gap(point: Point) -> bool {
     !point.0.is_finite() || !point.1.is_finite()
 }
 
-/// What is drawn of the columns so far.
-#[derive(Default)]
-struct Kept {
-    points: Vec<Point>,
-    ends_in_gap: bool,
-}
-
-impl Kept {
-    /// Adds the next column.
-    fn add(&mut self, few: &Few) {
-        let is_across = self.ends_in_gap && is_gap(few.first);
-        if is_across || few.corners.is_none() {
-            self.points.push((few.first.0, f64::NAN));
-        }
-        self.points
-            .extend(few.corners.iter().flat_map(Corners::points));
-        self.ends_in_gap = is_gap(few.last);
-    }
-}
-
-/// The points of a column.
-struct Few {
-    first: Point,
-    last: Point,
-    /// none where all are gaps
-    corners: Option<Corners>,
-}
-
-impl Few {
-    fn new(point: Numbered) -> Self {
-        let mut few = Self {
-            first: point.1,
-            last: point.1,
-            corners: None,
-        };
-        few.take(point);
-        few
-    }
-
-    fn take(&mut self, point: Numbered) {
-        self.last = point.1;
-        if !is_gap(point.1) {
-            self.corners
-                .get_or_insert_with(|| Corners::new(point))
-                .take(point);
-        }
-    }
-}
-
-/// What is drawn of finite points that are close together.
-struct Corners {
-    first: Numbered,
-    low: Numbered,
-    high: Numbered,
-    last: Numbered,
-}
-
-impl Corners {
-    fn new(point: Numbered) -> Self {
-        Self {
-            first: point,
-            low: point,
-            high: point,
-            last: point,
-        }
-    }
-
-    fn take(&mut self, point: Numbered) {
-        let y = |p: Numbered| p.1.1;
-        if y(point) < y(self.low) {
-            self.low = point;
-        }
-        if y(point) >= y(self.high) {
-            self.high = point;
-        }
-        self.last = point;
-    }
-
-    /// The first, lowest, highest and last point, in their order, each once.
-    fn points(&self) -> Vec<Point> {
-        let mut kept = vec![self.first, self.low, self.high, self.last];
-        kept.sort_by_key(|p| p.0);
-        kept.dedup_by_key(|p| p.0);
-        kept.into_iter().map(|p| p.1).collect()
-    }
+/// The first, the lowest, the highest and the last of the finite points, in their order, each once.
+fn corners(points: &[Point]) -> Vec<Point> {
+    let finite = || points.iter().enumerate().filter(|(_, p)| !is_gap(**p));
+    let low = finite().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
+    let high = finite().max_by(|a, b| a.1.1.total_cmp(&b.1.1));
+    let all = [finite().next(), low, high, finite().next_back()];
+    let mut all: Vec<(usize, &Point)> = all.into_iter().flatten().collect();
+    all.sort_by_key(|p| p.0);
+    all.dedup_by_key(|p| p.0);
+    all.into_iter().map(|p| *p.1).collect()
 }
 
 /// The stretches of a curve between gaps.
@@ -139,25 +73,25 @@ pub(super) fn stretches(points: &[Point]) -> impl Iterator<Item = &[Point]> {
     all.filter(|stretch| !stretch.is_empty())
 }
 
-/// The pieces of a line inside a band of values: a line that leaves the band ends at its edge. A
-/// point without neighbours is a piece of its own.
-pub(super) fn clipped(points: &[Point], band: &Range<f64>) -> Vec<Vec<Point>> {
+/// The pieces of a line between heights 0 and 1: a line that leaves them ends at the edge. A point without neighbours is a
+/// piece of its own.
+pub(super) fn clipped(points: &[Point]) -> Vec<Vec<Point>> {
     let mut pieces: Vec<Vec<Point>> = Vec::new();
     for stretch in stretches(points) {
         match stretch {
-            [alone] => pieces.extend(band.contains(&alone.1).then(|| vec![*alone])),
-            _ => cut(stretch, band, &mut pieces),
+            [alone] => pieces.extend((0.0..=1.0).contains(&alone.1).then(|| vec![*alone])),
+            _ => cut(stretch, &mut pieces),
         }
     }
     pieces
 }
 
 /// Adds the pieces of a line without gaps.
-fn cut(points: &[Point], band: &Range<f64>, pieces: &mut Vec<Vec<Point>>) {
+fn cut(points: &[Point], pieces: &mut Vec<Vec<Point>>) {
     let mut joined = false;
     for pair in points.windows(2) {
         let &[a, b] = pair else { continue };
-        let Some((from, to)) = segment(a, b, band) else {
+        let Some((from, to)) = segment(a, b) else {
             joined = false;
             continue;
         };
@@ -169,14 +103,13 @@ fn cut(points: &[Point], band: &Range<f64>, pieces: &mut Vec<Vec<Point>>) {
     }
 }
 
-/// The part of a segment inside the band.
-fn segment(a: Point, b: Point, band: &Range<f64>) -> Option<(Point, Point)> {
-    let outside = |edge: fn(f64, f64) -> bool, at: f64| edge(a.1, at) && edge(b.1, at);
-    if outside(|v, e| v < e, band.start) || outside(|v, e| v > e, band.end) {
+/// The part of a segment between heights 0 and 1.
+fn segment(a: Point, b: Point) -> Option<(Point, Point)> {
+    if a.1.max(b.1) < 0.0 || a.1.min(b.1) > 1.0 {
         return None;
     }
     let moved = |p: Point, q: Point| {
-        let edge = p.1.clamp(band.start, band.end);
+        let edge = p.1.clamp(0.0, 1.0);
         if edge == p.1 {
             return p;
         }
@@ -206,20 +139,20 @@ mod tests {
     #[test]
     fn a_line_is_cut_where_it_leaves_and_broken_at_gaps() {
         let points = [
-            (0.0, 0.0),
-            (1.0, 2.0),
-            (2.0, 0.0),
+            (0.0, 0.5),
+            (1.0, 1.5),
+            (2.0, 0.5),
             (3.0, f64::NAN),
-            (4.0, 0.0),
+            (4.0, 0.5),
             (5.0, 1.0),
         ];
-        let pieces = clipped(&points, &(-1.0..1.0));
+        let pieces = clipped(&points);
         assert_eq!(
             pieces,
             [
-                vec![(0.0, 0.0), (0.5, 1.0)],
-                vec![(1.5, 1.0), (2.0, 0.0)],
-                vec![(4.0, 0.0), (5.0, 1.0)]
+                vec![(0.0, 0.5), (0.5, 1.0)],
+                vec![(1.5, 1.0), (2.0, 0.5)],
+                vec![(4.0, 0.5), (5.0, 1.0)]
             ]
         );
     }
@@ -262,12 +195,12 @@ mod tests {
     fn a_point_without_neighbours_is_a_piece() {
         let nan = f64::NAN;
         let points = [(0.0, nan), (1.0, 0.5), (2.0, nan), (3.0, 5.0), (4.0, nan)];
-        assert_eq!(clipped(&points, &(-1.0..1.0)), [vec![(1.0, 0.5)]]);
+        assert_eq!(clipped(&points), [vec![(1.0, 0.5)]]);
     }
 
     #[test]
-    fn a_line_across_the_band_keeps_both_edges() {
-        let pieces = clipped(&[(0.0, -10.0), (1.0, 10.0)], &(-5.0..5.0));
-        assert_eq!(pieces, [vec![(0.25, -5.0), (0.75, 5.0)]]);
+    fn a_line_across_the_frame_keeps_both_edges() {
+        let pieces = clipped(&[(0.0, -0.5), (1.0, 1.5)]);
+        assert_eq!(pieces, [vec![(0.25, 0.0), (0.75, 1.0)]]);
     }
 }

@@ -1,144 +1,143 @@
-//! Title and legend of a figure.
+//! The legend of panels that share an axis.
 
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use super::marks::{BAND, OUTSIDE, stroke};
+use super::svg::{BEFORE, BLACK, BLUE, ORANGE, Svg, VERMILION, WORDS, fitted, width};
+use super::{Kind, Mark, Panel};
 
-use super::band::{band_style, mark_style};
-use super::style::{Area, Drawn, FONT, INK, LEFT, ORANGE, RIGHT, WIDTH, stroke};
-use super::{Extent, Figure, Kind};
-
-/// Sizes of the fonts.
-const TITLE: u32 = 18;
-const WORDS: u32 = 14;
-/// A line or a patch in the legend, and what is left free after an entry.
+/// A line or a patch in the legend, what is left free after it, and both with what is left free before it.
 const SAMPLE: i32 = 28;
-const GAP: i32 = 20;
+const AFTER: i32 = 4;
+const BESIDE: i32 = SAMPLE + AFTER + 20;
+/// An entry has as much room.
+const LEAST: i32 = 100;
 
-/// Pixels that a text takes at most in the fonts that viewers have for sans-serif.
-pub(super) fn width(text: &str, size: u32) -> i32 {
-    text.chars().count() as i32 * size as i32 / 2
-}
+/// What occurs in panels, in the order of the legend, with its words.
+pub(super) struct Legend(Vec<(Sample, String)>);
 
-/// The text, or as much of it as has room in so many pixels.
-pub(super) fn fitted(text: &str, size: u32, room: i32) -> String {
-    if width(text, size) <= room {
-        return text.to_owned();
-    }
-    // a letter takes half of its size, and the dots one or two
-    let letters = 2 * (room - size as i32).max(0) / size as i32;
-    let kept: String = text.chars().take(letters as usize).collect();
-    format!("{}…", kept.trim_end())
-}
-
-/// An entry of the legend.
+/// What an entry shows beside its words.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Entry {
+pub(super) enum Sample {
     Curve(Kind),
-    /// two standard deviations to either side
-    Band(Extent),
-    /// an estimate outside of its declared range
+    Band,
     Outside,
+    Chosen,
+    Present,
 }
 
-impl Entry {
-    fn label(self) -> &'static str {
-        match self {
-            Self::Curve(kind) => kind.label(),
-            Self::Band(extent) => extent.label(),
-            Self::Outside => "outside its range",
-        }
-    }
-}
-
-/// What occurs in a figure, in the order of the legend.
-pub(super) fn entries(figure: &Figure) -> Vec<Entry> {
-    let mut found: Vec<Entry> = figure.kinds().into_iter().map(Entry::Curve).collect();
-    for band in figure.panels.iter().flat_map(|p| &p.bands) {
-        let entry = Entry::Band(band.extent);
-        if !found.contains(&entry) {
-            found.push(entry);
-        }
-    }
-    if figure.panels.iter().any(|p| !p.outside.is_empty()) {
-        found.push(Entry::Outside);
-    }
-    found
-}
-
-/// Whether the legend has room beside the title.
-fn fits(title: &str, entries: &[Entry]) -> bool {
-    let entry = |e: &Entry| width(e.label(), WORDS) + 4 + SAMPLE + GAP;
-    let legend: i32 = entries.iter().map(entry).sum();
-    width(title, TITLE) + legend <= (WIDTH - LEFT - RIGHT) as i32
-}
-
-/// The title on the left, the legend on the right, under the title where it does not fit.
-pub(super) fn head(root: &Area<'_>, figure: &Figure) -> Drawn {
-    let entries = entries(figure);
-    let (title_at, legend_at) = match fits(&figure.title, &entries) {
-        true => (16, 26),
-        false => (8, 38),
-    };
-    let title = (FONT, TITLE).into_font().style(FontStyle::Bold).color(&INK);
-    let words = fitted(&figure.title, TITLE, (WIDTH - LEFT - RIGHT) as i32);
-    root.draw(&Text::new(words, (LEFT as i32, title_at), title))?;
-    let mut right = (WIDTH - RIGHT) as i32;
-    for entry in entries.into_iter().rev() {
-        // beside its sample, however broad its letters are
-        let words = (FONT, WORDS)
-            .into_font()
-            .color(&INK)
-            .pos(Pos::new(HPos::Left, VPos::Center));
-        right -= width(entry.label(), WORDS);
-        root.draw(&Text::new(entry.label(), (right, legend_at), words))?;
-        right -= 4;
-        sample(root, entry, right - SAMPLE, legend_at)?;
-        right -= SAMPLE + GAP;
-    }
-    Ok(())
-}
-
-/// A short piece of what the entry stands for.
-fn sample(root: &Area<'_>, entry: Entry, from: i32, y: i32) -> Drawn {
-    let to = from + SAMPLE;
-    match entry {
-        Entry::Curve(Kind::Measured) => {
-            for x in [from + 6, from + 14, from + 22] {
-                root.draw(&Circle::new((x, y), 2, ORANGE.filled()))?;
+impl Legend {
+    pub fn of(panels: &[&Panel]) -> Self {
+        let mut curves: Vec<_> = panels.iter().flat_map(|p| &p.curves).collect();
+        curves.sort_by_key(|c| c.kind);
+        let curves = curves.into_iter();
+        let curves = curves.map(|c| (Sample::Curve(c.kind), c.label()));
+        let bands = panels.iter().flat_map(|p| &p.bands);
+        let bands = bands.map(|b| (Sample::Band, b.extent.label()));
+        let marks = panels.iter().flat_map(|p| &p.marks);
+        let marks = marks.filter_map(|mark| match mark {
+            Mark::Outside(_) => Some((Sample::Outside, "outside its range")),
+            Mark::Chosen(_, words) => Some((Sample::Chosen, words)),
+            Mark::Present(_, words) => Some((Sample::Present, words)),
+            _ => None,
+        });
+        let mut entries = vec![];
+        for (sample, words) in curves.chain(bands).chain(marks) {
+            let entry = (sample, words.to_owned());
+            if !words.is_empty() && !entries.contains(&entry) {
+                entries.push(entry);
             }
-            Ok(())
         }
-        Entry::Curve(kind) => root.draw(&PathElement::new([(from, y), (to, y)], stroke(kind))),
-        Entry::Band(_) => root.draw(&Rectangle::new([(from, y - 6), (to, y + 6)], band_style())),
-        Entry::Outside => root.draw(&Rectangle::new([(from, y - 2), (to, y + 2)], mark_style())),
+        Self(entries)
+    }
+
+    /// Pixels from the first sample to the last word, with a gap before.
+    pub fn width(&self) -> i32 {
+        let entries = self.0.iter();
+        entries.map(|(_, words)| BESIDE + width(words, WORDS)).sum()
+    }
+
+    /// Draws the entries up to the right edge. Where they have no room each has the same; where there are very many, the last
+    /// are left out.
+    pub fn draw(&self, svg: &mut Svg, (left, mut right): (i32, i32), y: i32) {
+        let room = right - left;
+        let shown = self.0.len().min((room / LEAST) as usize);
+        let most = match self.width() <= room {
+            true => room,
+            false => room / shown.max(1) as i32 - BESIDE,
+        };
+        for (sample, words) in self.0.iter().take(shown).rev() {
+            let words = fitted(words, WORDS, most);
+            right -= width(&words, WORDS);
+            // beside its sample, however broad its letters are
+            svg.text(&words, (right, y), WORDS, BEFORE);
+            sample.draw(svg, (right - AFTER - SAMPLE, right - AFTER), y);
+            right -= BESIDE;
+        }
+    }
+}
+
+impl Sample {
+    /// A short piece of what the entry stands for.
+    fn draw(self, svg: &mut Svg, (from, to): (i32, i32), y: i32) {
+        let line = [(from, y), (to, y)];
+        match self {
+            Self::Curve(Kind::Measured) => {
+                let places = [6, 14, 22].into_iter();
+                places.for_each(|x| svg.dot((from + x, y), 2, ORANGE));
+            }
+            Self::Curve(Kind::Dots) => svg.dot((from + SAMPLE / 2, y), 5, ORANGE),
+            Self::Curve(Kind::Bars) => svg.rectangle((from, y - 5), (to, y + 5), BLUE),
+            Self::Curve(kind) => {
+                let (ink, width) = stroke(kind);
+                svg.path(&line, ink, width);
+            }
+            Self::Band => svg.rectangle((from, y - 6), (to, y + 6), BAND),
+            Self::Outside => svg.rectangle((from, y - 2), (to, y + 2), OUTSIDE),
+            Self::Chosen => svg.path(&line, VERMILION, 2),
+            Self::Present => svg.dashes(&line, BLACK),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Curve;
 
-    #[test]
-    fn what_has_no_room_is_cut_short() {
-        assert_eq!(fitted("level of the tank", 14, 119), "level of the tank");
-        assert_eq!(fitted("level of the tank", 14, 118), "level of the t…");
-        assert_eq!(fitted("level", 14, 7), "…");
+    fn drawn(panel: &Panel, right: i32) -> String {
+        let mut svg = Svg::default();
+        Legend::of(&[panel]).draw(&mut svg, (0, right), 50);
+        svg.sheet((right, 100), "")
     }
 
-    /// "GermaniManes: drift-observable observer" is some 330 pixels, four entries are 470, of 812.
     #[test]
-    fn a_legend_never_lies_on_the_title() {
-        let entries = [
-            Entry::Curve(Kind::True),
-            Entry::Curve(Kind::Measured),
-            Entry::Curve(Kind::Estimated),
-            Entry::Outside,
-        ];
-        assert!(!fits("GermaniManes: drift-observable observer", &entries));
-        assert!(fits(
-            "GermaniManes: drift-observable observer",
-            &entries[..3]
-        ));
-        assert!(fits("Ltaief: state-affine observer", &entries));
+    fn what_occurs_twice_is_named_once_and_by_its_own_words() {
+        let curve = |kind, name: &str| Curve::through(kind, []).named(name);
+        let panel = Panel {
+            curves: vec![
+                curve(Kind::Pale, "others"),
+                curve(Kind::Estimated, ""),
+                curve(Kind::Pale, "others"),
+                curve(Kind::Main, "x1"),
+                curve(Kind::Grey, ""),
+            ],
+            ..Panel::default()
+        };
+        let words: Vec<_> = Legend::of(&[&panel]).0;
+        let words: Vec<_> = words.iter().map(|(_, words)| words.as_str()).collect();
+        assert_eq!(words, ["estimated", "x1", "others"]);
+    }
+
+    #[test]
+    fn words_are_cut_where_a_legend_has_no_room() {
+        let name = "measuring everything that there is to be measured here";
+        let curves = [name, "x1"].map(|name| Curve::through(Kind::Bars, []).named(name));
+        let panel = Panel {
+            curves: curves.to_vec(),
+            ..Panel::default()
+        };
+        assert!(drawn(&panel, 800).contains(name));
+        let short = drawn(&panel, 300);
+        assert!(!short.contains(name) && short.contains('…') && short.contains("x1"));
+        assert!(!short.contains("x=\"-"));
     }
 }

@@ -2,12 +2,16 @@
 
 use std::ops::Range;
 
-use super::{Band, Extent, Figure, Kind, Panel};
+use super::axis::Axis;
+use super::{Band, Extent, Kind, Mark, Panel, Scale};
 use lynkeus_table::Series;
 use lynkeus_table::series::{Sorted, Store};
 
 /// A panel is cut when its curves span more than this many times what is worth seeing.
 const TOO_TALL: f64 = 4.0;
+
+/// Where values reach beyond this multiple of the value that is chosen, an axis from zero is cut.
+const CUT: f64 = 8.0;
 
 /// The axis of a panel.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,6 +54,34 @@ impl Panel {
         })
     }
 
+    /// The axis upwards, and where it is cut the extreme value; none where there is nothing finite to show.
+    pub(super) fn axis(&self) -> Option<(Axis, Option<f64>)> {
+        if self.upwards != Scale::Whole {
+            let most = self.chosen().map(|value| CUT * value);
+            let axis = self.upwards.axis(|| self.values(|_| true), most)?;
+            return Some((axis, None));
+        }
+        // a quantity without values keeps its place
+        let limits = self.limits().unwrap_or(Limits {
+            shown: -1.0..1.0,
+            beyond: None,
+        });
+        Some((Axis::linear(limits.shown), limits.beyond))
+    }
+
+    /// The greatest value of the curves that are not pale, at what is chosen; if it is positive.
+    fn chosen(&self) -> Option<f64> {
+        let chosen = self.marks.iter().find_map(|mark| match mark {
+            Mark::Chosen(at, _) => Some(*at),
+            _ => None,
+        })?;
+        let curves = self.curves.iter().filter(|c| c.kind != Kind::Pale);
+        let points = curves.flat_map(|c| c.time.iter().zip(&c.values));
+        let values = points.filter(|p| p.0 == chosen && p.1.is_finite());
+        let greatest = values.map(|p| p.1).max_by(f64::total_cmp);
+        greatest.filter(|value| *value > 0.0)
+    }
+
     /// What bands of quantiles span: errors that there were, not only what is thought possible.
     fn quantiles(&self) -> impl Iterator<Item = Range<f64>> {
         let own = self.bands.iter().filter(|b| b.extent == Extent::Quantiles);
@@ -80,14 +112,6 @@ impl Panel {
             .filter(move |c| of(c.kind))
             .flat_map(|c| &c.values)
             .filter(|v| v.is_finite())
-    }
-}
-
-impl Figure {
-    /// The span of time that all curves cover together.
-    pub(super) fn time_range(&self) -> Option<Range<f64>> {
-        let times = self.panels.iter().flat_map(|p| &p.curves);
-        extremes(times.flat_map(|c| &c.time))
     }
 }
 
@@ -128,14 +152,8 @@ mod tests {
     use crate::Curve;
 
     fn curve(kind: Kind, values: Vec<f64>) -> Curve {
-        Curve {
-            kind,
-            time: (0..values.len())
-                .map(|i| i as f64)
-                .collect::<Vec<_>>()
-                .into(),
-            values: values.into(),
-        }
+        let time = (0..values.len()).map(|i| i as f64);
+        Curve::new(kind, time.collect::<Vec<_>>(), values)
     }
 
     fn panel(curves: Vec<Curve>) -> Panel {
@@ -197,5 +215,22 @@ mod tests {
         assert_eq!(of(vec![0.0]).unwrap().shown, -1.0..1.0);
         assert_eq!(of(vec![f64::NAN]), None);
         assert_eq!(of(vec![]), None);
+    }
+
+    #[test]
+    fn a_curve_that_runs_away_is_cut_at_eight_times_what_is_chosen() {
+        let end = |points: &[(f64, f64)]| {
+            let panel = Panel {
+                upwards: Scale::FromZero,
+                marks: vec![Mark::Chosen(2.0, "knee".to_owned())],
+                ..panel(vec![Curve::through(Kind::Main, points.to_vec())])
+            };
+            let axis = panel.axis().unwrap().0;
+            assert_eq!(axis.ends.start, 0.0);
+            axis.ends.end
+        };
+        let points = [(1.0, 3.0), (2.0, 1.0), (4.0, 1e6)];
+        assert_eq!(end(&points), 1.06 * 8.0);
+        assert_eq!(end(&points[..2]), 1.06 * 3.0);
     }
 }

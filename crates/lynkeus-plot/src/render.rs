@@ -1,331 +1,217 @@
-//! Figures drawn with `plotters` onto its SVG backend.
+//! The sheet: where panels, their axes, captions and legends stand.
 
-use std::borrow::Cow;
-use std::ops::Range;
-
+use lynkeus_answer::Error;
 use lynkeus_expr::real::rounded;
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::band::{draw_band, draw_marks};
-use super::curve::draw_curve;
-use super::legend::{fitted, head, width};
-use super::limits::Limits;
-use super::style::{Area, Chart, Drawn, FAINT, FONT, FRAME, INK, LEFT, RIGHT, VERMILION, WIDTH};
-use super::{Curve, Figure, Kind, Panel};
-use lynkeus_answer::{Error, visible};
+use super::axis::{Axis, number};
+use super::legend::Legend;
+use super::marks::Frame;
+use super::svg::{
+    ABOVE, AFTER, BELOW, BOTTOM_LEFT, BOTTOM_RIGHT, FAINT, FRAME, NOTE, NUMBERS, Svg, TITLE,
+    TOP_LEFT, WORDS, fitted, width,
+};
+use super::{Figure, Kind, Mark, Panel, Scale};
 
-const HEAD: u32 = 52;
-const CAPTION: u32 = 24;
-const TIME_AXIS: u32 = 50;
+const WIDTH: i32 = 900;
+/// Where panels begin and end, and what they have between.
+const EDGES: (i32, i32) = (78, 878);
+const ROOM: i32 = EDGES.1 - EDGES.0;
+/// Title and first legend.
+const HEAD: i32 = 52;
+/// A legend between panels.
+const LEGEND: i32 = 34;
+const CAPTION: i32 = 24;
+/// Numbers under an axis, and under them its label.
+const NUMBERED: i32 = 26;
+const LABEL: i32 = 24;
+const TICK: i32 = 5;
+/// What names of rows, and numbers, take at most on the left, and what is free beside them.
+const NAMES: i32 = 244;
+const BESIDE: i32 = 16;
 
 /// The whole figure as SVG text.
 pub(super) fn svg(figure: &Figure) -> Result<String, Error> {
-    let Some(time) = figure.time_range().filter(|t| t.end > t.start) else {
-        return Err(Error::refused(
-            "nothing to draw: expected finite values at two times at least",
-        ));
-    };
-    let mut text = String::new();
-    draw(figure, &time, &mut text).map_err(|e| Error::input(format!("cannot draw: {e}")))?;
-    Ok(titled(text, &figure.title))
-}
-
-fn draw(figure: &Figure, time: &Range<f64>, text: &mut String) -> Drawn {
-    let panel = panel_height(figure.panels.len());
-    let count = u32::try_from(figure.panels.len()).unwrap_or(u32::MAX);
-    let height = HEAD + count.saturating_mul(panel + CAPTION) + TIME_AXIS;
-    let root = SVGBackend::with_string(text, (WIDTH, height)).into_drawing_area();
-    root.fill(&WHITE)?;
-    head(&root, figure)?;
-    let mut top = HEAD;
-    for (i, content) in figure.panels.iter().enumerate() {
-        let last = i + 1 == figure.panels.len();
-        let below = if last { TIME_AXIS } else { 0 };
-        let area = root
-            .clone()
-            .shrink((0, top), (WIDTH, CAPTION + panel + below));
-        draw_panel(&area, content, time, last.then_some(&figure.time_label))?;
-        top += CAPTION + panel;
+    let mut shown = vec![];
+    for panel in &figure.panels {
+        panel.upwards.check(&panel.caption)?;
+        let axis = panel.axis();
+        shown.extend(axis.map(|(y, beyond)| Shown { panel, y, beyond }));
     }
-    root.present()
+    if shown.is_empty() {
+        return Err(nothing(&figure.across));
+    }
+    let mut sheet = Sheet::default();
+    for group in shown.chunk_by(|a, b| a.panel.across.is_none() && b.panel.across.is_none()) {
+        sheet.group(figure, group)?;
+    }
+    Ok(sheet.svg.sheet((WIDTH, sheet.bottom), &figure.title))
 }
 
-fn panel_height(panels: usize) -> u32 {
-    match panels {
-        0 | 1 => 320,
-        2 => 220,
-        3 | 4 => 165,
+fn nothing(scale: &Scale) -> Error {
+    Error::refused(match scale {
+        Scale::Whole => "nothing to draw: expected finite values at two times at least",
+        _ => "nothing to draw: no finite values",
+    })
+}
+
+/// The axis across that panels share.
+fn across(scale: &Scale, name: &str, panels: &[&Panel]) -> Result<Axis, Error> {
+    scale.check(name)?;
+    let curves = || panels.iter().flat_map(|p| &p.curves);
+    let failed = || {
+        let marks = panels.iter().flat_map(|p| &p.marks);
+        marks.filter_map(|mark| match mark {
+            Mark::Failed(at) => Some(*at),
+            _ => None,
+        })
+    };
+    let values = || curves().flat_map(|c| &c.time).chain(failed());
+    scale.axis(values, None).ok_or_else(|| nothing(scale))
+}
+
+/// A panel that has something to show.
+struct Shown<'f> {
+    panel: &'f Panel,
+    y: Axis,
+    /// the extreme value of an estimate, where the axis is cut
+    beyond: Option<f64>,
+}
+
+/// The picture as far as it is drawn.
+#[derive(Default)]
+struct Sheet {
+    svg: Svg,
+    bottom: i32,
+}
+
+impl Sheet {
+    /// Draws panels that share their axis across, with a legend above and the axis' label below.
+    fn group(&mut self, figure: &Figure, group: &[Shown<'_>]) -> Result<(), Error> {
+        let panels: Vec<&Panel> = group.iter().map(|shown| shown.panel).collect();
+        let own = panels
+            .iter()
+            .find_map(|p| Some((p.across.as_ref()?, &p.caption)));
+        let (scale, name) = own.unwrap_or((&figure.across, &figure.label));
+        let x = across(scale, name, &panels)?;
+        self.head(&figure.title, &Legend::of(&panels));
+        let count = figure.panels.len();
+        let ticks = |shown: &Shown<'_>| upwards(&shown.y, height(shown.panel, count));
+        let numbers = group.iter().flat_map(ticks);
+        let widest = numbers.map(|(_, words)| width(&words, NUMBERS)).max();
+        let left = EDGES.0.max(widest.unwrap_or(0).min(NAMES) + BESIDE);
+        for (i, shown) in group.iter().enumerate() {
+            let top = self.bottom + CAPTION;
+            self.bottom = top + height(shown.panel, count);
+            let frame = Frame {
+                x: &x,
+                y: &shown.y,
+                left,
+                right: EDGES.1 - 1,
+                top,
+                bottom: self.bottom - 1,
+            };
+            self.caption(&frame, shown);
+            let is_last = i + 1 == group.len();
+            if is_last {
+                self.foot(own.is_none().then_some(&figure.label));
+            }
+            self.axes(&frame, is_last);
+            frame.draw(&mut self.svg, shown.panel);
+        }
+        Ok(())
+    }
+
+    /// The legend of the panels that follow. At the top it is at the right of the title, under it where it does not fit.
+    fn head(&mut self, title: &str, legend: &Legend) {
+        if self.bottom > 0 {
+            legend.draw(&mut self.svg, EDGES, self.bottom + LEGEND / 2);
+            self.bottom += LEGEND;
+            return;
+        }
+        let (title_at, legend_at) = match width(title, TITLE) + legend.width() <= ROOM {
+            true => (16, 26),
+            false => (8, 38),
+        };
+        let words = fitted(title, TITLE, ROOM);
+        self.svg.text(&words, (EDGES.0, title_at), TITLE, TOP_LEFT);
+        legend.draw(&mut self.svg, EDGES, legend_at);
+        self.bottom = HEAD;
+    }
+
+    /// Room for the numbers of an axis across, and its label.
+    fn foot(&mut self, label: Option<&String>) {
+        self.bottom += NUMBERED;
+        if let Some(label) = label {
+            self.bottom += LABEL;
+            let at = ((EDGES.0 + EDGES.1) / 2, self.bottom);
+            let words = fitted(label, WORDS, ROOM);
+            self.svg.text(&words, at, WORDS, BELOW);
+        }
+    }
+
+    /// The caption, and on the right how far an estimate peaks.
+    fn caption(&mut self, frame: &Frame<'_>, shown: &Shown<'_>) {
+        let is_worst = shown.panel.curves.iter().any(|c| c.kind == Kind::Worst);
+        let who = if is_worst { "worst run" } else { "estimate" };
+        let note = shown.beyond.map_or(String::new(), |beyond| {
+            format!("{who} peaks at {} (axis cut)", number(rounded(beyond, 3)))
+        });
+        let (left, right, y) = (frame.left, frame.right + 1, frame.top - 5);
+        let room = right - left - width(&note, WORDS);
+        let words = fitted(&shown.panel.caption, WORDS, room);
+        self.svg.text(&words, (left, y), WORDS, BOTTOM_LEFT);
+        if !note.is_empty() {
+            self.svg.text(&note, (right, y), NOTE, BOTTOM_RIGHT);
+        }
+    }
+
+    /// Grid, axes and numbers; those across where they are asked for.
+    fn axes(&mut self, frame: &Frame<'_>, has_across: bool) {
+        let (left, right, top, bottom) = (frame.left, frame.right, frame.top, frame.bottom);
+        let across = frame.x.ticks(9).into_iter();
+        let across = across.map(|(share, words)| (frame.pixel((share, 0.0)).0, words));
+        let across: Vec<(i32, String)> = across.collect();
+        let upwards = upwards(frame.y, bottom + 1 - top).into_iter();
+        let upwards = upwards.map(|(share, words)| (frame.pixel((0.0, share)).1, words));
+        let upwards: Vec<(i32, String)> = upwards.collect();
+        let svg = &mut self.svg;
+        for (x, _) in &across {
+            svg.line((*x, bottom), (*x, top), FAINT);
+        }
+        for (y, _) in &upwards {
+            svg.line((left, *y), (right, *y), FAINT);
+        }
+        svg.path(&[(left - 1, top), (left - 1, bottom)], FRAME, 1);
+        for (y, words) in upwards {
+            let words = fitted(&words, NUMBERS, NAMES);
+            svg.text(&words, (left - 2 * TICK, y), NUMBERS, AFTER);
+            svg.path(&[(left - 1 - TICK, y), (left - 1, y)], FRAME, 1);
+        }
+        if has_across {
+            let y = bottom + 1;
+            svg.path(&[(left, y), (right, y)], FRAME, 1);
+            for (x, words) in across {
+                let middle = x.min(WIDTH - width(&words, NUMBERS) / 2);
+                svg.text(&words, (middle, y + 2 * TICK), NUMBERS, ABOVE);
+                svg.path(&[(x, y), (x, y + TICK)], FRAME, 1);
+            }
+        }
+    }
+}
+
+/// Pixels from foot to top of a panel, one of so many.
+fn height(panel: &Panel, count: usize) -> i32 {
+    match (&panel.upwards, count) {
+        (Scale::Within(_), _) => 514,
+        (Scale::Rows(names), _) => names.len() as i32 * 19,
+        (_, 0 | 1) => 320,
+        (_, 2) => 220,
+        (_, 3 | 4) => 165,
         _ => 132,
     }
 }
 
-fn draw_panel(
-    area: &Area<'_>,
-    panel: &Panel,
-    time: &Range<f64>,
-    time_label: Option<&String>,
-) -> Drawn {
-    let limits = panel.limits().unwrap_or(Limits {
-        shown: -1.0..1.0,
-        beyond: None,
-    });
-    caption(area, panel, &limits)?;
-    let mut chart = ChartBuilder::on(area)
-        .margin_top(CAPTION)
-        .margin_right(RIGHT)
-        .set_label_area_size(LabelAreaPosition::Left, LEFT)
-        .set_label_area_size(
-            LabelAreaPosition::Bottom,
-            if time_label.is_some() { TIME_AXIS } else { 0 },
-        )
-        .build_cartesian_2d(time.clone(), limits.shown.clone())?;
-    axes(&mut chart, time_label, &limits.shown)?;
-    let columns = (WIDTH - LEFT - RIGHT) as usize;
-    for band in &panel.bands {
-        draw_band(&mut chart, band, &limits.shown, columns)?;
-    }
-    draw_marks(&mut chart, &panel.outside, time, &limits.shown, columns)?;
-    let mut curves: Vec<&Curve> = panel.curves.iter().collect();
-    curves.sort_by_key(|c| c.kind);
-    for curve in curves {
-        draw_curve(&mut chart, curve, time, &limits.shown)?;
-    }
-    Ok(())
-}
-
-fn caption(area: &Area<'_>, panel: &Panel, limits: &Limits) -> Drawn {
-    let baseline = CAPTION as i32 - 5;
-    let at = |side, size: u32, colour: &RGBColor| {
-        let font = (FONT, size).into_font();
-        font.color(colour).pos(Pos::new(side, VPos::Bottom))
-    };
-    let is_worst = panel.curves.iter().any(|c| c.kind == Kind::Worst);
-    let who = if is_worst { "worst run" } else { "estimate" };
-    let note = limits.beyond.map_or(String::new(), |beyond| {
-        format!("{who} peaks at {} (axis cut)", tick(&rounded(beyond, 3)))
-    });
-    let (left, right) = (LEFT as i32, (WIDTH - RIGHT) as i32);
-    let words = fitted(&panel.caption, 14, right - left - width(&note, 14));
-    area.draw(&Text::new(
-        words,
-        (left, baseline),
-        at(HPos::Left, 14, &INK),
-    ))?;
-    if note.is_empty() {
-        return Ok(());
-    }
-    area.draw(&Text::new(
-        note,
-        (right, baseline),
-        at(HPos::Right, 13, &VERMILION),
-    ))
-}
-
-fn axes(chart: &mut Chart<'_>, time_label: Option<&String>, shown: &Range<f64>) -> Drawn {
-    let height = shown.end - shown.start;
-    let level = |value: &f64| tick(&unless_dust(*value, height));
-    let ticks = (FONT, 13).into_font().color(&INK);
-    let mut mesh = chart.configure_mesh();
-    mesh.bold_line_style(FAINT)
-        .light_line_style(TRANSPARENT)
-        .axis_style(FRAME)
-        .x_labels(9)
-        .y_labels(5)
-        .label_style(ticks)
-        .x_label_formatter(&tick)
-        .y_label_formatter(&level)
-        .axis_desc_style((FONT, 14).into_font().color(&INK));
-    if let Some(label) = time_label {
-        mesh.x_desc(label);
-    }
-    mesh.draw()
-}
-
-/// A tick's number without the dust of binary fractions.
-pub(super) fn tick(value: &f64) -> String {
-    let value = rounded(*value, 9);
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    match value.abs() {
-        1e-4..1e6 => format!("{value}").replace('-', "\u{2212}"),
-        _ => format!("{value:e}").replace('-', "\u{2212}"),
-    }
-}
-
-/// Zero for the tick that only rounding keeps from it.
-fn unless_dust(value: f64, height: f64) -> f64 {
-    if value.abs() < 1e-9 * height {
-        0.0
-    } else {
-        value
-    }
-}
-
-/// Names the picture for screen readers and hovering. Characters of names that no XML may have, and those that a
-/// terminal obeys, are spelled out.
-pub(super) fn titled(svg: String, title: &str) -> String {
-    let svg = match visible::lines(&svg) {
-        Cow::Borrowed(_) => svg,
-        Cow::Owned(safe) => safe,
-    };
-    // the two that are no control characters
-    let svg = svg.replace(['\u{fffe}', '\u{ffff}'], "\u{fffd}");
-    let title = visible::line(title).replace(['\u{fffe}', '\u{ffff}'], "\u{fffd}");
-    let Some(end) = svg
-        .find("<svg")
-        .and_then(|at| Some(at + svg.get(at..)?.find('>')? + 1))
-    else {
-        return svg;
-    };
-    let (head, body) = svg.split_at(end);
-    let title = title
-        .replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;");
-    format!("{head}\n<title>{title}</title>{body}")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::{Band, Extent, Span};
-    use super::*;
-
-    fn wave(kind: Kind, n: usize) -> Curve {
-        let time: Vec<f64> = (0..n).map(|i| i as f64 / 10.0).collect();
-        let values: Vec<f64> = time.iter().map(|t| (t / 3.0).sin()).collect();
-        Curve {
-            kind,
-            time: time.into(),
-            values: values.into(),
-        }
-    }
-
-    fn figure(curves: Vec<Curve>) -> Figure {
-        Figure {
-            title: "Tank <1> & 2".to_owned(),
-            time_label: "time (s)".to_owned(),
-            panels: vec![Panel {
-                caption: "level (m)".to_owned(),
-                curves,
-                ..Panel::default()
-            }],
-        }
-    }
-
-    #[test]
-    fn a_picture_names_everything() {
-        let picture = figure(vec![wave(Kind::True, 300), wave(Kind::Estimated, 300)]);
-        let svg = picture.to_svg().unwrap();
-        for words in [
-            "<title>Tank &lt;1&gt; &amp; 2</title>",
-            "level (m)",
-            "time (s)",
-            "estimated",
-            "true",
-        ] {
-            assert!(svg.contains(words), "{words}");
-        }
-        assert!(!svg.contains("measured"));
-        assert!(!svg.contains("NaN"));
-    }
-
-    #[test]
-    fn bands_and_marks_are_drawn_and_named() {
-        let mut picture = figure(vec![wave(Kind::Estimated, 300), wave(Kind::Smoothed, 300)]);
-        let plain = picture.to_svg().unwrap();
-        let time: Vec<f64> = (0..300).map(|i| f64::from(i) / 10.0).collect();
-        let band = Band {
-            extent: Extent::TwoDeviations,
-            low: vec![-3.0; 300].into(),
-            high: time
-                .iter()
-                .map(|t| 3.0 + t.sin())
-                .collect::<Vec<_>>()
-                .into(),
-            time: time.into(),
-        };
-        picture.panels[0].bands = vec![band];
-        picture.panels[0].outside = vec![Span { from: 3.0, to: 4.0 }];
-        let svg = picture.to_svg().unwrap();
-        for words in ["± 2 sd", "outside its range", "smoothed", "estimated"] {
-            assert!(svg.contains(words), "{words}");
-        }
-        assert!(!plain.contains("± 2 sd") && !plain.contains("outside"));
-        assert!(svg.contains("<polygon") && !svg.contains("NaN"));
-        // the axis shows the band, too
-        let limits = picture.panels[0].limits().unwrap().shown;
-        assert!(limits.start < -3.0 && limits.end > 3.5, "{limits:?}");
-    }
-
-    #[test]
-    fn no_name_breaks_the_picture() {
-        let mut picture = figure(vec![wave(Kind::True, 30)]);
-        picture.title = "a\u{1b}[31m\u{0}\u{fffe}".to_owned();
-        picture.time_label = "<&\u{7}\u{9b}".to_owned();
-        let svg = picture.to_svg().unwrap();
-        let is_wrong = |c: char| {
-            (c.is_control() && c != '\n' && c != '\t') || matches!(c, '\u{fffe}' | '\u{ffff}')
-        };
-        assert!(!svg.contains(is_wrong), "{svg}");
-        for words in [
-            "<title>a\\u{1b}[31m\\u{0}\u{fffd}</title>",
-            "&lt;&amp;\\u{7}\\u{9b}",
-        ] {
-            assert!(svg.contains(words), "{words}");
-        }
-    }
-
-    #[test]
-    fn long_curves_give_small_pictures() {
-        let svg = figure(vec![wave(Kind::Estimated, 200_000)])
-            .to_svg()
-            .unwrap();
-        assert!(svg.len() < 150_000, "{} bytes", svg.len());
-    }
-
-    #[test]
-    fn a_long_caption_leaves_room_for_the_note() {
-        let mut peak = wave(Kind::Estimated, 300);
-        let values = peak.values.iter().enumerate();
-        let values = values.map(|(i, x)| if i == 3 { 1e3 } else { x });
-        peak.values = values.collect::<Vec<_>>().into();
-        let mut picture = figure(vec![peak, wave(Kind::True, 300)]);
-        picture.panels[0].caption = "level ".repeat(30);
-        let svg = picture.to_svg().unwrap();
-        assert!(svg.contains("peaks at 1000 (axis cut)") && svg.contains('…'));
-        let longest = svg
-            .lines()
-            .filter(|line| line.starts_with("level"))
-            .map(str::len);
-        assert!(longest.max().unwrap() < 100);
-    }
-
-    /// The laboratory's values of a state: few, and far apart.
-    #[test]
-    fn values_without_neighbours_are_dots() {
-        let mut sparse = wave(Kind::True, 300);
-        let values = sparse.values.iter().enumerate();
-        let values = values.map(|(i, x)| if i % 50 == 7 { x } else { f64::NAN });
-        sparse.values = values.collect::<Vec<_>>().into();
-        let svg = figure(vec![sparse, wave(Kind::Estimated, 300)]);
-        let svg = svg.to_svg().unwrap();
-        assert_eq!(svg.matches("<circle").count(), 6);
-    }
-
-    #[test]
-    fn nothing_to_draw_is_an_error() {
-        assert!(figure(vec![]).to_svg().is_err());
-        assert!(figure(vec![wave(Kind::True, 1)]).to_svg().is_err());
-    }
-
-    #[test]
-    fn ticks_are_plain() {
-        assert_eq!(tick(&0.300_000_000_000_000_04), "0.3");
-        assert_eq!(tick(&-2.0), "\u{2212}2");
-        assert_eq!(tick(&1e7), "1e7");
-        assert_eq!(tick(&0.0), "0");
-        assert_eq!(tick(&unless_dust(-5.55e-17, 1.0)), "0");
-    }
+/// The ticks of an axis upwards of such a height.
+fn upwards(y: &Axis, height: i32) -> Vec<(f64, String)> {
+    y.ticks((height as usize / 60).clamp(5, 10))
 }

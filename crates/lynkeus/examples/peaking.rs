@@ -144,8 +144,9 @@ fn main() -> Result<(), Error> {
     }
     let figure = Figure {
         title: "The feed of the column, estimated: remedies against peaking".to_owned(),
-        time_label: "time (min)".to_owned(),
+        label: "time (min)".to_owned(),
         panels,
+        ..Figure::default()
     };
     match std::env::args().nth(1) {
         Some(path) => save(Path::new(&path), &figure.to_svg()?),
@@ -205,11 +206,7 @@ fn row(case: &Case, name: &str, quiet: &Outcome, noisy: &Outcome) -> String {
 fn panel(name: &str, case: &Case, outcome: &Outcome) -> Panel {
     let rows: Vec<(f64, f64, f64)> = shown(case, outcome).collect();
     let time: Vec<f64> = rows.iter().map(|row| row.0).collect();
-    let curve = |kind: Kind, values: Vec<f64>| Curve {
-        kind,
-        time: time.clone().into(),
-        values: values.into(),
-    };
+    let curve = |kind: Kind, values: Vec<f64>| Curve::new(kind, time.clone(), values);
     let truth = rows.iter().map(|row| row.1).collect();
     let estimate = rows.iter().map(|row| row.2).collect();
     Panel {

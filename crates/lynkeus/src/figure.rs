@@ -2,54 +2,77 @@
 
 use crate::prepare::mentioned::not_drawn;
 use crate::{Error, Outcome, Quantity, Series};
-use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Panel, Span};
+use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Mark, Panel};
 use lynkeus_study::Name;
 
 /// Panels drawn where the study does not say which.
 pub(crate) const PANELS: usize = 6;
 
-/// The picture: the quantities of `show`, else unknown inputs and hidden states
-/// first, then what is measured, six at most; then the monitors.
-///
-/// # Errors
-/// `show` names something that is neither estimated nor measured.
-pub fn figure(
-    outcome: &Outcome,
-    time_unit: Option<&str>,
-    show: Option<&[Name]>,
-) -> Result<Figure, Error> {
-    let chosen = match show {
-        Some(names) => names
-            .iter()
-            .map(|name| find(outcome, name))
-            .collect::<Result<Vec<_>, _>>()?,
-        None => interesting(outcome),
-    };
-    let mut panels: Vec<Panel> = chosen.into_iter().map(|q| panel(outcome, q)).collect();
-    panels.extend(outcome.watches.iter().map(|watch| Panel {
-        name: watch.header.clone(),
-        caption: format!(
-            "{} (alarm below {})",
-            watch.header, watch.monitor.alarm_below
-        ),
-        curves: vec![curve(outcome, Kind::Estimated, &watch.values)],
-        ..Panel::default()
-    }));
-    let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
-    Ok(Figure {
-        title: format!(
-            "{}: {} observer",
-            outcome.plant, outcome.design.examination.family
-        ),
-        time_label: format!("time{unit}"),
-        panels,
-    })
+impl Outcome {
+    /// The picture: the quantities of the study's `show`, else unknown inputs and hidden states
+    /// first, then what is measured, six at most; then the monitors.
+    ///
+    /// # Errors
+    /// `show` names something that is neither estimated nor measured.
+    pub fn figure(&self) -> Result<Figure, Error> {
+        let chosen = match &self.show {
+            Some(names) => named(&self.quantities, names, |q| &q.name, "nothing")?,
+            None => interesting(self),
+        };
+        let mut panels: Vec<Panel> = chosen.into_iter().map(|q| panel(self, q)).collect();
+        panels.extend(self.watches.iter().map(|watch| Panel {
+            name: watch.header.clone(),
+            caption: format!(
+                "{} (alarm below {})",
+                watch.header, watch.monitor.alarm_below
+            ),
+            curves: vec![curve(self, Kind::Estimated, &watch.values)],
+            ..Panel::default()
+        }));
+        let family = self.design.examination.family;
+        let title = format!("{}: {family} observer", self.plant);
+        Ok(over_time(title, self.time_unit.as_deref(), panels))
+    }
 }
+
+/// What `show` asks for. A name that is not there is refused: `nothing`, or nothing of a kind, is called so.
+pub(crate) fn named<'a, T>(
+    all: &'a [T],
+    show: &[Name],
+    name_of: fn(&T) -> &str,
+    nothing: &str,
+) -> Result<Vec<&'a T>, Error> {
+    let find = |name: &Name| {
+        let mut found = all.iter().filter(|x| name_of(x) == name.text);
+        let names = || all.iter().map(name_of).collect::<Vec<_>>();
+        found
+            .next()
+            .ok_or_else(|| not_drawn(name, nothing, &names()))
+    };
+    show.iter().map(find).collect()
+}
+
+/// A unit after a name, "1" is Modelica's of numbers without one.
+pub(crate) fn in_brackets(unit: Option<&str>) -> String {
+    let unit = unit.filter(|unit| *unit != "1");
+    unit.map_or(String::new(), |unit| format!(" ({unit})"))
+}
+
+/// Panels over time.
+pub(crate) fn over_time(title: String, time_unit: Option<&str>, panels: Vec<Panel>) -> Figure {
+    let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
+    Figure {
+        title,
+        label: format!("time{unit}"),
+        panels,
+        ..Figure::default()
+    }
+}
+
 impl crate::Comparison {
     /// One panel per family: the quantity that is hardest to see, unknown inputs first.
     #[must_use]
-    pub fn picture(&self, time_unit: Option<&str>) -> Figure {
-        let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
+    pub fn picture(&self) -> Figure {
         let panels = self.rows.iter().filter_map(|row| {
             let run = row.run.as_ref().ok()?;
             let quantity = *interesting(&run.outcome).first()?;
@@ -57,20 +80,9 @@ impl crate::Comparison {
             panel.caption = format!("{}, {}", row.family, panel.caption);
             Some(panel)
         });
-        Figure {
-            title: format!("{}: families compared", self.plant),
-            time_label: format!("time{unit}"),
-            panels: panels.collect(),
-        }
+        let title = format!("{}: families compared", self.plant);
+        over_time(title, self.time_unit.as_deref(), panels.collect())
     }
-}
-
-fn find<'o>(outcome: &'o Outcome, name: &Name) -> Result<&'o Quantity, Error> {
-    let mut quantities = outcome.quantities.iter();
-    quantities.find(|q| q.name == name.text).ok_or_else(|| {
-        let names = outcome.quantities.iter().map(|q| q.name.as_str());
-        not_drawn(name, "nothing", &names.collect::<Vec<_>>())
-    })
 }
 
 fn interesting(outcome: &Outcome) -> Vec<&Quantity> {
@@ -80,23 +92,14 @@ fn interesting(outcome: &Outcome) -> Vec<&Quantity> {
         .filter(|q| q.estimate.is_some() || q.measured.is_some())
         .collect();
     all.sort_by_key(|q| (q.measured.is_some(), !q.unknown_input));
-    if all.len() > PANELS {
-        let measured = all.iter().filter(|q| q.measured.is_some()).count().min(2);
-        let hidden: Vec<&Quantity> = spread(
-            all.iter()
-                .copied()
-                .filter(|q| q.measured.is_none())
-                .collect(),
-            PANELS - measured,
-        );
-        let shown = all
-            .iter()
-            .copied()
-            .filter(|q| q.measured.is_some())
-            .take(measured);
-        return hidden.into_iter().chain(shown).collect();
+    if all.len() <= PANELS {
+        return all;
     }
-    all
+    let (mut measured, hidden): (Vec<_>, Vec<_>) =
+        all.into_iter().partition(|q| q.measured.is_some());
+    measured.truncate(2);
+    let hidden = spread(hidden, PANELS - measured.len());
+    hidden.into_iter().chain(measured).collect()
 }
 
 /// At most `count` of them, evenly spread: of a long chain the ends and the middle.
@@ -110,23 +113,19 @@ pub(crate) fn spread<T: Copy>(all: Vec<T>, count: usize) -> Vec<T> {
 }
 
 fn panel(outcome: &Outcome, quantity: &Quantity) -> Panel {
-    // "1" is Modelica's unit of numbers without one
-    let unit = quantity.unit.as_ref().filter(|unit| *unit != "1");
-    let unit = unit.map_or(String::new(), |unit| format!(" ({unit})"));
-    let mut caption = format!("{}{unit}", quantity.name);
-    if let Some(description) = &quantity.description {
-        caption = format!("{}: {description}{unit}", quantity.name);
-    }
+    let unit = in_brackets(quantity.unit.as_deref());
+    let caption = match &quantity.description {
+        Some(description) => format!("{}: {description}{unit}", quantity.name),
+        None => format!("{}{unit}", quantity.name),
+    };
+    let estimate = match quantity.estimate {
+        Some(_) => &quantity.estimate,
+        None => &quantity.expected,
+    };
     let series = [
         (Kind::True, &quantity.truth),
         (Kind::Measured, &quantity.measured),
-        (
-            Kind::Estimated,
-            quantity
-                .estimate
-                .as_ref()
-                .map_or(&quantity.expected, |_| &quantity.estimate),
-        ),
+        (Kind::Estimated, estimate),
         (Kind::Smoothed, &quantity.smoothed),
     ];
     let curves = series
@@ -138,7 +137,8 @@ fn panel(outcome: &Outcome, quantity: &Quantity) -> Panel {
         caption,
         curves,
         bands: bands(outcome, quantity),
-        outside: outside(outcome, quantity),
+        marks: outside(outcome, quantity),
+        ..Panel::default()
     }
 }
 
@@ -171,24 +171,17 @@ fn band(outcome: &Outcome, estimate: &Series, deviation: &Series) -> Band {
 }
 
 /// When the estimate is outside of its declared range.
-fn outside(outcome: &Outcome, quantity: &Quantity) -> Vec<Span> {
+fn outside(outcome: &Outcome, quantity: &Quantity) -> Vec<Mark> {
     let excursions = outcome.estimate_outside.iter().flat_map(|o| &o.quantities);
     let mut own = excursions.filter(|e| e.name == quantity.name);
     let stretches = own.next().map_or(&[][..], |e| &e.stretches);
     let at = |row: usize| outcome.time.get(row);
-    let spans = stretches.iter().filter_map(|rows| {
-        Some(Span {
-            from: at(*rows.start())?,
-            to: at(*rows.end())?,
-        })
-    });
+    let spans = stretches
+        .iter()
+        .filter_map(|rows| Some(Mark::Outside(at(*rows.start())?..at(*rows.end())?)));
     spans.collect()
 }
 
 fn curve(outcome: &Outcome, kind: Kind, values: &Series) -> Curve {
-    Curve {
-        kind,
-        time: outcome.time.clone(),
-        values: values.clone(),
-    }
+    Curve::new(kind, outcome.time.clone(), values.clone())
 }

@@ -2,10 +2,8 @@
 
 use super::{MonteCarlo, Scattered};
 use crate::Error;
-use crate::figure::{PANELS, spread};
-use crate::prepare::mentioned::not_drawn;
+use crate::figure::{PANELS, in_brackets, named, over_time, spread};
 use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Panel};
-use lynkeus_study::Name;
 
 impl MonteCarlo {
     /// The errors of the quantities of `show`, else of unknown inputs and hidden states first, six at
@@ -13,47 +11,28 @@ impl MonteCarlo {
     ///
     /// # Errors
     /// `show` names something that is not estimated.
-    pub fn figure(&self, time_unit: Option<&str>, show: Option<&[Name]>) -> Result<Figure, Error> {
-        let chosen = match show {
-            Some(names) => self.shown(names)?,
+    pub fn figure(&self) -> Result<Figure, Error> {
+        let chosen = match &self.show {
+            Some(names) => named(&self.quantities, names, |q| &q.name, "nothing estimated")?,
             None => {
                 let mut all: Vec<&Scattered> = self.quantities.iter().collect();
                 all.sort_by_key(|q| (q.is_measured, !q.unknown_input));
                 spread(all, PANELS)
             }
         };
-        let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
-        Ok(Figure {
-            title: format!(
-                "{}: {} observer, {} runs",
-                self.plant,
-                self.family,
-                self.seeds.len()
-            ),
-            time_label: format!("time{unit}"),
-            panels: chosen.into_iter().map(|q| self.panel(q)).collect(),
-        })
-    }
-
-    fn shown(&self, names: &[Name]) -> Result<Vec<&Scattered>, Error> {
-        let find = |name: &Name| {
-            let mut own = self.quantities.iter().filter(|q| q.name == name.text);
-            own.next().ok_or_else(|| {
-                let names = self.quantities.iter().map(|q| q.name.as_str());
-                not_drawn(name, "nothing estimated", &names.collect::<Vec<_>>())
-            })
-        };
-        names.iter().map(find).collect()
+        let runs = self.seeds.len();
+        let title = format!("{}: {} observer, {runs} runs", self.plant, self.family);
+        let panels = chosen.into_iter().map(|q| self.panel(q));
+        Ok(over_time(
+            title,
+            self.time_unit.as_deref(),
+            panels.collect(),
+        ))
     }
 
     fn panel(&self, quantity: &Scattered) -> Panel {
-        let unit = quantity.unit.as_ref().filter(|unit| *unit != "1");
-        let unit = unit.map_or(String::new(), |unit| format!(" ({unit})"));
-        let curve = |kind, values: &[f64]| Curve {
-            kind,
-            time: self.time.clone().into(),
-            values: values.to_vec().into(),
-        };
+        let unit = in_brackets(quantity.unit.as_deref());
+        let curve = |kind, values: &[f64]| Curve::new(kind, self.time.clone(), values.to_vec());
         Panel {
             name: quantity.name.clone(),
             caption: format!("error of {}{unit}", quantity.name),

@@ -3,7 +3,7 @@
 use super::axis::shown;
 use super::{Sweep, measures};
 use crate::Error;
-use lynkeus_plot::{Chart, Line, Look, Plot, Upright};
+use lynkeus_plot::{Curve, Figure, Kind, Mark, Panel, Scale};
 
 impl Sweep {
     /// The figures over the first key's values as SVG text. With several keys, the curve through
@@ -12,32 +12,44 @@ impl Sweep {
     /// # Errors
     /// There is nothing finite to draw.
     pub fn to_svg(&self) -> Result<String, Error> {
-        self.chart().to_svg()
+        self.figure().to_svg()
     }
 
     /// The picture before it is drawn.
-    pub fn chart(&self) -> Chart {
+    pub fn figure(&self) -> Figure {
+        let mut panels = self.panels();
+        if let Some(first) = panels.first_mut() {
+            first.marks.extend(self.failures());
+        }
+        Figure {
+            title: format!("{}: {}", self.plant, self.subject()),
+            label: self.axes.first().map_or(String::new(), |a| a.label()),
+            across: Scale::Parameter,
+            panels,
+        }
+    }
+
+    /// The values about the knee that are as good, the knee, and the value that is used or proposed.
+    fn marks(&self) -> Vec<Mark> {
         let first = self.axes.first();
         let knee = self.chosen().and_then(|row| row.values.first().copied());
-        let word = |word: &str, x: f64| Some((x, format!("{word} {}", shown(x))));
         let (present, whose) = match first.and_then(|a| a.proposed) {
             Some(proposed) => (Some(proposed), "proposed"),
             None => (first.and_then(|a| a.present), "study"),
         };
-        Chart {
-            title: format!("{}: {}", self.plant, self.subject()),
-            label: first.map_or(String::new(), |a| a.label()),
-            mark: knee.and_then(|x| match present == Some(x) {
-                true if whose == "study" => word("knee, and the study:", x),
-                _ => word("knee", x),
-            }),
-            present: present
-                .filter(|x| knee != Some(*x) && self.covers(*x))
-                .and_then(|x| word(whose, x)),
-            band: self.good(),
-            crosses: self.failures(),
-            plots: self.plots(),
-        }
+        let good = self
+            .good()
+            .map(|good| Mark::Good(*good.start()..*good.end()));
+        let chosen = knee.map(|x| {
+            let word = match present == Some(x) && whose == "study" {
+                true => "knee, and the study:",
+                false => "knee",
+            };
+            Mark::Chosen(x, format!("{word} {}", shown(x)))
+        });
+        let present = present.filter(|x| knee != Some(*x) && self.covers(*x));
+        let present = present.map(|x| Mark::Present(x, format!("{whose} {}", shown(x))));
+        good.into_iter().chain(chosen).chain(present).collect()
     }
 
     fn subject(&self) -> String {
@@ -53,38 +65,38 @@ impl Sweep {
     }
 
     /// The first key's values at which a run failed, the other keys being those of the knee.
-    fn failures(&self) -> Vec<f64> {
+    fn failures(&self) -> Vec<Mark> {
         let failed = self.rows.iter().filter(|row| self.beside_knee(row));
         failed
             .filter(|row| row.figure(measures::OBJECTIVE).is_none())
             .filter_map(|row| row.values.first().copied())
+            .map(Mark::Failed)
             .collect()
     }
 
-    fn plots(&self) -> Vec<Plot> {
+    fn panels(&self) -> Vec<Panel> {
         match self.log {
-            Some(_) => (0..self.measures.len()).map(|m| self.plot(m)).collect(),
-            None => self.simulated_plots(),
+            Some(_) => (0..self.measures.len()).map(|m| self.panel(m)).collect(),
+            None => self.simulated(),
         }
     }
 
     /// The mean error with its two parts, then everything else.
-    fn simulated_plots(&self) -> Vec<Plot> {
-        let mut mean = self.plot(measures::TOTAL_ERROR);
+    fn simulated(&self) -> Vec<Panel> {
+        let mut mean = self.panel(measures::TOTAL_ERROR);
         mean.caption = "mean error (share of the range)".to_owned();
-        mean.lines.iter_mut().for_each(|line| {
-            if line.look == Look::Main {
-                "with noise".clone_into(&mut line.name);
+        mean.curves.iter_mut().for_each(|curve| {
+            if curve.kind == Kind::Main {
+                "with noise".clone_into(&mut curve.name);
             }
         });
-        let part = |measure: usize, look: Look, name: &str| Line {
-            look,
-            name: name.to_owned(),
-            points: self.points(measure, |row| self.beside_knee(row)),
+        let part = |measure: usize, kind: Kind, name: &str| {
+            let points = self.points(measure, |row| self.beside_knee(row));
+            Curve::through(kind, points).named(name)
         };
-        let grey = part(measures::EXACT_ERROR, Look::Grey, "without noise");
-        let orange = part(measures::NOISE_ERROR, Look::Orange, "made by the noise");
-        mean.lines.extend([grey, orange]);
+        let grey = part(measures::EXACT_ERROR, Kind::Grey, "without noise");
+        let orange = part(measures::NOISE_ERROR, Kind::Orange, "made by the noise");
+        mean.curves.extend([grey, orange]);
         let others = [
             measures::SETTLING_TIME,
             measures::PEAK_ERROR,
@@ -92,12 +104,12 @@ impl Sweep {
             measures::ULTIMATE_BOUND,
             measures::SAMPLING_MARGIN,
         ];
-        let others = others.into_iter().map(|measure| self.plot(measure));
+        let others = others.into_iter().map(|measure| self.panel(measure));
         [mean].into_iter().chain(others).collect()
     }
 
     /// One figure: a curve for every combination of the keys after the first.
-    fn plot(&self, measure: usize) -> Plot {
+    fn panel(&self, measure: usize) -> Panel {
         let mut combinations: Vec<&[f64]> = vec![];
         for row in &self.rows {
             let others = row.values.get(1..).unwrap_or_default();
@@ -106,13 +118,13 @@ impl Sweep {
             }
         }
         let knee = self.chosen().and_then(|row| row.values.get(1..));
-        let line = |others: &&[f64]| Line {
-            look: match knee == Some(*others) {
-                true => Look::Main,
-                false => Look::Pale,
-            },
-            name: String::new(),
-            points: self.points(measure, |row| row.values.get(1..) == Some(*others)),
+        let curve = |others: &&[f64]| {
+            let kind = match knee == Some(*others) {
+                true => Kind::Main,
+                false => Kind::Pale,
+            };
+            let points = self.points(measure, |row| row.values.get(1..) == Some(*others));
+            Curve::through(kind, points)
         };
         let found = self.measures.get(measure);
         let unit = self
@@ -120,16 +132,18 @@ impl Sweep {
             .as_deref()
             .filter(|_| found.is_some_and(|m| m.is_time));
         let title = found.map_or("", |m| m.title);
-        Plot {
+        Panel {
             caption: match unit {
                 Some(unit) => format!("{title} ({unit})"),
                 None => title.to_owned(),
             },
-            upright: match found.map(|m| m.name) {
-                Some("ultimate_bound") => Upright::Log,
-                _ => Upright::Linear,
+            upwards: match found.map(|m| m.name) {
+                Some("ultimate_bound") => Scale::Log,
+                _ => Scale::FromZero,
             },
-            lines: combinations.iter().map(line).collect(),
+            curves: combinations.iter().map(curve).collect(),
+            marks: self.marks(),
+            ..Panel::default()
         }
     }
 }
