@@ -1,6 +1,7 @@
 //! The extended Kalman filter's correction.
 
 use super::belief::Belief;
+use super::record::Taken;
 use super::sensing::{Believed, Sensing};
 use super::smoother::Correction;
 use crate::Result;
@@ -30,7 +31,7 @@ impl Ekf {
         self.before.clone_from(&belief.x);
         if let Some(record) = &mut sensing.record {
             let inside = self.taken.iter().filter(|b| b.end.is_none());
-            let inside: Vec<Believed> = inside.copied().collect();
+            let inside: Vec<Taken> = inside.map(Believed::taken).collect();
             record.count(&inside);
             record.join(&inside, &belief.root);
         }
@@ -41,7 +42,7 @@ impl Ekf {
             let moves = belief.x.iter().zip(&self.before).map(|(x, x0)| x - x0);
             let moved: f64 = c.iter().zip(moves).map(|(c, moved)| c * moved).sum();
             if let Some(record) = &mut sensing.record {
-                record.count_at_end(believed, moved, spread);
+                record.count_at_end(believed.log_likelihood(moved, spread));
             }
             let Some((rest, noise)) = believed.weighed(moved, spread) else {
                 continue;

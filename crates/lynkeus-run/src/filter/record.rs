@@ -2,7 +2,6 @@
 
 use super::belief::Belief;
 use super::root::{Factor, Root, dot, substitute};
-use super::sensing::Believed;
 
 /// What a filter made of its last sample, kept where
 /// [`Estimator::keep_record`](crate::Estimator::keep_record) asked for it. Matrices are row by row.
@@ -28,6 +27,13 @@ pub struct Record {
     /// Sᵀc by sensor, S the root of P⁻
     projected: Vec<f64>,
     factor: Factor,
+}
+
+/// A reading that corrects.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Taken {
+    pub sensor: usize,
+    pub innovation: f64,
 }
 
 impl Record {
@@ -88,34 +94,33 @@ impl Record {
     }
 
     /// Counts readings inside of their sensors' ranges.
-    pub(crate) fn count(&mut self, taken: &[Believed]) {
+    pub(crate) fn count(&mut self, taken: &[Taken]) {
         let (block, size) = self.block(taken);
         let lower = self.factor.of(&block, size);
         let mut weighed: Vec<f64> = taken.iter().map(|b| b.innovation).collect();
         substitute(lower, size, &mut weighed);
-        for (a, believed) in taken.iter().enumerate() {
+        for (a, reading) in taken.iter().enumerate() {
             let pivot = lower[a * size + a];
             // a reading of which model and sensor are certain has no density
             if pivot > 0.0 {
                 let whole = std::f64::consts::TAU.ln() + 2.0 * pivot.ln();
-                self.log_likelihood -= 0.5 * (whole + believed.innovation * weighed[a]);
+                self.log_likelihood -= 0.5 * (whole + reading.innovation * weighed[a]);
             }
         }
     }
 
-    /// Counts a reading at an end of its sensor's range, where the output is known with a variance `spread`
-    /// and has `moved` since it was predicted.
-    pub(crate) fn count_at_end(&mut self, believed: &Believed, moved: f64, spread: f64) {
-        self.log_likelihood += believed.log_likelihood(moved, spread);
+    /// Counts a reading at an end of its sensor's range, of which that is the logarithm of how likely it is.
+    pub(crate) fn count_at_end(&mut self, log_likelihood: f64) {
+        self.log_likelihood += log_likelihood;
     }
 
     /// K = P⁻CᵀS⁻¹ over readings that correct together, from the slopes that were projected.
-    pub(crate) fn join(&mut self, taken: &[Believed], root: &Root) {
+    pub(crate) fn join(&mut self, taken: &[Taken], root: &Root) {
         let n = root.n;
         let (block, size) = self.block(taken);
         let lower = self.factor.of(&block, size).to_vec();
         for state in 0..n {
-            let of = |b: &Believed| &self.projected[b.sensor * n..(b.sensor + 1) * n];
+            let of = |b: &Taken| &self.projected[b.sensor * n..(b.sensor + 1) * n];
             let cross = taken.iter().map(|b| dot(root.row(state), of(b)));
             let mut gain: Vec<f64> = cross.collect();
             substitute(&lower, size, &mut gain);
@@ -149,9 +154,9 @@ impl Record {
     }
 
     /// S of some readings.
-    fn block(&self, taken: &[Believed]) -> (Vec<f64>, usize) {
+    fn block(&self, taken: &[Taken]) -> (Vec<f64>, usize) {
         let m = self.innovation.len();
-        let row = |a: &Believed| {
+        let row = |a: &Taken| {
             let a = a.sensor;
             taken
                 .iter()

@@ -13,7 +13,7 @@
 use super::belief::Belief;
 use super::health::{Health, Innovation, Reading};
 use super::model::{NoisyModel, Sensor};
-use super::record::Record;
+use super::record::{Record, Taken};
 use super::root::dot;
 use super::settings::FilterSettings;
 use super::smoother::Correction;
@@ -57,6 +57,14 @@ impl Believed {
         match self.end {
             None => Some((innovation, self.variance)),
             Some(end) => end.weighed(innovation, spread, self.variance),
+        }
+    }
+
+    /// As a record has it.
+    pub fn taken(&self) -> Taken {
+        Taken {
+            sensor: self.sensor,
+            innovation: self.innovation,
         }
     }
 

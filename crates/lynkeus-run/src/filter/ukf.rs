@@ -2,6 +2,7 @@
 
 use super::belief::Belief;
 use super::profile::Profile;
+use super::record::Taken;
 use super::root::{Factor, Root, dot, substitute};
 use super::sensing::{Believed, Sensing};
 use super::settings::{SigmaPoints, Weights};
@@ -213,6 +214,7 @@ impl Ukf {
         }
         if let Some(record) = &mut sensing.record {
             record.spread(|i, j| self.weights.moment(&self.shown, m, i, j));
+            let inside: Vec<Taken> = inside.iter().map(Believed::taken).collect();
             record.count(&inside);
         }
         let mut is_moved = false;
@@ -229,7 +231,7 @@ impl Ukf {
             let spread = self.weights.moment(&self.shown, m, i, i);
             let moved = self.expected[i] - before;
             if let Some(record) = &mut sensing.record {
-                record.count_at_end(&believed, moved, spread);
+                record.count_at_end(believed.log_likelihood(moved, spread));
             }
             if let Some((innovation, noise)) = believed.weighed(moved, spread) {
                 (believed.innovation, believed.variance) = (innovation, noise);

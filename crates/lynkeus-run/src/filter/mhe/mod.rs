@@ -275,11 +275,11 @@ impl Mhe {
         let mut taken = vec![];
         sensing.judge_all(belief, sample, &mut taken)?;
         if let Some(record) = &mut sensing.record {
-            let (inside, at_ends): (Vec<_>, Vec<_>) = taken.iter().partition(|b| b.end.is_none());
-            record.count(&inside);
-            for believed in &at_ends {
+            let inside = taken.iter().filter(|b| b.end.is_none());
+            record.count(&inside.map(Believed::taken).collect::<Vec<_>>());
+            for believed in taken.iter().filter(|b| b.end.is_some()) {
                 let spread = record.variance(believed.sensor) - believed.variance;
-                record.count_at_end(believed, 0.0, spread);
+                record.count_at_end(believed.log_likelihood(0.0, spread));
             }
         }
         let mut guess = belief.x.clone();
