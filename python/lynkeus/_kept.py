@@ -20,6 +20,7 @@ class Kept:
     """What :class:`_lynkeus.Answer` is asked, answered beforehand."""
 
     told: str
+    page: str
     summary: str
     named: tuple[tuple[str, Column], ...]
     picture: str | LynkeusError | None
@@ -39,6 +40,7 @@ class Kept:
         headers = core.headers()
         return cls(
             core.text(),
+            core.html(),
             core.json(),
             tuple((name, core.column(place)) for place, name in enumerate(headers)),
             _tried(core.svg),
@@ -53,6 +55,9 @@ class Kept:
 
     def text(self) -> str:
         return self.told
+
+    def html(self) -> str:
+        return self.page
 
     def json(self) -> str:
         return self.summary

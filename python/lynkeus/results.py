@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _html, _lynkeus, _plot, reports
+from . import _lynkeus, _plot, reports
 from ._kept import Kept
 from ._logs import log_of
 from ._optional import needed
@@ -111,7 +111,13 @@ class Answer:
         return self._core.svg()
 
     def _repr_html_(self) -> str:
-        return _html.page(self)
+        return f"<div>{self._core.html()}{self._picture()}</div>"
+
+    def _picture(self) -> str:
+        try:
+            return self.to_svg() or ""
+        except LynkeusError:
+            return ""  # nothing that can be drawn
 
 
 class Check(reports.CheckEntries, Answer):

@@ -73,7 +73,7 @@ fn seconds(study: &Study) -> Result<f64, String> {
 
 /// The largest error of a true state or an estimate at the end, where they are equal.
 fn error(outcome: &lynkeus::Outcome) -> Result<f64, String> {
-    let columns = outcome.columns(true);
+    let columns = outcome.columns();
     let last = |name: &str| {
         let column = columns.iter().find(|(header, _)| header == name);
         let end = column.and_then(|(_, values)| values.last());

@@ -9,7 +9,7 @@ use lynkeus::Error;
 use super::save::{self, is_standard};
 
 /// Where results go.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub(super) struct Output {
     /// Write the columns as CSV ("-": standard output, the default without --json)
     #[arg(short, long, value_name = "FILE.csv")]

@@ -5,11 +5,11 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 
+use lynkeus::Error;
 use lynkeus::precision::{self, Candidates};
-use lynkeus::{Error, Series};
 
+use super::files::Output;
 use super::inputs::Source;
-use super::output;
 use super::progress::Alive;
 use super::save::Results;
 
@@ -51,12 +51,13 @@ impl Options {
 
 /// Everything is computed before the first file is written.
 pub(super) fn how_well(source: &Source, options: &Options, json: bool) -> Result<ExitCode, Error> {
-    source
-        .files()
-        .writes("-o", options.output.as_deref())
-        .draws("--plot", options.plot.as_deref())
-        .prints_json(json)
-        .check()?;
+    let output = Output {
+        output: options.output.clone(),
+        plot: options.plot.clone(),
+        json,
+        quiet: false,
+    };
+    output.added_to(source.files()).check()?;
     let asked = precision::Options {
         horizon: options.horizon,
         sensors: options.sensors.map(|which| match which {
@@ -68,26 +69,5 @@ pub(super) fn how_well(source: &Source, options: &Options, json: bool) -> Result
     let report = lynkeus::precision(&source.study, &asked);
     drop(alive);
     let report = report?;
-    let columns = report.columns();
-    let columns: Vec<(String, Series)> = columns
-        .into_iter()
-        .map(|(name, values)| (name, values.into()))
-        .collect();
-    let columns: Vec<(String, &Series)> = columns
-        .iter()
-        .map(|(name, values)| (name.clone(), values))
-        .collect();
-    let mut results = Results::default();
-    if let Some(path) = &options.plot {
-        results.picture(path, report.to_svg())?;
-    }
-    if let Some(path) = &options.output {
-        results.write(path, |to| output::table(path, &columns, to))?;
-    }
-    results.report(json, &report, || report.to_json());
-    results.keep()?;
-    Ok(match report.is_positive() {
-        true => ExitCode::SUCCESS,
-        false => ExitCode::from(1),
-    })
+    Results::default().tell(&report, &output)
 }

@@ -2,22 +2,23 @@
 
 use std::io::{self, Read, Write};
 use std::path::Path;
+use std::process::ExitCode;
 
 use lynkeus::model::Diagnostic;
-use lynkeus::{Error, Series, table, visible};
+use lynkeus::{Answer, Error, Series, table, visible};
 use serde_json::Value;
 
 /// Columns as a CSV file, or as a Parquet file if it is called so.
 pub(super) fn table(
     path: &Path,
-    columns: &[(String, &Series)],
+    columns: &[(String, Series)],
     mut to: &mut (dyn Write + Send),
 ) -> io::Result<()> {
     let names: Vec<_> = columns.iter().map(|c| visible::line(&c.0)).collect();
     let named: Vec<(&str, &Series)> = names
         .iter()
         .zip(columns)
-        .map(|(name, (_, values))| (name.as_ref(), *values))
+        .map(|(name, (_, values))| (name.as_ref(), values))
         .collect();
     if table::is_parquet(path) {
         return table::write_parquet(&mut to, &named);
@@ -29,11 +30,6 @@ pub(super) fn table(
 /// A JSON object as text.
 pub(super) fn json(value: &Value) -> String {
     visible::json(&format!("{value:#}\n")).into_owned()
-}
-
-/// A report as text.
-pub(super) fn text(report: &impl std::fmt::Display) -> String {
-    visible::lines(&report.to_string()).into_owned()
 }
 
 /// Text to standard output; a reader that went away (`| head`) is no error.
@@ -64,6 +60,25 @@ pub(super) fn warn(text: &str) {
 pub(super) fn complain(error: &Error) {
     let heading = if brings_heading(error) { "" } else { "error: " };
     say(&format!("{heading}{error}"));
+}
+
+/// Tells what the user should know of an answer.
+pub(super) fn remarks(answer: &dyn Answer, quiet: bool) {
+    answer.warnings().iter().for_each(|text| warn(text));
+    if !quiet {
+        answer.notes().iter().for_each(|text| note(text));
+    }
+}
+
+/// Tells what speaks against an answer; the exit code says the same.
+pub(super) fn verdict(answer: &dyn Answer) -> ExitCode {
+    if let Some(refusal) = answer.refusal() {
+        complain(&refusal);
+    }
+    match answer.is_positive() {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::from(1),
+    }
 }
 
 /// A diagnostic of a model starts with its own "error".

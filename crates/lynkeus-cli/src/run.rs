@@ -3,8 +3,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use lynkeus::{CheckOptions, Checkpoint, Error, Outcome, Study};
-use serde_json::Value;
+use lynkeus::{Answer, CheckOptions, Checkpoint, Error, Outcome};
 
 use super::files::Output;
 use super::inputs::{self, Source};
@@ -29,12 +28,11 @@ pub(super) fn check(
         let svg = report.picture().and_then(|picture| picture.to_svg());
         results.picture(path, svg)?;
     }
-    results.report(json, &report, || report.to_json());
-    results.keep()?;
-    Ok(match report.is_positive() {
-        true => ExitCode::SUCCESS,
-        false => ExitCode::from(1),
-    })
+    let output = Output {
+        json,
+        ..Output::default()
+    };
+    results.tell(&report, &output)
 }
 
 pub(super) fn design(source: &Source, file: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
@@ -42,9 +40,7 @@ pub(super) fn design(source: &Source, file: Option<&Path>, json: bool) -> Result
     let alive = Alive::new("designing");
     let report = lynkeus::design(&source.study);
     drop(alive);
-    let report = report?;
-    tell(file, json, &report, || report.to_json())?;
-    Ok(ExitCode::SUCCESS)
+    tell(file, json, &report?)
 }
 
 pub(super) fn certify(source: &Source, file: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
@@ -52,28 +48,19 @@ pub(super) fn certify(source: &Source, file: Option<&Path>, json: bool) -> Resul
     let alive = Alive::new("certifying");
     let report = lynkeus::certify(&source.study);
     drop(alive);
-    let report = report?;
-    tell(file, json, &report, || report.to_json())?;
-    Ok(match report.is_refuted() {
-        true => ExitCode::from(1),
-        false => ExitCode::SUCCESS,
-    })
+    tell(file, json, &report?)
 }
 
 /// A report as text or as JSON, to a file or to standard output.
-fn tell(
-    file: Option<&Path>,
-    json: bool,
-    report: &impl std::fmt::Display,
-    to_json: impl FnOnce() -> Value,
-) -> Result<(), Error> {
+fn tell(file: Option<&Path>, json: bool, answer: &dyn Answer) -> Result<ExitCode, Error> {
     let mut results = Results::default();
     match file {
-        None => results.report(json, report, to_json),
-        Some(path) if json => results.put(path, output::json(&to_json()))?,
-        Some(path) => results.put(path, output::text(report))?,
+        None => results.answer(json, answer),
+        Some(path) if json => results.put(path, output::json(&answer.to_json()))?,
+        Some(path) => results.put(path, answer.text())?,
     }
-    results.keep()
+    results.keep()?;
+    Ok(output::verdict(answer))
 }
 
 pub(super) fn simulate(
@@ -89,11 +76,10 @@ pub(super) fn simulate(
     progress.finish();
     let mut results = Results::default();
     if let Some(path) = log {
-        let columns = outcome.log(&source.study.estimate);
-        let columns = columns.map_err(|e| e.at(&source.study.file))?;
+        let columns = outcome.log()?;
         results.write(path, |to| output::table(path, &columns, to))?;
     }
-    let code = finish(&source.study, output, &outcome, true, results)?;
+    let code = finish(output, &outcome, results)?;
     Ok(limits::code(&source.study, code))
 }
 
@@ -128,7 +114,7 @@ pub(super) fn estimate(
     {
         output::note(&format!("went on after row {}", checkpoint.resumed()));
     }
-    let code = finish(study, output, &outcome, false, Results::default())?;
+    let code = finish(output, &outcome, Results::default())?;
     // a run that a limit ended goes on another time
     if let Some(checkpoint) = checkpoint.filter(|_| study.budget.marked().is_none()) {
         checkpoint.remove()?;
@@ -147,59 +133,32 @@ pub(super) fn compare(
     let mut progress = Progress::new("comparing", output.quiet);
     let found = lynkeus::compare(&source.study, table.as_ref(), &mut progress.watch())?;
     progress.finish();
-    found.warnings().iter().for_each(|text| output::warn(text));
-    let mut results = Results::default();
-    if let Some(path) = &output.plot {
-        let picture = found.picture(source.study.time_unit.as_deref());
-        results.picture(path, picture.to_svg())?;
-    }
-    results.report(output.json, &found, || found.to_json());
-    results.keep()?;
-    let code = match found.is_positive() {
-        true => ExitCode::SUCCESS,
-        false => ExitCode::from(1),
-    };
+    let code = Results::default().tell(&found, output)?;
     Ok(limits::code(&source.study, code))
 }
 
 /// Everything is computed before the first file is written. Where nothing is asked for, and where
 /// all that is asked for is a picture that cannot be drawn, the columns are printed.
-fn finish(
-    study: &Study,
-    output: &Output,
-    outcome: &Outcome,
-    simulated: bool,
-    mut results: Results,
-) -> Result<ExitCode, Error> {
-    outcome.warnings.iter().for_each(|text| output::warn(text));
-    if !output.quiet {
-        outcome.notes.iter().for_each(|note| output::note(note));
-    }
-    let columns = outcome.columns(simulated);
-    let mut shown = output.json;
-    if let Some(path) = &output.plot {
-        let figure = lynkeus::figure(outcome, study.time_unit.as_deref(), study.show.as_deref());
-        let svg = figure.and_then(|figure| figure.to_svg());
+fn finish(asked: &Output, outcome: &Outcome, mut results: Results) -> Result<ExitCode, Error> {
+    output::remarks(outcome, asked.quiet);
+    let columns = outcome.columns();
+    let mut shown = asked.json;
+    if let Some(path) = &asked.plot {
+        let svg = outcome.figure().and_then(|figure| figure.to_svg());
         shown |= svg.is_ok();
         results.picture(path, svg)?;
     }
     let printed = Path::new("-");
-    match &output.output {
+    match &asked.output {
         Some(path) => results.write(path, |to| output::table(path, &columns, to))?,
         None if !shown && !results.has_printed() => {
             results.write(printed, |to| output::table(printed, &columns, to))?
         }
         None => {}
     }
-    if output.json {
-        results.print(&output::json(&outcome.to_json(simulated)));
+    if asked.json {
+        results.print(&output::json(&outcome.to_json()));
     }
     results.keep()?;
-    match outcome.refusal() {
-        None => Ok(ExitCode::SUCCESS),
-        Some(refusal) => {
-            output::complain(&refusal);
-            Ok(ExitCode::from(1))
-        }
-    }
+    Ok(output::verdict(outcome))
 }

@@ -7,10 +7,12 @@
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
-use lynkeus::{Error, interrupt};
+use lynkeus::{Answer, Error, interrupt};
 use tempfile::{NamedTempFile, SpooledTempFile};
 
+use super::files::Output;
 use super::{output, signals};
 
 /// The name that stands for standard input or output.
@@ -120,19 +122,42 @@ impl Results {
         self.printed.push_str(text);
     }
 
-    /// Adds what is told of the whole: JSON, or words for people where nothing else goes to standard
-    /// output.
-    pub fn report(
-        &mut self,
-        json: bool,
-        words: &impl std::fmt::Display,
-        to_json: impl FnOnce() -> serde_json::Value,
-    ) {
+    /// Adds an answer: JSON, or words for people where nothing else goes to standard output.
+    pub fn answer(&mut self, json: bool, answer: &dyn Answer) {
         if json {
-            self.print(&output::json(&to_json()));
+            self.print(&output::json(&answer.to_json()));
         } else if !self.has_printed() {
-            self.print(&output::text(words));
+            self.print(&answer.text());
         }
+    }
+
+    /// Adds an answer with its files, puts all in its place, and tells what speaks against it.
+    ///
+    /// # Errors
+    /// As [`keep`](Self::keep).
+    pub fn tell(mut self, answer: &dyn Answer, asked: &Output) -> Result<ExitCode, Error> {
+        output::remarks(answer, asked.quiet);
+        self.files(answer, asked.plot.as_deref(), asked.output.as_deref())?;
+        self.answer(asked.json, answer);
+        self.keep()?;
+        Ok(output::verdict(answer))
+    }
+
+    /// Adds the picture and the columns of an answer, where they are asked for.
+    pub fn files(
+        &mut self,
+        answer: &dyn Answer,
+        plot: Option<&Path>,
+        table: Option<&Path>,
+    ) -> Result<(), Error> {
+        if let (Some(path), Some(svg)) = (plot, answer.svg().transpose()) {
+            self.picture(path, svg)?;
+        }
+        if let Some(path) = table {
+            let columns = answer.columns();
+            self.write(path, |to| output::table(path, &columns, to))?;
+        }
+        Ok(())
     }
 
     /// Puts every result in its place.

@@ -10,8 +10,8 @@ use super::limits::{self, Limits};
 use super::output;
 use super::progress::Progress;
 use super::save::{Results, is_standard};
-use lynkeus::Error;
 use lynkeus::tune::{Change, Sweep};
+use lynkeus::{Error, visible};
 
 /// On what it is judged and where the answer goes.
 #[derive(Debug, Args)]
@@ -64,13 +64,9 @@ pub(super) fn tune(path: &Path, options: &Options, limits: &Limits) -> Result<Ex
         true => rewritten(path, &sweep)?,
         false => (String::new(), vec![]),
     };
-    if !options.quiet {
-        sweep.notes.iter().for_each(|note| output::note(note));
-    }
+    output::remarks(&sweep, options.quiet);
     let mut results = Results::default();
-    if let Some(path) = &options.plot {
-        results.picture(path, sweep.to_svg())?;
-    }
+    results.files(&sweep, options.plot.as_deref(), None)?;
     if let Some(file) = &options.output {
         results.put(file, sweep.to_csv()?)?;
     }
@@ -100,13 +96,15 @@ fn show(sweep: &Sweep, changes: &[Change], path: &Path, options: &Options, resul
     if results.has_printed() {
         return told.iter().for_each(|change| output::note(change));
     }
-    let told: String = told.into_iter().map(|change| change + "\n").collect();
-    results.report(options.json, &format!("{sweep}{told}"), || {
+    if options.json {
         let mut answer = sweep.to_json();
         if options.write {
             let words: Vec<String> = changes.iter().map(Change::to_string).collect();
             answer["written"] = words.into();
         }
-        answer
-    });
+        return results.print(&output::json(&answer));
+    }
+    results.answer(false, sweep);
+    told.iter()
+        .for_each(|change| results.print(&format!("{}\n", visible::lines(change))));
 }

@@ -12,7 +12,7 @@ use lynkeus::{
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::answer::{Answer, Of, Ran};
+use crate::answer::Answer;
 use crate::away::{MEMORY, Terms, Watch, away};
 use crate::errors::{exception, from_source};
 use crate::estimator::Estimator;
@@ -179,7 +179,7 @@ impl Study {
         let outcome = self.ask(py, &terms, |study, watch| {
             self.runner.simulate(study, watch)
         })?;
-        Ok(self.ran(outcome, true))
+        Ok(Answer::of(outcome))
     }
 
     #[pyo3(signature = (runs, progress=None, time_limit=None, memory_limit=MEMORY))]
@@ -195,7 +195,7 @@ impl Study {
         let found = self.ask(py, &terms, |study, watch| {
             lynkeus::monte_carlo(study, runs, watch)
         })?;
-        Ok(Answer::of(self.of(found)))
+        Ok(Answer::of(found))
     }
 
     /// That it names what its plant has.
@@ -223,7 +223,7 @@ impl Study {
             };
             self.runner.estimate(study, &*log.table(study)?, watch)
         })?;
-        Ok(self.ran(outcome, false))
+        Ok(Answer::of(outcome))
     }
 
     #[pyo3(signature = (log=None, progress=None, time_limit=None, memory_limit=MEMORY))]
@@ -261,7 +261,7 @@ impl Study {
             let table = log.as_ref().map(|log| log.table(study)).transpose()?;
             lynkeus::compare(study, table.as_deref(), watch)
         })?;
-        Ok(Answer::of(self.of(found)))
+        Ok(Answer::of(found))
     }
 
     /// The plant as functions, with the study's parameters.
@@ -355,21 +355,6 @@ impl Study {
             };
             work(&study, watch)
         })
-    }
-
-    fn ran(&self, outcome: lynkeus::Outcome, is_simulated: bool) -> Answer {
-        Answer::of(Ran {
-            outcome,
-            study: self.study.clone(),
-            is_simulated,
-        })
-    }
-
-    fn of<T>(&self, found: T) -> Of<T> {
-        Of {
-            found,
-            study: self.study.clone(),
-        }
     }
 }
 

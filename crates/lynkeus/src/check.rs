@@ -10,21 +10,22 @@ mod reserves;
 mod uniform;
 
 use std::collections::BTreeSet;
-use std::fmt;
 use std::time::Duration;
 
+use lynkeus_answer::Document;
+use lynkeus_answer::document::Line;
 use lynkeus_expr::{Budget, Spent};
 use lynkeus_model::Plant;
-use lynkeus_observability::{Answer, Verdict};
+use lynkeus_observability::{Answer as Observable, Verdict};
 use lynkeus_observers::{Examination, fit_word};
 use lynkeus_structure::{Sensors, determined, uniformity};
 use lynkeus_words::{Words, counted};
+use serde_json::Value;
 
 use crate::prepare::Prepared;
 use crate::prepare::declared::{Account, Declared};
-use crate::words::explain;
-use crate::words::{conditions, listed};
-use crate::{Error, ErrorKind, Study, estimate, prepare, prepare::calibrate};
+use crate::words::{condition, explain, listed};
+use crate::{Answer, Error, ErrorKind, Study, estimate, prepare, prepare::calibrate};
 #[cfg(test)]
 pub(crate) use json::CheckReport;
 use knowledge::Sorted;
@@ -215,7 +216,7 @@ fn knowledge(
             uniform: report.uniform.as_ref().map(Uniform::examined),
             determined: known,
         };
-        let of = |(assumption, answer): &mut (Assumption, Answer)| {
+        let of = |(assumption, answer): &mut (Assumption, Observable)| {
             found.settle(augmented, *assumption, answer);
             let known = Knowledge::new(augmented, *assumption, answer, &found);
             let mut known = known.map_err(explain)?;
@@ -267,85 +268,113 @@ impl Report {
     }
 }
 
-impl fmt::Display for Report {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let list = |names: &[String]| {
-            if names.is_empty() {
-                "nothing".to_owned()
-            } else {
-                names.join(", ")
-            }
+crate::answer::displayed!(Report);
+
+impl Answer for Report {
+    fn document(&self) -> Document {
+        let list = |names: &[String]| match names.is_empty() {
+            true => "nothing".to_owned(),
+            false => names.join(", "),
         };
-        writeln!(
-            f,
+        let mut document = Document::new(format!(
             "{}: {}, measured {}, unknown {}",
             self.plant,
             counted(self.states.len(), "state"),
             list(&self.measured),
             list(&self.unknown)
-        )?;
+        ));
+        document.part();
         for warning in &self.warnings {
-            write!(f, "\n{warning}")?;
+            document.code(warning.to_string());
         }
-        writeln!(f)?;
-        observability::print(f, self)?;
+        document.part();
+        observability::tell(&mut document, self);
         if let Some(uniform) = &self.uniform {
-            uniform::print(f, uniform, &knowledge::reserves(&self.knowledge))?;
+            uniform::tell(
+                &mut document,
+                uniform,
+                &knowledge::reserves(&self.knowledge),
+            );
         }
         if let Some(spent) = self.ended {
             let families = match self.examinations.is_empty() {
                 true => ", and which observer fits,",
                 false => "",
             };
-            writeln!(
-                f,
-                "\nwhere states can be told apart{families} is undecided: {spent}"
-            )?;
+            document.part().line(format!(
+                "where states can be told apart{families} is undecided: {spent}"
+            ));
         }
-        knowledge::print(
-            f,
-            &self.knowledge,
-            self.time_unit.as_deref().unwrap_or("unit of time"),
-        )?;
-        for examination in self.examinations.iter().filter(|e| e.spent().is_none()) {
-            writeln!(
-                f,
-                "\n{}: {}",
-                examination.family,
-                fit_word(examination.fit())
-            )?;
-            writeln!(f, "  {}", examination.summary.words())?;
-            conditions(f, examination.conditions(), "conditions on the whole box")?;
-        }
+        self.tell_known(&mut document);
+        let decided = self.examinations.iter().filter(|e| e.spent().is_none());
+        decided.for_each(|examination| tell_examination(&mut document, examination, false));
         if self.examinations.is_empty() {
-            return Ok(());
+            return document;
         }
-        self.ended_families(f)?;
-        if let Some(told) = self.declared.told() {
-            writeln!(f, "\n{told}")?;
+        self.tell_ended(&mut document);
+        document.part();
+        self.declared.told().map(|told| document.line(told));
+        document.part();
+        self.conclude(&mut document);
+        if let Some(next) = &self.next {
+            next.tell(&mut document);
         }
-        writeln!(f)?;
-        self.conclusion(f)?;
-        match &self.next {
-            Some(next) => write!(f, "\n{next}"),
-            None => Ok(()),
+        document
+    }
+
+    fn to_json(&self) -> Value {
+        Self::to_json(self)
+    }
+
+    fn is_positive(&self) -> bool {
+        Self::is_positive(self)
+    }
+
+    #[cfg(feature = "plot")]
+    fn svg(&self) -> Result<Option<String>, Error> {
+        match &self.uniform {
+            Some(_) => self.picture()?.to_svg().map(Some),
+            None => Ok(None),
         }
     }
 }
 
+/// A family with its conditions.
+pub(crate) fn tell_examination(
+    document: &mut Document,
+    examination: &Examination,
+    is_folded: bool,
+) {
+    let heading = Line::from(format!("{}: ", examination.family));
+    let heading = heading.decided(fit_word(examination.fit()));
+    match is_folded {
+        true => document.folded(heading),
+        false => document.heading(heading),
+    };
+    let conditions = examination.conditions().map(condition);
+    document.item(examination.summary.words());
+    document.conditions(conditions, "conditions on the whole box");
+}
+
 impl Report {
+    /// What can be known of each quantity.
+    pub(crate) fn tell_known(&self, document: &mut Document) {
+        let unit = self.time_unit.as_deref().unwrap_or("unit of time");
+        knowledge::tell(document, &self.knowledge, unit);
+    }
+
     /// The families whose examination was not finished, each reason told once.
-    fn ended_families(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn tell_ended(&self, document: &mut Document) {
         let ended = self.examinations.iter().filter(|e| e.spent().is_some());
         let mut open: Vec<&Examination> = ended.collect();
         while let Some(reason) = open.first().map(|e| &e.summary) {
             let same = |e: &&Examination| e.summary == *reason;
             let (told, rest): (Vec<_>, Vec<_>) = open.iter().copied().partition(same);
             let names: Vec<&str> = told.iter().map(|e| e.family.name()).collect();
-            writeln!(f, "\n{}: undecided\n  {}", names.join(", "), reason.words())?;
+            let heading = Line::from(format!("{}: ", names.join(", "))).decided("undecided");
+            document.heading(heading).item(reason.words());
             open = rest;
         }
-        Ok(())
     }
 
     /// That there is no observer, or that a limit ended the search for one.
@@ -362,52 +391,55 @@ impl Report {
         }
     }
 
-    fn conclusion(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn conclude(&self, document: &mut Document) {
         let Some(family) = self.recommended else {
-            return writeln!(f, "{}", self.none());
+            document.line(self.none());
+            return;
         };
-        let lists = |names: &[&str]| listed(names);
         let Sorted {
             seen,
             follows,
             hidden,
             open,
         } = self.sorted();
-        if !seen.is_empty() {
-            writeln!(f, "can be estimated: {} (by {family})", lists(&seen))?;
-        }
-        if !follows.is_empty() {
-            let names = lists(&follows);
-            writeln!(
-                f,
-                "in the end, as errors decay by themselves: {names} (by {family})"
-            )?;
-        }
         // under another assumption more may be known
         let more = self.knowledge.get(1).map(Knowledge::sorted);
         let is_more = |name: &&str| more.as_ref().is_some_and(|more| more.is_estimated(name));
         let (wandering, hidden): (Vec<&str>, Vec<&str>) = hidden.into_iter().partition(is_more);
-        if !wandering.is_empty() {
-            let (unknown, names) = (self.unknown.join(", "), lists(&wandering));
-            writeln!(f, "only if {unknown} hardly moves: {names} (by {family})")?;
+        let unknown = self.unknown.join(", ");
+        for (names, before, after) in [
+            (
+                seen,
+                "can be estimated: ".to_owned(),
+                format!(" (by {family})"),
+            ),
+            (
+                follows,
+                "in the end, as errors decay by themselves: ".to_owned(),
+                format!(" (by {family})"),
+            ),
+            (
+                wandering,
+                format!("only if {unknown} hardly moves: "),
+                format!(" (by {family})"),
+            ),
+            (
+                hidden,
+                "not from the outputs: ".to_owned(),
+                format!("; what {family} gives for them follows from the model alone"),
+            ),
+            (
+                open,
+                "whether the outputs tell ".to_owned(),
+                format!(" is not decided; {family} gives an estimate all the same"),
+            ),
+        ] {
+            if !names.is_empty() {
+                document.line(before + &listed(&names) + &after);
+            }
         }
-        if !hidden.is_empty() {
-            let names = lists(&hidden);
-            writeln!(
-                f,
-                "not from the outputs: {names}; what {family} gives for them follows from the model alone"
-            )?;
-        }
-        if !open.is_empty() {
-            let names = lists(&open);
-            writeln!(
-                f,
-                "whether the outputs tell {names} is not decided; {family} gives an estimate all the same"
-            )?;
-        }
-        match &self.choice {
-            Some(choice) => write!(f, "{choice}"),
-            None => Ok(()),
+        if let Some(choice) = &self.choice {
+            choice.tell(document);
         }
     }
 

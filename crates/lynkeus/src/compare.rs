@@ -32,6 +32,8 @@ pub struct Comparison {
     pub against: Against,
     /// how a simulation was sampled; none of a log
     pub interval: Option<Interval>,
+    /// the unit of time, where the study has one
+    pub time_unit: Option<String>,
 }
 
 /// What errors are measured against.
@@ -85,6 +87,7 @@ pub fn compare(
             (Some(_), false) => Against::Nothing,
         },
         interval,
+        time_unit: study.time_unit.clone(),
     })
 }
 

@@ -1,7 +1,7 @@
 //! The gains, matrices and parameters of a study's observer.
 
-use std::fmt;
-
+use lynkeus_answer::Document;
+use lynkeus_answer::document::Table;
 use lynkeus_observers::Design;
 use lynkeus_structure::Standing;
 use lynkeus_words::{Words, counted};
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use crate::certify::{self, Proof};
 use crate::entries::{Fit, Named, finite};
 use crate::prepare::correction::InjectionEntry;
-use crate::{CertifyReport, Error, Study};
+use crate::{Answer, CertifyReport, Error, Study};
 
 /// The answer of `lynkeus design`.
 #[derive(Debug)]
@@ -91,41 +91,43 @@ impl DesignReport {
     }
 }
 
-impl fmt::Display for DesignReport {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+/// The parameters of a design.
+pub(crate) fn tell_parameters(document: &mut Document, design: &Design) {
+    let parameters = design.parameters.iter();
+    let rows = parameters.map(|(name, value)| vec![name.as_str().into(), value.words().into()]);
+    let table = Table::plain(["parameter", "value"]).with(rows);
+    document.heading("parameters").table(table);
+}
+
+crate::answer::displayed!(DesignReport);
+
+impl Answer for DesignReport {
+    fn document(&self) -> Document {
         let Design {
             observer,
             examination,
-            parameters,
             ..
         } = &*self.certified.design;
-        writeln!(
-            f,
+        let mut document = Document::new(format!(
             "{}: {} observer, {}",
             self.plant,
             examination.family,
             counted(observer.states.len(), "state")
-        )?;
-        writeln!(f, "  {}", examination.summary.words())?;
+        ));
+        document.item(examination.summary.words());
         if examination.fit() == Standing::Undecided {
-            writeln!(
-                f,
-                "  not every condition is decided on the box; `lynkeus check` shows them"
-            )?;
+            document.item("not every condition is decided on the box; `lynkeus check` shows them");
         }
-        writeln!(f, "\nparameters")?;
-        for (name, value) in parameters {
-            writeln!(f, "  {name:<14} {}", value.words())?;
-        }
-        write!(f, "{}", self.certified.correction)?;
-        writeln!(
-            f,
-            "\n{}; `lynkeus certify` says more",
-            self.certified.conclusion()
-        )?;
-        for note in &self.certified.design.notes {
-            writeln!(f, "\nnote: {note}")?;
-        }
-        Ok(())
+        tell_parameters(&mut document, &self.certified.design);
+        self.certified.correction.tell(&mut document);
+        let conclusion = self.certified.conclusion();
+        let more = "; `lynkeus certify` says more";
+        document.part().line(conclusion.and(more));
+        document.part().notes(&self.certified.design.notes);
+        document
+    }
+
+    fn to_json(&self) -> Value {
+        Self::to_json(self)
     }
 }

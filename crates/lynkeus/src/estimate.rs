@@ -1,6 +1,7 @@
 //! A log through the study's observer.
 
 pub(crate) mod live;
+mod told;
 
 use std::ops::ControlFlow;
 

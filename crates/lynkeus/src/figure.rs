@@ -8,48 +8,49 @@ use lynkeus_study::Name;
 /// Panels drawn where the study does not say which.
 pub(crate) const PANELS: usize = 6;
 
-/// The picture: the quantities of `show`, else unknown inputs and hidden states
-/// first, then what is measured, six at most; then the monitors.
-///
-/// # Errors
-/// `show` names something that is neither estimated nor measured.
-pub fn figure(
-    outcome: &Outcome,
-    time_unit: Option<&str>,
-    show: Option<&[Name]>,
-) -> Result<Figure, Error> {
-    let chosen = match show {
-        Some(names) => names
-            .iter()
-            .map(|name| find(outcome, name))
-            .collect::<Result<Vec<_>, _>>()?,
-        None => interesting(outcome),
-    };
-    let mut panels: Vec<Panel> = chosen.into_iter().map(|q| panel(outcome, q)).collect();
-    panels.extend(outcome.watches.iter().map(|watch| Panel {
-        name: watch.header.clone(),
-        caption: format!(
-            "{} (alarm below {})",
-            watch.header, watch.monitor.alarm_below
-        ),
-        curves: vec![curve(outcome, Kind::Estimated, &watch.values)],
-        ..Panel::default()
-    }));
-    let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
-    Ok(Figure {
-        title: format!(
-            "{}: {} observer",
-            outcome.plant, outcome.design.examination.family
-        ),
-        time_label: format!("time{unit}"),
-        panels,
-    })
+impl Outcome {
+    /// The picture: the quantities of the study's `show`, else unknown inputs and hidden states
+    /// first, then what is measured, six at most; then the monitors.
+    ///
+    /// # Errors
+    /// `show` names something that is neither estimated nor measured.
+    pub fn figure(&self) -> Result<Figure, Error> {
+        let chosen = match &self.show {
+            Some(names) => names
+                .iter()
+                .map(|name| find(self, name))
+                .collect::<Result<Vec<_>, _>>()?,
+            None => interesting(self),
+        };
+        let mut panels: Vec<Panel> = chosen.into_iter().map(|q| panel(self, q)).collect();
+        panels.extend(self.watches.iter().map(|watch| Panel {
+            name: watch.header.clone(),
+            caption: format!(
+                "{} (alarm below {})",
+                watch.header, watch.monitor.alarm_below
+            ),
+            curves: vec![curve(self, Kind::Estimated, &watch.values)],
+            ..Panel::default()
+        }));
+        Ok(Figure {
+            title: format!(
+                "{}: {} observer",
+                self.plant, self.design.examination.family
+            ),
+            time_label: time_label(self.time_unit.as_deref()),
+            panels,
+        })
+    }
+}
+
+/// What stands under an axis of time.
+pub(crate) fn time_label(unit: Option<&str>) -> String {
+    unit.map_or("time".to_owned(), |unit| format!("time ({unit})"))
 }
 impl crate::Comparison {
     /// One panel per family: the quantity that is hardest to see, unknown inputs first.
     #[must_use]
-    pub fn picture(&self, time_unit: Option<&str>) -> Figure {
-        let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
+    pub fn picture(&self) -> Figure {
         let panels = self.rows.iter().filter_map(|row| {
             let run = row.run.as_ref().ok()?;
             let quantity = *interesting(&run.outcome).first()?;
@@ -59,7 +60,7 @@ impl crate::Comparison {
         });
         Figure {
             title: format!("{}: families compared", self.plant),
-            time_label: format!("time{unit}"),
+            time_label: time_label(self.time_unit.as_deref()),
             panels: panels.collect(),
         }
     }

@@ -71,6 +71,9 @@ pub mod prepare;
 // one observer over the rows of a log or a simulation, and what is kept of it
 mod course;
 
+// what an answer tells
+mod answer;
+
 // whether the result is credible, and what is said of it
 mod judge;
 
@@ -106,6 +109,7 @@ mod export;
 // the same study again and again
 mod choose;
 
+pub use answer::Answer;
 pub use certify::{AtTheta, CertifyReport, Excitation, Excited, Strays, certify};
 pub use check::{Assumption, CheckOptions, Knowledge, Known, Next, Report, Reserve, check};
 pub use choose::runner::{Runner, Runners};
@@ -119,8 +123,6 @@ pub use design::{DesignReport, design};
 pub use estimate::live::estimator;
 pub use estimate::{estimate, estimate_resumed};
 pub use export::export;
-#[cfg(feature = "plot")]
-pub use figure::figure;
 pub use judge::accuracy::{Accuracy, Coverage, Settling};
 pub use judge::frozen::Frozen;
 pub use judge::interval::{Intervals, Sampled};
@@ -139,7 +141,7 @@ pub use tune::tune;
 
 pub use words::explain;
 
-pub use lynkeus_answer::{Error, ErrorKind, near, visible};
+pub use lynkeus_answer::{Document, Error, ErrorKind, document, near, visible};
 pub use lynkeus_export::curly::c::Precision;
 pub use lynkeus_export::curly::fmu::Version as FmiVersion;
 pub use lynkeus_study::{Study, schema};

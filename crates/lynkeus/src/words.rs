@@ -1,8 +1,7 @@
 //! Numbers, ranges, verdicts and failures as people read them.
 
-use std::fmt;
-
 use lynkeus_answer::Error;
+use lynkeus_answer::document::Condition;
 use lynkeus_expr::real::rounded;
 use lynkeus_observers::Check;
 use lynkeus_run::Error as RunError;
@@ -61,35 +60,15 @@ pub(crate) fn in_words(error: &RunError) -> String {
     }
 }
 
-/// Conditions listed one by one: more proved ones than this become a count.
-const LISTED: usize = 12;
-
-/// One condition a line, the proved ones counted where they are many.
-pub(crate) fn conditions<'a>(
-    f: &mut fmt::Formatter<'_>,
-    checks: impl IntoIterator<Item = &'a Check>,
-    what: &str,
-) -> fmt::Result {
-    let checks: Vec<&Check> = checks.into_iter().collect();
-    let proved = |check: &&&Check| check.is_proved();
-    let count = checks.iter().filter(proved).count();
-    let brief = count > LISTED;
-    if brief {
-        writeln!(f, "  proved     {count} {what}")?;
+/// A condition with what decides it.
+pub(crate) fn condition(check: &Check) -> Condition {
+    let is_refuted = matches!(check.verdict, Verdict::Refuted(_));
+    Condition {
+        verdict: check.verdict.word(),
+        statement: check.statement.words(),
+        detail: check.reason.words(),
+        witness: is_refuted.then(|| check.verdict.words()),
     }
-    for check in checks.iter().filter(|c| !(brief && proved(c))) {
-        let word = check.verdict.word();
-        writeln!(
-            f,
-            "  {word:<10} {}: {}",
-            check.statement.words(),
-            check.reason.words()
-        )?;
-        if let Verdict::Refuted(_) = check.verdict {
-            writeln!(f, "             {}", check.verdict.words())?;
-        }
-    }
-    Ok(())
 }
 
 /// Names listed before the rest becomes a count.

@@ -151,7 +151,7 @@ impl Case {
         };
         let study = self.study("family = \"ekf\"", seed, scale, &parameter);
         let run = lynkeus::simulate(&study, &mut |_| ControlFlow::Continue(())).unwrap();
-        let columns = run.log(&study.estimate).unwrap();
+        let columns = run.log().unwrap();
         let owned = columns
             .into_iter()
             .map(|(name, column)| (name, column.to_vec()));

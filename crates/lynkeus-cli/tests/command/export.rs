@@ -208,7 +208,7 @@ pub(super) fn estimated(folder: &Path) -> Result<Run, lynkeus::Error> {
     let study = Study::load(folder.join("s.toml"))?;
     let log = Table::load(folder.join("log.csv"))?;
     let outcome = lynkeus::estimate(&study, &log, &mut |_| ControlFlow::Continue(()))?;
-    let columns = outcome.columns(false);
+    let columns = outcome.columns();
     let header = columns.iter().map(|(name, _)| name.clone()).collect();
     let columns: Vec<Vec<f64>> = columns.iter().map(|(_, c)| c.iter().collect()).collect();
     let rows = (0..columns[0].len()).map(|row| columns.iter().map(|c| c[row]).collect());

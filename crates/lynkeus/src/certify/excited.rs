@@ -4,9 +4,10 @@
 //! decides a run shows: λ_min(S) at each θ, how fast it falls as θ grows (α(θ)/θ² ~ θ^(p−2) where λ_min(S) ~ θ^−p), and
 //! what the theorem makes of it. It is measured on one run, and has no say in the verdict.
 
-use std::fmt;
 use std::ops::ControlFlow;
 
+use lynkeus_answer::Document;
+use lynkeus_answer::document::{Cell, Table};
 use lynkeus_observers::{Family, Tuning, Value};
 use lynkeus_structure::AugmentedPlant;
 use serde::Serialize;
@@ -230,38 +231,32 @@ impl<'a> From<&'a AtTheta> for AtThetaEntry<'a> {
     }
 }
 
-impl fmt::Display for Excited {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Excited {
+    pub(super) fn tell(&self, document: &mut Document) {
         let (from, until) = (number(self.window.0), number(self.window.1));
-        writeln!(
-            f,
+        document.heading(format!(
             "excitation along [simulate], t from {from} to {until}: measured, no part of any proof"
-        )?;
-        let line = |f: &mut fmt::Formatter<'_>, cells: [&str; 5]| {
-            let [θ, λ, scaled, condition, error] = cells;
-            let text = format!("  {θ:<10} {λ:<12} {scaled:<12} {condition:<12} {error}");
-            writeln!(f, "{}", text.trim_end())
-        };
-        let heads = ["θ", "λ_min(S)", "λ_min(S)·θ²", "σ_s·L/θ", "error/range"];
-        line(f, heads)?;
-        for row in &self.rows {
-            let θ = number(row.theta);
-            let figures = match &row.figures {
-                Ok(figures) => figures,
-                Err(reason) => {
-                    writeln!(f, "  {θ:<10} {reason}")?;
-                    continue;
+        ));
+        let row = |row: &AtTheta| {
+            let θ = Cell::Number(number(row.theta));
+            match &row.figures {
+                Err(reason) => vec![θ, reason.as_str().into()],
+                Ok(figures) => {
+                    let Excitation {
+                        excitation,
+                        condition,
+                        error,
+                    } = *figures;
+                    let scaled = excitation * row.theta.powi(2);
+                    let figures = [Some(excitation), Some(scaled), condition, error];
+                    let figures = figures.map(|x| Cell::number(x, number));
+                    std::iter::once(θ).chain(figures).collect()
                 }
-            };
-            let told = |x: Option<f64>| x.map_or("–".to_owned(), number);
-            let scaled = number(figures.excitation * row.theta.powi(2));
-            let (λ, condition) = (number(figures.excitation), told(figures.condition));
-            line(f, [&θ, &λ, &scaled, &condition, &told(figures.error)])?;
-        }
-        for conclusion in self.conclusions() {
-            writeln!(f, "  {conclusion}")?;
-        }
-        Ok(())
+            }
+        };
+        let titles = ["θ", "λ_min(S)", "λ_min(S)·θ²", "σ_s·L/θ", "error/range"];
+        document.table(Table::new(titles).with(self.rows.iter().map(row)));
+        document.items(self.conclusions());
     }
 }
 

@@ -1,14 +1,16 @@
 //! Certificates for people.
 
-use std::fmt;
-
+use lynkeus_answer::Document;
+use lynkeus_answer::document::{Cell, Line, Table};
 use lynkeus_observers::{Certificate, UltimateBound};
 use lynkeus_structure::Standing;
 use lynkeus_words::Words;
+use serde_json::Value;
 
 use super::CertifyReport;
+use crate::Answer;
 use crate::judge::interval::Intervals;
-use crate::words::{conditions, number, side};
+use crate::words::{condition, number, side};
 
 /// Where it is guaranteed.
 pub(crate) fn region(report: &CertifyReport) -> String {
@@ -19,62 +21,55 @@ pub(crate) fn region(report: &CertifyReport) -> String {
 
 impl CertifyReport {
     /// The verdict in a sentence.
-    pub fn conclusion(&self) -> String {
+    pub fn conclusion(&self) -> Line {
         conclusion(self)
     }
 
-    /// The verdict of one of its certificates, in a word or two.
-    pub(crate) fn word(&self, certificate: &Certificate) -> &'static str {
-        word(self, certificate)
+    /// Its certificates, one after the other.
+    pub(crate) fn tell_certificates(&self, document: &mut Document) {
+        certificate(document, self, &self.certificate);
+        if let Some(theorem) = &self.theorem {
+            certificate(document, self, theorem);
+        }
+    }
+
+    /// What the reader should know of all of it.
+    pub(crate) fn remarks(&self) -> Vec<String> {
+        // where something is proved, the first line says it
+        let strays = self.strays.words(false).filter(|_| !self.is_proved());
+        let strays = strays.map(|words| format!("the study leaves the box: {words}"));
+        let unseen = self.strays.failure.iter().map(|why| {
+            format!("whether the study stays in the box is not known, its run failed: {why}")
+        });
+        let assumed = self.assumed.iter().cloned();
+        let notes = assumed.chain(strays).chain(unseen);
+        notes.chain(self.declared.told()).collect()
     }
 }
 
-impl fmt::Display for CertifyReport {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        report(f, self)
-    }
-}
+crate::answer::displayed!(CertifyReport);
 
-fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt::Result {
-    writeln!(
-        f,
-        "{}: {} observer, {}",
-        report.plant,
-        report.design.examination.family,
-        conclusion(report)
-    )?;
-    writeln!(f, "{}", region(report))?;
-    writeln!(f)?;
-    certificate(f, report, &report.certificate)?;
-    if let Some(theorem) = &report.theorem {
-        writeln!(f)?;
-        certificate(f, report, theorem)?;
+impl Answer for CertifyReport {
+    fn document(&self) -> Document {
+        let family = self.design.examination.family;
+        let title = Line::from(format!("{}: {family} observer, ", self.plant));
+        let mut document = Document::new(title.then(self.conclusion()));
+        document.line(region(self));
+        self.tell_certificates(&mut document);
+        if let Some(excited) = &self.excited {
+            excited.tell(&mut document);
+        }
+        document.part().notes(self.remarks());
+        document
     }
-    if let Some(excited) = &report.excited {
-        write!(f, "\n{excited}")?;
+
+    fn to_json(&self) -> Value {
+        Self::to_json(self)
     }
-    // where something is proved, the first line says it
-    let strays = report.strays.words(false).filter(|_| !report.is_proved());
-    let strays = strays.map(|words| format!("the study leaves the box: {words}"));
-    let unseen = report.strays.failure.iter();
-    let unseen = unseen.map(|why| {
-        format!("whether the study stays in the box is not known, its run failed: {why}")
-    });
-    let notes: Vec<String> = report
-        .assumed
-        .iter()
-        .cloned()
-        .chain(strays)
-        .chain(unseen)
-        .chain(report.declared.told())
-        .collect();
-    if !notes.is_empty() {
-        writeln!(f)?;
+
+    fn is_positive(&self) -> bool {
+        !self.is_refuted()
     }
-    for note in &notes {
-        writeln!(f, "note: {note}")?;
-    }
-    Ok(())
 }
 
 /// The verdict in a word or two: never "proved" alone where the study is not in the box.
@@ -88,30 +83,27 @@ fn word(report: &CertifyReport, certificate: &Certificate) -> &'static str {
     }
 }
 
-fn conclusion(report: &CertifyReport) -> String {
+fn conclusion(report: &CertifyReport) -> Line {
     let best = report.best();
     if report.is_contradiction() {
-        return "undecided: one way proves and the other refutes it, which is a defect of this program; believe neither and report it".to_owned();
+        return Line::verdict("undecided").and(": one way proves and the other refutes it, which is a defect of this program; believe neither and report it");
     }
     match (report.verdict(), best.rate) {
-        (Standing::Proved, Some(rate)) => {
-            format!(
-                "{}: with sensors read continuously, the error decays at {} or faster{}{}",
-                proved(report),
-                number(rate),
-                left(report, best),
+        (Standing::Proved, rate) => {
+            let rate = rate.map_or(String::new(), |rate| {
+                format!(" at {} or faster{}", number(rate), left(report, best))
+            });
+            Line::verdict(proved(report)).and(format!(
+                ": with sensors read continuously, the error decays{rate}{}",
                 but(report)
-            )
+            ))
         }
-        (Standing::Proved, None) => {
-            format!(
-                "{}: with sensors read continuously, the error decays{}",
-                proved(report),
-                but(report)
-            )
+        (Standing::Refuted, _) => {
+            Line::verdict("refuted").and(": an error grows, however small it is")
         }
-        (Standing::Refuted, _) => "refuted: an error grows, however small it is".to_owned(),
-        (Standing::Undecided, _) => "undecided: neither a proof nor a counterexample".to_owned(),
+        (Standing::Undecided, _) => {
+            Line::verdict("undecided").and(": neither a proof nor a counterexample")
+        }
     }
 }
 
@@ -196,32 +188,23 @@ fn abbreviated(sides: &[String]) -> String {
     texts.join(", ")
 }
 
-fn certificate(
-    f: &mut fmt::Formatter<'_>,
-    report: &CertifyReport,
-    certificate: &Certificate,
-) -> fmt::Result {
-    writeln!(f, "{}: {}", certificate.basis, word(report, certificate))?;
-    conditions(f, &certificate.hypotheses, "hypotheses")?;
-    for constant in &certificate.constants {
-        writeln!(
-            f,
-            "  {:<10} {:<12} {}",
-            constant.name,
-            number(constant.value),
-            constant.words()
-        )?;
-    }
+fn certificate(document: &mut Document, report: &CertifyReport, certificate: &Certificate) {
+    let heading = Line::from(format!("{}: ", certificate.basis));
+    document.heading(heading.decided(word(report, certificate)));
+    document.conditions(certificate.hypotheses.iter().map(condition), "hypotheses");
+    let constants = certificate.constants.iter();
+    let rows = constants.map(|c| {
+        let value = Cell::Number(number(c.value));
+        vec![c.name.as_str().into(), value, c.words().into()]
+    });
+    document.table(Table::plain(["constant", "value", "meaning"]).with(rows));
     if !certificate.ultimate.is_empty() && certificate.ultimate_bound.is_some_and(|b| b > 0.0) {
         let bounds = bounds(report, &certificate.ultimate).join(", ");
-        writeln!(f, "  in the end within: {bounds}")?;
+        document.item(format!("in the end within: {bounds}"));
     }
     if let Some(found) = &certificate.mean_square {
         let bounds = bounds(report, &found.states).join(", ");
-        writeln!(f, "  {IN_MEAN_SQUARE}: {bounds}")?;
+        document.item(format!("{IN_MEAN_SQUARE}: {bounds}"));
     }
-    for note in report.notes_of(certificate) {
-        writeln!(f, "  note: {note}")?;
-    }
-    Ok(())
+    document.notes(report.notes_of(certificate));
 }

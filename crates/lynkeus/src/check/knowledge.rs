@@ -1,8 +1,7 @@
 //! For every quantity one of four things: known everywhere; known only while inputs excite it; not
 //! observable, but its error decays by itself; not known. For each assumption on the unknown inputs.
 
-use std::fmt;
-
+use lynkeus_answer::Document;
 use lynkeus_observability::{Answer, Verdict};
 use lynkeus_structure::detectability::{Detectability, Hidden, HiddenErrors, Observability};
 use lynkeus_structure::{self as structure, AugmentedPlant, Coordinate, Uniformity};
@@ -401,14 +400,14 @@ fn told(detectability: Detectability, unit: &str) -> String {
 }
 
 /// Every assumption that makes a difference.
-pub(super) fn print(f: &mut fmt::Formatter<'_>, all: &[Knowledge], unit: &str) -> fmt::Result {
+pub(super) fn tell(document: &mut Document, all: &[Knowledge], unit: &str) {
     let mut before: Option<&Knowledge> = None;
     for knowledge in all {
         if before.is_some_and(|before| before.quantities == knowledge.quantities) {
-            writeln!(f, "{}: the same", knowledge.words())?;
+            document.line(format!("{}: the same", knowledge.words()));
             continue;
         }
-        writeln!(f, "\n{}", knowledge.words())?;
+        document.heading(knowledge.words());
         let mut lines: Vec<(String, Vec<&str>)> = vec![];
         for (name, known) in &knowledge.quantities {
             let line = known.line(unit);
@@ -417,51 +416,38 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, all: &[Knowledge], unit: &str) -
                 None => lines.push((line, vec![name])),
             }
         }
-        for (line, names) in &lines {
-            writeln!(f, "  {}: {line}", listed(names))?;
-        }
-        caveats(f, knowledge)?;
+        document.items(
+            lines
+                .iter()
+                .map(|(line, names)| format!("{}: {line}", listed(names))),
+        );
+        document.items(caveats(knowledge));
         before = Some(knowledge);
     }
-    Ok(())
 }
 
+/// Coordinates of a point that are told.
+const COORDINATES: usize = 8;
+
 /// What the lines rest on.
-fn caveats(f: &mut fmt::Formatter<'_>, knowledge: &Knowledge) -> fmt::Result {
-    let hidden_errors = || {
-        knowledge
-            .quantities
-            .iter()
-            .filter_map(|(_, known)| match known {
-                Known::Hidden(detectability) => Some(*detectability),
-                _ => None,
-            })
-    };
+fn caveats(knowledge: &Knowledge) -> Vec<String> {
+    let mut told = vec![];
     if !knowledge.point.is_empty() {
-        let sides = knowledge
-            .point
-            .iter()
-            .take(8)
-            .map(|c| format!("{} = {}", c.name, number(c.value)));
-        writeln!(
-            f,
-            "  (linearised at {}; elsewhere it may be faster, slower, or not at all)",
+        let point = knowledge.point.iter().take(COORDINATES);
+        let sides = point.map(|c| format!("{} = {}", c.name, number(c.value)));
+        told.push(format!(
+            "(linearised at {}; elsewhere it may be faster, slower, or not at all)",
             sides.collect::<Vec<_>>().join(", ")
-        )?;
+        ));
     }
-    let decays =
-        hidden_errors().any(|detectability| matches!(detectability, Detectability::Decays { .. }));
-    match (decays, knowledge.assumption) {
-        (true, Assumption::Wandering { .. }) => writeln!(
-            f,
-            "  (decays: the error of the start is forgotten; what wanders keeps a part of it alive)"
-        ),
-        (true, _) => writeln!(
-            f,
-            "  (decays: once the observable quantities are known, for a model that is right)"
-        ),
-        (false, _) => Ok(()),
+    let decays = |known: &Known| matches!(known, Known::Hidden(Detectability::Decays { .. }));
+    if knowledge.quantities.iter().any(|(_, known)| decays(known)) {
+        told.push(match knowledge.assumption {
+            Assumption::Wandering { .. } => "(decays: the error of the start is forgotten; what wanders keeps a part of it alive)",
+            _ => "(decays: once the observable quantities are known, for a model that is right)",
+        }.to_owned());
     }
+    told
 }
 
 /// Names by what can be known of them.

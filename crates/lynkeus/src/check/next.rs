@@ -1,12 +1,13 @@
 //! What to type next, with what to paste into the study.
 
-use lynkeus_proof::spectrum;
-use std::fmt;
 use std::path::Path;
 
+use lynkeus_answer::Document;
+use lynkeus_answer::document::Table;
 use lynkeus_expr::real::rounded;
 use lynkeus_model::Variable;
 use lynkeus_observers::{Initial, Tuning, Value as Tuned};
+use lynkeus_proof::spectrum;
 use lynkeus_words::figures;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
@@ -56,22 +57,20 @@ fn lines<S: Serializer>(commands: &[(String, &'static str)], to: S) -> Result<S:
     to.collect_seq(commands.iter().map(|(command, _)| command))
 }
 
-impl fmt::Display for Next {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (&self.study, &self.observer) {
-            (Some(study), _) => writeln!(f, "a study to begin with (study.toml):\n\n{study}")?,
-            (None, Some(observer)) => writeln!(f, "to paste into the study:\n\n{observer}")?,
-            (None, None) => {}
+impl Next {
+    pub(super) fn tell(&self, document: &mut Document) {
+        let paste = match (&self.study, &self.observer) {
+            (Some(study), _) => Some(("a study to begin with (study.toml):", study)),
+            (None, Some(observer)) => Some(("to paste into the study:", observer)),
+            (None, None) => None,
+        };
+        if let Some((words, text)) = paste {
+            document.part().line(words).part().code(text);
         }
-        writeln!(f, "next:")?;
-        let wide = self
-            .commands
-            .iter()
-            .map(|(c, _)| c.chars().count())
-            .max()
-            .unwrap_or(0);
-        let mut lines = self.commands.iter();
-        lines.try_for_each(|(command, what)| writeln!(f, "  {command:wide$}  {what}"))
+        let commands = self.commands.iter();
+        let rows = commands.map(|(command, what)| vec![command.as_str().into(), (*what).into()]);
+        let table = Table::plain(["command", "what it tells"]).with(rows);
+        document.heading("next:").table(table);
     }
 }
 

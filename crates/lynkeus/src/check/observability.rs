@@ -1,7 +1,6 @@
 //! What can be known at all, in words.
 
-use std::fmt;
-
+use lynkeus_answer::Document;
 use lynkeus_expr::Budget;
 use lynkeus_model::Plant;
 use lynkeus_observability::{Answer, Quantity, Question, QuestionError, Verdict, analyse};
@@ -55,13 +54,13 @@ fn blame(study: &Study, error: QuestionError) -> Error {
     }
 }
 
-pub(super) fn print(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result {
+pub(super) fn tell(document: &mut Document, report: &Report) {
     let answer = &report.answer;
     let asked = |name: &&str| answer.quantities.iter().any(|(q, _)| q.name == *name);
     let names = report.states.iter().map(String::as_str);
     let given: Vec<&str> = names.filter(|name| !asked(name)).collect();
     if !given.is_empty() {
-        writeln!(f, "states with a known start: {}", listed(&given))?;
+        document.line(format!("states with a known start: {}", listed(&given)));
     }
     for (kind, plural) in [
         (Quantity::State, "states"),
@@ -79,52 +78,39 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result 
                 .filter(|(asked, k)| *k == kind && asked.verdict == verdict);
             let names: Vec<&str> = names.map(|(asked, _)| asked.name.as_str()).collect();
             if !names.is_empty() {
-                writeln!(f, "{plural} {words}: {}", listed(&names))?;
+                document.line(format!("{plural} {words}: {}", listed(&names)));
             }
         }
     }
-    for symmetry in answer.symmetries.iter().take(TOLD) {
-        writeln!(f, "  {}", symmetry.words())?;
-    }
+    document.items(answer.symmetries.iter().take(TOLD).map(Words::words));
     if answer.symmetries.len() > TOLD {
-        writeln!(
-            f,
-            "  and {} more such groups",
-            answer.symmetries.len() - TOLD
-        )?;
+        let more = answer.symmetries.len() - TOLD;
+        document.item(format!("and {more} more such groups"));
     }
     for asked in &answer.about {
-        writeln!(f, "about {}: {}", asked.name, asked.verdict.word())?;
+        document.line(format!("about {}: {}", asked.name, asked.verdict.word()));
     }
-    hint(f, report)?;
+    document.items(hint(answer));
     let is_open = |asked: &lynkeus_observability::Asked| asked.verdict == Verdict::Undecided;
-    if answer.is_complete() && !report.parameters && !answer.about.iter().any(is_open) {
-        return Ok(());
+    if !answer.is_complete() || report.parameters || answer.about.iter().any(is_open) {
+        // how it was decided matters once something is not as hoped
+        let notes = answer.notes.iter();
+        document.items(notes.map(|note| format!("({})", note.words())));
     }
-    // how it was decided matters once something is not as hoped
-    answer
-        .notes
-        .iter()
-        .try_for_each(|note| writeln!(f, "  ({})", note.words()))
 }
 
 /// What to do about it.
-fn hint(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result {
-    let answer = &report.answer;
+fn hint(answer: &Answer) -> Option<&'static str> {
     let hidden = |kind: Quantity| {
         let mut quantities = answer.quantities.iter();
         quantities.any(|(asked, k)| *k == kind && asked.verdict == Verdict::Unobservable)
     };
     if hidden(Quantity::State) || hidden(Quantity::UnknownInput) {
-        writeln!(
-            f,
-            "  they leave no trace of their own in the outputs: measure something that they act on, or a quantity of each group above"
-        )?;
-    } else if hidden(Quantity::Parameter) {
-        writeln!(
-            f,
-            "  fix one parameter of each group above, or measure something that tells them apart"
-        )?;
+        return Some(
+            "they leave no trace of their own in the outputs: measure something that they act on, or a quantity of each group above",
+        );
     }
-    Ok(())
+    hidden(Quantity::Parameter).then_some(
+        "fix one parameter of each group above, or measure something that tells them apart",
+    )
 }

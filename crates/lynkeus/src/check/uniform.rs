@@ -1,8 +1,7 @@
 //! For what inputs and where the states can be told apart, in words.
 
-use std::fmt;
-
-use lynkeus_structure::{self as structure, Blind, Place, Uniformity};
+use lynkeus_answer::Document;
+use lynkeus_structure::{self as structure, Blind, Coordinate, Place, Uniformity};
 #[cfg(feature = "plot")]
 use lynkeus_words::counted;
 
@@ -59,87 +58,76 @@ impl Uniform {
 }
 
 /// `reserves` are those of what is known, in words.
-pub(super) fn print(f: &mut fmt::Formatter<'_>, uniform: &Uniform, reserves: &str) -> fmt::Result {
+pub(super) fn tell(document: &mut Document, uniform: &Uniform, reserves: &str) {
     let Some(uniformity) = uniform.said() else {
-        return Ok(());
+        return;
     };
     let assumption = uniform.assumption();
     match &uniformity.regular.verdict {
         structure::Verdict::Proved => {
-            writeln!(
-                f,
-                "for every constant input{assumption} and everywhere on the box: proved{}{reserves}",
-                match uniformity.one_to_one.finding.is_proved() {
-                    true => "",
-                    false => ", for neighbouring states: locally",
-                }
-            )?;
-            return twins(f, uniformity);
+            let locally = match uniformity.one_to_one.finding.is_proved() {
+                true => "",
+                false => ", for neighbouring states: locally",
+            };
+            document.line(format!(
+                "for every constant input{assumption} and everywhere on the box: proved{locally}{reserves}"
+            ));
+            document.items(twins(uniformity));
+            return;
         }
         structure::Verdict::Refuted(witness) => {
-            let place = witness.zero().map(|p| {
-                let sides = p
-                    .coordinates
-                    .iter()
-                    .map(|c| side(&c.name, c.value, c.value));
-                sides.collect::<Vec<_>>().join(", ")
-            });
-            writeln!(
-                f,
+            let place = witness.zero().map(|p| place(&p.coordinates));
+            document.line(format!(
                 "not everywhere on the box{assumption}: the map from states to outputs and their derivatives is singular at {}",
                 place.unwrap_or_default()
-            )?;
+            ));
         }
         structure::Verdict::Undecided(_) => {
-            writeln!(f, "not decided everywhere on the box{assumption}")?;
+            document.line(format!("not decided everywhere on the box{assumption}"));
         }
     }
-    twins(f, uniformity)?;
-    for blind in &uniformity.blind {
-        writeln!(f, "  {}", told(blind))?;
-    }
+    document.items(twins(uniformity));
+    document.items(uniformity.blind.iter().map(told));
     if !uniformity.undeclared.is_empty() {
-        let names = uniformity.undeclared.join(", ");
-        return writeln!(
-            f,
-            "  declare min and max of {names} to see where singular points lie"
-        );
-    }
-    if uniformity.blind.is_empty() && !uniformity.singular.is_empty() {
-        writeln!(
-            f,
-            "  singular points lie in {} with {} % of its volume, within {}",
+        document.item(format!(
+            "declare min and max of {} to see where singular points lie",
+            uniformity.undeclared.join(", ")
+        ));
+    } else if uniformity.blind.is_empty() && !uniformity.singular.is_empty() {
+        document.item(format!(
+            "singular points lie in {} with {} % of its volume, within {}",
             match uniformity.singular.len() {
                 1 => "one part".to_owned(),
                 count => format!("{count} parts"),
             },
             number(100.0 * uniformity.share),
             hull(&uniformity.singular)
-        )?;
+        ));
     }
-    Ok(())
+}
+
+/// A point in words.
+fn place(coordinates: &[Coordinate]) -> String {
+    let sides = coordinates.iter().map(|c| side(&c.name, c.value, c.value));
+    sides.collect::<Vec<_>>().join(", ")
 }
 
 /// Two states far apart that nothing tells apart.
-fn twins(f: &mut fmt::Formatter<'_>, uniformity: &Uniformity) -> fmt::Result {
-    let Some(alike) = &uniformity.one_to_one.alike else {
-        return Ok(());
+fn twins(uniformity: &Uniformity) -> Option<String> {
+    let alike = uniformity.one_to_one.alike.as_ref()?;
+    let [one, other] = alike
+        .points
+        .each_ref()
+        .map(|point| place(&point.coordinates));
+    let nearly = if alike.is_proved {
+        ""
+    } else {
+        ", to twelve digits"
     };
-    let [one, other] = alike.points.each_ref().map(|point| {
-        let sides = point.coordinates.iter();
-        let sides = sides.map(|c| side(&c.name, c.value, c.value));
-        sides.collect::<Vec<_>>().join(", ")
-    });
-    writeln!(
-        f,
-        "  ({one}) and ({other}) give the same outputs and first {} derivatives{}",
-        uniformity.sides.len().saturating_sub(1),
-        if alike.is_proved {
-            ""
-        } else {
-            ", to twelve digits"
-        }
-    )
+    Some(format!(
+        "({one}) and ({other}) give the same outputs and first {} derivatives{nearly}",
+        uniformity.sides.len().saturating_sub(1)
+    ))
 }
 
 fn told(blind: &Blind) -> String {
@@ -149,10 +137,7 @@ fn told(blind: &Blind) -> String {
             "with the constant input {input} neighbouring states look alike everywhere: excite it"
         );
     };
-    let [one, other] = states.each_ref().map(|state| {
-        let sides = state.iter().map(|c| side(&c.name, c.value, c.value));
-        sides.collect::<Vec<_>>().join(", ")
-    });
+    let [one, other] = states.each_ref().map(|state| place(state));
     format!(
         "with the constant input {input} states that differ only in {} give the same outputs, e.g. ({one}) and ({other}): excite it",
         blind.hidden.join(", ")

@@ -202,13 +202,9 @@ mod tests {
 
     fn told(outcome: Result<Outcome, Error>) -> String {
         let outcome = outcome.unwrap();
-        let columns = outcome.columns(true).into_iter();
+        let columns = outcome.columns().into_iter();
         let columns = columns.map(|(name, values)| (name, values.to_vec()));
-        format!(
-            "{:?} {}",
-            columns.collect::<Vec<_>>(),
-            outcome.to_json(true)
-        )
+        format!("{:?} {}", columns.collect::<Vec<_>>(), outcome.to_json())
     }
 
     fn go(_: f64) -> ControlFlow<()> {
@@ -248,7 +244,7 @@ mod tests {
                 let run =
                     crate::simulate(&tank(observer, 0.05, &format!("seed = {seed}")), &mut go)
                         .unwrap();
-                let log = run.log(&study.estimate).unwrap().into_iter();
+                let log = run.log().unwrap().into_iter();
                 let log =
                     Table::from_columns(log.map(|(name, x)| (name, x.to_vec())).collect()).unwrap();
                 let alone = crate::estimate(&study, &log, &mut go);

@@ -1,13 +1,13 @@
 //! A comparison for people and machines.
 
-use std::fmt;
-
+use lynkeus_answer::Document;
+use lynkeus_answer::document::{Cell, Table};
 use lynkeus_words::figures;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::Doubt;
 use crate::entries::Named;
+use crate::{Answer, Doubt, Error};
 
 use super::{Against, Compared, Comparison, Interval, Run};
 
@@ -100,98 +100,95 @@ impl Comparison {
     /// What of the log contradicts itself, or counts nowhere: the same for every family.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
-        let mut runs = self.rows.iter().filter_map(|row| row.run.as_ref().ok());
-        runs.next().map_or(&[], |run| &run.outcome.warnings)
+        self.runs()
+            .next()
+            .map_or(&[], |(_, run)| &run.outcome.warnings)
     }
 }
 
 /// Quantities shown in a table for people.
 const SHOWN: usize = 5;
 
-impl fmt::Display for Comparison {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+crate::answer::displayed!(Comparison);
+
+impl Answer for Comparison {
+    fn document(&self) -> Document {
         let against = match self.against {
             Against::Simulation => "against the simulated plant",
             Against::Log => "against the columns of the log that are not read",
             Against::Nothing => "the log has no true values",
         };
-        write!(f, "{}: {against}", self.plant)?;
-        if let Some(interval) = &self.interval {
-            write!(f, ", {interval}")?;
-        }
-        writeln!(f, "\n")?;
-        let runs = || {
-            self.rows
-                .iter()
-                .filter_map(|row| Some((row.family, row.run.as_ref().ok()?)))
-        };
-        let names: Vec<&str> = match runs().next() {
-            Some((_, run)) => run
-                .settled
-                .iter()
-                .map(|s| s.quantity.as_str())
-                .take(SHOWN)
-                .collect(),
-            None => vec![],
-        };
-        let mut table = vec![vec!["family".to_owned()]];
-        table[0].extend(names.iter().map(|name| format!("RMS {name}")));
-        for title in ["peak", "settling", "roughness", "µs/sample"] {
-            table[0].push(title.to_owned());
-        }
-        for (family, run) in runs() {
-            let mut line = vec![family.to_owned()];
-            for name in &names {
-                let settled = run.settled.iter().find(|s| s.quantity == *name);
-                line.push(cell(settled.and_then(|s| s.rms)));
-            }
-            line.push(cell(run.peak));
-            line.push(cell(run.settling));
-            line.push(cell(run.roughness));
-            line.push(figures(1e6 * run.per_sample, 2));
-            table.push(line);
-        }
-        aligned(f, &table)?;
-        for (family, run) in runs() {
+        let sampled = self
+            .interval
+            .as_ref()
+            .map(|interval| format!(", {interval}"));
+        let sampled = sampled.unwrap_or_default();
+        let mut document = Document::new(format!("{}: {against}{sampled}", self.plant));
+        document.part().table(self.table());
+        for (family, run) in self.runs() {
             if let Some(doubt) = &run.doubt {
-                writeln!(f, "\n{family}: {doubt}")?;
+                document.part().line(format!("{family}: {doubt}"));
             }
         }
         for row in &self.rows {
             if let Err(reason) = &row.run {
-                writeln!(f, "\n{}: {reason}", row.family)?;
+                document.part().line(format!("{}: {reason}", row.family));
             }
         }
-        writeln!(
-            f,
-            "\nRMS over the last half; peak and roughness (the scatter from sample to sample) in widths of the declared ranges; settling within 5 % of them"
-        )
+        document.part().line("RMS over the last half; peak and roughness (the scatter from sample to sample) in widths of the declared ranges; settling within 5 % of them");
+        document
+    }
+
+    fn to_json(&self) -> Value {
+        Self::to_json(self)
+    }
+
+    fn is_positive(&self) -> bool {
+        Self::is_positive(self)
+    }
+
+    #[cfg(feature = "plot")]
+    fn svg(&self) -> Result<Option<String>, Error> {
+        self.picture().to_svg().map(Some)
+    }
+
+    fn warnings(&self) -> &[String] {
+        Self::warnings(self)
     }
 }
 
-fn cell(value: Option<f64>) -> String {
-    value.map_or_else(|| "-".to_owned(), |x| figures(x, 3))
-}
+impl Comparison {
+    fn runs(&self) -> impl Iterator<Item = (&'static str, &Run)> {
+        let rows = self.rows.iter();
+        rows.filter_map(|row| Some((row.family, row.run.as_ref().ok()?)))
+    }
 
-fn aligned(f: &mut fmt::Formatter<'_>, table: &[Vec<String>]) -> fmt::Result {
-    let columns = table.first().map_or(0, Vec::len);
-    let width = |j: usize| {
-        table
+    fn table(&self) -> Table {
+        let first = self.runs().next();
+        let settled = first.map_or(&[][..], |(_, run)| &run.settled);
+        let names: Vec<&str> = settled
             .iter()
-            .map(|row| row[j].chars().count())
-            .max()
-            .unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    for row in table {
-        let cells = row.iter().zip(&widths).enumerate();
-        for (j, (text, width)) in cells {
-            match j {
-                0 => write!(f, "{text:<width$}")?,
-                _ => write!(f, "  {text:>width$}")?,
-            }
-        }
-        writeln!(f)?;
+            .map(|s| s.quantity.as_str())
+            .take(SHOWN)
+            .collect();
+        let errors = names.iter().map(|name| format!("RMS {name}"));
+        let others = ["peak", "settling", "roughness", "µs/sample"].map(str::to_owned);
+        let titles = std::iter::once("family".to_owned())
+            .chain(errors)
+            .chain(others);
+        let rows = self.runs().map(|(family, run)| {
+            let rms = names.iter().map(|name| {
+                let settled = run.settled.iter().find(|s| s.quantity == *name);
+                settled.and_then(|s| s.rms)
+            });
+            let judged = rms.chain([run.peak, run.settling, run.roughness]);
+            let judged = judged.map(|x| Cell::number(x, |x| figures(x, 3)));
+            let cost = Cell::Number(figures(1e6 * run.per_sample, 2));
+            std::iter::once(family.into())
+                .chain(judged)
+                .chain([cost])
+                .collect()
+        });
+        Table::new(titles).with(rows)
     }
-    Ok(())
 }

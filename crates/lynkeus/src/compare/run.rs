@@ -6,6 +6,7 @@ use std::time::Instant;
 use lynkeus_model::Plant;
 use lynkeus_observers::Family;
 
+use crate::judge::accuracy::SETTLED;
 use crate::prepare::Prepared;
 use crate::tune::errors::Errors;
 use crate::{Error, Outcome, Quantity, Study, Table, estimate};
@@ -13,9 +14,6 @@ use lynkeus_study::{BetweenSamples, Name};
 
 /// Is told the fraction done and may stop the work.
 pub(super) type Watch<'w> = &'w mut dyn FnMut(f64) -> ControlFlow<()>;
-
-/// Settled is an error below this share of the range.
-const SETTLED: f64 = 0.05;
 
 /// One family on the data.
 #[derive(Debug)]

@@ -53,6 +53,16 @@ pub struct Doubt {
     pub level: Level,
 }
 
+impl Level {
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::Note => "note",
+            Self::Warning => "warning",
+            Self::Refusal => "refusal",
+        }
+    }
+}
+
 impl Kind {
     pub(crate) fn hint(self) -> &'static str {
         match self {

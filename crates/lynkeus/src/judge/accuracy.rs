@@ -9,7 +9,7 @@ use crate::words::instant;
 use crate::{Quantity, Series};
 
 /// Settled is an error below this share of the declared range.
-const SETTLED: f64 = 0.05;
+pub(crate) const SETTLED: f64 = 0.05;
 
 /// Quantities that are told of one by one.
 const TOLD: usize = 6;
@@ -141,9 +141,11 @@ fn accuracy(time: &Series, quantity: &Quantity, side: Option<&Dimension>) -> Opt
         rms: quantity.settled_error(),
         peak,
         peak_at,
-        settling: width.map_or(Settling::NoRange, |width| {
-            settling(errors(), SETTLED * width)
-        }),
+        settling: match width.map(|width| settled_from(errors(), SETTLED * width)) {
+            Some(Some(time)) => Settling::From(time),
+            Some(None) => Settling::Never,
+            None => Settling::NoRange,
+        },
         coverage: coverage(quantity),
     })
 }
@@ -171,16 +173,11 @@ fn coverage(quantity: &Quantity) -> Option<Coverage> {
     })
 }
 
-fn settling(errors: impl Iterator<Item = (f64, f64)>, most: f64) -> Settling {
-    let mut settling = Settling::Never;
-    for (t, e) in errors {
-        settling = match settling {
-            _ if e > most => Settling::Never,
-            Settling::Never => Settling::From(t),
-            settled => settled,
-        };
-    }
-    settling
+/// The first time from which on no error is larger than `most`; none where the last one is.
+pub(crate) fn settled_from(errors: impl Iterator<Item = (f64, f64)>, most: f64) -> Option<f64> {
+    errors.fold(None, |settled, (t, e)| {
+        (e <= most || e.is_nan()).then_some(settled.unwrap_or(t))
+    })
 }
 
 impl Accuracy {

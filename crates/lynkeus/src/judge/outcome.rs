@@ -24,7 +24,7 @@ use crate::prepare::systems::hat;
 use crate::prepare::{Prepared, StudyDesign};
 use crate::words::in_words;
 use crate::{Error, Quantity, Series, Study, judge::expected, judge::saturated, prepare::headers};
-use lynkeus_study::EstimateSettings;
+use lynkeus_study::{EstimateSettings, Name};
 use lynkeus_table::Instant;
 
 #[cfg(test)]
@@ -77,6 +77,16 @@ pub struct Outcome {
     pub time_header: String,
     /// header of the column of times in a log
     log_time: String,
+    /// how the study names the columns of one
+    settings: EstimateSettings,
+    /// the study, for messages
+    file: String,
+    /// the unit of time, where the study has one
+    pub time_unit: Option<String>,
+    /// the quantities that its picture shows, where the study says so
+    pub show: Option<Vec<Name>>,
+    /// the true course of the plant is known
+    pub is_simulated: bool,
     /// every state, input and measured output
     pub quantities: Vec<Quantity>,
     /// the measured outputs by name, noise included, where they are known
@@ -118,38 +128,26 @@ impl Outcome {
     /// The columns of the CSV: `t`; true states and inputs where they were
     /// simulated; `<name>_hat` for everything estimated; monitors. No two have the same
     /// header: what the model calls so itself keeps its name, and the others give way.
-    pub fn columns(&self, with_truth: bool) -> Vec<(String, &Series)> {
-        let mut columns: Vec<(String, &Series)> = vec![(self.time_header.clone(), &self.time)];
-        for quantity in self.quantities.iter().filter(|_| with_truth) {
-            if let Some(truth) = &quantity.truth {
-                columns.push((quantity.name.clone(), truth));
-            }
-        }
-        for quantity in &self.quantities {
-            if let Some(estimate) = &quantity.estimate {
-                columns.push((quantity.estimate_header.clone(), estimate));
-            }
-        }
-        for quantity in &self.quantities {
-            if let Some(deviation) = &quantity.deviation {
-                columns.push((quantity.deviation_header.clone(), deviation));
-            }
-        }
-        for quantity in &self.quantities {
-            if let Some(smoothed) = &quantity.smoothed {
-                columns.push((quantity.smoothed_header.clone(), smoothed));
-            }
-        }
-        for quantity in &self.quantities {
-            if let Some(deviation) = &quantity.smoothed_deviation {
-                columns.push((quantity.smoothed_deviation_header.clone(), deviation));
-            }
-        }
+    pub fn columns(&self) -> Vec<(String, Series)> {
+        type Of = fn(&Quantity) -> (&String, &Option<Series>);
+        let truth: Of = |q| (&q.name, &q.truth);
+        let others: [Of; 4] = [
+            |q| (&q.estimate_header, &q.estimate),
+            |q| (&q.deviation_header, &q.deviation),
+            |q| (&q.smoothed_header, &q.smoothed),
+            |q| (&q.smoothed_deviation_header, &q.smoothed_deviation),
+        ];
+        let told = self.is_simulated.then_some(truth).into_iter().chain(others);
+        let named = told.flat_map(|of| self.quantities.iter().map(of));
+        let named = named.filter_map(|(header, values)| Some((header, values.as_ref()?)));
         let innovations = self.innovation_columns.iter();
-        columns.extend(innovations.map(|(header, values)| (header.clone(), values)));
-        let watches = self.watches.iter();
-        columns.extend(watches.map(|w| (w.header.clone(), &w.values)));
-        columns
+        let watches = self.watches.iter().map(|w| (&w.header, &w.values));
+        std::iter::once((&self.time_header, &self.time))
+            .chain(named)
+            .chain(innovations.map(|(header, values)| (header, values)))
+            .chain(watches)
+            .map(|(header, values)| (header.clone(), values.clone()))
+            .collect()
     }
 
     /// What a logger would have seen: time, the measured outputs and the inputs, under the
@@ -157,21 +155,21 @@ impl Outcome {
     ///
     /// # Errors
     /// The study's `[estimate]` gives two of them the same header.
-    pub fn log(&self, settings: &EstimateSettings) -> Result<Vec<(String, &Series)>, Error> {
-        let header = |name: &str| headers::header(settings, name).to_owned();
+    pub fn log(&self) -> Result<Vec<(String, Series)>, Error> {
         let inputs = self.quantities.iter().filter(|q| q.is_input);
         let inputs = inputs.filter_map(|q| Some((&q.name, q.truth.as_ref()?)));
         let measured = self.measurements.iter().map(|(n, values)| (n, values));
-        let mut columns = vec![(self.log_time.clone(), &self.time)];
+        let mut columns = vec![(self.log_time.clone(), self.time.clone())];
         for (name, values) in measured.chain(inputs) {
-            let header = header(name);
+            let header = headers::header(&self.settings, name).to_owned();
             if columns.iter().any(|(known, _)| *known == header) {
                 return Err(Error::input(format!(
                     "the log would have two columns \"{header}\", and \"{name}\" is one of them"
                 ))
-                .hint("give each a header of its own: `time` and `columns` of [estimate]"));
+                .hint("give each a header of its own: `time` and `columns` of [estimate]")
+                .at(&self.file));
             }
-            columns.push((header, values));
+            columns.push((header, values.clone()));
         }
         Ok(columns)
     }
@@ -329,17 +327,23 @@ impl Raw<'_> {
         // of a gain that is chosen without the noises nobody takes them for counted
         let is_claimed = is_weighed || prepared.declared().disturbances.is_declared();
         notes.extend(declared.told().filter(|_| is_claimed));
+        let study = prepared.study();
         Ok(Outcome {
             plant: plant.name.clone(),
+            file: study.file.clone(),
             declared,
-            log_time: log_time(plant, &prepared.study().estimate),
+            log_time: log_time(plant, &study.estimate),
+            settings: study.estimate.clone(),
+            time_unit: study.time_unit.clone(),
+            show: study.show.clone(),
+            is_simulated: !replayed,
             doubts,
             ended: course.ended.map(|error| Ended {
                 message: match course.limit {
                     Some(spent) => not_whole(spent, &error),
                     None => in_words(&error),
                 },
-                file: prepared.study().file.clone(),
+                file: study.file.clone(),
                 by_limit: course.limit.is_some(),
                 followed: match replayed {
                     true => followed(&design, &innovations),

@@ -181,6 +181,8 @@ fn reported(
         plant: plant.name.clone(),
         family: rig.design.examination.family.name(),
         file: study.file.clone(),
+        time_unit: study.time_unit.clone(),
+        show: study.show.clone(),
         asked,
         seeds,
         failures,

@@ -2,7 +2,7 @@
 
 use super::{MonteCarlo, Scattered};
 use crate::Error;
-use crate::figure::{PANELS, spread};
+use crate::figure::{PANELS, spread, time_label};
 use crate::prepare::mentioned::not_drawn;
 use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Panel};
 use lynkeus_study::Name;
@@ -13,8 +13,8 @@ impl MonteCarlo {
     ///
     /// # Errors
     /// `show` names something that is not estimated.
-    pub fn figure(&self, time_unit: Option<&str>, show: Option<&[Name]>) -> Result<Figure, Error> {
-        let chosen = match show {
+    pub fn figure(&self) -> Result<Figure, Error> {
+        let chosen = match &self.show {
             Some(names) => self.shown(names)?,
             None => {
                 let mut all: Vec<&Scattered> = self.quantities.iter().collect();
@@ -22,7 +22,6 @@ impl MonteCarlo {
                 spread(all, PANELS)
             }
         };
-        let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
         Ok(Figure {
             title: format!(
                 "{}: {} observer, {} runs",
@@ -30,7 +29,7 @@ impl MonteCarlo {
                 self.family,
                 self.seeds.len()
             ),
-            time_label: format!("time{unit}"),
+            time_label: time_label(self.time_unit.as_deref()),
             panels: chosen.into_iter().map(|q| self.panel(q)).collect(),
         })
     }

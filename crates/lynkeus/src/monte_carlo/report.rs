@@ -2,17 +2,19 @@
 
 use std::fmt;
 
+use lynkeus_answer::Document;
+use lynkeus_answer::document::{Cell, Table};
 use lynkeus_words::figures;
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::statistics::{HIGH, mean, quantile};
 use super::{Again, Failure, MonteCarlo, Scattered};
-use crate::Error;
 use crate::entries::{Named, finite};
 use crate::judge::accuracy::Covered;
 use crate::judge::outcome::Ended;
 use crate::prepare::headers::Headers;
+use crate::{Answer, Error, Series};
 
 /// Seeds of runs that are told one by one.
 const TOLD: usize = 20;
@@ -239,52 +241,85 @@ impl MonteCarlo {
     }
 }
 
-impl fmt::Display for MonteCarlo {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+crate::answer::displayed!(MonteCarlo);
+
+impl Answer for MonteCarlo {
+    fn document(&self) -> Document {
         let Self { plant, family, .. } = self;
         let (done, asked) = (self.seeds.len(), self.asked);
-        writeln!(
-            f,
-            "{plant}: {family} observer, {done} of {asked} runs to the end"
-        )?;
+        let title = format!("{plant}: {family} observer, {done} of {asked} runs to the end");
+        let mut document = Document::new(title);
         if let (Some(first), Some(last)) = (self.seeds.first(), self.seeds.last()) {
-            writeln!(f, "seeds {first} to {last}; {}", self.again)?;
+            document.line(format!("seeds {first} to {last}; {}", self.again));
         }
-        writeln!(f, "RMS errors over the last half of the rows:")?;
-        let width = self.quantities.iter().map(|q| q.name.chars().count());
-        let width = width.max().unwrap_or(0).max("quantity".len());
-        writeln!(
-            f,
-            "  {:width$}  {:>10}  {:>10}  {:>10}  seed of the worst",
-            "quantity", "mean", "95 % below", "worst"
-        )?;
-        for q in &self.quantities {
-            let Settled { mean, q95, worst } = q.settled();
-            let [mean, q95, worst] = [mean, q95, worst].map(|x| figures(x, 3));
-            let seed = self.worst_seed(q).map_or(String::new(), |s| s.to_string());
-            writeln!(
-                f,
-                "  {:width$}  {mean:>10}  {q95:>10}  {worst:>10}  {seed}",
-                q.name
-            )?;
-        }
+        document.heading("RMS errors over the last half of the rows:");
+        document.table(self.table());
         let covered = self.quantities.iter().filter_map(|q| {
             let share = figures(100.0 * q.coverage?.within, 3);
             Some(format!("{} {share} %", q.name))
         });
         let covered: Vec<String> = covered.collect();
         if !covered.is_empty() {
-            writeln!(f, "within 2 sd there: {}", covered.join(", "))?;
+            document.line(format!("within 2 sd there: {}", covered.join(", ")));
         }
         for (runs, what) in [
             (&self.failures, "not in these figures, ended early"),
             (&self.doubtful, "in these figures, but not credible"),
         ] {
             if !runs.is_empty() {
-                writeln!(f, "{what}: seeds {}", told(runs))?;
+                document.line(format!("{what}: seeds {}", told(runs)));
             }
         }
-        Ok(())
+        document
+    }
+
+    fn to_json(&self) -> Value {
+        Self::to_json(self)
+    }
+
+    fn columns(&self) -> Vec<(String, Series)> {
+        let columns = Self::columns(self).into_iter();
+        columns.map(|(name, x)| (name, x.to_vec().into())).collect()
+    }
+
+    #[cfg(feature = "plot")]
+    fn svg(&self) -> Result<Option<String>, Error> {
+        self.figure()?.to_svg().map(Some)
+    }
+
+    #[cfg(feature = "plot")]
+    fn panels(&self) -> Result<Option<lynkeus_plot::Figure>, Error> {
+        self.figure().map(Some)
+    }
+
+    fn refusal(&self) -> Option<Error> {
+        Self::refusal(self)
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}
+
+impl MonteCarlo {
+    fn table(&self) -> Table {
+        let titles = [
+            "quantity",
+            "unit",
+            "mean",
+            "95 % below",
+            "worst",
+            "seed of the worst",
+        ];
+        let rows = self.quantities.iter().map(|q| {
+            let Settled { mean, q95, worst } = q.settled();
+            let unit = q.unit.clone().unwrap_or_default();
+            let figures = [mean, q95, worst].map(|x| Cell::Number(figures(x, 3)));
+            let seed = self.worst_seed(q).map_or(String::new(), |s| s.to_string());
+            let known = [q.name.as_str().into(), unit.into()].into_iter();
+            known.chain(figures).chain([seed.into()]).collect()
+        });
+        Table::new(titles).with(rows).dense()
     }
 }
 

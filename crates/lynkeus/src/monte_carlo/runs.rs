@@ -3,6 +3,7 @@
 use lynkeus_run::Column;
 
 use crate::Coverage;
+use lynkeus_study::Name;
 
 /// What many runs of a study give.
 #[derive(Clone, Debug)]
@@ -31,6 +32,10 @@ pub struct MonteCarlo {
     pub time_header: String,
     /// Everything that is estimated and whose true course is known.
     pub quantities: Vec<Scattered>,
+    /// The unit of time, where the study has one.
+    pub time_unit: Option<String>,
+    /// The quantities that the picture shows, where the study says so.
+    pub show: Option<Vec<Name>>,
     /// What the user should know.
     pub notes: Vec<String>,
 }

@@ -1,11 +1,14 @@
 //! The report as text: a screen at most.
 
-use std::fmt;
-
-use lynkeus_observability::precision::{Advice, SensorSet};
+use lynkeus_answer::Document;
+use lynkeus_answer::document::{Cell, Table};
+use lynkeus_observability::precision::{Advice, Deviations, SensorSet};
+use lynkeus_words::counted;
+use serde_json::Value;
 
 use super::Report;
 use crate::words::number;
+use crate::{Answer, Error, Series};
 
 /// Quantities listed.
 const LISTED: usize = 12;
@@ -16,26 +19,59 @@ const COLUMNS: usize = 6;
 /// Sensor sets listed.
 const SETS: usize = 6;
 
-impl fmt::Display for Report {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.heading(f)?;
-        self.quantities(f)?;
-        self.course(f)?;
+crate::answer::displayed!(Report);
+
+impl Answer for Report {
+    fn document(&self) -> Document {
+        let span = self.horizons.last().copied().unwrap_or_default();
+        let unit = self.unit();
+        let mut document = Document::new(format!(
+            "{}: what is known at present after {}{unit} of samples, one every {}{unit}",
+            self.plant,
+            number(span),
+            number(self.step)
+        ));
+        let told = self.sensors.iter().take(self.measured).map(|s| {
+            let aside = if s.is_stated { "" } else { " (assumed)" };
+            format!("{} {}{aside}", s.name, s.noise)
+        });
+        document.line(format!("measured: {}", told.collect::<Vec<_>>().join("; ")));
+        self.quantities(&mut document);
+        document.part().table(self.course());
         if let Some(advice) = &self.advice {
-            self.sensors(f, advice)?;
+            self.advise(&mut document, advice);
         }
         if self.horizons.len() < self.asked {
-            let reached = self.horizons.len();
-            writeln!(
-                f,
-                "a limit ended the run after {reached} of {} horizons",
-                self.asked
-            )?;
+            let (reached, asked) = (self.horizons.len(), self.asked);
+            document.line(format!(
+                "a limit ended the run after {reached} of {asked} horizons"
+            ));
         }
         if let Some(told) = self.declared.told() {
-            writeln!(f, "{told}")?;
+            document.line(told);
         }
-        self.doubts(f)
+        if self.is_doubtful {
+            document.part().line("what is seen and what is not is near the border of the integrator's accuracy: tighten rtol of [simulate] to be sure");
+        }
+        document
+    }
+
+    fn to_json(&self) -> Value {
+        Self::to_json(self)
+    }
+
+    fn is_positive(&self) -> bool {
+        Self::is_positive(self)
+    }
+
+    fn columns(&self) -> Vec<(String, Series)> {
+        let columns = Self::columns(self).into_iter();
+        columns.map(|(name, x)| (name, x.into())).collect()
+    }
+
+    #[cfg(feature = "plot")]
+    fn svg(&self) -> Result<Option<String>, Error> {
+        self.to_svg().map(Some)
     }
 }
 
@@ -46,60 +82,39 @@ impl Report {
             .map_or(String::new(), |unit| format!(" {unit}"))
     }
 
-    fn heading(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let span = self.horizons.last().copied().unwrap_or_default();
-        let unit = self.unit();
-        writeln!(
-            f,
-            "{}: what is known at present after {}{unit} of samples, one every {}{unit}",
-            self.plant,
-            number(span),
-            number(self.step)
-        )?;
-        let told = self.sensors.iter().take(self.measured).map(|s| {
-            let aside = if s.is_stated { "" } else { " (assumed)" };
-            format!("{} {}{aside}", s.name, s.noise)
-        });
-        writeln!(f, "measured: {}", told.collect::<Vec<_>>().join("; "))
-    }
-
-    fn quantities(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn quantities(&self, document: &mut Document) {
         let Some(last) = self.last() else {
-            return Ok(());
+            return;
         };
         let order = self.ranked();
-        let wide = self.wide();
-        writeln!(
-            f,
-            "\n{:wide$}  {:>16}  {:>14}  {:>16}  {:>16}",
-            "",
+        let titles = [
+            "quantity",
             "standard error",
             "of the range",
             "of its start",
-            self.beside()
-        )?;
-        for &i in order.iter().take(LISTED) {
-            writeln!(
-                f,
-                "{:wide$}  {:>16}  {:>14}  {:>16}  {:>16}",
-                self.names[i],
+            self.beside(),
+        ];
+        let rows = order.iter().map(|&i| {
+            let figures = [
                 error(self.told(i, last.present[i])),
                 percent(self.share(last, i)),
                 start_error(self.told(i, last.start[i]), self.scales[i]),
-                self.other(i)
-            )?;
-        }
-        match order.len().saturating_sub(LISTED) {
-            0 => {}
-            more => writeln!(f, "and {more} that are known better")?,
-        }
+                self.other(i),
+            ];
+            let name = Cell::from(self.names[i].as_str());
+            std::iter::once(name)
+                .chain(figures.map(Cell::Number))
+                .collect()
+        });
+        let table = Table::new(titles).with(rows).dense();
+        document
+            .part()
+            .table(table.at_most(LISTED, "that are known better"));
         if order.iter().any(|&i| self.told(i, last.present[i]) == 0.0) {
-            writeln!(
-                f,
-                "0: known exactly, for a model that is right: nothing of an error is left"
-            )?;
+            document
+                .line("0: known exactly, for a model that is right: nothing of an error is left");
         }
-        self.meaning(f)
+        self.meaning(document);
     }
 
     /// What stands in the last column.
@@ -121,122 +136,85 @@ impl Report {
     }
 
     /// What the figures count, in words.
-    fn meaning(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn meaning(&self, document: &mut Document) {
         if !self.disturbances.is_empty() {
-            writeln!(
-                f,
+            document.line(format!(
                 "disturbances ({}) are taken as zero: what they add to errors is not counted; `lynkeus check` bounds what it can",
                 self.disturbances.join(", ")
-            )?;
+            ));
         }
-        match (self.counts_process_noise, &self.filtered) {
-            (true, _) => writeln!(
-                f,
-                "[process_noise] is counted: these are the standard deviations of the extended Kalman filter; sensor sets are compared for an exact model"
-            ),
-            (false, Some(_)) => writeln!(
-                f,
-                "the model is taken as exact; a filter without [process_noise] trusts it less, and its sd says so"
-            ),
-            (false, None) => Ok(()),
+        if self.counts_process_noise {
+            document.line("[process_noise] is counted: these are the standard deviations of the extended Kalman filter; sensor sets are compared for an exact model");
+        } else if self.filtered.is_some() {
+            document.line("the model is taken as exact; a filter without [process_noise] trusts it less, and its sd says so");
         }
     }
 
     /// The least certain quantities and the mean over some horizons.
-    fn course(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn course(&self) -> Table {
         let shown = spread(self.horizons.len(), COLUMNS);
-        let wide = self.wide();
-        write!(f, "\n{:wide$}", "after")?;
-        for &h in &shown {
-            write!(f, "  {:>9}", number(self.horizons[h]))?;
+        let mut titles = vec!["after".to_owned()];
+        titles.extend(shown.iter().map(|&h| number(self.horizons[h])));
+        if let Some(last) = titles.last_mut() {
+            *last += &self.unit();
         }
-        writeln!(f, "{}", self.unit())?;
-        for &i in self.ranked().iter().take(2) {
-            write!(f, "{:wide$}", self.names[i])?;
-            for &h in &shown {
-                write!(f, "  {:>9}", percent(self.share(&self.deviations[h], i)))?;
-            }
-            writeln!(f)?;
-        }
-        write!(f, "{:wide$}", "mean")?;
-        for &h in &shown {
-            let (mean, unseen) = self.mean(&self.deviations[h]);
-            match unseen {
-                0 => write!(f, "  {:>9}", percent(mean))?,
-                _ => write!(f, "  {:>9}", format!("{unseen} unseen"))?,
-            }
-        }
-        writeln!(f)
+        let line = |name: &str, share: &dyn Fn(&Deviations) -> String| {
+            let shares = shown
+                .iter()
+                .map(|&h| Cell::Number(share(&self.deviations[h])));
+            std::iter::once(Cell::from(name)).chain(shares).collect()
+        };
+        let ranked = self.ranked();
+        let worst = ranked.iter().take(2);
+        let worst = worst.map(|&i| line(&self.names[i], &|d| percent(self.share(d, i))));
+        let mean = line("mean", &|d| match self.mean(d) {
+            (mean, 0) => percent(mean),
+            (_, unseen) => format!("{unseen} unseen"),
+        });
+        Table::new(titles).with(worst.chain([mean]))
     }
 
-    fn sensors(&self, f: &mut fmt::Formatter<'_>, advice: &Advice) -> fmt::Result {
+    fn advise(&self, document: &mut Document, advice: &Advice) {
         let size = advice.present.sensors.len();
         let tried = advice.same_size.len();
-        let how = if advice.is_complete {
-            "all"
-        } else {
-            "exchanging one,"
+        let how = match advice.is_complete {
+            true => "all",
+            false => "exchanging one,",
         };
-        let plural = if size == 1 { "" } else { "s" };
-        let wide = self.set_width(advice);
-        writeln!(f, "\nwhich {size} sensor{plural} ({how} {tried} tried):")?;
-        let best = advice.same_size.iter().enumerate().take(SETS);
-        for (rank, set) in best {
-            self.set_line(f, advice, rank, set, wide)?;
+        document.heading(format!(
+            "which {} ({how} {tried} tried):",
+            counted(size, "sensor")
+        ));
+        let is_own = |set: &SensorSet| set.sensors == advice.present.sensors;
+        let ranked = advice.same_size.iter().enumerate();
+        let shown = ranked.filter(|(rank, set)| *rank < SETS || is_own(set));
+        let rows = shown.map(|(rank, set)| {
+            let own = if is_own(set) { "(the study's)" } else { "" };
+            vec![
+                Cell::Number((rank + 1).to_string()),
+                self.set(set).into(),
+                self.quality(set).into(),
+                own.into(),
+            ]
+        });
+        let titles = ["rank", "sensors", "how well", "of the study"];
+        document.table(Table::plain(titles).with(rows));
+        for (sets, words, is_new) in [
+            (&advice.additions, "best addition", true),
+            (&advice.singles, "best single sensor", size != 1),
+            (&advice.pairs, "best pair", size != 2),
+        ] {
+            if let Some(set) = sets.first().filter(|_| is_new) {
+                document.line(format!("{words}: {}: {}", self.set(set), self.quality(set)));
+            }
         }
-        let present = advice
-            .same_size
-            .iter()
-            .position(|s| s.sensors == advice.present.sensors);
-        if let Some(rank) = present.filter(|rank| *rank >= SETS) {
-            self.set_line(f, advice, rank, &advice.present, wide)?;
+        if let Some(noise) = self.usual_noise() {
+            document.line(noise);
         }
-        let first = |sets: &[SensorSet], words: &str, f: &mut fmt::Formatter<'_>| match sets.first()
-        {
-            Some(set) => writeln!(f, "{words}{}: {}", self.set(set), self.quality(set)),
-            None => Ok(()),
-        };
-        first(&advice.additions, "best addition: ", f)?;
-        if size != 1 {
-            first(&advice.singles, "best single sensor: ", f)?;
-        }
-        if size != 2 {
-            first(&advice.pairs, "best pair: ", f)?;
-        }
-        self.usual_noise(f)
-    }
-
-    fn set_line(
-        &self,
-        f: &mut fmt::Formatter<'_>,
-        advice: &Advice,
-        rank: usize,
-        set: &SensorSet,
-        wide: usize,
-    ) -> fmt::Result {
-        let own = match set.sensors == advice.present.sensors {
-            true => "  (the study's)",
-            false => "",
-        };
-        writeln!(
-            f,
-            "{:>5}  {:wide$}  {}{own}",
-            rank + 1,
-            self.set(set),
-            self.quality(set)
-        )
-    }
-
-    fn set_width(&self, advice: &Advice) -> usize {
-        let shown = advice.same_size.iter().take(SETS);
-        let all = shown.chain([&advice.present]);
-        all.map(|set| self.set(set).chars().count())
-            .max()
-            .unwrap_or(0)
     }
 
     /// How the noise of candidates was chosen.
-    fn usual_noise(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn usual_noise(&self) -> Option<String> {
         let added = self.sensors.iter().skip(self.measured);
         let mut noises: Vec<&str> = added
             .filter(|s| !s.is_stated)
@@ -245,43 +223,24 @@ impl Report {
         let count = noises.len();
         noises.sort_unstable();
         noises.dedup();
-        match noises[..] {
-            [] => Ok(()),
-            [one] => writeln!(f, "noise assumed for {count} sensors that could be: {one}"),
-            _ => writeln!(
-                f,
-                "noise assumed for {count} sensors that could be: the same share of the range as the measured ones"
-            ),
-        }
+        let noise = match noises[..] {
+            [] => return None,
+            [one] => one,
+            _ => "the same share of the range as the measured ones",
+        };
+        Some(format!(
+            "noise assumed for {count} sensors that could be: {noise}"
+        ))
     }
 
     fn quality(&self, set: &SensorSet) -> String {
-        let worst = self.names.get(set.worst).map_or("", String::as_str);
         if set.unseen > 0 {
             return format!("{} not seen within this horizon", set.unseen);
         }
+        let worst = self.names.get(set.worst).map_or("", String::as_str);
         let share = self.share(&set.deviations, set.worst);
-        format!(
-            "mean {:>8}, worst {:>8} ({worst})",
-            percent(set.score.exp()),
-            percent(share)
-        )
-    }
-
-    /// Where the rank decision is near its border.
-    fn doubts(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.is_doubtful {
-            true => writeln!(
-                f,
-                "\nwhat is seen and what is not is near the border of the integrator's accuracy: tighten rtol of [simulate] to be sure"
-            ),
-            false => Ok(()),
-        }
-    }
-
-    fn wide(&self) -> usize {
-        let names = self.names.iter().map(|n| n.chars().count());
-        names.max().unwrap_or(0).max(5)
+        let (mean, share) = (percent(set.score.exp()), percent(share));
+        format!("mean {mean}, worst {share} ({worst})")
     }
 }
 

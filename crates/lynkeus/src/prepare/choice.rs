@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use lynkeus_answer::Document;
 use lynkeus_expr::Spent;
 use lynkeus_expr::real::rounded;
 use lynkeus_observers::{Design, Family, Tuning, Value};
@@ -230,38 +231,32 @@ impl Choice {
     }
 }
 
-impl fmt::Display for Choice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Choice {
+    /// The decision, with what stands behind it.
+    pub(crate) fn tell(&self, document: &mut Document) {
         let family = self.family;
-        match self.grounds {
+        document.line(match self.grounds {
             Grounds::Proved {
                 first_of_several: true,
-            } => writeln!(
-                f,
-                "{family} comes first: of the families that fit, it has the simplest gain"
-            )?,
+            } => format!("{family} comes first: of the families that fit, it has the simplest gain"),
             Grounds::Proved { .. } => {
-                writeln!(f, "{family} is the one whose every condition is proved")?
+                format!("{family} is the one whose every condition is proved")
             }
-            Grounds::Undecided => writeln!(
-                f,
+            Grounds::Undecided => format!(
                 "{family} is not proved to fit, but nothing refutes it: what is undecided above says what would settle it"
-            )?,
-            Grounds::Filter if self.is_asked_for => writeln!(
-                f,
+            ),
+            Grounds::Filter if self.is_asked_for => format!(
                 "{family} is the study's choice: it runs on any plant, and nothing is proved of its error"
-            )?,
-            Grounds::Filter => writeln!(f, "{}", self.loss())?,
-        }
-        for passed in &self.passed {
-            writeln!(f, "  {passed}")?;
-        }
-        if let Some(hanging) = self.hanging() {
-            writeln!(f, "{hanging}")?;
-        }
-        match &self.proposal {
-            Some(proposal) => writeln!(f, "{proposal}"),
-            None => Ok(()),
+            ),
+            Grounds::Filter => self.loss(),
+        });
+        document.items(&self.passed);
+        for line in self
+            .hanging()
+            .into_iter()
+            .chain(self.proposal.as_ref().map(Proposal::to_string))
+        {
+            document.line(line);
         }
     }
 }

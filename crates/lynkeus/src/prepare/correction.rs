@@ -1,8 +1,9 @@
 //! How the measurements correct the estimate, for people and machines.
 
 use std::collections::HashMap;
-use std::fmt;
 
+use lynkeus_answer::Document;
+use lynkeus_answer::document::{Cell, Table};
 use lynkeus_expr::{Node, Tape};
 use lynkeus_model::Plant;
 use lynkeus_observers as observers;
@@ -16,8 +17,6 @@ use crate::{Error, Study, prepare::systems};
 
 /// Characters of an expression that a machine reads.
 const WHOLE: usize = 2000;
-/// Characters of an expression in a line.
-const LINE: usize = 90;
 
 /// How the measurements correct an observer's estimate.
 #[derive(Clone, Debug, PartialEq)]
@@ -157,16 +156,6 @@ impl Correction {
         let entries = entries.iter();
         Some(nested(entries.map(|e| (&*e.state, &*e.output, e))))
     }
-
-    fn outputs(&self) -> Vec<&str> {
-        let mut names: Vec<&str> = match self {
-            Self::Gain(entries) => entries.iter().map(|e| &*e.output).collect(),
-            Self::Varying(entries) => entries.iter().map(|e| &*e.output).collect(),
-        };
-        let mut seen = std::collections::HashSet::new();
-        names.retain(|name| seen.insert(*name));
-        names
-    }
 }
 
 fn nested<'a, T>(entries: impl Iterator<Item = (&'a str, &'a str, T)>) -> Named<Named<T>> {
@@ -178,32 +167,46 @@ fn nested<'a, T>(entries: impl Iterator<Item = (&'a str, &'a str, T)>) -> Named<
     rows
 }
 
-impl fmt::Display for Correction {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for output in self.outputs() {
-            match self {
-                Self::Gain(entries) => {
-                    writeln!(f, "\ngain of {output} on")?;
-                    for e in entries.iter().filter(|e| e.output == output) {
-                        writeln!(f, "  {:<14} {}", e.state, short(e.value))?;
-                    }
+impl Correction {
+    /// Output by output.
+    pub(crate) fn tell(&self, document: &mut Document) {
+        match self {
+            Self::Gain(entries) => {
+                for (output, entries) in by_output(entries, |e| &e.output) {
+                    let row =
+                        |e: &GainEntry| vec![e.state.as_str().into(), Cell::Number(short(e.value))];
+                    let table = Table::plain(["estimate", "gain"]);
+                    document.heading(format!("gain of {output} on"));
+                    document.table(table.with(entries.into_iter().map(row)));
                 }
-                Self::Varying(entries) => {
-                    writeln!(
-                        f,
-                        "\ncorrection by {output}: what a unit of it adds, at the start, to"
-                    )?;
-                    for e in entries.iter().filter(|e| e.output == output) {
+            }
+            Self::Varying(entries) => {
+                for (output, entries) in by_output(entries, |e| &e.output) {
+                    let row = |e: &InjectionEntry| {
                         let value = e.at_start.map_or("?".to_owned(), short);
-                        let mut text: String = e.expression.chars().take(LINE).collect();
-                        if text.len() < e.expression.len() {
-                            text.push('…');
-                        }
-                        writeln!(f, "  {:<14} {value:<12} = {text}", e.state)?;
-                    }
+                        let formula = Cell::Formula(e.expression.clone());
+                        vec![e.state.as_str().into(), Cell::from(value), formula]
+                    };
+                    let table = Table::plain(["estimate", "at the start", "everywhere"]);
+                    document.heading(format!(
+                        "correction by {output}: what a unit of it adds, at the start, to"
+                    ));
+                    document.table(table.with(entries.into_iter().map(row)));
                 }
             }
         }
-        Ok(())
     }
+}
+
+/// Entries by their outputs, in the order of these.
+fn by_output<T>(entries: &[T], output: impl Fn(&T) -> &String) -> Vec<(&String, Vec<&T>)> {
+    let mut groups: Vec<(&String, Vec<&T>)> = vec![];
+    for entry in entries {
+        let name = output(entry);
+        match groups.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, group)) => group.push(entry),
+            None => groups.push((name, vec![entry])),
+        }
+    }
+    groups
 }

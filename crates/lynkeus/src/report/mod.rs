@@ -7,7 +7,6 @@ mod data;
 mod html;
 mod knob;
 mod positions;
-mod proof;
 mod run;
 mod sections;
 mod told;
@@ -24,7 +23,6 @@ use crate::tune::slider::Ground;
 use crate::{
     CheckOptions, Error, Study, Table, certify, check, course::fixed_steps, estimate, prepare,
 };
-use html::Html;
 use knob::Knob;
 use positions::Positions;
 use told::{Told, without_folder};
@@ -104,7 +102,12 @@ pub fn report(
     let samples = Log::read(&prepared, table)?.samples;
     notes.extend_from_slice(&outcome.warnings);
     notes.extend_from_slice(&outcome.notes);
-    let mut certified = certify(study);
+    // a page goes to others: no folder of this machine
+    let named = Study {
+        file: file_name(&study.file),
+        ..study.clone()
+    };
+    let mut certified = certify(&named);
     if let Ok(certified) = &mut certified {
         // of the samples that the page shows
         certified.sampling = outcome.intervals;
@@ -113,11 +116,10 @@ pub fn report(
         study,
         plant: &plant,
         source: match log {
-            // a page goes to others: no folder of this machine
             Some(log) => format!("the log {}", file_name(&log.place())),
             None => "a simulation of the study".to_owned(),
         },
-        checked: checked(study),
+        checked: checked(&named),
         certified,
         data: data::json(&prepared, &outcome, &samples, &moving, tradeoff.as_ref()),
         tradeoff,
@@ -135,11 +137,7 @@ pub fn report(
 
 /// What `check` says to others: files without the folders of this machine.
 fn checked(study: &Study) -> Result<check::Report, Error> {
-    let named = Study {
-        file: file_name(&study.file),
-        ..study.clone()
-    };
-    let mut report = check(&named, &CheckOptions::default())?;
+    let mut report = check(study, &CheckOptions::default())?;
     report.warnings = report.warnings.iter().map(without_folder).collect();
     Ok(report)
 }
@@ -155,10 +153,8 @@ const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 
 
 impl Told<'_> {
     fn page(&self) -> String {
-        let mut body = Html::default();
-        self.tell(&mut body);
+        let body = self.tell();
         let title = html::escaped(&format!("{}: what is estimated", self.outcome.plant));
-        let body = body.text();
         let variants = self.moving.as_ref().map_or(&[][..], |knob| &knob.variants);
         let observers: Vec<String> = variants
             .iter()

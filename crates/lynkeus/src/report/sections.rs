@@ -1,51 +1,53 @@
 //! What a page says, section by section.
 
-use lynkeus_observers::{Examination, fit_word};
-use lynkeus_words::{Words, counted, figures};
+use lynkeus_answer::Document;
+use lynkeus_answer::document::{Cell, Line, Table};
+use lynkeus_words::counted;
 
 use super::data::ROWS;
-use super::html::{Cell, Html, badge, words};
-use super::proof;
+use super::html::{element, section, words};
 use super::told::{Told, without_folder};
-use crate::check::{Known, Report};
+use crate::check::tell_examination;
 use crate::print::head::file_name;
-use crate::words::{instant, number};
-use crate::{Accuracy, Error, Knowledge, Settling};
+use crate::words::number;
+use crate::{Answer, Error, design};
 
 impl Told<'_> {
     /// The whole page, but for its script.
-    pub(super) fn tell(&self, page: &mut Html) {
-        page.within("header", |html| self.head(html));
-        page.within("main", |html| {
-            html.within("section id=\"estimates\"", |html| self.estimates(html));
-            html.within("section id=\"known\"", |html| self.known(html));
-            html.within("section id=\"conditions\"", |html| self.conditions(html));
-            html.within("section id=\"design\"", |html| self.design(html));
-            html.within("section id=\"certificate\"", |html| {
-                html.element("h2", "What is guaranteed");
-                match &self.certified {
-                    Ok(certified) => proof::certificate(html, certified),
-                    Err(error) => failed(html, error),
-                }
-            });
-            html.within("section id=\"notes\"", |html| self.notes(html));
-        });
-        page.element(
-            "footer",
-            &format!(
-                "Made by lynkeus {} from {}. Pictures by uPlot.",
-                env!("CARGO_PKG_VERSION"),
-                file_name(&self.study.file)
+    pub(super) fn tell(&self) -> String {
+        let certificate = match &self.certified {
+            Ok(certified) => certified.document().to_html(),
+            Err(error) => failed(error),
+        };
+        let sections = [
+            section("estimates", "The estimates", &self.estimates()),
+            section("known", "What can be known", &self.known()),
+            section(
+                "conditions",
+                "Conditions of the observer",
+                &self.conditions(),
             ),
-        );
+            section("design", "The design", &self.design()),
+            section("certificate", "What is guaranteed", &certificate),
+            self.remarks(),
+        ];
+        let version = env!("CARGO_PKG_VERSION");
+        let study = file_name(&self.study.file);
+        let made = format!("Made by lynkeus {version} from {study}. Pictures by uPlot.");
+        format!(
+            "<header>\n{}</header>\n<main>\n{}</main>\n{}",
+            self.head(),
+            sections.concat(),
+            element("footer", &made)
+        )
     }
 
-    fn head(&self, html: &mut Html) {
+    fn head(&self) -> String {
         let outcome = &self.outcome;
-        html.element("h1", &outcome.plant);
+        let mut head = element("h1", &outcome.plant);
         if let Some(refusal) = outcome.refusal() {
             let words = format!("Do not trust these estimates: {}", words(&refusal));
-            html.element("p class=\"alarm\" role=\"alert\"", &words);
+            head += &element("p class=\"alarm\" role=\"alert\"", &words);
         }
         let observer = &outcome.design.observer;
         let measured: Vec<String> = observer.measured.iter().map(|m| m.name.clone()).collect();
@@ -59,7 +61,7 @@ impl Told<'_> {
             .into_iter()
             .map(|e| e.variable.name.clone())
             .collect();
-        html.element(
+        head += &element(
             "p class=\"lead\"",
             &format!(
                 "The {} observer estimates {} from {}.",
@@ -70,128 +72,95 @@ impl Told<'_> {
         );
         let verdict = match &self.certified {
             Ok(certified) => certified.conclusion(),
-            Err(error) => format!("undecided: {}", error.message()),
+            Err(error) => Line::verdict("undecided").and(format!(": {}", error.message())),
         };
-        let (word, rest) = verdict.split_once(": ").unwrap_or(("", &verdict));
-        let rest = super::html::escaped(rest);
-        let word = match word {
-            "" => badge("undecided"),
-            word => badge(word),
-        };
-        html.raw(&format!("<p>Convergence: {word} {rest}</p>"));
+        let verdict = Line::from("Convergence: ").then(verdict);
+        format!("{head}<p>{}</p>\n", verdict.to_html())
     }
 
-    fn estimates(&self, html: &mut Html) {
-        html.element("h2", "The estimates");
+    fn estimates(&self) -> String {
         let rows = self.outcome.time.len();
-        html.element(
+        let mut html = element(
             "p",
             &format!("{} of {}.", counted(rows, "sample"), self.source),
         );
         if rows > ROWS {
             let words = format!("The pictures show the first {ROWS} of {rows} samples.");
-            html.element("p", &words);
+            html += &element("p", &words);
         }
-        match &self.moving {
-            Ok(_) => html.raw("<div id=\"controls\"></div>\n<p id=\"status\" role=\"status\"></p>"),
-            Err(why) => {
-                let why = words(why);
-                html.element("p", &format!("The observer cannot run in this page: {why}. The pictures are what the command gives."));
+        html += &match &self.moving {
+            Ok(_) => {
+                "<div id=\"controls\"></div>\n<p id=\"status\" role=\"status\"></p>\n".to_owned()
             }
-        }
-        html.raw(
-            "<noscript><p>The pictures need JavaScript.</p></noscript>\n<div id=\"charts\"></div>",
-        );
-        let rows = self.outcome.accuracies.iter().map(accuracy).collect();
-        let head = [
-            "quantity",
-            "RMS error, last half",
-            "largest error",
-            "at time",
-            "within 5 % of its range",
-        ];
-        html.table(&head, rows);
+            Err(why) => element(
+                "p",
+                &format!(
+                    "The observer cannot run in this page: {}. The pictures are what the command gives.",
+                    words(why)
+                ),
+            ),
+        };
+        html += "<noscript><p>The pictures need JavaScript.</p></noscript>\n<div id=\"charts\"></div>\n";
+        let mut errors = Document::default();
+        errors.table(self.outcome.errors());
+        html += &errors.to_html();
         // in the same section, so that the sliders stay in sight
         if let Some(tradeoff) = &self.tradeoff {
-            html.within("section id=\"tradeoff\"", |html| tradeoff.tell(html));
+            html += &section("tradeoff", "The trade-off", &tradeoff.html());
         }
+        html
     }
 
-    fn known(&self, html: &mut Html) {
-        html.element("h2", "What can be known");
+    fn known(&self) -> String {
         let report = match &self.checked {
             Ok(report) => report,
-            Err(error) => return failed(html, error),
+            Err(error) => return failed(error),
         };
-        let unit = report.time_unit.as_deref().unwrap_or("unit of time");
-        let Some(first) = report.knowledge.first() else {
-            return whole(html, report);
-        };
-        let is_same = |k: &&Knowledge| !std::ptr::eq(*k, first) && k.quantities == first.quantities;
-        let (same, told): (Vec<_>, Vec<_>) = report.knowledge.iter().partition(is_same);
-        let mut head = vec!["quantity".to_owned()];
-        head.extend(told.iter().map(|k| k.words()));
-        let line = |known: Option<&(String, Known)>| {
-            known.map_or(Cell::from(""), |(_, known)| Cell::from(known.line(unit)))
-        };
-        let rows = first.quantities.iter().map(|(name, _)| {
-            let of = |k: &&Knowledge| line(k.quantities.iter().find(|(n, _)| n == name));
-            let mut row = vec![Cell::from(name.clone())];
-            row.extend(told.iter().map(of));
-            row
-        });
-        let head: Vec<&str> = head.iter().map(String::as_str).collect();
-        html.table(&head, rows.collect());
-        for same in same {
-            html.element("p", &format!("It is {}.", same.words()));
-        }
-        whole(html, report);
+        let mut known = Document::default();
+        report.tell_known(&mut known);
+        format!(
+            "{}<details>{}{}</details>\n",
+            known.to_html(),
+            element("summary", "All that `lynkeus check` says"),
+            report.document().to_html()
+        )
     }
 
-    fn conditions(&self, html: &mut Html) {
-        html.element("h2", "Conditions of the observer");
+    fn conditions(&self) -> String {
         let own = &self.outcome.design.examination;
-        examination(html, own);
-        let Ok(report) = &self.checked else { return };
-        let others = report.examinations.iter();
-        for other in others.filter(|e| e.family != own.family) {
-            let title = format!("{}: {}", other.family, fit_word(other.fit()));
-            html.folded(&title, |html| examination(html, other));
-        }
+        let mut document = Document::default();
+        tell_examination(&mut document, own, false);
+        let examinations = self.checked.iter().flat_map(|report| &report.examinations);
+        let others = examinations.filter(|e| e.family != own.family);
+        others.for_each(|other| tell_examination(&mut document, other, true));
+        document.to_html()
     }
 
-    fn design(&self, html: &mut Html) {
-        html.element("h2", "The design");
-        let design = &self.outcome.design;
-        let rows = design
-            .parameters
-            .iter()
-            .map(|(name, value)| vec![Cell::from(name.as_str()), Cell::from(value.words())]);
-        html.table(&["parameter", "value"], rows.collect());
+    fn design(&self) -> String {
+        let own = &self.outcome.design;
+        let mut document = Document::default();
+        design::tell_parameters(&mut document, own);
         if let Ok(certified) = &self.certified {
-            proof::correction(html, &certified.correction);
+            certified.correction.tell(&mut document);
         }
-        let rows = design.observer.states.iter().map(|(signal, start)| {
-            vec![
-                Cell::from(signal.name.clone()),
-                Cell::Number(number(*start)),
-            ]
-        });
-        let rows: Vec<Vec<Cell>> = rows.collect();
-        let count = counted(rows.len(), "state");
-        html.folded(&format!("{count} with their starts"), |html| {
-            html.table(&["state", "start"], rows);
-        });
+        let states = own.observer.states.iter();
+        let rows = states
+            .map(|(signal, start)| vec![signal.name.as_str().into(), Cell::Number(number(*start))]);
+        let count = counted(own.observer.states.len(), "state");
+        document.folded(format!("{count} with their starts"));
+        document.table(Table::new(["state", "start"]).with(rows));
+        document.to_html()
     }
 
-    fn notes(&self, html: &mut Html) {
-        if self.notes.is_empty() && self.plant.warnings.is_empty() {
-            return;
-        }
-        html.element("h2", "Notes");
-        html.list(&self.notes);
+    fn remarks(&self) -> String {
         let warnings = self.plant.warnings.iter().map(without_folder);
-        html.list(warnings.map(|warning| warning.one_line()));
+        let warnings = warnings.map(|warning| warning.one_line());
+        let mut document = Document::default();
+        document.notes(self.notes.iter().cloned().chain(warnings));
+        match document.to_html() {
+            notes if notes.is_empty() => notes,
+            notes => section("notes", "Notes", &notes),
+        }
     }
 }
 
@@ -207,38 +176,6 @@ fn listed(names: &[String]) -> String {
     }
 }
 
-/// The report for people as it stands.
-fn whole(html: &mut Html, report: &Report) {
-    html.folded("All that `lynkeus check` says", |html| {
-        html.element("pre", &report.to_string());
-    });
-}
-
-fn failed(html: &mut Html, error: &Error) {
-    html.element("p class=\"alarm\"", &words(error));
-}
-
-fn accuracy(accuracy: &Accuracy) -> Vec<Cell> {
-    let error = |e: f64| Cell::Number(figures(e, 3));
-    vec![
-        Cell::from(accuracy.quantity.as_str()),
-        accuracy.rms.map_or(Cell::from("not known"), error),
-        error(accuracy.peak),
-        Cell::Number(instant(accuracy.peak_at)),
-        match accuracy.settling {
-            Settling::From(t) => Cell::from(format!("from {} on", instant(t))),
-            Settling::Never => Cell::from("not at the end"),
-            Settling::NoRange => Cell::from("no range declared"),
-        },
-    ]
-}
-
-fn examination(html: &mut Html, examination: &Examination) {
-    html.raw(&format!(
-        "<p>{}: {} {}</p>",
-        super::html::escaped(examination.family.name()),
-        badge(fit_word(examination.fit())),
-        super::html::escaped(&examination.summary.words())
-    ));
-    proof::conditions(html, examination.conditions());
+fn failed(error: &Error) -> String {
+    element("p class=\"alarm\"", &words(error))
 }

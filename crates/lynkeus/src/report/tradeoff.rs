@@ -2,10 +2,12 @@
 
 use std::ops::ControlFlow;
 
+use lynkeus_answer::Document;
+use lynkeus_answer::document::{Cell, Table};
 use lynkeus_observers::Design;
 use serde::Serialize;
 
-use super::html::{Cell, Html, words};
+use super::html::{element, words};
 use super::positions::Positions;
 use crate::Error;
 use crate::entries::Named;
@@ -107,31 +109,30 @@ impl Tradeoff {
         self.positions.all.iter().position(|p| p.factor == 1.0)
     }
 
-    pub fn tell(&self, html: &mut Html) {
-        html.element("h2", "The trade-off");
+    /// What stands under the heading.
+    pub fn html(&self) -> String {
         let sweep = match &self.sweep {
             Ok(sweep) => sweep,
-            Err(error) => {
-                return html.element("p", &format!("It cannot be told: {}", words(error)));
-            }
+            Err(error) => return element("p", &format!("It cannot be told: {}", words(error))),
         };
+        let mut html = String::new();
         if let Some(knee) = sweep.chosen() {
-            html.element("p", &self.how_to_read());
-            html.element("p", &best(sweep, knee));
-            html.raw("<div id=\"compromise\"></div>");
+            html += &element("p", &self.how_to_read());
+            html += &element("p", &best(sweep, knee));
+            html += "<div id=\"compromise\"></div>\n";
         }
-        self.table(html, sweep);
-        html.element("p class=\"hint\"", self.definitions());
+        let mut document = Document::default();
+        html += &document.table(self.table(sweep)).to_html();
+        html += &element("p class=\"hint\"", self.definitions());
         let first = self
             .first
             .map(|first| format!("judged on the first {first} samples"));
         let beyond = sweep.at_an_end().map(|_| {
             "the knee is at an end of the slider: the best value may lie beyond".to_owned()
         });
-        let notes: Vec<&String> = sweep.notes.iter().chain(&first).chain(&beyond).collect();
-        if !notes.is_empty() {
-            html.list(notes);
-        }
+        let mut notes = Document::default();
+        notes.notes(sweep.notes.iter().cloned().chain(first).chain(beyond));
+        html + &notes.to_html()
     }
 
     fn how_to_read(&self) -> String {
@@ -166,31 +167,24 @@ impl Tradeoff {
     }
 
     /// A row for every position.
-    fn table(&self, html: &mut Html, sweep: &Sweep) {
-        let places: Vec<usize> = (0..sweep.measures.len())
-            .filter(|place| has(sweep, *place))
-            .collect();
-        let titles = places.iter().filter_map(|place| {
-            let measure = sweep.measures.get(*place)?;
+    fn table(&self, sweep: &Sweep) -> Table {
+        let titles = sweep.measures.iter().map(|measure| {
             let unit = sweep.time_unit.as_ref().filter(|_| measure.is_time);
-            Some(match unit {
+            match unit {
                 Some(unit) => format!("{} ({unit})", measure.title),
                 None => measure.title.to_owned(),
-            })
+            }
         });
-        let mut head = vec![swept(sweep)];
-        head.extend(titles);
-        head.push(String::new());
-        let head: Vec<&str> = head.iter().map(String::as_str).collect();
+        let titles = std::iter::once(swept(sweep))
+            .chain(titles)
+            .chain([String::new()]);
         let rows = sweep.rows.iter().enumerate().map(|(place, row)| {
-            let values = row.values.iter().map(|x| axis::shown(*x));
-            let figures = places.iter().map(|place| row.figure(*place));
-            let figures = figures.map(|x| x.map_or("\u{2013}".to_owned(), brief));
-            let mut cells: Vec<Cell> = values.chain(figures).map(Cell::Number).collect();
-            cells.push(Cell::from(self.remark(sweep, place, row)));
-            cells
+            let values = row.values.iter().map(|x| Cell::Number(axis::shown(*x)));
+            let figures = row.figures.iter().map(|x| Cell::number(*x, brief));
+            let remark = Cell::from(self.remark(sweep, place, row));
+            values.chain(figures).chain([remark]).collect()
         });
-        html.table(&head, rows.collect());
+        Table::new(titles).with(rows).dense()
     }
 
     fn remark(&self, sweep: &Sweep, place: usize, row: &Row) -> String {

@@ -1,6 +1,7 @@
 //! Errors of an estimate over time, each as a share of its quantity's scale, and what is read off them.
 
 use crate::judge::RUN_AWAY;
+use crate::judge::accuracy::settled_from;
 
 /// Scaled errors: estimate minus truth, divided by the quantity's scale.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,24 +46,18 @@ impl Errors {
         for (i, &start) in starts.iter().enumerate() {
             let end = starts.get(i + 1).copied().unwrap_or(f64::INFINITY);
             // the row at a jump shows the error that the jump makes
-            let inside = |t: f64| t >= start && (t < end);
-            let rows = || self.time.iter().zip(&worst).filter(|(t, _)| inside(**t));
-            let Some((last, _)) = rows().next_back() else {
+            let rows = self.time.iter().copied().zip(worst.iter().copied());
+            let mut rows = rows.filter(|(t, _)| *t >= start && *t < end).peekable();
+            let Some((first, _)) = rows.peek().copied() else {
                 continue;
             };
-            let outside = rows().rfind(|(_, e)| **e > tolerance);
-            match outside {
-                Some((t, _)) if t == last => return None,
-                Some((t, _)) => longest = longest.max(self.after(*t) - start),
-                None => {}
+            let settled = settled_from(rows, tolerance)?;
+            // before its first row nothing was seen to be wrong
+            if settled > first {
+                longest = longest.max(settled - start);
             }
         }
         Some(longest)
-    }
-
-    /// The row's time after `t`.
-    fn after(&self, t: f64) -> f64 {
-        self.time.iter().copied().find(|s| *s > t).unwrap_or(t)
     }
 
     /// Row and quantity of the largest error after the first row, with its magnitude.

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use lynkeus_answer::Document;
+use lynkeus_answer::document::{Cell, Table};
 use lynkeus_expr::real::rounded;
 use lynkeus_words::counted;
 use serde::Serialize;
@@ -9,9 +11,9 @@ use serde_json::{Value, json};
 
 use super::axis::shown;
 use super::{Peak, Row, Sweep};
-use crate::Error;
 use crate::entries::Named;
 use crate::prepare::declared::Account;
+use crate::{Answer, Error, Series};
 use lynkeus_table::significant;
 
 /// The answer of `tune`.
@@ -151,12 +153,6 @@ impl Sweep {
         }
         Some(text)
     }
-
-    /// The header of a figure.
-    fn heading(&self, index: usize) -> String {
-        let name = self.measures.get(index).map_or("", |m| m.name);
-        name.replace('_', " ")
-    }
 }
 
 /// Three significant digits.
@@ -169,52 +165,73 @@ pub(crate) fn brief(x: f64) -> String {
     }
 }
 
-impl fmt::Display for Sweep {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+crate::answer::displayed!(Sweep);
+
+impl Answer for Sweep {
+    fn document(&self) -> Document {
         let on = self
             .log
             .as_deref()
             .map_or("in simulation".to_owned(), |log| format!("on {log}"));
-        writeln!(
-            f,
-            "{}: {} {on}\n",
-            self.plant,
-            counted(self.rows.len(), "value")
-        )?;
-        let headings = (0..self.measures.len()).map(|i| self.heading(i));
-        let header: Vec<String> = self
-            .axes
-            .iter()
-            .map(|a| a.label())
-            .chain(headings)
-            .collect();
-        let width = |text: &String| text.chars().count().max(8);
-        let widths: Vec<usize> = header.iter().map(width).collect();
-        let line = |f: &mut fmt::Formatter<'_>, cells: &[String]| {
-            for (cell, width) in cells.iter().zip(&widths) {
-                write!(f, "  {cell:>width$}")?;
-            }
-            Ok(())
+        let values = counted(self.rows.len(), "value");
+        let mut document = Document::new(format!("{}: {values} {on}", self.plant));
+        document.part().table(self.table());
+        if let Some(verdict) = self.verdict() {
+            document.part().line(verdict);
+        }
+        document
+    }
+
+    fn to_json(&self) -> Value {
+        Self::to_json(self)
+    }
+
+    fn columns(&self) -> Vec<(String, Series)> {
+        let whole = |values: &mut dyn Iterator<Item = Option<f64>>| -> Series {
+            let values: Vec<f64> = values.map(|x| x.unwrap_or(f64::NAN)).collect();
+            values.into()
         };
-        line(f, &header)?;
-        writeln!(f)?;
-        for (i, row) in self.rows.iter().enumerate() {
-            let values = row.values.iter().map(|x| shown(*x));
-            let figures = row.figures.iter();
-            let figures = figures.map(|x| x.map_or("\u{2013}".to_owned(), brief));
-            line(f, &values.chain(figures).collect::<Vec<_>>())?;
-            if self.knee == Some(i) {
-                f.write_str("  \u{2190} knee")?;
-            }
-            if let Some(failure) = &row.failure {
-                write!(f, "  {}", shortened(failure))?;
-            }
-            writeln!(f)?;
-        }
-        match self.verdict() {
-            Some(verdict) => writeln!(f, "\n{verdict}"),
-            None => Ok(()),
-        }
+        let rows = || self.rows.iter();
+        let keys = self.axes.iter().enumerate().map(|(place, axis)| {
+            let values = whole(&mut rows().map(|row| row.values.get(place).copied()));
+            (axis.key.clone(), values)
+        });
+        let figures = self.measures.iter().enumerate().map(|(place, measure)| {
+            (
+                measure.name.to_owned(),
+                whole(&mut rows().map(|row| row.figure(place))),
+            )
+        });
+        keys.chain(figures).collect()
+    }
+
+    #[cfg(feature = "plot")]
+    fn svg(&self) -> Result<Option<String>, Error> {
+        self.to_svg().map(Some)
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}
+
+impl Sweep {
+    fn table(&self) -> Table {
+        let keys = self.axes.iter().map(|axis| axis.label());
+        let measures = self.measures.iter().map(|m| m.name.replace('_', " "));
+        let titles = keys.chain(measures).chain([String::new()]);
+        let rows = self.rows.iter().enumerate().map(|(place, row)| {
+            let values = row.values.iter().map(|x| Cell::Number(shown(*x)));
+            let figures = row.figures.iter().map(|x| Cell::number(*x, brief));
+            let knee = (self.knee == Some(place)).then(|| "\u{2190} knee".to_owned());
+            let failure = row.failure.as_deref().map(shortened);
+            let remarks: Vec<String> = knee.into_iter().chain(failure).collect();
+            values
+                .chain(figures)
+                .chain([remarks.join("  ").into()])
+                .collect()
+        });
+        Table::new(titles).with(rows)
     }
 }
 

@@ -95,7 +95,7 @@ fn a_page_is_one_file_with_what_the_commands_say() {
     let word = word.split(':').next().unwrap();
     assert!(
         own.contains(&format!(
-            "Convergence: <span class=\"verdict open\">{word}</span>"
+            "Convergence: <span class=\"verdict\" style=\"color:var(--open,#a16207);font-weight:600\">{word}</span>"
         )),
         "{word}"
     );

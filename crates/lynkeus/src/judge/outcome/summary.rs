@@ -62,14 +62,13 @@ pub(crate) struct RunReport<'a> {
 }
 
 impl Outcome {
-    /// The run in figures, as the command's `--json` prints it; `with_truth` as in
-    /// [`columns`](Self::columns).
-    pub fn to_json(&self, with_truth: bool) -> Value {
+    /// The run in figures, as the command's `--json` prints it.
+    pub fn to_json(&self) -> Value {
         let estimated = || {
             let quantities = self.quantities.iter();
             quantities.filter_map(|q| Some((q, q.estimate.as_ref()?)))
         };
-        let columns = self.columns(with_truth).into_iter();
+        let columns = self.columns().into_iter();
         json!(RunReport {
             plant: &self.plant,
             family: self.design.examination.family.name(),
