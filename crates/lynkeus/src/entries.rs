@@ -57,19 +57,19 @@ impl From<Standing> for Verdict {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) enum Fit {
     #[serde(rename = "fits")]
-    Holds,
+    Fitting,
     #[serde(rename = "undecided")]
     Undecided,
     #[serde(rename = "does not fit")]
-    Refuted,
+    Unfit,
 }
 
 impl From<Standing> for Fit {
     fn from(standing: Standing) -> Self {
         match standing {
-            Standing::Proved => Self::Holds,
+            Standing::Proved => Self::Fitting,
             Standing::Undecided => Self::Undecided,
-            Standing::Refuted => Self::Refuted,
+            Standing::Refuted => Self::Unfit,
         }
     }
 }
