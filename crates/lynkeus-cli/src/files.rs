@@ -3,36 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
 use lynkeus::Error;
 
+use super::options::Output;
 use super::save::{self, is_standard};
-
-/// Where results go.
-#[derive(Debug, Default, Args)]
-pub(super) struct Output {
-    /// Write the columns as CSV ("-": standard output, the default without --json)
-    #[arg(short, long, value_name = "FILE.csv")]
-    pub output: Option<PathBuf>,
-    /// Draw the result
-    #[arg(long, value_name = "FILE.svg")]
-    pub plot: Option<PathBuf>,
-    /// Print one JSON object that sums the result up
-    #[arg(long)]
-    pub json: bool,
-    /// No progress bar and no notes
-    #[arg(short, long)]
-    pub quiet: bool,
-}
-
-impl Output {
-    pub fn added_to(&self, files: Files) -> Files {
-        files
-            .writes("-o", self.output.as_deref())
-            .draws("--plot", self.plot.as_deref())
-            .prints_json(self.json)
-    }
-}
 
 /// The files of one command.
 #[derive(Debug, Default)]
@@ -62,6 +36,13 @@ enum Content {
 }
 
 impl Files {
+    /// Adds the results that a command is asked for.
+    pub fn asked(self, output: &Output) -> Self {
+        self.writes("-o", output.output.as_deref())
+            .draws("--plot", output.plot.as_deref())
+            .prints_json(output.json)
+    }
+
     /// Adds what is read.
     pub fn reads(mut self, role: &'static str, path: Option<&Path>) -> Self {
         self.inputs.extend(named(role, path));

@@ -8,8 +8,8 @@ use clap::{Args, ValueEnum};
 use lynkeus::Error;
 use lynkeus::precision::{self, Candidates};
 
-use super::files::Output;
 use super::inputs::Source;
+use super::options::Output;
 use super::progress::Alive;
 use super::save::Results;
 
@@ -57,7 +57,7 @@ pub(super) fn how_well(source: &Source, options: &Options, json: bool) -> Result
         json,
         quiet: false,
     };
-    output.added_to(source.files()).check()?;
+    source.files().asked(&output).check()?;
     let asked = precision::Options {
         horizon: options.horizon,
         sensors: options.sensors.map(|which| match which {

@@ -6,6 +6,7 @@ mod how_well;
 mod inputs;
 mod limits;
 mod monte_carlo;
+mod options;
 mod output;
 mod progress;
 mod report;
@@ -22,8 +23,8 @@ use clap::{Parser, Subcommand, ValueEnum};
 use lynkeus::run::Backend;
 use lynkeus::{CheckOptions, Error, ErrorKind, interrupt};
 
-use files::Output;
 use inputs::Source;
+use options::Output;
 
 use limits::Limits;
 

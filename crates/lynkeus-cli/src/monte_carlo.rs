@@ -4,9 +4,9 @@ use std::process::ExitCode;
 
 use lynkeus::Error;
 
-use super::files::Output;
 use super::inputs::Source;
 use super::limits;
+use super::options::Output;
 use super::progress::Progress;
 use super::save::Results;
 
@@ -16,7 +16,7 @@ pub(super) fn monte_carlo(
     output: &Output,
     runs: usize,
 ) -> Result<ExitCode, Error> {
-    output.added_to(source.files()).check()?;
+    source.files().asked(output).check()?;
     let study = &source.study;
     let mut progress = Progress::new("simulating", output.quiet);
     let found = lynkeus::monte_carlo(study, runs, &mut progress.watch())?;

@@ -5,8 +5,8 @@ use std::process::ExitCode;
 
 use lynkeus::{Answer, CheckOptions, Checkpoint, Error, Outcome};
 
-use super::files::Output;
 use super::inputs::{self, Source};
+use super::options::Output;
 use super::progress::{Alive, Progress};
 use super::save::{Results, is_standard};
 use super::{limits, output};
@@ -68,9 +68,8 @@ pub(super) fn simulate(
     output: &Output,
     log: Option<&Path>,
 ) -> Result<ExitCode, Error> {
-    output
-        .added_to(source.files().writes("--log", log))
-        .check()?;
+    let files = source.files().writes("--log", log);
+    files.asked(output).check()?;
     let mut progress = Progress::new("simulating", output.quiet);
     let outcome = lynkeus::simulate(&source.study, &mut progress.watch())?;
     progress.finish();
@@ -94,7 +93,7 @@ pub(super) fn estimate(
         return Err(Error::input(message).hint("name a file after --checkpoint"));
     }
     let files = source.files().reads("the log", Some(log));
-    let files = output.added_to(files).writes("--checkpoint", checkpoint);
+    let files = files.asked(output).writes("--checkpoint", checkpoint);
     files.check()?;
     let study = &source.study;
     let table = inputs::log(study, log)?;
@@ -128,7 +127,7 @@ pub(super) fn compare(
     output: &Output,
 ) -> Result<ExitCode, Error> {
     let files = source.files().reads("the log", log);
-    output.added_to(files).check()?;
+    files.asked(output).check()?;
     let table = log.map(|log| inputs::log(&source.study, log)).transpose()?;
     let mut progress = Progress::new("comparing", output.quiet);
     let found = lynkeus::compare(&source.study, table.as_ref(), &mut progress.watch())?;

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 use lynkeus::{Answer, Error, interrupt};
 use tempfile::{NamedTempFile, SpooledTempFile};
 
-use super::files::Output;
+use super::options::Output;
 use super::{output, signals};
 
 /// The name that stands for standard input or output.

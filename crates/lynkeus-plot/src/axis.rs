@@ -5,8 +5,6 @@ use std::ops::Range;
 use lynkeus_answer::Error;
 use lynkeus_expr::real::rounded;
 
-use super::limits::extremes;
-
 /// Ends of a logarithmic axis of a parameter differ at least by this ratio.
 const RATIO: f64 = 2.5;
 
@@ -206,6 +204,13 @@ pub(super) fn number(value: f64) -> String {
         1e-4..1e6 => format!("{value}").replace('-', "\u{2212}"),
         _ => format!("{value:e}").replace('-', "\u{2212}"),
     }
+}
+
+/// The least and the greatest of the finite values.
+pub(super) fn extremes(values: impl Iterator<Item = f64>) -> Option<Range<f64>> {
+    values.filter(|v| v.is_finite()).fold(None, |range, v| {
+        Some(range.map_or(v..v, |r: Range<f64>| r.start.min(v)..r.end.max(v)))
+    })
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::axis::Axis;
+use super::axis::{Axis, extremes};
 use super::{Band, Extent, Kind, Mark, Panel, Scale};
 use lynkeus_table::Series;
 use lynkeus_table::series::{Sorted, Store};
@@ -125,13 +125,6 @@ fn middle(store: &Store, values: impl Iterator<Item = f64>) -> Option<Range<f64>
 
 fn union(a: &Range<f64>, b: &Range<f64>) -> Range<f64> {
     a.start.min(b.start)..a.end.max(b.end)
-}
-
-/// The least and the greatest of the finite values.
-pub(super) fn extremes(values: impl Iterator<Item = f64>) -> Option<Range<f64>> {
-    values.filter(|v| v.is_finite()).fold(None, |range, v| {
-        Some(range.map_or(v..v, |r: Range<f64>| r.start.min(v)..r.end.max(v)))
-    })
 }
 
 /// Some air above and below; a constant gets an axis around it.

@@ -191,7 +191,7 @@ impl Sheet {
             let y = bottom + 1;
             svg.path(&[(left, y), (right, y)], FRAME, 1);
             for (x, words) in across {
-                let middle = x.min(WIDTH - width(&words, NUMBERS) / 2);
+                let middle = x.min(WIDTH - 1 - width(&words, NUMBERS) / 2);
                 svg.text(&words, (middle, y + 2 * TICK), NUMBERS, ABOVE);
                 svg.path(&[(x, y), (x, y + TICK)], FRAME, 1);
             }
@@ -213,5 +213,5 @@ fn height(panel: &Panel, count: usize) -> i32 {
 
 /// The ticks of an axis upwards of such a height.
 fn upwards(y: &Axis, height: i32) -> Vec<(f64, String)> {
-    y.ticks((height as usize / 60).clamp(5, 10))
+    y.ticks((height as usize / 55).clamp(5, 10))
 }

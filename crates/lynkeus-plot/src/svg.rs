@@ -113,8 +113,9 @@ impl Svg {
 
     pub fn dot(&mut self, (x, y): Pixel, radius: u32, ink: Ink) {
         let fill = ink.fill();
-        self.0 +=
-            &format!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" {fill} stroke=\"none\"/>\n");
+        self.0 += &format!(
+            "<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" {fill} stroke=\"none\" stroke-width=\"1\"/>\n"
+        );
     }
 }
 

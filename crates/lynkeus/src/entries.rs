@@ -57,19 +57,19 @@ impl From<Standing> for Verdict {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) enum Fit {
     #[serde(rename = "fits")]
-    Fits,
+    Fitting,
     #[serde(rename = "undecided")]
     Undecided,
     #[serde(rename = "does not fit")]
-    DoesNotFit,
+    Unfit,
 }
 
 impl From<Standing> for Fit {
     fn from(standing: Standing) -> Self {
         match standing {
-            Standing::Proved => Self::Fits,
+            Standing::Proved => Self::Fitting,
             Standing::Undecided => Self::Undecided,
-            Standing::Refuted => Self::DoesNotFit,
+            Standing::Refuted => Self::Unfit,
         }
     }
 }

@@ -1,7 +1,8 @@
 //! The extended Kalman filter's correction.
 
 use super::belief::Belief;
-use super::sensing::{Believed, Sensing};
+use super::censored::Believed;
+use super::sensing::Sensing;
 use super::smoother::Correction;
 use crate::Result;
 use crate::runner::Sample;

@@ -40,6 +40,7 @@
 //! ```
 
 mod belief;
+mod censored;
 mod ekf;
 pub(crate) mod health;
 mod mhe;

@@ -1,8 +1,8 @@
 //! What a correction is made of, for those who ask for it.
 
 use super::belief::Belief;
+use super::censored::Believed;
 use super::root::{Factor, Root, dot, substitute};
-use super::sensing::Believed;
 
 /// What a filter made of its last sample, kept where
 /// [`Estimator::keep_record`](crate::Estimator::keep_record) asked for it. Matrices are row by row.

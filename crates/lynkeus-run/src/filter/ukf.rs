@@ -1,9 +1,10 @@
 //! The unscented Kalman filter.
 
 use super::belief::Belief;
+use super::censored::Believed;
 use super::profile::Profile;
 use super::root::{Factor, Root, dot, substitute};
-use super::sensing::{Believed, Sensing};
+use super::sensing::Sensing;
 use super::settings::{SigmaPoints, Weights};
 use super::smoother::Correction;
 use super::transition::Propagation;

@@ -92,3 +92,19 @@ pub(super) struct Figures {
     /// share of autocorrelations outside of the 95 % band
     outside_band: Option<f64>,
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn every_measure_is_an_entry_of_the_schema() {
+        let schema = schemars::schema_for!(Figures);
+        let entries = schema.as_object().unwrap()["properties"].as_object();
+        let entries: BTreeSet<&str> = entries.unwrap().keys().map(String::as_str).collect();
+        let measures = SIMULATED.iter().chain(LOGGED).map(|measure| measure.name);
+        assert_eq!(entries, measures.collect());
+    }
+}

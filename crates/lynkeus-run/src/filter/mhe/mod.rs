@@ -16,10 +16,11 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::belief::{Belief, confine};
+use super::censored::Believed;
 use super::model::NoisyModel;
 use super::profile::Profile;
 use super::root::dot;
-use super::sensing::{Believed, Sensing};
+use super::sensing::Sensing;
 use super::smoother::{History, Step};
 use super::transition::{Propagation, Stage};
 use crate::noise::Limits;
