@@ -12,7 +12,7 @@ from ._base import Base
 from ._each import Errors, Tell, each
 from ._fleet import is_one, split
 from ._logs import collected, given, log_of
-from ._progress import Progress
+from ._progress import Progress, Terms
 from .errors import InputError, LogWarning, NotCredible
 from .results import Estimation, Run, Simulation
 
@@ -47,7 +47,8 @@ def estimate_each(study: _lynkeus.Study, logs: Any, by: str | None, options: Opt
     names = [f"the log of {key!r}" for key in keys] if keys is not None else _places("log", logs)
 
     def run(log: Any, tell: Tell) -> Run:
-        found = study.estimate(given(log), tell, options.time_limit, options.memory_limit)
+        terms = Terms(options.time_limit, options.memory_limit, tell)
+        found = study.estimate(given(log), terms)
         return Estimation(found)
 
     found = _all(run, logs, names, "estimating", options)
@@ -67,10 +68,10 @@ def sweep(study: _lynkeus.Study, changes: Iterable[Mapping[str, Any]], log: Any,
     base = Base(study)
 
     def run(change: Mapping[str, Any], tell: Tell) -> Run:
-        core, limits = base.changed(change), (options.time_limit, options.memory_limit)
+        core, terms = base.changed(change), Terms(options.time_limit, options.memory_limit, tell)
         if recorded is None:
-            return Simulation(core.simulate(tell, *limits))
-        return Estimation(core.estimate(recorded, tell, *limits))
+            return Simulation(core.simulate(terms))
+        return Estimation(core.estimate(recorded, terms))
 
     return _all(run, asked, _places("change", asked), "sweeping", options)
 

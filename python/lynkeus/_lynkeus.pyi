@@ -1,19 +1,19 @@
 """The compiled half of the package."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._columns import Given as _Given
+from ._progress import Terms as _Terms
 from .errors import LynkeusError
 from .reports import Health as _Health, Innovation as _Innovation
 from .study import Study as _Study
 
 _Column = NDArray[np.float64]
-_Tell = Callable[[float], Any] | None
 
 #: MiB that a call may take where nothing else is said
 MEMORY: float
@@ -209,13 +209,7 @@ class Study:
     def plant(self) -> tuple[str, str | None] | None: ...
     @property
     def model(self) -> str | None: ...
-    def check(
-        self,
-        parameters: bool,
-        about: Sequence[str],
-        time_limit: float | None = None,
-        memory_limit: float = ...,
-    ) -> Answer: ...
+    def check(self, parameters: bool, about: Sequence[str], terms: _Terms | None = None) -> Answer: ...
     def export(
         self,
         to: str,
@@ -224,51 +218,21 @@ class Study:
         step: float | None = None,
         tunable: bool = False,
         system: str | None = None,
-        time_limit: float | None = None,
-        memory_limit: float = ...,
+        terms: _Terms | None = None,
     ) -> tuple[list[tuple[str, bytes]], list[str]]: ...
-    def design(self, time_limit: float | None = None, memory_limit: float = ...) -> Answer: ...
-    def certify(self, time_limit: float | None = None, memory_limit: float = ...) -> Answer: ...
-    def how_well(
-        self,
-        horizon: float | None,
-        sensors: str | None,
-        time_limit: float | None = None,
-        memory_limit: float = ...,
-    ) -> Answer: ...
-    def simulate(
-        self, progress: _Tell = None, time_limit: float | None = None, memory_limit: float = ...
-    ) -> Answer: ...
-    def monte_carlo(
-        self, runs: int, progress: _Tell = None, time_limit: float | None = None, memory_limit: float = ...
-    ) -> Answer: ...
+    def design(self, terms: _Terms | None = None) -> Answer: ...
+    def certify(self, terms: _Terms | None = None) -> Answer: ...
+    def how_well(self, horizon: float | None, sensors: str | None, terms: _Terms | None = None) -> Answer: ...
+    def simulate(self, terms: _Terms | None = None) -> Answer: ...
+    def monte_carlo(self, runs: int, terms: _Terms | None = None) -> Answer: ...
     def refuse_misfits(self) -> None:
         """Raises where the study names what its plant does not have."""
 
-    def estimate(
-        self,
-        log: Log | str,
-        progress: _Tell = None,
-        time_limit: float | None = None,
-        memory_limit: float = ...,
-        record: bool = False,
-    ) -> Answer: ...
-    def tune(
-        self,
-        log: Log | str | None,
-        progress: _Tell = None,
-        time_limit: float | None = None,
-        memory_limit: float = ...,
-    ) -> Answer: ...
-    def compare(
-        self,
-        log: Log | str | None,
-        progress: _Tell = None,
-        time_limit: float | None = None,
-        memory_limit: float = ...,
-    ) -> Answer: ...
+    def estimate(self, log: Log | str, terms: _Terms | None = None, record: bool = False) -> Answer: ...
+    def tune(self, log: Log | str | None, terms: _Terms | None = None) -> Answer: ...
+    def compare(self, log: Log | str | None, terms: _Terms | None = None) -> Answer: ...
     def functions(self) -> Functions: ...
-    def observer(self, time_limit: float | None = None, memory_limit: float = ...) -> Functions: ...
+    def observer(self, terms: _Terms | None = None) -> Functions: ...
     def estimator(self, study: _Study) -> Estimator: ...
 
 class Functions:

@@ -4,9 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
+
+from ._lynkeus import MEMORY
 
 Progress = bool | Callable[[float], Any]
+
+
+class Terms(NamedTuple):
+    """What a call may take, in seconds and MiB, and whom it tells the fraction done."""
+
+    time_limit: float | None = None
+    memory_limit: float = MEMORY
+    progress: Callable[[float], Any] | None = None
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from ._batched import Batched
 from ._export import EXPORT, Export, write
 from ._logs import given
 from ._lynkeus import MEMORY
-from ._progress import Progress, told
+from ._progress import Progress, Terms, told
 from ._toml import document, valid
 from ._types import LogLike, Names, Number, Numbers
 from .errors import InputError, LimitError
@@ -294,7 +294,7 @@ class Study(Batched):
             A limit ended it before there was an answer.
         """
         asked = [valid(x) for x in about]
-        return Check(self._core.check(parameters, asked, time_limit, memory_limit))
+        return Check(self._core.check(parameters, asked, Terms(time_limit, memory_limit)))
 
     @takes(**LIMITS)
     def design(self, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Design:
@@ -321,7 +321,7 @@ class Study(Batched):
         LimitError
             A limit ended it before there was an answer.
         """
-        return Design(self._core.design(time_limit, memory_limit))
+        return Design(self._core.design(Terms(time_limit, memory_limit)))
 
     @takes(**LIMITS)
     def certify(self, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Certificate:
@@ -348,7 +348,7 @@ class Study(Batched):
         LimitError
             A limit ended it before there was an answer.
         """
-        return Certificate(self._core.certify(time_limit, memory_limit))
+        return Certificate(self._core.certify(Terms(time_limit, memory_limit)))
 
     @takes(horizon=optional(real()), sensors=optional(word), **LIMITS)
     def how_well(
@@ -385,7 +385,7 @@ class Study(Batched):
         LimitError
             A limit ended it before there was an answer.
         """
-        return HowWell(self._core.how_well(horizon, sensors, time_limit, memory_limit))
+        return HowWell(self._core.how_well(horizon, sensors, Terms(time_limit, memory_limit)))
 
     @overload
     def simulate(
@@ -445,8 +445,8 @@ class Study(Batched):
             raise InputError(f"runs: expected at least 1, found {runs}")
         with told(progress, "simulating") as tell:
             if runs is None:
-                return judged(Simulation(self._core.simulate(tell, time_limit, memory_limit)))
-            return judged(MonteCarlo(self._core.monte_carlo(runs, tell, time_limit, memory_limit)))
+                return judged(Simulation(self._core.simulate(Terms(time_limit, memory_limit, tell))))
+            return judged(MonteCarlo(self._core.monte_carlo(runs, Terms(time_limit, memory_limit, tell))))
 
     @takes(record=flag, progress=told_of, **LIMITS)
     def estimate(
@@ -491,7 +491,7 @@ class Study(Batched):
             A limit ended it before its first row.
         """
         with told(progress, "estimating") as tell:
-            return judged(Estimation(self._core.estimate(given(log), tell, time_limit, memory_limit, record)))
+            return judged(Estimation(self._core.estimate(given(log), Terms(time_limit, memory_limit, tell), record)))
 
     @takes(progress=told_of, **LIMITS)
     def tune(
@@ -528,7 +528,7 @@ class Study(Batched):
             A limit ended it before there was an answer.
         """
         with told(progress, "tuning") as tell:
-            return Sweep(self._core.tune(None if log is None else given(log), tell, time_limit, memory_limit))
+            return Sweep(self._core.tune(None if log is None else given(log), Terms(time_limit, memory_limit, tell)))
 
     @takes(progress=told_of, **LIMITS)
     def compare(
@@ -568,7 +568,7 @@ class Study(Batched):
         """
         with told(progress, "comparing") as tell:
             recorded = None if log is None else given(log)
-            return warned(Comparison(self._core.compare(recorded, tell, time_limit, memory_limit)))
+            return warned(Comparison(self._core.compare(recorded, Terms(time_limit, memory_limit, tell))))
 
     def plant(self) -> Functions:
         """The plant as functions of numbers.
@@ -610,7 +610,7 @@ class Study(Batched):
         LimitError
             A limit ended it before there was an answer.
         """
-        return Observer(self._core.observer(time_limit, memory_limit), (Study.observer, (self,)))
+        return Observer(self._core.observer(Terms(time_limit, memory_limit)), (Study.observer, (self,)))
 
     @takes(**EXPORT, **LIMITS)
     def export(
@@ -667,7 +667,7 @@ class Study(Batched):
             A limit ended it before there was an answer.
         """
         files, notes = self._core.export(
-            to, precision, fmi, step, tunable, system, time_limit, memory_limit
+            to, precision, fmi, step, tunable, system, Terms(time_limit, memory_limit)
         )
         return write(Path(folder), files, notes, force=force)
 

@@ -29,7 +29,8 @@ pub const MEMORY: f64 = 2048.0;
 #[global_allocator]
 static ALLOCATOR: Cap<System> = Cap::new(System, usize::MAX);
 
-/// What a call may take, and whom it tells.
+/// What a call may take, and whom it tells: `lynkeus._progress.Terms`.
+#[derive(FromPyObject)]
 pub struct Terms<'py> {
     /// called with the fraction done
     progress: Option<Bound<'py, PyAny>>,
@@ -41,23 +42,15 @@ pub struct Terms<'py> {
 
 impl Default for Terms<'_> {
     fn default() -> Self {
-        Self::new(None, None, MEMORY)
+        Self {
+            progress: None,
+            time_limit: None,
+            memory_limit: MEMORY,
+        }
     }
 }
 
 impl<'py> Terms<'py> {
-    pub fn new(
-        progress: Option<Bound<'py, PyAny>>,
-        time_limit: Option<f64>,
-        memory_limit: f64,
-    ) -> Self {
-        Self {
-            progress,
-            time_limit,
-            memory_limit,
-        }
-    }
-
     /// From now on; what others have in memory by now does not count.
     fn budget(&self) -> PyResult<Budget> {
         let time = match self.time_limit {

@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::answer::Answer;
-use crate::away::{MEMORY, Terms, Watch, away};
+use crate::away::{Terms, Watch, away};
 use crate::errors::{exception, from_source};
 use crate::estimator::Estimator;
 use crate::functions::Functions;
@@ -107,53 +107,41 @@ impl Study {
         self.study.model.as_deref()
     }
 
-    #[pyo3(signature = (parameters=false, about=vec![], time_limit=None, memory_limit=MEMORY))]
+    #[pyo3(signature = (parameters=false, about=vec![], terms=None))]
     fn check(
         &self,
         py: Python<'_>,
         parameters: bool,
         about: Vec<String>,
-        time_limit: Option<f64>,
-        memory_limit: f64,
+        terms: Option<Terms<'_>>,
     ) -> PyResult<Answer> {
         let options = CheckOptions { parameters, about };
-        let terms = Terms::new(None, time_limit, memory_limit);
+        let terms = terms.unwrap_or_default();
         let report = self.ask(py, &terms, |study, _| lynkeus::check(study, &options));
         report.map(Answer::of)
     }
 
-    #[pyo3(signature = (time_limit=None, memory_limit=MEMORY))]
-    fn design(
-        &self,
-        py: Python<'_>,
-        time_limit: Option<f64>,
-        memory_limit: f64,
-    ) -> PyResult<Answer> {
-        let terms = Terms::new(None, time_limit, memory_limit);
+    #[pyo3(signature = (terms=None))]
+    fn design(&self, py: Python<'_>, terms: Option<Terms<'_>>) -> PyResult<Answer> {
+        let terms = terms.unwrap_or_default();
         let report = self.ask(py, &terms, |study, _| lynkeus::design(study));
         report.map(Answer::of)
     }
 
-    #[pyo3(signature = (time_limit=None, memory_limit=MEMORY))]
-    fn certify(
-        &self,
-        py: Python<'_>,
-        time_limit: Option<f64>,
-        memory_limit: f64,
-    ) -> PyResult<Answer> {
-        let terms = Terms::new(None, time_limit, memory_limit);
+    #[pyo3(signature = (terms=None))]
+    fn certify(&self, py: Python<'_>, terms: Option<Terms<'_>>) -> PyResult<Answer> {
+        let terms = terms.unwrap_or_default();
         let report = self.ask(py, &terms, |study, _| lynkeus::certify(study));
         report.map(Answer::of)
     }
 
-    #[pyo3(signature = (horizon=None, sensors=None, time_limit=None, memory_limit=MEMORY))]
+    #[pyo3(signature = (horizon=None, sensors=None, terms=None))]
     fn how_well(
         &self,
         py: Python<'_>,
         horizon: Option<f64>,
         sensors: Option<&str>,
-        time_limit: Option<f64>,
-        memory_limit: f64,
+        terms: Option<Terms<'_>>,
     ) -> PyResult<Answer> {
         let sensors = match sensors {
             None => None,
@@ -162,36 +150,28 @@ impl Study {
             Some(other) => return Err(unknown("sensors", "\"outputs\" or \"all\"", other)),
         };
         let options = precision::Options { horizon, sensors };
-        let terms = Terms::new(None, time_limit, memory_limit);
+        let terms = terms.unwrap_or_default();
         let report = self.ask(py, &terms, |study, _| lynkeus::precision(study, &options));
         report.map(Answer::of)
     }
 
-    #[pyo3(signature = (progress=None, time_limit=None, memory_limit=MEMORY))]
-    fn simulate(
-        &self,
-        py: Python<'_>,
-        progress: Option<Bound<'_, PyAny>>,
-        time_limit: Option<f64>,
-        memory_limit: f64,
-    ) -> PyResult<Answer> {
-        let terms = Terms::new(progress, time_limit, memory_limit);
+    #[pyo3(signature = (terms=None))]
+    fn simulate(&self, py: Python<'_>, terms: Option<Terms<'_>>) -> PyResult<Answer> {
+        let terms = terms.unwrap_or_default();
         let outcome = self.ask(py, &terms, |study, watch| {
             self.runner.simulate(study, watch)
         })?;
         Ok(Answer::of(outcome))
     }
 
-    #[pyo3(signature = (runs, progress=None, time_limit=None, memory_limit=MEMORY))]
+    #[pyo3(signature = (runs, terms=None))]
     fn monte_carlo(
         &self,
         py: Python<'_>,
         runs: usize,
-        progress: Option<Bound<'_, PyAny>>,
-        time_limit: Option<f64>,
-        memory_limit: f64,
+        terms: Option<Terms<'_>>,
     ) -> PyResult<Answer> {
-        let terms = Terms::new(progress, time_limit, memory_limit);
+        let terms = terms.unwrap_or_default();
         let found = self.ask(py, &terms, |study, watch| {
             lynkeus::monte_carlo(study, runs, watch)
         })?;
@@ -205,17 +185,15 @@ impl Study {
         })
     }
 
-    #[pyo3(signature = (log, progress=None, time_limit=None, memory_limit=MEMORY, record=false))]
+    #[pyo3(signature = (log, terms=None, record=false))]
     fn estimate(
         &self,
         py: Python<'_>,
         log: Given,
-        progress: Option<Bound<'_, PyAny>>,
-        time_limit: Option<f64>,
-        memory_limit: f64,
+        terms: Option<Terms<'_>>,
         record: bool,
     ) -> PyResult<Answer> {
-        let terms = Terms::new(progress, time_limit, memory_limit);
+        let terms = terms.unwrap_or_default();
         let outcome = self.ask(py, &terms, |study, watch| {
             let study = &lynkeus::Study {
                 records: record,
@@ -226,16 +204,14 @@ impl Study {
         Ok(Answer::of(outcome))
     }
 
-    #[pyo3(signature = (log=None, progress=None, time_limit=None, memory_limit=MEMORY))]
+    #[pyo3(signature = (log=None, terms=None))]
     fn tune(
         &self,
         py: Python<'_>,
         log: Option<Given>,
-        progress: Option<Bound<'_, PyAny>>,
-        time_limit: Option<f64>,
-        memory_limit: f64,
+        terms: Option<Terms<'_>>,
     ) -> PyResult<Answer> {
-        let terms = Terms::new(progress, time_limit, memory_limit);
+        let terms = terms.unwrap_or_default();
         let sweep = self.ask(py, &terms, |study, watch| {
             let table = log.as_ref().map(|log| log.table(study)).transpose()?;
             let sweep = lynkeus::tune(study, table.as_deref(), watch)?;
@@ -247,16 +223,14 @@ impl Study {
         sweep.map(Answer::of)
     }
 
-    #[pyo3(signature = (log=None, progress=None, time_limit=None, memory_limit=MEMORY))]
+    #[pyo3(signature = (log=None, terms=None))]
     fn compare(
         &self,
         py: Python<'_>,
         log: Option<Given>,
-        progress: Option<Bound<'_, PyAny>>,
-        time_limit: Option<f64>,
-        memory_limit: f64,
+        terms: Option<Terms<'_>>,
     ) -> PyResult<Answer> {
-        let terms = Terms::new(progress, time_limit, memory_limit);
+        let terms = terms.unwrap_or_default();
         let found = self.ask(py, &terms, |study, watch| {
             let table = log.as_ref().map(|log| log.table(study)).transpose()?;
             lynkeus::compare(study, table.as_deref(), watch)
@@ -273,14 +247,9 @@ impl Study {
     }
 
     /// The observer as functions.
-    #[pyo3(signature = (time_limit=None, memory_limit=MEMORY))]
-    fn observer(
-        &self,
-        py: Python<'_>,
-        time_limit: Option<f64>,
-        memory_limit: f64,
-    ) -> PyResult<Functions> {
-        let terms = Terms::new(None, time_limit, memory_limit);
+    #[pyo3(signature = (terms=None))]
+    fn observer(&self, py: Python<'_>, terms: Option<Terms<'_>>) -> PyResult<Functions> {
+        let terms = terms.unwrap_or_default();
         self.ask(py, &terms, |study, _| {
             let plant = lynkeus::prepare::plant(study)?;
             let design = Prepared::new(study, &plant)?.design()?;
@@ -289,7 +258,7 @@ impl Study {
     }
 
     /// Names and contents of files, and what the user should know.
-    #[pyo3(signature = (to, precision, fmi, step=None, tunable=false, system=None, time_limit=None, memory_limit=MEMORY))]
+    #[pyo3(signature = (to, precision, fmi, step=None, tunable=false, system=None, terms=None))]
     #[allow(
         clippy::too_many_arguments,
         reason = "the options of a call from Python"
@@ -303,8 +272,7 @@ impl Study {
         step: Option<f64>,
         tunable: bool,
         system: Option<&str>,
-        time_limit: Option<f64>,
-        memory_limit: f64,
+        terms: Option<Terms<'_>>,
     ) -> PyResult<(Vec<Written<'py>>, Vec<String>)> {
         let options = ExportOptions {
             to: target(to, fmi)?,
@@ -317,7 +285,7 @@ impl Study {
             step,
             tunable,
         };
-        let terms = Terms::new(None, time_limit, memory_limit);
+        let terms = terms.unwrap_or_default();
         let made = self.ask(py, &terms, |study, _| lynkeus::export(study, &options))?;
         let files = made.files.into_iter();
         let files = files.map(|file| (file.name, PyBytes::new(py, &file.bytes)));
