@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::entries::Named;
-use crate::{Answer, Doubt, Error};
+use crate::{Answer, Doubt};
 
 use super::{Against, Compared, Comparison, Interval, Run};
 
@@ -148,7 +148,7 @@ impl Answer for Comparison {
     }
 
     #[cfg(feature = "plot")]
-    fn svg(&self) -> Result<Option<String>, Error> {
+    fn svg(&self) -> Result<Option<String>, crate::Error> {
         self.picture().to_svg().map(Some)
     }
 

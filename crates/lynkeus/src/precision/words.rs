@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::Report;
 use crate::words::number;
-use crate::{Answer, Error, Series};
+use crate::{Answer, Series};
 
 /// Quantities listed.
 const LISTED: usize = 12;
@@ -70,7 +70,7 @@ impl Answer for Report {
     }
 
     #[cfg(feature = "plot")]
-    fn svg(&self) -> Result<Option<String>, Error> {
+    fn svg(&self) -> Result<Option<String>, crate::Error> {
         self.to_svg().map(Some)
     }
 }
