@@ -102,6 +102,11 @@ fn test() -> Result<(), String> {
         Some(path) => tests.env(python::VARIABLE, path),
         None => tests.env_remove(python::VARIABLE),
     };
+    // some tests wait, for limits and for signals
+    if std::env::var_os("RUST_TEST_THREADS").is_none() {
+        let processors = std::thread::available_parallelism().map_or(2, std::num::NonZero::get);
+        tests.env("RUST_TEST_THREADS", (processors + 1).to_string());
+    }
     match found(package, "the tests of the Python package")? {
         Some(python) => package::test_beside(&python, &tests),
         None => run(&mut tests),

@@ -20,7 +20,7 @@ const ARGUMENTS: [&str; 7] = [
 ];
 
 /// Long enough to be killed a few times, whatever else the machine does.
-const LONG: Duration = Duration::from_secs(3);
+const LONG: Duration = Duration::from_secs(2);
 
 /// The two tanks with so many substeps that a run takes long, and what it gives in the end.
 struct Slow {
