@@ -17,7 +17,7 @@ use crate::print::target::{Artifact, Declared, Export, ExportOptions, Subject, W
 /// The study's estimator as source code, as `[estimate]` says: with the same fixed step it gives what
 /// [`estimate()`](crate::estimate()) gives. Where the study has no fixed step, one that is short
 /// enough for the fastest mode at the start is taken, and told. With another [`Subject`], and of a bare
-/// model, the plant or the observer in continuous time for simulators ([`Target::Fmu`]).
+/// model, the plant or the observer in continuous time for simulators ([`Target::Fmu`](crate::Target::Fmu)).
 ///
 /// # Errors
 /// As [`estimator`](crate::estimator()); and what cannot run elsewhere: a moving horizon, plants
