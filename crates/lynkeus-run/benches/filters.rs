@@ -5,7 +5,7 @@ use lynkeus_expr::Graph;
 use lynkeus_run::filter::{
     FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
 };
-use lynkeus_run::{Blueprint, Error, EstimatorSettings, Level, Method, Tolerances};
+use lynkeus_run::{Blueprint, Error, EstimatorSettings, Level, Method, Step, Tolerances};
 
 fn main() {
     divan::main();
@@ -46,13 +46,17 @@ fn chain(n: usize) -> Result<NoisyModel, Error> {
     })
 }
 
-/// Runs a filter for long enough that P has filled, then measures sample by sample.
+/// Runs a filter for long enough that P has filled and that there is machine code, then measures sample by sample.
 fn measure(bencher: Bencher, n: usize, kind: FilterKind) {
     let method = Method::Adaptive(Tolerances {
         relative: 1e-6,
         absolute: 1e-8,
         ..Tolerances::default()
     });
+    measure_by(method, 30, bencher, n, kind);
+}
+
+fn measure_by(method: Method, before: usize, bencher: Bencher, n: usize, kind: FilterKind) {
     let run = EstimatorSettings {
         method,
         ..EstimatorSettings::default()
@@ -71,7 +75,7 @@ fn measure(bencher: Bencher, n: usize, kind: FilterKind) {
             Err(error) => panic!("{error}"),
         }
     };
-    for _ in 0..30 {
+    for _ in 0..before {
         black_box(push());
     }
     bencher.bench_local(push);
@@ -80,6 +84,13 @@ fn measure(bencher: Bencher, n: usize, kind: FilterKind) {
 #[divan::bench(args = [2, 8, 25, 61, 200])]
 fn ekf(bencher: Bencher, n: usize) {
     measure(bencher, n, FilterKind::Extended);
+}
+
+/// One step of Runge and Kutta between samples.
+#[divan::bench(args = [2, 4, 8, 12, 16, 25, 61])]
+fn ekf_rk4(bencher: Bencher, n: usize) {
+    let method = Method::Rk4(Step::Substeps(1));
+    measure_by(method, 10_000, bencher, n, FilterKind::Extended);
 }
 
 #[divan::bench(args = [2, 8, 25, 61, 200])]

@@ -90,6 +90,7 @@
 mod adaptive;
 mod batch;
 mod blueprint;
+mod classical;
 mod closed_loop;
 pub mod credible;
 mod divergence;

@@ -1,12 +1,12 @@
 //! Code of equations: tapes that are interpreted at first, and run as machine code once that pays.
 
-use std::collections::HashMap;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use lynkeus_expr::{Expr, Graph, MissingInput, Node, Tape, jacobian};
 use lynkeus_native::Function;
 
+use crate::classical::{Term, classical_step};
 use crate::equations::Equations;
 use crate::{Place, Slopes};
 
@@ -113,7 +113,7 @@ impl Routine {
     /// length last) and the states at its end. None where the step is too large for one function.
     pub fn step_in(&self, graph: &Graph) -> Option<(Vec<Node>, Vec<Node>)> {
         let is_small = self.tape.len() <= LARGEST_STEP;
-        is_small.then(|| classical_step(graph, self.inputs(), &self.outputs))
+        is_small.then(|| step_of(graph, self.inputs(), &self.outputs))
     }
 
     fn native(&self) -> Option<&Function<1>> {
@@ -162,50 +162,39 @@ impl Routine {
 }
 
 /// One step of the classical Runge–Kutta method for x' = `slopes`, functions of `inputs`: time, the
-/// states and what is constant. Operation by operation it is what [`Rk4`](crate::Rk4) does; what the
-/// stages have in common is computed once.
-fn classical_step(g: &Graph, inputs: &[Node], slopes: &[Node]) -> (Vec<Node>, Vec<Node>) {
+/// states and what is constant. What the stages have in common is computed once.
+fn step_of(g: &Graph, inputs: &[Node], slopes: &[Node]) -> (Vec<Node>, Vec<Node>) {
     let h = g.fresh("h");
-    let t = g.expr(inputs[0]);
     let states = &inputs[1..=slopes.len()];
-    let x: Vec<Expr<'_>> = states.iter().map(|&x| g.expr(x)).collect();
-    let moved = |factor: Expr<'_>, k: &[Node]| -> Vec<Node> {
-        let ends = x.iter().zip(k);
-        let ends = ends.map(|(&x, &k)| (x + factor * g.expr(k)).node());
-        ends.collect()
+    let x: Vec<Term<'_>> = states.iter().map(|&x| Some(g.expr(x))).collect();
+    let slope = |t: Expr<'_>, x: &[Term<'_>]| {
+        let at = [Some(t)].into_iter().chain(x.iter().copied()).flatten();
+        let places = inputs.iter().copied().zip(at.map(Expr::node));
+        let found = g.substitute(slopes, &places.collect());
+        found.into_iter().map(|k| Some(g.expr(k))).collect()
     };
-    let slope = |t: Expr<'_>, at: Vec<Node>| -> Vec<Node> {
-        let places = inputs.iter().copied().zip([t.node()].into_iter().chain(at));
-        g.substitute(slopes, &places.collect::<HashMap<_, _>>())
-    };
-    let half = h * 0.5;
-    let k1 = slopes;
-    let k2 = slope(t + half, moved(half, k1));
-    let k3 = slope(t + half, moved(half, &k2));
-    let k4 = slope(t + h, moved(h, &k3));
-    let next = x.iter().enumerate().map(|(i, &x)| {
-        let [k1, k2, k3, k4] = [k1, &k2, &k3, &k4].map(|k| g.expr(k[i]));
-        (x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)).node()
-    });
-    let next = next.collect();
+    let next = classical_step(g.expr(inputs[0]), h, &x, slope);
+    // a state is never nothing
+    let next = next.into_iter().flatten().map(Expr::node).collect();
     ([inputs, &[h.node()]].concat(), next)
 }
 
 /// Machine code in use, and how often it would have been before.
 #[derive(Clone, Debug, Default)]
-struct Engine {
+pub(crate) struct Engine {
     waited: u32,
     running: Option<Function<1>>,
 }
 
 impl Engine {
-    /// The machine code, made when its time has come.
-    fn ready<'f>(
+    /// The machine code, made when its time has come: where it would have been of use so often.
+    pub fn ready<'f>(
         &mut self,
+        patience: u32,
         make: impl FnOnce() -> Option<&'f Function<1>>,
     ) -> Option<&mut Function<1>> {
         if self.running.is_none() {
-            if Backend::patience(PATIENCE).is_none_or(|patience| self.waited < patience) {
+            if Backend::patience(patience).is_none_or(|patience| self.waited < patience) {
                 self.waited = self.waited.saturating_add(1);
                 return None;
             }
@@ -231,7 +220,7 @@ impl Runner {
     /// Writes the outputs at `inputs`.
     #[inline]
     pub fn eval(&mut self, inputs: &[f64], outputs: &mut [f64]) {
-        match self.native.ready(|| self.routine.native()) {
+        match self.native.ready(PATIENCE, || self.routine.native()) {
             Some(native) => native.eval(inputs.as_chunks().0, outputs.as_chunks_mut().0),
             None => self.interpreter.eval(inputs, outputs),
         }
@@ -250,7 +239,7 @@ impl Runner {
     /// For a routine (t, x, w) → dx: one step of length `h` of the classical Runge–Kutta method
     /// from `inputs` to `next`. False where that is not done at once. The inputs are as before.
     pub fn step(&mut self, inputs: &mut Vec<f64>, h: f64, next: &mut [f64]) -> bool {
-        let Some(step) = self.step.ready(|| self.routine.step()) else {
+        let Some(step) = self.step.ready(PATIENCE, || self.routine.step()) else {
             return false;
         };
         // in its place: a copy read at once waits for what was just written, 20 ns

@@ -401,6 +401,12 @@ impl Evaluation {
         self.is_held = !held_modes.is_empty();
     }
 
+    /// Goes to (t, x): what its equations read there; none where not all of it stays over a step.
+    pub(crate) fn free_inputs(&mut self, t: f64, x: &[f64]) -> Option<&mut Vec<f64>> {
+        let stays = !self.is_held && self.line.is_none();
+        stays.then(|| self.at(t, x).1)
+    }
+
     /// Goes to (t, x): the code that is in force there, and what it reads.
     fn at(&mut self, t: f64, x: &[f64]) -> (&mut Both<Runner>, &mut Vec<f64>) {
         self.inputs[0] = t;

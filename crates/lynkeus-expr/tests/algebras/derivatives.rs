@@ -2,7 +2,7 @@
 
 use crate::exact::{Exact, error, to_f64};
 use crate::operations::{Case, cases};
-use astro_float::BigFloat;
+use astro_float_num::BigFloat;
 use lynkeus_expr::{Algebra, Node, Tape, jacobian};
 use proptest::prelude::*;
 

@@ -1,6 +1,6 @@
 //! The reference: an algebra of numbers with as many bits as wanted, by the `astro-float` library.
 
-use astro_float::{BigFloat, Consts, RoundingMode};
+use astro_float_num::{BigFloat, Consts, RoundingMode};
 use lynkeus_expr::{Algebra, Binary, Implicit, Interval, Reals, Unary};
 use std::cell::RefCell;
 
@@ -232,7 +232,7 @@ pub fn to_f64(value: &BigFloat) -> f64 {
     let fraction = words.last().map_or(0.0, |&word| word as f64) / 2.0_f64.powi(64);
     let half = exponent / 2;
     let size = fraction * 2.0_f64.powi(half) * 2.0_f64.powi(exponent - half);
-    if sign == astro_float::Sign::Neg {
+    if sign == astro_float_num::Sign::Neg {
         -size
     } else {
         size

@@ -2,7 +2,7 @@
 
 use crate::exact::{Exact, holds};
 use crate::sample::{POWERS, interval_and_member};
-use astro_float::BigFloat;
+use astro_float_num::BigFloat;
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Algebra, Binary, Interval, Reals, Unary};
 use proptest::prelude::*;

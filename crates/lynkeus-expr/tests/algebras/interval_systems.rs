@@ -2,7 +2,7 @@
 
 use crate::exact::{Exact, holds};
 use crate::sample::{interval_and_member, member, moderate};
-use astro_float::BigFloat;
+use astro_float_num::BigFloat;
 use lynkeus_expr::Algebra;
 use lynkeus_expr::interval::{Interval, solve};
 use proptest::prelude::*;

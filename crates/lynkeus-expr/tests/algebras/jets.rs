@@ -2,7 +2,7 @@
 
 use crate::exact::{Exact, error, holds, to_f64};
 use crate::operations::{Case, cases};
-use astro_float::BigFloat;
+use astro_float_num::BigFloat;
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Algebra, Graph, Interval, Jets, Node, Nodes, Reals, Tape};
 use proptest::prelude::*;

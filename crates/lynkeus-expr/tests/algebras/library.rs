@@ -8,7 +8,7 @@ use lynkeus_expr::{Algebra, Binary, Unary};
 const COUNT: usize = 2000;
 
 /// |found − exact| in units in the last place of the exact value.
-pub fn units(found: f64, exact: &astro_float::BigFloat) -> f64 {
+pub fn units(found: f64, exact: &astro_float_num::BigFloat) -> f64 {
     let nearest = to_f64(exact).abs().max(f64::MIN_POSITIVE);
     let unit = nearest.next_up() - nearest;
     let space = Exact(256);

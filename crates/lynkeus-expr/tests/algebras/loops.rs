@@ -2,7 +2,7 @@
 //! derivatives and ranges are computed without any loop, and with many bits.
 
 use crate::exact::{Exact, error, holds};
-use astro_float::BigFloat;
+use astro_float_num::BigFloat;
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{
     Algebra, Expr, Graph, Implicit, ImplicitUnknown, Interval, Jets, Node, Nodes, Reals, Tape,

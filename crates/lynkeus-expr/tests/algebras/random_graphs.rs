@@ -4,7 +4,7 @@ use crate::exact::{Exact, holds, to_f64};
 use crate::jets::{ORDER, arguments_between, jets, reference};
 use crate::recipe::{INPUTS, Style, compute, follow, recipe, symbols, without_systems};
 use crate::sample::member;
-use astro_float::BigFloat;
+use astro_float_num::BigFloat;
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Algebra, Graph, Interval, Node, Nodes, Op, Reals, Tape, jacobian};
 use proptest::prelude::*;

@@ -203,7 +203,8 @@ impl Factor {
         lower.clear();
         lower.resize(n * n, 0.0);
         for j in 0..n {
-            let own = &lower[j * n + firsts[j]..j * n + j];
+            // sums are grouped by columns, wherever a row begins
+            let own = &lower[j * n + (firsts[j] & !3)..j * n + j];
             let pivot = matrix[j * n + j] - dot(own, own);
             let noise = n as f64 * f64::EPSILON * matrix[j * n + j].abs();
             if pivot.is_nan() || pivot <= noise {
@@ -212,7 +213,7 @@ impl Factor {
             let root = pivot.sqrt();
             lower[j * n + j] = root;
             for i in j + 1..n {
-                let begin = firsts[i].max(firsts[j]);
+                let begin = firsts[i].max(firsts[j]) & !3;
                 if firsts[i] > j {
                     continue;
                 }

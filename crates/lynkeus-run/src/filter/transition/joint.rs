@@ -3,8 +3,10 @@
 use std::sync::Arc;
 
 use super::series::Transition;
+use super::straight::Straight;
 use crate::Evaluation;
 use crate::filter::profile::Profile;
+use crate::filter::root::Root;
 use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place, Result, Slopes};
 
 /// x̂, Φ and W by one integration, for flows with few states.
@@ -12,6 +14,8 @@ use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place, Resu
 pub(crate) struct Joint {
     pub integrator: Integrator,
     equation: Equation,
+    /// the first step from a sample, where steps are those of Runge and Kutta
+    straight: Option<Straight>,
     /// q, the largest entry of Q
     scale: f64,
     /// the state of [`Variational`]
@@ -25,19 +29,24 @@ impl Joint {
             true => process_noise.iter().map(|q| q / scale).collect(),
             false => vec![],
         };
+        let is_classical = matches!(method, Method::Rk4(_));
+        let noisy = || process_noise.iter().map(|q| *q > 0.0).collect();
         let equation = Equation::new(flow, noise);
         Ok(Self {
             integrator: Integrator::new(method, equation.dimension())?,
             equation,
+            straight: is_classical.then(|| flow.straight(noisy())),
             scale,
             z: vec![],
         })
     }
 
-    /// Takes `x` to the next sample and writes Φ and W.
+    /// Takes `x` to the next sample and writes Φ and W. What it makes of the root of a covariance is
+    /// [taken](Self::take) afterwards, where it was found on the way.
     pub fn advance(
         &mut self,
         driven: &mut Evaluation,
+        root: &Root,
         from: f64,
         to: f64,
         x: &mut [f64],
@@ -49,7 +58,17 @@ impl Joint {
         self.z.extend_from_slice(x);
         self.z.resize(equation.dimension(), 0.0);
         (0..n).for_each(|i| self.z[n + i * width + i] = 1.0);
-        let mut flow = Variational { driven, equation };
+        let first = self.straight.as_mut();
+        let mut flow = Variational {
+            driven,
+            equation,
+            first: first.map(|straight| First {
+                straight,
+                root,
+                scale: self.scale,
+                is_over: false,
+            }),
+        };
         self.integrator.advance(&mut flow, from, to, &mut self.z)?;
         x.copy_from_slice(&self.z[..n]);
         let columns = |first: usize, scale: f64| {
@@ -63,6 +82,12 @@ impl Joint {
         }
         Ok(())
     }
+
+    /// Writes the root of ΦPΦᵀ + W over the last way, where one step made it.
+    pub fn take(&mut self, root: &mut Root) -> bool {
+        let mut straight = self.straight.iter_mut();
+        straight.any(|straight| straight.take(root))
+    }
 }
 
 /// x̂' = f(t, x̂, u) with Φ' = FΦ and W' = FW + WFᵀ + Q/q, F = ∂f/∂x along x̂: from Φ = I and
@@ -74,6 +99,15 @@ impl Joint {
 struct Variational<'a> {
     driven: &'a mut Evaluation,
     equation: &'a mut Equation,
+    first: Option<First<'a>>,
+}
+
+/// The first step from Φ = I and W = 0.
+struct First<'a> {
+    straight: &'a mut Straight,
+    root: &'a Root,
+    scale: f64,
+    is_over: bool,
 }
 
 /// What the variational equation is made of, and how the right-hand sides f, FΦ and FW + WFᵀ depend on
@@ -112,6 +146,9 @@ impl Dynamics for Variational<'_> {
     }
 
     fn derivatives(&mut self, t: f64, z: &[f64], dz: &mut [f64]) {
+        if let Some(first) = &mut self.first {
+            first.straight.forget();
+        }
         let equation = &mut *self.equation;
         let (n, width, slopes) = (equation.n, equation.width, &mut equation.slopes);
         let (x, rows) = z.split_at(n);
@@ -137,8 +174,23 @@ impl Dynamics for Variational<'_> {
         }
     }
 
+    fn step(&mut self, t: f64, h: f64, z: &[f64], next: &mut [f64]) -> bool {
+        let Some(first) = &mut self.first else {
+            return false;
+        };
+        if std::mem::replace(&mut first.is_over, true) {
+            return false;
+        }
+        let noise = (&*self.equation.noise, first.scale);
+        let x = &z[..self.equation.n];
+        let straight = &mut first.straight;
+        straight.step(self.driven, (t, h), x, noise, first.root, next)
+    }
+
     fn slopes(&mut self, t: f64, z: &[f64], slopes: &mut Slopes) -> bool {
-        let Self { driven, equation } = self;
+        let Self {
+            driven, equation, ..
+        } = self;
         let x = &z[..equation.n];
         if !driven.output_slopes(t, x, &mut equation.second) {
             return false;
@@ -261,6 +313,7 @@ mod tests {
             let mut linearised = Variational {
                 driven: &mut driven,
                 equation: &mut Equation::new(&flow, noise),
+                first: None,
             };
             let dimension = linearised.dimension();
             let z: Vec<f64> = (0..dimension)

@@ -4,6 +4,7 @@
 mod joint;
 mod piecewise;
 mod series;
+mod straight;
 
 use std::sync::Arc;
 
@@ -16,6 +17,7 @@ use crate::{EstimatorSettings, Linearised, Method, Result, Step};
 use joint::Joint;
 use piecewise::Piecewise;
 use series::Transition;
+pub(crate) use straight::{Code, Straight};
 
 /// Up to so many states x̂, Φ and W are integrated together, and wherever steps are given: these are
 /// then the steps of all three.
@@ -69,7 +71,9 @@ impl Propagation {
         let (driven, x) = (&mut self.driven, &mut self.end);
         x.clone_from(&belief.x);
         match &mut self.scheme {
-            Scheme::Joint(joint) => joint.advance(driven, from, to, x, &mut self.transition)?,
+            Scheme::Joint(joint) => {
+                joint.advance(driven, &belief.root, from, to, x, &mut self.transition)?;
+            }
             Scheme::Piecewise(variation) => {
                 self.transition = variation.advance(driven, belief, from, to, x)?;
             }
@@ -81,7 +85,13 @@ impl Propagation {
     pub fn predict(&mut self, belief: &mut Belief, from: f64, to: f64) -> Result<()> {
         self.advance(belief, from, to)?;
         belief.x.clone_from(&self.end);
-        self.carry(&mut belief.root);
+        let is_carried = match &mut self.scheme {
+            Scheme::Joint(joint) => joint.take(&mut belief.root),
+            Scheme::Piecewise(_) => false,
+        };
+        if !is_carried {
+            self.carry(&mut belief.root);
+        }
         Ok(())
     }
 

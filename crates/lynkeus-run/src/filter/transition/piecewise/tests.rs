@@ -56,7 +56,14 @@ fn differ(chain: &Linearised, step: f64, ours: Method, reference: Method) -> f64
         let mut other = x.clone();
         let mut expected = Transition::start(n, true);
         joint
-            .advance(&mut driven.clone(), from, to, &mut other, &mut expected)
+            .advance(
+                &mut driven.clone(),
+                &belief.root,
+                from,
+                to,
+                &mut other,
+                &mut expected,
+            )
             .unwrap();
         let found = variation
             .advance(&mut driven, &belief, from, to, &mut x)
