@@ -176,6 +176,16 @@ impl<const LANES: usize> Function<LANES> {
     }
 }
 
+/// The largest number of lanes that is compiled for here; 1 also where nothing is.
+#[must_use]
+pub fn widest() -> usize {
+    match (is_supported(), is_extended()) {
+        (true, true) => 8,
+        (true, false) => 4,
+        _ => 1,
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
 fn is_supported() -> bool {
     std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")

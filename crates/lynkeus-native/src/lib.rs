@@ -49,4 +49,4 @@ mod schedule;
 #[cfg(target_arch = "x86_64")]
 mod vectors;
 
-pub use function::{Buffer, Function};
+pub use function::{Buffer, Function, widest};
