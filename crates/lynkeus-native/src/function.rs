@@ -100,8 +100,8 @@ impl<const LANES: usize> Function<LANES> {
         spacing: Option<usize>,
         is_extended: bool,
     ) -> Option<Self> {
-        let is_called = calls::<LANES>;
-        let program = &scheduled(program, registers(is_extended), is_called);
+        let registers = registers(is_extended);
+        let program = &scheduled(program, registers, LANES == 1, calls::<LANES>);
         let emitter = emit::<LANES>(program, shared, spacing, is_extended);
         let outputs = spacing.unwrap_or(program.outputs.len());
         let places = [program.inputs, outputs, emitter.frame.len() + 1];

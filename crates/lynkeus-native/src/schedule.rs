@@ -1,5 +1,5 @@
-//! The order of a program's operations: those on the longest way to an output first, as far as registers
-//! last. A processor looks some hundred operations ahead by itself, which are few chains of a long sum.
+//! The order of a program's operations: calls early, those on the longest way to an output first, as far as
+//! registers last. A processor looks some hundred operations ahead by itself, which are few chains of a long sum.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -49,30 +49,69 @@ fn is_leaf(value: Value) -> bool {
     )
 }
 
-/// The program with its operations in a better order, and without those that nothing needs. What
-/// `is_fixed` stays where it is among the others: calls, before which registers are emptied.
+/// The program in a better order, and without what nothing needs. A call, which empties the registers, comes as
+/// soon as it can. Where one number is computed with at a time, other operations are put into the order in which
+/// a processor is through with them soonest; groups of lanes are many, and go on beside each other.
 pub(crate) fn scheduled(
     program: &Program,
     registers: usize,
-    is_fixed: impl Fn(Value) -> bool,
+    is_single: bool,
+    is_call: impl Fn(Value) -> bool,
 ) -> Program {
     let mut scheduler = Scheduler::new(program, registers);
     let mut section = vec![];
-    for (id, &value) in (0..).zip(&program.values) {
-        if !scheduler.is_needed[id as usize] {
-            continue;
-        }
-        match value {
-            Value::Input(_) | Value::Constant(_) => scheduler.order.push(id),
-            _ if is_fixed(value) => {
-                scheduler.run(&std::mem::take(&mut section));
-                scheduler.issue(id);
-            }
-            _ => section.push(id),
+    for id in called_early(program, &scheduler.is_needed, &is_call) {
+        let value = program.values[id as usize];
+        if matches!(value, Value::Input(_) | Value::Constant(_)) || !is_single {
+            scheduler.order.push(id);
+        } else if is_call(value) {
+            scheduler.run(&std::mem::take(&mut section));
+            scheduler.issue(id);
+        } else {
+            section.push(id);
         }
     }
     scheduler.run(&section);
     scheduler.result()
+}
+
+/// What is needed in its order, but each call, with what it needs, before all that it does not need.
+fn called_early(
+    program: &Program,
+    is_needed: &[bool],
+    is_call: &impl Fn(Value) -> bool,
+) -> Vec<Id> {
+    let needed = (0..)
+        .zip(&program.values)
+        .filter(|(id, _)| is_needed[*id as usize]);
+    let (mut order, mut is_placed) = (vec![], vec![false; is_needed.len()]);
+    let mut place = |id: Id, order: &mut Vec<Id>| {
+        let is_new = !std::mem::replace(&mut is_placed[id as usize], true);
+        if is_new {
+            order.push(id);
+        }
+        is_new
+    };
+    for (id, value) in needed.clone() {
+        if let Value::Input(_) = value {
+            place(id, &mut order);
+        }
+    }
+    for (call, _) in needed.clone().filter(|(_, value)| is_call(**value)) {
+        let (mut cone, mut open) = (vec![], vec![call]);
+        while let Some(id) = open.pop() {
+            if place(id, &mut cone) {
+                program.each_argument(program.values[id as usize], |argument| open.push(argument));
+            }
+        }
+        // arguments are numbered before their users
+        cone.sort_unstable();
+        order.extend(cone);
+    }
+    for (id, _) in needed {
+        place(id, &mut order);
+    }
+    order
 }
 
 /// An operation that waits for its turn: those on the longest way first, then in their order.
