@@ -42,6 +42,8 @@ pub(crate) struct Emitter<'p, const LANES: usize> {
     free: Vec<usize>,
     homes: Vec<Home>,
     holds: [Option<Id>; 32],
+    /// the next use of what a register holds; the largest number where there is none
+    next: [Id; 32],
     /// those that values live in
     registers: &'static [Register],
     /// every place where a value is used, the next one last
@@ -50,8 +52,8 @@ pub(crate) struct Emitter<'p, const LANES: usize> {
     results: Vec<Vec<u32>>,
     /// where each linear system stands in the frame
     systems: Vec<usize>,
-    /// registers that the operation at hand reads
-    pinned: Vec<Register>,
+    /// a bit for each register that the operation at hand reads
+    pinned: u32,
     /// slots that the operation at hand may still read, free from the next one on
     leaving: Vec<usize>,
 }
@@ -85,12 +87,13 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
             free: vec![],
             homes: vec![Home::default(); count],
             holds: [None; 32],
+            next: [Id::MAX; 32],
             registers: &REGISTERS[..registers(assembler.is_extended)],
             assembler,
             uses,
             results,
             systems: vec![],
-            pinned: vec![],
+            pinned: 0,
             leaving: vec![],
         };
         emitter.place_leaves(shared);
@@ -177,6 +180,7 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
             while uses.last().is_some_and(|&next| next <= at) {
                 uses.pop();
             }
+            self.look_ahead(argument);
             self.drop_if_dead(argument);
         }
     }
@@ -188,6 +192,7 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
         let home = &mut self.homes[id as usize];
         if let Some(register) = home.register.take() {
             self.holds[register as usize] = None;
+            self.next[register as usize] = Id::MAX;
         }
         if let Some(slot) = home.slot.take() {
             self.leaving.push(slot);
@@ -205,7 +210,7 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
                 register
             }
         };
-        self.pinned.push(register);
+        self.pinned |= 1 << register;
         register
     }
 
@@ -239,7 +244,7 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
     /// A register for the result of the operation at hand, whose arguments are consumed.
     pub fn result(&mut self, id: Id, arguments: &[Id]) -> Register {
         self.consume(id, arguments);
-        self.pinned.clear();
+        self.pinned = 0;
         let register = self.vacant();
         self.settle(id, register);
         register
@@ -248,20 +253,25 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
     pub fn settle(&mut self, id: Id, register: Register) {
         self.holds[register as usize] = Some(id);
         self.homes[id as usize].register = Some(register);
+        self.look_ahead(id);
+    }
+
+    /// Notes when the value of a register is used next.
+    fn look_ahead(&mut self, id: Id) {
+        if let Some(register) = self.homes[id as usize].register {
+            let next = self.uses[id as usize].last();
+            self.next[register as usize] = next.copied().unwrap_or(Id::MAX);
+        }
     }
 
     /// A free register; where there is none, that of the value whose next use is farthest.
     fn vacant(&mut self) -> Register {
-        let next = |holds: &Option<Id>| match holds {
-            None => u32::MAX,
-            Some(id) => self.uses[*id as usize]
-                .last()
-                .map_or(u32::MAX, |&use_| use_),
+        // one number to compare, for want of branches: the next use, then the lowest register
+        let key = |&r: &Register| match self.pinned >> r & 1 {
+            0 => u64::from(self.next[r as usize]) << 8 | u64::from(!r),
+            _ => 0,
         };
-        let open = self.registers.iter().filter(|r| !self.pinned.contains(r));
-        let register = *open
-            .max_by_key(|&&r| (next(&self.holds[r as usize]), std::cmp::Reverse(r)))
-            .unwrap_or(&0);
+        let register = !(self.registers.iter().map(key).max().unwrap_or(0) as Register);
         self.vacate(register);
         register
     }
@@ -270,6 +280,7 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
         if let Some(id) = self.holds[register as usize].take() {
             self.spill(id, register);
             self.homes[id as usize].register = None;
+            self.next[register as usize] = Id::MAX;
         }
     }
 
@@ -291,6 +302,6 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
         for &register in self.registers {
             self.vacate(register);
         }
-        self.pinned.clear();
+        self.pinned = 0;
     }
 }

@@ -63,6 +63,7 @@ pub(crate) fn scheduled(
     for id in called_early(program, &scheduler.is_needed, &is_call) {
         let value = program.values[id as usize];
         if matches!(value, Value::Input(_) | Value::Constant(_)) || !is_single {
+            scheduler.is_begun[id as usize] = true;
             scheduler.order.push(id);
         } else if is_call(value) {
             scheduler.run(&std::mem::take(&mut section));
@@ -130,6 +131,9 @@ struct Scheduler<'p> {
     frees: Vec<bool>,
     /// arguments that are not begun
     missing: Vec<u32>,
+    /// the users that wait for a value: each with the place of the one before, the last one's by the value
+    links: Vec<(Id, Option<u32>)>,
+    last_user: Vec<Option<u32>>,
     /// when a result is there
     done: Vec<u32>,
     is_begun: Vec<bool>,
@@ -173,6 +177,8 @@ impl<'p> Scheduler<'p> {
             users: vec![0; count],
             frees: vec![false; count],
             missing: vec![0; count],
+            links: vec![],
+            last_user: vec![None; count],
             done: vec![0; count],
             is_begun: vec![false; count],
             at: vec![None; count],
@@ -216,26 +222,27 @@ impl<'p> Scheduler<'p> {
         self.program.values[id as usize]
     }
 
-    /// The operations between two fixed ones.
+    /// The operations between two calls, in their order.
     fn run(&mut self, section: &[Id]) {
-        let Some(&begin) = section.first() else {
-            return;
-        };
-        let mut users: Vec<Vec<Id>> = vec![vec![]; section.len()];
+        let (mut known, mut missing) = (vec![], vec![]);
         for &id in section {
+            let (uses, is_begun) = (&mut missing, &self.is_begun);
+            let before = uses.len();
             each_once(self.program, self.value(id), |argument| {
-                let place = match argument < begin {
-                    true => None,
-                    false => section.binary_search(&argument).ok(),
-                };
-                if let Some(place) = place {
-                    self.missing[id as usize] += 1;
-                    users[place].push(id);
+                if !is_begun[argument as usize] {
+                    uses.push((argument, id));
                 }
             });
+            self.missing[id as usize] = (missing.len() - before) as u32;
+            if missing.len() == before {
+                known.push(Reverse(id));
+            }
         }
-        let known = section.iter().filter(|&&id| self.missing[id as usize] == 0);
-        self.queue.far.extend(known.map(|&id| Reverse(id)));
+        for (argument, user) in missing {
+            let last = self.last_user[argument as usize].replace(self.links.len() as u32);
+            self.links.push((user, last));
+        }
+        self.queue.far.extend(known);
         let mut first = 0;
         while first < section.len() {
             let end = section.get(first + WINDOW).copied().unwrap_or(Id::MAX);
@@ -248,14 +255,14 @@ impl<'p> Scheduler<'p> {
             {
                 first += 1;
             }
-            let Ok(place) = section.binary_search(&id) else {
-                continue;
-            };
-            for &user in &users[place] {
+            let mut link = self.last_user[id as usize];
+            while let Some(place) = link {
+                let (user, before) = self.links[place as usize];
                 self.missing[user as usize] -= 1;
                 if self.missing[user as usize] == 0 {
                     self.queue.far.push(Reverse(user));
                 }
+                link = before;
             }
         }
     }
