@@ -4,7 +4,7 @@
 //! is computed of what is zero whatever happens: Φ = I and W = 0 at the sample, the entries that the plant
 //! leaves out of Φ and W, and what follows of them in the reflections.
 
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 use std::sync::{Arc, OnceLock};
 
 use lynkeus_expr::{Expr, Graph, Node, Tape};
@@ -329,9 +329,10 @@ pub(crate) struct Straight {
     code: Arc<Code>,
     engine: Engine,
     outputs: Vec<f64>,
-    /// where the squares of the covariance begin among the outputs, after its root; none where the last step
-    /// carried none
-    carried: Option<std::ops::Range<usize>>,
+    /// how many of them are those of the step
+    step: usize,
+    /// which are the squares of the covariance, after its root; none where the last step carried none
+    carried: Option<Range<usize>>,
 }
 
 impl Straight {
@@ -340,20 +341,20 @@ impl Straight {
             code,
             engine: Engine::default(),
             outputs: vec![],
+            step: 0,
             carried: None,
         }
     }
 
-    /// Takes x̂ at `t` to `next` at `t + h`, which has the rows of (Φ W) after it; `noise` are the densities in
-    /// units of `scale`. Where that is not done at once it is false.
-    pub fn step(
+    /// Takes x̂ at `t` to `t + h` with Φ, W and the root of the covariance; `noise` are the densities in units
+    /// of `scale`. Where that is not done at once it is false.
+    pub fn run(
         &mut self,
         flow: &mut Evaluation,
         (t, h): (f64, f64),
         x: &[f64],
         (noise, scale): (&[f64], f64),
         root: &Root,
-        next: &mut [f64],
     ) -> bool {
         self.carried = None;
         let code = &*self.code;
@@ -366,21 +367,21 @@ impl Straight {
         };
         let before = inputs.len();
         inputs.extend([h, scale]);
-        inputs.extend(
-            noise
-                .iter()
-                .zip(&code.noisy)
-                .filter(|(_, is)| **is)
-                .map(|(q, _)| q),
-        );
+        let own = noise.iter().zip(&code.noisy).filter(|(_, is)| **is);
+        inputs.extend(own.map(|(q, _)| q));
         (0..root.n).for_each(|i| inputs.extend_from_slice(&root.row(i)[..=i]));
         self.outputs.resize(made.outputs, 0.0);
         function.eval(inputs.as_chunks().0, self.outputs.as_chunks_mut().0);
         inputs.truncate(before);
-        next.copy_from_slice(&self.outputs[..made.step]);
+        self.step = made.step;
         let squares = made.step + lower(root.n)..made.outputs;
         self.carried = (made.outputs > made.step).then_some(squares);
         true
+    }
+
+    /// x̂ after the step, then the rows of (Φ W).
+    pub fn next(&self) -> &[f64] {
+        &self.outputs[..self.step]
     }
 
     /// What there was is of no use.
@@ -404,5 +405,122 @@ impl Straight {
             root.entries[i * n..=i * n + i].copy_from_slice(row);
         }
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Propagation, Scheme};
+    use super::*;
+    use crate::filter::Belief;
+    use crate::{EstimatorSettings, Linearised, Method, Step};
+
+    struct Random(u64);
+
+    impl Random {
+        /// In [−1, 1).
+        fn next(&mut self) -> f64 {
+            self.0 = self
+                .0
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        }
+
+        fn is(&mut self, share: f64) -> bool {
+            self.next() < 2.0 * share - 1.0
+        }
+    }
+
+    /// A stable plant whose states read some of each other, under a signal.
+    fn plant(random: &mut Random, n: usize) -> Linearised {
+        let g = Graph::new();
+        let [time, u] = ["time", "u"].map(|name| g.symbol(name));
+        let x: Vec<Expr<'_>> = (0..n).map(|i| g.symbol(&format!("x{i}"))).collect();
+        let derivative = |i: usize| {
+            // some states are parameters
+            if i > 0 && random.is(0.1) {
+                return g.constant(0.0);
+            }
+            let own = x[i] * (-0.5 - random.next().abs());
+            let others = (0..n)
+                .filter(|j| *j != i)
+                .fold(own, |sum, j| match random.is(0.4) {
+                    true => sum + (x[j] * (1.0 + random.next())).sin() * random.next(),
+                    false => sum,
+                });
+            others + u * random.next() + (time * random.next()).cos()
+        };
+        let derivatives: Vec<Node> = (0..n).map(derivative).map(Expr::node).collect();
+        let states = x.iter().enumerate();
+        let states: Vec<_> = states
+            .map(|(i, x)| (format!("x{i}"), x.node(), 0.3))
+            .collect();
+        let signals = [("u".to_owned(), u.node())];
+        Linearised::flow(&g, time.node(), &states, &signals, &derivatives).unwrap()
+    }
+
+    /// The same bits with machine code and without, over plants of every structure, with noise on some states or
+    /// none, states that are known exactly, or up to next to nothing, and one step from sample to sample or two.
+    #[test]
+    fn the_numbers_are_those_of_the_loops() {
+        let mut random = Random(5);
+        let (mut leaps, mut steps) = (0, 0);
+        for trial in 0..60 {
+            let n = 1 + trial % 7;
+            let flow = plant(&mut random, n);
+            let noise: Vec<f64> = (0..n)
+                .map(|_| {
+                    if random.is(0.7) {
+                        random.next().abs()
+                    } else {
+                        0.0
+                    }
+                })
+                .collect();
+            let variances: Vec<f64> = (0..n)
+                .map(|_| match random.next().abs() {
+                    s if s < 0.1 => 0.0,
+                    s if s < 0.2 => 1e-290 * s,
+                    s => s,
+                })
+                .collect();
+            let run = EstimatorSettings {
+                method: Method::Rk4(Step::Substeps(1 + trial % 3 / 2)),
+                ..EstimatorSettings::default()
+            };
+            let new = || Propagation::new(&flow, &noise, run).unwrap();
+            let (mut ours, mut loops) = (new(), new());
+            let Scheme::Joint(joint) = &mut loops.scheme else {
+                unreachable!("steps are given");
+            };
+            joint.forget_code();
+            let mut beliefs = [(); 2].map(|()| Belief::new(&vec![0.3; n], &variances));
+            let seen: Vec<f64> = (0..n).map(|_| random.next()).collect();
+            for k in 0..PATIENCE + 100 {
+                let (from, to) = (0.1 * f64::from(k), 0.1 * f64::from(k + 1));
+                for (propagation, belief) in [&mut ours, &mut loops].into_iter().zip(&mut beliefs) {
+                    propagation.driven.start(&[(0.3 * from).sin()]);
+                    propagation.predict(belief, from, to).unwrap();
+                    let mut projected = vec![0.0; n];
+                    belief.root.transposed_times(&seen, &mut projected);
+                    belief.take(&projected, 0.01, 0.5, &mut vec![]);
+                }
+                let [one, other] = &beliefs;
+                let bits = |belief: &Belief| -> Vec<u64> {
+                    let all = belief.x.iter().chain(&belief.root.entries);
+                    // of zeros the sign may differ
+                    all.map(|x| (x + 0.0).to_bits()).collect()
+                };
+                assert_eq!(bits(one), bits(other), "trial {trial}, sample {k}");
+                if ours.is_behind {
+                    leaps += 1;
+                }
+                steps += usize::from(k >= PATIENCE);
+            }
+            let own: Vec<f64> = ours.transition().entries().to_vec();
+            assert_eq!(own, loops.transition().entries(), "trial {trial}");
+        }
+        assert!(4 * leaps > steps, "{leaps} of {steps}");
     }
 }
