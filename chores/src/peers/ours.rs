@@ -7,6 +7,7 @@ use lynkeus::Study;
 use lynkeus::run::Backend;
 use serde_json::{Value, json};
 
+use super::chain;
 use super::clock::Clock;
 use super::lanes;
 use xtask::process::root;
@@ -34,7 +35,8 @@ pub fn print(what: &str) -> Result<(), String> {
             let seconds = |own: bool| lanes::seconds(own).map_err(|error| error.to_string());
             json!({ "batch": seconds(false)?, "own": seconds(true)? })
         }
-        _ => return Err("expected interpreter, native or lanes".to_owned()),
+        "filters" => chain::filters().map_err(|error| error.to_string())?,
+        _ => return Err("expected interpreter, native, lanes or filters".to_owned()),
     };
     writeln!(std::io::stdout(), "{found}").map_err(|error| error.to_string())
 }
