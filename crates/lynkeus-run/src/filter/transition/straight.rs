@@ -84,7 +84,7 @@ impl Code {
         };
         let (h, scale) = (graph.fresh("h"), graph.fresh("scale"));
         let next = flow.step(h);
-        let root: Vec<Expr<'_>> = (0..lower(n)).map(|_| graph.fresh("S")).collect();
+        let root: Vec<Expr<'_>> = (0..n * n).map(|_| graph.fresh("S")).collect();
         let carried = flow.carried(&next, scale, &root);
         let own = [h, scale]
             .into_iter()
@@ -112,11 +112,6 @@ impl Code {
                 })
             })
     }
-}
-
-/// Entries of a lower triangle.
-fn lower(n: usize) -> usize {
-    n * (n + 1) / 2
 }
 
 /// x' = f with F, and the noise on its states in units of its largest density.
@@ -215,7 +210,7 @@ impl<'g> Flow<'g> {
         rows.resize(begin + n * n, None);
         for i in 0..n {
             for (j, phi) in row(i)[..n].iter().enumerate() {
-                for (k, &s) in root[lower(j)..=lower(j) + j].iter().enumerate() {
+                for (k, &s) in root[j * n..=j * n + j].iter().enumerate() {
                     let into = &mut rows[begin + k * n + i];
                     *into = sum(*into, phi.map(|phi| phi * s));
                 }
@@ -261,7 +256,7 @@ impl<'g> Flow<'g> {
         let n = self.states();
         let count = rows.len() / n;
         let nothing = self.graph.constant(0.0);
-        let mut root = vec![None; lower(n)];
+        let mut root = vec![None; n * n];
         let mut squares = vec![];
         for k in 0..n {
             let column = |rows: &[Term<'g>]| -> Vec<(usize, Expr<'g>)> {
@@ -301,10 +296,10 @@ impl<'g> Flow<'g> {
                     *entry = Some(entry.map_or(-part, |entry| entry - part));
                 }
             }
-            root[lower(k) + k] = Some(norm);
+            root[k * n + k] = Some(norm);
             for j in k + 1..n {
                 let entry = rows[k * n + j];
-                root[lower(j) + k] = entry.map(|a| is_above.map_or(a, |is| turned(is, a)));
+                root[j * n + k] = entry.map(|a| is_above.map_or(a, |is| turned(is, a)));
             }
         }
         root.extend(squares);
@@ -369,12 +364,12 @@ impl Straight {
         inputs.extend([h, scale]);
         let own = noise.iter().zip(&code.noisy).filter(|(_, is)| **is);
         inputs.extend(own.map(|(q, _)| q));
-        (0..root.n).for_each(|i| inputs.extend_from_slice(&root.row(i)[..=i]));
+        inputs.extend_from_slice(&root.entries);
         self.outputs.resize(made.outputs, 0.0);
         function.eval(inputs.as_chunks().0, self.outputs.as_chunks_mut().0);
         inputs.truncate(before);
         self.step = made.step;
-        let squares = made.step + lower(root.n)..made.outputs;
+        let squares = made.step + root.entries.len()..made.outputs;
         self.carried = (made.outputs > made.step).then_some(squares);
         true
     }
@@ -391,19 +386,15 @@ impl Straight {
 
     /// Writes the root of the covariance after the step, where it is known.
     pub fn take(&mut self, root: &mut Root) -> bool {
-        let n = root.n;
         let Some(squares) = self.carried.take() else {
             return false;
         };
-        let entries = &self.outputs[squares.start - lower(n)..squares.start];
+        let entries = &self.outputs[self.step..squares.start];
         let is_sound = self.outputs[squares].iter().all(|s| SQUARES.contains(s));
         if !is_sound || !are_finite(entries) {
             return false;
         }
-        for i in 0..n {
-            let row = &entries[lower(i)..=lower(i) + i];
-            root.entries[i * n..=i * n + i].copy_from_slice(row);
-        }
+        root.entries.copy_from_slice(entries);
         true
     }
 }
