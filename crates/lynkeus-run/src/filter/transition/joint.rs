@@ -42,7 +42,7 @@ impl Joint {
         Ok(Self {
             integrator: Integrator::new(method, equation.dimension())?,
             equation,
-            straight: step.map(|_| flow.straight(noisy())),
+            straight: step.map(|_| Straight::new(flow, noisy())),
             step,
             scale,
             z: vec![],

@@ -7,14 +7,15 @@
 use std::ops::{Range, RangeInclusive};
 use std::sync::{Arc, OnceLock};
 
-use lynkeus_expr::{Expr, Graph, Node, Tape};
+use lynkeus_expr::{Expr, Node, Tape};
 use lynkeus_native::Function;
 
-use crate::classical::{Term, classical_step, sum};
+use crate::classical::Term;
+use crate::filter::expressions::Flow;
 use crate::filter::root::Root;
 use crate::method::are_finite;
 use crate::routine::{Engine, LARGEST_STEP};
-use crate::{Evaluation, Jacobian, System};
+use crate::{Evaluation, Jacobian, Linearised, System};
 
 /// Steps by loops that take as long as compiling one does.
 const PATIENCE: u32 = 1_000;
@@ -25,15 +26,19 @@ const LARGEST_CARRIED: usize = 20_000;
 /// Columns with such squares are not spoilt by rounding towards zero; the loops bring others to size first.
 const SQUARES: RangeInclusive<f64> = 1e-240..=1e240;
 
-/// The code of a flow, made once for all that run it.
+/// The code of a flow, made once for all that run it: its graph keeps it.
 #[derive(Debug)]
-pub(crate) struct Code {
-    flow: System,
-    /// F, among the outputs of the flow
-    jacobian: Jacobian,
+struct Code {
     /// whether noise acts on a state
     noisy: Vec<bool>,
     made: OnceLock<Option<Made>>,
+}
+
+/// What is asked of a graph: the code with noise on such states, of a flow whose F are those of its outputs.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct Question {
+    noisy: Vec<bool>,
+    slopes: Range<usize>,
 }
 
 #[derive(Debug)]
@@ -45,31 +50,32 @@ struct Made {
 }
 
 impl Code {
-    pub fn new(flow: &System, jacobian: &Jacobian, noisy: Vec<bool>) -> Self {
-        Self {
-            flow: flow.clone(),
-            jacobian: jacobian.clone(),
-            noisy,
-            made: OnceLock::new(),
-        }
+    fn of(flow: &Linearised, noisy: Vec<bool>) -> Arc<Self> {
+        let slopes = flow.jacobians().state.outputs();
+        let question = Question { noisy, slopes };
+        let graph = flow.system().equations().graph();
+        graph.noted(&question).unwrap_or_else(|| {
+            let code = Arc::new(Self {
+                noisy: question.noisy.clone(),
+                made: OnceLock::new(),
+            });
+            graph.note(question, code.clone());
+            code
+        })
     }
 
-    /// Whether noise acts on these states.
-    pub fn is_for(&self, noisy: &[bool]) -> bool {
-        self.noisy == noisy
+    fn made(&self, flow: &System, slopes: &Jacobian) -> Option<&Made> {
+        let make = || self.make(flow, slopes);
+        self.made.get_or_init(make).as_ref()
     }
 
-    fn made(&self) -> Option<&Made> {
-        self.made.get_or_init(|| self.make()).as_ref()
-    }
-
-    fn make(&self) -> Option<Made> {
-        let n = self.flow.states().len();
+    fn make(&self, system: &System, jacobian: &Jacobian) -> Option<Made> {
+        let n = system.states().len();
         // if Φ and W were full
-        if 16 * n * self.jacobian.places().len() > LARGEST_STEP {
+        if 16 * n * jacobian.places().len() > LARGEST_STEP {
             return None;
         }
-        let equations = self.flow.equations();
+        let equations = system.equations();
         let graph = equations.graph();
         let free = &equations.roots.free;
         let noise = self.noisy.iter();
@@ -78,18 +84,18 @@ impl Code {
             graph: &graph,
             inputs: &equations.inputs[..equations.smooth_inputs()],
             derivatives: &free.derivatives,
-            slopes: &free.outputs[self.jacobian.outputs()],
-            places: self.jacobian.places(),
+            slopes: &free.outputs[jacobian.outputs()],
+            places: jacobian.places(),
             noise,
         };
         let (h, scale) = (graph.fresh("h"), graph.fresh("scale"));
         let next = flow.step(h);
-        let root: Vec<Expr<'_>> = (0..n * n).map(|_| graph.fresh("S")).collect();
+        let root: Vec<Term<'_>> = (0..n * n).map(|_| Some(graph.fresh("S"))).collect();
         let carried = flow.carried(&next, scale, &root);
         let own = [h, scale]
             .into_iter()
             .chain(flow.noise.iter().copied().flatten());
-        let own = own.chain(root).map(Expr::node);
+        let own = own.chain(root.into_iter().flatten()).map(Expr::node);
         let inputs: Vec<Node> = flow.inputs.iter().copied().chain(own).collect();
         let nothing = graph.constant(0.0);
         let nodes = |terms: &[Term<'_>]| -> Vec<Node> {
@@ -114,214 +120,12 @@ impl Code {
     }
 }
 
-/// x' = f with F, and the noise on its states in units of its largest density.
-struct Flow<'g> {
-    graph: &'g Graph,
-    /// time, the states and what is constant over a step
-    inputs: &'g [Node],
-    derivatives: &'g [Node],
-    /// entries of F
-    slopes: &'g [Node],
-    places: &'g [(usize, usize)],
-    noise: Vec<Term<'g>>,
-}
-
-impl<'g> Flow<'g> {
-    fn states(&self) -> usize {
-        self.derivatives.len()
-    }
-
-    /// Numbers in a row of (Φ W).
-    fn width(&self) -> usize {
-        match self.is_noisy() {
-            true => 2 * self.states(),
-            false => self.states(),
-        }
-    }
-
-    fn is_noisy(&self) -> bool {
-        self.noise.iter().any(Option::is_some)
-    }
-
-    fn term(&self, node: Node) -> Term<'g> {
-        let is_nothing = self.graph.constant_value(node) == Some(0.0);
-        (!is_nothing).then(|| self.graph.expr(node))
-    }
-
-    /// x̂ and the rows of (Φ W) after a step of length h.
-    fn step(&self, h: Expr<'g>) -> Vec<Term<'g>> {
-        let (n, width) = (self.states(), self.width());
-        let x = self.inputs[1..=n].iter().map(|&x| Some(self.graph.expr(x)));
-        let mut z: Vec<Term<'g>> = x.collect();
-        z.resize(n + n * width, None);
-        (0..n).for_each(|i| z[n + i * width + i] = Some(self.graph.constant(1.0)));
-        let t = self.graph.expr(self.inputs[0]);
-        classical_step(t, h, &z, |t, z| self.variation(t, z))
-    }
-
-    /// x̂', Φ' = FΦ and W' = FW + WFᵀ + Q.
-    fn variation(&self, t: Expr<'g>, z: &[Term<'g>]) -> Vec<Term<'g>> {
-        let (n, width) = (self.states(), self.width());
-        let (x, rows) = z.split_at(n);
-        let at = [Some(t)].into_iter().chain(x.iter().copied());
-        let nothing = self.graph.constant(0.0);
-        let at = at.map(|value| value.unwrap_or(nothing).node());
-        let places = self.inputs.iter().copied().zip(at).collect();
-        let all = [self.derivatives, self.slopes].concat();
-        let all = self.graph.substitute(&all, &places);
-        let (dx, slopes) = all.split_at(n);
-        let mut dz: Vec<Term<'g>> = dx.iter().map(|&dx| self.term(dx)).collect();
-        dz.resize(z.len(), None);
-        let drows = &mut dz[n..];
-        for (&(i, j), &slope) in self.places.iter().zip(slopes) {
-            let Some(slope) = self.term(slope) else {
-                continue;
-            };
-            for c in 0..width {
-                let into = &mut drows[i * width + c];
-                *into = sum(*into, rows[j * width + c].map(|from| slope * from));
-            }
-        }
-        for (i, q) in self.noise.iter().enumerate().filter(|_| width > n) {
-            for j in 0..i {
-                let (a, b) = (i * width + n + j, j * width + n + i);
-                let both = sum(drows[a], drows[b]);
-                (drows[a], drows[b]) = (both, both);
-            }
-            let diagonal = &mut drows[i * width + n + i];
-            *diagonal = sum(diagonal.map(|d| 2.0 * d), *q);
-        }
-        dz
-    }
-
-    /// The lower root of ΦPΦᵀ + W after a step, row by row, from that of P; then the squares of the columns
-    /// that were reflected.
-    fn carried(&self, next: &[Term<'g>], scale: Expr<'g>, root: &[Expr<'g>]) -> Vec<Term<'g>> {
-        let (n, width) = (self.states(), self.width());
-        let row = |i: usize| &next[n + i * width..n + (i + 1) * width];
-        let mut rows = vec![];
-        if width > n {
-            let noise = (0..n).flat_map(|i| &row(i)[n..]);
-            let noise: Vec<Term<'g>> = noise.map(|w| w.map(|w| scale * w)).collect();
-            let factor = self.factor(&noise);
-            rows.extend((0..n * n).map(|at| factor[at % n * n + at / n]));
-        }
-        let begin = rows.len();
-        rows.resize(begin + n * n, None);
-        for i in 0..n {
-            for (j, phi) in row(i)[..n].iter().enumerate() {
-                for (k, &s) in root[j * n..=j * n + j].iter().enumerate() {
-                    let into = &mut rows[begin + k * n + i];
-                    *into = sum(*into, phi.map(|phi| phi * s));
-                }
-            }
-        }
-        self.reflected(&mut rows)
-    }
-
-    /// As [`Factor`](crate::filter::root::Factor).
-    fn factor(&self, matrix: &[Term<'g>]) -> Vec<Term<'g>> {
-        let n = self.states();
-        let nothing = self.graph.constant(0.0);
-        let mut lower: Vec<Term<'g>> = vec![None; n * n];
-        for j in 0..n {
-            let Some(diagonal) = matrix[j * n + j] else {
-                continue;
-            };
-            let known = |lower: &[Term<'g>], i: usize| {
-                dot(&lower[i * n..i * n + j], &lower[j * n..j * n + j])
-            };
-            let pivot = match known(&lower, j) {
-                Some(known) => diagonal - known,
-                None => diagonal,
-            };
-            let noise = n as f64 * f64::EPSILON * diagonal.abs();
-            let is_there = noise.less(pivot);
-            let root = is_there.select(pivot.sqrt(), nothing);
-            lower[j * n + j] = Some(root);
-            for i in j + 1..n {
-                let rest = match (matrix[i * n + j], known(&lower, i)) {
-                    (Some(entry), Some(known)) => Some(entry - known),
-                    (None, Some(known)) => Some(-known),
-                    (entry, None) => entry,
-                };
-                lower[i * n + j] = rest.map(|rest| is_there.select(rest / root, nothing));
-            }
-        }
-        lower
-    }
-
-    /// As [`Root::of_rows`], without units.
-    fn reflected(&self, rows: &mut [Term<'g>]) -> Vec<Term<'g>> {
-        let n = self.states();
-        let count = rows.len() / n;
-        let nothing = self.graph.constant(0.0);
-        let mut root = vec![None; n * n];
-        let mut squares = vec![];
-        for k in 0..n {
-            let column = |rows: &[Term<'g>]| -> Vec<(usize, Expr<'g>)> {
-                let all = (k..count).map(|r| (r, rows[r * n + k]));
-                all.filter_map(|(r, entry)| entry.map(|entry| (r, entry)))
-                    .collect()
-            };
-            let own = column(rows);
-            let square = own.iter().map(|(_, entry)| entry.powi(2));
-            let Some(square) = square.reduce(|all, one| all + one) else {
-                continue;
-            };
-            squares.push(Some(square));
-            let norm = square.sqrt();
-            let pivot = rows[k * n + k];
-            let is_above = pivot.map(|pivot| nothing.less(pivot));
-            let turned = |is: Expr<'g>, value: Expr<'g>| is.select(-value, value);
-            let head = is_above.map_or(norm, |is| turned(is, norm));
-            let first = pivot.map_or(-head, |pivot| pivot - head);
-            let beta = -head * first;
-            rows[k * n + k] = Some(first);
-            let reflector = column(rows);
-            let sums: Vec<Term<'g>> = (k + 1..n)
-                .map(|j| {
-                    let products = reflector.iter();
-                    let products = products.map(|(r, v)| rows[r * n + j].map(|a| *v * a));
-                    products.fold(None, sum)
-                })
-                .collect();
-            for (r, v) in reflector {
-                let factor = v / beta;
-                for (j, part) in (k + 1..n).zip(&sums) {
-                    let Some(part) = part.map(|part| factor * part) else {
-                        continue;
-                    };
-                    let entry = &mut rows[r * n + j];
-                    *entry = Some(entry.map_or(-part, |entry| entry - part));
-                }
-            }
-            root[k * n + k] = Some(norm);
-            for j in k + 1..n {
-                let entry = rows[k * n + j];
-                root[j * n + k] = entry.map(|a| is_above.map_or(a, |is| turned(is, a)));
-            }
-        }
-        root.extend(squares);
-        root
-    }
-}
-
-/// As [`dot`](crate::filter::root::dot).
-fn dot<'g>(a: &[Term<'g>], b: &[Term<'g>]) -> Term<'g> {
-    let whole = a.len() / 4 * 4;
-    let mut sums = [None; 5];
-    for (at, (a, b)) in a.iter().zip(b).enumerate() {
-        let into = &mut sums[if at < whole { at % 4 } else { 4 }];
-        *into = sum(*into, a.zip(*b).map(|(a, b)| a * b));
-    }
-    sums.into_iter().fold(None, sum)
-}
-
 /// A step in use.
 #[derive(Clone, Debug)]
 pub(crate) struct Straight {
     code: Arc<Code>,
+    /// F, among the outputs of the flow
+    slopes: Jacobian,
     engine: Engine,
     outputs: Vec<f64>,
     /// how many of them are those of the step
@@ -331,9 +135,11 @@ pub(crate) struct Straight {
 }
 
 impl Straight {
-    pub fn new(code: Arc<Code>) -> Self {
+    /// Of a flow with noise on such states.
+    pub fn new(flow: &Linearised, noisy: Vec<bool>) -> Self {
         Self {
-            code,
+            code: Code::of(flow, noisy),
+            slopes: flow.jacobians().state.clone(),
             engine: Engine::default(),
             outputs: vec![],
             step: 0,
@@ -353,11 +159,16 @@ impl Straight {
     ) -> bool {
         self.carried = None;
         let code = &*self.code;
-        let make = || code.made().map(|made| &made.function);
-        let Some(function) = self.engine.ready(PATIENCE, make) else {
+        let is_there = code.made.get().is_some();
+        let made = || code.made(flow.system(), &self.slopes);
+        let patience = if is_there { 0 } else { PATIENCE };
+        let ready = self
+            .engine
+            .ready(patience, || made().map(|made| &made.function));
+        let (Some(function), Some(made)) = (ready, code.made.get().and_then(Option::as_ref)) else {
             return false;
         };
-        let (Some(made), Some(inputs)) = (code.made(), flow.free_inputs(t, x)) else {
+        let Some(inputs) = flow.free_inputs(t, x) else {
             return false;
         };
         let before = inputs.len();
@@ -405,6 +216,7 @@ mod tests {
     use super::*;
     use crate::filter::Belief;
     use crate::{EstimatorSettings, Linearised, Method, Step};
+    use lynkeus_expr::Graph;
 
     struct Random(u64);
 
