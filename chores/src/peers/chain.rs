@@ -16,7 +16,9 @@ const ROWS: usize = 10_000;
 /// Windows of so many rows are timed, of which the least counts.
 const WINDOWS: usize = 10;
 const FLEET: usize = 1_000;
+/// Rows of a window that all filters go through, and windows.
 const FLEET_ROWS: usize = 50;
+const FLEET_WINDOWS: usize = 6;
 /// Between the readings of two filters of the fleet.
 const PHASE: f64 = 0.01;
 
@@ -32,10 +34,10 @@ pub(super) fn filters() -> Result<Value, Error> {
         let mut ready = alone.clone();
         found.insert(format!("sample {n}"), json!(sample(&mut alone)?));
         ready.restore(&start.snapshot())?;
-        let fleet = Fleet::new(ready);
-        let (seconds, ends) = fleet.measure(one_by_one)?;
-        found.insert(format!("fleet {n}"), json!(seconds));
-        found.insert(format!("by transition, fleet {n}"), json!(ends));
+        let fleet = measure_fleet(vec![ready; FLEET], one_by_one)?;
+        found.insert(format!("fleet {n}"), json!(fleet.later));
+        found.insert(format!("fleet at first {n}"), json!(fleet.first));
+        found.insert(format!("by transition, fleet {n}"), json!(fleet.ends));
     }
     Ok(Value::Object(found))
 }
@@ -107,42 +109,43 @@ fn sample(filter: &mut Estimator) -> Result<f64, Error> {
     Ok(least)
 }
 
-/// Many filters that differ in their readings.
+/// Seconds of a sample of one of many filters, and where the first and the last are after the first window.
 struct Fleet {
-    /// all, at their start
-    filters: Vec<Estimator>,
-    /// of each
-    readings: Vec<Vec<f64>>,
+    /// in the first window, in which each looks at its step once, and in a later one
+    first: f64,
+    later: f64,
+    ends: Vec<f64>,
 }
 
-impl Fleet {
-    fn new(filter: Estimator) -> Self {
-        let readings = |m| readings(FLEET_ROWS, PHASE * m as f64);
-        Self {
-            filters: vec![filter; FLEET],
-            readings: (0..FLEET).map(readings).collect(),
+/// Filters at their start, with readings of their own, by something that takes all of them over the rows of a window,
+/// the first of which has that number.
+fn measure_fleet(
+    mut filters: Vec<Estimator>,
+    advance: impl Fn(&mut [Estimator], &[Vec<f64>], usize) -> Result<(), Error>,
+) -> Result<Fleet, Error> {
+    let mut fleet = Fleet {
+        first: f64::INFINITY,
+        later: f64::INFINITY,
+        ends: vec![],
+    };
+    for window in 0..FLEET_WINDOWS {
+        let first = window * FLEET_ROWS;
+        let phases = (0..FLEET).map(|m| STEP * first as f64 + PHASE * m as f64);
+        let readings: Vec<Vec<f64>> = phases.map(|phase| readings(FLEET_ROWS, phase)).collect();
+        let clock = Clock::start();
+        advance(&mut filters, &readings, first)?;
+        let seconds = clock.seconds() / (FLEET * FLEET_ROWS) as f64;
+        if window == 0 {
+            fleet.first = seconds;
+            fleet.ends = [end(&filters[0]), end(&filters[FLEET - 1])].concat();
+        } else {
+            fleet.later = fleet.later.min(seconds);
         }
     }
-
-    /// Seconds of a sample of one filter, and where the first and the last end, by something that takes all filters
-    /// over all rows.
-    fn measure(
-        &self,
-        advance: impl Fn(&mut [Estimator], &[Vec<f64>]) -> Result<(), Error>,
-    ) -> Result<(f64, Vec<f64>), Error> {
-        let (mut least, mut ends) = (f64::INFINITY, vec![]);
-        for _ in 0..3 {
-            let mut filters = self.filters.clone();
-            let clock = Clock::start();
-            advance(&mut filters, &self.readings)?;
-            least = least.min(clock.seconds() / (FLEET * FLEET_ROWS) as f64);
-            ends = [end(&filters[0]), end(&filters[FLEET - 1])].concat();
-        }
-        Ok((least, ends))
-    }
+    Ok(fleet)
 }
 
-fn one_by_one(filters: &mut [Estimator], readings: &[Vec<f64>]) -> Result<(), Error> {
+fn one_by_one(filters: &mut [Estimator], readings: &[Vec<f64>], first: usize) -> Result<(), Error> {
     let mut all = filters.iter_mut().zip(readings);
-    all.try_for_each(|(filter, readings)| run(filter, readings, 0))
+    all.try_for_each(|(filter, readings)| run(filter, readings, first))
 }

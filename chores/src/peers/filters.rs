@@ -125,6 +125,11 @@ fn rows() -> Vec<Row> {
         as_text("Lynkeus, CSV to CSV", OURS_AS_TEXT),
         as_text("C, P itself, CSV to CSV", C_AS_TEXT),
         Row::new("1,000 filters: Lynkeus, one after the other", OURS, "fleet"),
+        Row::new(
+            "1,000 filters: … in the first 50 rows of each",
+            OURS,
+            "fleet at first",
+        ),
         Row::new("1,000 filters: JAX, `vmap`", "jax", "fleet"),
         Row::new(
             "1,000 filters: JAX, `vmap`, F's bands written out",

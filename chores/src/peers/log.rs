@@ -56,8 +56,7 @@ pub(super) fn ours(
         .replace("{observer}", observer);
     let study = table.with_extension("toml");
     fs::write(&study, text_of).map_err(|e| format!("{}: {e}", study.display()))?;
-    let [lynkeus, study, log, table] =
-        [&programs.lynkeus, &study, log, table].map(|path| text(path));
+    let [lynkeus, study, log, table] = [&*programs.lynkeus, &*study, log, table].map(text);
     let command = [&lynkeus, "estimate", &study, &log, "-q", "-o", &table];
     Ok(command.map(str::to_owned).to_vec())
 }

@@ -32,8 +32,12 @@ pub fn print(what: &str) -> Result<(), String> {
         "interpreter" => study_alone(Backend::Interpreter)?,
         "native" => study_alone(Backend::Native)?,
         "lanes" => {
-            let seconds = |own: bool| lanes::seconds(own).map_err(|error| error.to_string());
-            json!({ "batch": seconds(false)?, "own": seconds(true)? })
+            let run = |own: bool| lanes::run(own).map_err(|error| error.to_string());
+            let [one, own] = [run(false)?, run(true)?];
+            json!({
+                "batch": one.step, "end of batch": [one.end],
+                "own": own.step, "end of own": [own.end],
+            })
         }
         "filters" => chain::filters().map_err(|error| error.to_string())?,
         _ => return Err("expected interpreter, native, lanes or filters".to_owned()),
