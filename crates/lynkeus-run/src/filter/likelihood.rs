@@ -155,7 +155,7 @@ impl Likelihood {
                 parameters.len(),
             ));
         }
-        if !(longest_step > 0.0) {
+        if longest_step.is_nan() || longest_step <= 0.0 {
             return Err(Error::setting(
                 "longest step",
                 "a number above 0",
