@@ -3,7 +3,7 @@
 
 use lynkeus_expr::{Binary, Unary};
 
-use crate::assemble::{Opcode, Operand, Register, Relation};
+use crate::assemble::{Assembler, Mask, Opcode, Operand, Register, Relation};
 use crate::library;
 use crate::record::{Id, Program, Value};
 use crate::registers::{Emitter, TEMPORARY};
@@ -11,20 +11,17 @@ use crate::registers::{Emitter, TEMPORARY};
 /// Bits other than the sign.
 const MAGNITUDE: f64 = f64::from_bits(!(1 << 63));
 
-/// What the operations read from memory: the frame has to know them beforehand.
-const CONSTANTS: [f64; 6] = [-0.0, MAGNITUDE, 0.0, 1.0, -1.0, f64::NAN];
-
-const MASK: Register = TEMPORARY[0];
-const OTHER: Register = TEMPORARY[1];
-
 /// Code for a program, of whose inputs the first `shared` stand apart. With `spacing`, the distance in
 /// values of the outputs of one group of lanes from those of the next, it goes over many groups.
 pub(crate) fn emit<const LANES: usize>(
     program: &Program,
     shared: usize,
     spacing: Option<usize>,
+    is_extended: bool,
 ) -> Emitter<'_, LANES> {
-    let mut emitter = Emitter::<LANES>::new(program, shared, &CONSTANTS);
+    let calls = program.values.iter().any(|&value| calls::<LANES>(value));
+    let assembler = Assembler::new(LANES, is_extended, calls);
+    let mut emitter = Emitter::<LANES>::new(program, shared, assembler);
     emitter.assembler.enter();
     let first = emitter.assembler.bytes.len();
     for (i, &value) in program.values.iter().enumerate() {
@@ -37,6 +34,16 @@ pub(crate) fn emit<const LANES: usize>(
     }
     emitter.assembler.leave();
     emitter
+}
+
+/// Whether a value is made by a call.
+pub(crate) fn calls<const LANES: usize>(value: Value) -> bool {
+    match value {
+        Value::Unary(op, _) => library::unary::<LANES>(op).is_some(),
+        Value::Binary(op, ..) => library::binary::<LANES>(op).is_some(),
+        Value::Solve(_) => true,
+        _ => false,
+    }
 }
 
 impl<const LANES: usize> Emitter<'_, LANES> {
@@ -60,31 +67,52 @@ impl<const LANES: usize> Emitter<'_, LANES> {
                 None => self.binary(id, op, x, y),
             },
             Value::Select(c, x, y) => self.select(id, c, x, y),
+            Value::Choice(relation, compared, x, y) => {
+                let relation = match relation {
+                    Binary::Less => Relation::Less,
+                    Binary::LessEq => Relation::LessEqual,
+                    _ => Relation::Equal,
+                };
+                self.choose(id, relation, compared, x, y);
+            }
         }
         self.finish(id);
+    }
+
+    /// A number as a last operand.
+    fn number(&mut self, value: f64) -> Operand {
+        Operand::Memory(self.constant(value))
     }
 
     fn unary(&mut self, id: Id, op: Unary, x: Id) {
         let from = self.register(x);
         // it may be the same register
         let to = self.result(id, &[x]);
-        let [zero, one, sign, magnitude] = [0.0, 1.0, -0.0, MAGNITUDE].map(|c| self.constant(c));
         match op {
             Unary::Sign => {
-                let minus_one = self.constant(-1.0);
-                self.assembler.compare(Relation::Greater, MASK, from, zero);
-                self.assembler.compare(Relation::Less, OTHER, from, zero);
-                self.assembler.blend(to, from, one, MASK);
-                self.assembler.blend(to, to, minus_one, OTHER);
+                let [zero, one, minus_one] = [0.0, 1.0, -1.0].map(|c| self.number(c));
+                let [above, below] = [Mask::First, Mask::Second];
+                self.assembler.compare(Relation::Greater, above, from, zero);
+                self.assembler.compare(Relation::Less, below, from, zero);
+                self.assembler.blend(to, from, one, above);
+                self.assembler.blend(to, to, minus_one, below);
             }
             Unary::Not => {
-                self.assembler.compare(Relation::Equal, MASK, from, zero);
-                self.assembler.apply(Opcode::And, to, MASK, one);
+                let zero = self.number(0.0);
+                self.assembler
+                    .compare(Relation::Equal, Mask::First, from, zero);
+                self.hold(to);
             }
             Unary::Sqrt => self.assembler.sqrt(to, from),
             Unary::Floor => self.assembler.floor(to, from),
-            Unary::Abs => self.assembler.apply(Opcode::And, to, from, magnitude),
-            Unary::Neg => self.assembler.apply(Opcode::Xor, to, from, sign),
+            Unary::Abs => {
+                let magnitude = self.number(MAGNITUDE);
+                self.assembler.apply(Opcode::And, to, from, magnitude);
+            }
+            Unary::Neg => {
+                let sign = self.number(-0.0);
+                self.assembler.apply(Opcode::Xor, to, from, sign);
+            }
             // called, as `library` has them; named, so that a new operation does not compile before it has a place
             Unary::Exp
             | Unary::Ln
@@ -109,10 +137,10 @@ impl<const LANES: usize> Emitter<'_, LANES> {
             Binary::Less => self.relation(id, Relation::Less, x, y),
             Binary::LessEq => self.relation(id, Relation::LessEqual, x, y),
             Binary::Equal => self.relation(id, Relation::Equal, x, y),
-            Binary::And => self.truth(id, Opcode::And, x, y),
-            Binary::Or => self.truth(id, Opcode::Or, x, y),
-            Binary::Min => self.extreme(id, Relation::Less, Opcode::And, x, y),
-            Binary::Max => self.extreme(id, Relation::Greater, Opcode::AndNot, x, y),
+            Binary::And => self.truth(id, true, x, y),
+            Binary::Or => self.truth(id, false, x, y),
+            Binary::Min => self.smaller(id, x, y),
+            Binary::Max => self.larger(id, x, y),
             // called
             Binary::Pow | Binary::Atan2 => {}
         }
@@ -132,67 +160,86 @@ impl<const LANES: usize> Emitter<'_, LANES> {
         self.assembler.apply(op, to, first, second);
     }
 
+    /// The truth value of the first mask.
+    fn hold(&mut self, to: Register) {
+        let one = self.constant(1.0);
+        self.assembler.pick(to, one, Mask::First);
+    }
+
     fn relation(&mut self, id: Id, relation: Relation, x: Id, y: Id) {
         let first = self.register(x);
         let second = self.operand(y);
-        let one = self.constant(1.0);
-        self.assembler.compare(relation, MASK, first, second);
+        self.assembler.compare(relation, Mask::First, first, second);
         let to = self.result(id, &[x, y]);
-        self.assembler.apply(Opcode::And, to, MASK, one);
+        self.hold(to);
     }
 
     /// Anything but zero is true, NaN too.
-    fn truth(&mut self, id: Id, op: Opcode, x: Id, y: Id) {
+    fn truth(&mut self, id: Id, is_and: bool, x: Id, y: Id) {
         let (first, second) = (self.register(x), self.register(y));
-        let [zero, one] = [0.0, 1.0].map(|c| self.constant(c));
-        self.assembler
-            .compare(Relation::NotEqual, MASK, first, zero);
-        self.assembler
-            .compare(Relation::NotEqual, OTHER, second, zero);
-        self.assembler
-            .apply(op, MASK, MASK, Operand::Register(OTHER));
+        let zero = self.number(0.0);
+        for (mask, value) in [(Mask::First, first), (Mask::Second, second)] {
+            self.assembler
+                .compare(Relation::NotEqual, mask, value, zero);
+        }
+        self.assembler.join(is_and);
         let to = self.result(id, &[x, y]);
-        self.assembler.apply(Opcode::And, to, MASK, one);
+        self.hold(to);
     }
 
-    /// The smaller or the larger one, NaN if either is. Of two zeros the one whose sign is the
-    /// extreme: `pick` takes x's sign where both are equal.
-    fn extreme(&mut self, id: Id, relation: Relation, pick: Opcode, x: Id, y: Id) {
+    /// The smaller of two values in registers, NaN if either is; of two zeros −0 if one is. An extreme of
+    /// the processor is its second operand in these cases: so both orders have the bits between them.
+    fn least(&mut self, to: Register, [one, other]: [Register; 2], x: Register, y: Register) {
+        self.assembler
+            .apply(Opcode::Min, one, x, Operand::Register(y));
+        self.assembler
+            .apply(Opcode::Min, other, y, Operand::Register(x));
+        self.assembler
+            .apply(Opcode::Or, to, one, Operand::Register(other));
+    }
+
+    fn smaller(&mut self, id: Id, x: Id, y: Id) {
         let (first, second) = (self.register(x), self.register(y));
-        let nan = self.constant(f64::NAN);
-        let y_value = Operand::Register(second);
-        self.assembler.compare(relation, MASK, first, y_value);
-        self.assembler
-            .compare(Relation::Equal, OTHER, first, y_value);
-        self.assembler
-            .apply(pick, OTHER, first, Operand::Register(OTHER));
-        self.assembler
-            .apply(Opcode::Or, MASK, MASK, Operand::Register(OTHER));
-        self.assembler
-            .compare(Relation::Unordered, OTHER, first, y_value);
         let to = self.result(id, &[x, y]);
-        self.assembler
-            .blend(to, second, Operand::Register(first), MASK);
-        self.assembler.blend(to, to, nan, OTHER);
+        self.least(to, TEMPORARY, first, second);
+    }
+
+    /// The negative of the smaller one of the negatives.
+    fn larger(&mut self, id: Id, x: Id, y: Id) {
+        let (first, second) = (self.register(x), self.register(y));
+        let to = self.result(id, &[x, y]);
+        let sign = self.number(-0.0);
+        let [a, b] = TEMPORARY;
+        self.assembler.apply(Opcode::Xor, a, first, sign);
+        self.assembler.apply(Opcode::Xor, b, second, sign);
+        self.least(to, [to, a], a, b);
+        self.assembler.apply(Opcode::Xor, to, to, sign);
     }
 
     /// `if c then x else y`; NaN where nobody knows.
     fn select(&mut self, id: Id, c: Id, x: Id, y: Id) {
         let condition = self.register(c);
         let (first, second) = (self.register(x), self.register(y));
-        let [zero, nan] = [0.0, f64::NAN].map(|c| self.constant(c));
+        let [zero, nan] = [0.0, f64::NAN].map(|c| self.number(c));
+        let own = Operand::Register(condition);
         self.assembler
-            .compare(Relation::NotEqual, MASK, condition, zero);
-        self.assembler.compare(
-            Relation::Unordered,
-            OTHER,
-            condition,
-            Operand::Register(condition),
-        );
+            .compare(Relation::NotEqual, Mask::First, condition, zero);
+        self.assembler
+            .compare(Relation::Unordered, Mask::Second, condition, own);
         let to = self.result(id, &[c, x, y]);
         self.assembler
-            .blend(to, second, Operand::Register(first), MASK);
-        self.assembler.blend(to, to, nan, OTHER);
+            .blend(to, second, Operand::Register(first), Mask::First);
+        self.assembler.blend(to, to, nan, Mask::Second);
+    }
+
+    /// `x` where the relation of `a` and `b` holds, else `y`.
+    fn choose(&mut self, id: Id, relation: Relation, [a, b]: [Id; 2], x: Id, y: Id) {
+        let (first, second) = (self.register(a), self.operand(b));
+        self.assembler.compare(relation, Mask::First, first, second);
+        let (yes, no) = (self.register(x), self.register(y));
+        let to = self.result(id, &[a, b, x, y]);
+        self.assembler
+            .blend(to, no, Operand::Register(yes), Mask::First);
     }
 
     /// Number of unknowns of a system, which has n² + n arguments.
@@ -203,14 +250,14 @@ impl<const LANES: usize> Emitter<'_, LANES> {
     fn solve(&mut self, id: Id, system: u32) {
         let arguments = &self.program.systems[system as usize];
         for (i, &argument) in arguments.iter().enumerate() {
-            let from = self.source(argument, MASK);
+            let from = self.source(argument, TEMPORARY[0]);
             self.assembler.store(from, self.place(system, i));
         }
         self.consume(id, arguments);
         self.vacate_all();
-        self.assembler.pass(0, self.place(system, 0));
-        self.assembler.pass_number(self.size(system) as u32);
-        self.assembler.call(library::solver::<LANES>());
+        let (place, size) = (self.place(system, 0), self.size(system) as u32);
+        self.assembler
+            .call_plain(library::solver::<LANES>(), place, size);
     }
 
     /// A function: arguments and result go by register, one number or four in each.

@@ -9,9 +9,13 @@ use memmap2::Mmap;
 use crate::record::Program;
 
 #[cfg(target_arch = "x86_64")]
-use crate::emit::emit;
+use crate::emit::{calls, emit};
 #[cfg(target_arch = "x86_64")]
 use crate::memory;
+#[cfg(target_arch = "x86_64")]
+use crate::registers::registers;
+#[cfg(target_arch = "x86_64")]
+use crate::schedule::scheduled;
 
 /// Most instructions of a tape that is compiled.
 const LARGEST: usize = 1_000_000;
@@ -43,8 +47,8 @@ struct Compiled {
 }
 
 impl<const LANES: usize> Function<LANES> {
-    /// Compiles a tape, for 1 lane or 4. None on machines that are not compiled for (other than
-    /// x86-64 with AVX2 and FMA), where the system does not let programs make code, for tapes with
+    /// Compiles a tape, for 1 lane, 4 or 8. None on machines that are not compiled for (other than
+    /// x86-64 with AVX2 and FMA; for 8 lanes also AVX-512 with F, DQ and VL), where the system does not let programs make code, for tapes with
     /// operations that are not compiled, and for other numbers of lanes.
     pub fn compile(tape: &Tape) -> Option<Self> {
         Self::of(tape, 0, None)
@@ -60,26 +64,54 @@ impl<const LANES: usize> Function<LANES> {
         Self::of(tape, shared, Some(spacing))
     }
 
+    /// As [`Function::compile`], for a processor without AVX-512: to compare.
+    pub fn compile_for_avx2(tape: &Tape) -> Option<Self> {
+        let is_compiled_for = matches!(LANES, 1 | 4) && is_supported();
+        Self::made(tape, 0, None, is_compiled_for, false)
+    }
+
     fn of(tape: &Tape, shared: usize, spacing: Option<usize>) -> Option<Self> {
-        let is_compiled_for = (LANES == 1 || LANES == 4) && is_supported();
+        let is_extended = LANES != 4 && is_extended();
+        let is_compiled_for = match LANES {
+            1 | 4 => is_supported(),
+            8 => is_extended,
+            _ => false,
+        };
+        Self::made(tape, shared, spacing, is_compiled_for, is_extended)
+    }
+
+    fn made(
+        tape: &Tape,
+        shared: usize,
+        spacing: Option<usize>,
+        is_compiled_for: bool,
+        is_extended: bool,
+    ) -> Option<Self> {
         if !is_compiled_for || tape.len() > LARGEST {
             return None;
         }
-        Self::compiled(&Program::record(tape)?, shared, spacing)
+        Self::compiled(&Program::record(tape)?, shared, spacing, is_extended)
     }
 
     #[cfg(target_arch = "x86_64")]
-    fn compiled(program: &Program, shared: usize, spacing: Option<usize>) -> Option<Self> {
-        let emitter = emit::<LANES>(program, shared, spacing);
+    fn compiled(
+        program: &Program,
+        shared: usize,
+        spacing: Option<usize>,
+        is_extended: bool,
+    ) -> Option<Self> {
+        let registers = registers(is_extended);
+        let program = &scheduled(program, registers, LANES == 1, calls::<LANES>);
+        let emitter = emit::<LANES>(program, shared, spacing, is_extended);
         let outputs = spacing.unwrap_or(program.outputs.len());
-        let places = [program.inputs, outputs, emitter.frame() + 1];
+        let places = [program.inputs, outputs, emitter.frame.len() + 1];
         let is_large = |&count: &usize| count > LARGEST_PLACE / (8 * LANES);
         if places.iter().any(is_large) {
             return None;
         }
-        let mut frame = Buffer::new(emitter.frame() + 1);
-        for (place, &constant) in frame.values_mut().iter_mut().zip(&emitter.constants) {
-            *place = [constant; LANES];
+        let mut frame = Buffer::new(emitter.frame.len() + 1);
+        for (place, &value) in frame.values_mut().iter_mut().zip(&emitter.frame) {
+            *place = [value; LANES];
         }
         let compiled = Arc::new(Compiled {
             inputs: program.inputs,
@@ -92,7 +124,7 @@ impl<const LANES: usize> Function<LANES> {
     }
 
     #[cfg(not(target_arch = "x86_64"))]
-    fn compiled(_: &Program, _: usize, _: Option<usize>) -> Option<Self> {
+    fn compiled(_: &Program, _: usize, _: Option<usize>, _: bool) -> Option<Self> {
         None
     }
 
@@ -144,13 +176,37 @@ impl<const LANES: usize> Function<LANES> {
     }
 }
 
+/// The largest number of lanes that is compiled for here; 1 also where nothing is.
+#[must_use]
+pub fn widest() -> usize {
+    match (is_supported(), is_extended()) {
+        (true, true) => 8,
+        (true, false) => 4,
+        _ => 1,
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
 fn is_supported() -> bool {
     std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
 }
 
+/// Whether there are eight lanes.
+#[cfg(target_arch = "x86_64")]
+fn is_extended() -> bool {
+    is_supported()
+        && std::arch::is_x86_feature_detected!("avx512f")
+        && std::arch::is_x86_feature_detected!("avx512dq")
+        && std::arch::is_x86_feature_detected!("avx512vl")
+}
+
 #[cfg(not(target_arch = "x86_64"))]
 fn is_supported() -> bool {
+    false
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn is_extended() -> bool {
     false
 }
 

@@ -16,6 +16,8 @@ pub(crate) enum Value {
     Unary(Unary, Id),
     Binary(Binary, Id, Id),
     Select(Id, Id, Id),
+    /// the third where this relation of the first two holds, else the fourth
+    Choice(Binary, [Id; 2], Id, Id),
     /// solves the linear system of this index; has no value of its own
     Solve(u32),
     /// (system, which of its n + 1 results)
@@ -30,6 +32,19 @@ pub(crate) struct Program {
     /// arguments of the linear systems: A row by row, then b
     pub systems: Vec<Vec<Id>>,
     pub outputs: Vec<Id>,
+}
+
+impl Value {
+    /// The same of other arguments.
+    pub fn with_arguments(self, to: impl Fn(Id) -> Id) -> Self {
+        match self {
+            Self::Unary(op, a) => Self::Unary(op, to(a)),
+            Self::Binary(op, a, b) => Self::Binary(op, to(a), to(b)),
+            Self::Select(c, a, b) => Self::Select(to(c), to(a), to(b)),
+            Self::Choice(op, [a, b], x, y) => Self::Choice(op, [to(a), to(b)], to(x), to(y)),
+            Self::Input(_) | Self::Constant(_) | Self::Solve(_) | Self::Entry(..) => self,
+        }
+    }
 }
 
 impl Program {
@@ -58,6 +73,7 @@ impl Program {
             Value::Unary(_, a) => give(a),
             Value::Binary(_, a, b) => [a, b].into_iter().for_each(give),
             Value::Select(c, a, b) => [c, a, b].into_iter().for_each(give),
+            Value::Choice(_, [a, b], x, y) => [a, b, x, y].into_iter().for_each(give),
             Value::Solve(system) => {
                 let arguments = self.systems[system as usize].iter();
                 arguments.copied().for_each(give);
@@ -144,8 +160,15 @@ impl Algebra for Recorder {
         self.push(Value::Binary(op, x, y))
     }
 
+    /// A relation needs not be a number first.
     fn select(&self, condition: &Id, x: &Id, y: &Id) -> Id {
-        self.push(Value::Select(*condition, *x, *y))
+        let condition_value = self.program.borrow().values[*condition as usize];
+        self.push(match condition_value {
+            Value::Binary(op @ (Binary::Less | Binary::LessEq | Binary::Equal), a, b) => {
+                Value::Choice(op, [a, b], *x, *y)
+            }
+            _ => Value::Select(*condition, *x, *y),
+        })
     }
 
     fn solve(&self, a: &[Id], b: &[Id]) -> (Vec<Id>, Id) {

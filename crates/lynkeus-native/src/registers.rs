@@ -1,12 +1,25 @@
 //! Where values are while code is emitted: each goes into a register when it is made, and to the
 //! frame when its register is needed more urgently by another.
 
+use std::collections::HashMap;
+
 use crate::assemble::{Address, Assembler, Base, Operand, Register};
 use crate::record::{Id, Program, Value};
 
-/// Registers that values live in; the two above are for the operations' own use.
-const REGISTERS: usize = 14;
+/// Registers for the operations' own use.
 pub(crate) const TEMPORARY: [Register; 2] = [14, 15];
+
+/// Registers that values live in, those that are encoded shortly first.
+const REGISTERS: [Register; 30] = [
+    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27,
+    28, 29, 30, 31,
+];
+
+/// How many values registers hold, with AVX-512 or without.
+pub(crate) fn registers(is_extended: bool) -> usize {
+    let all = if is_extended { 32 } else { 16 };
+    all - TEMPORARY.len()
+}
 
 /// Where a value is.
 #[derive(Clone, Copy, Default)]
@@ -21,14 +34,16 @@ struct Home {
 pub(crate) struct Emitter<'p, const LANES: usize> {
     pub program: &'p Program,
     pub assembler: Assembler,
-    /// they stand first in the frame, and are all there before the first value
-    pub constants: Vec<f64>,
-    /// places of the frame after the constants
-    extra: usize,
-    /// of these, those whose values are not needed any more
+    /// what stands in the frame before the first value is made: constants where they are first needed, so
+    /// that near places are those in use
+    pub frame: Vec<f64>,
+    constants: HashMap<u64, Address>,
+    /// places whose values are not needed any more
     free: Vec<usize>,
     homes: Vec<Home>,
-    holds: [Option<Id>; REGISTERS],
+    holds: [Option<Id>; 32],
+    /// those that values live in
+    registers: &'static [Register],
     /// every place where a value is used, the next one last
     uses: Vec<Vec<u32>>,
     /// outputs that a value is
@@ -48,9 +63,8 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
         Address { base, offset }
     }
 
-    /// With constants, inputs and systems in their places; `constants` are those that the operations
-    /// read from memory.
-    pub fn new(program: &'p Program, shared: usize, constants: &[f64]) -> Self {
+    /// With inputs and systems in their places.
+    pub fn new(program: &'p Program, shared: usize, assembler: Assembler) -> Self {
         let count = program.values.len();
         let mut results = vec![vec![]; count];
         for (i, &output) in program.outputs.iter().enumerate() {
@@ -66,47 +80,50 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
         }
         let mut emitter = Self {
             program,
-            assembler: Assembler::new(LANES > 1),
-            constants: vec![],
-            extra: 0,
+            frame: vec![],
+            constants: HashMap::new(),
             free: vec![],
             homes: vec![Home::default(); count],
-            holds: [None; REGISTERS],
+            holds: [None; 32],
+            registers: &REGISTERS[..registers(assembler.is_extended)],
+            assembler,
             uses,
             results,
             systems: vec![],
             pinned: vec![],
             leaving: vec![],
         };
-        emitter.place_leaves(shared, constants);
+        emitter.place_leaves(shared);
         emitter
     }
 
-    /// Constants, inputs and systems have their places before anything is computed.
-    fn place_leaves(&mut self, shared: usize, constants: &[f64]) {
-        self.constants.extend(constants);
-        for (i, &value) in self.program.values.iter().enumerate() {
-            self.homes[i].memory = match value {
-                Value::Constant(c) => {
-                    self.constants.push(c);
-                    Some(Self::address(Base::Frame, self.constants.len() - 1))
-                }
-                Value::Input(k) => Some(match (k as usize).checked_sub(shared) {
-                    Some(own) => Self::address(Base::Inputs, own),
-                    None => Self::address(Base::Shared, k as usize),
-                }),
-                _ => None,
-            };
+    /// Inputs and systems have their places before anything is computed.
+    fn place_leaves(&mut self, shared: usize) {
+        for (home, &value) in self.homes.iter_mut().zip(&self.program.values) {
+            let Value::Input(k) = value else { continue };
+            home.memory = Some(match (k as usize).checked_sub(shared) {
+                Some(own) => Self::address(Base::Inputs, own),
+                None => Self::address(Base::Shared, k as usize),
+            });
         }
         for system in &self.program.systems {
-            self.systems.push(self.frame());
-            self.extra += system.len() + 1;
+            self.systems.push(self.frame.len());
+            self.frame.resize(self.frame.len() + system.len() + 1, 0.0);
         }
     }
 
-    /// Length of the frame.
-    pub fn frame(&self) -> usize {
-        self.constants.len() + self.extra
+    /// A new place of the frame.
+    fn slot(&mut self, value: f64) -> usize {
+        self.frame.push(value);
+        self.frame.len() - 1
+    }
+
+    /// Where a value stands in memory, if it does.
+    fn memory(&mut self, id: Id) -> Option<Address> {
+        if let Value::Constant(c) = self.program.values[id as usize] {
+            return Some(self.constant(c));
+        }
+        self.homes[id as usize].memory
     }
 
     /// Whether a value is to be made: begins its operation. Slots that the operation before it may
@@ -147,7 +164,7 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
 
     fn loaded(&mut self, id: Id, to: Register) -> Register {
         // what is in no register is in memory
-        if let Some(address) = self.homes[id as usize].memory {
+        if let Some(address) = self.memory(id) {
             self.assembler.load(to, address);
         }
         to
@@ -196,7 +213,7 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
     pub fn operand(&mut self, id: Id) -> Operand {
         let home = self.homes[id as usize];
         let is_leaf = home.slot.is_none();
-        match (home.register, home.memory) {
+        match (home.register, self.memory(id)) {
             (None, Some(address)) if is_leaf || self.uses[id as usize].len() < 2 => {
                 Operand::Memory(address)
             }
@@ -209,12 +226,14 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
         self.homes[id as usize].register.is_none()
     }
 
-    /// A constant of the operations, one of those that the emitter was made with.
-    pub fn constant(&self, value: f64) -> Operand {
-        let is_same = |c: &f64| c.to_bits() == value.to_bits();
-        let place = self.constants.iter().position(is_same);
-        debug_assert!(place.is_some(), "{value} is none of them");
-        Operand::Memory(Self::address(Base::Frame, place.unwrap_or(0)))
+    /// Where a number stands in the frame.
+    pub fn constant(&mut self, value: f64) -> Address {
+        if let Some(&address) = self.constants.get(&value.to_bits()) {
+            return address;
+        }
+        let address = Self::address(Base::Frame, self.slot(value));
+        self.constants.insert(value.to_bits(), address);
+        address
     }
 
     /// A register for the result of the operation at hand, whose arguments are consumed.
@@ -239,10 +258,10 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
                 .last()
                 .map_or(u32::MAX, |&use_| use_),
         };
-        let open = (0..REGISTERS).filter(|&r| !self.pinned.contains(&(r as Register)));
-        let register = open
-            .max_by_key(|&r| (next(&self.holds[r]), std::cmp::Reverse(r)))
-            .unwrap_or(0) as Register;
+        let open = self.registers.iter().filter(|r| !self.pinned.contains(r));
+        let register = *open
+            .max_by_key(|&&r| (next(&self.holds[r as usize]), std::cmp::Reverse(r)))
+            .unwrap_or(&0);
         self.vacate(register);
         register
     }
@@ -256,13 +275,10 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
 
     /// Sees that a value is in memory.
     fn spill(&mut self, id: Id, register: Register) -> Address {
-        if let Some(address) = self.homes[id as usize].memory {
+        if let Some(address) = self.memory(id) {
             return address;
         }
-        let slot = self.free.pop().unwrap_or_else(|| {
-            self.extra += 1;
-            self.frame() - 1
-        });
+        let slot = self.free.pop().unwrap_or_else(|| self.slot(0.0));
         let address = Self::address(Base::Frame, slot);
         self.assembler.store(register, address);
         let home = &mut self.homes[id as usize];
@@ -272,7 +288,7 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
 
     /// A call changes every register.
     pub fn vacate_all(&mut self) {
-        for register in 0..REGISTERS as Register {
+        for &register in self.registers {
             self.vacate(register);
         }
         self.pinned.clear();

@@ -72,7 +72,7 @@ fn same(x: f64, y: f64) -> bool {
     x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan())
 }
 
-fn agrees(draws: &[Draw], rows: &[[f64; 5]; 4]) -> Result<(), TestCaseError> {
+fn agrees(draws: &[Draw], rows: &[[f64; 5]; 8]) -> Result<(), TestCaseError> {
     let g = Graph::new();
     let inputs: Vec<Node> = (0..5).map(|i| g.symbol(&format!("x{i}")).node()).collect();
     let outputs = build(&g, &inputs, draws);
@@ -81,52 +81,71 @@ fn agrees(draws: &[Draw], rows: &[[f64; 5]; 4]) -> Result<(), TestCaseError> {
         eprintln!("skipped: machine code is not made here");
         return Ok(());
     };
+    let mut narrow = Function::<1>::compile_for_avx2(&tape).expect("any processor has it");
     let mut interpreter = tape.evaluator();
-    let mut lanes = Function::<4>::compile(&tape).expect("as for one lane");
-    let columns: Vec<[f64; 4]> = (0..5).map(|i| rows.map(|row| row[i])).collect();
-    let mut side_by_side = vec![[0.0; 4]; outputs.len()];
-    lanes.eval(&columns, &mut side_by_side);
-    let together = tape.eval_in(&Lanes::<4>, &columns);
-    for (i, (e, found)) in together.iter().zip(&side_by_side).enumerate() {
-        for lane in 0..4 {
-            let (e, found) = (e[lane], found[lane]);
-            prop_assert!(same(e, found), "output {i}, lane {lane}: {e} and {found}");
-        }
+    let [first, second] = [0, 1].map(|half| std::array::from_fn(|lane| rows[4 * half + lane]));
+    for rows in [&first, &second] {
+        side_by_side::<4>(&tape, rows)?;
     }
+    side_by_side::<8>(&tape, rows)?;
     for row in rows {
         let (mut expected, mut found) = (vec![0.0; outputs.len()], vec![[0.0]; outputs.len()]);
         interpreter.eval(row, &mut expected);
-        single.eval(&row.map(|x| [x]), &mut found);
-        for (i, &e) in expected.iter().enumerate() {
-            prop_assert!(same(e, found[i][0]), "output {i}: {e} and {}", found[i][0]);
+        for single in [&mut single, &mut narrow] {
+            single.eval(&row.map(|x| [x]), &mut found);
+            for (i, &e) in expected.iter().enumerate() {
+                prop_assert!(same(e, found[i][0]), "output {i}: {e} and {}", found[i][0]);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// So many lanes give what the interpreter gives in each, where they are compiled for.
+fn side_by_side<const N: usize>(tape: &Tape, rows: &[[f64; 5]; N]) -> Result<(), TestCaseError> {
+    let Some(mut lanes) = Function::<N>::compile(tape) else {
+        prop_assert!(N == 8, "as for one lane");
+        return Ok(());
+    };
+    let columns: Vec<[f64; N]> = (0..5).map(|i| rows.map(|row| row[i])).collect();
+    let mut found = vec![[0.0; N]; tape.outputs()];
+    lanes.eval(&columns, &mut found);
+    let expected = tape.eval_in(&Lanes::<N>, &columns);
+    for (i, (e, found)) in expected.iter().zip(&found).enumerate() {
+        for lane in 0..N {
+            let (e, found) = (e[lane], found[lane]);
+            prop_assert!(
+                same(e, found),
+                "output {i}, lane {lane} of {N}: {e} and {found}"
+            );
         }
     }
     Ok(())
 }
 
 /// Three groups with two inputs in common give what each gives alone.
-fn sweeps_agree(draws: &[Draw], rows: &[[f64; 5]; 4]) -> Result<(), TestCaseError> {
+fn sweeps_agree<const N: usize>(draws: &[Draw], rows: &[[f64; 5]; N]) -> Result<(), TestCaseError> {
     const SPARE: usize = 3;
     let g = Graph::new();
     let inputs: Vec<Node> = (0..5).map(|i| g.symbol(&format!("x{i}")).node()).collect();
     let outputs = build(&g, &inputs, draws);
     let tape = Tape::new(&g, &inputs, &outputs).expect("all inputs are there");
     let spacing = outputs.len() + SPARE;
-    let Some(mut sweeper) = Function::<4>::sweeping(&tape, 2, spacing) else {
+    let Some(mut sweeper) = Function::<N>::sweeping(&tape, 2, spacing) else {
         return Ok(());
     };
     let [u, v, a, b, c] = std::array::from_fn(|i| rows.map(|row| row[i]));
     let own = [[a, b, c], [b, c, a], [c, c, b]];
-    let mut found = vec![[7.0; 4]; 3 * spacing];
+    let mut found = vec![[7.0; N]; 3 * spacing];
     sweeper.sweep(3, &[u, v], own.as_flattened(), &mut found);
     for (group, [a, b, c]) in own.into_iter().enumerate() {
-        let expected = tape.eval_in(&Lanes::<4>, &[u, v, a, b, c]);
+        let expected = tape.eval_in(&Lanes::<N>, &[u, v, a, b, c]);
         let (values, spare) = found[group * spacing..][..spacing].split_at(outputs.len());
         let pairs = values.as_flattened().iter().zip(expected.as_flattened());
         for (found, expected) in pairs {
             prop_assert!(same(*found, *expected), "group {group}: {found} {expected}");
         }
-        prop_assert_eq!(spare, &[[7.0; 4]; SPARE]);
+        prop_assert_eq!(spare, &[[7.0; N]; SPARE]);
     }
     Ok(())
 }
@@ -145,23 +164,29 @@ fn linear_systems_of_every_size_agree() {
         let second = g.solve(&a, &first.x);
         let outputs = [&first.x[..], &second.x, &[first.rcond, second.rcond]].concat();
         let tape = Tape::new(&g, &[x.node(), y.node()], &outputs).expect("all inputs are there");
-        let Some(mut lanes) = Function::<4>::compile(&tape) else {
-            assert!(
-                n == 65 || Function::<4>::compile(&smallest()).is_none(),
-                "{n}"
-            );
+        if n == 65 {
+            assert!(Function::<4>::compile(&tape).is_none());
             continue;
-        };
-        assert!(n < 65);
-        let inputs = [[0.3, -1.5, f64::NAN, 0.0], [2.0, 0.25, 1.0, 0.0]];
-        let mut found = vec![[0.0; 4]; outputs.len()];
-        for _ in 0..2 {
-            lanes.eval(&inputs, &mut found);
-            let expected = tape.eval_in(&Lanes::<4>, &inputs);
-            let pairs = found.as_flattened().iter().zip(expected.as_flattened());
-            assert!(pairs.clone().all(|(f, e)| same(*f, *e)), "{n}");
-            assert!(found[0][0].is_finite() && found[0][0] != 0.0);
         }
+        systems_agree::<4>(&tape);
+        systems_agree::<8>(&tape);
+    }
+}
+
+fn systems_agree<const N: usize>(tape: &Tape) {
+    let Some(mut lanes) = Function::<N>::compile(tape) else {
+        assert!(Function::<N>::compile(&smallest()).is_none());
+        return;
+    };
+    let [x, y] = [[0.3, -1.5, f64::NAN, 0.0], [2.0, 0.25, 1.0, 0.0]];
+    let inputs = [x, y].map(|row| std::array::from_fn(|lane| row[lane % 4]));
+    let mut found = vec![[0.0; N]; tape.outputs()];
+    for _ in 0..2 {
+        lanes.eval(&inputs, &mut found);
+        let expected = tape.eval_in(&Lanes::<N>, &inputs);
+        let pairs = found.as_flattened().iter().zip(expected.as_flattened());
+        assert!(pairs.clone().all(|(f, e)| same(*f, *e)));
+        assert!(found[0][0].is_finite() && found[0][0] != 0.0);
     }
 }
 
@@ -172,8 +197,8 @@ fn smallest() -> Tape {
     Tape::new(&g, &[x], &[x]).expect("its input is there")
 }
 
-fn rows() -> impl Strategy<Value = [[f64; 5]; 4]> {
-    prop::array::uniform4(prop::array::uniform5(number()))
+fn rows() -> impl Strategy<Value = [[f64; 5]; 8]> {
+    prop::array::uniform8(prop::array::uniform5(number()))
 }
 
 proptest! {
@@ -182,7 +207,8 @@ proptest! {
     #[test]
     fn random_programs_agree(draws in prop::collection::vec(draw(), 1..200), rows in rows()) {
         agrees(&draws, &rows)?;
-        sweeps_agree(&draws, &rows)?;
+        sweeps_agree::<8>(&draws, &rows)?;
+        sweeps_agree::<4>(&draws, &std::array::from_fn(|lane| rows[lane]))?;
     }
 }
 

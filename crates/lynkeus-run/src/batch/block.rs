@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use lynkeus_native::Buffer;
 
-use super::plan::{Divided, Event, LANES, Lane, Leg, Program};
+use super::plan::{Divided, Event, Leg, Program};
 use crate::divergence::Bound;
 use crate::error::state_text;
 use crate::integrator::instant;
@@ -31,15 +31,15 @@ pub(crate) type IsOver<'a> = dyn Fn() -> bool + Sync + 'a;
 const FEW: usize = 4;
 
 /// Most groups of lanes in a block.
-fn most_groups(program: &Program) -> usize {
-    let group = (program.states + program.disturbances) * size_of::<Lane>();
+fn most_groups<const L: usize>(program: &Program<L>) -> usize {
+    let group = (program.states + program.disturbances) * size_of::<[f64; L]>();
     (CACHE / (2 * group).max(1)).clamp(1, GROUPS)
 }
 
 /// Groups of lanes in each block of so many runs: few enough that every thread has a block.
-pub(crate) fn groups(program: &Program, runs: usize, threads: usize) -> usize {
+pub(crate) fn groups<const L: usize>(program: &Program<L>, runs: usize, threads: usize) -> usize {
     let most = most_groups(program);
-    let own = runs.div_ceil(LANES).div_ceil(threads.max(1));
+    let own = runs.div_ceil(L).div_ceil(threads.max(1));
     own.clamp(FEW.min(most), most)
 }
 
@@ -53,28 +53,28 @@ pub struct Ended {
 }
 
 /// The working memory of a thread.
-pub(crate) struct Desk<'p> {
-    program: &'p Program,
-    step: Divided,
-    row: Divided,
-    /// arguments of what is shared, at four instants
-    arguments: Vec<Lane>,
-    shared: Buffer<LANES>,
-    shared_row: Buffer<LANES>,
-    rows: Buffer<LANES>,
+pub(crate) struct Desk<'p, const L: usize> {
+    program: &'p Program<L>,
+    step: Divided<L>,
+    row: Divided<L>,
+    /// arguments of what is shared, at one instant a lane
+    arguments: Vec<[f64; L]>,
+    shared: Buffer<L>,
+    shared_row: Buffer<L>,
+    rows: Buffer<L>,
     is_over: &'p IsOver<'p>,
     /// steps of a group since it was asked
     since_asked: usize,
 }
 
-impl<'p> Desk<'p> {
-    pub fn new(program: &'p Program, is_over: &'p IsOver<'p>) -> Self {
+impl<'p, const L: usize> Desk<'p, L> {
+    pub fn new(program: &'p Program<L>, is_over: &'p IsOver<'p>) -> Self {
         Self {
             step: program.step.clone(),
             row: program.row.clone(),
             arguments: vec![],
             shared: Buffer::new(AHEAD * program.step.shared),
-            shared_row: Buffer::new(LANES * program.row.shared),
+            shared_row: Buffer::new(L * program.row.shared),
             rows: Buffer::new(most_groups(program) * program.columns),
             program,
             is_over,
@@ -101,16 +101,16 @@ impl<'p> Desk<'p> {
         let count = AHEAD.min(leg.steps - first);
         let size = self.program.step.shared;
         let tables = self.shared.values_mut();
-        let tables = tables.chunks_exact_mut(LANES * size.max(1));
-        for (k, table) in (0..count).step_by(LANES).zip(tables) {
-            let times: [[f64; 2]; LANES] = std::array::from_fn(|lane| {
+        let tables = tables.chunks_exact_mut(L * size.max(1));
+        for (k, table) in (0..count).step_by(L).zip(tables) {
+            let times: [[f64; 2]; L] = std::array::from_fn(|lane| {
                 // lanes without a step of their own do the last one again
                 let step = (first + k + lane).min(leg.steps - 1);
                 [step, step + 1].map(|i| instant(leg.from, leg.to, leg.steps, i))
             });
             self.arguments.clear();
             self.arguments.push(times.map(|[t, _]| t));
-            let modes = leg.modes.iter().map(|&mode| [mode; LANES]);
+            let modes = leg.modes.iter().map(|&mode| [mode; L]);
             self.arguments.extend(modes);
             self.arguments.push(times.map(|[t, next]| next - t));
             self.step.share(&self.arguments, table);
@@ -119,11 +119,11 @@ impl<'p> Desk<'p> {
     }
 
     /// The values of a row of every group.
-    fn read(&mut self, time: f64, modes: &[f64], groups: usize, x: &[Lane]) -> &[Lane] {
+    fn read(&mut self, time: f64, modes: &[f64], groups: usize, x: &[[f64; L]]) -> &[[f64; L]] {
         let size = self.program.row.shared;
         self.arguments.clear();
-        self.arguments.push([time; LANES]);
-        self.arguments.extend(modes.iter().map(|&m| [m; LANES]));
+        self.arguments.push([time; L]);
+        self.arguments.extend(modes.iter().map(|&m| [m; L]));
         let table = self.shared_row.values_mut();
         self.row.share(&self.arguments, table);
         let rows = self.rows.values_mut();
@@ -142,30 +142,37 @@ struct Run {
 
 /// Trajectories side by side. The last group is filled up with copies.
 #[derive(Debug)]
-pub(crate) struct Block {
+pub(crate) struct Block<const L: usize> {
     /// place of the first one among all
     first: usize,
     runs: Vec<Run>,
     groups: usize,
     /// states, then what disturbs them, of each group of lanes
-    now: Buffer<LANES>,
-    next: Buffer<LANES>,
+    now: Buffer<L>,
+    next: Buffer<L>,
+    pub record: Record,
+}
+
+/// What a block leaves behind.
+#[derive(Debug, Default)]
+pub(crate) struct Record {
+    pub runs: usize,
     /// rows of the portion at hand: row by row, column by column, run by run
-    pub recorded: Vec<f64>,
+    pub values: Vec<f64>,
     pub ended: Vec<Ended>,
 }
 
-impl Block {
+impl<const L: usize> Block<L> {
     /// With the sensors and the start of each.
-    pub fn new(program: &Program, first: usize, members: Vec<(Sensors, Vec<f64>)>) -> Self {
-        let groups = members.len().div_ceil(LANES);
+    pub fn new(program: &Program<L>, first: usize, members: Vec<(Sensors, Vec<f64>)>) -> Self {
+        let groups = members.len().div_ceil(L);
         let own = program.states + program.disturbances;
         let mut now = Buffer::new(groups * own);
-        for place in 0..groups * LANES {
+        for place in 0..groups * L {
             let (_, start) = &members[place.min(members.len() - 1)];
-            let group = &mut now.values_mut()[place / LANES * own..][..own];
+            let group = &mut now.values_mut()[place / L * own..][..own];
             for (x, start) in group.iter_mut().zip(start) {
-                x[place % LANES] = *start;
+                x[place % L] = *start;
             }
         }
         let run = |(sensors, start): (Sensors, Vec<f64>)| Run {
@@ -175,29 +182,26 @@ impl Block {
         };
         Self {
             first,
+            record: Record {
+                runs: members.len(),
+                ..Record::default()
+            },
             runs: members.into_iter().map(run).collect(),
             groups,
             next: now.clone(),
             now,
-            recorded: vec![],
-            ended: vec![],
         }
-    }
-
-    /// Number of trajectories.
-    pub fn len(&self) -> usize {
-        self.runs.len()
     }
 
     /// Goes through a portion of the plan, and records these columns of its rows; breaks where the
     /// work is over before its end.
     pub fn run(
         &mut self,
-        desk: &mut Desk<'_>,
+        desk: &mut Desk<'_, L>,
         events: &[Event],
         columns: &[usize],
     ) -> ControlFlow<()> {
-        self.recorded.clear();
+        self.record.values.clear();
         for event in events {
             match event {
                 Event::Draw { is_sample } => self.draw(desk.program, *is_sample),
@@ -208,23 +212,23 @@ impl Block {
         ControlFlow::Continue(())
     }
 
-    fn draw(&mut self, program: &Program, is_sample: bool) {
+    fn draw(&mut self, program: &Program<L>, is_sample: bool) {
         let own = program.states + program.disturbances;
         for run in &mut self.runs {
             run.sensors.draw(is_sample);
         }
-        for place in 0..self.groups * LANES {
+        for place in 0..self.groups * L {
             let run = &self.runs[place.min(self.runs.len() - 1)];
-            let first = place / LANES * own + program.states;
+            let first = place / L * own + program.states;
             for (k, value) in run.sensors.disturbances().enumerate() {
                 for buffer in [&mut self.now, &mut self.next] {
-                    buffer.values_mut()[first + k][place % LANES] = value;
+                    buffer.values_mut()[first + k][place % L] = value;
                 }
             }
         }
     }
 
-    fn advance(&mut self, desk: &mut Desk<'_>, leg: &Leg) -> ControlFlow<()> {
+    fn advance(&mut self, desk: &mut Desk<'_, L>, leg: &Leg) -> ControlFlow<()> {
         let size = desk.program.step.shared;
         let mut done = 0;
         while done < leg.steps {
@@ -241,11 +245,11 @@ impl Block {
         ControlFlow::Continue(())
     }
 
-    fn record(&mut self, desk: &mut Desk<'_>, time: f64, modes: &[f64], columns: &[usize]) {
+    fn record(&mut self, desk: &mut Desk<'_, L>, time: f64, modes: &[f64], columns: &[usize]) {
         let program = desk.program;
         let rows = desk.read(time, modes, self.groups, self.now.values());
         let own = program.states + program.disturbances;
-        for (k, runs) in self.runs.chunks_mut(LANES).enumerate() {
+        for (k, runs) in self.runs.chunks_mut(L).enumerate() {
             let row = &rows[k * program.columns..][..program.columns];
             let x = &self.now.values()[k * own..][..program.states];
             let extent = Extent::new(program, row, x);
@@ -254,38 +258,38 @@ impl Block {
                     continue;
                 };
                 run.is_over = true;
-                let run = self.first + k * LANES + lane;
-                self.ended.push(Ended { run, error });
+                let run = self.first + k * L + lane;
+                self.record.ended.push(Ended { run, error });
             }
         }
         for &column in columns {
             let lanes = rows.iter().skip(column).step_by(program.columns);
             let values = lanes.flatten().take(self.runs.len());
-            self.recorded.extend(values);
+            self.record.values.extend(values);
         }
     }
 }
 
-/// How large the values of four runs are at a row.
-struct Extent {
+/// How large the values of a group of runs are at a row.
+struct Extent<const L: usize> {
     /// zero where all are finite
-    oddity: Lane,
+    oddity: [f64; L],
     /// of what is no estimate
-    known: Lane,
+    known: [f64; L],
     /// of the observer's states
-    estimates: Lane,
+    estimates: [f64; L],
 }
 
-impl Extent {
-    fn new(program: &Program, row: &[Lane], x: &[Lane]) -> Self {
-        let mut oddity = [0.0; LANES];
+impl<const L: usize> Extent<L> {
+    fn new(program: &Program<L>, row: &[[f64; L]], x: &[[f64; L]]) -> Self {
+        let mut oddity = [0.0; L];
         for value in row.iter().chain(x) {
             for (odd, v) in oddity.iter_mut().zip(value) {
                 *odd += v * 0.0;
             }
         }
-        let largest = |values: &[Lane]| {
-            values.iter().fold([0.0; LANES], |largest: Lane, value| {
+        let largest = |values: &[[f64; L]]| {
+            values.iter().fold([0.0; L], |largest: [f64; L], value| {
                 std::array::from_fn(|lane| largest[lane].max(value[lane].abs()))
             })
         };
@@ -299,12 +303,12 @@ impl Extent {
 
 impl Run {
     /// Whether the run goes on, which is at a lane of its group with states `x`.
-    fn judge(
+    fn judge<const L: usize>(
         &mut self,
-        program: &Program,
+        program: &Program<L>,
         time: f64,
-        extent: &Extent,
-        x: &[Lane],
+        extent: &Extent<L>,
+        x: &[[f64; L]],
         lane: usize,
     ) -> Result<()> {
         let x = || x.iter().map(|x| x[lane]).collect::<Vec<f64>>();
@@ -343,7 +347,9 @@ mod tests {
         let inputs = System::new(&g, time.node(), &[], &[], &[], &[]).unwrap();
         let mut simulation = Simulation::new(plant, inputs, 1.0, 0.5);
         simulation.method = Method::Rk4(Step::AtMost(0.1));
-        let (_, program) = super::super::plan::Plan::new(&simulation).unwrap().unwrap();
+        let (_, program) = super::super::plan::Plan::new::<4>(&simulation)
+            .unwrap()
+            .unwrap();
         for (runs, threads, expected) in [
             (0, 1, 4),
             (1, 8, 4),
@@ -354,7 +360,7 @@ mod tests {
             (1_000, 0, 64),
         ] {
             assert_eq!(
-                groups(&program, runs, threads),
+                groups::<4>(&program, runs, threads),
                 expected,
                 "{runs} {threads}"
             );

@@ -1,7 +1,7 @@
 //! Many runs of one simulation at once.
 //!
-//! Four trajectories stand side by side in vector registers, some such groups in a block that
-//! stays in the cache, and threads take blocks. What all of them have in common, time and what
+//! Four or eight trajectories, as the processor has it, stand side by side in vector registers, some such
+//! groups in a block that stays in the cache, and threads take blocks. What all of them have in common, time and what
 //! follows from it, is computed once for a block. Elementary functions are those of
 //! [`lynkeus_expr::lanes`], in every trajectory, so that what a run gives depends on neither its
 //! neighbours nor the number of threads; where none is used a run in a batch is that of
@@ -18,8 +18,8 @@ use std::thread::{Builder, available_parallelism};
 use crate::{Column, Error, Result, Simulation};
 pub use block::Ended;
 
-use block::{Block, Desk, IsOver, groups};
-use plan::{Event, LANES, Plan, Program};
+use block::{Block, Desk, IsOver, Record, groups};
+use plan::{Event, Plan, Program};
 
 /// What one run of a batch has of its own.
 #[derive(Clone, Debug)]
@@ -34,8 +34,7 @@ pub struct Member {
 /// depend on the state. They go on together, some rows at a time.
 pub struct Batch {
     plan: Plan,
-    program: Program,
-    blocks: Vec<Block>,
+    work: Box<dyn Work>,
     /// places of the recorded columns in a row
     columns: Vec<usize>,
     times: Vec<f64>,
@@ -56,7 +55,11 @@ impl Batch {
         members: &[Member],
         columns: &[Column],
     ) -> Result<Option<Self>> {
-        let Some((plan, program)) = Plan::new(simulation)? else {
+        let made = match lynkeus_native::widest() {
+            8 if members.len() > 4 => Blocks::<8>::new(simulation, members)?,
+            _ => Blocks::<4>::new(simulation, members)?,
+        };
+        let Some((plan, work)) = made else {
             return Ok(None);
         };
         let table = simulation.table();
@@ -67,26 +70,10 @@ impl Batch {
             })
         };
         let columns = columns.iter().map(place).collect::<Result<Vec<_>, _>>()?;
-        // what a run gives does not depend on the block that it is in
-        let threads = available_parallelism().map_or(1, NonZero::get);
-        let size = groups(&program, members.len(), threads) * LANES;
-        let mut blocks = vec![];
-        for (k, members) in members.chunks(size).enumerate() {
-            let member = |m: &Member| {
-                let plant = simulation.plant.clone().with_start(m.start.clone())?;
-                let observer = simulation.observer.iter().flat_map(|o| o.start());
-                let start = plant.start().iter().chain(observer).copied().collect();
-                Ok((plan.sensors(simulation, m.seed)?, start))
-            };
-            let members = members.iter().map(member);
-            let members = members.collect::<Result<Vec<_>>>()?;
-            blocks.push(Block::new(&program, k * size, members));
-        }
         Ok(Some(Self {
             runs: members.len(),
             plan,
-            program,
-            blocks,
+            work,
             columns,
             times: vec![],
             reached: simulation.start,
@@ -98,7 +85,7 @@ impl Batch {
     /// in their own way.
     #[must_use]
     pub fn is_exact(&self) -> bool {
-        !self.program.step.has_functions && !self.program.row.has_functions
+        self.work.is_exact()
     }
 
     /// Number of rows of every run.
@@ -128,7 +115,7 @@ impl Batch {
                 _ => None,
             });
             self.times.extend(times);
-            if !self.run(&events, threads, is_over) {
+            if !self.work.run(&events, &self.columns, threads, is_over) {
                 self.times.clear();
                 self.is_cancelled = true;
             } else if let Some(time) = self.times.last() {
@@ -142,9 +129,107 @@ impl Batch {
         Err(Error::Cancelled { time })
     }
 
-    /// Whether the work went on to the last of these events.
-    fn run(&mut self, events: &[Event], threads: usize, is_over: &IsOver<'_>) -> bool {
-        let (program, columns) = (&self.program, &self.columns[..]);
+    /// Times of the rows at hand.
+    #[must_use]
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// The values of a row at hand in all runs, in the order of the members, for a column by its
+    /// place among those that are recorded. Those of runs that ended mean nothing.
+    pub fn values(&self, row: usize, column: usize) -> impl Iterator<Item = f64> + '_ {
+        let place = row * self.columns.len() + column;
+        self.records().flat_map(move |record| {
+            let runs = record.runs;
+            record.values[place * runs..][..runs].iter().copied()
+        })
+    }
+
+    /// The runs that did not go on, so far.
+    pub fn ended(&self) -> impl Iterator<Item = &Ended> {
+        self.records().flat_map(|record| &record.ended)
+    }
+
+    fn records(&self) -> impl Iterator<Item = &Record> {
+        (0..).map_while(|block| self.work.record(block))
+    }
+
+    /// Number of runs.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.runs
+    }
+
+    /// True of no runs.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.runs == 0
+    }
+}
+
+/// The blocks of a batch, of whatever number of lanes.
+trait Work: Send + Sync {
+    /// Whether no function is used that lanes round in their own way.
+    fn is_exact(&self) -> bool;
+
+    /// Takes all blocks through these events, of whose rows they record `columns`. False where the work was over
+    /// before the last one.
+    fn run(
+        &mut self,
+        events: &[Event],
+        columns: &[usize],
+        threads: usize,
+        is_over: &IsOver<'_>,
+    ) -> bool;
+
+    /// What a block leaves behind; none after the last one.
+    fn record(&self, block: usize) -> Option<&Record>;
+}
+
+/// With so many trajectories in a register.
+struct Blocks<const L: usize> {
+    program: Program<L>,
+    blocks: Vec<Block<L>>,
+}
+
+impl<const L: usize> Blocks<L> {
+    /// The plan of a simulation and the blocks of its runs.
+    fn new(simulation: &Simulation, members: &[Member]) -> Result<Option<(Plan, Box<dyn Work>)>> {
+        let Some((plan, program)) = Plan::new::<L>(simulation)? else {
+            return Ok(None);
+        };
+        // what a run gives does not depend on the block that it is in
+        let threads = available_parallelism().map_or(1, NonZero::get);
+        let size = groups(&program, members.len(), threads) * L;
+        let mut blocks = vec![];
+        for (k, members) in members.chunks(size).enumerate() {
+            let member = |m: &Member| {
+                let plant = simulation.plant.clone().with_start(m.start.clone())?;
+                let observer = simulation.observer.iter().flat_map(|o| o.start());
+                let start = plant.start().iter().chain(observer).copied().collect();
+                Ok((plan.sensors(simulation, m.seed)?, start))
+            };
+            let members = members.iter().map(member);
+            let members = members.collect::<Result<Vec<_>>>()?;
+            blocks.push(Block::new(&program, k * size, members));
+        }
+        Ok(Some((plan, Box::new(Self { program, blocks }))))
+    }
+}
+
+impl<const L: usize> Work for Blocks<L> {
+    fn is_exact(&self) -> bool {
+        !self.program.step.has_functions && !self.program.row.has_functions
+    }
+
+    fn run(
+        &mut self,
+        events: &[Event],
+        columns: &[usize],
+        threads: usize,
+        is_over: &IsOver<'_>,
+    ) -> bool {
+        let program = &self.program;
         let threads = threads.min(self.blocks.len());
         let is_cut = AtomicBool::new(false);
         let queue = Mutex::new(self.blocks.iter_mut());
@@ -168,36 +253,7 @@ impl Batch {
         !is_cut.into_inner()
     }
 
-    /// Times of the rows at hand.
-    #[must_use]
-    pub fn times(&self) -> &[f64] {
-        &self.times
-    }
-
-    /// The values of a row at hand in all runs, in the order of the members, for a column by its
-    /// place among those that are recorded. Those of runs that ended mean nothing.
-    pub fn values(&self, row: usize, column: usize) -> impl Iterator<Item = f64> + '_ {
-        let place = row * self.columns.len() + column;
-        self.blocks.iter().flat_map(move |block| {
-            let runs = block.len();
-            block.recorded[place * runs..][..runs].iter().copied()
-        })
-    }
-
-    /// The runs that did not go on, so far.
-    pub fn ended(&self) -> impl Iterator<Item = &Ended> {
-        self.blocks.iter().flat_map(|block| &block.ended)
-    }
-
-    /// Number of runs.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.runs
-    }
-
-    /// True of no runs.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.runs == 0
+    fn record(&self, block: usize) -> Option<&Record> {
+        self.blocks.get(block).map(|block| &block.record)
     }
 }

@@ -48,9 +48,9 @@ pub(crate) struct Plan {
 
 /// The code that every trajectory of a batch runs.
 #[derive(Debug)]
-pub(crate) struct Program {
-    pub step: Divided,
-    pub row: Divided,
+pub(crate) struct Program<const L: usize> {
+    pub step: Divided<L>,
+    pub row: Divided<L>,
     pub states: usize,
     /// what disturbs sensors and states
     pub disturbances: usize,
@@ -70,7 +70,7 @@ impl Plan {
     ///
     /// # Errors
     /// A simulation that cannot be run.
-    pub fn new(simulation: &Simulation) -> Result<Option<(Self, Program)>> {
+    pub fn new<const L: usize>(simulation: &Simulation) -> Result<Option<(Self, Program<L>)>> {
         simulation.method.check()?;
         let Method::Rk4(step @ (Step::AtMost(_) | Step::Substeps(_))) = simulation.method else {
             return Ok(None);
@@ -154,7 +154,7 @@ impl Plan {
 }
 
 /// The code of a step and of a row.
-fn program(clock: &mut Loop) -> Result<Option<Program>> {
+fn program<const L: usize>(clock: &mut Loop) -> Result<Option<Program<L>>> {
     let system = clock.joined.system().clone();
     let equations = system.equations();
     let (states, disturbances) = (equations.states.len(), equations.signals.len());
@@ -180,22 +180,17 @@ fn program(clock: &mut Loop) -> Result<Option<Program>> {
     }))
 }
 
-/// Trajectories in a register.
-pub(crate) const LANES: usize = 4;
-
-pub(crate) type Lane = [f64; LANES];
-
 /// Largest tape that is compiled for a batch.
 const LARGEST: usize = 200_000;
 
 /// Functions in two parts, what all trajectories share (time, the step, what jumps with time) and what
 /// is their own; each thread has a copy. Interpreter and machine code give the same values to the bit.
 #[derive(Clone, Debug)]
-pub(crate) struct Divided {
+pub(crate) struct Divided<const L: usize> {
     /// shared inputs → the values that the rest reads
-    common: Engine,
+    common: Engine<L>,
     /// these values, then all other inputs → the outputs
-    own: Engine,
+    own: Engine<L>,
     /// number of values that all trajectories share
     pub shared: usize,
     /// whether there is a function that lanes round in their own way
@@ -204,18 +199,18 @@ pub(crate) struct Divided {
     outputs: usize,
     /// from the outputs of one group of lanes to those of the next
     spacing: usize,
-    scratch: Vec<Lane>,
+    scratch: Vec<[f64; L]>,
 }
 
 /// Machine code, or a tape.
 #[derive(Clone, Debug)]
-enum Engine {
-    Native(Function<LANES>),
-    Interpreted(Box<Evaluator<Lanes<LANES>>>),
+enum Engine<const L: usize> {
+    Native(Function<L>),
+    Interpreted(Box<Evaluator<Lanes<L>>>),
 }
 
-impl Engine {
-    fn new(tape: &Tape, compile: impl FnOnce(&Tape) -> Option<Function<LANES>>) -> Self {
+impl<const L: usize> Engine<L> {
+    fn new(tape: &Tape, compile: impl FnOnce(&Tape) -> Option<Function<L>>) -> Self {
         let is_wanted = Backend::compiles_at_once() && tape.len() <= LARGEST;
         match is_wanted.then(|| compile(tape)).flatten() {
             Some(function) => Self::Native(function),
@@ -224,7 +219,7 @@ impl Engine {
     }
 }
 
-impl Divided {
+impl<const L: usize> Divided<L> {
     /// Of `outputs`, functions of `inputs`, of which some are a trajectory's own.
     ///
     /// # Errors
@@ -257,14 +252,14 @@ impl Divided {
             own_inputs,
             outputs: outputs.len(),
             spacing,
-            scratch: vec![[0.0; LANES]; own.inputs()],
+            scratch: vec![[0.0; L]; own.inputs()],
         })
     }
 
-    /// What all trajectories share at four instants: the lanes of `inputs`. Each instant has its
+    /// What all trajectories share at so many instants: the lanes of `inputs`. Each instant has its
     /// place in `table`, of [`Divided::shared`] values that have one number in all lanes.
-    pub fn share(&mut self, inputs: &[Lane], table: &mut [Lane]) {
-        let count = table.len() / LANES;
+    pub fn share(&mut self, inputs: &[[f64; L]], table: &mut [[f64; L]]) {
+        let count = table.len() / L;
         let values = &mut self.scratch[..count];
         match &mut self.common {
             Engine::Native(native) => native.eval(inputs, values),
@@ -272,13 +267,19 @@ impl Divided {
         }
         for (instant, places) in table.chunks_exact_mut(count.max(1)).enumerate() {
             for (place, value) in places.iter_mut().zip(values.iter()) {
-                *place = [value[instant]; LANES];
+                *place = [value[instant]; L];
             }
         }
     }
 
     /// The outputs of every group of lanes, from what is shared and what is its own.
-    pub fn sweep(&mut self, groups: usize, shared: &[Lane], inputs: &[Lane], outputs: &mut [Lane]) {
+    pub fn sweep(
+        &mut self,
+        groups: usize,
+        shared: &[[f64; L]],
+        inputs: &[[f64; L]],
+        outputs: &mut [[f64; L]],
+    ) {
         match &mut self.own {
             Engine::Native(native) => native.sweep(groups, shared, inputs, outputs),
             Engine::Interpreted(tape) => {
@@ -301,13 +302,14 @@ mod tests {
 
     #[test]
     fn what_depends_on_time_alone_is_computed_once() {
+        const LANES: usize = 4;
         let g = Graph::new();
         let [t, x, p] = ["t", "x", "p"].map(|name| g.symbol(name));
         let u = (t * 3.0).sin() * 2.0;
         let dx = x * u + u.exp() * p - x.sin();
         let (inputs, outputs) = ([t, x, p].map(|e| e.node()), [dx.node(), u.node()]);
         let tape = Tape::new(&g, &inputs, &outputs).unwrap();
-        let mut code = Divided::new(&g, &inputs, &outputs, 1..3, 2).unwrap();
+        let mut code = Divided::<LANES>::new(&g, &inputs, &outputs, 1..3, 2).unwrap();
         // u and eᵘ
         assert!(code.shared == 2 && code.has_functions);
         let mut table = [[0.0; LANES]; 2 * LANES];
