@@ -49,6 +49,6 @@ int main(int argc, char **argv) {
     double end = run(steps);
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &b);
     double seconds = (b.tv_sec - a.tv_sec) + 1e-9 * (b.tv_nsec - a.tv_nsec);
-    printf("{\"step\": %g, \"end\": %.17g}\n", seconds / steps, end);
+    printf("{\"step\": %g, \"end\": [%.17g]}\n", seconds / steps, end);
     return 0;
 }

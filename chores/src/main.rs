@@ -30,6 +30,7 @@ fn main() -> ExitCode {
         ("falsify", options) => falsify::run(options),
         ("bench-peers", options) => peers::bench(options),
         ("bench-runs", options) => peers::runs::bench(options),
+        ("bench-rows", options) => peers::rows::bench(options),
         // one of the peers, as a process of its own
         ("bench-ours", options) => peers::ours::print(options.first().map_or("", String::as_str)),
         _ => Err(format!(

@@ -31,13 +31,15 @@ and, built with --release first (`chores` runs their own tests, which `test` lea
             [--binary FILE]
   exercise  random operations on estimators of every kind: no panic, always finite or an error, a
             restored snapshot equal to the bit; [--seed N] [--count N] [--seconds N]
-  bench-peers  ours beside C by hand, numba, JAX, diffrax, CasADi and SciPy: the table of
-            BENCHMARKS.md; [--rounds N]; needs gcc
+  bench-peers  ours beside C by hand, numba, JAX, diffrax, CasADi, SciPy and FilterPy: the tables of
+            BENCHMARKS.md; [--rounds N] [--table steps|filters]; needs gcc and `cargo build --release`
   bench-runs   10,000 runs of the column with noise beside JAX: clock, processor time and memory;
-            [--runs N] [--rounds N]; needs `cargo build --release`";
+            [--runs N] [--rounds N]; needs `cargo build --release`
+  bench-rows   10,000,000 rows of a log, CSV to CSV, beside C: the same figures;
+            [--rows N] [--rounds N]; needs gcc and `cargo build --release`";
 
 /// What the package `chores` does.
-const CHORES: [&str; 8] = [
+const CHORES: [&str; 9] = [
     "gallery",
     "figures",
     "gap",
@@ -46,6 +48,7 @@ const CHORES: [&str; 8] = [
     "exercise",
     "bench-peers",
     "bench-runs",
+    "bench-rows",
 ];
 
 fn main() -> ExitCode {

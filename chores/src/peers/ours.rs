@@ -7,6 +7,7 @@ use lynkeus::Study;
 use lynkeus::run::Backend;
 use serde_json::{Value, json};
 
+use super::chain;
 use super::clock::Clock;
 use super::lanes;
 use xtask::process::root;
@@ -31,10 +32,15 @@ pub fn print(what: &str) -> Result<(), String> {
         "interpreter" => study_alone(Backend::Interpreter)?,
         "native" => study_alone(Backend::Native)?,
         "lanes" => {
-            let seconds = |own: bool| lanes::seconds(own).map_err(|error| error.to_string());
-            json!({ "batch": seconds(false)?, "own": seconds(true)? })
+            let run = |own: bool| lanes::run(own).map_err(|error| error.to_string());
+            let [one, own] = [run(false)?, run(true)?];
+            json!({
+                "batch": one.step, "end of batch": [one.end],
+                "own": own.step, "end of own": [own.end],
+            })
         }
-        _ => return Err("expected interpreter, native or lanes".to_owned()),
+        "filters" => chain::filters().map_err(|error| error.to_string())?,
+        _ => return Err("expected interpreter, native, lanes or filters".to_owned()),
     };
     writeln!(std::io::stdout(), "{found}").map_err(|error| error.to_string())
 }

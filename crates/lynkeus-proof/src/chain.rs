@@ -307,3 +307,58 @@ fn normalised(chain: &Chain) -> IntervalMatrix {
         false => S[i][j] / (S[i][i] * S[j][j]).sqrt(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chain(states: &[usize], scales: &[f64], weights: &[f64]) -> Chain {
+        let n = states.len();
+        let diagonal = |i: usize, j: usize| match i == j {
+            true => Interval::point(weights[i] * weights[i]),
+            false => Interval::ZERO,
+        };
+        Chain {
+            states: states.to_vec(),
+            speed: Interval::ONE,
+            scales: scales.iter().copied().map(Interval::point).collect(),
+            S: square(n, diagonal),
+            g: vec![Interval::ONE; n],
+            partials: vec![],
+        }
+    }
+
+    /// By hand, for D = (2, 3, 5) and s = (1, 4, 0.5): within a chain and from one to the other each slope counts
+    /// with its own scales and weights, and one of a state in no chain does not.
+    #[test]
+    fn couplings_have_the_scales_and_weights_of_both_states() {
+        let chains = [
+            chain(&[3, 0], &[1.0, 4.0], &[2.0, 3.0]),
+            chain(&[1], &[0.5], &[5.0]),
+        ];
+        let slope = |row, column, size| Slope { row, column, size };
+        let slopes = [
+            slope(0, 3, 7.0),
+            slope(3, 1, 2.0),
+            slope(1, 0, 0.25),
+            slope(2, 1, 9.0),
+        ];
+        let places = [(0, 0), (0, 1), (1, 0)];
+        let G = couplings(&chains, &places, &slopes);
+        // (row, column) in places: D_a L (s_b/s_a)/D_b
+        let expected = [
+            ((1, 0), 3.0 * 7.0 * (1.0 / 4.0) / 2.0),
+            ((0, 2), 2.0 * 2.0 * (0.5 / 1.0) / 5.0),
+            ((2, 1), 5.0 * 0.25 * (4.0 / 0.5) / 3.0),
+        ];
+        for p in 0..3 {
+            for q in 0..3 {
+                let known = expected.iter().find(|(at, _)| *at == (p, q));
+                let value = known.map_or(0.0, |(_, value)| *value);
+                let found = G[p][q];
+                assert!(found.contains(value), "{p}, {q}: {found:?} beside {value}");
+                assert!(found.hi() - found.lo() < 1e-14, "{p}, {q}: {found:?}");
+            }
+        }
+    }
+}

@@ -62,7 +62,7 @@ pub struct Estimator {
     held: usize,
     runner: Box<dyn Runner>,
     /// the state before the call under way
-    image: Vec<u8>,
+    image: Vec<u64>,
 }
 
 impl Blueprint {
@@ -289,7 +289,7 @@ impl Estimator {
         let refused = |fault| Error::Snapshot { fault };
         let state = snapshot::opened(snapshot, self.fingerprint()).map_err(refused)?;
         let mut restored = self.clone();
-        snapshot::load(state, |walk| restored.walk(walk, true))
+        snapshot::load(&state, |walk| restored.walk(walk, true))
             .map_err(|_| refused(SnapshotFault::Damaged))?;
         *self = restored;
         Ok(())

@@ -1,11 +1,9 @@
 //! Systems that are compiled with their Jacobians.
 
 use std::ops::Range;
-use std::sync::{Arc, Mutex};
 
 use lynkeus_expr::{Graph, Node, jacobian};
 
-use crate::filter::transition::{Code, Straight};
 use crate::method::are_finite;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Evaluation, Events, Result, System};
@@ -19,8 +17,6 @@ use crate::{Dynamics, Evaluation, Events, Result, System};
 pub struct Linearised {
     system: System,
     jacobians: Jacobians<Jacobian>,
-    /// of steps that were asked for, by the states on which noise acts
-    steps: Arc<Mutex<Vec<Arc<Code>>>>,
 }
 
 /// One of each Jacobian, empty where it is not asked for.
@@ -69,11 +65,7 @@ impl Linearised {
             output: Jacobian::among(&mut all, &jacobians.output),
         };
         let system = System::new(graph, time, states, signals, derivatives, &all)?;
-        Ok(Self {
-            system,
-            jacobians,
-            steps: Arc::default(),
-        })
+        Ok(Self { system, jacobians })
     }
 
     /// A flow x' = f with F, by its states.
@@ -121,19 +113,6 @@ impl Linearised {
     #[must_use]
     pub fn system(&self) -> &System {
         &self.system
-    }
-
-    /// The code of one step of x̂, Φ and W with noise on such states.
-    pub(crate) fn straight(&self, noisy: Vec<bool>) -> Straight {
-        // a list only grows: it is whole wherever a thread left it
-        let mut steps = self.steps.lock().unwrap_or_else(|e| e.into_inner());
-        let known = steps.iter().find(|code| code.is_for(&noisy));
-        let code = known.cloned().unwrap_or_else(|| {
-            let new = Arc::new(Code::new(&self.system, &self.jacobians.state, noisy));
-            steps.push(new.clone());
-            new
-        });
-        Straight::new(code)
     }
 
     /// Where the entries of its Jacobians are.

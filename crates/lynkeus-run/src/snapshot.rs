@@ -1,4 +1,4 @@
-//! States as bytes, and back.
+//! States as words of 64 bits, and back; snapshots as bytes.
 //!
 //! What a state is made of is written down once: the same walk over its parts saves and loads.
 
@@ -89,8 +89,8 @@ pub(crate) struct Damaged;
 /// One walk over the parts of a state.
 #[derive(Debug)]
 pub(crate) enum Walk<'a> {
-    Save(&'a mut Vec<u8>),
-    Load(&'a [u8]),
+    Save(&'a mut Vec<u64>),
+    Load(&'a [u64]),
 }
 
 /// What has a state to save.
@@ -102,11 +102,10 @@ pub(crate) trait Persist {
 impl Walk<'_> {
     pub fn word(&mut self, word: &mut u64) -> Result<(), Damaged> {
         match self {
-            Walk::Save(bytes) => bytes.extend_from_slice(&word.to_le_bytes()),
-            Walk::Load(bytes) => {
-                let (first, rest) = bytes.split_first_chunk().ok_or(Damaged)?;
-                *word = u64::from_le_bytes(*first);
-                *bytes = rest;
+            Walk::Save(words) => words.push(*word),
+            Walk::Load(words) => {
+                let (first, rest) = words.split_first().ok_or(Damaged)?;
+                (*word, *words) = (*first, rest);
             }
         }
         Ok(())
@@ -145,31 +144,24 @@ impl Walk<'_> {
     /// Numbers whose count never changes.
     pub fn numbers(&mut self, numbers: &mut [f64]) -> Result<(), Damaged> {
         match self {
-            Walk::Save(bytes) => {
-                let from = bytes.len();
-                bytes.resize(from + 8 * numbers.len(), 0);
-                for (place, x) in bytes[from..].chunks_exact_mut(8).zip(numbers) {
-                    place.copy_from_slice(&x.to_le_bytes());
-                }
-            }
-            Walk::Load(bytes) => {
-                let (own, rest) = bytes.split_at_checked(8 * numbers.len()).ok_or(Damaged)?;
-                for (x, place) in numbers.iter_mut().zip(own.chunks_exact(8)) {
-                    *x = f64::from_le_bytes(place.try_into().map_err(|_| Damaged)?);
-                }
-                *bytes = rest;
+            Walk::Save(words) => words.extend(numbers.iter().map(|x| x.to_bits())),
+            Walk::Load(words) => {
+                let (own, rest) = words.split_at_checked(numbers.len()).ok_or(Damaged)?;
+                let pairs = numbers.iter_mut().zip(own);
+                pairs.for_each(|(x, word)| *x = f64::from_bits(*word));
+                *words = rest;
             }
         }
         Ok(())
     }
 
     /// How many parts there are of what is `length` long now; each takes a word at least, so that
-    /// no damaged count asks for more memory than the bytes have.
+    /// no damaged count asks for more memory than the snapshot has.
     pub fn length(&mut self, length: usize) -> Result<usize, Damaged> {
         let mut found = length;
         self.count(&mut found)?;
         match self {
-            Walk::Load(bytes) if found > bytes.len() / 8 => Err(Damaged),
+            Walk::Load(words) if found > words.len() => Err(Damaged),
             _ => Ok(found),
         }
     }
@@ -192,12 +184,12 @@ impl Walk<'_> {
     }
 }
 
-/// Loads everything from bytes, and nothing is left.
+/// Loads everything from words, and nothing is left.
 pub(crate) fn load(
-    bytes: &[u8],
+    words: &[u64],
     state: impl FnOnce(&mut Walk<'_>) -> Result<(), Damaged>,
 ) -> Result<(), Damaged> {
-    let mut walk = Walk::Load(bytes);
+    let mut walk = Walk::Load(words);
     state(&mut walk)?;
     match walk {
         Walk::Load([]) => Ok(()),
@@ -210,14 +202,13 @@ pub(crate) fn seal(
     fingerprint: u64,
     state: impl FnOnce(&mut Walk<'_>) -> Result<(), Damaged>,
 ) -> Vec<u8> {
-    let mut bytes = MAGIC.to_vec();
-    for word in [VERSION, fingerprint, 0] {
-        bytes.extend_from_slice(&word.to_le_bytes());
-    }
+    let mut words = vec![];
     // a state that is there can be walked over
-    let _ = state(&mut Walk::Save(&mut bytes));
-    let length = (bytes.len() - HEAD) as u64;
-    bytes[HEAD - 8..HEAD].copy_from_slice(&length.to_le_bytes());
+    let _ = state(&mut Walk::Save(&mut words));
+    let length = 8 * words.len() as u64;
+    let head = [VERSION, fingerprint, length].into_iter();
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend(head.chain(words).flat_map(u64::to_le_bytes));
     let sum = checksum(&bytes);
     bytes.extend_from_slice(&sum.to_le_bytes());
     bytes
@@ -233,7 +224,7 @@ fn checksum(bytes: &[u8]) -> u64 {
 ///
 /// # Errors
 /// Why it cannot be restored.
-pub(crate) fn opened(bytes: &[u8], fingerprint: u64) -> Result<&[u8], SnapshotFault> {
+pub(crate) fn opened(bytes: &[u8], fingerprint: u64) -> Result<Vec<u64>, SnapshotFault> {
     let word = |at: usize| {
         let bytes = bytes.get(at..at + 8).and_then(|b| b.try_into().ok());
         bytes.map_or(0, u64::from_le_bytes)
@@ -253,7 +244,10 @@ pub(crate) fn opened(bytes: &[u8], fingerprint: u64) -> Result<&[u8], SnapshotFa
     if word(16) != fingerprint {
         return Err(SnapshotFault::OtherObserver);
     }
-    Ok(&bytes[HEAD..end])
+    match bytes[HEAD..end].as_chunks() {
+        (words, []) => Ok(words.iter().copied().map(u64::from_le_bytes).collect()),
+        _ => Err(SnapshotFault::Damaged),
+    }
 }
 
 #[cfg(test)]
@@ -295,7 +289,7 @@ mod tests {
     fn what_is_saved_is_loaded() {
         let bytes = seal(42, |walk| state().walk(walk));
         let mut found = State::default();
-        load(opened(&bytes, 42).unwrap(), |walk| found.walk(walk)).unwrap();
+        load(&opened(&bytes, 42).unwrap(), |walk| found.walk(walk)).unwrap();
         assert_eq!(found, state());
         assert!(found.x.is_sign_negative());
     }
@@ -318,10 +312,10 @@ mod tests {
 
     #[test]
     fn damaged_lengths_ask_for_no_memory() {
-        let mut bytes = vec![];
-        state().walk(&mut Walk::Save(&mut bytes)).unwrap();
-        bytes[24..32].copy_from_slice(&u64::MAX.to_le_bytes());
-        assert!(load(&bytes, |walk| State::default().walk(walk)).is_err());
-        assert!(load(&bytes[..20], |walk| State::default().walk(walk)).is_err());
+        let mut words = vec![];
+        state().walk(&mut Walk::Save(&mut words)).unwrap();
+        words[3] = u64::MAX;
+        assert!(load(&words, |walk| State::default().walk(walk)).is_err());
+        assert!(load(&words[..2], |walk| State::default().walk(walk)).is_err());
     }
 }

@@ -56,28 +56,39 @@ fn write(to: &mut Vec<u8>, x: f64, digits: usize) {
 impl Decimal {
     /// From `-12.5e-3`.
     fn read(text: &str) -> Self {
-        let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
-        let unsigned = mantissa.strip_prefix('-');
+        let text = text.as_bytes();
+        let unsigned = text.strip_prefix(b"-").unwrap_or(text);
+        // the letter of an exponent has a sign and three digits after it at most
+        let tail = unsigned.len().saturating_sub(5);
+        let letter = unsigned[tail..].iter().position(|byte| *byte == b'e');
+        let (mantissa, exponent) = match letter {
+            Some(at) => unsigned.split_at(tail + at),
+            None => (unsigned, &b""[..]),
+        };
+        let exponent = str::from_utf8(exponent.get(1..).unwrap_or_default());
+        let exponent: i32 = exponent.ok().and_then(|e| e.parse().ok()).unwrap_or(0);
+        let dot = mantissa.iter().position(|byte| *byte == b'.');
+        let (whole, part) = match dot {
+            Some(dot) => (&mantissa[..dot], &mantissa[dot + 1..]),
+            None => (mantissa, &b""[..]),
+        };
+        // zeros before the first digit only move the point
+        let first = |part: &[u8]| part.iter().position(|byte| *byte != b'0');
+        let (skipped, zeros) = match first(whole) {
+            Some(at) => (at, 0),
+            None => (whole.len(), first(part).unwrap_or(part.len())),
+        };
         let mut decimal = Self {
-            negative: unsigned.is_some(),
+            negative: unsigned.len() < text.len(),
             digits: [b'0'; 20],
             count: 0,
-            point: exponent.parse().unwrap_or(0),
+            point: exponent + (whole.len() - skipped) as i32 - zeros as i32,
         };
-        let mut is_fraction = false;
-        for byte in unsigned.unwrap_or(mantissa).bytes() {
-            match byte {
-                b'.' => is_fraction = true,
-                // zeros before the first digit only move the point
-                b'0' if decimal.count == 0 => decimal.point -= i32::from(is_fraction),
-                digit => {
-                    decimal.point += i32::from(!is_fraction);
-                    if let Some(place) = decimal.digits.get_mut(decimal.count) {
-                        *place = digit;
-                        decimal.count += 1;
-                    }
-                }
-            }
+        for part in [&whole[skipped..], &part[zeros..]] {
+            let places = &mut decimal.digits[decimal.count..];
+            let count = part.len().min(places.len());
+            places[..count].copy_from_slice(&part[..count]);
+            decimal.count += count;
         }
         decimal.trim();
         decimal

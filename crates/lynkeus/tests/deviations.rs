@@ -366,7 +366,7 @@ impl Scatter {
 
 /// Within what a chi-square of so many runs would leave in 999 of 1000 cases.
 fn agree(case: &Case) {
-    const RUNS: u64 = 40;
+    const RUNS: u64 = 24;
     // Wilson and Hilferty's quantiles
     let part = 2.0 / (9.0 * RUNS as f64);
     let bound = |z: f64| (1.0 - part + z * part.sqrt()).powi(3).sqrt();

@@ -42,7 +42,9 @@
 mod belief;
 mod censored;
 mod ekf;
+mod expressions;
 pub(crate) mod health;
+mod likelihood;
 mod mhe;
 mod model;
 mod profile;
@@ -57,6 +59,7 @@ mod ukf;
 pub use crate::noise::Limits;
 pub(crate) use belief::Belief;
 pub use health::{Health, Innovation, Reading, SensorHealth};
+pub use likelihood::{Likelihood, ParametricPlant, Row, Score};
 pub(crate) use model::check_counts;
 pub use model::{NoisyModel, NoisyPlant, Sensor};
 pub use record::Record;

@@ -78,16 +78,18 @@ impl Root {
         gain.clear();
         gain.resize(n, 0.0);
         let mut alpha = r;
+        let mut root = r.sqrt();
         for (j, v) in projected.iter().enumerate().rev() {
             let before = alpha;
             alpha += v * v;
+            let root_before = std::mem::replace(&mut root, alpha.sqrt());
             // what is left of the column, and what the later ones take
             let left = match alpha > 0.0 {
                 true => (before / alpha).sqrt(),
                 false => 1.0,
             };
             let taken = match before > 0.0 {
-                true => v / (before.sqrt() * alpha.sqrt()),
+                true => v / (root_before * root),
                 false => 0.0,
             };
             let column = self.entries[j * (n + 1)..].iter_mut().step_by(n);

@@ -5,6 +5,7 @@ mod batches;
 mod common;
 mod coverage;
 mod integration;
+mod likelihood;
 mod linear_plants;
 mod replay;
 mod second_opinion;

@@ -5,9 +5,12 @@ use std::sync::Arc;
 use super::series::Transition;
 use super::straight::Straight;
 use crate::Evaluation;
+use crate::filter::belief::Belief;
 use crate::filter::profile::Profile;
 use crate::filter::root::Root;
-use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place, Result, Slopes};
+use crate::integrator::{check_interval, fixed_steps, instant};
+use crate::method::are_finite;
+use crate::{Dynamics, Error, Events, Integrator, Linearised, Method, Place, Result, Slopes, Step};
 
 /// x̂, Φ and W by one integration, for flows with few states.
 #[derive(Clone, Debug)]
@@ -16,6 +19,7 @@ pub(crate) struct Joint {
     equation: Equation,
     /// the first step from a sample, where steps are those of Runge and Kutta
     straight: Option<Straight>,
+    step: Option<Step>,
     /// q, the largest entry of Q
     scale: f64,
     /// the state of [`Variational`]
@@ -29,13 +33,17 @@ impl Joint {
             true => process_noise.iter().map(|q| q / scale).collect(),
             false => vec![],
         };
-        let is_classical = matches!(method, Method::Rk4(_));
+        let step = match method {
+            Method::Rk4(step) => Some(step),
+            _ => None,
+        };
         let noisy = || process_noise.iter().map(|q| *q > 0.0).collect();
         let equation = Equation::new(flow, noise);
         Ok(Self {
             integrator: Integrator::new(method, equation.dimension())?,
             equation,
-            straight: is_classical.then(|| flow.straight(noisy())),
+            straight: step.map(|_| Straight::new(flow, noisy())),
+            step,
             scale,
             z: vec![],
         })
@@ -71,8 +79,60 @@ impl Joint {
         };
         self.integrator.advance(&mut flow, from, to, &mut self.z)?;
         x.copy_from_slice(&self.z[..n]);
+        self.write(&self.z, transition);
+        Ok(())
+    }
+
+    /// Takes a belief to the next sample where that is one step, and one function; the transition is
+    /// [written](Self::write_last) when somebody asks for it.
+    pub fn leap(
+        &mut self,
+        driven: &mut Evaluation,
+        belief: &mut Belief,
+        from: f64,
+        to: f64,
+    ) -> bool {
+        let Some(straight) = &mut self.straight else {
+            return false;
+        };
+        let length = self.step.and_then(|step| step.length(to - from));
+        let steps = length.and_then(|length| fixed_steps(from, to, length).ok());
+        let is_one = steps == Some(1) && check_interval(from, to).is_ok();
+        if !is_one || driven.system().has_instants() {
+            return false;
+        }
+        let h = instant(from, to, 1, 1) - from;
+        let noise = (&*self.equation.noise, self.scale);
+        if !straight.run(driven, (from, h), &belief.x, noise, &belief.root) {
+            return false;
+        }
+        // where a covariance is finite, so is what it was made of
+        let is_sound = are_finite(&straight.next()[..self.equation.n]);
+        let is_carried = is_sound && straight.take(&mut belief.root);
+        if is_carried {
+            let x = &straight.next()[..self.equation.n];
+            belief.x.copy_from_slice(x);
+        }
+        is_carried
+    }
+
+    /// Goes on by the loops alone.
+    #[cfg(test)]
+    pub fn forget_code(&mut self) {
+        self.straight = None;
+    }
+
+    /// Writes Φ and W of the last leap.
+    pub fn write_last(&self, transition: &mut Transition<Profile>) {
+        if let Some(straight) = &self.straight {
+            self.write(straight.next(), transition);
+        }
+    }
+
+    fn write(&self, z: &[f64], transition: &mut Transition<Profile>) {
+        let (n, width) = (self.equation.n, self.equation.width);
         let columns = |first: usize, scale: f64| {
-            let rows = self.z[n..].chunks_exact(width);
+            let rows = z[n..].chunks_exact(width);
             let entries = rows.flat_map(move |row| &row[first..first + n]);
             entries.map(move |e| scale * e)
         };
@@ -80,7 +140,6 @@ impl Joint {
         if let Some(noise) = &mut transition.noise {
             noise.fill(columns(n, self.scale));
         }
-        Ok(())
     }
 
     /// Writes the root of ΦPΦᵀ + W over the last way, where one step made it.
@@ -184,7 +243,11 @@ impl Dynamics for Variational<'_> {
         let noise = (&*self.equation.noise, first.scale);
         let x = &z[..self.equation.n];
         let straight = &mut first.straight;
-        straight.step(self.driven, (t, h), x, noise, first.root, next)
+        let is_done = straight.run(self.driven, (t, h), x, noise, first.root);
+        if is_done {
+            next.copy_from_slice(straight.next());
+        }
+        is_done
     }
 
     fn slopes(&mut self, t: f64, z: &[f64], slopes: &mut Slopes) -> bool {

@@ -17,7 +17,6 @@ use crate::{EstimatorSettings, Linearised, Method, Result, Step};
 use joint::Joint;
 use piecewise::Piecewise;
 use series::Transition;
-pub(crate) use straight::{Code, Straight};
 
 /// Up to so many states x̂, Φ and W are integrated together, and wherever steps are given: these are
 /// then the steps of all three.
@@ -30,6 +29,8 @@ pub(crate) struct Propagation {
     pub driven: Evaluation,
     scheme: Scheme,
     transition: Transition<Profile>,
+    /// the transition is that of a way before the last
+    is_behind: bool,
     /// the estimate at the end of the last way
     pub end: Vec<f64>,
     /// of W
@@ -59,6 +60,7 @@ impl Propagation {
             driven: flow.system().driven(run.between),
             scheme,
             transition: Transition::start(n, process_noise.iter().any(|q| *q > 0.0)),
+            is_behind: false,
             end: vec![],
             factor: Factor::default(),
             rows: vec![],
@@ -68,6 +70,7 @@ impl Propagation {
 
     /// The way to the next sample from the belief's estimate, which stays.
     pub fn advance(&mut self, belief: &Belief, from: f64, to: f64) -> Result<()> {
+        self.is_behind = false;
         let (driven, x) = (&mut self.driven, &mut self.end);
         x.clone_from(&belief.x);
         match &mut self.scheme {
@@ -83,6 +86,12 @@ impl Propagation {
 
     /// x̂⁻ and P⁻ = ΦPΦᵀ + W at the next sample. A flow that fails leaves the belief as it was.
     pub fn predict(&mut self, belief: &mut Belief, from: f64, to: f64) -> Result<()> {
+        if let Scheme::Joint(joint) = &mut self.scheme
+            && joint.leap(&mut self.driven, belief, from, to)
+        {
+            self.is_behind = true;
+            return Ok(());
+        }
         self.advance(belief, from, to)?;
         belief.x.clone_from(&self.end);
         let is_carried = match &mut self.scheme {
@@ -97,6 +106,7 @@ impl Propagation {
 
     /// ΦPΦᵀ + W over the last way.
     pub fn carry(&mut self, root: &mut Root) {
+        self.catch_up();
         let mut rows = std::mem::take(&mut self.rows);
         rows.clear();
         self.push_root(&mut rows);
@@ -119,8 +129,16 @@ impl Propagation {
     }
 
     /// Φ of the last way.
-    pub fn transition(&self) -> &Profile {
+    pub fn transition(&mut self) -> &Profile {
+        self.catch_up();
         &self.transition.matrix
+    }
+
+    fn catch_up(&mut self) {
+        if let (true, Scheme::Joint(joint)) = (self.is_behind, &self.scheme) {
+            joint.write_last(&mut self.transition);
+            self.is_behind = false;
+        }
     }
 
     /// Whether noise moves the states.

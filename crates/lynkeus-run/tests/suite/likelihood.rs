@@ -1,0 +1,284 @@
+//! −log L along a filter and its derivatives, beside the filter itself and beside differences.
+
+use lynkeus_expr::{Expr, Graph, Node};
+use lynkeus_run::filter::{
+    FilterKind, FilterSettings, Likelihood, NoisyModel, NoisyPlant, ParametricPlant, Row, Sensor,
+};
+use lynkeus_run::{Blueprint, EstimatorSettings, Level, Method, Step};
+
+struct Random(u64);
+
+impl Random {
+    /// In [−1, 1).
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + 0.5 * (high - low) * (1.0 + self.next())
+    }
+}
+
+/// A log: time, readings (NaN in gaps), inputs.
+type Log = Vec<(f64, Vec<f64>, Vec<f64>)>;
+
+fn rows(log: &Log) -> impl Iterator<Item = Row<'_>> {
+    log.iter().map(|(t, readings, inputs)| Row {
+        t: *t,
+        readings,
+        inputs,
+    })
+}
+
+/// A plant of random structure: rates, a density, a noise and a start are parameters.
+struct Case {
+    graph: Graph,
+    n: usize,
+    sensors: usize,
+    /// [rates…, density, noise, start]
+    values: Vec<f64>,
+    log: Log,
+    seed: u64,
+}
+
+impl Case {
+    fn new(seed: u64) -> Self {
+        let mut random = Random(seed);
+        let n = 1 + seed as usize % 4;
+        let sensors = 1 + seed as usize % 2;
+        let mut values: Vec<f64> = (0..n).map(|_| random.between(0.4, 1.6)).collect();
+        values.extend([0.02, 0.05, 0.7].map(|v| v * random.between(0.5, 2.0)));
+        let mut t = 0.0;
+        let log = (0..25).map(|_| {
+            let y = (0..sensors).map(|_| match random.next() < 0.5 {
+                true => 0.6 + 0.3 * random.next(),
+                false => f64::NAN,
+            });
+            let row = (t, y.collect(), vec![random.next()]);
+            t += random.between(0.02, 0.3);
+            row
+        });
+        let log = log.collect();
+        Self {
+            graph: Graph::new(),
+            n,
+            sensors,
+            values,
+            log,
+            seed,
+        }
+    }
+
+    /// The plant with these expressions for its parameters.
+    fn plant(&self, θ: &[Node]) -> (Vec<Node>, Vec<Node>, Vec<Node>, [Node; 2]) {
+        let g = &self.graph;
+        let mut random = Random(self.seed + 1000);
+        let x: Vec<Expr<'_>> = (0..self.n).map(|i| g.symbol(&format!("x{i}"))).collect();
+        let u = g.symbol("u");
+        let derivatives = (0..self.n).map(|i| {
+            let own = -g.expr(θ[i]) * x[i] * (1.0 + 0.2 * x[i]);
+            let before = if i == 0 {
+                u
+            } else {
+                g.expr(θ[i - 1]) * x[i - 1].sin()
+            };
+            own + before + 0.1 * random.next() * x[self.n - 1]
+        });
+        let derivatives = derivatives.map(Expr::node).collect();
+        let outputs =
+            (0..self.sensors).map(|k| (x[self.n - 1] + 0.3 * k as f64 * x[0].exp()).node());
+        let states = x.iter().map(|x| x.node()).collect();
+        (
+            states,
+            derivatives,
+            outputs.collect(),
+            [g.symbol("time").node(), u.node()],
+        )
+    }
+
+    fn likelihood(&self) -> Likelihood {
+        let g = &self.graph;
+        let θ: Vec<Expr<'_>> = (0..self.values.len())
+            .map(|i| g.symbol(&format!("p{i}")))
+            .collect();
+        let nodes: Vec<Node> = θ.iter().map(|θ| θ.node()).collect();
+        let (states, derivatives, outputs, [time, u]) = self.plant(&nodes);
+        let [q, r, start] = [0, 1, 2].map(|k| θ[self.n + k]);
+        let zero = g.constant(0.0).node();
+        // noise acts on the last state alone where there are three
+        let is_noisy = |i: usize| self.n != 3 || i == 2;
+        Likelihood::new(&ParametricPlant {
+            graph: g,
+            time,
+            derivatives,
+            inputs: vec![u],
+            sensors: outputs.iter().map(|&h| (h, (r * r).node())).collect(),
+            process_noise: (0..self.n)
+                .map(|i| if is_noisy(i) { q.node() } else { zero })
+                .collect(),
+            start: states
+                .iter()
+                .map(|_| (start.node(), g.constant(0.2).node()))
+                .collect(),
+            parameters: nodes,
+            states,
+        })
+        .unwrap()
+    }
+
+    /// −log L of the filter of the library, whose corrections are other code.
+    fn filtered(&self) -> f64 {
+        let g = &self.graph;
+        let θ: Vec<Node> = self.values.iter().map(|&v| g.constant(v).node()).collect();
+        let (states, derivatives, outputs, [time, u]) = self.plant(&θ);
+        let [q, r, start] = [0, 1, 2].map(|k| self.values[self.n + k]);
+        let model = NoisyModel::new(&NoisyPlant {
+            graph: g,
+            time,
+            states: states
+                .iter()
+                .map(|&x| (format!("{x:?}"), x, start))
+                .collect(),
+            derivatives,
+            inputs: vec![("u".into(), u)],
+            sensors: (outputs.iter().enumerate())
+                .map(|(k, &output)| Sensor {
+                    name: format!("y{k}"),
+                    output,
+                    noise: Level::Absolute(r),
+                    limits: None,
+                })
+                .collect(),
+            process_noise: (0..self.n)
+                .map(|i| if self.n != 3 || i == 2 { q } else { 0.0 })
+                .collect(),
+            initial_variance: vec![0.2 * 0.2; self.n],
+            ranges: vec![],
+            confined: None,
+        })
+        .unwrap();
+        let run = EstimatorSettings {
+            method: Method::Rk4(Step::Substeps(1)),
+            ..EstimatorSettings::default()
+        };
+        let settings = FilterSettings::of(FilterKind::Extended);
+        let mut filter = Blueprint::filter(model, settings, run).estimator().unwrap();
+        filter.keep_record();
+        let mut sum = 0.0;
+        for (t, readings, inputs) in &self.log {
+            filter.push(*t, &[&readings[..], inputs].concat()).unwrap();
+            sum -= filter.record().unwrap().log_likelihood;
+        }
+        sum
+    }
+}
+
+#[test]
+fn the_likelihood_is_the_filter_s() {
+    for seed in 0..40 {
+        let case = Case::new(seed);
+        let score = case
+            .likelihood()
+            .score(&case.values, rows(&case.log), 1.0)
+            .unwrap();
+        let expected = case.filtered();
+        let off = (score.value - expected).abs() / (1.0 + expected.abs());
+        assert!(
+            off < 1e-11,
+            "seed {seed}: {} beside {expected}",
+            score.value
+        );
+        let readings = case
+            .log
+            .iter()
+            .flat_map(|row| &row.1)
+            .filter(|y| y.is_finite());
+        assert_eq!(score.readings, readings.count());
+    }
+}
+
+/// Beside differences of order 6, which leave about 1e-9 of the value.
+#[test]
+fn derivatives_are_those_of_the_value() {
+    for seed in 0..40 {
+        let case = Case::new(seed);
+        let mut likelihood = case.likelihood();
+        let mut value = |θ: &[f64]| likelihood.score(θ, rows(&case.log), 0.1).unwrap().value;
+        let mut differences = vec![];
+        for p in 0..case.values.len() {
+            let h = 2e-3 * case.values[p];
+            let mut at = |k: f64| {
+                let mut θ = case.values.clone();
+                θ[p] += k * h;
+                value(&θ)
+            };
+            let [one, two, three] = [1.0, 2.0, 3.0].map(|k| at(k) - at(-k));
+            differences.push((45.0 * one - 9.0 * two + three) / (60.0 * h));
+        }
+        let score = likelihood
+            .score(&case.values, rows(&case.log), 0.1)
+            .unwrap();
+        for (p, (exact, difference)) in score.gradient.iter().zip(differences).enumerate() {
+            let size = 1.0 + exact.abs() + score.value.abs() / case.values[p];
+            let off = (exact - difference).abs() / size;
+            assert!(
+                off < 1e-8,
+                "seed {seed}, parameter {p}: {exact} beside {difference}"
+            );
+        }
+    }
+}
+
+/// y = c + noise of deviation r, known exactly but for c and r: Fisher's information of N readings is N/r² of c
+/// and 2N/r² of r, and they have nothing in common.
+#[test]
+fn the_information_is_fisher_s() {
+    let g = Graph::new();
+    let [time, x, c, r] = ["time", "x", "c", "r"].map(|name| g.symbol(name));
+    let zero = g.constant(0.0).node();
+    let mut likelihood = Likelihood::new(&ParametricPlant {
+        graph: &g,
+        time: time.node(),
+        states: vec![x.node()],
+        derivatives: vec![zero],
+        inputs: vec![],
+        sensors: vec![(x.node(), (r * r).node())],
+        process_noise: vec![zero],
+        start: vec![(c.node(), zero)],
+        parameters: vec![c.node(), r.node()],
+    })
+    .unwrap();
+    let log: Log = (0..50)
+        .map(|k| (f64::from(k), vec![1.0 + (f64::from(k)).sin()], vec![]))
+        .collect();
+    let score = likelihood.score(&[1.1, 0.5], rows(&log), 1.0).unwrap();
+    for (found, expected) in score.information.iter().zip([200.0, 0.0, 0.0, 400.0]) {
+        assert!((found - expected).abs() < 1e-9, "{found} beside {expected}");
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let case = Case::new(1);
+    let mut likelihood = case.likelihood();
+    let refused = |likelihood: &mut Likelihood, θ: &[f64], step: f64| {
+        likelihood
+            .score(θ, rows(&case.log), step)
+            .unwrap_err()
+            .to_string()
+    };
+    assert!(refused(&mut likelihood, &[1.0], 1.0).contains("number of parameters"));
+    assert!(refused(&mut likelihood, &case.values, f64::NAN).contains("longest step"));
+    let back = vec![case.log[3].clone(), case.log[1].clone()];
+    let error = likelihood
+        .score(&case.values, rows(&back), 1.0)
+        .unwrap_err();
+    assert!(
+        matches!(error, lynkeus_run::Error::TimeBefore { .. }),
+        "{error}"
+    );
+}
