@@ -56,8 +56,8 @@ impl Batch {
         columns: &[Column],
     ) -> Result<Option<Self>> {
         let made = match lynkeus_native::widest() {
-            8 if members.len() > 4 => Blocks::<8>::new(simulation, members)?,
-            _ => Blocks::<4>::new(simulation, members)?,
+            8 if members.len() > 4 => Blocks::<8>::work(simulation, members)?,
+            _ => Blocks::<4>::work(simulation, members)?,
         };
         let Some((plan, work)) = made else {
             return Ok(None);
@@ -194,7 +194,7 @@ struct Blocks<const L: usize> {
 
 impl<const L: usize> Blocks<L> {
     /// The plan of a simulation and the blocks of its runs.
-    fn new(simulation: &Simulation, members: &[Member]) -> Result<Option<(Plan, Box<dyn Work>)>> {
+    fn work(simulation: &Simulation, members: &[Member]) -> Result<Option<(Plan, Box<dyn Work>)>> {
         let Some((plan, program)) = Plan::new::<L>(simulation)? else {
             return Ok(None);
         };
