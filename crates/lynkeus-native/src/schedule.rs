@@ -59,10 +59,11 @@ pub(crate) fn scheduled(
     is_call: impl Fn(Value) -> bool,
 ) -> Program {
     let mut scheduler = Scheduler::new(program, registers);
+    let is_ordered = is_single && scheduler.is_deep();
     let mut section = vec![];
     for id in called_early(program, &scheduler.is_needed, &is_call) {
         let value = program.values[id as usize];
-        if matches!(value, Value::Input(_) | Value::Constant(_)) || !is_single {
+        if matches!(value, Value::Input(_) | Value::Constant(_)) || !is_ordered {
             scheduler.is_begun[id as usize] = true;
             scheduler.order.push(id);
         } else if is_call(value) {
@@ -216,6 +217,13 @@ impl<'p> Scheduler<'p> {
         for id in 0..self.program.values.len() as Id {
             self.note_last_user(id);
         }
+    }
+
+    /// Whether the longest way takes long beside all operations. Where it does not, neighbours have little to do
+    /// with each other, and a processor needs no help.
+    fn is_deep(&self) -> bool {
+        let longest = self.height.iter().max().copied().unwrap_or(0);
+        2 * (WIDTH * longest) as usize >= self.program.values.len()
     }
 
     fn value(&self, id: Id) -> Value {
