@@ -221,6 +221,10 @@ mod tests {
         assert_eq!(n * p, interval(-21.0, -8.0));
         assert_eq!(m * m, interval(-5.0, 25.0));
         assert_eq!(m * p, interval(-7.0, 35.0));
+        assert_eq!(p * p, interval(16.0, 49.0));
+        for (a, b) in [(n, m), (n, p), (m, p)] {
+            assert_eq!(a * b, b * a);
+        }
         assert_eq!(Interval::ZERO * Interval::ENTIRE, Interval::ZERO);
         assert_eq!(
             interval(2.0, INF) * interval(-INF, -3.0),
