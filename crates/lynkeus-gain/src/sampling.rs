@@ -17,58 +17,80 @@ const LARGEST_STEP: f64 = 1e28;
 /// How far from 1 a spectral radius is told from it.
 const ROUNDING: f64 = 1e-9;
 
-/// What is found of an error between samples.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    /// with the inter-sample predictor: the first interval at which an error does not shrink from
-    /// sample to sample; infinite where none was found up to 1000 times the fastest mode
-    pub predict: f64,
-    /// with held measurements: 2/ρ(CK), in which the estimate has followed a held reading by
-    /// 1 − e⁻² = 86 %, so that it runs after the steps that holding makes
-    pub hold: f64,
+/// The linearised error (e, ε)' = M (e, ε) of an observer with predicted measurements
+/// w' = L_f h(x̂), where e = x̂ − x, ε = w − y. A sample sets ε to 0, so that from one to the next
+/// e⁺ = Ψ(τ) e with Ψ the upper left block of exp(Mτ), and errors shrink where its spectral
+/// radius is below 1. They do with short intervals.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampledError {
+    M: DMatrix<f64>,
+    /// entries of e
+    n: usize,
+    /// the largest modulus of an eigenvalue without samples
+    fastest: f64,
+    hold: f64,
 }
 
-/// The largest intervals between samples for the linearised error (e, ε)' = M (e, ε) of an
-/// observer with predicted measurements w' = L_f h(x̂), where e = x̂ − x, ε = w − y, and ε is the
-/// last `sensors` entries. A sample sets ε to 0, so that from one to the next
-/// e⁺ = Ψ(τ) e with Ψ the upper left block of exp(Mτ), and errors shrink where its spectral
-/// radius is below 1. C is ∂h/∂x̂ by sensor, K = ∂F/∂w the upper right block of M.
-///
-/// None where errors do not shrink with short intervals either, and where M is too large or
-/// not finite.
-#[must_use]
-pub fn limits(M: &DMatrix<f64>, C: &DMatrix<f64>) -> Option<Limits> {
-    let (size, sensors) = (M.nrows(), C.nrows());
-    let n = size.checked_sub(sensors).filter(|n| *n > 0)?;
-    let is_fit = (M.ncols(), C.ncols()) == (size, n) && M.iter().all(|x| x.is_finite());
-    if !is_fit || size > LARGEST {
-        return None;
+impl SampledError {
+    /// From M, where ε is the last entries, and C = ∂h/∂x̂ by sensor. None where errors do not
+    /// shrink with short intervals, and where M is too large or not finite.
+    #[must_use]
+    pub fn new(M: DMatrix<f64>, C: &DMatrix<f64>) -> Option<Self> {
+        let (size, sensors) = (M.nrows(), C.nrows());
+        let n = size.checked_sub(sensors).filter(|n| *n > 0)?;
+        let is_fit = (M.ncols(), C.ncols()) == (size, n) && M.iter().all(|x| x.is_finite());
+        if !is_fit || size > LARGEST {
+            return None;
+        }
+        // K = ∂F/∂w is the upper right block
+        let hold = 2.0 / radius(C * M.view((0, n), (n, sensors)))?;
+        let fastest = radius(M.view((0, 0), (n, n)).into_owned())?;
+        if fastest <= 0.0 || !fastest.is_finite() {
+            return None;
+        }
+        let found = Self {
+            M,
+            n,
+            fastest,
+            hold,
+        };
+        found.shrinks(SHORTEST / fastest).then_some(found)
     }
-    let hold = 2.0 / radius(C * M.view((0, n), (n, sensors)))?;
-    let fastest = radius(M.view((0, 0), (n, n)).into_owned())?;
-    if fastest <= 0.0 || !fastest.is_finite() {
-        return None;
+
+    /// With held measurements: 2/ρ(CK), in which the estimate has followed a held reading by
+    /// 1 − e⁻² = 86 %, so that it runs after the steps that holding makes.
+    #[must_use]
+    pub fn hold(&self) -> f64 {
+        self.hold
     }
-    let shrinks = |interval: f64| {
-        let step = M * interval;
+
+    /// With the inter-sample predictor: the first interval at which an error does not shrink from
+    /// sample to sample; infinite where none was found up to 1000 times the fastest mode. What is
+    /// not below `least` is looked for no further, and told as something not below it.
+    #[must_use]
+    pub fn predict(&self, least: f64) -> f64 {
+        let longest = LONGEST / self.fastest;
+        let mut interval = SHORTEST / self.fastest;
+        while interval <= longest && interval < least && self.shrinks(interval * FINER) {
+            interval *= FINER;
+        }
+        match interval {
+            _ if interval > longest => f64::INFINITY,
+            _ if interval >= least => interval,
+            _ => between(interval, interval * FINER, |interval| {
+                self.shrinks(interval)
+            }),
+        }
+    }
+
+    fn shrinks(&self, interval: f64) -> bool {
+        let step = &self.M * interval;
         // also where the flow is not a number: nothing is seen to shrink
         step.amax() < LARGEST_STEP && {
-            let flow = step.exp().view((0, 0), (n, n)).into_owned();
+            let flow = step.exp().view((0, 0), (self.n, self.n)).into_owned();
             radius(flow).is_some_and(|radius| radius < 1.0 - ROUNDING)
         }
-    };
-    let mut interval = SHORTEST / fastest;
-    if !shrinks(interval) {
-        return None;
     }
-    while interval <= LONGEST / fastest && shrinks(interval * FINER) {
-        interval *= FINER;
-    }
-    let predict = match interval > LONGEST / fastest {
-        true => f64::INFINITY,
-        false => between(interval, interval * FINER, shrinks),
-    };
-    Some(Limits { predict, hold })
 }
 
 /// Where errors cease to shrink, to 1 %.
@@ -92,6 +114,21 @@ fn radius(matrix: DMatrix<f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The limits: with the predictor, and with held measurements.
+    #[derive(Debug, PartialEq)]
+    struct Limits {
+        predict: f64,
+        hold: f64,
+    }
+
+    fn limits(M: &DMatrix<f64>, C: &DMatrix<f64>) -> Option<Limits> {
+        let found = SampledError::new(M.clone(), C)?;
+        Some(Limits {
+            predict: found.predict(f64::INFINITY),
+            hold: found.hold(),
+        })
+    }
 
     /// M for a chain of integrators with gain (θ c₁, θ² c₂, …) from its first state.
     fn chain(θ: f64, c: &[f64]) -> DMatrix<f64> {
@@ -128,6 +165,10 @@ mod tests {
             assert!((θ * two.predict - 5.001).abs() < 0.06, "{two:?}");
             // CK = 2θ
             assert!((θ * two.hold - 1.0).abs() < 1e-12, "{two:?}");
+            // what is beyond what is asked for is not looked for
+            let near = SampledError::new(chain(θ, &[2.0, 1.0]), &first(2)).unwrap();
+            assert!((1.0..1.2).contains(&(θ * near.predict(1.0 / θ))));
+            assert_eq!(near.predict(6.0 / θ), two.predict);
             let three = limits(&chain(θ, &[3.0, 3.0, 1.0]), &first(3)).unwrap();
             assert!((θ * three.predict - 2.899).abs() < 0.04, "{three:?}");
         }

@@ -187,8 +187,19 @@ struct Branch {
     /// the first of its two halves, the second behind it
     halves: Option<usize>,
     sampled: bool,
-    /// its extreme corner that is one of the cell that it is a half of
-    shared: Option<End>,
+    /// what it is a half of; none for the whole
+    half: Option<Half>,
+}
+
+/// Of a cell that is half of another.
+#[derive(Clone, Copy)]
+struct Half {
+    /// the other
+    of: usize,
+    /// its end at which this half is: they share that extreme corner
+    end: End,
+    /// the side that was halved
+    side: usize,
 }
 
 /// A cell by its place in the tree, the one with the lowest bound first.
@@ -224,6 +235,8 @@ struct Search<'a> {
     /// the smallest and the largest value attained
     lowest: Option<Point>,
     highest: Option<Point>,
+    /// only a bound is asked for: while a cell has none, points decide nothing
+    bound_only: bool,
 }
 
 impl<'a> Search<'a> {
@@ -239,6 +252,7 @@ impl<'a> Search<'a> {
             tree: vec![],
             lowest: None,
             highest: None,
+            bound_only: false,
         };
         search.add(asked.region.cell(), None);
         Ok(search)
@@ -267,6 +281,7 @@ impl<'a> Search<'a> {
     /// A bound of the absolute values, as well as the budget allows. The end that values were
     /// seen further out at is sought first; the other only as far as it is not nearer to zero.
     fn magnitude(&mut self) -> f64 {
+        self.bound_only = true;
         self.sample(0, true);
         let size = |end: End| self.attained(end).map_or(0.0, f64::abs);
         let (first, second) = match size(End::Lower) > size(End::Upper) {
@@ -274,6 +289,9 @@ impl<'a> Search<'a> {
             false => (End::Upper, End::Lower),
         };
         let size = -self.end(first).bound;
+        if size == f64::INFINITY {
+            return size;
+        }
         size.max(-self.end_beyond(second, f64::NEG_INFINITY, -size).bound)
     }
 
@@ -295,8 +313,13 @@ impl<'a> Search<'a> {
             bound: end.bound(self.tree[0].values),
             place: 0,
         }]);
+        // halves at which no point was looked at yet
+        let mut unseen = vec![];
         for step in 0..self.asked.budget {
             let Some(weakest) = open.peek() else { break };
+            if !(self.bound_only && weakest.bound == f64::NEG_INFINITY) {
+                self.sample_all(&mut unseen, end);
+            }
             let looks = step % OFTEN == 0;
             let is_hopeless = self.attained(end).is_some_and(|best| best <= hopeless);
             let done = is_hopeless || weakest.bound >= enough || self.is_close(weakest.bound, end);
@@ -309,12 +332,16 @@ impl<'a> Search<'a> {
             open.pop();
             for place in [first, first + 1] {
                 let bound = end.bound(self.tree[place].values);
-                // where no value can be further out than one attained, none is tried
-                if self.attained(end).is_none_or(|best| bound < best) {
-                    self.sample(place, self.asked.region.dimensions.len() <= FACES);
-                }
+                unseen.push(place);
                 open.push(Open { bound, place });
             }
+        }
+        if !(self.bound_only
+            && open
+                .peek()
+                .is_some_and(|open| open.bound == f64::NEG_INFINITY))
+        {
+            self.sample_all(&mut unseen, end);
         }
         // one cell stands there from the start, and two take the place of one
         open.pop().unwrap_or(Open {
@@ -323,13 +350,25 @@ impl<'a> Search<'a> {
         })
     }
 
-    fn add(&mut self, cell: Cell, shared: Option<End>) {
+    /// Looks at points of some cells, one after the other: where no value can be further out than
+    /// one attained, none is tried.
+    fn sample_all(&mut self, places: &mut Vec<usize>, end: End) {
+        let faces = self.asked.region.dimensions.len() <= FACES;
+        for place in places.drain(..) {
+            let bound = end.bound(self.tree[place].values);
+            if self.attained(end).is_none_or(|best| bound < best) {
+                self.sample(place, faces);
+            }
+        }
+    }
+
+    fn add(&mut self, cell: Cell, half: Option<Half>) {
         self.tree.push(Branch {
             values: self.bounds.value(&cell),
             cell,
             halves: None,
             sampled: false,
-            shared,
+            half,
         });
     }
 
@@ -338,10 +377,16 @@ impl<'a> Search<'a> {
         if let Some(first) = self.tree[place].halves {
             return Some(first);
         }
-        let [one, other] = self.asked.region.split(&self.tree[place].cell)?;
+        let whole = &self.tree[place].cell;
+        let [one, other] = self.asked.region.split(whole)?;
+        let side = (0..whole.len()).find(|&i| one[i] != whole[i])?;
+        let half = |end| {
+            let of = place;
+            Some(Half { of, end, side })
+        };
         let first = self.tree.len();
-        self.add(one, Some(End::Lower));
-        self.add(other, Some(End::Upper));
+        self.add(one, half(End::Lower));
+        self.add(other, half(End::Upper));
         self.tree[place].halves = Some(first);
         Some(first)
     }
@@ -369,20 +414,41 @@ impl<'a> Search<'a> {
         if std::mem::replace(&mut self.tree[place].sampled, true) {
             return;
         }
-        let Branch { cell, shared, .. } = &self.tree[place];
-        let mut points = vec![self.asked.region.middle_point(cell)];
-        if *shared != Some(End::Lower) {
-            points.push(lowest_corner(cell));
+        let half = self.tree[place].half;
+        let shared = half.map(|half| half.end);
+        // the middles of the faces beside the cut are points of the whole
+        let seen = half
+            .filter(|half| self.has_seen_faces(half))
+            .map(|half| half.side);
+        let cell = std::mem::take(&mut self.tree[place].cell);
+        let mut point = self.asked.region.middle_point(&cell);
+        self.look(&point);
+        if shared != Some(End::Lower) {
+            self.look(&lowest_corner(&cell));
         }
-        if *shared != Some(End::Upper) {
-            points.push(highest_corner(cell));
+        if shared != Some(End::Upper) {
+            self.look(&highest_corner(&cell));
         }
-        if faces {
-            points.extend(self.asked.region.faces(cell));
+        let sides = cell
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| faces && Some(*i) != seen);
+        for (i, side) in sides {
+            let middle = point[i];
+            for end in [side.lo(), side.hi()] {
+                point[i] = end;
+                self.look(&point);
+            }
+            point[i] = middle;
         }
-        for point in points {
-            self.look(&point);
-        }
+        self.tree[place].cell = cell;
+    }
+
+    /// Whether the points of a half's faces on both sides of the cut were looked at when the whole was.
+    fn has_seen_faces(&self, half: &Half) -> bool {
+        // the halves of whole numbers have a gap between them
+        let is_cut = !self.asked.region.dimensions[half.side].integer;
+        is_cut && self.tree[half.of].sampled
     }
 
     fn look(&mut self, at: &[f64]) {

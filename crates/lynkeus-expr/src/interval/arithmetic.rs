@@ -19,6 +19,7 @@ impl Neg for Interval {
 impl Add for Interval {
     type Output = Self;
 
+    #[inline]
     fn add(self, other: Self) -> Self {
         self.combine(other, |a, b| (sum(a.lo, b.lo).down(), sum(a.hi, b.hi).up()))
     }
@@ -27,6 +28,7 @@ impl Add for Interval {
 impl Sub for Interval {
     type Output = Self;
 
+    #[inline]
     fn sub(self, other: Self) -> Self {
         self + -other
     }
@@ -37,13 +39,24 @@ impl Mul for Interval {
 
     fn mul(self, other: Self) -> Self {
         self.combine(other, |a, b| {
-            if a.lo >= 0.0 && b.lo >= 0.0 {
-                return (product(a.lo, b.lo).down(), product(a.hi, b.hi).up());
-            }
-            a.corners(b, |x, y| {
-                let product = product(x, y);
-                (product.down(), product.up())
-            })
+            let down = |x, y| product(x, y).down();
+            let up = |x, y| product(x, y).up();
+            // the signs say which ends have the smallest and the largest product
+            let [least, most] = match (a.lo >= 0.0, a.hi <= 0.0, b.lo >= 0.0, b.hi <= 0.0) {
+                (true, _, true, _) => [(a.lo, b.lo), (a.hi, b.hi)],
+                (true, _, _, true) => [(a.hi, b.lo), (a.lo, b.hi)],
+                (_, true, true, _) => [(a.lo, b.hi), (a.hi, b.lo)],
+                (_, true, _, true) => [(a.hi, b.hi), (a.lo, b.lo)],
+                (true, _, _, _) => [(a.hi, b.lo), (a.hi, b.hi)],
+                (_, true, _, _) => [(a.lo, b.hi), (a.lo, b.lo)],
+                (_, _, true, _) => [(a.lo, b.hi), (a.hi, b.hi)],
+                (_, _, _, true) => [(a.hi, b.lo), (a.lo, b.lo)],
+                _ => {
+                    let lo = down(a.lo, b.hi).min(down(a.hi, b.lo));
+                    return (lo, up(a.lo, b.lo).max(up(a.hi, b.hi)));
+                }
+            };
+            (down(least.0, least.1), up(most.0, most.1))
         })
     }
 }
@@ -208,6 +221,10 @@ mod tests {
         assert_eq!(n * p, interval(-21.0, -8.0));
         assert_eq!(m * m, interval(-5.0, 25.0));
         assert_eq!(m * p, interval(-7.0, 35.0));
+        assert_eq!(p * p, interval(16.0, 49.0));
+        for (a, b) in [(n, m), (n, p), (m, p)] {
+            assert_eq!(a * b, b * a);
+        }
         assert_eq!(Interval::ZERO * Interval::ENTIRE, Interval::ZERO);
         assert_eq!(
             interval(2.0, INF) * interval(-INF, -3.0),

@@ -1,6 +1,7 @@
 //! Newton's method on t·cᵀx − Σ log det F_j(x) − log(R² − |x|²).
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use lynkeus_expr::Budget;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -37,6 +38,18 @@ pub(super) struct Barrier<'a> {
     pub budget: &'a Budget,
 }
 
+/// The factors of the blocks' values.
+type Factors = Vec<Cholesky<f64, Dyn>>;
+
+/// The barrier about a point, whatever t is.
+struct Local {
+    factors: Factors,
+    /// what the blocks take from the gradient, (unknown, tr(W F_k)) in their order
+    slopes: Vec<(usize, f64)>,
+    /// none where the arithmetic gave out or the budget ended
+    curvature: Option<Curvature>,
+}
+
 impl Barrier<'_> {
     /// From a point inside to near the minimum, until `good(x, gap)`: the gap bounds
     /// how far cᵀx is above its minimum. Where the arithmetic gives out, or the budget
@@ -48,13 +61,14 @@ impl Barrier<'_> {
         good: impl Fn(&DVector<f64>, f64) -> bool,
     ) -> Option<Ended> {
         let order = 1.0 + self.blocks.iter().map(|b| b.size as f64).sum::<f64>();
-        let mut t = self.first(&x, order)?;
+        let mut local = self.local(&x, self.factors(&x)?);
+        let mut t = self.first(&x, &local, order)?;
         for _ in 0..STEPS {
-            let factors = self.factors(&x)?;
-            let (g, H) = self.derivatives(&x, &factors, t);
-            let Some(step) = newton(H, &g, self.budget) else {
+            let Some(curvature) = &local.curvature else {
                 break;
             };
+            let g = self.gradient(&x, &local, t);
+            let step = curvature.newton(&g);
             let decrement = -g.dot(&step);
             let done = good(&x, order / t);
             if decrement < if done { CENTRAL } else { NEAR } {
@@ -64,8 +78,11 @@ impl Barrier<'_> {
                 t *= GROWTH;
                 continue;
             }
-            match self.advanced(&x, &step, &factors, t, decrement) {
-                Some(next) => x = next,
+            match self.advanced(&x, &step, &local.factors, t, decrement) {
+                Some((next, factors)) => {
+                    local = self.local(&next, factors);
+                    x = next;
+                }
                 None => break,
             }
         }
@@ -74,10 +91,10 @@ impl Barrier<'_> {
 
     /// The t for which the start is most nearly central, within reason:
     /// it minimises |tc + g| in the metric of the barrier's inverse Hessian.
-    fn first(&self, x: &DVector<f64>, order: f64) -> Option<f64> {
+    fn first(&self, x: &DVector<f64>, local: &Local, order: f64) -> Option<f64> {
         let usual = order / (1.0 + self.cost.dot(x).abs());
-        let (g, H) = self.derivatives(x, &self.factors(x)?, 0.0);
-        let towards = newton(H, &self.cost, self.budget)?;
+        let g = self.gradient(x, local, 0.0);
+        let towards = local.curvature.as_ref()?.newton(&self.cost);
         let nearest = -towards.dot(&g) / towards.dot(&self.cost);
         Some(nearest.clamp(30.0 * usual, 1e4 * usual))
     }
@@ -86,7 +103,7 @@ impl Barrier<'_> {
         self.factors(x).is_some()
     }
 
-    fn factors(&self, x: &DVector<f64>) -> Option<Vec<Cholesky<f64, Dyn>>> {
+    fn factors(&self, x: &DVector<f64>) -> Option<Factors> {
         if x.norm_squared() >= RADIUS * RADIUS {
             return None;
         }
@@ -96,21 +113,34 @@ impl Barrier<'_> {
             .collect()
     }
 
-    fn derivatives(
-        &self,
-        x: &DVector<f64>,
-        factors: &[Cholesky<f64, Dyn>],
-        t: f64,
-    ) -> (DVector<f64>, DMatrix<f64>) {
-        let slack = RADIUS * RADIUS - x.norm_squared();
-        let mut g = &self.cost * t + x * (2.0 / slack);
+    /// RADIUS² − |x|²
+    fn slack(x: &DVector<f64>) -> f64 {
+        RADIUS * RADIUS - x.norm_squared()
+    }
+
+    /// Gradient and Hessian, as far as they do not depend on t.
+    fn local(&self, x: &DVector<f64>, factors: Factors) -> Local {
+        let slack = Self::slack(x);
         let m = x.len();
+        let mut slopes = vec![];
         let mut H = DMatrix::identity(m, m) * (2.0 / slack);
         H.ger(4.0 / (slack * slack), x, x, 1.0);
-        for (block, factor) in self.blocks.iter().zip(factors) {
-            block.derivatives(&factor.inverse(), &mut g, &mut H, self.budget);
+        for (block, factor) in self.blocks.iter().zip(&factors) {
+            block.derivatives(&factor.inverse(), &mut slopes, &mut H, self.budget);
         }
-        (g, H)
+        Local {
+            factors,
+            slopes,
+            curvature: Curvature::of(H, self.budget),
+        }
+    }
+
+    fn gradient(&self, x: &DVector<f64>, local: &Local, t: f64) -> DVector<f64> {
+        let mut g = &self.cost * t + x * (2.0 / Self::slack(x));
+        for &(unknown, slope) in &local.slopes {
+            g[unknown] -= slope;
+        }
+        g
     }
 
     fn merit(&self, x: &DVector<f64>, factors: &[Cholesky<f64, Dyn>], t: f64) -> f64 {
@@ -122,11 +152,11 @@ impl Barrier<'_> {
                 .map(|d| d.ln())
                 .sum::<f64>()
         };
-        let slack = RADIUS * RADIUS - x.norm_squared();
-        t * self.cost.dot(x) - slack.ln() - factors.iter().map(log_det).sum::<f64>()
+        let logarithms = factors.iter().map(log_det).sum::<f64>();
+        t * self.cost.dot(x) - Self::slack(x).ln() - logarithms
     }
 
-    /// A step along Newton's direction that lowers the merit.
+    /// A point along Newton's direction with a lower merit, and the blocks' factors there.
     fn advanced(
         &self,
         x: &DVector<f64>,
@@ -134,7 +164,7 @@ impl Barrier<'_> {
         factors: &[Cholesky<f64, Dyn>],
         t: f64,
         decrement: f64,
-    ) -> Option<DVector<f64>> {
+    ) -> Option<(DVector<f64>, Factors)> {
         let merit = self.merit(x, factors, t);
         let mut length = 1.0;
         while length > 1e-12 {
@@ -142,7 +172,7 @@ impl Barrier<'_> {
             if let Some(factors) = self.factors(&next)
                 && self.merit(&next, &factors, t) <= merit - 1e-4 * length * decrement
             {
-                return Some(next);
+                return Some((next, factors));
             }
             length *= 0.6;
         }
@@ -150,30 +180,42 @@ impl Barrier<'_> {
     }
 }
 
-/// −H⁻¹g, with unknowns scaled so that H has a unit diagonal; none where the budget is spent.
-/// Of H the lower triangle is read.
-fn newton(mut H: DMatrix<f64>, g: &DVector<f64>, budget: &Budget) -> Option<DVector<f64>> {
-    if budget.spent().is_some() {
-        return None;
-    }
-    let scale = H.diagonal().map(|h| 1.0 / h.sqrt());
-    for (j, mut column) in H.column_iter_mut().enumerate() {
-        let below = column.as_mut_slice().iter_mut().zip(scale.as_slice());
-        below
-            .skip(j)
-            .for_each(|(h, factor)| *h *= factor * scale[j]);
-    }
-    let right = -g.component_mul(&scale);
-    let mut ridge = 1e-14;
-    while ridge < 1e-4 {
-        let mut regular = H.clone();
-        regular.fill_diagonal(1.0 + ridge);
-        if let Some(factor) = cholesky(regular, budget) {
-            return Some(factor.solve(&right).component_mul(&scale));
+/// A Hessian, factored with its unknowns scaled so that it has a unit diagonal.
+struct Curvature {
+    scale: DVector<f64>,
+    factor: Cholesky<f64, Dyn>,
+}
+
+impl Curvature {
+    /// None where the budget is spent. Of H the lower triangle is read.
+    fn of(mut H: DMatrix<f64>, budget: &Budget) -> Option<Self> {
+        if budget.spent().is_some() {
+            return None;
         }
-        ridge *= 100.0;
+        let scale = H.diagonal().map(|h| 1.0 / h.sqrt());
+        for (j, mut column) in H.column_iter_mut().enumerate() {
+            let below = column.as_mut_slice().iter_mut().zip(scale.as_slice());
+            below
+                .skip(j)
+                .for_each(|(h, factor)| *h *= factor * scale[j]);
+        }
+        let mut ridge = 1e-14;
+        while ridge < 1e-4 {
+            let mut regular = H.clone();
+            regular.fill_diagonal(1.0 + ridge);
+            if let Some(factor) = cholesky(regular, budget) {
+                return Some(Self { scale, factor });
+            }
+            ridge *= 100.0;
+        }
+        None
     }
-    None
+
+    /// −H⁻¹g
+    fn newton(&self, g: &DVector<f64>) -> DVector<f64> {
+        let right = -g.component_mul(&self.scale);
+        self.factor.solve(&right).component_mul(&self.scale)
+    }
 }
 
 /// The factor of a matrix that may be large, panel by panel; none where it has none, or
@@ -200,20 +242,31 @@ fn cholesky(mut L: DMatrix<f64>, budget: &Budget) -> Option<Cholesky<f64, Dyn>> 
 
 /// Some columns of the factor, from which those before have been taken.
 fn panel(L: &mut DMatrix<f64>, from: usize, to: usize) -> Option<()> {
+    let n = L.nrows();
     for j in from..to {
-        for k in from..j {
-            let factor = -L[(j, k)];
-            let (mut column, before) = L.columns_range_pair_mut(j, k);
-            let before = before.rows_range(j..);
-            column.rows_range_mut(j..).axpy(factor, &before, 1.0);
+        let (before, rest) = L.as_mut_slice().split_at_mut(j * n);
+        let column = &mut rest[j..n];
+        // four at a time: the column is read and written once for all
+        let mut sides = before[from * n..].chunks_exact(4 * n);
+        for sides in &mut sides {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|k| &sides[k * n + j..(k + 1) * n]);
+            let (f, g, h, i) = (-a[0], -b[0], -c[0], -d[0]);
+            let all = a.iter().zip(b).zip(c.iter().zip(d));
+            for (sum, ((a, b), (c, d))) in column.iter_mut().zip(all) {
+                *sum = (((*sum + f * a) + g * b) + h * c) + i * d;
+            }
         }
-        let pivot = L[(j, j)];
+        for side in sides.remainder().chunks_exact(n) {
+            let factor = -side[j];
+            let pairs = column.iter_mut().zip(&side[j..]);
+            pairs.for_each(|(sum, entry)| *sum += factor * entry);
+        }
+        let pivot = column[0];
         if pivot.is_nan() || pivot <= 0.0 {
             return None;
         }
-        let mut column = L.column_mut(j);
-        let mut below = column.rows_range_mut(j..);
-        below /= pivot.sqrt();
+        let root = pivot.sqrt();
+        column.iter_mut().for_each(|entry| *entry /= root);
     }
     Some(())
 }
@@ -223,39 +276,54 @@ pub(super) struct Block {
     pub size: usize,
     constant: DMatrix<f64>,
     terms: Vec<Term>,
+    /// the terms again, a few side by side
+    groups: Vec<Group>,
+    /// per column: the rows of the upper triangle that some term reads
+    read: Vec<Range<usize>>,
+}
+
+/// Terms that stand side by side.
+const SIDE: usize = 4;
+
+/// Inner products with neighbouring terms: sums that wait for nothing of each other.
+struct Group {
+    /// one entry of each term: its place in the matrix, column by column, and its value, twice
+    /// where it has a mirror image; zeros where a term has no more
+    entries: Vec<([usize; SIDE], [f64; SIDE])>,
+}
+
+impl Group {
+    fn new(terms: &[Term], n: usize) -> Self {
+        let most = terms.iter().map(|term| term.entries.len()).max();
+        let mut entries = vec![([0; SIDE], [0.0; SIDE]); most.unwrap_or(0)];
+        for (side, term) in terms.iter().enumerate() {
+            for ((places, weights), &(i, j, value)) in entries.iter_mut().zip(&term.entries) {
+                places[side] = j * n + i;
+                weights[side] = if i == j { value } else { 2.0 * value };
+            }
+        }
+        Self { entries }
+    }
+
+    /// tr(F G) for symmetric G, of which the upper triangle is read.
+    fn inner(&self, G: &[f64]) -> [f64; SIDE] {
+        let mut sums = [0.0; SIDE];
+        for (places, weights) in &self.entries {
+            for (sum, (place, weight)) in sums.iter_mut().zip(places.iter().zip(weights)) {
+                *sum += weight * G[*place];
+            }
+        }
+        sums
+    }
 }
 
 /// F_k of one unknown that occurs.
 struct Term {
     unknown: usize,
-    /// entries of the upper triangle
-    entries: Vec<Entry>,
+    /// entries on or above the diagonal, (row, column, value)
+    entries: Vec<(usize, usize, f64)>,
     /// F_k = Σ e_i vᵀ + v e_iᵀ over few rows i
     rows: Vec<Row>,
-}
-
-/// An entry on or above the diagonal.
-#[derive(Clone, Copy)]
-struct Entry {
-    i: usize,
-    j: usize,
-    value: f64,
-    /// of the n×n matrix, column by column
-    place: usize,
-    /// the value, twice where it has a mirror image
-    weight: f64,
-}
-
-impl Entry {
-    fn new((i, j, value): (usize, usize, f64), n: usize) -> Self {
-        Self {
-            i,
-            j,
-            value,
-            place: j * n + i,
-            weight: if i == j { value } else { 2.0 * value },
-        }
-    }
 }
 
 /// A row of a symmetric matrix, and the column that mirrors it.
@@ -266,18 +334,18 @@ struct Row {
 }
 
 impl Term {
-    fn new(unknown: usize, entries: Vec<Entry>, n: usize) -> Self {
+    fn new(unknown: usize, entries: Vec<(usize, usize, f64)>, n: usize) -> Self {
         let mut rows = vec![];
         let mut left = entries.clone();
         while !left.is_empty() {
             let mut counts = vec![0; n];
-            for entry in &left {
-                counts[entry.i] += 1;
-                counts[entry.j] += 1;
+            for &(i, j, _) in &left {
+                counts[i] += 1;
+                counts[j] += 1;
             }
             let fullest = (0..n).max_by_key(|&i| counts[i]).unwrap_or(0);
             let mut row = vec![];
-            left.retain(|&Entry { i, j, value, .. }| {
+            left.retain(|&(i, j, value)| {
                 match (i == fullest, j == fullest) {
                     (true, true) => row.push((i, 0.5 * value)),
                     (true, false) => row.push((j, value)),
@@ -298,32 +366,71 @@ impl Term {
         }
     }
 
-    /// tr(F G) for symmetric G, of which the upper triangle is read.
-    fn inner(&self, G: &[f64]) -> f64 {
-        let entries = self.entries.iter();
-        entries.map(|entry| entry.weight * G[entry.place]).sum()
-    }
-
-    /// The upper triangle of W F W, into G; `b` has room for a column.
-    fn sandwiched(&self, W: &DMatrix<f64>, b: &mut DVector<f64>, G: &mut DMatrix<f64>) {
+    /// The upper triangle of W F W, into G where that is `read`; `room` is for columns.
+    fn sandwiched(
+        &self,
+        W: &DMatrix<f64>,
+        read: &[Range<usize>],
+        room: &mut [Vec<f64>; 2],
+        G: &mut DMatrix<f64>,
+    ) {
         let n = W.ncols();
-        for (place, row) in self.rows.iter().enumerate() {
-            let a = W.column(row.place);
-            b.fill(0.0);
-            for &(j, value) in &row.entries {
-                b.axpy(value, &W.column(j), 1.0);
+        let column = |j: usize| &W.as_slice()[j * n..(j + 1) * n];
+        for (place, rows) in self.rows.chunks(2).enumerate() {
+            for (b, row) in room.iter_mut().zip(rows) {
+                b.clear();
+                b.resize(n, 0.0);
+                for &(j, value) in &row.entries {
+                    let pairs = b.iter_mut().zip(column(j));
+                    pairs.for_each(|(b, w)| *b += value * w);
+                }
             }
-            let (a, b) = (a.as_slice(), b.as_slice());
-            for (column, into) in G.as_mut_slice().chunks_mut(n).enumerate() {
-                let (of_a, of_b) = (a[column], b[column]);
-                let pairs = a[..=column].iter().zip(&b[..=column]);
-                let pairs = into[..=column].iter_mut().zip(pairs);
-                match place {
-                    0 => pairs.for_each(|(g, (a, b))| *g = a * of_b + b * of_a),
-                    _ => pairs.for_each(|(g, (a, b))| *g += a * of_b + b * of_a),
+            let [b, d] = &*room;
+            let a = column(rows[0].place);
+            // two at once: G is read and written once for both
+            let c = rows.get(1).map(|row| column(row.place));
+            for (k, (into, rows)) in G.as_mut_slice().chunks_mut(n).zip(read).enumerate() {
+                let into = &mut into[rows.clone()];
+                match c {
+                    Some(c) => put_two(into, place == 0, [a, b, c, d].map(|v| part(v, k, rows))),
+                    None => put_one(into, place == 0, [a, b].map(|v| part(v, k, rows))),
                 }
             }
         }
+    }
+}
+
+/// A number of a column, and the part of the column that is asked for.
+type Part<'a> = (f64, &'a [f64]);
+
+fn part<'a>(column: &'a [f64], k: usize, rows: &Range<usize>) -> Part<'a> {
+    (column[k], &column[rows.clone()])
+}
+
+/// The column of a bᵀ + b aᵀ, set or added.
+fn put_one(into: &mut [f64], is_first: bool, [(of_a, a), (of_b, b)]: [Part<'_>; 2]) {
+    let all = into.iter_mut().zip(a.iter().zip(b));
+    match is_first {
+        true => all.for_each(|(g, (a, b))| *g = a * of_b + b * of_a),
+        false => all.for_each(|(g, (a, b))| *g += a * of_b + b * of_a),
+    }
+}
+
+/// The same, and then that of c dᵀ + d cᵀ.
+fn put_two(
+    into: &mut [f64],
+    is_first: bool,
+    [(of_a, a), (of_b, b), (of_c, c), (of_d, d)]: [Part<'_>; 4],
+) {
+    let pairs = a.iter().zip(b).zip(c.iter().zip(d));
+    let all = into.iter_mut().zip(pairs);
+    match is_first {
+        true => all.for_each(|(g, ((a, b), (c, d)))| {
+            *g = (a * of_b + b * of_a) + (c * of_d + d * of_c);
+        }),
+        false => all.for_each(|(g, ((a, b), (c, d)))| {
+            *g = (*g + (a * of_b + b * of_a)) + (c * of_d + d * of_c);
+        }),
     }
 }
 
@@ -333,27 +440,45 @@ const LOOK: usize = 16;
 impl Block {
     pub fn new(F: &Affine) -> Self {
         let n = F.rows();
-        let mut terms: BTreeMap<usize, Vec<Entry>> = BTreeMap::new();
+        let mut terms: BTreeMap<usize, Vec<(usize, usize, f64)>> = BTreeMap::new();
         for i in 0..n {
             for j in i..n {
                 for (unknown, value) in F.terms(i, j).filter(|(_, value)| *value != 0.0) {
-                    let entry = Entry::new((i, j, value), n);
-                    terms.entry(unknown).or_default().push(entry);
+                    terms.entry(unknown).or_default().push((i, j, value));
                 }
             }
         }
-        let (terms, constants) = (terms.into_iter(), F.constants());
+        let terms = terms.into_iter();
+        let constants = F.constants();
+        Self::of(
+            DMatrix::from_fn(n, n, |i, j| constants[(i.min(j), i.max(j))]),
+            terms.map(|(k, entries)| Term::new(k, entries, n)).collect(),
+        )
+    }
+
+    fn of(constant: DMatrix<f64>, terms: Vec<Term>) -> Self {
+        let n = constant.nrows();
+        let mut read = vec![0..0; n];
+        for &(i, j, _) in terms.iter().flat_map(|term| &term.entries) {
+            read[j] = match read[j].is_empty() {
+                true => i..i + 1,
+                false => read[j].start.min(i)..read[j].end.max(i + 1),
+            };
+        }
+        let groups = terms.chunks(SIDE).map(|terms| Group::new(terms, n));
         Self {
             size: n,
-            constant: DMatrix::from_fn(n, n, |i, j| constants[(i.min(j), i.max(j))]),
-            terms: terms.map(|(k, entries)| Term::new(k, entries, n)).collect(),
+            constant,
+            groups: groups.collect(),
+            terms,
+            read,
         }
     }
 
     pub fn value(&self, x: &DVector<f64>) -> DMatrix<f64> {
         let mut F = self.constant.clone();
         for term in &self.terms {
-            for &Entry { i, j, value, .. } in &term.entries {
+            for &(i, j, value) in &term.entries {
                 F[(i, j)] += x[term.unknown] * value;
                 if i != j {
                     F[(j, i)] += x[term.unknown] * value;
@@ -363,28 +488,38 @@ impl Block {
         F
     }
 
-    /// Adds −∇ log det and the lower triangle of its Hessian: with W = F⁻¹,
+    /// Adds what −∇ log det takes from the gradient, and the lower triangle of the Hessian: with W = F⁻¹,
     /// g_k = −tr(W F_k) and H_kl = tr(W F_k W F_l). Where the budget ends they are not whole,
     /// and nobody reads them: who does asks for the budget first.
     pub fn derivatives(
         &self,
         W: &DMatrix<f64>,
-        g: &mut DVector<f64>,
+        slopes: &mut Vec<(usize, f64)>,
         H: &mut DMatrix<f64>,
         budget: &Budget,
     ) {
         let (n, m) = (self.size, H.nrows());
-        let (mut b, mut G) = (DVector::zeros(n), DMatrix::zeros(n, n));
+        let (mut room, mut G) = ([vec![], vec![]], DMatrix::zeros(n, n));
+        let of_W = self
+            .groups
+            .iter()
+            .flat_map(|group| group.inner(W.as_slice()));
+        slopes.extend(self.terms.iter().map(|term| term.unknown).zip(of_W));
         for (a, term) in self.terms.iter().enumerate() {
             if a % LOOK == 0 && budget.spent().is_some() {
                 return;
             }
             let k = term.unknown;
-            g[k] -= term.inner(W.as_slice());
-            term.sandwiched(W, &mut b, &mut G);
+            term.sandwiched(W, &self.read, &mut room, &mut G);
             let column = &mut H.as_mut_slice()[k * m..(k + 1) * m];
-            for other in &self.terms[a..] {
-                column[other.unknown] += other.inner(G.as_slice());
+            // those beside it that stand before it are of the upper triangle
+            let first = a / SIDE;
+            let groups = self.terms.chunks(SIDE).zip(&self.groups).skip(first);
+            for (terms, group) in groups {
+                let inner = group.inner(G.as_slice());
+                for (other, inner) in terms.iter().zip(inner) {
+                    column[other.unknown] += inner;
+                }
             }
         }
     }
@@ -444,19 +579,24 @@ mod tests {
             F[(i, j)] = value;
             F[(j, i)] = value;
         }
-        let entries = entries.into_iter().map(|entry| Entry::new(entry, n));
-        let term = Term::new(0, entries.collect(), n);
+        let block = Block::of(DMatrix::zeros(n, n), vec![Term::new(0, entries, n)]);
+        let term = &block.terms[0];
         let W = DMatrix::from_fn(n, n, |i, j| ((i * j) as f64).cos());
         let expected = &W * &F * &W;
         // what was in the room before does not count
         let mut found = DMatrix::from_element(n, n, 7.0);
-        term.sandwiched(&W, &mut DVector::from_element(n, 3.0), &mut found);
-        for j in 0..n {
-            for i in 0..=j {
+        let mut room = [vec![3.0; n], vec![]];
+        term.sandwiched(&W, &block.read, &mut room, &mut found);
+        for (j, rows) in block.read.iter().enumerate() {
+            for i in rows.clone() {
                 assert!((found[(i, j)] - expected[(i, j)]).abs() < 1e-13);
             }
         }
-        assert!((term.inner(W.as_slice()) - (&F * &W).trace()).abs() < 1e-13);
+        // what is read of it is what the term weighs
+        let mut entries = term.entries.iter();
+        assert!(entries.all(|(i, j, _)| block.read[*j].contains(i)));
+        let found = block.groups[0].inner(W.as_slice())[0];
+        assert!((found - (&F * &W).trace()).abs() < 1e-13);
     }
 
     /// Gradient and Hessian of −log det F against differences.
@@ -480,9 +620,13 @@ mod tests {
         let block = Block::new(&F);
         let x = DVector::from_vec(vec![0.3, -0.4, 0.2, 0.5]);
         let barrier = |x: &DVector<f64>| -block.value(x).determinant().ln();
-        let (mut g, mut H) = (DVector::zeros(4), DMatrix::zeros(4, 4));
+        let (mut slopes, mut H) = (vec![], DMatrix::zeros(4, 4));
         let W = block.value(&x).try_inverse().unwrap();
-        block.derivatives(&W, &mut g, &mut H, &Budget::default());
+        block.derivatives(&W, &mut slopes, &mut H, &Budget::default());
+        let mut g: DVector<f64> = DVector::zeros(4);
+        slopes
+            .iter()
+            .for_each(|(unknown, slope)| g[*unknown] -= slope);
         let h = 1e-4;
         let moved = |steps: &[(usize, f64)]| {
             let mut x = x.clone();

@@ -39,15 +39,37 @@ impl<'g> Flow<'_, 'g> {
         (!is_nothing).then(|| self.graph.expr(node))
     }
 
-    /// x̂ and the rows of (Φ W) after a step of length h.
-    pub fn step(&self, h: Expr<'g>) -> Vec<Term<'g>> {
+    /// x̂ and the rows of (Φ W) at a sample: Φ = I, W = 0.
+    pub fn start(&self) -> Vec<Term<'g>> {
         let (n, width) = (self.states(), self.width());
         let x = self.inputs[1..=n].iter().map(|&x| Some(self.graph.expr(x)));
         let mut z: Vec<Term<'g>> = x.collect();
         z.resize(n + n * width, None);
         (0..n).for_each(|i| z[n + i * width + i] = Some(self.graph.constant(1.0)));
+        z
+    }
+
+    /// What x̂ and the rows of (Φ W) are after a step of length h.
+    pub fn step(&self, h: Expr<'g>, z: &[Term<'g>]) -> Vec<Term<'g>> {
         let t = self.graph.expr(self.inputs[0]);
-        classical_step(t, h, &z, |t, z| self.variation(t, z))
+        classical_step(t, h, z, |t, z| self.variation(t, z))
+    }
+
+    /// Symbols for what is not zero after some steps from a sample; more of them make no more.
+    pub fn under_way(&self, h: Expr<'g>) -> Vec<Term<'g>> {
+        let n = self.states();
+        let x = self.start();
+        let mut found = self.step(h, &x);
+        loop {
+            let rows = found[n..].iter();
+            let rows = rows.map(|entry| entry.map(|_| self.graph.fresh("z")));
+            let z: Vec<Term<'g>> = x[..n].iter().copied().chain(rows).collect();
+            found = self.step(h, &z);
+            let grows = |(new, old): (&Term<'g>, &Term<'g>)| new.is_some() && old.is_none();
+            if !found.iter().zip(&z).any(grows) {
+                return z;
+            }
+        }
     }
 
     /// x̂', Φ' = FΦ and W' = FW + WFᵀ + Q.

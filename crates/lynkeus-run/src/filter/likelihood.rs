@@ -444,7 +444,7 @@ impl<'p, 'g> Sample<'p, 'g> {
             places: &places,
             noise: plant.process_noise.iter().map(|&q| self.term(q)).collect(),
         };
-        let next = flow.step(self.h);
+        let next = flow.step(self.h, &flow.start());
         let mut root = flow.carried(&next, plant.graph.constant(1.0), &self.belief().1);
         root.truncate(n * n);
         (next[..n].to_vec(), root)

@@ -120,7 +120,7 @@ impl<'a> From<&'a CertifyReport> for Proof<'a> {
             declared: &report.declared,
             outside_box: &report.strays,
             excitation: report.excited.as_ref().map(Excited::entry),
-            sampling: report.sampling.map(|intervals| intervals.entry(true)),
+            sampling: report.sampling.as_ref().map(|found| found.entry(true)),
             notes: both
                 .flat_map(|certificate| report.notes_of(certificate))
                 .chain(report.assumed.iter().cloned())

@@ -1,5 +1,7 @@
 //! The interval between samples against what the observer stands.
 
+use std::sync::OnceLock;
+
 use lynkeus_expr::{Node, Tape, jacobian};
 use lynkeus_gain::sampling;
 use lynkeus_observers::{Design, Observer};
@@ -29,18 +31,18 @@ pub enum Sampled {
 
 /// The sampling interval of a log or of a simulation, and estimates of the largest that the observer
 /// stands: from its linearised error along the estimate, no proof.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Intervals {
     /// the time between two samples, the median of a log's
     pub interval: f64,
     /// whose samples these are
     pub of: Sampled,
-    /// with `between_samples = "predict"`: beyond it errors grow from sample to sample
-    pub predict: f64,
-    /// with held measurements: beyond it an observer follows the steps that holding makes
-    pub hold: f64,
     /// how the run went
     between: BetweenSamples,
+    /// the error at some rows, never none
+    errors: Vec<sampling::SampledError>,
+    /// takes a thousand exponentials, and most runs need not know it
+    predict: OnceLock<f64>,
 }
 
 /// The interval between samples, beside what the observer stands (an estimate, no proof).
@@ -74,9 +76,9 @@ pub(crate) fn intervals(
         estimates: course.estimates.iter().collect(),
         inputs: samples.inputs.iter().collect(),
     };
-    let limits = path.limits(prepared.augmented(), &design.observer)?;
     let interval = median_interval(samples)?;
-    Some(Intervals::new(interval, Sampled::Log, limits, prepared))
+    let errors = path.errors(prepared.augmented(), &design.observer)?;
+    Intervals::new(interval, Sampled::Log, errors, prepared)
 }
 
 /// The interval of the study's simulation, where it is sampled, against the limits along its run,
@@ -105,8 +107,8 @@ pub(crate) fn simulated(
             .map(|u| of(&u.name)?.truth.as_ref())
             .collect::<Option<_>>()?,
     };
-    let limits = path.limits(prepared.augmented(), observer)?;
-    Some(Intervals::new(step, Sampled::Simulation, limits, prepared))
+    let errors = path.errors(prepared.augmented(), observer)?;
+    Intervals::new(step, Sampled::Simulation, errors, prepared)
 }
 
 /// A run of an observer: what it estimates and its inputs, row by row.
@@ -117,13 +119,13 @@ struct Path<'s> {
 }
 
 impl Path<'_> {
-    /// The smallest limits along the run; none for filters, whose gains know the interval, for
-    /// observers with further states, and where errors do not shrink.
-    fn limits(
+    /// The errors along the run that shrink with short intervals; none for filters, whose gains know
+    /// the interval, and for observers with further states.
+    fn errors(
         &self,
         augmented: &AugmentedPlant<'_>,
         observer: &Observer,
-    ) -> Option<sampling::Limits> {
+    ) -> Option<Vec<sampling::SampledError>> {
         let is_estimate = observer
             .states
             .iter()
@@ -174,14 +176,14 @@ impl Path<'_> {
             for (&(i, j, _), value) in views.entries.iter().zip(rest) {
                 C[(i, j)] += value;
             }
-            sampling::limits(&M, &C)
+            (M, C)
         };
-        let found: Vec<sampling::Limits> = (0..rows).step_by(stride).filter_map(at).collect();
-        let smallest = |of: fn(&sampling::Limits) -> f64| found.iter().map(of).reduce(f64::min);
-        Some(sampling::Limits {
-            predict: smallest(|l| l.predict)?,
-            hold: smallest(|l| l.hold)?,
-        })
+        let mut all: Vec<(DMatrix<f64>, DMatrix<f64>)> =
+            (0..rows).step_by(stride).map(at).collect();
+        // that of a linear plant is the same everywhere
+        all.dedup();
+        let of = |(M, C): (DMatrix<f64>, DMatrix<f64>)| sampling::SampledError::new(M, &C);
+        Some(all.into_iter().filter_map(of).collect())
     }
 }
 
@@ -195,14 +197,36 @@ fn median_interval(samples: &Samples) -> Option<f64> {
 }
 
 impl Intervals {
-    fn new(interval: f64, of: Sampled, limits: sampling::Limits, prepared: &Prepared<'_>) -> Self {
-        Self {
+    /// None where no error shrinks.
+    fn new(
+        interval: f64,
+        of: Sampled,
+        errors: Vec<sampling::SampledError>,
+        prepared: &Prepared<'_>,
+    ) -> Option<Self> {
+        (!errors.is_empty()).then(|| Self {
             interval,
             of,
-            predict: limits.predict,
-            hold: limits.hold,
             between: prepared.study().estimate.between_samples,
-        }
+            errors,
+            predict: OnceLock::new(),
+        })
+    }
+
+    /// With `between_samples = "predict"`: beyond it errors grow from sample to sample.
+    #[must_use]
+    pub fn predict(&self) -> f64 {
+        let smallest =
+            |least, error: &sampling::SampledError| f64::min(least, error.predict(least));
+        let find = || self.errors.iter().fold(f64::INFINITY, smallest);
+        *self.predict.get_or_init(find)
+    }
+
+    /// With held measurements: beyond it an observer follows the steps that holding makes.
+    #[must_use]
+    pub fn hold(&self) -> f64 {
+        let limits = self.errors.iter().map(sampling::SampledError::hold);
+        limits.fold(f64::INFINITY, f64::min)
     }
 
     /// Whether the readings are further apart than the observer stands. Readings that are
@@ -210,19 +234,19 @@ impl Intervals {
     #[must_use]
     pub fn is_beyond(&self) -> bool {
         match self.between {
-            BetweenSamples::Predict => self.interval >= self.predict,
-            BetweenSamples::Hold => self.interval > self.hold,
+            BetweenSamples::Predict => self.interval >= self.predict(),
+            BetweenSamples::Hold => self.interval > self.hold(),
             BetweenSamples::Linear => false,
         }
     }
 
     /// Beside the limit in a few words, where the readings are beyond it.
     pub(crate) fn beyond(&self) -> Option<String> {
-        let (limit, how) = match self.between {
-            BetweenSamples::Predict => (self.predict, "predicted"),
-            _ => (self.hold, "held"),
-        };
         self.is_beyond().then(|| {
+            let (limit, how) = match self.between {
+                BetweenSamples::Predict => (self.predict(), "predicted"),
+                _ => (self.hold(), "held"),
+            };
             format!(
                 "the samples are {} apart, and {how} between them this observer stands about {} (an estimate, no proof)",
                 figures(self.interval, 2),
@@ -237,19 +261,21 @@ impl Intervals {
         SamplingLimits {
             log: of(Sampled::Log),
             simulation: of(Sampled::Simulation),
-            largest_predict: finite(self.predict),
-            largest_hold: finite(self.hold),
+            largest_predict: finite(self.predict()),
+            largest_hold: finite(self.hold()),
             beyond: of_certificate.then(|| self.is_beyond()),
         }
     }
 
     /// What is to be said where the log's interval is beyond the limit.
     pub(crate) fn words(&self) -> Option<String> {
+        if !self.is_beyond() {
+            return None;
+        }
         let interval = figures(self.interval, 2);
-        let (predict, hold) = (figures(self.predict, 2), figures(self.hold, 2));
-        let is_for_predict = self.interval < self.predict;
+        let (predict, hold) = (figures(self.predict(), 2), figures(self.hold(), 2));
+        let is_for_predict = self.interval < self.predict();
         match self.between {
-            _ if !self.is_beyond() => None,
             BetweenSamples::Predict => Some(format!(
                 "the log's readings are {interval} apart, and this observer stands about {predict} with between_samples = \"predict\" (an estimate from its linearised error, no proof): a smaller theta, or family = \"ekf\""
             )),
@@ -257,7 +283,7 @@ impl Intervals {
                 let remedy = match is_for_predict {
                     true => format!(
                         "between_samples = \"predict\", which stands {}, ",
-                        match self.predict.is_finite() {
+                        match self.predict().is_finite() {
                             true => format!("about {predict}"),
                             false => "any interval".to_owned(),
                         }
@@ -277,13 +303,16 @@ mod tests {
     use super::*;
 
     fn words(interval: f64, predict: f64, hold: f64) -> String {
-        let between = BetweenSamples::Hold;
+        // e' = −e/2 − K e, held for 2/K
+        let K = 2.0 / hold;
+        let M = DMatrix::from_row_slice(2, 2, &[-0.5 - K, K, -0.5, 0.0]);
+        let error = sampling::SampledError::new(M, &DMatrix::identity(1, 1));
         let found = Intervals {
             interval,
             of: Sampled::Log,
-            predict,
-            hold,
-            between,
+            between: BetweenSamples::Hold,
+            errors: error.into_iter().collect(),
+            predict: predict.into(),
         };
         found.words().unwrap_or_default()
     }

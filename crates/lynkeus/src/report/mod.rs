@@ -110,7 +110,7 @@ pub fn report(
     let mut certified = certify(&named);
     if let Ok(certified) = &mut certified {
         // of the samples that the page shows
-        certified.sampling = outcome.intervals;
+        certified.sampling = outcome.intervals.clone();
     }
     let told = Told {
         study,

@@ -161,7 +161,7 @@ struct Variational<'a> {
     first: Option<First<'a>>,
 }
 
-/// The first step from Φ = I and W = 0.
+/// Steps as functions; the first one is from Φ = I and W = 0.
 struct First<'a> {
     straight: &'a mut Straight,
     root: &'a Root,
@@ -237,12 +237,13 @@ impl Dynamics for Variational<'_> {
         let Some(first) = &mut self.first else {
             return false;
         };
-        if std::mem::replace(&mut first.is_over, true) {
-            return false;
-        }
-        let noise = (&*self.equation.noise, first.scale);
-        let x = &z[..self.equation.n];
+        let noise = &*self.equation.noise;
         let straight = &mut first.straight;
+        if std::mem::replace(&mut first.is_over, true) {
+            return straight.go_on(self.driven, (t, h), z, noise, next);
+        }
+        let x = &z[..self.equation.n];
+        let noise = (noise, first.scale);
         let is_done = straight.run(self.driven, (t, h), x, noise, first.root);
         if is_done {
             next.copy_from_slice(straight.next());

@@ -7,10 +7,11 @@
 use std::ops::{Range, RangeInclusive};
 use std::sync::{Arc, OnceLock};
 
-use lynkeus_expr::{Expr, Node, Tape};
+use lynkeus_expr::{Expr, Graph, Node, Tape};
 use lynkeus_native::Function;
 
 use crate::classical::Term;
+use crate::equations::Equations;
 use crate::filter::expressions::Flow;
 use crate::filter::root::Root;
 use crate::method::are_finite;
@@ -31,7 +32,8 @@ const SQUARES: RangeInclusive<f64> = 1e-240..=1e240;
 struct Code {
     /// whether noise acts on a state
     noisy: Vec<bool>,
-    made: OnceLock<Option<Made>>,
+    first: OnceLock<Option<Made>>,
+    later: OnceLock<Option<Function<1>>>,
 }
 
 /// What is asked of a graph: the code with noise on such states, of a flow whose F are those of its outputs.
@@ -57,67 +59,110 @@ impl Code {
         graph.noted(&question).unwrap_or_else(|| {
             let code = Arc::new(Self {
                 noisy: question.noisy.clone(),
-                made: OnceLock::new(),
+                first: OnceLock::new(),
+                later: OnceLock::new(),
             });
             graph.note(question, code.clone());
             code
         })
     }
 
-    fn made(&self, flow: &System, slopes: &Jacobian) -> Option<&Made> {
-        let make = || self.make(flow, slopes);
-        self.made.get_or_init(make).as_ref()
+    /// The densities of the noises that act.
+    fn acting<'n>(&'n self, noise: &'n [f64]) -> impl Iterator<Item = &'n f64> {
+        let all = noise.iter().zip(&self.noisy);
+        all.filter(|(_, acts)| **acts).map(|(density, _)| density)
     }
 
-    fn make(&self, system: &System, jacobian: &Jacobian) -> Option<Made> {
-        let n = system.states().len();
-        // if Φ and W were full
-        if 16 * n * jacobian.places().len() > LARGEST_STEP {
-            return None;
-        }
+    /// The first step from a sample, with the covariance where that is not too much.
+    fn first(&self, system: &System, jacobian: &Jacobian) -> Option<Made> {
         let equations = system.equations();
         let graph = equations.graph();
+        let flow = self.flow(&graph, equations, jacobian)?;
+        let n = system.states().len();
+        let (h, scale) = (graph.fresh("h"), graph.fresh("scale"));
+        let next = flow.step(h, &flow.start());
+        let root: Vec<Term<'_>> = (0..n * n).map(|_| Some(graph.fresh("S"))).collect();
+        let carried = flow.carried(&next, scale, &root);
+        let own = [Some(h), Some(scale)].into_iter();
+        let inputs = flow.inputs_with(own.chain(flow.noise.iter().copied()).chain(root));
+        let step = nodes(&graph, &next);
+        let all = [&step[..], &nodes(&graph, &carried)].concat();
+        let kinds = [(&all, LARGEST_CARRIED), (&step, LARGEST_STEP)];
+        kinds.into_iter().find_map(|(outputs, most)| {
+            Some(Made {
+                function: compiled(&graph, &inputs, outputs, most)?,
+                step: step.len(),
+                outputs: outputs.len(),
+            })
+        })
+    }
+
+    /// A step from anywhere.
+    fn later(&self, system: &System, jacobian: &Jacobian) -> Option<Function<1>> {
+        let equations = system.equations();
+        let graph = equations.graph();
+        let flow = self.flow(&graph, equations, jacobian)?;
+        let h = graph.fresh("h");
+        let z = flow.under_way(h);
+        let n = system.states().len();
+        // of entries that stay zero, too: they stand in their places
+        let rows = z[n..]
+            .iter()
+            .map(|entry| Some(entry.unwrap_or_else(|| graph.fresh("z"))));
+        let own = [Some(h)].into_iter().chain(flow.noise.iter().copied());
+        let inputs = flow.inputs_with(own.chain(rows));
+        let next = nodes(&graph, &flow.step(h, &z));
+        compiled(&graph, &inputs, &next, LARGEST_CARRIED)
+    }
+
+    /// The flow with noise; none where there would be too much of it, were Φ and W full.
+    fn flow<'f, 'g>(
+        &self,
+        graph: &'g Graph,
+        equations: &'f Equations,
+        jacobian: &'f Jacobian,
+    ) -> Option<Flow<'f, 'g>> {
         let free = &equations.roots.free;
-        let noise = self.noisy.iter();
-        let noise: Vec<Term<'_>> = noise.map(|n| n.then(|| graph.fresh("q"))).collect();
+        let noise = self.noisy.iter().map(|n| n.then(|| graph.fresh("q")));
         let flow = Flow {
-            graph: &graph,
+            graph,
             inputs: &equations.inputs[..equations.smooth_inputs()],
             derivatives: &free.derivatives,
             slopes: &free.outputs[jacobian.outputs()],
             places: jacobian.places(),
-            noise,
+            noise: noise.collect(),
         };
-        let (h, scale) = (graph.fresh("h"), graph.fresh("scale"));
-        let next = flow.step(h);
-        let root: Vec<Term<'_>> = (0..n * n).map(|_| Some(graph.fresh("S"))).collect();
-        let carried = flow.carried(&next, scale, &root);
-        let own = [h, scale]
-            .into_iter()
-            .chain(flow.noise.iter().copied().flatten());
-        let own = own.chain(root.into_iter().flatten()).map(Expr::node);
-        let inputs: Vec<Node> = flow.inputs.iter().copied().chain(own).collect();
-        let nothing = graph.constant(0.0);
-        let nodes = |terms: &[Term<'_>]| -> Vec<Node> {
-            terms
-                .iter()
-                .map(|term| term.unwrap_or(nothing).node())
-                .collect()
-        };
-        let step = nodes(&next);
-        let all = [&step[..], &nodes(&carried)].concat();
-        [(all, LARGEST_CARRIED), (step.clone(), LARGEST_STEP)]
-            .into_iter()
-            .find_map(|(outputs, most)| {
-                let tape = Tape::new(&graph, &inputs, &outputs).ok()?;
-                let function = (tape.len() <= most).then(|| Function::compile(&tape))??;
-                Some(Made {
-                    function,
-                    step: step.len(),
-                    outputs: outputs.len(),
-                })
-            })
+        (16 * self.noisy.len() * flow.places.len() <= LARGEST_STEP).then_some(flow)
     }
+}
+
+/// What is there already is not waited for.
+fn patience<T>(code: &OnceLock<Option<T>>) -> u32 {
+    match code.get() {
+        Some(_) => 0,
+        None => PATIENCE,
+    }
+}
+
+impl<'g> Flow<'_, 'g> {
+    /// What the equations read, then these symbols.
+    fn inputs_with(&self, more: impl Iterator<Item = Term<'g>>) -> Vec<Node> {
+        let more = more.flatten().map(Expr::node);
+        self.inputs.iter().copied().chain(more).collect()
+    }
+}
+
+fn nodes(graph: &Graph, terms: &[Term<'_>]) -> Vec<Node> {
+    let nothing = graph.constant(0.0).node();
+    terms
+        .iter()
+        .map(|term| term.map_or(nothing, Expr::node))
+        .collect()
+}
+
+fn compiled(graph: &Graph, inputs: &[Node], outputs: &[Node], most: usize) -> Option<Function<1>> {
+    let tape = Tape::new(graph, inputs, outputs).ok()?;
+    (tape.len() <= most).then(|| Function::compile(&tape))?
 }
 
 /// A step in use.
@@ -126,7 +171,8 @@ pub(crate) struct Straight {
     code: Arc<Code>,
     /// F, among the outputs of the flow
     slopes: Jacobian,
-    engine: Engine,
+    first: Engine,
+    later: Engine,
     outputs: Vec<f64>,
     /// how many of them are those of the step
     step: usize,
@@ -140,7 +186,8 @@ impl Straight {
         Self {
             code: Code::of(flow, noisy),
             slopes: flow.jacobians().state.clone(),
-            engine: Engine::default(),
+            first: Engine::default(),
+            later: Engine::default(),
             outputs: vec![],
             step: 0,
             carried: None,
@@ -159,13 +206,16 @@ impl Straight {
     ) -> bool {
         self.carried = None;
         let code = &*self.code;
-        let is_there = code.made.get().is_some();
-        let made = || code.made(flow.system(), &self.slopes);
-        let patience = if is_there { 0 } else { PATIENCE };
+        let patience = patience(&code.first);
+        let made = || {
+            code.first
+                .get_or_init(|| code.first(flow.system(), &self.slopes))
+        };
         let ready = self
-            .engine
-            .ready(patience, || made().map(|made| &made.function));
-        let (Some(function), Some(made)) = (ready, code.made.get().and_then(Option::as_ref)) else {
+            .first
+            .ready(patience, || Some(&made().as_ref()?.function));
+        let made = code.first.get().and_then(Option::as_ref);
+        let (Some(function), Some(made)) = (ready, made) else {
             return false;
         };
         let Some(inputs) = flow.free_inputs(t, x) else {
@@ -173,8 +223,7 @@ impl Straight {
         };
         let before = inputs.len();
         inputs.extend([h, scale]);
-        let own = noise.iter().zip(&code.noisy).filter(|(_, is)| **is);
-        inputs.extend(own.map(|(q, _)| q));
+        inputs.extend(code.acting(noise));
         inputs.extend_from_slice(&root.entries);
         self.outputs.resize(made.outputs, 0.0);
         function.eval(inputs.as_chunks().0, self.outputs.as_chunks_mut().0);
@@ -182,6 +231,40 @@ impl Straight {
         self.step = made.step;
         let squares = made.step + root.entries.len()..made.outputs;
         self.carried = (made.outputs > made.step).then_some(squares);
+        true
+    }
+
+    /// Takes x̂ and the rows of (Φ W) from anywhere at `t` to `next` at `t + h`. Where that is not done at once
+    /// it is false.
+    pub fn go_on(
+        &mut self,
+        flow: &mut Evaluation,
+        (t, h): (f64, f64),
+        z: &[f64],
+        noise: &[f64],
+        next: &mut [f64],
+    ) -> bool {
+        self.carried = None;
+        let code = &*self.code;
+        let patience = patience(&code.later);
+        let make = || {
+            code.later
+                .get_or_init(|| code.later(flow.system(), &self.slopes))
+        };
+        let ready = self.later.ready(patience, || make().as_ref());
+        let (x, rows) = z.split_at(code.noisy.len());
+        let Some(function) = ready else {
+            return false;
+        };
+        let Some(inputs) = flow.free_inputs(t, x) else {
+            return false;
+        };
+        let before = inputs.len();
+        inputs.push(h);
+        inputs.extend(code.acting(noise));
+        inputs.extend_from_slice(rows);
+        function.eval(inputs.as_chunks().0, next.as_chunks_mut().0);
+        inputs.truncate(before);
         true
     }
 
@@ -216,7 +299,6 @@ mod tests {
     use super::*;
     use crate::filter::Belief;
     use crate::{EstimatorSettings, Linearised, Method, Step};
-    use lynkeus_expr::Graph;
 
     struct Random(u64);
 

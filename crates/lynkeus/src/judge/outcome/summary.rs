@@ -90,7 +90,7 @@ impl Outcome {
                 .iter()
                 .map(|a| (a.quantity.clone(), a))
                 .collect(),
-            sampling: self.intervals.map(|intervals| intervals.entry(false)),
+            sampling: self.intervals.as_ref().map(|found| found.entry(false)),
             frozen: &self.frozen,
             monitors: self
                 .watches
