@@ -351,11 +351,10 @@ mod tests {
             ((0, 2), 2.0 * 2.0 * (0.5 / 1.0) / 5.0),
             ((2, 1), 5.0 * 0.25 * (4.0 / 0.5) / 3.0),
         ];
-        for p in 0..3 {
-            for q in 0..3 {
+        for (p, row) in G.iter().enumerate() {
+            for (q, found) in row.iter().enumerate() {
                 let known = expected.iter().find(|(at, _)| *at == (p, q));
                 let value = known.map_or(0.0, |(_, value)| *value);
-                let found = G[p][q];
                 assert!(found.contains(value), "{p}, {q}: {found:?} beside {value}");
                 assert!(found.hi() - found.lo() < 1e-14, "{p}, {q}: {found:?}");
             }
