@@ -39,7 +39,7 @@ const OBSERVERS: [(&str, &str); 14] = [
 ];
 
 /// Filters of random plants among which every option occurs: family, noise, limits, gate, sigma points, steps, `sd`.
-const FILTERS: [u64; 9] = [5, 13, 21, 35, 37, 41, 79, 87, 399];
+const FILTERS: [u64; 6] = [5, 13, 21, 35, 79, 399];
 
 pub(super) fn has(command: &str) -> bool {
     let mut asked = Command::new(command);
