@@ -38,8 +38,8 @@ const OBSERVERS: [(&str, &str); 14] = [
     ("column", "study-noise.toml"),
 ];
 
-/// Filters of random plants among which every option occurs: family, noise, limits, gate, sigma points, steps, `sd`.
-const FILTERS: [u64; 6] = [5, 13, 21, 35, 79, 399];
+/// Filters of random plants among which every kind of option occurs: family, noise, limits, gate, sigma points, steps, `sd`.
+const FILTERS: [u64; 6] = [13, 21, 35, 41, 79, 399];
 
 pub(super) fn has(command: &str) -> bool {
     let mut asked = Command::new(command);
