@@ -351,6 +351,7 @@ mod tests {
             ((0, 2), 2.0 * 2.0 * (0.5 / 1.0) / 5.0),
             ((2, 1), 5.0 * 0.25 * (4.0 / 0.5) / 3.0),
         ];
+        assert!(G.len() == 3 && G.iter().all(|row| row.len() == 3));
         for (p, row) in G.iter().enumerate() {
             for (q, found) in row.iter().enumerate() {
                 let known = expected.iter().find(|(at, _)| *at == (p, q));
