@@ -102,6 +102,7 @@ mod events;
 pub mod filter;
 mod integrator;
 mod jacobian;
+mod lanes;
 mod linearised;
 mod method;
 mod noise;

@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use lynkeus_expr::lanes::{self, Lanes, Portable};
-use lynkeus_expr::{Evaluator, Graph, MissingInput, Node, Op, Tape};
+use lynkeus_expr::lanes::{self, Portable};
+use lynkeus_expr::{Graph, MissingInput, Node, Op, Tape};
 use lynkeus_native::Function;
 
 use crate::closed_loop::Loop;
 use crate::integrator::{APART, check_interval, fixed_steps, pieces};
+use crate::lanes::Engine;
 use crate::noise::Sensors;
-use crate::routine::Backend;
 use crate::run::{Itinerary, Stop};
 use crate::{Events, Method, Noise, Result, Simulation, Step};
 
@@ -180,9 +180,6 @@ fn program<const L: usize>(clock: &mut Loop) -> Result<Option<Program<L>>> {
     }))
 }
 
-/// Largest tape that is compiled for a batch.
-const LARGEST: usize = 200_000;
-
 /// Functions in two parts, what all trajectories share (time, the step, what jumps with time) and what
 /// is their own; each thread has a copy. Interpreter and machine code give the same values to the bit.
 #[derive(Clone, Debug)]
@@ -200,23 +197,6 @@ pub(crate) struct Divided<const L: usize> {
     /// from the outputs of one group of lanes to those of the next
     spacing: usize,
     scratch: Vec<[f64; L]>,
-}
-
-/// Machine code, or a tape.
-#[derive(Clone, Debug)]
-enum Engine<const L: usize> {
-    Native(Function<L>),
-    Interpreted(Box<Evaluator<Lanes<L>>>),
-}
-
-impl<const L: usize> Engine<L> {
-    fn new(tape: &Tape, compile: impl FnOnce(&Tape) -> Option<Function<L>>) -> Self {
-        let is_wanted = Backend::compiles_at_once() && tape.len() <= LARGEST;
-        match is_wanted.then(|| compile(tape)).flatten() {
-            Some(function) => Self::Native(function),
-            None => Self::Interpreted(Box::new(tape.evaluator_in(Lanes))),
-        }
-    }
 }
 
 impl<const L: usize> Divided<L> {
@@ -261,10 +241,7 @@ impl<const L: usize> Divided<L> {
     pub fn share(&mut self, inputs: &[[f64; L]], table: &mut [[f64; L]]) {
         let count = table.len() / L;
         let values = &mut self.scratch[..count];
-        match &mut self.common {
-            Engine::Native(native) => native.eval(inputs, values),
-            Engine::Interpreted(tape) => tape.eval(inputs, values),
-        }
+        self.common.eval(inputs, values);
         for (instant, places) in table.chunks_exact_mut(count.max(1)).enumerate() {
             for (place, value) in places.iter_mut().zip(values.iter()) {
                 *place = [value[instant]; L];

@@ -204,13 +204,14 @@ impl Projection {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    struct Random(u64);
+    /// Numbers in [−1, 1).
+    pub(crate) struct Random(pub u64);
 
     impl Random {
-        fn next(&mut self) -> f64 {
+        pub fn next(&mut self) -> f64 {
             self.0 = self
                 .0
                 .wrapping_mul(6_364_136_223_846_793_005)

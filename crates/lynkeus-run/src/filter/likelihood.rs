@@ -9,19 +9,24 @@
 
 use std::collections::BTreeSet;
 
-use lynkeus_expr::lanes::Lanes;
-use lynkeus_expr::{Evaluator, Expr, Graph, Node, Tape, jacobian};
+use lynkeus_expr::{Expr, Graph, Node, Tape, jacobian};
 use lynkeus_native::Function;
 
 use super::expressions::{Corrected, Flow, corrected};
 use crate::classical::Term;
 use crate::integrator::{fixed_steps, instant};
+use crate::lanes::Engine;
 use crate::{Error, Result};
 
 /// Parameters whose tangents are found together.
 const LANES: usize = 4;
 
 type Lane = [f64; LANES];
+
+/// Groups of lanes of so many parameters; one also of none, for the values.
+fn groups(parameters: usize) -> usize {
+    parameters.div_ceil(LANES).max(1)
+}
 
 /// A plant with its sensors and noises as functions of parameters θ.
 ///
@@ -112,6 +117,16 @@ pub struct Likelihood {
     /// how many numbers x̂ and S have
     states: usize,
     entries: usize,
+    inputs: usize,
+}
+
+/// # Errors
+/// [`Error::Setting`] for another number of something.
+fn check(what: &str, expected: usize, found: usize) -> Result<()> {
+    match found == expected {
+        true => Ok(()),
+        false => Err(Error::setting(what, expected.to_string(), found)),
+    }
 }
 
 impl Likelihood {
@@ -132,6 +147,7 @@ impl Likelihood {
                 .collect::<Result<_>>()?,
             states: n,
             entries: sample.pattern.len(),
+            inputs: plant.inputs.len(),
         })
     }
 
@@ -139,8 +155,8 @@ impl Likelihood {
     /// most this length.
     ///
     /// # Errors
-    /// [`Error::Setting`] for another number of parameters, a step that is no length or too many of them, and
-    /// [`Error::TimeBefore`] for rows that run back.
+    /// [`Error::Setting`] for another number of parameters, readings or inputs, a step that is no length or too
+    /// many of them; [`Error::NoNumber`] for a time that is none, [`Error::TimeBefore`] for rows that run back.
     pub fn score<'a>(
         &mut self,
         parameters: &[f64],
@@ -148,13 +164,7 @@ impl Likelihood {
         longest_step: f64,
     ) -> Result<Score> {
         let count = self.parameters;
-        if parameters.len() != count {
-            return Err(Error::setting(
-                "number of parameters",
-                count.to_string(),
-                parameters.len(),
-            ));
-        }
+        check("number of parameters", count, parameters.len())?;
         if longest_step.is_nan() || longest_step <= 0.0 {
             return Err(Error::setting(
                 "longest step",
@@ -173,8 +183,14 @@ impl Likelihood {
         let mut before: Option<f64> = None;
         let mut inputs: Vec<f64> = vec![];
         for row in rows {
+            check("number of readings", self.correct.len(), row.readings.len())?;
+            check("number of inputs", self.inputs, row.inputs.len())?;
+            if !row.t.is_finite() {
+                let (signal, value) = ("t".to_owned(), row.t);
+                return Err(Error::NoNumber { signal, value });
+            }
             if let Some(from) = before.filter(|from| *from != row.t) {
-                if row.t < from || row.t.is_nan() {
+                if row.t < from {
                     return Err(Error::TimeBefore {
                         reached: from,
                         time: row.t,
@@ -244,7 +260,7 @@ impl Bundle {
     fn new(numbers: usize, parameters: usize) -> Self {
         Self {
             values: vec![0.0; numbers],
-            tangents: vec![vec![[0.0; LANES]; numbers]; parameters.div_ceil(LANES)],
+            tangents: vec![vec![[0.0; LANES]; numbers]; groups(parameters)],
         }
     }
 
@@ -265,15 +281,9 @@ impl Bundle {
 /// Expressions with their derivatives along one direction of what they read, in lanes.
 #[derive(Clone, Debug)]
 struct Code {
-    engine: Engine,
+    engine: Engine<LANES>,
     inputs: Vec<Lane>,
     outputs: Vec<Lane>,
-}
-
-#[derive(Clone, Debug)]
-enum Engine {
-    Native(Function<LANES>),
-    Interpreted(Box<Evaluator<Lanes<LANES>>>),
 }
 
 impl Code {
@@ -285,12 +295,8 @@ impl Code {
         let inputs = [known, moves, &directions].concat();
         let all = [outputs, &tangents].concat();
         let tape = Tape::new(graph, &inputs, &all)?;
-        let engine = match Function::compile(&tape) {
-            Some(function) => Engine::Native(function),
-            None => Engine::Interpreted(Box::new(tape.evaluator_in(Lanes))),
-        };
         Ok(Self {
-            engine,
+            engine: Engine::new(&tape, Function::compile),
             inputs: vec![[0.0; LANES]; inputs.len()],
             outputs: vec![[0.0; LANES]; all.len()],
         })
@@ -306,7 +312,7 @@ impl Code {
         let numbers: usize = bundles.iter().map(|bundle| bundle.values.len()).sum();
         let first = known.len() + numbers + parameters.len();
         let count = to.values.len();
-        for group in 0..parameters.len().div_ceil(LANES) {
+        for group in 0..groups(parameters.len()) {
             let own = bundles.iter().flat_map(|bundle| &bundle.tangents[group]);
             let seeds = (0..parameters.len()).map(|p| {
                 std::array::from_fn(|lane| f64::from(u8::from(group * LANES + lane == p)))
@@ -315,10 +321,7 @@ impl Code {
             for (place, tangent) in self.inputs[first..].iter_mut().zip(tangents) {
                 *place = tangent;
             }
-            match &mut self.engine {
-                Engine::Native(function) => function.eval(&self.inputs, &mut self.outputs),
-                Engine::Interpreted(tape) => tape.eval(&self.inputs, &mut self.outputs),
-            }
+            self.engine.eval(&self.inputs, &mut self.outputs);
             let values = to.values.iter_mut().zip(&self.outputs);
             values.for_each(|(to, value)| *to = value[0]);
             to.tangents[group].copy_from_slice(&self.outputs[count..]);

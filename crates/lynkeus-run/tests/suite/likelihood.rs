@@ -273,6 +273,21 @@ fn what_does_not_fit_is_refused() {
     };
     assert!(refused(&mut likelihood, &[1.0], 1.0).contains("number of parameters"));
     assert!(refused(&mut likelihood, &case.values, f64::NAN).contains("longest step"));
+    let mut wide = case.log.clone();
+    wide[2].1.push(1.0);
+    let error = likelihood
+        .score(&case.values, rows(&wide), 1.0)
+        .unwrap_err();
+    assert!(error.to_string().contains("number of readings"), "{error}");
+    let mut timeless = case.log.clone();
+    timeless[0].0 = f64::NAN;
+    let error = likelihood
+        .score(&case.values, rows(&timeless), 1.0)
+        .unwrap_err();
+    assert!(
+        matches!(error, lynkeus_run::Error::NoNumber { .. }),
+        "{error}"
+    );
     let back = vec![case.log[3].clone(), case.log[1].clone()];
     let error = likelihood
         .score(&case.values, rows(&back), 1.0)
@@ -280,5 +295,32 @@ fn what_does_not_fit_is_refused() {
     assert!(
         matches!(error, lynkeus_run::Error::TimeBefore { .. }),
         "{error}"
+    );
+}
+
+/// Nothing that is searched: the value alone, by hand of two readings 1 and 2 about 0 with variance 4.
+#[test]
+fn a_plant_without_parameters_has_a_value() {
+    let g = Graph::new();
+    let [time, x] = ["time", "x"].map(|name| g.symbol(name).node());
+    let number = |value: f64| g.constant(value).node();
+    let mut likelihood = Likelihood::new(&ParametricPlant {
+        graph: &g,
+        time,
+        states: vec![x],
+        derivatives: vec![number(0.0)],
+        inputs: vec![],
+        sensors: vec![(x, number(4.0))],
+        process_noise: vec![number(0.0)],
+        start: vec![(number(0.0), number(0.0))],
+        parameters: vec![],
+    })
+    .unwrap();
+    let log: Log = [1.0, 2.0].iter().map(|y| (*y, vec![*y], vec![])).collect();
+    let value = likelihood.score(&[], rows(&log), 1.0).unwrap().value;
+    let expected = 0.5 * (1.25 + 2.0 * (8.0 * std::f64::consts::PI).ln());
+    assert!(
+        (value - expected).abs() < 1e-12,
+        "{value} beside {expected}"
     );
 }

@@ -298,23 +298,11 @@ mod tests {
     use super::super::{Propagation, Scheme};
     use super::*;
     use crate::filter::Belief;
+    use crate::filter::belief::tests::Random;
     use crate::{EstimatorSettings, Linearised, Method, Step};
 
-    struct Random(u64);
-
-    impl Random {
-        /// In [−1, 1).
-        fn next(&mut self) -> f64 {
-            self.0 = self
-                .0
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-        }
-
-        fn is(&mut self, share: f64) -> bool {
-            self.next() < 2.0 * share - 1.0
-        }
+    fn is(random: &mut Random, share: f64) -> bool {
+        random.next() < 2.0 * share - 1.0
     }
 
     /// A stable plant whose states read some of each other, under a signal.
@@ -324,13 +312,13 @@ mod tests {
         let x: Vec<Expr<'_>> = (0..n).map(|i| g.symbol(&format!("x{i}"))).collect();
         let derivative = |i: usize| {
             // some states are parameters
-            if i > 0 && random.is(0.1) {
+            if i > 0 && is(random, 0.1) {
                 return g.constant(0.0);
             }
             let own = x[i] * (-0.5 - random.next().abs());
             let others = (0..n)
                 .filter(|j| *j != i)
-                .fold(own, |sum, j| match random.is(0.4) {
+                .fold(own, |sum, j| match is(random, 0.4) {
                     true => sum + (x[j] * (1.0 + random.next())).sin() * random.next(),
                     false => sum,
                 });
@@ -356,7 +344,7 @@ mod tests {
             let flow = plant(&mut random, n);
             let noise: Vec<f64> = (0..n)
                 .map(|_| {
-                    if random.is(0.7) {
+                    if is(&mut random, 0.7) {
                         random.next().abs()
                     } else {
                         0.0

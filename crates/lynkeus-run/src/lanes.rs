@@ -1,0 +1,35 @@
+//! A tape in lanes: as machine code, or interpreted.
+
+use lynkeus_expr::lanes::Lanes;
+use lynkeus_expr::{Evaluator, Tape};
+use lynkeus_native::Function;
+
+use crate::Backend;
+
+/// Largest tape that is compiled.
+const LARGEST: usize = 200_000;
+
+/// Machine code, or a tape. Both give the same values to the bit.
+#[derive(Clone, Debug)]
+pub(crate) enum Engine<const L: usize> {
+    Native(Function<L>),
+    Interpreted(Box<Evaluator<Lanes<L>>>),
+}
+
+impl<const L: usize> Engine<L> {
+    pub fn new(tape: &Tape, compile: impl FnOnce(&Tape) -> Option<Function<L>>) -> Self {
+        let is_wanted = Backend::compiles_at_once() && tape.len() <= LARGEST;
+        match is_wanted.then(|| compile(tape)).flatten() {
+            Some(function) => Self::Native(function),
+            None => Self::Interpreted(Box::new(tape.evaluator_in(Lanes))),
+        }
+    }
+
+    /// Writes the outputs at `inputs`.
+    pub fn eval(&mut self, inputs: &[[f64; L]], outputs: &mut [[f64; L]]) {
+        match self {
+            Self::Native(function) => function.eval(inputs, outputs),
+            Self::Interpreted(tape) => tape.eval(inputs, outputs),
+        }
+    }
+}
