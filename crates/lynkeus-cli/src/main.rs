@@ -2,6 +2,7 @@
 
 mod export;
 mod files;
+mod fit;
 mod how_well;
 mod inputs;
 mod limits;
@@ -71,6 +72,7 @@ Examples:
   lynkeus simulate study.toml -o run.csv --plot run.svg
   lynkeus simulate study.toml --runs 1000 --plot spread.svg
   lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
+  lynkeus fit study.toml log.csv --write
   lynkeus tune study.toml --plot tune.svg
   lynkeus export study.toml --to c -o device
   lynkeus export model.mo --to fmu -o plant
@@ -162,6 +164,15 @@ enum Command {
         /// Keep the replay in this file while it runs: the same command goes on there after it was killed or a limit ended it. Removed once the result is written
         #[arg(long, value_name = "FILE")]
         checkpoint: Option<PathBuf>,
+        #[command(flatten)]
+        limits: Limits,
+    },
+    /// Find parameters, noises and starts from logs, by their likelihood, and say what the logs cannot tell
+    Fit {
+        /// The study with its [fit] (TOML; "-": standard input)
+        study: PathBuf,
+        #[command(flatten)]
+        options: fit::Options,
         #[command(flatten)]
         limits: Limits,
     },
@@ -303,6 +314,11 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             let source = Source::load(&study, limits.budget())?;
             run::estimate(&source, &log, &output, checkpoint.as_deref())
         }
+        Command::Fit {
+            study,
+            options,
+            limits,
+        } => fit::fit(&study, &options, &limits),
         Command::Tune {
             study,
             options,

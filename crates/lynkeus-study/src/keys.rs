@@ -6,7 +6,7 @@ mod judged;
 use lynkeus_observers::{KeySpec, REQUIRED, Shape};
 use lynkeus_run::Tolerances;
 
-pub(super) use judged::{COMPARE, PLOT, RANGE, TUNE};
+pub(super) use judged::{COMPARE, FIT, PLOT, PRIOR, RANGE, TUNE};
 
 /// A number, or a Modelica expression of time.
 const EXPRESSION: Shape = Shape::Either(&[Shape::Number, Shape::Text]);
@@ -40,7 +40,7 @@ pub(super) const KEYS: [KeySpec; 4] = [
 ];
 
 /// The sections.
-pub(super) const SECTIONS: [KeySpec; 10] = [
+pub(super) const SECTIONS: [KeySpec; 11] = [
     KeySpec {
         name: "sensors",
         shape: Shape::Section(&[&SENSORS]),
@@ -94,6 +94,12 @@ pub(super) const SECTIONS: [KeySpec; 10] = [
         shape: Shape::Section(&[&TUNE]),
         default: "none",
         meaning: "which keys are swept, and what a value is judged by",
+    },
+    KeySpec {
+        name: "fit",
+        shape: Shape::Section(&[&FIT]),
+        default: "none",
+        meaning: "which parameters and noises are found from logs ([fit](fit.md))",
     },
     KeySpec {
         name: "compare",

@@ -27,6 +27,7 @@
 
 mod certify;
 mod estimate;
+mod fit;
 mod generator;
 mod keys;
 mod observer;
@@ -47,6 +48,7 @@ use toml::de::DeTable;
 
 pub use certify::{Box, CertifySettings};
 pub use estimate::{BetweenSamples, EstimateSettings, Smoothing};
+pub use fit::{Chosen, FitSettings, Objective, Prior};
 pub use generator::Generator;
 pub use observer::ObserverSettings;
 pub use schema::schema;
@@ -97,6 +99,8 @@ pub struct Study {
     pub estimate: EstimateSettings,
     /// Which tuning to sweep and how to judge it.
     pub tune: TuneSettings,
+    /// What is found from logs, and how.
+    pub fit: FitSettings,
     /// The families that `compare` runs; `None` means each that fits, and the filters.
     pub compare: Option<Vec<Name>>,
     /// The quantities to draw, one panel each; `None` lets the tool choose.
@@ -223,6 +227,7 @@ impl Study {
                 .optional("estimate", estimate::read)?
                 .unwrap_or_default(),
             tune: top.optional("tune", tune::read)?.unwrap_or_default(),
+            fit: top.optional("fit", fit::read)?.unwrap_or_default(),
             compare: top.optional("compare", compare)?.flatten(),
             show,
             time_unit,

@@ -104,7 +104,7 @@ pub(super) fn read(entry: Entry<'_>) -> Result<TuneSettings, Error> {
 }
 
 /// A number between 0 and 1, ends excluded.
-fn share(entry: Entry<'_>) -> Result<f64, Error> {
+pub(super) fn share(entry: Entry<'_>) -> Result<f64, Error> {
     let refusal = entry.wrong("a number between 0 and 1");
     let number = entry.number().ok();
     number.filter(|x| *x > 0.0 && *x < 1.0).ok_or(refusal)

@@ -82,7 +82,12 @@ mod estimate;
 
 mod simulate;
 
+// chosen values into a study file
+mod rewrite;
+
 pub mod tune;
+
+mod fit;
 
 mod check;
 
@@ -123,6 +128,7 @@ pub use design::{DesignReport, design};
 pub use estimate::live::estimator;
 pub use estimate::{estimate, estimate_resumed};
 pub use export::export;
+pub use fit::{Fit, FitOptions, fit};
 pub use judge::accuracy::{Accuracy, Coverage, Settling};
 pub use judge::frozen::Frozen;
 pub use judge::interval::{Intervals, Sampled};
@@ -136,6 +142,7 @@ pub use prepare::declared::Account;
 pub use prepare::systems::observer as observer_system;
 pub use print::target::{Artifact, Export, ExportOptions, Subject, Target};
 pub use report::{Page, ReportOptions, report};
+pub use rewrite::Change;
 pub use simulate::simulate;
 pub use tune::tune;
 

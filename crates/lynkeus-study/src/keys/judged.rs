@@ -1,6 +1,6 @@
-//! How runs are judged and shown: `[tune]`, `[compare]` and `[plot]`.
+//! How runs are judged and shown: `[tune]`, `[fit]`, `[compare]` and `[plot]`.
 
-use lynkeus_observers::{KeySpec, Shape};
+use lynkeus_observers::{KeySpec, REQUIRED, Shape};
 
 use super::EXPRESSION;
 
@@ -72,6 +72,101 @@ pub(crate) const RANGE: [KeySpec; 4] = [
         shape: Shape::Word(&["log", "linear"]),
         default: "`\"log\"`",
         meaning: "equal ratios, or equal differences",
+    },
+];
+
+/// All of a kind, or some by their names.
+const CHOSEN: Shape = Shape::As(
+    "true, or list of names",
+    &Shape::Either(&[Shape::Flag, Shape::NAMES]),
+);
+
+/// `[fit]`
+pub(crate) const FIT: [KeySpec; 11] = [
+    KeySpec {
+        name: "parameters",
+        shape: Shape::As("list of parameters", &Shape::NAMES),
+        default: "none",
+        meaning: "parameters of the plant that are found, within the model's `min` and `max` or `bounds`",
+    },
+    KeySpec {
+        name: "log",
+        shape: Shape::As("list of parameters", &Shape::NAMES),
+        default: "none",
+        meaning: "those that are searched as logarithms: their ranges must be positive. Noises and densities always are",
+    },
+    KeySpec {
+        name: "noise",
+        shape: CHOSEN,
+        default: "none",
+        meaning: "measured outputs whose noise is found; the search starts at `noise` of `[sensors]`, or at the scatter of the readings",
+    },
+    KeySpec {
+        name: "process_noise",
+        shape: CHOSEN,
+        default: "none",
+        meaning: "states and unknown inputs whose spectral density is found; `true`: those with a density above 0 in `[process_noise]`, where the search starts. What is neither found nor declared is 0",
+    },
+    KeySpec {
+        name: "initial",
+        shape: Shape::As("list of states", &Shape::NAMES),
+        default: "none",
+        meaning: "states whose start is found, one for each log; their `initial_variance` counts as 0",
+    },
+    KeySpec {
+        name: "bounds",
+        shape: Shape::As(
+            "table: name = `[least, greatest]`",
+            &Shape::Table(&Shape::List(&Shape::Number)),
+        ),
+        default: "`min` and `max` of the model",
+        meaning: "ranges of what is found, by the name of a parameter or a state, or `\"noise.level\"`, `\"process_noise.x\"`, `\"initial.x\"`",
+    },
+    KeySpec {
+        name: "priors",
+        shape: Shape::Table(&Shape::Section(&[&PRIOR])),
+        default: "none",
+        meaning: "what was known before: a normal distribution under the same names",
+    },
+    KeySpec {
+        name: "objective",
+        shape: Shape::Word(&["innovations", "simulation"]),
+        default: "`\"innovations\"`",
+        meaning: "the likelihood of the filter's innovations, or of the errors of the plant alone: then all errors are the sensors', and neither densities nor `initial_variance` are read",
+    },
+    KeySpec {
+        name: "starts",
+        shape: Shape::Whole(1),
+        default: "1",
+        meaning: "searches: from the study's own values, then from seeded points spread over the bounds",
+    },
+    KeySpec {
+        name: "seed",
+        shape: Shape::Whole(0),
+        default: "0",
+        meaning: "seed of those points",
+    },
+    KeySpec {
+        name: "held_out",
+        shape: Shape::Share,
+        default: "none",
+        meaning: "share at the end of each log that is not fitted, but predicted and told beside",
+    },
+];
+
+/// A prior of `[fit]`.
+pub(crate) const PRIOR: [KeySpec; 2] = [
+    KeySpec {
+        name: "mean",
+        shape: Shape::Number,
+        default: REQUIRED,
+        meaning: "the mean",
+    },
+    KeySpec {
+        name: "sd",
+        shape: Shape::Positive,
+        default: REQUIRED,
+        meaning: "the standard deviation",
     },
 ];
 

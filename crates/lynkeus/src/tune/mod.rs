@@ -24,7 +24,7 @@ mod row;
 pub(crate) mod slider;
 mod speed;
 mod trial;
-mod whiteness;
+pub(crate) mod whiteness;
 
 use std::ops::ControlFlow;
 

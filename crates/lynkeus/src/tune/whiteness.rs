@@ -8,7 +8,7 @@ const BAND: f64 = 1.959_964;
 
 /// What the autocorrelations of a series say.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Whiteness {
+pub(crate) struct Whiteness {
     /// the statistic of Ljung and Box over its number of lags: about 1 for a white series
     pub ljung_box: f64,
     /// share of the lags whose autocorrelation is outside the 95 % band: about 0.05 for a white series
@@ -17,7 +17,7 @@ pub(super) struct Whiteness {
 
 /// The whiteness of a series around zero (a mean that is not zero can be foretold as well), over
 /// lags 1 to 20, or a fifth of its length if that is less. None for a series too short or all zero.
-pub(super) fn whiteness(series: &[f64]) -> Option<Whiteness> {
+pub(crate) fn whiteness(series: &[f64]) -> Option<Whiteness> {
     let n = series.len();
     let lags = MOST_LAGS.min(n / 5);
     let power: f64 = series.iter().map(|x| x * x).sum();

@@ -135,8 +135,8 @@ enum Wide {
 /// An innovation on the way.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
-    /// the row's time
-    pub t: f64,
+    /// the place of its row
+    pub row: usize,
     /// its place among the sensors
     pub sensor: usize,
     /// y − ŷ; of a reading at an end of its range the end less ŷ
@@ -299,7 +299,7 @@ impl<const L: usize> Passes<L> {
         }
         let mut before: Option<f64> = None;
         let mut inputs: Vec<f64> = vec![];
-        for row in rows {
+        for (place, row) in rows.into_iter().enumerate() {
             check("number of readings", self.sensors.len(), row.readings.len())?;
             check("number of inputs", self.inputs, row.inputs.len())?;
             if !row.t.is_finite() {
@@ -312,7 +312,9 @@ impl<const L: usize> Passes<L> {
             before = Some(row.t);
             inputs.clear();
             inputs.extend_from_slice(row.inputs);
-            self.take(&row, &mut score, &mut see);
+            self.take(&row, &mut score, &mut |seen| {
+                see(Seen { row: place, ..seen });
+            });
             if !score.value.is_finite() {
                 return Ok(score);
             }
@@ -368,7 +370,7 @@ impl<const L: usize> Passes<L> {
                 None => self.take_reading(sensor, row, reading, score),
             }
             see(Seen {
-                t: row.t,
+                row: 0,
                 sensor,
                 innovation: self.seen.ν,
                 variance: self.seen.σ2,

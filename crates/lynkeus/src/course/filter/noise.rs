@@ -145,6 +145,17 @@ pub(crate) fn of_families(prepared: &Prepared<'_>, span: f64, notes: &mut Vec<St
     states.map(density).collect()
 }
 
+/// A density to begin a search with: a wander over a twentieth of the range, or of the start value, in a tenth
+/// of the log.
+pub(crate) fn guessed(state: &Variable, span: f64) -> f64 {
+    let width = state.max - state.min;
+    let size = match width.is_finite() && width > 0.0 {
+        true => width,
+        false => state.start.unwrap_or(0.0).abs().max(1.0),
+    };
+    10.0 * (0.05 * size).powi(2) / span.max(f64::MIN_POSITIVE)
+}
+
 /// What a model may be wrong by where the study does not say: this share of a state's range.
 const DOUBT: f64 = 0.0025;
 

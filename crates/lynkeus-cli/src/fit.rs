@@ -1,0 +1,112 @@
+//! `lynkeus fit`.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::inputs::{self, Source};
+use super::limits::{self, Limits};
+use super::output;
+use super::progress::Progress;
+use super::save::{Results, is_standard};
+use lynkeus::{Answer, Change, Error, Fit, FitOptions, visible};
+
+/// What it is fitted to and where the answer goes.
+#[derive(Debug, Args)]
+pub(super) struct Options {
+    /// The logs (CSV or Parquet; "-": standard input)
+    #[arg(required = true, value_name = "LOG.csv")]
+    logs: Vec<PathBuf>,
+    /// Write the values found into the study; everything else in it stays as it is
+    #[arg(long)]
+    write: bool,
+    /// Intervals by profile likelihood: the other values are searched anew along each
+    #[arg(long)]
+    profiles: bool,
+    /// Write the innovations of every row as CSV ("-": standard output)
+    #[arg(short, long, value_name = "FILE.csv")]
+    output: Option<PathBuf>,
+    /// Draw the innovations and their autocorrelation
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Print one JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+    /// No progress bar and no notes
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Everything is computed before the first file is written.
+pub(super) fn fit(path: &Path, options: &Options, limits: &Limits) -> Result<ExitCode, Error> {
+    if options.write && is_standard(path) {
+        return Err(Error::input("--write needs a study that is a file"));
+    }
+    let source = Source::load(path, limits.budget())?;
+    let files = match options.write {
+        true => source.plant().writes("--write", Some(path)),
+        false => source.files(),
+    };
+    let logs = options.logs.iter();
+    logs.clone()
+        .fold(files, |files, log| files.reads("the log", Some(log)))
+        .writes("-o", options.output.as_deref())
+        .draws("--plot", options.plot.as_deref())
+        .prints_json(options.json)
+        .check()?;
+    let tables = logs.map(|log| inputs::log(&source.study, log));
+    let tables = tables.collect::<Result<Vec<_>, _>>()?;
+    let asked = FitOptions {
+        profiles: options.profiles,
+    };
+    let mut progress = Progress::new("fitting", options.quiet);
+    let fit = lynkeus::fit(&source.study, &tables, asked, &mut progress.watch())?;
+    progress.finish();
+    // values that are none of the plant's do not get into the study
+    let is_written = options.write && fit.is_positive();
+    let (text, changes) = match is_written {
+        true => rewritten(path, &fit)?,
+        false => (String::new(), vec![]),
+    };
+    output::remarks(&fit, options.quiet);
+    let mut results = Results::default();
+    results.files(&fit, options.plot.as_deref(), options.output.as_deref())?;
+    if is_written {
+        results.put(path, text)?;
+    }
+    show(&fit, &changes, path, options, &mut results);
+    results.keep()?;
+    Ok(limits::code(&source.study, output::verdict(&fit)))
+}
+
+/// The study with the values found.
+fn rewritten(path: &Path, fit: &Fit) -> Result<(String, Vec<Change>), Error> {
+    let text = std::fs::read_to_string(path).map_err(|e| {
+        Error::input(format!("cannot read the study again: {e}")).at(path.display())
+    })?;
+    fit.rewritten(&text)
+        .map_err(|error| error.at(path.display()))
+}
+
+/// The fit in words or as JSON, with what was written; where standard output has a result, that is a note.
+fn show(fit: &Fit, changes: &[Change], path: &Path, options: &Options, results: &mut Results) {
+    let told: Vec<String> = changes
+        .iter()
+        .map(|c| format!("{}: {c}", path.display()))
+        .collect();
+    if results.has_printed() {
+        return told.iter().for_each(|change| output::note(change));
+    }
+    if options.json {
+        let mut answer = fit.to_json();
+        if options.write {
+            let words: Vec<String> = changes.iter().map(Change::to_string).collect();
+            answer["written"] = words.into();
+        }
+        return results.print(&output::json(&answer));
+    }
+    results.answer(false, fit);
+    told.iter()
+        .for_each(|change| results.print(&format!("{}\n", visible::lines(change))));
+}

@@ -1,0 +1,143 @@
+//! `[fit]`: what is found from logs, within what, and by what it is judged.
+
+use super::Name;
+use super::keys::{FIT, PRIOR};
+use super::section::Entry;
+use super::simulate;
+use lynkeus_answer::Error;
+
+/// What `fit` finds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FitSettings {
+    /// Parameters of the plant.
+    pub parameters: Vec<Name>,
+    /// Those of them that are searched as logarithms; noises and densities always are.
+    pub log: Vec<Name>,
+    /// Outputs whose noise is found.
+    pub noise: Chosen,
+    /// States and unknown inputs whose spectral density is found.
+    pub process_noise: Chosen,
+    /// States whose start is found, one for each log; nothing is then uncertain about it.
+    pub initial: Vec<Name>,
+    /// Ranges: (name, least, greatest value).
+    pub bounds: Vec<(Name, (f64, f64))>,
+    /// What was known before.
+    pub priors: Vec<(Name, Prior)>,
+    /// What is least at the best values.
+    pub objective: Objective,
+    /// The study's own values and so many further ones less one, from which the search starts.
+    pub starts: usize,
+    /// Seed of those.
+    pub seed: u64,
+    /// The share at the end of each log that is not fitted, but predicted.
+    pub held_out: Option<f64>,
+}
+
+impl Default for FitSettings {
+    fn default() -> Self {
+        Self {
+            parameters: vec![],
+            log: vec![],
+            noise: Chosen::Named(vec![]),
+            process_noise: Chosen::Named(vec![]),
+            initial: vec![],
+            bounds: vec![],
+            priors: vec![],
+            objective: Objective::Innovations,
+            starts: 1,
+            seed: 0,
+            held_out: None,
+        }
+    }
+}
+
+/// All of a kind, or these.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Chosen {
+    /// Every one.
+    All,
+    /// These.
+    Named(Vec<Name>),
+}
+
+/// A normal distribution that a value is taken from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior {
+    /// Its mean.
+    pub mean: f64,
+    /// Its standard deviation, above 0.
+    pub sd: f64,
+}
+
+/// What a fit makes least.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Objective {
+    /// −log L of the filter's innovations.
+    Innovations,
+    /// The same of the plant alone: from its start without corrections, all errors the sensors'.
+    Simulation,
+}
+
+pub(super) fn read(entry: Entry<'_>) -> Result<FitSettings, Error> {
+    let mut section = entry.section("[fit]", &FIT)?;
+    let objectives = [
+        ("innovations", Objective::Innovations),
+        ("simulation", Objective::Simulation),
+    ];
+    let mut names = |key| {
+        let names = section.optional(key, |e| e.list_of(Entry::name))?;
+        Ok::<_, Error>(names.unwrap_or_default())
+    };
+    let (parameters, log, initial) = (names("parameters")?, names("log")?, names("initial")?);
+    Ok(FitSettings {
+        parameters,
+        log,
+        initial,
+        noise: chosen(section.take("noise"))?,
+        process_noise: chosen(section.take("process_noise"))?,
+        bounds: simulate::pairs(section.take("bounds"), range)?,
+        priors: simulate::pairs(section.take("priors"), prior)?,
+        objective: section
+            .optional("objective", |e| e.choice(&objectives))?
+            .unwrap_or(Objective::Innovations),
+        starts: section
+            .optional("starts", |e| e.whole(1))?
+            .map_or(1, |n| usize::try_from(n).unwrap_or(usize::MAX)),
+        seed: section.optional("seed", |e| e.whole(0))?.unwrap_or(0),
+        held_out: section.optional("held_out", super::tune::share)?,
+    })
+}
+
+fn chosen(entry: Option<Entry<'_>>) -> Result<Chosen, Error> {
+    let Some(entry) = entry else {
+        return Ok(Chosen::Named(vec![]));
+    };
+    match entry.as_boolean() {
+        Some(true) => Ok(Chosen::All),
+        Some(false) => Ok(Chosen::Named(vec![])),
+        None if entry.is_list() => Ok(Chosen::Named(entry.list_of(Entry::name)?)),
+        None => Err(entry.wrong("true, false or a list of names")),
+    }
+}
+
+fn range(entry: Entry<'_>) -> Result<(f64, f64), Error> {
+    let refusal = entry.wrong("[least, greatest value]");
+    match entry.list_of(Entry::number)?[..] {
+        [low, high] if low < high => Ok((low, high)),
+        _ => Err(refusal),
+    }
+}
+
+fn prior(entry: Entry<'_>) -> Result<Prior, Error> {
+    let [no_mean, no_deviation] = ["mean", "sd"].map(|key| {
+        entry.wrong(&format!(
+            "a table with `mean` and `sd`, such as {{ mean = 0.04, sd = 0.01 }}; `{key}` is missing"
+        ))
+    });
+    let mut section = entry.section("a prior of [fit]", &PRIOR)?;
+    let mean = section.optional("mean", Entry::number)?.ok_or(no_mean)?;
+    let sd = section
+        .optional("sd", Entry::positive)?
+        .ok_or(no_deviation)?;
+    Ok(Prior { mean, sd })
+}

@@ -1,0 +1,131 @@
+//! Errors of predictions at the values found: one step ahead, and of the plant alone.
+
+use super::problem::{Problem, Rows as Which};
+use crate::Error;
+use crate::tune::whiteness::{Whiteness, whiteness};
+
+/// How well the readings of a sensor are predicted, in root mean square over all logs.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Errors {
+    pub output: String,
+    pub fitted: Portion,
+    /// over the rows that were held out
+    pub held_out: Option<Portion>,
+    /// of the innovations over their deviations, where they were fitted
+    pub whiteness: Option<Whiteness>,
+}
+
+/// Over some of the rows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Portion {
+    pub readings: usize,
+    /// by what is fitted: of the innovations
+    pub one_step: Option<f64>,
+    /// the mean of the squared innovations over their variances: 1 where these are right
+    pub squares: Option<f64>,
+    /// of the plant alone, from its start without corrections
+    pub free_run: Option<f64>,
+}
+
+/// The innovations of every reading.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rows {
+    /// number of the log, and time
+    pub at: Vec<(usize, f64)>,
+    /// by output: reading − prediction, its deviation, and the error of the plant alone
+    pub columns: Vec<(String, [Vec<f64>; 3])>,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    count: usize,
+    squares: f64,
+    scaled: f64,
+}
+
+impl Sum {
+    fn add(&mut self, innovation: f64, variance: f64) {
+        self.count += 1;
+        self.squares += innovation * innovation;
+        self.scaled += innovation * innovation / variance;
+    }
+
+    fn mean(&self, sum: f64) -> Option<f64> {
+        let mean = sum / self.count as f64;
+        mean.is_finite().then_some(mean)
+    }
+}
+
+/// Runs all logs once more; `alone` is the same problem of the plant alone, where that means something.
+///
+/// # Errors
+/// As [`Problem::at`].
+pub(super) fn errors<'p>(
+    problem: &mut Problem<'p>,
+    alone: Option<&mut Problem<'p>>,
+    outputs: &[String],
+    values: &[f64],
+) -> Result<(Vec<Errors>, Rows), Error> {
+    let mut rows = Rows {
+        at: vec![],
+        columns: outputs
+            .iter()
+            .map(|name| (name.clone(), Default::default()))
+            .collect(),
+    };
+    let logs = problem.logs;
+    for (place, log) in logs.iter().enumerate() {
+        rows.at.extend(log.time.iter().map(|t| (place + 1, *t)));
+    }
+    for (_, columns) in &mut rows.columns {
+        columns
+            .iter_mut()
+            .for_each(|c| c.resize(rows.at.len(), f64::NAN));
+    }
+    let count = outputs.len();
+    // by output: fitted and held out, of what is fitted and of the plant alone
+    let mut sums = vec![[[Sum::default(); 2]; 2]; count];
+    let mut scaled: Vec<Vec<f64>> = vec![vec![]; count];
+    for (way, problem) in [Some(problem), alone].into_iter().enumerate() {
+        let Some(problem) = problem else { continue };
+        let mut first = 0;
+        for (place, log) in logs.iter().enumerate() {
+            problem.score(place, values, Which::All, |seen| {
+                let is_held_out = usize::from(seen.row >= log.fitted);
+                sums[seen.sensor][way][is_held_out].add(seen.innovation, seen.variance);
+                let columns = &mut rows.columns[seen.sensor].1;
+                let at = first + seen.row;
+                if way == 1 {
+                    columns[2][at] = seen.innovation;
+                    return;
+                }
+                columns[0][at] = seen.innovation;
+                columns[1][at] = seen.variance.sqrt();
+                if is_held_out == 0 {
+                    scaled[seen.sensor].push(seen.innovation / seen.variance.sqrt());
+                }
+            })?;
+            first += log.time.len();
+        }
+    }
+    let found = outputs.iter().enumerate().map(|(sensor, output)| {
+        let portion = |k: usize| {
+            let [own, alone] = [0, 1].map(|way| sums[sensor][way][k]);
+            let root = |sum: Sum| sum.mean(sum.squares).map(f64::sqrt);
+            Portion {
+                readings: own.count,
+                one_step: root(own),
+                squares: own.mean(own.scaled),
+                free_run: root(alone),
+            }
+        };
+        let held_out = portion(1);
+        Errors {
+            output: output.clone(),
+            fitted: portion(0),
+            held_out: (held_out.readings > 0).then_some(held_out),
+            whiteness: whiteness(&scaled[sensor]),
+        }
+    });
+    Ok((found.collect(), rows))
+}

@@ -1,0 +1,155 @@
+//! The plant of a study as a function of what is unknown.
+
+use std::collections::{BTreeSet, HashMap};
+
+use lynkeus_expr::Node;
+use lynkeus_model::Plant;
+use lynkeus_observers::FilterTuning;
+use lynkeus_run::Level;
+use lynkeus_run::filter::{Likelihood, ParametricLevel, ParametricPlant, ParametricSensor};
+use lynkeus_structure::AugmentedPlant;
+
+use super::unknown::{Kind, Unknown};
+use crate::prepare::{self, Prepared};
+use crate::words::explain;
+use crate::{Error, Study};
+
+/// The plant with the parameters that are found as symbols.
+///
+/// # Errors
+/// As [`prepare::plant`].
+pub(super) fn symbolic(study: &Study) -> Result<Plant, Error> {
+    let all = prepare::symbolic_plant(study, BTreeSet::new())?;
+    let is_found = |name: &str| study.fit.parameters.iter().any(|p| p.is_or_has(name));
+    let names = all.parameters.iter().map(|p| &p.variable.name);
+    let unknown_ones = |name: &str| study.sensors.unknown.iter().any(|u| u.is_or_has(name));
+    let numbers = names.filter(|name| !is_found(name) && !unknown_ones(name));
+    prepare::symbolic_plant(study, numbers.cloned().collect())
+}
+
+/// What a likelihood is made of.
+#[derive(Clone, Copy)]
+pub(super) struct Source<'s> {
+    pub prepared: &'s Prepared<'s>,
+    /// with the parameters that are found as symbols
+    pub symbolic: &'s AugmentedPlant<'s>,
+    pub tuning: &'s FilterTuning,
+    /// the plant alone: it starts where it is said to, and nothing disturbs it
+    pub is_alone: bool,
+}
+
+impl Source<'_> {
+    /// The likelihood of a log whose states start here, as a function of the unknowns that it depends on, by their
+    /// places.
+    ///
+    /// # Errors
+    /// A noise that is 0, or that nobody states.
+    pub fn likelihood(
+        &self,
+        unknowns: &[(usize, &Unknown)],
+        starts: &[f64],
+    ) -> Result<Likelihood, Error> {
+        let Self {
+            prepared,
+            symbolic,
+            tuning,
+            is_alone,
+        } = *self;
+        let graph = symbolic.graph();
+        let number = |value: f64| graph.constant(value).node();
+        let symbols: Vec<Node> = (unknowns.iter())
+            .map(|(_, unknown)| match unknown.kind {
+                Kind::Parameter => parameter(symbolic.plant, &unknown.name),
+                _ => graph.fresh(unknown.label()).node(),
+            })
+            .collect();
+        let symbol = |kind: fn(&Kind) -> Option<usize>| -> HashMap<usize, Node> {
+            let all = unknowns.iter().zip(&symbols);
+            all.filter_map(|((_, unknown), symbol)| Some((kind(&unknown.kind)?, *symbol)))
+                .collect()
+        };
+        let noises = symbol(|kind| match kind {
+            Kind::Noise(place) => Some(*place),
+            _ => None,
+        });
+        let densities = symbol(|kind| match kind {
+            Kind::Density(place) => Some(*place),
+            _ => None,
+        });
+        let begins = symbol(|kind| match kind {
+            Kind::Start { state, .. } => Some(*state),
+            _ => None,
+        });
+        let declared = prepared.declared();
+        let initial = &prepared.study().observer.tuning.initial;
+        let start = |(i, state): (usize, &lynkeus_model::Variable)| {
+            if let Some(&symbol) = begins.get(&i) {
+                return (symbol, number(0.0));
+            }
+            let given = initial.of(&state.name).or(initial.default);
+            // a start of the model may depend on parameters
+            let own = state.start_node.filter(|_| given.is_none());
+            let deviation = match is_alone {
+                true => 0.0,
+                false => tuning.initial_variance[i].sqrt(),
+            };
+            (own.unwrap_or(number(starts[i])), number(deviation))
+        };
+        let density = |(i, state): (usize, &lynkeus_model::Variable)| {
+            let own = declared.process_noise.of(&state.name).copied();
+            match densities.get(&i) {
+                _ if is_alone => number(0.0),
+                Some(&symbol) => symbol,
+                None => number(own.unwrap_or(0.0)),
+            }
+        };
+        let sensors = symbolic.outputs.iter().enumerate().map(|(i, output)| {
+            let name = &output.variable.name;
+            let level = declared.noise.of(name).map(|noise| Level::from(*noise));
+            let size = match (noises.get(&i), level) {
+                (Some(&symbol), _) => graph.expr(symbol),
+                (None, Some(level)) if level.size() > 0.0 => graph.constant(level.size()),
+                (None, _) => return Err(no_noise(prepared.study(), name)),
+            };
+            Ok(ParametricSensor {
+                output: output.variable.node,
+                noise: match level {
+                    Some(Level::Relative(_)) => ParametricLevel::Share(size.node()),
+                    Some(Level::Uniform(_)) => {
+                        ParametricLevel::Variance((size.powi(2) / 3.0).node())
+                    }
+                    _ => ParametricLevel::Variance(size.powi(2).node()),
+                },
+                limits: declared.limits.of(name).copied(),
+            })
+        });
+        let plant = ParametricPlant {
+            graph,
+            time: symbolic.plant.time,
+            states: symbolic.states.iter().map(|state| state.node).collect(),
+            derivatives: symbolic.derivatives.clone(),
+            inputs: symbolic.inputs.iter().map(|input| input.node).collect(),
+            sensors: sensors.collect::<Result<_, Error>>()?,
+            process_noise: symbolic.states.iter().enumerate().map(density).collect(),
+            start: symbolic.states.iter().enumerate().map(start).collect(),
+            parameters: symbols,
+        };
+        Likelihood::new(&plant).map_err(explain)
+    }
+}
+
+/// The symbol of a parameter.
+fn parameter(plant: &Plant, name: &str) -> Node {
+    let mut all = plant.parameters.iter().map(|p| &p.variable);
+    let own = all.find(|variable| variable.name == name);
+    // one that no equation reads is a symbol of its own
+    own.map_or_else(|| plant.graph.fresh(name).node(), |variable| variable.node)
+}
+
+fn no_noise(study: &Study, name: &str) -> Error {
+    let message =
+        format!("the noise of {name} is 0, or nobody states it: no reading has a likelihood");
+    Error::input(message).at(&study.file).hint(format!(
+        "add noise = {{ {name} = … }} to [sensors], or let it be found: noise = [\"{name}\"] in [fit]"
+    ))
+}

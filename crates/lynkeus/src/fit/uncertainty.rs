@@ -1,0 +1,205 @@
+//! How well the values are known.
+
+use std::ops::ControlFlow;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::problem::Problem;
+use super::search::{Found, positive, search};
+use crate::Error;
+
+/// 95 % of a normal distribution are within so many deviations.
+const DEVIATES: f64 = 1.959_963_984_540_054;
+
+/// Twice what −log L may rise within an interval of 95 %: χ² of one degree of freedom, and of one side at a bound.
+const RISES: [f64; 2] = [3.841_458_820_694_124, 2.705_543_454_095_404];
+
+/// A value with how well it is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Known {
+    pub value: f64,
+    /// none at a bound, or where the Hessian is not positive
+    pub sd: Option<f64>,
+    pub interval: Option<(f64, f64)>,
+    pub is_bound: bool,
+}
+
+/// Values and correlations of what is not at a bound.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Uncertainty {
+    pub known: Vec<Known>,
+    /// places of those that are not at a bound
+    pub free: Vec<usize>,
+    pub correlation: DMatrix<f64>,
+}
+
+/// From the Hessian at the end of a search.
+pub(super) fn uncertainty(problem: &Problem<'_>, found: &Found) -> Uncertainty {
+    let values = problem.values(&found.point.z);
+    let free: Vec<usize> = (0..values.len()).filter(|&i| !found.is_bound[i]).collect();
+    let own = DMatrix::from_fn(free.len(), free.len(), |i, j| {
+        found.hessian[(free[i], free[j])]
+    });
+    let covariance = positive(own).map(|factor| factor.inverse());
+    let deviation = |i: usize| {
+        let place = free.iter().position(|&f| f == i)?;
+        let covariance = covariance.as_ref()?;
+        let slope = problem.unknowns[i].slope(values[i]);
+        Some(covariance[(place, place)].sqrt() * slope.abs())
+    };
+    let known = values.iter().enumerate().map(|(i, &value)| {
+        let sd = deviation(i);
+        Known {
+            value,
+            sd,
+            interval: sd.map(|sd| normal(problem, i, value, sd)),
+            is_bound: found.is_bound[i],
+        }
+    });
+    let known = known.collect();
+    let correlation = match &covariance {
+        None => DMatrix::from_element(free.len(), free.len(), f64::NAN),
+        Some(covariance) => DMatrix::from_fn(free.len(), free.len(), |i, j| match i == j {
+            true => 1.0,
+            false => covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt(),
+        }),
+    };
+    Uncertainty {
+        known,
+        free,
+        correlation,
+    }
+}
+
+/// By the standard deviation: even about a value, by a factor about a noise.
+fn normal(problem: &Problem<'_>, i: usize, value: f64, sd: f64) -> (f64, f64) {
+    let unknown = &problem.unknowns[i];
+    let (low, high) = match unknown.kind.is_noise() {
+        true => {
+            let factor = (DEVIATES * sd / value).exp();
+            (value / factor, value * factor)
+        }
+        false => (value - DEVIATES * sd, value + DEVIATES * sd),
+    };
+    (low.max(unknown.low), high.min(unknown.high))
+}
+
+/// The interval in which −log L, the other unknowns being the best for each value, stays as low as 95 % of logs
+/// let it; at a bound one-sided.
+///
+/// # Errors
+/// As [`Problem::at`].
+pub(super) fn profile(
+    problem: &mut Problem<'_>,
+    found: &Found,
+    i: usize,
+    known: &Known,
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<Option<(f64, f64)>, Error> {
+    let unknown = problem.unknowns[i].clone();
+    let mut ends = [unknown.low, unknown.high];
+    for (side, end) in ends.iter_mut().enumerate() {
+        let sign = [-1.0, 1.0][side];
+        let limit = unknown.searched([unknown.low, unknown.high][side]);
+        let at = found.point.z[i];
+        if known.is_bound && (limit - at).abs() < 1e-9 * (1.0 + at.abs()) {
+            continue;
+        }
+        let rise = 0.5 * RISES[usize::from(known.is_bound)];
+        let size = match known.sd {
+            Some(sd) => sd / unknown.slope(known.value).abs(),
+            None if unknown.is_log => 1.0,
+            None => 0.1 * (unknown.high - unknown.low).min(at.abs().max(1e-3)),
+        };
+        let mut edge = Edge {
+            problem,
+            held: i,
+            from: found.point.z.clone(),
+            least: found.point.value,
+            rise,
+            watch,
+        };
+        match edge.find(at, sign, size, limit)? {
+            Some(z) => *end = unknown.value(z),
+            None => return Ok(None),
+        }
+    }
+    Ok(Some((ends[0], ends[1])))
+}
+
+/// Where a profile has risen by so much.
+struct Edge<'e, 'p> {
+    problem: &'e mut Problem<'p>,
+    /// the unknown that is moved
+    held: usize,
+    /// where the search for the others starts
+    from: DVector<f64>,
+    least: f64,
+    rise: f64,
+    watch: &'e mut dyn FnMut() -> ControlFlow<()>,
+}
+
+/// Values of the unknown that are tried on a side.
+const TRIALS: usize = 40;
+
+impl Edge<'_, '_> {
+    /// The edge on a side of `at`, by doubling, then by the secant of the root of the rise, which is nearly
+    /// straight; the limit where it is not reached. None where the search was told to stop.
+    fn find(&mut self, at: f64, sign: f64, size: f64, limit: f64) -> Result<Option<f64>, Error> {
+        let root = |rise: f64| rise.max(0.0).sqrt();
+        let goal = root(self.rise);
+        let mut inside = (at, 0.0);
+        let mut outside: Option<(f64, f64)> = None;
+        let mut next = at + sign * size * goal * 2.0_f64.sqrt();
+        for _ in 0..TRIALS {
+            let z = if sign > 0.0 {
+                next.min(limit)
+            } else {
+                next.max(limit)
+            };
+            let Some(rise) = self.rise_at(z)? else {
+                return Ok(None);
+            };
+            let reached = root(rise);
+            if (reached - goal).abs() < 1e-4 * goal {
+                return Ok(Some(z));
+            }
+            match reached < goal {
+                true if z == limit => return Ok(Some(limit)),
+                true => inside = (z, reached),
+                false => outside = Some((z, reached)),
+            }
+            next = match outside {
+                None => {
+                    let slope = (reached / (z - at).abs()).max(f64::MIN_POSITIVE);
+                    let far = (goal / slope).min(4.0 * (z - at).abs());
+                    at + sign * far.max(1.2 * (z - at).abs())
+                }
+                Some(outside) if outside.1.is_finite() => {
+                    let share = (goal - inside.1) / (outside.1 - inside.1);
+                    inside.0 + share.clamp(0.05, 0.95) * (outside.0 - inside.0)
+                }
+                Some(outside) => 0.5 * (inside.0 + outside.0),
+            };
+            if outside.is_some_and(|o| (o.0 - inside.0).abs() < 1e-9 * (1.0 + at.abs())) {
+                return Ok(Some(inside.0));
+            }
+        }
+        Ok(Some(inside.0))
+    }
+
+    fn rise_at(&mut self, z: f64) -> Result<Option<f64>, Error> {
+        let mut start = self.from.clone();
+        start[self.held] = z;
+        let mut held = vec![false; start.len()];
+        held[self.held] = true;
+        let found = search(self.problem, start, &held, self.watch)?;
+        if found.is_ended {
+            return Ok(None);
+        }
+        if found.point.value.is_finite() {
+            self.from = found.point.z.clone();
+        }
+        Ok(Some(found.point.value - self.least))
+    }
+}
