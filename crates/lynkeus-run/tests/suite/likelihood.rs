@@ -86,7 +86,7 @@ impl Case {
 
     /// The noise of others grows with the output.
     fn is_share(&self) -> bool {
-        self.seed % 4 == 0 && self.sensors == 1
+        self.seed.is_multiple_of(4) && self.sensors == 1
     }
 
     fn noise(&self, r: Expr<'_>) -> ParametricLevel {

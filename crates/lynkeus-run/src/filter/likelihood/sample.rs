@@ -7,7 +7,7 @@ use lynkeus_expr::{Expr, Node, Tape};
 use lynkeus_native::Function;
 
 use super::code::Code;
-use super::{ParametricLevel, ParametricPlant};
+use super::plant::{ParametricLevel, ParametricPlant};
 use crate::classical::{Term, sum};
 use crate::filter::expressions::{Corrected, Flow, corrected};
 use crate::{Error, Result};

@@ -1,0 +1,50 @@
+//! A plant as a function of what is not known.
+
+use lynkeus_expr::{Graph, Node};
+
+use crate::noise::Limits;
+
+/// A plant with its sensors and noises as functions of parameters θ.
+///
+/// Everything is an expression of one graph: f and h of time, states, inputs and θ; noises and starts of θ alone.
+#[derive(Clone, Debug)]
+pub struct ParametricPlant<'g> {
+    /// the graph of all expressions
+    pub graph: &'g Graph,
+    /// the symbol of time
+    pub time: Node,
+    /// symbols of the states
+    pub states: Vec<Node>,
+    /// f, one per state
+    pub derivatives: Vec<Node>,
+    /// symbols of the known inputs, held from one row to the next
+    pub inputs: Vec<Node>,
+    /// what is measured
+    pub sensors: Vec<ParametricSensor>,
+    /// spectral density of the white noise on each derivative
+    pub process_noise: Vec<Node>,
+    /// the first estimate of each state, and its standard deviation
+    pub start: Vec<(Node, Node)>,
+    /// symbols of θ
+    pub parameters: Vec<Node>,
+}
+
+/// A sensor of a [`ParametricPlant`].
+#[derive(Clone, Debug)]
+pub struct ParametricSensor {
+    /// h(t, x, u)
+    pub output: Node,
+    /// how strong its noise is
+    pub noise: ParametricLevel,
+    /// the range that it can show; a reading at an end says that y is there or beyond
+    pub limits: Option<Limits>,
+}
+
+/// The noise of a sensor as a function of θ.
+#[derive(Clone, Copy, Debug)]
+pub enum ParametricLevel {
+    /// its variance
+    Variance(Node),
+    /// its standard deviation as a share p of the output: the variance is p²E\[h²\]
+    Share(Node),
+}
