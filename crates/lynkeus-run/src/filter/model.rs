@@ -109,6 +109,17 @@ impl NoisyModel {
         })
     }
 
+    /// Starts at another estimate, in the order of the states.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a wrong number of values, or one that is not finite.
+    pub fn start_at(&mut self, start: Vec<f64>) -> Result<()> {
+        for flow in [&mut self.flow].into_iter().chain(&mut self.confined) {
+            flow.start_at(start.clone())?;
+        }
+        Ok(())
+    }
+
     /// Equations, noises, limits and ranges.
     pub(crate) fn tell(&self, digest: &mut Digest) {
         let all = [&self.flow, &self.output_map].into_iter();
