@@ -138,7 +138,7 @@ impl Fleet {
     }
 
     /// What became of a filter's last readings, one per sensor.
-    pub fn innovations(&self, filter: usize) -> impl Iterator<Item = Innovation> + '_ {
+    pub fn innovations(&self, filter: usize) -> impl Iterator<Item = Innovation> + Clone + '_ {
         let readings = self.asset(filter).readings.iter().enumerate();
         readings.map(move |(sensor, reading)| self.side.innovation(filter, sensor, *reading))
     }

@@ -148,24 +148,37 @@ fn another(random: &mut Random, filter: &Blueprint) -> Blueprint {
     let Updates::Filter { model, .. } = &mut other.updates else {
         unreachable!("a filter");
     };
-    for number in model
-        .process_noise
-        .iter_mut()
-        .chain(&mut model.initial_variance)
-    {
-        *number *= 1.0 + 0.5 * random.next();
-    }
-    for sensor in &mut model.sensors {
-        let factor = 1.0 + 0.5 * random.next();
-        sensor.noise = match sensor.noise {
-            Level::Absolute(size) => Level::Absolute(size * factor),
-            Level::Relative(size) => Level::Relative(size * factor),
-            Level::Uniform(size) => Level::Uniform(size * factor),
-        };
-    }
-    let start = model.flow.system().start().iter();
-    let start = start.map(|x| x + 0.1 * random.next()).collect();
-    model.as_mut().start_at(start).unwrap();
+    let g = Graph::new();
+    let symbol = g.symbol("any").node();
+    let mut number = |number: &f64| number * (1.0 + 0.5 * random.next());
+    let process_noise = model.process_noise.iter().map(&mut number).collect();
+    let initial_variance = model.initial_variance.iter().map(&mut number).collect();
+    let sensors = model.sensors.iter().map(|sensor| Sensor {
+        noise: match sensor.noise {
+            Level::Absolute(size) => Level::Absolute(number(&size)),
+            Level::Relative(size) => Level::Relative(number(&size)),
+            Level::Uniform(size) => Level::Uniform(number(&size)),
+        },
+        ..sensor.clone()
+    });
+    let sensors = sensors.collect();
+    let flow = model.flow.system();
+    let states = flow.states().iter().zip(flow.start());
+    let states = states.map(|(name, x)| (name.clone(), symbol, number(x)));
+    **model = model
+        .with_numbers(&NoisyPlant {
+            graph: &g,
+            time: symbol,
+            states: states.collect(),
+            derivatives: vec![],
+            inputs: vec![],
+            sensors,
+            process_noise,
+            initial_variance,
+            ranges: model.ranges.clone(),
+            confined: None,
+        })
+        .unwrap();
     other
 }
 

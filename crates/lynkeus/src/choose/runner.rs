@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use lynkeus_model::Plant;
 
+use crate::course::filter::keep_compiled;
 use crate::prepare::{Prepared, StudyDesign, is_certified_gain};
 use crate::simulate::{self, Rig};
 use crate::{Error, Outcome, Study, Table, choose, estimate, prepare, prepare::systems};
@@ -91,18 +92,38 @@ impl Runner {
         table: &Table,
         watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
     ) -> Result<Outcome, Error> {
-        let (plant, design) = match self.replayed.copy(study) {
-            Some(kept) => kept,
-            None => {
-                let plant = prepare::plant(study)?;
-                let prepared = Prepared::new(study, &plant)?;
-                let design = prepared.design()?;
-                self.replayed.keep(&prepared, &design);
-                drop(prepared);
-                (plant, design)
-            }
-        };
+        let (plant, design) = self.replay(study)?;
         estimate::with_design(&Prepared::new(study, &plant)?, design, table, watch)
+    }
+
+    /// The same for several logs: where a filter allows it, side by side. How many pay off together says
+    /// [`side_by_side`](crate::side_by_side).
+    ///
+    /// # Errors
+    /// As [`Runner::estimate`] of the study; those of each log stand in its place.
+    pub fn estimate_together(
+        &self,
+        study: &Study,
+        tables: &[&Table],
+        watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<Vec<Result<Outcome, Error>>, Error> {
+        let (plant, design) = self.replay(study)?;
+        let prepared = Prepared::new(study, &plant)?;
+        Ok(estimate::together(&prepared, &design, tables, watch))
+    }
+
+    /// The plant with the observer that replays logs.
+    fn replay(&self, study: &Study) -> Result<(Plant, StudyDesign), Error> {
+        if let Some(kept) = self.replayed.copy(study) {
+            return Ok(kept);
+        }
+        let plant = prepare::plant(study)?;
+        let prepared = Prepared::new(study, &plant)?;
+        let design = prepared.design()?;
+        keep_compiled(prepared.augmented().graph());
+        self.replayed.keep(&prepared, &design);
+        drop(prepared);
+        Ok((plant, design))
     }
 }
 
