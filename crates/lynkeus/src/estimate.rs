@@ -142,7 +142,8 @@ pub(crate) fn together(
     alone.collect()
 }
 
-fn in_lanes(
+/// None where they are to be done one after the other.
+pub(crate) fn in_lanes(
     prepared: &Prepared<'_>,
     design: &StudyDesign,
     tables: &[&Table],

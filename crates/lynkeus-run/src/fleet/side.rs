@@ -31,7 +31,7 @@ pub(super) trait Side: Debug + Send + Sync {
 
     fn names(&self) -> &[String];
 
-    /// Numbers of one lane, a number of each lane after the other, and how many lanes there are.
+    /// Numbers at their [`Places`], of each the values of all lanes, and how many lanes there are.
     fn values(&self) -> (&[f64], usize);
 
     fn copied(&self) -> Box<dyn Side>;
@@ -259,14 +259,12 @@ fn is_share(level: Level) -> bool {
 
 /// Whether two models differ in nothing but numbers.
 fn are_alike(a: &NoisyModel, b: &NoisyModel) -> bool {
-    let sensors = a.sensors.iter().zip(&b.sensors);
+    let mut sensors = a.sensors.iter().zip(&b.sensors);
     a.flow.system().has_code_of(b.flow.system())
         && a.output_map.system().has_code_of(b.output_map.system())
         && noisy(a) == noisy(b)
         && a.sensors.len() == b.sensors.len()
-        && sensors
-            .clone()
-            .all(|(a, b)| is_share(a.noise) == is_share(b.noise))
+        && sensors.all(|(a, b)| is_share(a.noise) == is_share(b.noise))
 }
 
 impl<const L: usize> Lanes<L> {
@@ -302,18 +300,14 @@ impl<const L: usize> Lanes<L> {
         let places = Places::new((n, m, p), acting);
         let passed = places.step - places.belief.end;
         let steps = Steps::<L>::of(&model.flow, noisy(model), passed).ok_or(Apart::Large)?;
-        let sensors = || {
-            filters
-                .iter()
-                .flat_map(|f| parts(f).map(|p| &p.0.sensors))
-                .flatten()
-        };
+        let all = filters.iter().flat_map(parts);
+        let mut sensors = all.flat_map(|(model, _)| &model.sensors);
         let mut made = Self {
             one: steps.one.clone(),
             many: None,
             correct: correction.code.clone(),
             is_exact: !correction.has_functions && !steps.has_functions,
-            is_choosy: settings.gate.is_some() || sensors().any(is_choosy),
+            is_choosy: settings.gate.is_some() || sensors.any(is_choosy),
             settings: settings.clone(),
             run: first.run,
             step,

@@ -278,6 +278,56 @@ mod tests {
         }
     }
 
+    /// Filters with fixed steps go side by side; a log that ends early or cannot be read has its own answer.
+    #[test]
+    fn logs_together_give_what_each_gives_alone() {
+        let fixed = "[estimate]\nmethod = \"rk4\"\nstep = 0.3\nsd = true\ninnovations = true";
+        let studies = [
+            (tank("family = \"ekf\", gate = 3.0", 0.05, fixed), true),
+            (tank("family = \"ekf\"", 0.05, ""), false),
+            (tank("theta = 1.0", 0.05, fixed), false),
+        ];
+        let log = |k: u32, name: &str| {
+            let column =
+                |f: &dyn Fn(f64) -> f64| (0..300 + 10 * k).map(|i| f(f64::from(i))).collect();
+            let y = |i: f64| match i {
+                _ if i % 7.0 == 3.0 => f64::NAN,
+                _ if k == 2 && i > 100.0 => 1e300,
+                _ => 4.0 + (0.01 * i * f64::from(1 + k)).sin(),
+            };
+            let columns = [
+                ("t", column(&|i| 0.2 * i + 0.01 * (i * i % 5.0))),
+                (name, column(&y)),
+            ];
+            Table::from_columns(columns.map(|(name, x)| (name.to_owned(), x)).into()).unwrap()
+        };
+        let tables = [
+            log(0, "y"),
+            log(1, "y"),
+            log(2, "y"),
+            log(3, "z"),
+            log(4, "y"),
+        ];
+        let tables: Vec<&Table> = tables.iter().collect();
+        let all = |found: Result<Outcome, Error>| match found {
+            Ok(outcome) => told(Ok(outcome)),
+            Err(error) => format!("{error:?}"),
+        };
+        for (study, is_together) in studies {
+            let runner = Runner::new(study.clone());
+            let found = runner.estimate_together(&study, &tables, &mut go).unwrap();
+            let found: Vec<String> = found.into_iter().map(all).collect();
+            let alone = tables
+                .iter()
+                .map(|table| all(crate::estimate(&study, table, &mut go)));
+            assert_eq!(found, alone.collect::<Vec<_>>());
+            let (plant, design) = runner.replay(&study).unwrap();
+            let prepared = Prepared::new(&study, &plant).unwrap();
+            let in_lanes = estimate::in_lanes(&prepared, &design, &tables, &mut go);
+            assert_eq!(in_lanes.is_some(), is_together);
+        }
+    }
+
     #[test]
     fn a_proposal_of_simulations_is_not_kept() {
         for (observer, is_kept) in FAMILIES.into_iter().zip([true, true, true, false, false]) {
