@@ -20,9 +20,11 @@ const ROWS: usize = 10_000;
 /// Windows of so many rows are timed, of which the least counts.
 const WINDOWS: usize = 10;
 const FLEET: usize = 1_000;
-/// Rows of a window that all filters go through, and windows.
+/// Rows of a window that all filters go through.
 const FLEET_ROWS: usize = 50;
-const FLEET_WINDOWS: usize = 6;
+/// So long at least the windows after the first are timed together, in seconds: processor time is counted in steps of
+/// some milliseconds.
+const FLEET_SECONDS: f64 = 0.5;
 /// Between the readings of two filters of the fleet.
 const PHASE: f64 = 0.01;
 
@@ -138,24 +140,28 @@ fn measure_fleet<F: Ends>(
     advance: impl Fn(&mut [F], &[Vec<f64>], usize) -> Result<(), Error>,
 ) -> Result<Fleet, Error> {
     let mut fleet = Fleet {
-        first: f64::INFINITY,
-        later: f64::INFINITY,
+        first: 0.0,
+        later: 0.0,
         ends: vec![],
     };
-    for window in 0..FLEET_WINDOWS {
+    let mut seconds = 0.0;
+    for window in 0.. {
         let first = window * FLEET_ROWS;
         let phases = (0..FLEET).map(|m| STEP * first as f64 + PHASE * m as f64);
         let readings: Vec<Vec<f64>> = phases.map(|phase| readings(FLEET_ROWS, phase)).collect();
         let clock = Clock::start();
         advance(&mut filters, &readings, first)?;
-        let seconds = clock.seconds() / (FLEET * FLEET_ROWS) as f64;
         if window == 0 {
-            fleet.first = seconds;
+            fleet.first = clock.seconds() / (FLEET * FLEET_ROWS) as f64;
             let [first, last] = [filters.first(), filters.last()];
             let ends = [first.map(Ends::first), last.map(Ends::last)];
             fleet.ends = ends.into_iter().flatten().flatten().collect();
-        } else {
-            fleet.later = fleet.later.min(seconds);
+            continue;
+        }
+        seconds += clock.seconds();
+        if seconds > FLEET_SECONDS {
+            fleet.later = seconds / (window * FLEET * FLEET_ROWS) as f64;
+            break;
         }
     }
     Ok(fleet)
