@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from . import _lynkeus
 from ._base import Base
-from ._each import Errors, Tell, each
+from ._each import Errors, Tell, Work, each
 from ._fleet import is_one, split
 from ._logs import collected, given, log_of
 from ._progress import Progress, Terms
@@ -46,13 +48,30 @@ def estimate_each(study: _lynkeus.Study, logs: Any, by: str | None, options: Opt
     keys = list(named) if isinstance(named, Mapping) else None
     names = [f"the log of {key!r}" for key in keys] if keys is not None else _places("log", logs)
 
-    def run(log: Any, tell: Tell) -> Run:
-        terms = Terms(options.time_limit, options.memory_limit, tell)
-        found = study.estimate(given(log), terms)
-        return Estimation(found)
+    def terms(tell: Tell) -> Terms:
+        return Terms(options.time_limit, options.memory_limit, tell)
 
-    found = _all(run, logs, names, "estimating", options)
+    def alone(log: Any, tell: Tell) -> Run:
+        return Estimation(study.estimate(given(log), terms(tell)))
+
+    def run(logs: Sequence[Any], tell: Tell) -> Sequence[Callable[[], Run]]:
+        if len(logs) > 1:
+            # what is wrong with the study, or with what is no log, each says for itself
+            with suppress(Exception):
+                found = study.estimate_together([given(log) for log in logs], terms(tell))
+                return [partial(_estimation, one) for one in found]
+        return [partial(alone, log, tell) for log in logs]
+
+    # a limit is one of each log
+    together = study.side_by_side() if options.time_limit is None else 1
+    found = _all(run, logs, names, "estimating", options, together)
     return found if keys is None else dict(zip(keys, found, strict=True))
+
+
+def _estimation(found: _lynkeus.Answer | BaseException) -> Run:
+    if isinstance(found, BaseException):
+        raise found
+    return Estimation(found)
 
 
 def sweep(study: _lynkeus.Study, changes: Iterable[Mapping[str, Any]], log: Any, options: Options) -> list[Any]:
@@ -73,7 +92,10 @@ def sweep(study: _lynkeus.Study, changes: Iterable[Mapping[str, Any]], log: Any,
             return Simulation(core.simulate(terms))
         return Estimation(core.estimate(recorded, terms))
 
-    return _all(run, asked, _places("change", asked), "sweeping", options)
+    def each_alone(changes: Sequence[Mapping[str, Any]], tell: Tell) -> Sequence[Callable[[], Run]]:
+        return [partial(run, change, tell) for change in changes]
+
+    return _all(each_alone, asked, _places("change", asked), "sweeping", options)
 
 
 def _places(what: str, items: Sequence[Any]) -> list[str]:
@@ -81,14 +103,23 @@ def _places(what: str, items: Sequence[Any]) -> list[str]:
 
 
 def _all(
-    run: Callable[[Any, Tell], Run], items: Sequence[Any], names: Sequence[str], what: str, options: Options
+    run: Work[Any, Run],
+    items: Sequence[Any],
+    names: Sequence[str],
+    what: str,
+    options: Options,
+    together: int = 1,
 ) -> list[Any]:
     """What is kept of the run of each item, in their order; one warning for all that are not credible."""
     doubted: dict[int, str] = {}
     lossy: dict[int, str] = {}
 
-    def work(place: int, tell: Tell) -> Any:
-        found = run(items[place], tell)
+    def work(places: Sequence[int], tell: Tell) -> Sequence[Callable[[], Any]]:
+        runs = run([items[place] for place in places], tell)
+        return [partial(kept, place, one) for place, one in zip(places, runs, strict=True)]
+
+    def kept(place: int, run: Callable[[], Run]) -> Any:
+        found = run()
         if found.refusal is not None:
             doubted[place] = str(found.refusal)
         if warnings_of := found._core.warnings():
@@ -99,6 +130,7 @@ def _all(
         work,
         range(len(items)),
         names,
+        together=together,
         workers=options.workers,
         errors=options.errors,
         progress=options.progress,

@@ -17,6 +17,8 @@ Item = TypeVar("Item")
 Kept = TypeVar("Kept")
 Errors = Literal["raise", "return"]
 Tell = Callable[[float], None]
+#: makes of some items what each of them gives: one function per item, which returns it or raises
+Work = Callable[[Sequence[Item], Tell], Sequence[Callable[[], Kept]]]
 
 #: in seconds, between two looks at what was told and at Ctrl-C
 LOOK = 0.1
@@ -33,49 +35,62 @@ class _Fractions:
         self.done = [0.0] * count
         self.is_over = threading.Event()
 
-    def tell(self, place: int) -> Tell:
+    def tell(self, places: range) -> Tell:
         def tell(fraction: float) -> None:
             if self.is_over.is_set():
                 raise _Ended
-            self.done[place] = fraction
+            for place in places:
+                self.done[place] = fraction
 
         return tell
 
 
 def each(
-    work: Callable[[Item, Tell], Kept],
+    work: Work[Item, Kept],
     items: Sequence[Item],
     names: Sequence[str],
     *,
+    together: int = 1,
     workers: int | None,
     errors: Errors,
     progress: Progress,
     what: str,
 ) -> list[Kept | LynkeusError]:
-    """What ``work`` makes of each item, in their order. An error of ours stands in its place, or is
-    raised with the item's name as a note and ends the rest."""
+    """What ``work`` makes of each item, at most so many ``together``, in their order. An error of ours stands in its
+    place, or is raised with the item's name as a note and ends the rest."""
     chosen(errors)
     count = _workers(workers, len(items))
     fractions = _Fractions(len(items))
 
-    def call(place: int) -> Kept | LynkeusError:
-        tell = fractions.tell(place)
+    def call(places: range) -> list[Kept | LynkeusError]:
+        tell = fractions.tell(places)
         try:
             tell(0.0)  # ended while it waited
-            return work(items[place], tell)
+            given = work([items[place] for place in places], tell)
+            return [kept(place, give) for place, give in zip(places, given, strict=True)]
+        finally:
+            tell_done(places)
+
+    def kept(place: int, give: Callable[[], Kept]) -> Kept | LynkeusError:
+        try:
+            return give()
         except Exception as error:
             error.add_note(f"in {names[place]}")
             if errors == "return" and isinstance(error, LynkeusError):
                 return error
             raise
-        finally:
+
+    def tell_done(places: range) -> None:
+        for place in places:
             fractions.done[place] = 1.0
 
+    size = max(1, min(together, -(-len(items) // count)))
     with told(progress, what) as shown, ThreadPoolExecutor(count, "lynkeus") as pool:
-        futures = [pool.submit(call, place) for place in range(len(items))]
+        groups = [range(first, min(first + size, len(items))) for first in range(0, len(items), size)]
+        futures = [pool.submit(call, places) for places in groups]
         try:
             _watch(futures, fractions, shown)
-            return [future.result() for future in futures]
+            return [found for future in futures for found in future.result()]
         finally:
             fractions.is_over.set()
             for future in futures:
@@ -98,12 +113,12 @@ def _workers(asked: int | None, items: int) -> int:
 
 
 def _watch(
-    futures: list[Future[Kept | LynkeusError]],
+    futures: list[Future[list[Kept | LynkeusError]]],
     fractions: _Fractions,
     shown: Callable[[float], object] | None,
 ) -> None:
     """Until all are done; what one of them raises is raised at once."""
-    done: SimpleQueue[Future[Kept | LynkeusError]] = SimpleQueue()
+    done: SimpleQueue[Future[list[Kept | LynkeusError]]] = SimpleQueue()
     for future in futures:
         future.add_done_callback(done.put)
     waiting, due = len(futures), 0.0

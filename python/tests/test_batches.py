@@ -8,6 +8,7 @@ import signal
 import threading
 import time
 import warnings
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -182,6 +183,39 @@ def test_doubts_are_told_once() -> None:
     assert [not run.is_credible for run in runs] == doubts
 
 
+@pytest.mark.parametrize("further", [{}, {"gate": 2.0}, {"bounds": "project"}])
+def test_filters_side_by_side_give_what_each_gives_alone(further: dict[str, Any]) -> None:
+    """Logs of different lengths, with gaps and times of their own; one that ends early, and one that is none."""
+    filtered = lynkeus.Study(
+        MODEL,
+        unknown=["inflow"],
+        noise={"y": 0.02},
+        process_noise={"inflow": 1e-3, "level": 1e-9},
+        observer={"family": "ekf", **further},
+        estimate={"method": "rk4", "step": 0.4, "sd": True, "innovations": True},
+    )
+    random = np.random.default_rng(5)
+    logs: list[Any] = []
+    for rows in range(150, 290, 10):
+        t = np.cumsum(random.uniform(0.1, 1.0, rows))
+        y = 4.0 + np.sin(0.1 * t) + random.normal(0.0, 0.02, rows)
+        y[random.uniform(size=rows) < 0.2] = np.nan
+        logs.append({"t": t, "y": y})
+    logs[3]["y"][50:] = 1e300
+    logs[5] = {"t": [0.0, 1.0], "z": [4.0, 4.0]}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        runs = filtered.estimate_each(logs, errors="return", workers=1)
+        for place, (run, log) in enumerate(zip(runs, logs, strict=True)):
+            try:
+                alone = filtered.estimate(log)
+            except lynkeus.LynkeusError as error:
+                assert str(run) == str(error) and run.__notes__ == [f"in log {place}"]
+                continue
+            same(run, alone)
+            assert str(run) == str(alone) and run.is_credible == alone.is_credible
+
+
 def test_progress_rises_to_the_end(study: lynkeus.Study) -> None:
     seen: list[float] = []
     study.sweep(seeds(30), progress=seen.append)
@@ -194,7 +228,8 @@ def test_what_is_left_of_many_is_not_looked_at_again_and_again() -> None:
     def cost(count: int) -> float:
         began = time.process_time()
         nothing: dict[str, Any] = {"workers": 2, "errors": "raise", "progress": False, "what": ""}
-        assert each(lambda item, _: item, range(count), [""] * count, **nothing) == list(range(count))
+        work = lambda items, _: [partial(int, item) for item in items]  # noqa: E731
+        assert each(work, range(count), [""] * count, **nothing) == list(range(count))
         return time.process_time() - began
 
     cost(100)

@@ -2,8 +2,12 @@
 //! between samples, within one process.
 
 use lynkeus::expr::Graph;
-use lynkeus::run::filter::{FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor};
-use lynkeus::run::{Blueprint, Error, Estimator, EstimatorSettings, Level, Method, Step};
+use lynkeus::run::filter::{
+    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Row, Sensor,
+};
+use lynkeus::run::{
+    Blueprint, Error, Estimator, EstimatorSettings, Fleet as Together, Level, Method, Step,
+};
 use serde_json::{Map, Value, json};
 
 use super::clock::Clock;
@@ -16,17 +20,22 @@ const ROWS: usize = 10_000;
 /// Windows of so many rows are timed, of which the least counts.
 const WINDOWS: usize = 10;
 const FLEET: usize = 1_000;
-/// Rows of a window that all filters go through, and windows.
+/// Rows of a window that all filters go through.
 const FLEET_ROWS: usize = 50;
-const FLEET_WINDOWS: usize = 6;
+/// So long at least the windows after the first are timed together, in seconds: processor time is counted in steps of
+/// some milliseconds.
+const FLEET_SECONDS: f64 = 0.5;
 /// Between the readings of two filters of the fleet.
 const PHASE: f64 = 0.01;
 
+type Fault = Box<dyn std::error::Error>;
+
 /// Seconds of a sample, alone and in a fleet, and where the filters end.
-pub(super) fn filters() -> Result<Value, Error> {
+pub(super) fn filters() -> Result<Value, Fault> {
     let mut found = Map::new();
     for n in CELLS {
-        let start = filter(n)?;
+        let blueprint = filter(n)?;
+        let start = blueprint.estimator()?;
         let mut alone = start.clone();
         run(&mut alone, &readings(ROWS, 0.0), 0)?;
         found.insert(format!("by transition {n}"), json!(end(&alone)));
@@ -38,12 +47,18 @@ pub(super) fn filters() -> Result<Value, Error> {
         found.insert(format!("fleet {n}"), json!(fleet.later));
         found.insert(format!("fleet at first {n}"), json!(fleet.first));
         found.insert(format!("by transition, fleet {n}"), json!(fleet.ends));
+        let together = measure_together(&blueprint)?;
+        if together.ends != fleet.ends {
+            let ends = (together.ends, fleet.ends);
+            return Err(format!("side by side is not one by one: {ends:?}").into());
+        }
+        found.insert(format!("fleet in lanes {n}"), json!(together.later));
     }
     Ok(Value::Object(found))
 }
 
 /// x_i' = φ(x_{i−1}) − φ(x_i), φ(x) = 2.5 x/(1 + 1.5 x), fed by a signal.
-fn filter(n: usize) -> Result<Estimator, Error> {
+fn filter(n: usize) -> Result<Blueprint, Error> {
     let g = Graph::new();
     let (time, u) = (g.symbol("time"), g.symbol("u"));
     let x: Vec<_> = (0..n).map(|i| g.symbol(&format!("x[{i}]"))).collect();
@@ -75,7 +90,8 @@ fn filter(n: usize) -> Result<Estimator, Error> {
         method: Method::Rk4(Step::Substeps(1)),
         ..EstimatorSettings::default()
     };
-    Blueprint::filter(model, FilterSettings::of(FilterKind::Extended), run).estimator()
+    let settings = FilterSettings::of(FilterKind::Extended);
+    Ok(Blueprint::filter(model, settings, run))
 }
 
 fn readings(rows: usize, phase: f64) -> Vec<f64> {
@@ -119,30 +135,94 @@ struct Fleet {
 
 /// Filters at their start, with readings of their own, by something that takes all of them over the rows of a window,
 /// the first of which has that number.
-fn measure_fleet(
-    mut filters: Vec<Estimator>,
-    advance: impl Fn(&mut [Estimator], &[Vec<f64>], usize) -> Result<(), Error>,
+fn measure_fleet<F: Ends>(
+    mut filters: Vec<F>,
+    advance: impl Fn(&mut [F], &[Vec<f64>], usize) -> Result<(), Error>,
 ) -> Result<Fleet, Error> {
     let mut fleet = Fleet {
-        first: f64::INFINITY,
-        later: f64::INFINITY,
+        first: 0.0,
+        later: 0.0,
         ends: vec![],
     };
-    for window in 0..FLEET_WINDOWS {
+    let mut seconds = 0.0;
+    for window in 0.. {
         let first = window * FLEET_ROWS;
         let phases = (0..FLEET).map(|m| STEP * first as f64 + PHASE * m as f64);
         let readings: Vec<Vec<f64>> = phases.map(|phase| readings(FLEET_ROWS, phase)).collect();
         let clock = Clock::start();
         advance(&mut filters, &readings, first)?;
-        let seconds = clock.seconds() / (FLEET * FLEET_ROWS) as f64;
         if window == 0 {
-            fleet.first = seconds;
-            fleet.ends = [end(&filters[0]), end(&filters[FLEET - 1])].concat();
-        } else {
-            fleet.later = fleet.later.min(seconds);
+            fleet.first = clock.seconds() / (FLEET * FLEET_ROWS) as f64;
+            let [first, last] = [filters.first(), filters.last()];
+            let ends = [first.map(Ends::first), last.map(Ends::last)];
+            fleet.ends = ends.into_iter().flatten().flatten().collect();
+            continue;
+        }
+        seconds += clock.seconds();
+        if seconds > FLEET_SECONDS {
+            fleet.later = seconds / (window * FLEET * FLEET_ROWS) as f64;
+            break;
         }
     }
     Ok(fleet)
+}
+
+/// Where the first and the last of one or some filters are.
+trait Ends {
+    fn first(&self) -> Vec<f64>;
+    fn last(&self) -> Vec<f64>;
+}
+
+impl Ends for Estimator {
+    fn first(&self) -> Vec<f64> {
+        end(self)
+    }
+
+    fn last(&self) -> Vec<f64> {
+        end(self)
+    }
+}
+
+impl Ends for Together {
+    fn first(&self) -> Vec<f64> {
+        self.estimate(0).chain(self.deviations(0)).collect()
+    }
+
+    fn last(&self) -> Vec<f64> {
+        let last = self.len() - 1;
+        self.estimate(last).chain(self.deviations(last)).collect()
+    }
+}
+
+/// The same filters side by side, as many as there are lanes.
+fn measure_together(filter: &Blueprint) -> Result<Fleet, Fault> {
+    let of = |count: usize| Together::new(&vec![filter.clone(); count]);
+    let width = Together::width();
+    let mut all = vec![of(width)?; FLEET / width];
+    if !FLEET.is_multiple_of(width) {
+        all.push(of(FLEET % width)?);
+    }
+    Ok(measure_fleet(all, in_lanes)?)
+}
+
+fn in_lanes(fleets: &mut [Together], readings: &[Vec<f64>], first: usize) -> Result<(), Error> {
+    let width = Together::width();
+    for (fleet, readings) in fleets.iter_mut().zip(readings.chunks(width)) {
+        let mut rows = vec![None; readings.len()];
+        for k in 0..FLEET_ROWS {
+            for (row, readings) in rows.iter_mut().zip(readings) {
+                *row = Some(Row {
+                    t: STEP * (first + k) as f64,
+                    readings: &readings[k..=k],
+                    inputs: &[INPUT],
+                });
+            }
+            if let Some((_, error)) = fleet.push(&rows).into_iter().next() {
+                return Err(error);
+            }
+        }
+    }
+    Ok(())
 }
 
 fn one_by_one(filters: &mut [Estimator], readings: &[Vec<f64>], first: usize) -> Result<(), Error> {

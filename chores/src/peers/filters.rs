@@ -130,6 +130,11 @@ fn rows() -> Vec<Row> {
             OURS,
             "fleet at first",
         ),
+        Row::new(
+            "1,000 filters: Lynkeus, side by side in lanes",
+            OURS,
+            "fleet in lanes",
+        ),
         Row::new("1,000 filters: JAX, `vmap`", "jax", "fleet"),
         Row::new(
             "1,000 filters: JAX, `vmap`, F's bands written out",

@@ -204,6 +204,42 @@ impl Study {
         Ok(Answer::of(outcome))
     }
 
+    /// How many logs are best estimated together.
+    fn side_by_side(&self) -> usize {
+        lynkeus::side_by_side(&self.study)
+    }
+
+    /// What [`Study::estimate`] gives for each of some logs, or raises.
+    #[pyo3(signature = (logs, terms=None))]
+    fn estimate_together<'py>(
+        &self,
+        py: Python<'py>,
+        logs: Vec<Given>,
+        terms: Option<Terms<'_>>,
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let terms = terms.unwrap_or_default();
+        let found = self.ask(py, &terms, |study, watch| {
+            let tables: Vec<_> = logs.iter().map(|log| log.table(study)).collect();
+            let read: Vec<&lynkeus::table::Table> =
+                tables.iter().flatten().map(|table| &**table).collect();
+            let found = self.runner.estimate_together(study, &read, watch)?;
+            let mut found = found.into_iter();
+            let each = tables.into_iter().map(|table| {
+                table?;
+                // one for each that was read
+                found
+                    .next()
+                    .unwrap_or_else(|| Err(Error::input("no result")))
+            });
+            Ok(each.collect::<Vec<_>>())
+        })?;
+        let each = found.into_iter().map(|outcome| match outcome {
+            Ok(outcome) => Bound::new(py, Answer::of(outcome)).map(Bound::into_any),
+            Err(error) => Ok(exception(&error).into_value(py).into_bound(py).into_any()),
+        });
+        each.collect()
+    }
+
     #[pyo3(signature = (log=None, terms=None))]
     fn tune(
         &self,

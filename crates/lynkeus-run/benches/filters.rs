@@ -3,9 +3,9 @@
 use divan::{Bencher, black_box};
 use lynkeus_expr::Graph;
 use lynkeus_run::filter::{
-    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
+    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Row, Sensor, SigmaPoints,
 };
-use lynkeus_run::{Blueprint, Error, EstimatorSettings, Level, Method, Step, Tolerances};
+use lynkeus_run::{Blueprint, Error, EstimatorSettings, Fleet, Level, Method, Step, Tolerances};
 
 fn main() {
     divan::main();
@@ -91,6 +91,32 @@ fn ekf(bencher: Bencher, n: usize) {
 fn ekf_rk4(bencher: Bencher, n: usize) {
     let method = Method::Rk4(Step::Substeps(1));
     measure_by(method, 10_000, bencher, n, FilterKind::Extended);
+}
+
+/// As many as there are lanes, one step of Runge and Kutta between samples.
+#[divan::bench(args = [2, 4, 8, 12, 16, 25])]
+fn ekf_fleet(bencher: Bencher, n: usize) {
+    let run = EstimatorSettings {
+        method: Method::Rk4(Step::Substeps(1)),
+        ..EstimatorSettings::default()
+    };
+    let model = chain(n).unwrap_or_else(|error| panic!("{error}"));
+    let filter = Blueprint::filter(model, FilterSettings::of(FilterKind::Extended), run);
+    let filters = vec![filter; Fleet::width()];
+    let mut fleet = Fleet::new(&filters).unwrap_or_else(|apart| panic!("{apart}"));
+    let mut k = 0_u32;
+    bencher.bench_local(|| {
+        let t = STEP * f64::from(k);
+        k += 1;
+        let (readings, inputs) = ([0.5 + 0.1 * t.sin()], [black_box(0.7)]);
+        let row = Row {
+            t,
+            readings: &readings,
+            inputs: &inputs,
+        };
+        let failed = fleet.push(&[Some(row); 8][..filters.len()]);
+        assert!(failed.is_empty());
+    });
 }
 
 #[divan::bench(args = [2, 8, 25, 61, 200])]

@@ -27,6 +27,11 @@ impl Bound {
         }
     }
 
+    /// What no value may exceed.
+    pub(crate) fn most(&self) -> f64 {
+        FACTOR * self.scale
+    }
+
     /// # Errors
     /// [`Error::Diverged`], with the hint, for a value beyond the bound, or NaN.
     pub(crate) fn check(
@@ -36,8 +41,9 @@ impl Bound {
         values: &[f64],
         hint: impl FnOnce() -> String,
     ) -> Result<()> {
+        let most = self.most();
         // a reading may be so large that the bound itself is infinite
-        let inside = |v: &f64| v.is_finite() && v.abs() <= FACTOR * self.scale;
+        let inside = |v: &f64| v.is_finite() && v.abs() <= most;
         match values.iter().position(|v| !inside(v)) {
             None => Ok(()),
             Some(i) => Err(diverged(time, names, values, i, hint())),

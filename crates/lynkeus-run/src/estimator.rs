@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use crate::filter::{Filter, Health, Innovation, Record, Smoothed};
-use crate::runner::{Runner, Sample};
+use crate::runner::{Runner, Sample, check_time, no_number};
 use crate::sampled::Sampled;
 use crate::snapshot::{self, Damaged, Walk};
 use crate::{
@@ -116,7 +116,7 @@ impl Estimator {
     /// [`Error::Diverged`], [`Error::NotFinite`] and the errors of the integration.
     pub fn predict(&mut self, t: f64) -> Result<&[f64]> {
         self.started()?;
-        self.check_time(t)?;
+        check_time(self.time, t)?;
         self.save();
         let before = self.time.replace(t);
         self.signals[..self.sensors].fill(f64::NAN);
@@ -147,7 +147,7 @@ impl Estimator {
             let expected = format!("{}: {}", self.names.len(), self.names.join(", "));
             return Err(Error::setting("number of signals", expected, signals.len()));
         }
-        self.check_time(t)?;
+        check_time(self.time, t)?;
         let inputs = self.sensors..self.names.len();
         let missing = |i: &usize| !signals[*i].is_finite();
         if let (None, Some(i)) = (self.time, inputs.clone().find(missing)) {
@@ -167,16 +167,6 @@ impl Estimator {
     fn started(&self) -> Result<f64> {
         let none = || Error::setting("samples so far", "one, which sets the time", 0);
         self.time.ok_or_else(none)
-    }
-
-    fn check_time(&self, t: f64) -> Result<()> {
-        if !t.is_finite() {
-            return Err(no_number("t", t));
-        }
-        match self.time {
-            Some(reached) if t < reached => Err(Error::TimeBefore { reached, time: t }),
-            _ => Ok(()),
-        }
     }
 
     /// Names of the signals: sensors, then known inputs.
@@ -353,12 +343,5 @@ impl Estimator {
             true => self.runner.walk_history(walk),
             false => Ok(()),
         }
-    }
-}
-
-fn no_number(signal: &str, value: f64) -> Error {
-    Error::NoNumber {
-        signal: signal.to_owned(),
-        value,
     }
 }

@@ -1,13 +1,23 @@
 //! A tape in lanes: as machine code, or interpreted.
 
-use lynkeus_expr::lanes::Lanes;
-use lynkeus_expr::{Evaluator, Tape};
+use lynkeus_expr::lanes::{self, Lanes, Portable};
+use lynkeus_expr::{Evaluator, Graph, Node, Op, Tape};
 use lynkeus_native::Function;
 
 use crate::Backend;
 
 /// Largest tape that is compiled.
 const LARGEST: usize = 200_000;
+
+/// Whether there is a function that lanes round in their own way.
+pub(crate) fn have_functions(graph: &Graph, outputs: &[Node]) -> bool {
+    let rounds = |node: &Node| match graph.op(*node) {
+        Op::Unary(op, _) => lanes::unary::<Portable<1>>(op).is_some(),
+        Op::Binary(op, ..) => lanes::binary::<Portable<1>>(op).is_some(),
+        _ => false,
+    };
+    graph.reachable(outputs).iter().any(rounds)
+}
 
 /// Machine code, or a tape. Both give the same values to the bit.
 #[derive(Clone, Debug)]

@@ -109,6 +109,15 @@ impl Linearised {
         Self::new(graph, time, &[], &read, &[], outputs, &jacobians)
     }
 
+    /// Starts elsewhere.
+    ///
+    /// # Errors
+    /// As [`System::with_start`].
+    pub(crate) fn start_at(&mut self, start: Vec<f64>) -> Result<()> {
+        self.system = self.system.clone().with_start(start)?;
+        Ok(())
+    }
+
     /// What is compiled.
     #[must_use]
     pub fn system(&self) -> &System {

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use crate::filter::health::{Health, Innovation};
 use crate::filter::{Record, Smoothed};
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Result, StepAdvice};
+use crate::{Error, Result, StepAdvice};
 
 /// A sample as an observer takes it.
 #[derive(Clone, Copy, Debug)]
@@ -74,6 +74,27 @@ pub(crate) trait Runner: Persist + Debug + Send + Sync {
     }
 
     fn copied(&self) -> Box<dyn Runner>;
+}
+
+/// That a row at `t` may follow what was reached.
+///
+/// # Errors
+/// [`Error::NoNumber`], [`Error::TimeBefore`].
+pub(crate) fn check_time(reached: Option<f64>, t: f64) -> Result<()> {
+    if !t.is_finite() {
+        return Err(no_number("t", t));
+    }
+    match reached {
+        Some(reached) if t < reached => Err(Error::TimeBefore { reached, time: t }),
+        _ => Ok(()),
+    }
+}
+
+pub(crate) fn no_number(signal: &str, value: f64) -> Error {
+    Error::NoNumber {
+        signal: signal.to_owned(),
+        value,
+    }
 }
 
 impl Clone for Box<dyn Runner> {

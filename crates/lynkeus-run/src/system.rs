@@ -202,6 +202,11 @@ impl System {
         digest.numbers(&self.start);
     }
 
+    /// Whether another one has the same code, and differs in numbers alone.
+    pub(crate) fn has_code_of(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.code, &other.code)
+    }
+
     /// The equations that it is compiled from.
     pub(crate) fn equations(&self) -> &Equations {
         &self.code.equations

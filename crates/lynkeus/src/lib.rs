@@ -126,7 +126,7 @@ pub use course::doubt::{Doubt, Kind as DoubtKind, Level as DoubtLevel};
 pub use course::quantity::Quantity;
 pub use design::{DesignReport, design};
 pub use estimate::live::estimator;
-pub use estimate::{estimate, estimate_resumed};
+pub use estimate::{estimate, estimate_resumed, side_by_side};
 pub use export::export;
 pub use fit::{Fit, FitOptions, fit};
 pub use judge::accuracy::{Accuracy, Coverage, Settling};

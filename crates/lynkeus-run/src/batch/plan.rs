@@ -2,13 +2,12 @@
 
 use std::ops::Range;
 
-use lynkeus_expr::lanes::{self, Portable};
-use lynkeus_expr::{Graph, MissingInput, Node, Op, Tape};
+use lynkeus_expr::{Graph, MissingInput, Node, Tape};
 use lynkeus_native::Function;
 
 use crate::closed_loop::Loop;
 use crate::integrator::{APART, check_interval, fixed_steps, pieces};
-use crate::lanes::Engine;
+use crate::lanes::{Engine, have_functions};
 use crate::noise::Sensors;
 use crate::run::{Itinerary, Stop};
 use crate::{Events, Method, Noise, Result, Simulation, Step};
@@ -214,11 +213,6 @@ impl<const L: usize> Divided<L> {
         let common = [&inputs[..own.start], &inputs[own.end..]].concat();
         let divided = g.hoisted(outputs, &common);
         let shared = divided.values.len();
-        let rounds = |node: &Node| match g.op(*node) {
-            Op::Unary(op, _) => lanes::unary::<Portable<1>>(op).is_some(),
-            Op::Binary(op, ..) => lanes::binary::<Portable<1>>(op).is_some(),
-            _ => false,
-        };
         let common = Tape::new(g, &common, &divided.values)?;
         let own_inputs = own.len();
         let own = [&divided.symbols, &inputs[own]].concat();
@@ -228,7 +222,7 @@ impl<const L: usize> Divided<L> {
             common: Engine::new(&common, Function::compile),
             own: Engine::new(&own, sweeping),
             shared,
-            has_functions: g.reachable(outputs).iter().any(rounds),
+            has_functions: have_functions(g, outputs),
             own_inputs,
             outputs: outputs.len(),
             spacing,

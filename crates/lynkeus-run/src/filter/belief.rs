@@ -20,6 +20,14 @@ impl Belief {
         }
     }
 
+    /// x̂, then the lower triangle of S, row by row.
+    pub fn numbers_mut(&mut self) -> impl Iterator<Item = &mut f64> {
+        let n = self.root.n;
+        let rows = self.root.entries.chunks_exact_mut(n.max(1)).enumerate();
+        let entries = rows.flat_map(|(i, row)| &mut row[..=i]);
+        self.x.iter_mut().chain(entries)
+    }
+
     /// Corrects by a reading, as [`Root::update`], that is `innovation` off.
     pub fn take(
         &mut self,

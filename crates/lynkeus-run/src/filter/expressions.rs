@@ -3,7 +3,10 @@
 
 use lynkeus_expr::{Expr, Graph, Node};
 
+use crate::Jacobian;
 use crate::classical::{Term, classical_step, sum};
+use crate::equations::Equations;
+use crate::routine::LARGEST_STEP;
 
 /// x' = f with F, and the noise on its states in units of its largest density.
 pub(crate) struct Flow<'f, 'g> {
@@ -17,7 +20,33 @@ pub(crate) struct Flow<'f, 'g> {
     pub noise: Vec<Term<'g>>,
 }
 
-impl<'g> Flow<'_, 'g> {
+impl<'f, 'g> Flow<'f, 'g> {
+    /// Of equations with noise on such states; none where there would be too much of it, were Φ and W full.
+    pub fn of(
+        graph: &'g Graph,
+        equations: &'f Equations,
+        jacobian: &'f Jacobian,
+        noisy: &[bool],
+    ) -> Option<Self> {
+        let free = &equations.roots.free;
+        let noise = noisy.iter().map(|n| n.then(|| graph.fresh("q")));
+        let flow = Flow {
+            graph,
+            inputs: &equations.inputs[..equations.smooth_inputs()],
+            derivatives: &free.derivatives,
+            slopes: &free.outputs[jacobian.outputs()],
+            places: jacobian.places(),
+            noise: noise.collect(),
+        };
+        (16 * noisy.len() * flow.places.len() <= LARGEST_STEP).then_some(flow)
+    }
+
+    /// What the equations read, then these symbols.
+    pub fn inputs_with(&self, more: impl Iterator<Item = Term<'g>>) -> Vec<Node> {
+        let more = more.flatten().map(Expr::node);
+        self.inputs.iter().copied().chain(more).collect()
+    }
+
     fn states(&self) -> usize {
         self.derivatives.len()
     }
@@ -222,8 +251,17 @@ impl<'g> Flow<'_, 'g> {
     }
 }
 
+/// Their nodes, 0 where there is nothing.
+pub(crate) fn nodes(graph: &Graph, terms: &[Term<'_>]) -> Vec<Node> {
+    let nothing = graph.constant(0.0).node();
+    terms
+        .iter()
+        .map(|term| term.map_or(nothing, Expr::node))
+        .collect()
+}
+
 /// As [`dot`](super::root::dot).
-fn dot<'g>(a: &[Term<'g>], b: &[Term<'g>]) -> Term<'g> {
+pub(crate) fn dot<'g>(a: &[Term<'g>], b: &[Term<'g>]) -> Term<'g> {
     let whole = a.len() / 4 * 4;
     let mut sums = [None; 5];
     for (at, (a, b)) in a.iter().zip(b).enumerate() {
@@ -245,6 +283,16 @@ pub(crate) struct Corrected<'g> {
     pub noise: Expr<'g>,
 }
 
+/// Sᵀc, as [`Root::transposed_times`](super::root::Root::transposed_times).
+pub(crate) fn projected<'g>(root: &[Term<'g>], c: &[Term<'g>]) -> Vec<Term<'g>> {
+    let n = c.len();
+    let projected = |j: usize| {
+        let terms = (j..n).map(|i| c[i].zip(root[i * n + j]).map(|(c, s)| c * s));
+        terms.fold(None, sum)
+    };
+    (0..n).map(projected).collect()
+}
+
 /// Carlson's update of x̂ and S by a reading that is `innovation` off; `slopes` is the row of C. The variance of
 /// its noise, which is not 0, is a function of how uncertain the output is. As [`Root::update`](super::root::Root::update).
 pub(crate) fn corrected<'g>(
@@ -255,11 +303,7 @@ pub(crate) fn corrected<'g>(
 ) -> Corrected<'g> {
     let n = x.len();
     let mut root = root.to_vec();
-    let projected = |j: usize| {
-        let terms = (j..n).map(|i| slopes[i].zip(root[i * n + j]).map(|(c, s)| c * s));
-        terms.fold(None, sum)
-    };
-    let projected: Vec<Term<'g>> = (0..n).map(projected).collect();
+    let projected = projected(&root, slopes);
     let spread = dot(&projected, &projected);
     let noise = noise(spread);
     let variance = spread.map_or(noise, |spread| spread + noise);

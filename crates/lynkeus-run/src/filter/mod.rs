@@ -40,9 +40,9 @@
 //! ```
 
 mod belief;
-mod censored;
+pub(crate) mod censored;
 mod ekf;
-mod expressions;
+pub(crate) mod expressions;
 pub(crate) mod health;
 mod likelihood;
 mod mhe;
@@ -50,7 +50,7 @@ mod model;
 mod profile;
 mod record;
 pub(crate) mod root;
-mod sensing;
+pub(crate) mod sensing;
 mod settings;
 mod smoother;
 pub(crate) mod transition;
@@ -87,6 +87,31 @@ enum Engine {
     Extended(Ekf),
     Unscented(Box<Ukf>),
     MovingHorizon(Box<Mhe>),
+}
+
+/// What an extended filter has beside its belief.
+#[derive(Clone, Debug)]
+pub(crate) struct Beside {
+    /// known inputs from the last sample on
+    pub inputs: Vec<f64>,
+    pub bound: Bound,
+    pub health: Health,
+    /// of each sensor's readings that were rejected in a row, those that differ from the one before, and
+    /// that one
+    pub rejected: Vec<(usize, f64)>,
+}
+
+impl Beside {
+    /// At the start.
+    pub fn new(model: &NoisyModel) -> Self {
+        let (flow, sensors) = (model.flow.system(), model.sensors.len());
+        Self {
+            inputs: vec![0.0; flow.signals().len()],
+            bound: Bound::new(flow.start()),
+            health: Health::of(sensors),
+            rejected: vec![(0, 0.0); sensors],
+        }
+    }
 }
 
 /// A filter under way.
@@ -142,6 +167,31 @@ impl Filter {
             history: settings.keep_history.then(History::default),
             pending: None,
         })
+    }
+
+    /// Goes to where another one is: x̂, then the lower triangle of S row by row, and what is beside.
+    pub fn resume(&mut self, belief: impl Iterator<Item = f64>, beside: &Beside) {
+        let places = self.belief.numbers_mut();
+        places.zip(belief).for_each(|(place, value)| *place = value);
+        self.propagation.driven.start(&beside.inputs);
+        self.bound = beside.bound;
+        self.sensing.health.clone_from(&beside.health);
+        let kept = self.sensing.moved.iter_mut().zip(&mut self.sensing.last);
+        for ((moved, last), rejected) in kept.zip(&beside.rejected) {
+            (*moved, *last) = *rejected;
+        }
+    }
+
+    /// Where it is: what [`Filter::resume`] takes.
+    pub fn standing(&mut self) -> (impl Iterator<Item = f64>, Beside) {
+        let kept = self.sensing.moved.iter().zip(&self.sensing.last);
+        let beside = Beside {
+            inputs: self.propagation.driven.signals().to_vec(),
+            bound: self.bound,
+            health: self.sensing.health.clone(),
+            rejected: kept.map(|(moved, last)| (*moved, *last)).collect(),
+        };
+        (self.belief.numbers_mut().map(|x| *x), beside)
     }
 
     /// To the next sample; the transition is what the smoother needs of it. Where the plant has no

@@ -109,6 +109,24 @@ impl NoisyModel {
         })
     }
 
+    /// The same with the numbers of a plant whose expressions are those of this one: where it starts, variances,
+    /// noises, limits and ranges. The code is shared.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for numbers that are impossible, and for other numbers of them.
+    pub fn with_numbers(&self, plant: &NoisyPlant<'_>) -> Result<Self> {
+        check(plant)?;
+        let mut changed = self.clone();
+        for flow in [&mut changed.flow].into_iter().chain(&mut changed.confined) {
+            flow.start_at(plant.states.iter().map(|state| state.2).collect())?;
+        }
+        changed.sensors.clone_from(&plant.sensors);
+        changed.process_noise.clone_from(&plant.process_noise);
+        changed.initial_variance.clone_from(&plant.initial_variance);
+        changed.ranges.clone_from(&plant.ranges);
+        Ok(changed)
+    }
+
     /// Equations, noises, limits and ranges.
     pub(crate) fn tell(&self, digest: &mut Digest) {
         let all = [&self.flow, &self.output_map].into_iter();

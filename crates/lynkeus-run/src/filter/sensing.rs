@@ -24,7 +24,7 @@ const MOVED: usize = 5;
 /// A reading so many deviations from what is expected contradicts the prediction: then it has a say in
 /// how large a noise that grows with the value is. A nearer one has none: readings that come out high
 /// would count less than those that come out low.
-const SURPRISE: f64 = 3.0;
+pub(crate) const SURPRISE: f64 = 3.0;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Sensing {
@@ -34,9 +34,9 @@ pub(crate) struct Sensing {
     /// of readings that only stand for others ([`FilterSettings::foresees`])
     foresees: bool,
     /// of the readings of each sensor that were rejected in a row, those that differ from the one before
-    moved: Vec<usize>,
+    pub moved: Vec<usize>,
     /// the reading before
-    last: Vec<f64>,
+    pub last: Vec<f64>,
     pub innovations: Vec<Innovation>,
     pub health: Health,
     /// of this sample, where a smoother asks for them

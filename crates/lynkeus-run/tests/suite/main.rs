@@ -4,6 +4,7 @@
 mod batches;
 mod common;
 mod coverage;
+mod fleet;
 mod integration;
 mod likelihood;
 mod linear_plants;

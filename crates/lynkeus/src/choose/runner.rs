@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use lynkeus_model::Plant;
 
+use crate::course::filter::keep_compiled;
 use crate::prepare::{Prepared, StudyDesign, is_certified_gain};
 use crate::simulate::{self, Rig};
 use crate::{Error, Outcome, Study, Table, choose, estimate, prepare, prepare::systems};
@@ -91,18 +92,38 @@ impl Runner {
         table: &Table,
         watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
     ) -> Result<Outcome, Error> {
-        let (plant, design) = match self.replayed.copy(study) {
-            Some(kept) => kept,
-            None => {
-                let plant = prepare::plant(study)?;
-                let prepared = Prepared::new(study, &plant)?;
-                let design = prepared.design()?;
-                self.replayed.keep(&prepared, &design);
-                drop(prepared);
-                (plant, design)
-            }
-        };
+        let (plant, design) = self.replay(study)?;
         estimate::with_design(&Prepared::new(study, &plant)?, design, table, watch)
+    }
+
+    /// The same for several logs: where a filter allows it, side by side. How many pay off together says
+    /// [`side_by_side`](crate::side_by_side).
+    ///
+    /// # Errors
+    /// As [`Runner::estimate`] of the study; those of each log stand in its place.
+    pub fn estimate_together(
+        &self,
+        study: &Study,
+        tables: &[&Table],
+        watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<Vec<Result<Outcome, Error>>, Error> {
+        let (plant, design) = self.replay(study)?;
+        let prepared = Prepared::new(study, &plant)?;
+        Ok(estimate::together(&prepared, &design, tables, watch))
+    }
+
+    /// The plant with the observer that replays logs.
+    fn replay(&self, study: &Study) -> Result<(Plant, StudyDesign), Error> {
+        if let Some(kept) = self.replayed.copy(study) {
+            return Ok(kept);
+        }
+        let plant = prepare::plant(study)?;
+        let prepared = Prepared::new(study, &plant)?;
+        let design = prepared.design()?;
+        keep_compiled(prepared.augmented().graph());
+        self.replayed.keep(&prepared, &design);
+        drop(prepared);
+        Ok((plant, design))
     }
 }
 
@@ -254,6 +275,56 @@ mod tests {
                     "{observer} {seed}"
                 );
             }
+        }
+    }
+
+    /// Filters with fixed steps go side by side; a log that ends early or cannot be read has its own answer.
+    #[test]
+    fn logs_together_give_what_each_gives_alone() {
+        let fixed = "[estimate]\nmethod = \"rk4\"\nstep = 0.3\nsd = true\ninnovations = true";
+        let studies = [
+            (tank("family = \"ekf\", gate = 3.0", 0.05, fixed), true),
+            (tank("family = \"ekf\"", 0.05, ""), false),
+            (tank("theta = 1.0", 0.05, fixed), false),
+        ];
+        let log = |k: u32, name: &str| {
+            let column =
+                |f: &dyn Fn(f64) -> f64| (0..300 + 10 * k).map(|i| f(f64::from(i))).collect();
+            let y = |i: f64| match i {
+                _ if i % 7.0 == 3.0 => f64::NAN,
+                _ if k == 2 && i > 100.0 => 1e300,
+                _ => 4.0 + (0.01 * i * f64::from(1 + k)).sin(),
+            };
+            let columns = [
+                ("t", column(&|i| 0.2 * i + 0.01 * (i * i % 5.0))),
+                (name, column(&y)),
+            ];
+            Table::from_columns(columns.map(|(name, x)| (name.to_owned(), x)).into()).unwrap()
+        };
+        let tables = [
+            log(0, "y"),
+            log(1, "y"),
+            log(2, "y"),
+            log(3, "z"),
+            log(4, "y"),
+        ];
+        let tables: Vec<&Table> = tables.iter().collect();
+        let all = |found: Result<Outcome, Error>| match found {
+            Ok(outcome) => told(Ok(outcome)),
+            Err(error) => format!("{error:?}"),
+        };
+        for (study, is_together) in studies {
+            let runner = Runner::new(study.clone());
+            let found = runner.estimate_together(&study, &tables, &mut go).unwrap();
+            let found: Vec<String> = found.into_iter().map(all).collect();
+            let alone = tables
+                .iter()
+                .map(|table| all(crate::estimate(&study, table, &mut go)));
+            assert_eq!(found, alone.collect::<Vec<_>>());
+            let (plant, design) = runner.replay(&study).unwrap();
+            let prepared = Prepared::new(&study, &plant).unwrap();
+            let in_lanes = estimate::in_lanes(&prepared, &design, &tables, &mut go);
+            assert_eq!(in_lanes.is_some(), is_together);
         }
     }
 

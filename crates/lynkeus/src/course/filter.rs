@@ -1,15 +1,19 @@
 //! A log through a Kalman filter.
 
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use lynkeus_expr::{Graph, Node};
 use lynkeus_model::Variable;
 use lynkeus_observers::{Design, FilterTuning, Signal};
 use lynkeus_run::filter::{
-    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, Smoothed,
+    FilterKind, FilterSettings, Health, Limits, NoisyModel, NoisyPlant, Sensor, Smoothed,
 };
-use lynkeus_run::{Blueprint, EstimatorSettings};
+use lynkeus_run::{Blueprint, EstimatorSettings, Fleet};
 use lynkeus_structure::AugmentedPlant;
 use lynkeus_words::short;
 
-use crate::course::replay::{Watch, replay};
+use crate::course::replay::{Watch, replay, replay_together};
 use crate::course::{Course, Samples};
 use crate::prepare::Prepared;
 use crate::words::explain;
@@ -43,27 +47,7 @@ pub(crate) fn run(
     }
     let n = filter.names().len();
     replay(&mut filter, samples, n, &mut course, watch)?;
-    let health = filter.health();
-    course.inputs_held = health.inputs_held;
-    if health.confined > 0 {
-        course.notes.push(format!(
-            "the model has no value where the estimate was: at {} samples it was put back into its declared range; family = \"mhe\" keeps it there",
-            health.confined
-        ));
-    }
-    if health.projected > 0 {
-        course.notes.push(format!(
-            "bounds = \"project\": {} times the estimate was put back into the declared ranges",
-            health.projected
-        ));
-    }
-    if health.unsolved > 0 {
-        course.notes.push(format!(
-            "at {} of {} samples the iteration did not converge: these estimates are not the minimum over their window; a shorter `horizon`, wider ranges or a better start may help",
-            health.unsolved,
-            samples.time.len()
-        ));
-    }
+    tell(filter.health(), samples, &mut course);
     let smoothed = match study.estimate.smoothing {
         None => None,
         Some(Smoothing::Interval) => filter.smoothed(None, study.estimate.deviations),
@@ -84,6 +68,70 @@ pub(crate) fn run(
         course.smoothed_deviations = asked.then(|| of(|row| &row.deviations));
     }
     Ok(course)
+}
+
+/// What a filter's user should know of its run.
+fn tell(health: &Health, samples: &Samples, course: &mut Course) {
+    course.inputs_held = health.inputs_held;
+    if health.confined > 0 {
+        course.notes.push(format!(
+            "the model has no value where the estimate was: at {} samples it was put back into its declared range; family = \"mhe\" keeps it there",
+            health.confined
+        ));
+    }
+    if health.projected > 0 {
+        course.notes.push(format!(
+            "bounds = \"project\": {} times the estimate was put back into the declared ranges",
+            health.projected
+        ));
+    }
+    if health.unsolved > 0 {
+        course.notes.push(format!(
+            "at {} of {} samples the iteration did not converge: these estimates are not the minimum over their window; a shorter `horizon`, wider ranges or a better start may help",
+            health.unsolved,
+            samples.time.len()
+        ));
+    }
+}
+
+/// Fewer rows are over before there is machine code for them.
+const WORTHWHILE: usize = 1_000;
+
+/// Runs the filters of designs side by side, each over samples of its own, where that gives what each gives alone to the
+/// bit; none where it does not, or does not pay.
+pub(crate) fn together(
+    prepared: &Prepared<'_>,
+    runs: &[(&Design, &Samples)],
+    settings: EstimatorSettings,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Option<Vec<Result<Course, Error>>> {
+    let study = prepared.study();
+    let rows: usize = runs.iter().map(|(_, samples)| samples.time.len()).sum();
+    if study.records || runs.len() < 2 || rows < WORTHWHILE {
+        return None;
+    }
+    let (mut filters, mut courses) = (vec![], vec![]);
+    for (design, samples) in runs {
+        let mut course = Course {
+            keeps_innovations: study.estimate.innovations,
+            ..Course::default()
+        };
+        let filter = blueprint(prepared, design, samples, settings, &mut course.notes);
+        filters.push(filter.ok()?);
+        courses.push(course);
+    }
+    let mut fleet = Fleet::new(&filters).ok()?;
+    if !fleet.is_exact() {
+        return None;
+    }
+    let samples: Vec<&Samples> = runs.iter().map(|run| run.1).collect();
+    let done = replay_together(&mut fleet, &samples, &mut courses, watch);
+    let all = done.into_iter().zip(courses).enumerate();
+    let all = all.map(|(place, (done, mut course))| {
+        tell(fleet.health(place), samples[place], &mut course);
+        done.map(|()| course)
+    });
+    Some(all.collect())
 }
 
 /// What the design's filter is made of.
@@ -223,5 +271,53 @@ fn model(
         ranges: augmented.states.iter().map(range).collect(),
         confined: Some(tuning.confined.clone()),
     };
-    NoisyModel::new(&plant).map_err(explain)
+    compiled(&plant).map_err(explain)
+}
+
+/// The filter of a plant that is kept for many logs: compiled once, it has the numbers of each. The plant's graph has
+/// it, and so have its copies.
+#[derive(Debug, Default)]
+struct Compiled(Mutex<Option<(Asked, NoisyModel)>>);
+
+/// What a filter is compiled from.
+#[derive(Debug, PartialEq)]
+struct Asked {
+    nodes: Vec<Vec<Node>>,
+    names: Vec<Vec<String>>,
+}
+
+/// What is asked of a graph.
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct ForAll;
+
+/// From now on filters of this graph and its copies are compiled once.
+pub(crate) fn keep_compiled(graph: &Graph) {
+    graph.note(ForAll, Arc::<Compiled>::default());
+}
+
+fn compiled(plant: &NoisyPlant<'_>) -> Result<NoisyModel, lynkeus_run::Error> {
+    let Some(known) = plant.graph.noted::<_, Arc<Compiled>>(&ForAll) else {
+        return NoisyModel::new(plant);
+    };
+    let signals = plant.inputs.iter().map(|input| (&input.0, input.1));
+    let states = plant.states.iter().map(|state| (&state.0, state.1));
+    let sensors = plant.sensors.iter().map(|s| (&s.name, s.output));
+    let named = states.map(|(name, node)| (name.clone(), node)).unzip();
+    let read = signals.map(|(name, node)| (name.clone(), node)).unzip();
+    let seen = sensors.map(|(name, node)| (name.clone(), node)).unzip();
+    let parts: [(Vec<String>, Vec<Node>); 3] = [named, read, seen];
+    let (names, mut nodes): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+    nodes.push(vec![plant.time]);
+    nodes.push(plant.derivatives.clone());
+    nodes.extend(plant.confined.clone());
+    let asked = Asked { nodes, names };
+    let mut known = known.0.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((own, model)) = &*known
+        && *own == asked
+    {
+        return model.with_numbers(plant);
+    }
+    let model = NoisyModel::new(plant)?;
+    *known = Some((asked, model.clone()));
+    Ok(model)
 }

@@ -2,8 +2,8 @@
 
 use std::ops::ControlFlow;
 
-use lynkeus_run::filter::{Innovation, Reading};
-use lynkeus_run::{Error as RunError, Estimator};
+use lynkeus_run::filter::{Innovation, Reading, Row, SensorHealth};
+use lynkeus_run::{Error as RunError, Estimator, Fleet};
 
 use crate::course::checkpoint::{Checkpoint, Halfway};
 use crate::course::corrections::Corrections;
@@ -48,14 +48,12 @@ pub(crate) fn replay(
     watch: &mut Watch<'_>,
 ) -> Result<(), Error> {
     let rows = samples.time.len();
-    course.estimates = course.columns(estimates);
     course.monitors = course.columns(estimator.names().len().saturating_sub(estimates));
-    course.deviations = estimator.deviations().map(|d| course.columns(d.len()));
-    course.traces = vec![Trace::default(); estimator.innovations().len()];
-    course.settled = course.traces.clone();
-    if course.keeps_innovations {
-        course.innovations = course.columns(2 * course.traces.len());
-    }
+    let deviations = estimator.deviations().map(<[f64]>::len);
+    begin(
+        course,
+        (estimates, deviations, estimator.innovations().len()),
+    );
     course.corrections = Corrections::of(estimator, &course.store);
     let mut half = Halfway::default();
     let first = match &mut watch.checkpoint {
@@ -83,23 +81,7 @@ pub(crate) fn replay(
         if let (Some(columns), Some(row)) = (&mut course.deviations, estimator.deviations()) {
             add_row(columns, row.iter().copied());
         }
-        let traces = course.traces.iter_mut().zip(&mut course.settled);
-        for ((trace, settled), innovation) in traces.zip(estimator.innovations()) {
-            trace.take(
-                time,
-                innovation.reading,
-                innovation.value / innovation.deviation,
-            );
-            // while the start counts, an innovation says nothing of what is left without it
-            if innovation.deviation <= FORGOTTEN * innovation.settled {
-                let z = innovation.value / innovation.settled;
-                settled.take(time, innovation.reading, z);
-            }
-        }
-        if course.keeps_innovations {
-            let kept = estimator.innovations().iter().flat_map(row_of);
-            add_row(&mut course.innovations, kept);
-        }
+        judge(course, time, estimator.innovations().iter().copied());
         if let (Some(corrections), Some(record)) = (&mut course.corrections, estimator.record()) {
             corrections.add(record);
         }
@@ -118,11 +100,126 @@ pub(crate) fn replay(
         }
     }
     if !estimator.innovations().is_empty() {
-        course.sensors = estimator.health().sensors.clone();
-        let late = course.sensors.iter().zip(&half.sensors);
-        course.late = late.map(|(all, half)| all.since(half)).collect();
+        end(course, &estimator.health().sensors, &half.sensors);
     }
     Ok(())
+}
+
+/// The columns of so many estimates, deviations and sensors.
+fn begin(course: &mut Course, (estimates, deviations, sensors): (usize, Option<usize>, usize)) {
+    course.estimates = course.columns(estimates);
+    course.deviations = deviations.map(|count| course.columns(count));
+    course.traces = vec![Trace::default(); sensors];
+    course.settled = course.traces.clone();
+    if course.keeps_innovations {
+        course.innovations = course.columns(2 * sensors);
+    }
+}
+
+/// Takes what became of the readings of a row.
+fn judge(course: &mut Course, time: f64, innovations: impl Iterator<Item = Innovation> + Clone) {
+    let traces = course.traces.iter_mut().zip(&mut course.settled);
+    for ((trace, settled), innovation) in traces.zip(innovations.clone()) {
+        trace.take(
+            time,
+            innovation.reading,
+            innovation.value / innovation.deviation,
+        );
+        // while the start counts, an innovation says nothing of what is left without it
+        if innovation.deviation <= FORGOTTEN * innovation.settled {
+            let z = innovation.value / innovation.settled;
+            settled.take(time, innovation.reading, z);
+        }
+    }
+    if course.keeps_innovations {
+        let kept = innovations.flat_map(|innovation| row_of(&innovation));
+        add_row(&mut course.innovations, kept);
+    }
+}
+
+/// How the readings went, and those of the last half of the rows.
+fn end(course: &mut Course, sensors: &[SensorHealth], half: &[SensorHealth]) {
+    course.sensors = sensors.to_vec();
+    let late = course.sensors.iter().zip(half);
+    course.late = late.map(|(all, half)| all.since(half)).collect();
+}
+
+/// Runs filters side by side over samples of their own, as [`replay`] each of them.
+///
+/// # Errors
+/// No room for the rows, of the place that is told.
+pub(crate) fn replay_together(
+    fleet: &mut Fleet,
+    samples: &[&Samples],
+    courses: &mut [Course],
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Vec<Result<(), Error>> {
+    let states = fleet.names().len();
+    let longest = samples.iter().map(|s| s.time.len()).max().unwrap_or(0);
+    let mut left: Vec<_> = samples.iter().map(|s| s.rows_from(0)).collect();
+    let mut signals: Vec<Vec<f64>> = samples
+        .iter()
+        .map(|s| vec![0.0; s.columns().count()])
+        .collect();
+    let mut half: Vec<Vec<SensorHealth>> = vec![vec![]; samples.len()];
+    let mut found: Vec<Result<(), Error>> = samples.iter().map(|_| Ok(())).collect();
+    for (course, samples) in courses.iter_mut().zip(samples) {
+        begin(course, (states, Some(states), samples.readings.len()));
+    }
+    for row in 0..longest {
+        let mut times = vec![None; samples.len()];
+        for (place, time) in times.iter_mut().enumerate() {
+            let course = &mut courses[place];
+            if row.is_multiple_of(LOOK) && found[place].is_ok() {
+                found[place] = course.check();
+            }
+            if found[place].is_ok() && course.ended.is_none() {
+                *time = left[place].next(&mut signals[place]);
+            }
+        }
+        let rows = times.iter().zip(&signals).zip(samples);
+        let rows = rows.map(|((t, signals), samples)| {
+            let (readings, inputs) = signals.split_at(samples.readings.len());
+            t.map(|t| Row {
+                t,
+                readings,
+                inputs,
+            })
+        });
+        let rows: Vec<Option<Row<'_>>> = rows.collect();
+        for (place, error) in fleet.push(&rows) {
+            // a sample that was lost is no fault of the log
+            found[place] = samples[place].check();
+            courses[place].ended = Some(error);
+        }
+        for (place, time) in times.iter().enumerate() {
+            let (Some(time), None) = (time, &courses[place].ended) else {
+                continue;
+            };
+            let course = &mut courses[place];
+            add_row(&mut course.estimates, fleet.estimate(place));
+            if let Some(columns) = &mut course.deviations {
+                add_row(columns, fleet.deviations(place));
+            }
+            judge(course, *time, fleet.innovations(place));
+            if row == samples[place].time.len() / 2 {
+                half[place].clone_from(&fleet.health(place).sensors);
+            }
+        }
+        if watch((row + 1) as f64 / longest as f64).is_break() {
+            for (course, time) in courses.iter_mut().zip(&times) {
+                course.ended = match (course.ended.take(), time) {
+                    (None, Some(time)) => Some(RunError::Cancelled { time: *time }),
+                    (ended, _) => ended,
+                };
+            }
+            break;
+        }
+    }
+    for (place, course) in courses.iter_mut().enumerate() {
+        end(course, &fleet.health(place).sensors, &half[place]);
+    }
+    found
 }
 
 /// An innovation with its standard deviation.

@@ -17,6 +17,7 @@ use crate::{EstimatorSettings, Linearised, Method, Result, Step};
 use joint::Joint;
 use piecewise::Piecewise;
 use series::Transition;
+pub(crate) use straight::SQUARES;
 
 /// Up to so many states x̂, Φ and W are integrated together, and wherever steps are given: these are
 /// then the steps of all three.

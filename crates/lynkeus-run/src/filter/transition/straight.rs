@@ -7,12 +7,11 @@
 use std::ops::{Range, RangeInclusive};
 use std::sync::{Arc, OnceLock};
 
-use lynkeus_expr::{Expr, Graph, Node, Tape};
+use lynkeus_expr::{Graph, Node, Tape};
 use lynkeus_native::Function;
 
 use crate::classical::Term;
-use crate::equations::Equations;
-use crate::filter::expressions::Flow;
+use crate::filter::expressions::{Flow, nodes};
 use crate::filter::root::Root;
 use crate::method::are_finite;
 use crate::routine::{Engine, LARGEST_STEP};
@@ -25,7 +24,7 @@ const PATIENCE: u32 = 1_000;
 const LARGEST_CARRIED: usize = 20_000;
 
 /// Columns with such squares are not spoilt by rounding towards zero; the loops bring others to size first.
-const SQUARES: RangeInclusive<f64> = 1e-240..=1e240;
+pub(crate) const SQUARES: RangeInclusive<f64> = 1e-240..=1e240;
 
 /// The code of a flow, made once for all that run it: its graph keeps it.
 #[derive(Debug)]
@@ -77,7 +76,7 @@ impl Code {
     fn first(&self, system: &System, jacobian: &Jacobian) -> Option<Made> {
         let equations = system.equations();
         let graph = equations.graph();
-        let flow = self.flow(&graph, equations, jacobian)?;
+        let flow = Flow::of(&graph, equations, jacobian, &self.noisy)?;
         let n = system.states().len();
         let (h, scale) = (graph.fresh("h"), graph.fresh("scale"));
         let next = flow.step(h, &flow.start());
@@ -101,7 +100,7 @@ impl Code {
     fn later(&self, system: &System, jacobian: &Jacobian) -> Option<Function<1>> {
         let equations = system.equations();
         let graph = equations.graph();
-        let flow = self.flow(&graph, equations, jacobian)?;
+        let flow = Flow::of(&graph, equations, jacobian, &self.noisy)?;
         let h = graph.fresh("h");
         let z = flow.under_way(h);
         let n = system.states().len();
@@ -114,26 +113,6 @@ impl Code {
         let next = nodes(&graph, &flow.step(h, &z));
         compiled(&graph, &inputs, &next, LARGEST_CARRIED)
     }
-
-    /// The flow with noise; none where there would be too much of it, were Φ and W full.
-    fn flow<'f, 'g>(
-        &self,
-        graph: &'g Graph,
-        equations: &'f Equations,
-        jacobian: &'f Jacobian,
-    ) -> Option<Flow<'f, 'g>> {
-        let free = &equations.roots.free;
-        let noise = self.noisy.iter().map(|n| n.then(|| graph.fresh("q")));
-        let flow = Flow {
-            graph,
-            inputs: &equations.inputs[..equations.smooth_inputs()],
-            derivatives: &free.derivatives,
-            slopes: &free.outputs[jacobian.outputs()],
-            places: jacobian.places(),
-            noise: noise.collect(),
-        };
-        (16 * self.noisy.len() * flow.places.len() <= LARGEST_STEP).then_some(flow)
-    }
 }
 
 /// What is there already is not waited for.
@@ -142,22 +121,6 @@ fn patience<T>(code: &OnceLock<Option<T>>) -> u32 {
         Some(_) => 0,
         None => PATIENCE,
     }
-}
-
-impl<'g> Flow<'_, 'g> {
-    /// What the equations read, then these symbols.
-    fn inputs_with(&self, more: impl Iterator<Item = Term<'g>>) -> Vec<Node> {
-        let more = more.flatten().map(Expr::node);
-        self.inputs.iter().copied().chain(more).collect()
-    }
-}
-
-fn nodes(graph: &Graph, terms: &[Term<'_>]) -> Vec<Node> {
-    let nothing = graph.constant(0.0).node();
-    terms
-        .iter()
-        .map(|term| term.map_or(nothing, Expr::node))
-        .collect()
 }
 
 fn compiled(graph: &Graph, inputs: &[Node], outputs: &[Node], most: usize) -> Option<Function<1>> {
@@ -295,6 +258,8 @@ impl Straight {
 
 #[cfg(test)]
 mod tests {
+    use lynkeus_expr::Expr;
+
     use super::super::{Propagation, Scheme};
     use super::*;
     use crate::filter::Belief;
