@@ -4,6 +4,7 @@ use super::Name;
 use super::keys::{RANGE, TUNE};
 use super::section::Entry;
 use super::simulate::{self, Expression};
+use super::swept::{DENSITY, NOISE};
 use lynkeus_answer::Error;
 
 /// Values of a range whose study does not say how many.
@@ -15,7 +16,7 @@ const MOST_POINTS: u64 = 10_000;
 /// How a tuning is swept and judged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TuneSettings {
-    /// The keys of `[observer]` to sweep with their values; empty lets the tool choose.
+    /// What to sweep ([`Swept`](crate::Swept)) with its values; empty lets the tool choose.
     pub keys: Vec<(Name, Values)>,
     /// The scaled error below which an estimate counts as settled.
     pub tolerance: f64,
@@ -81,10 +82,15 @@ pub(super) fn read(entry: Entry<'_>) -> Result<TuneSettings, Error> {
     let mut section = entry.section("[tune]", &TUNE)?;
     let defaults = TuneSettings::default();
     let keys = section.optional("keys", |table| {
-        let pairs = table.pairs()?.into_iter();
-        pairs
-            .map(|(name, entry)| Ok((name, values(entry)?)))
-            .collect::<Result<Vec<_>, Error>>()
+        let mut keys = vec![];
+        for (name, entry) in table.pairs()? {
+            let is_section = [DENSITY, NOISE].contains(&name.text.as_str());
+            match is_section && entry.has_inner() {
+                true => keys.extend(dotted(&name.text, entry)?),
+                false => keys.push((name, values(entry)?)),
+            }
+        }
+        Ok(keys)
     })?;
     Ok(TuneSettings {
         keys: keys.unwrap_or_default(),
@@ -101,6 +107,15 @@ pub(super) fn read(entry: Entry<'_>) -> Result<TuneSettings, Error> {
                 usize::try_from(n).unwrap_or(usize::MAX)
             }),
     })
+}
+
+/// `noise.y = …`, which TOML takes for a table `noise`.
+fn dotted(section: &str, entry: Entry<'_>) -> Result<Vec<(Name, Values)>, Error> {
+    let key = |(name, entry): (Name, Entry<'_>)| {
+        let text = format!("{section}.{name}");
+        Ok((Name { text, ..name }, values(entry)?))
+    };
+    entry.pairs()?.into_iter().map(key).collect()
 }
 
 /// A number between 0 and 1, ends excluded.

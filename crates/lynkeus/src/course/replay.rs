@@ -10,6 +10,7 @@ use crate::course::corrections::Corrections;
 use crate::course::trace::Trace;
 use crate::course::{Course, Samples, add_row};
 use crate::{Error, Study};
+use lynkeus_study::Records;
 
 /// Rows between two looks at whether there is room for them.
 const LOOK: usize = 1 << 16;
@@ -56,7 +57,11 @@ pub(crate) fn replay(
     if course.keeps_innovations {
         course.innovations = course.columns(2 * course.traces.len());
     }
-    course.corrections = Corrections::of(estimator, &course.store);
+    match course.records {
+        Records::Nothing => {}
+        Records::Likelihood => course.predicted = course.columns(estimator.sensors()),
+        Records::All => course.corrections = Corrections::of(estimator, &course.store),
+    }
     let mut half = Halfway::default();
     let first = match &mut watch.checkpoint {
         None => 0,
@@ -100,8 +105,12 @@ pub(crate) fn replay(
             let kept = estimator.innovations().iter().flat_map(row_of);
             add_row(&mut course.innovations, kept);
         }
-        if let (Some(corrections), Some(record)) = (&mut course.corrections, estimator.record()) {
-            corrections.add(record);
+        if let Some(record) = estimator.record() {
+            course.log_likelihood += record.log_likelihood;
+            add_row(&mut course.predicted, record.predicted.iter().copied());
+            if let Some(corrections) = &mut course.corrections {
+                corrections.add(record);
+            }
         }
         if row == rows / 2 {
             half = Halfway::at(estimator, watch.checkpoint.is_some());

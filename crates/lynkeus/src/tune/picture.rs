@@ -5,6 +5,9 @@ use super::{Sweep, measures};
 use crate::Error;
 use lynkeus_plot::{Curve, Figure, Kind, Mark, Panel, Scale};
 
+/// Values that make each reading so much less likely, in logarithms, are out of sight.
+const UNLIKELY: f64 = 2.0;
+
 impl Sweep {
     /// The figures over the first key's values as SVG text. With several keys, the curve through
     /// the knee is drawn boldly and those of the other combinations palely.
@@ -68,7 +71,7 @@ impl Sweep {
     fn failures(&self) -> Vec<Mark> {
         let failed = self.rows.iter().filter(|row| self.beside_knee(row));
         failed
-            .filter(|row| row.figure(measures::OBJECTIVE).is_none())
+            .filter(|row| row.figure(self.objective).is_none())
             .filter_map(|row| row.values.first().copied())
             .map(Mark::Failed)
             .collect()
@@ -108,6 +111,15 @@ impl Sweep {
         [mean].into_iter().chain(others).collect()
     }
 
+    /// From the least value of a figure to the greatest, without those that are far less likely.
+    fn near_the_least(&self, measure: usize) -> Scale {
+        let all = || self.rows.iter().filter_map(|row| row.figure(measure));
+        let least = all().fold(f64::INFINITY, f64::min);
+        let most = all().fold(least, f64::max).min(least + UNLIKELY);
+        let air = 0.05 * (most - least).max(f64::MIN_POSITIVE);
+        Scale::Within(least - air..most + air)
+    }
+
     /// One figure: a curve for every combination of the keys after the first.
     fn panel(&self, measure: usize) -> Panel {
         let mut combinations: Vec<&[f64]> = vec![];
@@ -139,6 +151,7 @@ impl Sweep {
             },
             upwards: match found.map(|m| m.name) {
                 Some("ultimate_bound") => Scale::Log,
+                Some("nll_per_reading") => self.near_the_least(measure),
                 _ => Scale::FromZero,
             },
             curves: combinations.iter().map(curve).collect(),

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use toml_edit::{Document, Item, Table, Value};
+use lynkeus_study::Swept;
+use toml_edit::{Document, InlineTable, Item, Key, Table, TableLike, Value};
 
 use super::axis::shown;
 use super::{Axis, Sweep};
@@ -66,35 +67,56 @@ struct Edit {
     by: String,
 }
 
+/// Where in a study the numbers of an axis stand.
+struct Slot<'a> {
+    /// names of tables, the outermost first
+    tables: &'static [&'static str],
+    /// the key in the last of them, and where within its value; without one it is all values of the table
+    key: Option<(&'a str, &'a [usize])>,
+}
+
+impl<'a> Slot<'a> {
+    fn of(swept: &'a Swept) -> Self {
+        let name = |name: &'a Option<String>| name.as_deref().map(|name| (name, &[][..]));
+        match swept {
+            Swept::Tuning(base, path) => Self {
+                tables: &["observer"],
+                key: Some((base, path)),
+            },
+            Swept::Density(of) => Self {
+                tables: &["process_noise"],
+                key: name(of),
+            },
+            Swept::Noise(of) => Self {
+                tables: &["sensors", "noise"],
+                key: name(of),
+            },
+        }
+    }
+}
+
 fn put(text: &str, axis: &Axis, value: f64) -> Result<(String, Change), Error> {
     let document = parsed(text)?;
-    let (base, path) = axis.path();
-    let key = axis.key.clone();
-    let Some(item) = document.get("observer") else {
-        let (end, to) = (line_end(text), shown(value));
-        let change = Change {
-            key,
-            from: None,
-            to: to.clone(),
-        };
-        let section = format!("{text}{end}[observer]{end}{base} = {to}{end}");
-        return Ok((section, change));
+    let slot = Slot::of(axis.swept());
+    let (found, missing) = innermost(document.as_item(), slot.tables)?;
+    let table = found.last().filter(|_| missing.is_empty());
+    let table = table.and_then(|(_, item)| item.as_table_like());
+    let gone = || {
+        let section = slot.tables.join(".");
+        Error::input(format!("[{section}] no longer has `{}`", axis.key))
     };
-    let Some(observer) = item.as_table_like() else {
-        return Err(Error::input("[observer] of the study is no table"));
+    let Some((key, path)) = slot.key else {
+        return scaled(text, table.ok_or_else(gone)?, axis, value);
     };
-    let Some(present) = observer.get(base) else {
-        let to = shown(value);
-        let edit = addition(text, item, &format!("{base} = {to}"))
-            .ok_or_else(|| Error::input(format!("cannot see where `{base}` belongs")))?;
+    let Some(present) = table.and_then(|table| table.get(key)) else {
+        let (text, to) = added(text, &found, missing, key, value)?;
         let change = Change {
-            key,
+            key: axis.key.clone(),
             from: None,
             to,
         };
-        return Ok((edited(text, 0..text.len(), &[edit]), change));
+        return Ok((text, change));
     };
-    let gone = || Error::input(format!("[observer] no longer has `{}`", axis.key));
     let mut slot = present.as_value().ok_or_else(gone)?;
     for &index in path {
         let entries = slot.as_array().ok_or_else(gone)?;
@@ -104,9 +126,100 @@ fn put(text: &str, axis: &Axis, value: f64) -> Result<(String, Change), Error> {
     let mut edits = vec![];
     scale(slot, axis, value, &mut edits)?;
     let change = Change {
-        key,
+        key: axis.key.clone(),
         from: text.get(place.clone()).map(str::to_owned),
         to: edited(text, place, &edits),
+    };
+    Ok((edited(text, 0..text.len(), &edits), change))
+}
+
+/// Tables with their names, the outermost first.
+type Tables<'d> = Vec<(&'static str, &'d Item)>;
+
+/// The tables of a document as far as they are there, and the names of the others.
+fn innermost<'d>(
+    document: &'d Item,
+    names: &'static [&'static str],
+) -> Result<(Tables<'d>, &'static [&'static str]), Error> {
+    let mut found: Tables<'d> = vec![];
+    for (depth, name) in names.iter().enumerate() {
+        let within = found.last().map_or(document, |(_, item)| item);
+        let table = within.as_table_like();
+        let Some(item) = table.and_then(|table| table.get(name)) else {
+            return Ok((found, names.get(depth..).unwrap_or_default()));
+        };
+        if item.as_table_like().is_none() {
+            let whole = names.get(..=depth).unwrap_or_default().join(".");
+            return Err(Error::input(format!("[{whole}] of the study is no table")));
+        }
+        found.push((name, item));
+    }
+    Ok((found, &[]))
+}
+
+/// The text with a new key in a table that may be new, and the value as it is written.
+fn added(
+    text: &str,
+    found: &Tables<'_>,
+    missing: &[&str],
+    key: &str,
+    value: f64,
+) -> Result<(String, String), Error> {
+    let (end, to, own) = (line_end(text), shown(value), Key::new(key));
+    let own = own.display_repr();
+    let Some((_, table)) = found.last() else {
+        let section = missing.join(".");
+        let text = format!("{text}{end}[{section}]{end}{own} = {to}{end}");
+        return Ok((text, to));
+    };
+    let assignment = match missing {
+        [] => format!("{own} = {to}"),
+        missing => format!("{} = {{ {own} = {to} }}", missing.join(".")),
+    };
+    // names before a dot, up to the table with a header of its own
+    let is_dotted = |(_, item): &&(&str, &Item)| match item {
+        Item::Value(value) => value.as_inline_table().is_some_and(InlineTable::is_dotted),
+        item => item.as_table().is_some_and(Table::is_dotted),
+    };
+    let dotted: Vec<&str> = found
+        .iter()
+        .rev()
+        .take_while(is_dotted)
+        .map(|t| t.0)
+        .collect();
+    let prefix: String = dotted.iter().rev().map(|name| format!("{name}.")).collect();
+    let header: Vec<&str> = found.iter().map(|(name, _)| *name).collect();
+    let edit = addition(text, table, &header.join("."), &prefix, &assignment)
+        .ok_or_else(|| Error::input(format!("cannot see where `{key}` belongs")))?;
+    Ok((edited(text, 0..text.len(), &[edit]), to))
+}
+
+/// Multiplies every number of a table.
+fn scaled(
+    text: &str,
+    table: &dyn TableLike,
+    axis: &Axis,
+    value: f64,
+) -> Result<(String, Change), Error> {
+    let (mut edits, mut from, mut to) = (vec![], vec![], vec![]);
+    let mut values: Vec<(&str, &Value)> = table
+        .iter()
+        .filter_map(|(name, item)| Some((name, item.as_value()?)))
+        .collect();
+    values.sort_by_key(|(_, value)| value.span().map_or(0, |span| span.start));
+    for (name, slot) in values {
+        let mut own = vec![];
+        scale(slot, axis, value, &mut own)?;
+        let place = slot.span().unwrap_or_default();
+        let before = text.get(place.clone()).unwrap_or_default();
+        from.push(format!("{name} = {before}"));
+        to.push(format!("{name} = {}", edited(text, place, &own)));
+        edits.extend(own);
+    }
+    let change = Change {
+        key: axis.key.clone(),
+        from: Some(from.join(", ")),
+        to: to.join(", "),
     };
     Ok((edited(text, 0..text.len(), &edits), change))
 }
@@ -124,6 +237,11 @@ fn scale(slot: &Value, axis: &Axis, value: f64, edits: &mut Vec<Edit>) -> Result
             .iter()
             .try_for_each(|(_, e)| scale(e, axis, value, edits));
     }
+    if let (Some(share), Some(range)) = (slot.as_str().and_then(share), slot.span()) {
+        let by = format!("\"{}%\"", shown(axis.chosen(share, value)));
+        edits.push(Edit { range, by });
+        return Ok(());
+    }
     let whole = slot.as_integer().map(|i| i as f64);
     let (Some(present), Some(range)) = (slot.as_float().or(whole), slot.span()) else {
         return Err(Error::input(format!(
@@ -140,6 +258,11 @@ fn scale(slot: &Value, axis: &Axis, value: f64, edits: &mut Vec<Edit>) -> Result
     Ok(())
 }
 
+/// The number of a noise such as `"5%"`.
+fn share(text: &str) -> Option<f64> {
+    text.trim().strip_suffix('%')?.trim().parse().ok()
+}
+
 /// A piece of `text` with the edits in it, which come in its order.
 fn edited(text: &str, piece: Range<usize>, edits: &[Edit]) -> String {
     let mut out = String::new();
@@ -153,21 +276,26 @@ fn edited(text: &str, piece: Range<usize>, edits: &[Edit]) -> String {
     out
 }
 
-/// How `[observer]`, however it is written, gets a key: after its last one.
-fn addition(text: &str, observer: &Item, assignment: &str) -> Option<Edit> {
+/// How a table, however it is written, gets a key: after its last one. `header` is its whole name.
+fn addition(
+    text: &str,
+    table: &Item,
+    header: &str,
+    prefix: &str,
+    assignment: &str,
+) -> Option<Edit> {
     let insert = |at: usize, by: String| Some(Edit { range: at..at, by });
-    match observer {
+    match table {
         Item::Value(Value::InlineTable(table)) => {
             let ends = table.iter().filter_map(|(_, value)| value.span());
             match ends.map(|span| span.end).max() {
-                Some(end) => insert(end, format!(", {assignment}")),
+                Some(end) => insert(end, format!(", {prefix}{assignment}")),
                 None => insert(table.span()?.start + 1, format!(" {assignment} ")),
             }
         }
         Item::Table(table) => {
-            let header = table.span().filter(|_| !table.is_implicit());
-            if let Some(end) = last_end(table).or(header.map(|span| span.end)) {
-                let prefix = if table.is_dotted() { "observer." } else { "" };
+            let own = table.span().filter(|_| !table.is_implicit());
+            if let Some(end) = last_end(table).or(own.map(|span| span.end)) {
                 return Some(new_line(text, end, &format!("{prefix}{assignment}")));
             }
             // only tables in it, such as [observer.initial]: its own comes before them
@@ -175,7 +303,7 @@ fn addition(text: &str, observer: &Item, assignment: &str) -> Option<Edit> {
             let first = inner.map(|span| span.start).min()?;
             let end = line_end(text);
             let start = text.get(..first)?.rfind('\n').map_or(0, |i| i + 1);
-            insert(start, format!("[observer]{end}{assignment}{end}{end}"))
+            insert(start, format!("[{header}]{end}{assignment}{end}{end}"))
         }
         _ => None,
     }
@@ -231,6 +359,7 @@ mod tests {
             axes,
             measures: measures::SIMULATED,
             rows: vec![row],
+            objective: measures::OBJECTIVE,
             knee: Some(0),
             time_unit: None,
             declared: crate::Account::default(),
@@ -339,6 +468,83 @@ mod tests {
             assert_eq!(new, format!("{text}{end}[observer]{end}theta = 2{end}"));
             assert_eq!(changes[0].to_string(), "theta = 2 is new");
         }
+    }
+
+    #[test]
+    fn noises_are_written_where_they_stand() {
+        let filter = "observer = { family = \"ekf\" }\n";
+        for (keys, values, text, new) in [
+            (
+                "process_noise.x = [1], noise.y = [1]",
+                &[0.5, 2.0][..],
+                "[process_noise]\nx = 0.1 # slow\n[sensors]\nnoise = { y = 1 }\n",
+                "[process_noise]\nx = 0.5 # slow\n[sensors]\nnoise = { y = 2 }\n",
+            ),
+            (
+                "process_noise.w = [1]",
+                &[0.5],
+                "process_noise.x = 1\n[sensors]\nmeasured = [\"y\"]\n",
+                "process_noise.x = 1\nprocess_noise.w = 0.5\n[sensors]\nmeasured = [\"y\"]\n",
+            ),
+            (
+                "process_noise.\"x[1]\" = [1], noise.y = [1]",
+                &[0.5, 2.0],
+                "[process_noise]\r\nx = 1\r\n[sensors]\r\nmeasured = [\"y\"]\r\n",
+                "[process_noise]\r\nx = 1\r\n\"x[1]\" = 0.5\r\n[sensors]\r\nmeasured = [\"y\"]\r\nnoise = { y = 2 }\r\n",
+            ),
+            (
+                "process_noise.w = [1], noise.y = [1]",
+                &[0.5, 2.0],
+                "plant = 'p'\n",
+                "plant = 'p'\n\n[process_noise]\nw = 0.5\n\n[sensors.noise]\ny = 2\n",
+            ),
+            (
+                "noise.y = [1]",
+                &[2.0],
+                "sensors = { noise.z = 1 }\n",
+                "sensors = { noise.z = 1, noise.y = 2 }\n",
+            ),
+            (
+                "noise.y = [1]",
+                &[2.0],
+                "sensors.noise.z = 1\n[plot]\n",
+                "sensors.noise.z = 1\nsensors.noise.y = 2\n[plot]\n",
+            ),
+            (
+                "noise.y = [1]",
+                &[2.0],
+                "[sensors]\nnoise.z = 1\n[sensors.limits]\ny = [0, 1]\n",
+                "[sensors]\nnoise.z = 1\nnoise.y = 2\n[sensors.limits]\ny = [0, 1]\n",
+            ),
+            (
+                "noise.y = [1]",
+                &[2.0],
+                "[sensors.limits]\ny = [0, 1]\n",
+                "[sensors]\nnoise = { y = 2 }\n\n[sensors.limits]\ny = [0, 1]\n",
+            ),
+        ] {
+            let sweep = sweep(&format!("{filter}tune.keys = {{ {keys} }}"), values);
+            let (found, _) = sweep.rewritten(text).unwrap();
+            assert_eq!(found, new);
+            // it is the study that was meant
+            Study::parse(&found, "s.toml").unwrap();
+        }
+    }
+
+    #[test]
+    fn all_noises_are_multiplied() {
+        let sections = "process_noise = { x = 0.1, v = 3 }\nsensors.noise = { y = \"5%\", z = { uniform = 1 } }\n";
+        let keys =
+            "observer = { family = \"ekf\" }\ntune.keys = { process_noise = [2], noise = [2] }\n";
+        let (found, changes) = sweep(&format!("{keys}{sections}"), &[2.0, 3.0])
+            .rewritten(sections)
+            .unwrap();
+        let new = "process_noise = { x = 0.2, v = 6 }\nsensors.noise = { y = \"15%\", z = { uniform = 3 } }\n";
+        assert_eq!(found, new);
+        assert_eq!(
+            changes[0].to_string(),
+            "process_noise: x = 0.1, v = 3 becomes x = 0.2, v = 6"
+        );
     }
 
     #[test]
