@@ -203,7 +203,7 @@ impl Rig {
 }
 
 /// Why a run ended before its end: a limit, or what the model does.
-pub(crate) fn ended_early(error: lynkeus_run::Error, study: &Study) -> Error {
+fn ended_early(error: lynkeus_run::Error, study: &Study) -> Error {
     match study.budget.marked() {
         Some(spent) => Error::ended(spent).at(&study.file),
         None => interrupted(error, &study.file),
@@ -275,11 +275,10 @@ pub(crate) fn recorded(study: &Study, plant: &Plant, step: f64) -> Result<Table,
     let mut simulation = open_loop(study, settings, plant)?;
     simulation.output_step = step;
     let watch = &mut |_| ControlFlow::Continue(());
-    let run = simulation.run_watched(&mut within(&study.budget, watch));
-    let run = run.map_err(|interrupted| ended_early(interrupted.error, study))?;
+    let run = alone(study, &simulation, &mut within(&study.budget, watch))?;
     let settings = &study.estimate;
     let own = |variables: &[Variable], role: Role| -> Vec<(String, Vec<f64>)> {
-        let values = |i: usize| run.column(role.at(i)).unwrap_or_default().to_vec();
+        let values = |i: usize| run.column(role.at(i)).map_or_else(Vec::new, Series::to_vec);
         let variables = variables.iter().enumerate();
         variables
             .map(|(i, v)| (v.name.clone(), values(i)))
@@ -289,7 +288,7 @@ pub(crate) fn recorded(study: &Study, plant: &Plant, step: f64) -> Result<Table,
     let seen = own(&plant.outputs, Role::Measured).into_iter();
     let seen = seen.chain(inputs.clone());
     let seen = seen.map(|(name, values)| (header(settings, &name).to_owned(), values));
-    let time = (log_time(plant, settings), run.times().to_vec());
+    let time = (log_time(plant, settings), run.time.to_vec());
     let truth = own(&plant.states, Role::State).into_iter().chain(inputs);
     let table = Table::from_columns([time].into_iter().chain(seen).collect())?;
     Ok(table.with_truth(truth.collect()))

@@ -77,7 +77,7 @@ impl Tradeoff {
             Ground::Simulation { .. } => Ok(None),
         };
         let sweep = first.and_then(|first| {
-            let ground = first.as_ref().map_or(ground, |table| Ground::Log(table));
+            let ground = first.as_ref().map_or(ground, Ground::Log);
             tune::along(prepared, design, axis, &grid, ground, watch)
         });
         Ok(Self {
