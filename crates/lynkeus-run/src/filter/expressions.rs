@@ -241,15 +241,17 @@ pub(crate) struct Corrected<'g> {
     /// y − ŷ, and its variance
     pub innovation: Expr<'g>,
     pub variance: Expr<'g>,
+    /// what of it is the reading's noise
+    pub noise: Expr<'g>,
 }
 
-/// Carlson's update of x̂ and S by a reading that is `innovation` off, with a noise of variance `noise` that is
-/// not 0; `slopes` is the row of C. As [`Root::update`](super::root::Root::update).
+/// Carlson's update of x̂ and S by a reading that is `innovation` off; `slopes` is the row of C. The variance of
+/// its noise, which is not 0, is a function of how uncertain the output is. As [`Root::update`](super::root::Root::update).
 pub(crate) fn corrected<'g>(
     (x, root): (&[Term<'g>], &[Term<'g>]),
     slopes: &[Term<'g>],
     innovation: Expr<'g>,
-    noise: Expr<'g>,
+    noise: impl Fn(Term<'g>) -> Expr<'g>,
 ) -> Corrected<'g> {
     let n = x.len();
     let mut root = root.to_vec();
@@ -259,6 +261,7 @@ pub(crate) fn corrected<'g>(
     };
     let projected: Vec<Term<'g>> = (0..n).map(projected).collect();
     let spread = dot(&projected, &projected);
+    let noise = noise(spread);
     let variance = spread.map_or(noise, |spread| spread + noise);
     let mut gain: Vec<Term<'g>> = vec![None; n];
     let mut alpha = noise;
@@ -290,5 +293,6 @@ pub(crate) fn corrected<'g>(
         root,
         innovation,
         variance,
+        noise,
     }
 }

@@ -59,7 +59,9 @@ mod ukf;
 pub use crate::noise::Limits;
 pub(crate) use belief::Belief;
 pub use health::{Health, Innovation, Reading, SensorHealth};
-pub use likelihood::{Likelihood, ParametricPlant, Row, Score};
+pub use likelihood::{
+    Likelihood, ParametricLevel, ParametricPlant, ParametricSensor, Row, Score, Seen,
+};
 pub(crate) use model::check_counts;
 pub use model::{NoisyModel, NoisyPlant, Sensor};
 pub use record::Record;

@@ -2,7 +2,8 @@
 
 use lynkeus_expr::{Expr, Graph, Node};
 use lynkeus_run::filter::{
-    FilterKind, FilterSettings, Likelihood, NoisyModel, NoisyPlant, ParametricPlant, Row, Sensor,
+    FilterKind, FilterSettings, Likelihood, Limits, NoisyModel, NoisyPlant, ParametricLevel,
+    ParametricPlant, ParametricSensor, Row, Seen, Sensor,
 };
 use lynkeus_run::{Blueprint, EstimatorSettings, Level, Method, Step};
 
@@ -22,6 +23,10 @@ impl Random {
         low + 0.5 * (high - low) * (1.0 + self.next())
     }
 }
+
+/// What makes the noise so large that readings rarely contradict the prediction: to one that does, the filter
+/// gives another noise.
+const SHARE: f64 = 9.0;
 
 /// A log: time, readings (NaN in gaps), inputs.
 type Log = Vec<(f64, Vec<f64>, Vec<f64>)>;
@@ -73,6 +78,24 @@ impl Case {
         }
     }
 
+    /// A sensor of every other plant with one does not show more than so much.
+    fn limits(&self) -> Option<Limits> {
+        let (low, high) = (0.45, 0.75);
+        (self.seed % 4 == 2).then_some(Limits { low, high })
+    }
+
+    /// The noise of others grows with the output.
+    fn is_share(&self) -> bool {
+        self.seed % 4 == 0 && self.sensors == 1
+    }
+
+    fn noise(&self, r: Expr<'_>) -> ParametricLevel {
+        match self.is_share() {
+            true => ParametricLevel::Share((SHARE * r).node()),
+            false => ParametricLevel::Variance((r * r).node()),
+        }
+    }
+
     /// The plant with these expressions for its parameters.
     fn plant(&self, θ: &[Node]) -> (Vec<Node>, Vec<Node>, Vec<Node>, [Node; 2]) {
         let g = &self.graph;
@@ -116,7 +139,14 @@ impl Case {
             time,
             derivatives,
             inputs: vec![u],
-            sensors: outputs.iter().map(|&h| (h, (r * r).node())).collect(),
+            sensors: outputs
+                .iter()
+                .map(|&output| ParametricSensor {
+                    output,
+                    noise: self.noise(r),
+                    limits: self.limits(),
+                })
+                .collect(),
             process_noise: (0..self.n)
                 .map(|i| if is_noisy(i) { q.node() } else { zero })
                 .collect(),
@@ -149,8 +179,11 @@ impl Case {
                 .map(|(k, &output)| Sensor {
                     name: format!("y{k}"),
                     output,
-                    noise: Level::Absolute(r),
-                    limits: None,
+                    noise: match self.is_share() {
+                        true => Level::Relative(SHARE * r),
+                        false => Level::Absolute(r),
+                    },
+                    limits: self.limits(),
                 })
                 .collect(),
             process_noise: (0..self.n)
@@ -179,12 +212,25 @@ impl Case {
 
 #[test]
 fn the_likelihood_is_the_filter_s() {
+    let mut shares = 0;
     for seed in 0..40 {
         let case = Case::new(seed);
+        let mut is_surprised = false;
+        let see = |seen: Seen| is_surprised |= seen.innovation.powi(2) > 9.0 * seen.variance;
         let score = case
             .likelihood()
-            .score(&case.values, rows(&case.log), 1.0)
+            .watched(&case.values, rows(&case.log), Step::AtMost(1.0), see)
             .unwrap();
+        let readings = case
+            .log
+            .iter()
+            .flat_map(|row| &row.1)
+            .filter(|y| y.is_finite());
+        assert_eq!(score.readings, readings.count());
+        if case.is_share() && is_surprised {
+            continue;
+        }
+        shares += u32::from(case.is_share());
         let expected = case.filtered();
         let off = (score.value - expected).abs() / (1.0 + expected.abs());
         assert!(
@@ -192,13 +238,8 @@ fn the_likelihood_is_the_filter_s() {
             "seed {seed}: {} beside {expected}",
             score.value
         );
-        let readings = case
-            .log
-            .iter()
-            .flat_map(|row| &row.1)
-            .filter(|y| y.is_finite());
-        assert_eq!(score.readings, readings.count());
     }
+    assert!(shares > 2, "{shares}");
 }
 
 /// Beside differences of order 6, which leave about 1e-9 of the value.
@@ -207,7 +248,12 @@ fn derivatives_are_those_of_the_value() {
     for seed in 0..40 {
         let case = Case::new(seed);
         let mut likelihood = case.likelihood();
-        let mut value = |θ: &[f64]| likelihood.score(θ, rows(&case.log), 0.1).unwrap().value;
+        let mut value = |θ: &[f64]| {
+            likelihood
+                .score(θ, rows(&case.log), Step::AtMost(0.1))
+                .unwrap()
+                .value
+        };
         let mut differences = vec![];
         for p in 0..case.values.len() {
             let h = 2e-3 * case.values[p];
@@ -220,7 +266,7 @@ fn derivatives_are_those_of_the_value() {
             differences.push((45.0 * one - 9.0 * two + three) / (60.0 * h));
         }
         let score = likelihood
-            .score(&case.values, rows(&case.log), 0.1)
+            .score(&case.values, rows(&case.log), Step::AtMost(0.1))
             .unwrap();
         for (p, (exact, difference)) in score.gradient.iter().zip(differences).enumerate() {
             let size = 1.0 + exact.abs() + score.value.abs() / case.values[p];
@@ -246,7 +292,11 @@ fn the_information_is_fisher_s() {
         states: vec![x.node()],
         derivatives: vec![zero],
         inputs: vec![],
-        sensors: vec![(x.node(), (r * r).node())],
+        sensors: vec![ParametricSensor {
+            output: x.node(),
+            noise: ParametricLevel::Variance((r * r).node()),
+            limits: None,
+        }],
         process_noise: vec![zero],
         start: vec![(c.node(), zero)],
         parameters: vec![c.node(), r.node()],
@@ -255,7 +305,9 @@ fn the_information_is_fisher_s() {
     let log: Log = (0..50)
         .map(|k| (f64::from(k), vec![1.0 + (f64::from(k)).sin()], vec![]))
         .collect();
-    let score = likelihood.score(&[1.1, 0.5], rows(&log), 1.0).unwrap();
+    let score = likelihood
+        .score(&[1.1, 0.5], rows(&log), Step::AtMost(1.0))
+        .unwrap();
     for (found, expected) in score.information.iter().zip([200.0, 0.0, 0.0, 400.0]) {
         assert!((found - expected).abs() < 1e-9, "{found} beside {expected}");
     }
@@ -267,22 +319,22 @@ fn what_does_not_fit_is_refused() {
     let mut likelihood = case.likelihood();
     let refused = |likelihood: &mut Likelihood, θ: &[f64], step: f64| {
         likelihood
-            .score(θ, rows(&case.log), step)
+            .score(θ, rows(&case.log), Step::AtMost(step))
             .unwrap_err()
             .to_string()
     };
     assert!(refused(&mut likelihood, &[1.0], 1.0).contains("number of parameters"));
-    assert!(refused(&mut likelihood, &case.values, f64::NAN).contains("longest step"));
+    assert!(refused(&mut likelihood, &case.values, f64::NAN).contains("step"));
     let mut wide = case.log.clone();
     wide[2].1.push(1.0);
     let error = likelihood
-        .score(&case.values, rows(&wide), 1.0)
+        .score(&case.values, rows(&wide), Step::AtMost(1.0))
         .unwrap_err();
     assert!(error.to_string().contains("number of readings"), "{error}");
     let mut timeless = case.log.clone();
     timeless[0].0 = f64::NAN;
     let error = likelihood
-        .score(&case.values, rows(&timeless), 1.0)
+        .score(&case.values, rows(&timeless), Step::AtMost(1.0))
         .unwrap_err();
     assert!(
         matches!(error, lynkeus_run::Error::NoNumber { .. }),
@@ -290,7 +342,7 @@ fn what_does_not_fit_is_refused() {
     );
     let back = vec![case.log[3].clone(), case.log[1].clone()];
     let error = likelihood
-        .score(&case.values, rows(&back), 1.0)
+        .score(&case.values, rows(&back), Step::AtMost(1.0))
         .unwrap_err();
     assert!(
         matches!(error, lynkeus_run::Error::TimeBefore { .. }),
@@ -310,14 +362,21 @@ fn a_plant_without_parameters_has_a_value() {
         states: vec![x],
         derivatives: vec![number(0.0)],
         inputs: vec![],
-        sensors: vec![(x, number(4.0))],
+        sensors: vec![ParametricSensor {
+            output: x,
+            noise: ParametricLevel::Variance(number(4.0)),
+            limits: None,
+        }],
         process_noise: vec![number(0.0)],
         start: vec![(number(0.0), number(0.0))],
         parameters: vec![],
     })
     .unwrap();
     let log: Log = [1.0, 2.0].iter().map(|y| (*y, vec![*y], vec![])).collect();
-    let value = likelihood.score(&[], rows(&log), 1.0).unwrap().value;
+    let value = likelihood
+        .score(&[], rows(&log), Step::AtMost(1.0))
+        .unwrap()
+        .value;
     let expected = 0.5 * (1.25 + 2.0 * (8.0 * std::f64::consts::PI).ln());
     assert!(
         (value - expected).abs() < 1e-12,

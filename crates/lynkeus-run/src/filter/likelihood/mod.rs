@@ -1,0 +1,510 @@
+//! How likely a log is, and how that changes with what is not known: parameters of the plant, noises, starts.
+//!
+//! Along an extended filter every reading has an innovation ν = y − ŷ with a variance σ², and
+//! −log L = ½ Σ (ν²/σ² + log 2πσ²) (F. C. Schweppe, *IEEE Transactions on Information Theory* 11 (1965) 61–70).
+//! A sample is straight-line code over expressions ([`super::expressions`]), so that its derivatives are
+//! expressions, too: ∂x̂/∂θ and ∂S/∂θ are carried beside x̂ and S, one parameter in each lane. The same tangents
+//! give Fisher's information, Σ (∂ν ∂νᵀ/σ² + ½ ∂σ² ∂σ²ᵀ/σ⁴), with which a search takes its steps and whose
+//! inverse is the covariance of what it finds (K. J. Åström, *Automatica* 16 (1980) 551–574).
+
+mod code;
+mod sample;
+
+use lynkeus_expr::{Graph, Node, Tape};
+use lynkeus_native::Function;
+
+use super::censored::{End, Tail};
+use crate::integrator::{fixed_steps, instant};
+use crate::noise::Limits;
+use crate::{Error, Method, Result, Step};
+use code::{Bundle, Code, passes};
+use sample::Sample;
+
+/// A plant with its sensors and noises as functions of parameters θ.
+///
+/// Everything is an expression of one graph: f and h of time, states, inputs and θ; noises and starts of θ alone.
+#[derive(Clone, Debug)]
+pub struct ParametricPlant<'g> {
+    /// the graph of all expressions
+    pub graph: &'g Graph,
+    /// the symbol of time
+    pub time: Node,
+    /// symbols of the states
+    pub states: Vec<Node>,
+    /// f, one per state
+    pub derivatives: Vec<Node>,
+    /// symbols of the known inputs, held from one row to the next
+    pub inputs: Vec<Node>,
+    /// what is measured
+    pub sensors: Vec<ParametricSensor>,
+    /// spectral density of the white noise on each derivative
+    pub process_noise: Vec<Node>,
+    /// the first estimate of each state, and its standard deviation
+    pub start: Vec<(Node, Node)>,
+    /// symbols of θ
+    pub parameters: Vec<Node>,
+}
+
+/// A sensor of a [`ParametricPlant`].
+#[derive(Clone, Debug)]
+pub struct ParametricSensor {
+    /// h(t, x, u)
+    pub output: Node,
+    /// how strong its noise is
+    pub noise: ParametricLevel,
+    /// the range that it can show; a reading at an end says that y is there or beyond
+    pub limits: Option<Limits>,
+}
+
+/// The noise of a sensor as a function of θ.
+#[derive(Clone, Copy, Debug)]
+pub enum ParametricLevel {
+    /// its variance
+    Variance(Node),
+    /// its standard deviation as a share p of the output: the variance is p²E\[h²\]
+    Share(Node),
+}
+
+/// A row of a log.
+#[derive(Clone, Copy, Debug)]
+pub struct Row<'a> {
+    /// its time
+    pub t: f64,
+    /// one per sensor; not a number where it did not report
+    pub readings: &'a [f64],
+    /// one per known input
+    pub inputs: &'a [f64],
+}
+
+/// −log L of a log at θ, with its derivatives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Score {
+    /// −log L; infinite or no number where the plant has no value on the way
+    pub value: f64,
+    /// its derivative by each parameter
+    pub gradient: Vec<f64>,
+    /// Fisher's information, row by row
+    pub information: Vec<f64>,
+    /// how many readings there were
+    pub readings: usize,
+}
+
+/// [`Score`]s of one plant: compiled once, for any log and any θ.
+///
+/// ```
+/// use lynkeus_expr::Graph;
+/// use lynkeus_run::filter::{Likelihood, ParametricLevel, ParametricPlant, ParametricSensor, Row};
+/// use lynkeus_run::Step;
+///
+/// // a level that nobody moves: its value is the mean of the readings
+/// let g = Graph::new();
+/// let [time, x, level] = ["time", "x", "level"].map(|name| g.symbol(name));
+/// let number = |value: f64| g.constant(value).node();
+/// let mut likelihood = Likelihood::new(&ParametricPlant {
+///     graph: &g,
+///     time: time.node(),
+///     states: vec![x.node()],
+///     derivatives: vec![number(0.0)],
+///     inputs: vec![],
+///     sensors: vec![ParametricSensor {
+///         output: x.node(),
+///         noise: ParametricLevel::Variance(number(1.0)),
+///         limits: None,
+///     }],
+///     process_noise: vec![number(0.0)],
+///     start: vec![(level.node(), number(0.0))],
+///     parameters: vec![level.node()],
+/// })?;
+/// let rows = [1.0, 2.0, 6.0].map(|y| [y]);
+/// let log = |k: usize| Row { t: k as f64, readings: &rows[k], inputs: &[] };
+/// let score = likelihood.score(&[3.0], (0..3).map(log), Step::Substeps(1))?;
+/// assert!(score.gradient[0].abs() < 1e-12);
+/// assert!((score.information[0] - 3.0).abs() < 1e-12);
+/// # Ok::<(), lynkeus_run::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Likelihood(Wide);
+
+/// As many parameters in a pass as the processor takes.
+#[derive(Clone, Debug)]
+enum Wide {
+    Four(Box<Passes<4>>),
+    Eight(Box<Passes<8>>),
+}
+
+/// An innovation on the way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    /// the row's time
+    pub t: f64,
+    /// its place among the sensors
+    pub sensor: usize,
+    /// y − ŷ; of a reading at an end of its range the end less ŷ
+    pub innovation: f64,
+    /// its variance
+    pub variance: f64,
+}
+
+impl Likelihood {
+    /// Compiles a plant.
+    ///
+    /// # Errors
+    /// [`Error::MissingInput`] for an expression that reads another symbol, [`Error::Setting`] for wrong numbers of
+    /// expressions.
+    pub fn new(plant: &ParametricPlant<'_>) -> Result<Self> {
+        let sample = Sample::new(plant)?;
+        let is_wide = lynkeus_native::widest() == 8 && plant.parameters.len() > 4;
+        Ok(Self(match is_wide {
+            true => Wide::Eight(Box::new(Passes::new(&sample, Function::<8>::compile)?)),
+            false => Wide::Four(Box::new(Passes::new(&sample, Function::<4>::compile)?)),
+        }))
+    }
+
+    /// −log L of a log at θ, its gradient and Fisher's information; from row to row by such steps of Runge and
+    /// Kutta ([`Step::Auto`]: one).
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for another number of parameters, readings or inputs, a step that is no length or too
+    /// many of them; [`Error::NoNumber`] for a time that is none, [`Error::TimeBefore`] for rows that run back.
+    pub fn score<'a>(
+        &mut self,
+        parameters: &[f64],
+        rows: impl IntoIterator<Item = Row<'a>>,
+        step: Step,
+    ) -> Result<Score> {
+        self.watched(parameters, rows, step, |_| {})
+    }
+
+    /// The same; `see` is told every innovation.
+    ///
+    /// # Errors
+    /// As [`Self::score`].
+    pub fn watched<'a>(
+        &mut self,
+        parameters: &[f64],
+        rows: impl IntoIterator<Item = Row<'a>>,
+        step: Step,
+        see: impl FnMut(Seen),
+    ) -> Result<Score> {
+        Method::Rk4(step).check()?;
+        match &mut self.0 {
+            Wide::Four(passes) => passes.score(parameters, rows, step, see),
+            Wide::Eight(passes) => passes.score(parameters, rows, step, see),
+        }
+    }
+}
+
+/// # Errors
+/// [`Error::Setting`] for another number of something.
+fn check(what: &str, expected: usize, found: usize) -> Result<()> {
+    match found == expected {
+        true => Ok(()),
+        false => Err(Error::setting(what, expected.to_string(), found)),
+    }
+}
+
+/// The code of a sample, and x̂ and S with their tangents, by pass.
+#[derive(Clone, Debug)]
+struct Passes<const L: usize> {
+    parameters: usize,
+    /// of θ: x̂ and S at the start
+    begin: Code<L>,
+    /// of t, h, u, x̂, S and θ: x̂ and S a step later
+    predict: Code<L>,
+    sensors: Vec<Sensor<L>>,
+    inputs: usize,
+    states: usize,
+    belief: Vec<Bundle<L>>,
+    /// x̂ at the row before its readings count
+    at: Vec<Bundle<L>>,
+    seen: Tangents,
+}
+
+/// A sensor's code.
+#[derive(Clone, Debug)]
+struct Sensor<const L: usize> {
+    /// of t, y, u, x̂ at the row, x̂, S and θ: x̂ and S after it, ν and σ²
+    correct: Code<L>,
+    limited: Option<Limited<L>>,
+}
+
+/// That of a reading at an end of the range.
+#[derive(Clone, Debug)]
+struct Limited<const L: usize> {
+    limits: Limits,
+    /// of the same: ν and σ² alone, and the variance of the noise
+    view: Code<L>,
+    /// of the same, and ν and R as they count: x̂ and S after it
+    weigh: Code<L>,
+}
+
+/// ν and σ² of a reading with their derivatives by all parameters.
+#[derive(Clone, Debug, Default)]
+struct Tangents {
+    ν: f64,
+    σ2: f64,
+    dν: Vec<f64>,
+    dσ2: Vec<f64>,
+}
+
+impl<const L: usize> Passes<L> {
+    fn new(sample: &Sample<'_, '_>, compile: fn(&Tape) -> Option<Function<L>>) -> Result<Self> {
+        let plant = sample.plant();
+        let (states, parameters) = (plant.states.len(), plant.parameters.len());
+        let sensors = plant.sensors.iter().enumerate().map(|(i, sensor)| {
+            Ok(Sensor {
+                correct: sample.correct(i, compile)?,
+                limited: (sensor.limits)
+                    .map(|limits| -> Result<_> {
+                        Ok(Limited {
+                            limits,
+                            view: sample.view(i, compile)?,
+                            weigh: sample.weigh(i, compile)?,
+                        })
+                    })
+                    .transpose()?,
+            })
+        });
+        let count = passes(parameters, L);
+        Ok(Self {
+            parameters,
+            begin: sample.begin(compile)?,
+            predict: sample.predict(compile)?,
+            sensors: sensors.collect::<Result<_>>()?,
+            inputs: plant.inputs.len(),
+            states,
+            belief: vec![vec![[0.0; L]; 2 * sample.numbers()]; count],
+            at: vec![vec![[0.0; L]; 2 * states]; count],
+            seen: Tangents {
+                dν: vec![0.0; parameters],
+                dσ2: vec![0.0; parameters],
+                ..Tangents::default()
+            },
+        })
+    }
+
+    fn score<'a>(
+        &mut self,
+        parameters: &[f64],
+        rows: impl IntoIterator<Item = Row<'a>>,
+        step: Step,
+        mut see: impl FnMut(Seen),
+    ) -> Result<Score> {
+        let count = self.parameters;
+        check("number of parameters", count, parameters.len())?;
+        self.place(parameters);
+        let mut score = Score::none(count);
+        for (pass, belief) in self.belief.iter_mut().enumerate() {
+            belief.copy_from_slice(self.begin.run(pass, [], &[]));
+        }
+        let mut before: Option<f64> = None;
+        let mut inputs: Vec<f64> = vec![];
+        for row in rows {
+            check("number of readings", self.sensors.len(), row.readings.len())?;
+            check("number of inputs", self.inputs, row.inputs.len())?;
+            if !row.t.is_finite() {
+                let (signal, value) = ("t".to_owned(), row.t);
+                return Err(Error::NoNumber { signal, value });
+            }
+            if let Some(from) = before.filter(|from| *from != row.t) {
+                self.advance(from, row.t, step, &inputs)?;
+            }
+            before = Some(row.t);
+            inputs.clear();
+            inputs.extend_from_slice(row.inputs);
+            self.take(&row, &mut score, &mut see);
+            if !score.value.is_finite() {
+                return Ok(score);
+            }
+        }
+        Ok(score)
+    }
+
+    fn place(&mut self, parameters: &[f64]) {
+        self.begin.place(parameters);
+        self.predict.place(parameters);
+        for sensor in &mut self.sensors {
+            sensor.correct.place(parameters);
+            if let Some(limited) = &mut sensor.limited {
+                limited.view.place(parameters);
+                limited.weigh.place(parameters);
+            }
+        }
+    }
+
+    /// From one row to the next.
+    fn advance(&mut self, from: f64, to: f64, step: Step, inputs: &[f64]) -> Result<()> {
+        if to < from {
+            let (reached, time) = (from, to);
+            return Err(Error::TimeBefore { reached, time });
+        }
+        let steps = fixed_steps(from, to, step.length(to - from).unwrap_or(to - from))?;
+        for i in 0..steps {
+            let [t, next] = [i, i + 1].map(|i| instant(from, to, steps, i));
+            for (pass, belief) in self.belief.iter_mut().enumerate() {
+                let next = self.predict.run(pass, [&[t, next - t], inputs], &[belief]);
+                belief.copy_from_slice(next);
+            }
+        }
+        Ok(())
+    }
+
+    /// The readings of a row, one after the other; h and its slopes are those at the estimate before them.
+    fn take(&mut self, row: &Row<'_>, score: &mut Score, see: &mut impl FnMut(Seen)) {
+        let n = self.states;
+        for (at, belief) in self.at.iter_mut().zip(&self.belief) {
+            let half = belief.len() / 2;
+            at[..n].copy_from_slice(&belief[..n]);
+            at[n..].copy_from_slice(&belief[half..half + n]);
+        }
+        for sensor in 0..self.sensors.len() {
+            let reading = row.readings[sensor];
+            if !reading.is_finite() {
+                continue;
+            }
+            let limits = self.sensors[sensor].limited.as_ref().map(|l| l.limits);
+            match limits.and_then(|limits| Some((limits, End::of(limits, reading)?))) {
+                Some((limits, end)) => self.take_end(sensor, row, (end, end.value(limits)), score),
+                None => self.take_reading(sensor, row, reading, score),
+            }
+            see(Seen {
+                t: row.t,
+                sensor,
+                innovation: self.seen.ν,
+                variance: self.seen.σ2,
+            });
+        }
+    }
+
+    fn take_reading(&mut self, sensor: usize, row: &Row<'_>, reading: f64, score: &mut Score) {
+        let code = &mut self.sensors[sensor].correct;
+        for (pass, belief) in self.belief.iter_mut().enumerate() {
+            let known: [&[f64]; 2] = [&[row.t, reading], row.inputs];
+            let found = code.run(pass, known, &[&self.at[pass], belief]);
+            let (m, half) = (belief.len() / 2, found.len() / 2);
+            belief[..m].copy_from_slice(&found[..m]);
+            belief[m..].copy_from_slice(&found[half..half + m]);
+            self.seen
+                .take(pass, [&found[m], &found[m + 1]], |k| found[half + m + k]);
+        }
+        score.count(&self.seen);
+    }
+
+    /// A reading at an end of the range: see [`super::censored`].
+    fn take_end(
+        &mut self,
+        sensor: usize,
+        row: &Row<'_>,
+        (end, value): (End, f64),
+        score: &mut Score,
+    ) {
+        let Some(limited) = &mut self.sensors[sensor].limited else {
+            return;
+        };
+        let known: [&[f64]; 2] = [&[row.t, value], row.inputs];
+        for (pass, belief) in self.belief.iter_mut().enumerate() {
+            let parts: [&[[f64; L]]; 2] = [&self.at[pass], belief];
+            let found = limited.view.run(pass, known, &parts);
+            self.seen
+                .take(pass, [&found[0], &found[1]], |k| found[3 + k]);
+            let Some(weighed) = weighed(end, found) else {
+                continue;
+            };
+            let parts: [&[[f64; L]]; 3] = [&self.at[pass], belief, &weighed];
+            let found = limited.weigh.run(pass, known, &parts);
+            belief.copy_from_slice(found);
+        }
+        score.count_end(end, &self.seen);
+    }
+}
+
+/// ν and R with which a reading at an end corrects, with their tangents; none where it says nothing. `found`
+/// are ν, σ² and R of the end as a reading.
+fn weighed<const L: usize>(end: End, found: &[[f64; L]]) -> Option<[[f64; L]; 4]> {
+    let [ν, σ2, r] = [found[0][0], found[1][0], found[2][0]];
+    let sign = end.sign();
+    let σ = σ2.sqrt();
+    let tail = Tail::beyond(sign * ν / σ);
+    let (value, noise) = end.weighed(ν, σ2 - r, r)?;
+    let told = tail.told();
+    let mut all = [[value; L], [noise; L], [0.0; L], [0.0; L]];
+    for lane in 0..L {
+        let [dν, dσ2, dr] = [3, 4, 5].map(|k: usize| found[k][lane]);
+        let dσ = 0.5 * dσ2 / σ;
+        let da = sign * (dν - ν / σ * dσ) / σ;
+        // λ' = δ, (λ − a)' = δ − 1
+        let dexcess = (told - 1.0) * da;
+        let dtold = (told * tail.excess + tail.mean * (told - 1.0)) * da;
+        all[2][lane] = sign * (dσ - σ / tail.excess * dexcess) / tail.excess;
+        all[3][lane] = dr + dσ2 * (1.0 / told - 1.0) - σ2 * dtold / (told * told);
+    }
+    Some(all)
+}
+
+impl Tangents {
+    /// Those of a pass; `along(0)` are the derivatives of ν, `along(1)` those of σ².
+    fn take<const L: usize>(
+        &mut self,
+        pass: usize,
+        [ν, σ2]: [&[f64; L]; 2],
+        along: impl Fn(usize) -> [f64; L],
+    ) {
+        (self.ν, self.σ2) = (ν[0], σ2[0]);
+        for (into, tangents) in [&mut self.dν, &mut self.dσ2]
+            .into_iter()
+            .zip([0, 1].map(along))
+        {
+            let own = into.iter_mut().skip(pass * L).zip(tangents);
+            own.for_each(|(place, tangent)| *place = tangent);
+        }
+    }
+}
+
+impl Score {
+    fn none(parameters: usize) -> Self {
+        Self {
+            value: 0.0,
+            gradient: vec![0.0; parameters],
+            information: vec![0.0; parameters * parameters],
+            readings: 0,
+        }
+    }
+
+    fn count(&mut self, seen: &Tangents) {
+        let Tangents { ν, σ2, dν, dσ2 } = seen;
+        let weight = 1.0 / σ2;
+        let share = ν * weight;
+        self.value += 0.5 * (ν * share + (std::f64::consts::TAU * σ2).ln());
+        self.readings += 1;
+        let [first, second] = [share, 0.5 * (weight - share * share)];
+        for ((g, dν), dσ2) in self.gradient.iter_mut().zip(dν).zip(dσ2) {
+            *g += dν * first + dσ2 * second;
+        }
+        let half = 0.5 * weight * weight;
+        let rows = self.information.chunks_exact_mut(dν.len().max(1));
+        for (row, (own_ν, own_σ2)) in rows.zip(dν.iter().zip(dσ2)) {
+            let (a, b) = (own_ν * weight, own_σ2 * half);
+            for ((entry, dν), dσ2) in row.iter_mut().zip(dν).zip(dσ2) {
+                *entry += a * dν + b * dσ2;
+            }
+        }
+    }
+
+    /// −log Φ(−a) with a = ±ν/σ, whose slope is λ and whose curvature δ.
+    fn count_end(&mut self, end: End, seen: &Tangents) {
+        let σ = seen.σ2.sqrt();
+        let a = end.sign() * seen.ν / σ;
+        let tail = Tail::beyond(a);
+        self.value -= tail.log_weight();
+        self.readings += 1;
+        let tangents = seen.dν.iter().zip(&seen.dσ2);
+        let da = tangents.map(|(dν, dσ2)| end.sign() * dν / σ - 0.5 * a * dσ2 / seen.σ2);
+        let da: Vec<f64> = da.collect();
+        for (p, own) in da.iter().enumerate() {
+            self.gradient[p] += tail.mean * own;
+            for (q, other) in da.iter().enumerate() {
+                self.information[p * da.len() + q] += tail.told() * own * other;
+            }
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! The expressions of a sample.
+
+use std::collections::BTreeSet;
+
+use lynkeus_expr::jacobian;
+use lynkeus_expr::{Expr, Node, Tape};
+use lynkeus_native::Function;
+
+use super::code::Code;
+use super::{ParametricLevel, ParametricPlant};
+use crate::classical::{Term, sum};
+use crate::filter::expressions::{Corrected, Flow, corrected};
+use crate::{Error, Result};
+
+type Compile<const L: usize> = fn(&Tape) -> Option<Function<L>>;
+
+/// The expressions of a sample.
+pub(super) struct Sample<'p, 'g> {
+    plant: &'p ParametricPlant<'g>,
+    /// F and C: row, column and entry
+    slopes: Vec<(usize, usize, Node)>,
+    views: Vec<(usize, usize, Node)>,
+    h: Expr<'g>,
+    reading: Expr<'g>,
+    /// symbols of the estimate at a row before its readings count
+    at: Vec<Node>,
+    /// entries of S that are not 0 whatever happens, and their symbols
+    pattern: Vec<(usize, usize)>,
+    root: Vec<Node>,
+}
+
+impl<'p, 'g> Sample<'p, 'g> {
+    pub fn new(plant: &'p ParametricPlant<'g>) -> Result<Self> {
+        let (g, n) = (plant.graph, plant.states.len());
+        let counts = [
+            plant.derivatives.len(),
+            plant.process_noise.len(),
+            plant.start.len(),
+        ];
+        if n == 0 || counts.iter().any(|count| *count != n) {
+            let expected =
+                "one derivative, density and start for each state, of which there are some";
+            return Err(Error::setting("states", expected, n));
+        }
+        let outputs: Vec<Node> = plant.sensors.iter().map(|sensor| sensor.output).collect();
+        let mut sample = Self {
+            plant,
+            slopes: jacobian::forward(g, &plant.derivatives, &plant.states).entries,
+            views: jacobian::forward(g, &outputs, &plant.states).entries,
+            h: g.fresh("h"),
+            reading: g.fresh("y"),
+            at: (0..n).map(|i| g.fresh(format!("x{i}")).node()).collect(),
+            pattern: vec![],
+            root: vec![],
+        };
+        sample.find_pattern();
+        Ok(sample)
+    }
+
+    /// Every entry of S that a start, a step or a reading makes, or one of them after the others.
+    fn find_pattern(&mut self) {
+        let n = self.plant.states.len();
+        let deviations = self.plant.start.iter().enumerate();
+        let first = deviations.filter(|(_, start)| self.term(start.1).is_some());
+        let mut pattern: BTreeSet<(usize, usize)> = first.map(|(i, _)| (i, i)).collect();
+        loop {
+            self.pattern = pattern.iter().copied().collect();
+            let fresh = self
+                .pattern
+                .iter()
+                .map(|_| self.plant.graph.fresh("S").node());
+            self.root = fresh.collect();
+            let (_, predicted) = self.predicted();
+            let corrected =
+                (0..self.plant.sensors.len()).map(|sensor| self.corrected(sensor, None).root);
+            let roots: Vec<Vec<Term<'g>>> = corrected.chain([predicted]).collect();
+            let places = (0..n * n).filter(|&at| roots.iter().any(|root| root[at].is_some()));
+            let before = pattern.len();
+            pattern.extend(places.map(|at| (at / n, at % n)));
+            if pattern.len() == before {
+                return;
+            }
+        }
+    }
+
+    fn term(&self, node: Node) -> Term<'g> {
+        let is_nothing = self.plant.graph.constant_value(node) == Some(0.0);
+        (!is_nothing).then(|| self.plant.graph.expr(node))
+    }
+
+    fn belief(&self) -> (Vec<Term<'g>>, Vec<Term<'g>>) {
+        let (g, n) = (self.plant.graph, self.plant.states.len());
+        let x = self.plant.states.iter().map(|&x| Some(g.expr(x))).collect();
+        let mut root = vec![None; n * n];
+        for (&(i, j), &entry) in self.pattern.iter().zip(&self.root) {
+            root[i * n + j] = Some(g.expr(entry));
+        }
+        (x, root)
+    }
+
+    fn nodes(&self, (x, root): (&[Term<'g>], &[Term<'g>])) -> Vec<Node> {
+        let n = self.plant.states.len();
+        let entries = self.pattern.iter().map(|&(i, j)| root[i * n + j]);
+        let all = x.iter().copied().chain(entries);
+        let nothing = self.plant.graph.constant(0.0);
+        all.map(|term| term.unwrap_or(nothing).node()).collect()
+    }
+
+    /// x̂ and the entries of S.
+    pub fn numbers(&self) -> usize {
+        self.plant.states.len() + self.pattern.len()
+    }
+
+    pub fn plant(&self) -> &'p ParametricPlant<'g> {
+        self.plant
+    }
+
+    fn code<const L: usize>(
+        &self,
+        (known, moves): (&[Node], &[Node]),
+        outputs: &[Node],
+        compile: Compile<L>,
+    ) -> Result<Code<L>> {
+        let plant = self.plant;
+        Code::new(
+            plant.graph,
+            known,
+            moves,
+            &plant.parameters,
+            outputs,
+            compile,
+        )
+    }
+
+    pub fn begin<const L: usize>(&self, compile: Compile<L>) -> Result<Code<L>> {
+        let n = self.plant.states.len();
+        let x = self.plant.start.iter().map(|start| self.term(start.0));
+        let mut root = vec![None; n * n];
+        for (i, start) in self.plant.start.iter().enumerate() {
+            root[i * n + i] = self.term(start.1);
+        }
+        let outputs = self.nodes((&x.collect::<Vec<_>>(), &root));
+        self.code((&[], &[]), &outputs, compile)
+    }
+
+    /// x̂ and S after a step.
+    fn predicted(&self) -> (Vec<Term<'g>>, Vec<Term<'g>>) {
+        let (plant, n) = (self.plant, self.plant.states.len());
+        let rest = plant.inputs.iter().chain(&plant.parameters);
+        let inputs = [plant.time].into_iter().chain(plant.states.iter().copied());
+        let inputs: Vec<Node> = inputs.chain(rest.copied()).collect();
+        let places: Vec<(usize, usize)> = self.slopes.iter().map(|s| (s.0, s.1)).collect();
+        let slopes: Vec<Node> = self.slopes.iter().map(|s| s.2).collect();
+        let flow = Flow {
+            graph: plant.graph,
+            inputs: &inputs,
+            derivatives: &plant.derivatives,
+            slopes: &slopes,
+            places: &places,
+            noise: plant.process_noise.iter().map(|&q| self.term(q)).collect(),
+        };
+        let next = flow.step(self.h, &flow.start());
+        let mut root = flow.carried(&next, plant.graph.constant(1.0), &self.belief().1);
+        root.truncate(n * n);
+        (next[..n].to_vec(), root)
+    }
+
+    pub fn predict<const L: usize>(&self, compile: Compile<L>) -> Result<Code<L>> {
+        let plant = self.plant;
+        let (x, root) = self.predicted();
+        let known = [&[plant.time, self.h.node()][..], &plant.inputs].concat();
+        let moves = [&plant.states[..], &self.root].concat();
+        self.code((&known, &moves), &self.nodes((&x, &root)), compile)
+    }
+
+    /// By a reading, or by one of this innovation and variance of the noise.
+    fn corrected(&self, sensor: usize, weighed: Option<[Expr<'g>; 2]>) -> Corrected<'g> {
+        let (g, n) = (self.plant.graph, self.plant.states.len());
+        let output = self.plant.sensors[sensor].output;
+        let own = self.views.iter().filter(|view| view.0 == sensor);
+        let views: Vec<(usize, Node)> = own.map(|view| (view.1, view.2)).collect();
+        // as they are at the estimate before the row's readings
+        let all: Vec<Node> = [output]
+            .into_iter()
+            .chain(views.iter().map(|v| v.1))
+            .collect();
+        let moved = self
+            .plant
+            .states
+            .iter()
+            .copied()
+            .zip(self.at.iter().copied());
+        let all = g.substitute(&all, &moved.collect());
+        let mut slopes: Vec<Term<'g>> = vec![None; n];
+        for ((column, _), &slope) in views.iter().zip(&all[1..]) {
+            slopes[*column] = self.term(slope);
+        }
+        let (x, root) = self.belief();
+        let off = slopes.iter().zip(&self.plant.states).zip(&self.at);
+        let terms = off.filter_map(|((c, &x), &at)| c.map(|c| c * (g.expr(x) - g.expr(at))));
+        let predicted = terms.fold(g.expr(all[0]), |sum, term| sum + term);
+        let (innovation, given) = match weighed {
+            Some([innovation, noise]) => (innovation, Some(noise)),
+            None => (self.reading - predicted, None),
+        };
+        let noise = |spread: Term<'g>| match (given, self.plant.sensors[sensor].noise) {
+            (Some(given), _) => given,
+            (None, ParametricLevel::Variance(variance)) => g.expr(variance),
+            (None, ParametricLevel::Share(share)) => {
+                let square = sum(Some(predicted * predicted), spread);
+                g.expr(share).powi(2) * square.unwrap_or(g.constant(0.0))
+            }
+        };
+        corrected((&x, &root), &slopes, innovation, noise)
+    }
+
+    /// What the code of a sensor reads: t, y and u; x̂ at the row, x̂ and S.
+    fn read(&self) -> (Vec<Node>, Vec<Node>) {
+        let plant = self.plant;
+        let known = [&[plant.time, self.reading.node()][..], &plant.inputs].concat();
+        let moves = [&self.at[..], &plant.states, &self.root].concat();
+        (known, moves)
+    }
+
+    pub fn correct<const L: usize>(&self, sensor: usize, compile: Compile<L>) -> Result<Code<L>> {
+        let found = self.corrected(sensor, None);
+        let belief = self.nodes((&found.x, &found.root));
+        let seen = [found.innovation.node(), found.variance.node()];
+        let (known, moves) = self.read();
+        self.code((&known, &moves), &[&belief[..], &seen].concat(), compile)
+    }
+
+    /// ν, σ² and the variance of the noise.
+    pub fn view<const L: usize>(&self, sensor: usize, compile: Compile<L>) -> Result<Code<L>> {
+        let found = self.corrected(sensor, None);
+        let seen = [found.innovation, found.variance, found.noise].map(Expr::node);
+        let (known, moves) = self.read();
+        self.code((&known, &moves), &seen, compile)
+    }
+
+    /// x̂ and S after a reading whose innovation and variance of the noise are given with their tangents.
+    pub fn weigh<const L: usize>(&self, sensor: usize, compile: Compile<L>) -> Result<Code<L>> {
+        let g = self.plant.graph;
+        let weighed = ["innovation", "noise"].map(|name| g.fresh(name));
+        let found = self.corrected(sensor, Some(weighed));
+        let (known, mut moves) = self.read();
+        moves.extend(weighed.map(Expr::node));
+        self.code(
+            (&known, &moves),
+            &self.nodes((&found.x, &found.root)),
+            compile,
+        )
+    }
+}
