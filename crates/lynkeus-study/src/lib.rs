@@ -53,8 +53,7 @@ pub use schema::schema;
 pub use sensors::{Noise, Sensors};
 pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
-pub use swept::Swept;
-pub use tune::{Scale, TuneSettings, Values};
+pub use tune::{Scale, Swept, TuneSettings, Values};
 pub use whole::Whole;
 
 use lynkeus_expr::Budget;

@@ -4,53 +4,9 @@ use std::collections::BTreeSet;
 
 use lynkeus_answer::Error;
 use lynkeus_answer::near::suggest;
-use lynkeus_observers::{FAMILIES, Family};
+use lynkeus_observers::FAMILIES;
 
-use crate::{Name, Study};
-
-/// What a key of a sweep means.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Swept {
-    /// a key of `[observer]`, and where within its value, counted from 0
-    Tuning(String, Vec<usize>),
-    /// the spectral density of an estimated quantity in `[process_noise]`; of none, all of them
-    Density(Option<String>),
-    /// the noise of an output in `[sensors]`; of none, that of all
-    Noise(Option<String>),
-}
-
-impl Swept {
-    /// `theta[1]` is the key `theta` and the index 0, `noise.y` the noise of the output y.
-    #[must_use]
-    pub fn read(key: &str) -> Option<Self> {
-        let (section, name) = match key.split_once('.') {
-            Some((section, name)) => (section, Some(name.to_owned())),
-            None => (key, None),
-        };
-        match section {
-            DENSITY => Some(Self::Density(name)),
-            NOISE => Some(Self::Noise(name)),
-            _ => {
-                let (base, path) = place(key)?;
-                Some(Self::Tuning(base.to_owned(), path))
-            }
-        }
-    }
-
-    /// Whether a family reads it: noises are what filters weigh readings by.
-    #[must_use]
-    pub fn is_of(&self, family: &dyn Family) -> bool {
-        match self {
-            Self::Tuning(base, _) => family.owns(base),
-            Self::Density(_) | Self::Noise(_) => family.is_filter(),
-        }
-    }
-}
-
-/// What a key begins with that is a density, or all of them,
-pub(crate) const DENSITY: &str = "process_noise";
-/// and with that is the noise of an output.
-pub(crate) const NOISE: &str = "noise";
+use crate::{Name, Study, Swept};
 
 impl Study {
     /// Refuses keys to sweep that no family has; with `of_others` those, too, that none in question has.
@@ -89,16 +45,6 @@ impl Study {
         let refusal = Error::input(format!("`keys` of [tune]: {why}")).at(&self.file);
         name.blame(refusal)
     }
-}
-
-/// `theta[1]` is the key `theta` and the index 0.
-fn place(key: &str) -> Option<(&str, Vec<usize>)> {
-    let Some((base, rest)) = key.split_once('[') else {
-        return Some((key, vec![]));
-    };
-    let indices = rest.strip_suffix(']')?.split("][");
-    let index = |text: &str| text.trim().parse::<usize>().ok()?.checked_sub(1);
-    Some((base.trim(), indices.map(index).collect::<Option<_>>()?))
 }
 
 /// What is swept belongs to a family that the study allows, or why not and what to do.

@@ -4,14 +4,68 @@ use super::Name;
 use super::keys::{RANGE, TUNE};
 use super::section::Entry;
 use super::simulate::{self, Expression};
-use super::swept::{DENSITY, NOISE};
 use lynkeus_answer::Error;
+use lynkeus_observers::Family;
 
 /// Values of a range whose study does not say how many.
 const POINTS: usize = 21;
 
 /// Most values of one key.
 const MOST_POINTS: u64 = 10_000;
+
+/// What a key begins with that is a density, or all of them,
+const DENSITY: &str = "process_noise";
+/// and with that is the noise of an output.
+const NOISE: &str = "noise";
+
+/// What a key of a sweep means.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Swept {
+    /// a key of `[observer]`, and where within its value, counted from 0
+    Tuning(String, Vec<usize>),
+    /// the spectral density of an estimated quantity in `[process_noise]`; of none, all of them
+    Density(Option<String>),
+    /// the noise of an output in `[sensors]`; of none, that of all
+    Noise(Option<String>),
+}
+
+impl Swept {
+    /// `theta[1]` is the key `theta` and the index 0, `noise.y` the noise of the output y.
+    #[must_use]
+    pub fn read(key: &str) -> Option<Self> {
+        let (section, name) = match key.split_once('.') {
+            Some((section, name)) => (section, Some(name.to_owned())),
+            None => (key, None),
+        };
+        match section {
+            DENSITY => Some(Self::Density(name)),
+            NOISE => Some(Self::Noise(name)),
+            _ => {
+                let (base, path) = place(key)?;
+                Some(Self::Tuning(base.to_owned(), path))
+            }
+        }
+    }
+
+    /// Whether a family reads it: noises are what filters weigh readings by.
+    #[must_use]
+    pub fn is_of(&self, family: &dyn Family) -> bool {
+        match self {
+            Self::Tuning(base, _) => family.owns(base),
+            Self::Density(_) | Self::Noise(_) => family.is_filter(),
+        }
+    }
+}
+
+/// `theta[1]` is the key `theta` and the index 0.
+fn place(key: &str) -> Option<(&str, Vec<usize>)> {
+    let Some((base, rest)) = key.split_once('[') else {
+        return Some((key, vec![]));
+    };
+    let indices = rest.strip_suffix(']')?.split("][");
+    let index = |text: &str| text.trim().parse::<usize>().ok()?.checked_sub(1);
+    Some((base.trim(), indices.map(index).collect::<Option<_>>()?))
+}
 
 /// How a tuning is swept and judged.
 #[derive(Clone, Debug, PartialEq)]
