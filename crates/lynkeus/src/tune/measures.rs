@@ -65,13 +65,15 @@ pub(super) const NOISE_GAIN: usize = 5;
 pub(super) const ULTIMATE_BOUND: usize = 6;
 pub(super) const SAMPLING_MARGIN: usize = 7;
 
+/// What decides of filters on a log; of many readings small differences tell.
+pub(super) const LIKELIHOOD: Measure = Measure {
+    digits: 6,
+    ..measure("nll_per_reading", "\u{2212}log likelihood per reading")
+};
+
 /// The figures of a sweep on a log: the first is that of filters, the last that of observers.
 const LOGGED: &[Measure] = &[
-    Measure {
-        // of many readings small differences tell
-        digits: 6,
-        ..measure("nll_per_reading", "\u{2212}log likelihood per reading")
-    },
+    LIKELIHOOD,
     measure("held_out_error", "error on held-out samples"),
     measure("innovation", "innovation, root mean square"),
     measure("ljung_box", "Ljung–Box statistic per lag (white: 1)"),

@@ -111,13 +111,14 @@ impl Sweep {
         [mean].into_iter().chain(others).collect()
     }
 
-    /// From the least value of a figure to the greatest, without those that are far less likely.
-    fn near_the_least(&self, measure: usize) -> Scale {
-        let all = || self.rows.iter().filter_map(|row| row.figure(measure));
-        let least = all().fold(f64::INFINITY, f64::min);
-        let most = all().fold(least, f64::max).min(least + UNLIKELY);
-        let air = 0.05 * (most - least).max(f64::MIN_POSITIVE);
-        Scale::Within(least - air..most + air)
+    /// Up to which value a figure is drawn.
+    fn most_drawn(&self, measure: usize) -> f64 {
+        let is_likelihood = self.measures.get(measure) == Some(&measures::LIKELIHOOD);
+        let all = self.rows.iter().filter_map(|row| row.figure(measure));
+        match is_likelihood {
+            true => all.fold(f64::INFINITY, f64::min) + UNLIKELY,
+            false => f64::INFINITY,
+        }
     }
 
     /// One figure: a curve for every combination of the keys after the first.
@@ -130,12 +131,14 @@ impl Sweep {
             }
         }
         let knee = self.chosen().and_then(|row| row.values.get(1..));
+        let most = self.most_drawn(measure);
         let curve = |others: &&[f64]| {
             let kind = match knee == Some(*others) {
                 true => Kind::Main,
                 false => Kind::Pale,
             };
-            let points = self.points(measure, |row| row.values.get(1..) == Some(*others));
+            let mut points = self.points(measure, |row| row.values.get(1..) == Some(*others));
+            points.retain(|(_, y)| *y <= most || y.is_nan());
             Curve::through(kind, points)
         };
         let found = self.measures.get(measure);
@@ -151,7 +154,7 @@ impl Sweep {
             },
             upwards: match found.map(|m| m.name) {
                 Some("ultimate_bound") => Scale::Log,
-                Some("nll_per_reading") => self.near_the_least(measure),
+                _ if found == Some(&measures::LIKELIHOOD) => Scale::Whole,
                 _ => Scale::FromZero,
             },
             curves: combinations.iter().map(curve).collect(),
