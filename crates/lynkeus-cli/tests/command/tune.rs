@@ -371,7 +371,9 @@ fn noises_of_a_filter_are_judged_by_their_likelihood() {
         "{}",
         text.out
     );
-    assert!(folder.read("t.svg").contains("log likelihood per reading"));
+    let picture = folder.read("t.svg");
+    assert!(picture.contains("log likelihood per reading"));
+    assert!(picture.contains("knee, and the study: 0.02"));
 
     let before = folder.read("s.toml");
     let other = before
@@ -480,6 +482,11 @@ fn a_filter_is_judged_in_simulation() {
     let inner: f64 = errors[1..errors.len() - 1].iter().sum();
     let mean = (inner + (errors[0] + errors[errors.len() - 1]) / 2.0) / (errors.len() - 1) as f64;
     near(&answer["knee"]["mean_error"], mean);
+    assert!(answer["knee"].get("sampling_margin").is_none());
+    let drawn = folder.run(&["tune", "s.toml", "-q", "--plot", "t.svg"]);
+    assert_eq!(drawn.code, 0, "{}", drawn.err);
+    let picture = folder.read("t.svg");
+    assert!(picture.contains("made by the noise") && !picture.contains("stable step"));
     // whatever stands in the study of the family: where no other has the key it is a filter
     folder.change("s.toml", "family = \"ekf\"", "");
     folder.change("s.toml", "initial_variance = { x = 0.04 }", "");

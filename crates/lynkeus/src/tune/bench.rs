@@ -77,7 +77,7 @@ impl<'a> Bench<'a> {
 
     pub fn measures(&self) -> &'static [Measure] {
         match self {
-            Self::Simulation(_) => measures::SIMULATED,
+            Self::Simulation(ground) => measures::simulated(ground.is_filters()),
             Self::Log(record) => measures::of_log(record.is_filters),
         }
     }

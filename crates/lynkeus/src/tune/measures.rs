@@ -41,8 +41,17 @@ pub(crate) fn brief(x: f64, digits: usize) -> String {
     }
 }
 
-/// The figures of a sweep in simulation.
-pub(super) const SIMULATED: &[Measure] = &[
+/// The figures of a sweep in simulation, of filters or of observers.
+pub(super) fn simulated(is_filters: bool) -> &'static [Measure] {
+    match is_filters {
+        // they correct nothing between samples
+        true => &SIMULATED[..SAMPLING_MARGIN],
+        false => SIMULATED,
+    }
+}
+
+/// The figures of a sweep in simulation: the last is that of observers.
+const SIMULATED: &[Measure] = &[
     measure("mean_error", "mean error, noise included"),
     measure("mean_error_exact", "mean error without noise"),
     measure("mean_error_noise", "mean error that the noise makes"),

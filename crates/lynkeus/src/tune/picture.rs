@@ -107,7 +107,8 @@ impl Sweep {
             measures::ULTIMATE_BOUND,
             measures::SAMPLING_MARGIN,
         ];
-        let others = others.into_iter().map(|measure| self.panel(measure));
+        let others = others.into_iter().filter(|m| *m < self.measures.len());
+        let others = others.map(|measure| self.panel(measure));
         [mean].into_iter().chain(others).collect()
     }
 

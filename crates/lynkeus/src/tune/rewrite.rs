@@ -351,13 +351,13 @@ mod tests {
 
     fn sweep(text: &str, values: &[f64]) -> Sweep {
         let axes = axis::axes(&Study::parse(text, "s.toml").unwrap()).unwrap();
-        let mut row = Row::empty(values, measures::SIMULATED.len());
+        let mut row = Row::empty(values, measures::simulated(false).len());
         row.set(measures::TOTAL_ERROR, Some(1.0));
         Sweep {
             plant: "P".to_owned(),
             log: None,
             axes,
-            measures: measures::SIMULATED,
+            measures: measures::simulated(false),
             rows: vec![row],
             objective: measures::OBJECTIVE,
             knee: Some(0),

@@ -65,6 +65,10 @@ impl Simulated {
             reference,
         })
     }
+
+    pub fn is_filters(&self) -> bool {
+        self.samples.is_some()
+    }
 }
 
 impl Sampled {
