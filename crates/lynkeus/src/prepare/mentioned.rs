@@ -41,21 +41,26 @@ pub(crate) fn refuse_strangers(study: &Study, plant: &Plant) -> Result<(), Error
 /// Refuses noises to sweep of what has none.
 fn refuse_strange_noises(study: &Study, plant: &Plant) -> Result<(), Error> {
     let mut declared = study.clone();
+    let mut is_swept = false;
     for (name, _) in &study.tune.keys {
-        let own = |text: &String| Name {
-            text: text.clone(),
+        let own = |text: String| Name {
+            text,
             place: name.place.clone(),
         };
         match Swept::read(&name.text) {
-            Some(Swept::Density(Some(of))) => declared.process_noise.push((own(&of), 0.0)),
+            Some(Swept::Density(Some(of))) => declared.process_noise.push((own(of), 0.0)),
             Some(Swept::Noise(Some(of))) => {
-                let noise = (own(&of), Noise::Absolute(0.0));
+                let noise = (own(of), Noise::Absolute(0.0));
                 declared.sensors.noise.push(noise);
             }
-            _ => {}
+            _ => continue,
         }
+        is_swept = true;
     }
-    Declared::new(&declared, plant).map(drop)
+    match is_swept {
+        true => Declared::new(&declared, plant).map(drop),
+        false => Ok(()),
+    }
 }
 
 /// Refuses `unknown` states: every observer estimates those. `plant` is the model's, no parameter of it a state.
