@@ -888,9 +888,9 @@ class SweptKey(Record):
     """A key that is swept."""
 
     key: str
-    """the key of ``[observer]``"""
+    """the key of ``[observer]``, or ``process_noise.NAME``, ``noise.OUTPUT``"""
     factor: bool
-    """whether its values are factors on all numbers of a list"""
+    """whether its values are factors on all numbers of a list, or of a section"""
 
 
 class Peak(Record):
@@ -923,6 +923,8 @@ class SweptRow(Record):
     """the error in the end under ``disturbance``"""
     sampling_margin: float | None
     """the longest stable step beside the step of the samples"""
+    nll_per_reading: float | None
+    """−log of the likelihood of the innovations, over the number of readings that count; of filters on a log"""
     held_out_error: float | None
     """error on samples that were held out; on a log"""
     innovation: float | None
@@ -933,6 +935,8 @@ class SweptRow(Record):
     """share of autocorrelations outside of the 95 % band"""
     peak: Peak | None
     """the largest error, where it is known"""
+    readings: int | None
+    """readings that the likelihood counts; of filters on a log"""
     failure: str | None
     """why there are no figures"""
     _ITEMS: ClassVar = {"keys": Named[float]}
@@ -954,9 +958,10 @@ class SweepEntries:
     present: Named[float | None]
     """the study's own value of each key"""
     knee: SweptRow | None
-    """the tuning of the least error"""
+    """the tuning of the least error; of filters on a log the most likely one"""
     nearly_as_good: list[float] | None
-    """values of the first key whose error is within 10 % of that, ``[smallest, largest]``"""
+    """values of the first key whose error is within 10 % of that, ``[smallest, largest]``; of filters on a
+    log those that are as likely within 95 %: the logarithm of the likelihood is at most 1.92 less"""
     rows: list[SweptRow]
     """each tuning"""
     declared: Declared
@@ -993,6 +998,20 @@ class Compared(Record):
     """time until every error stays within 5 % of its range; ``None`` where it does not"""
     roughness: float | None
     """scatter of the estimates from sample to sample, in widths of the declared ranges"""
+    nll_per_reading: float | None
+    """−log of the likelihood of the innovations, over the number of readings that count; of filters"""
+    readings: int | None
+    """readings that count in it: those that corrected, and those at a limit of their sensor"""
+    held_out_error: float | None
+    """root mean square error of the prediction on samples that were held out, over the span of the output"""
+    innovation: float | None
+    """root mean square of the innovations, over the span of the output"""
+    ljung_box: float | None
+    """Ljung–Box statistic of the innovations per lag; of white ones 1"""
+    outside_band: float | None
+    """share of their autocorrelations outside of the 95 % band"""
+    unforetold: str | None
+    """why that is not known, or not of all of the log"""
     seconds_per_sample: float
     """computing time of a sample, in seconds"""
     credible: bool

@@ -451,10 +451,12 @@ TuneKeys = TypedDict(
 class TuneSection(TypedDict, total=False):
     """which keys are swept, and what a value is judged by (table; default: none)"""
 
-    keys: Mapping[str, Numbers | TuneKeys] | None
-    """what is swept; several keys make a grid. The values of a key that is a list are factors on all its
-    numbers. `points` is 21, `scale` `"log"` (or `"linear"`) (table: key of `[observer]`, or an entry of
-    one such as `"theta[1]"` = list of numbers, or `{ from, to, points, scale }`; default: see tuning)"""
+    keys: Mapping[str, Numbers | TuneKeys | Mapping[str, Numbers | TuneKeys]] | None
+    """what is swept; several keys make a grid. The values of a key that is a list, of `process_noise` and of
+    `noise` as a whole are factors on all its numbers. `points` is 21, `scale` `"log"` (or `"linear"`)
+    (table: key of `[observer]`, or an entry of one such as `"theta[1]"`; for filters also
+    `process_noise.NAME` and `noise.OUTPUT` = list of numbers, or `{ from, to, points, scale }`; default:
+    see tuning)"""
 
     tolerance: Number | None
     """error, as a share of the range, below which an estimate is settled (number between 0 and 1; default:

@@ -16,7 +16,7 @@ use lynkeus::{Error, visible};
 /// On what it is judged and where the answer goes.
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// Judge by the prediction of held-out samples of this log instead of by simulation
+    /// Judge by this log instead of by simulation: by held-out samples, or a filter's likelihood
     #[arg(long, value_name = "LOG.csv")]
     log: Option<PathBuf>,
     /// Write the figures of every value as CSV ("-": standard output)

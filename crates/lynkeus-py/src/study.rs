@@ -7,7 +7,8 @@ use lynkeus::precision::{self, Candidates};
 use lynkeus::prepare::Prepared;
 use lynkeus::study::Whole;
 use lynkeus::{
-    CheckOptions, Error, ExportOptions, FmiVersion, Precision, Runner, Runners, Subject, Target,
+    CheckOptions, Error, ExportOptions, FmiVersion, Precision, Records, Runner, Runners, Subject,
+    Target,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -196,7 +197,10 @@ impl Study {
         let terms = terms.unwrap_or_default();
         let outcome = self.ask(py, &terms, |study, watch| {
             let study = &lynkeus::Study {
-                records: record,
+                records: match record {
+                    true => Records::All,
+                    false => Records::Nothing,
+                },
                 ..study.clone()
             };
             self.runner.estimate(study, &*log.table(study)?, watch)

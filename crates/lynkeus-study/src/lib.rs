@@ -55,8 +55,7 @@ pub use schema::schema;
 pub use sensors::{Noise, Sensors};
 pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
-pub use swept::swept;
-pub use tune::{Scale, TuneSettings, Values};
+pub use tune::{Scale, Swept, TuneSettings, Values};
 pub use whole::Whole;
 
 use lynkeus_expr::Budget;
@@ -107,10 +106,22 @@ pub struct Study {
     pub show: Option<Vec<Name>>,
     /// The unit on the time axis.
     pub time_unit: Option<String>,
-    /// Whether a replay keeps what a filter's corrections are made of; no file has it.
-    pub records: bool,
+    /// What a replay keeps of a filter's corrections; no file has it.
+    pub records: Records,
     /// The time and the memory that the work on the study may take; no file has it.
     pub budget: Budget,
+}
+
+/// What is kept of a filter's corrections.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Records {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// How likely the readings were, and what was expected of them.
+    Likelihood,
+    /// All that they are made of.
+    All,
 }
 
 /// Whether a file is a model by its name.
@@ -231,7 +242,7 @@ impl Study {
             compare: top.optional("compare", compare)?.flatten(),
             show,
             time_unit,
-            records: false,
+            records: Records::default(),
             budget: Budget::default(),
         })
     }

@@ -237,6 +237,15 @@ impl<'a> Entry<'a> {
         }
     }
 
+    /// Whether it is a table that holds tables or lists.
+    pub fn has_inner(&self) -> bool {
+        let is_inner = |value: &DeValue<'_>| matches!(value, DeValue::Table(_) | DeValue::Array(_));
+        match self.value.get_ref() {
+            DeValue::Table(table) => table.values().any(|value| is_inner(value.get_ref())),
+            _ => false,
+        }
+    }
+
     /// The text of a string value, `None` for any other type.
     pub fn as_text(&self) -> Option<&str> {
         match self.value.get_ref() {

@@ -5,6 +5,7 @@ use super::keys::{RANGE, TUNE};
 use super::section::Entry;
 use super::simulate::{self, Expression};
 use lynkeus_answer::Error;
+use lynkeus_observers::Family;
 
 /// Values of a range whose study does not say how many.
 const POINTS: usize = 21;
@@ -12,10 +13,64 @@ const POINTS: usize = 21;
 /// Most values of one key.
 const MOST_POINTS: u64 = 10_000;
 
+/// What a key begins with that is a density, or all of them,
+const DENSITY: &str = "process_noise";
+/// and with that is the noise of an output.
+const NOISE: &str = "noise";
+
+/// What a key of a sweep means.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Swept {
+    /// a key of `[observer]`, and where within its value, counted from 0
+    Tuning(String, Vec<usize>),
+    /// the spectral density of an estimated quantity in `[process_noise]`; of none, all of them
+    Density(Option<String>),
+    /// the noise of an output in `[sensors]`; of none, that of all
+    Noise(Option<String>),
+}
+
+impl Swept {
+    /// `theta[1]` is the key `theta` and the index 0, `noise.y` the noise of the output y.
+    #[must_use]
+    pub fn read(key: &str) -> Option<Self> {
+        let (section, name) = match key.split_once('.') {
+            Some((section, name)) => (section, Some(name.to_owned())),
+            None => (key, None),
+        };
+        match section {
+            DENSITY => Some(Self::Density(name)),
+            NOISE => Some(Self::Noise(name)),
+            _ => {
+                let (base, path) = place(key)?;
+                Some(Self::Tuning(base.to_owned(), path))
+            }
+        }
+    }
+
+    /// Whether a family reads it: noises are what filters weigh readings by.
+    #[must_use]
+    pub fn is_of(&self, family: &dyn Family) -> bool {
+        match self {
+            Self::Tuning(base, _) => family.owns(base),
+            Self::Density(_) | Self::Noise(_) => family.is_filter(),
+        }
+    }
+}
+
+/// `theta[1]` is the key `theta` and the index 0.
+fn place(key: &str) -> Option<(&str, Vec<usize>)> {
+    let Some((base, rest)) = key.split_once('[') else {
+        return Some((key, vec![]));
+    };
+    let indices = rest.strip_suffix(']')?.split("][");
+    let index = |text: &str| text.trim().parse::<usize>().ok()?.checked_sub(1);
+    Some((base.trim(), indices.map(index).collect::<Option<_>>()?))
+}
+
 /// How a tuning is swept and judged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TuneSettings {
-    /// The keys of `[observer]` to sweep with their values; empty lets the tool choose.
+    /// What to sweep ([`Swept`](crate::Swept)) with its values; empty lets the tool choose.
     pub keys: Vec<(Name, Values)>,
     /// The scaled error below which an estimate counts as settled.
     pub tolerance: f64,
@@ -81,10 +136,15 @@ pub(super) fn read(entry: Entry<'_>) -> Result<TuneSettings, Error> {
     let mut section = entry.section("[tune]", &TUNE)?;
     let defaults = TuneSettings::default();
     let keys = section.optional("keys", |table| {
-        let pairs = table.pairs()?.into_iter();
-        pairs
-            .map(|(name, entry)| Ok((name, values(entry)?)))
-            .collect::<Result<Vec<_>, Error>>()
+        let mut keys = vec![];
+        for (name, entry) in table.pairs()? {
+            let is_section = [DENSITY, NOISE].contains(&name.text.as_str());
+            match is_section && entry.has_inner() {
+                true => keys.extend(dotted(&name.text, entry)?),
+                false => keys.push((name, values(entry)?)),
+            }
+        }
+        Ok(keys)
     })?;
     Ok(TuneSettings {
         keys: keys.unwrap_or_default(),
@@ -101,6 +161,15 @@ pub(super) fn read(entry: Entry<'_>) -> Result<TuneSettings, Error> {
                 usize::try_from(n).unwrap_or(usize::MAX)
             }),
     })
+}
+
+/// `noise.y = …`, which TOML takes for a table `noise`.
+fn dotted(section: &str, entry: Entry<'_>) -> Result<Vec<(Name, Values)>, Error> {
+    let key = |(name, entry): (Name, Entry<'_>)| {
+        let text = format!("{section}.{name}");
+        Ok((Name { text, ..name }, values(entry)?))
+    };
+    entry.pairs()?.into_iter().map(key).collect()
 }
 
 /// A number between 0 and 1, ends excluded.

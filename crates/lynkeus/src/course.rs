@@ -25,6 +25,7 @@ use crate::course::recorded::Recorded;
 use crate::course::trace::Trace;
 use crate::prepare::systems::monitor_column;
 use crate::{Error, Quantity, Series};
+use lynkeus_study::Records;
 use lynkeus_table::series::{Iter, Store};
 
 /// Samples for an observer: what each sensor and each known input reads, NaN where it does not.
@@ -117,8 +118,14 @@ pub(crate) struct Course {
     /// where they are: of each sensor its innovations, then their standard deviations; NaN where it
     /// did not report
     pub innovations: Vec<Series>,
-    /// what the corrections of a filter are made of, where that is asked for
+    /// what is kept of a filter's corrections
+    pub records: Records,
+    /// what they are made of, where all is kept
     pub corrections: Option<Corrections>,
+    /// ŷ of each sensor before it corrects, where the likelihood is kept
+    pub predicted: Vec<Series>,
+    /// Σ over the rows of −½(log det 2πS + νᵀS⁻¹ν), where the likelihood is kept
+    pub log_likelihood: f64,
     /// what speaks against the estimates beside what is seen in them
     pub doubts: Vec<Doubt>,
     /// what was chosen for the user

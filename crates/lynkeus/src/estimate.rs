@@ -25,7 +25,7 @@ use crate::{
     Error, Outcome, Quantity, Series, Study, Table, course::filter, course::lines, course::sampled,
     judge::interval, prepare,
 };
-use lynkeus_study::{BetweenSamples, EstimateSettings, Method};
+use lynkeus_study::{BetweenSamples, EstimateSettings, Method, Records};
 
 /// Replays a log; `watch` is told the fraction done and may stop the replay.
 ///
@@ -350,7 +350,7 @@ pub(crate) fn refuse_settings(prepared: &Prepared<'_>, design: &Design) -> Resul
     refuse_strays(prepared)?;
     let study = prepared.study();
     let Some(filter) = &design.observer.filter else {
-        if study.records {
+        if study.records != Records::Nothing {
             let message = format!(
                 "record: expected a filter (\"ekf\", \"ukf\" or \"mhe\"), found the {} observer, which has neither innovation covariances nor a likelihood",
                 design.examination.family

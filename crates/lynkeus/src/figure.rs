@@ -1,6 +1,7 @@
 //! The picture of an outcome.
 
 use crate::prepare::mentioned::not_drawn;
+use crate::tune::Foretold;
 use crate::{Error, Outcome, Quantity, Series};
 use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Mark, Panel};
 use lynkeus_study::Name;
@@ -77,12 +78,25 @@ impl crate::Comparison {
             let run = row.run.as_ref().ok()?;
             let quantity = *interesting(&run.outcome).first()?;
             let mut panel = panel(&run.outcome, quantity);
-            panel.caption = format!("{}, {}", row.family, panel.caption);
+            let foretold = run.foretold.as_ref().map_or_else(String::new, foretold);
+            panel.caption = format!("{}, {}{foretold}", row.family, panel.caption);
             Some(panel)
         });
         let title = format!("{}: families compared", self.plant);
         over_time(title, self.time_unit.as_deref(), panels.collect())
     }
+}
+
+/// What is known of a run without true values.
+fn foretold(foretold: &Foretold) -> String {
+    let figures = [
+        ("\u{2212}log L per reading", foretold.nll_per_reading, 6),
+        ("held-out error", foretold.held_out_error, 3),
+    ];
+    let known = figures.into_iter();
+    let known =
+        known.filter_map(|(name, x, digits)| Some((name, lynkeus_words::figures(x?, digits))));
+    known.map(|(name, x)| format!("; {name} {x}")).collect()
 }
 
 fn interesting(outcome: &Outcome) -> Vec<&Quantity> {

@@ -151,7 +151,7 @@ pub use words::explain;
 pub use lynkeus_answer::{Document, Error, ErrorKind, document, near, visible};
 pub use lynkeus_export::curly::c::Precision;
 pub use lynkeus_export::curly::fmu::Version as FmiVersion;
-pub use lynkeus_study::{Study, schema};
+pub use lynkeus_study::{Records, Study, schema};
 pub use lynkeus_table::{Incoming, Series, Table, series};
 
 pub use lynkeus_expr as expr;

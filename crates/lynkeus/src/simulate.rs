@@ -12,7 +12,7 @@ use crate::Table;
 use crate::course::fixed_steps::unlocated;
 use crate::course::recorded::Recorded;
 use crate::course::{Course, Samples};
-use crate::crew::within;
+use crate::crew::{Watch, within};
 use crate::judge::outcome::{Raw, interrupted, is_answer, measurements, settle};
 use crate::prepare::headers::{header, log_time};
 use crate::prepare::spread::Spread;
@@ -77,6 +77,17 @@ pub(crate) struct Ran {
     pub course: Course,
 }
 
+impl Ran {
+    /// Plant and observer as one system; what ends it early is told in the course.
+    pub fn together(simulation: &Simulation, observer: &Observer, watch: &mut Watch<'_>) -> Self {
+        let mut run = Recorded::new(simulation);
+        let done = simulation.run_into(&mut |time, row| run.push(time, row), watch);
+        let mut course = Course::of_run(observer, &run);
+        course.ended = done.err();
+        Self { run, course }
+    }
+}
+
 impl Spread {
     /// The plant of the run of a seed; `nominal` is the study's.
     ///
@@ -112,13 +123,12 @@ impl Rig {
     pub fn of(prepared: &Prepared<'_>, design: StudyDesign) -> Result<Self, Error> {
         let (study, plant) = (prepared.study(), prepared.plant());
         let settings = settings(study)?;
-        let mut simulation = open_loop(study, settings, plant)?;
-        let observer = &design.observer;
-        if observer.filter.is_some() {
-            simulation.output_step = settings.sample_step.unwrap_or(simulation.output_step);
-        } else {
-            simulation.observer = Some(systems::observer(plant, observer)?);
-            simulation.inputs = systems::inputs(study, plant, settings, observer)?;
+        let mut simulation = match design.observer.filter {
+            Some(_) => open_loop(study, settings, plant)?,
+            None => closed_loop(study, plant, &design.observer)?,
+        };
+        if design.observer.filter.is_some() {
+            simulation.output_step = sample_step(settings);
         }
         Ok(Self {
             spread: Spread::new(plant, settings)?,
@@ -184,18 +194,16 @@ impl Rig {
         if self.design.observer.filter.is_some() {
             return sampled(prepared, &self.design, &simulation, watch);
         }
-        let mut run = Recorded::new(&simulation);
         let watch = &mut within(&study.budget, watch);
-        let done = simulation.run_into(&mut |time, row| run.push(time, row), watch);
-        let mut course = Course::of_run(&self.design.observer, &run);
-        course.ended = done.err();
-        settle(&mut course, run.time.len(), study, &study.file, is_answer)?;
-        Ok(Ran { run, course })
+        let mut ran = Ran::together(&simulation, &self.design.observer, watch);
+        let rows = ran.run.time.len();
+        settle(&mut ran.course, rows, study, &study.file, is_answer)?;
+        Ok(ran)
     }
 }
 
 /// Why a run ended before its end: a limit, or what the model does.
-pub(crate) fn ended_early(error: lynkeus_run::Error, study: &Study) -> Error {
+fn ended_early(error: lynkeus_run::Error, study: &Study) -> Error {
     match study.budget.marked() {
         Some(spent) => Error::ended(spent).at(&study.file),
         None => interrupted(error, &study.file),
@@ -267,11 +275,10 @@ pub(crate) fn recorded(study: &Study, plant: &Plant, step: f64) -> Result<Table,
     let mut simulation = open_loop(study, settings, plant)?;
     simulation.output_step = step;
     let watch = &mut |_| ControlFlow::Continue(());
-    let run = simulation.run_watched(&mut within(&study.budget, watch));
-    let run = run.map_err(|interrupted| ended_early(interrupted.error, study))?;
+    let run = alone(study, &simulation, &mut within(&study.budget, watch))?;
     let settings = &study.estimate;
     let own = |variables: &[Variable], role: Role| -> Vec<(String, Vec<f64>)> {
-        let values = |i: usize| run.column(role.at(i)).unwrap_or_default().to_vec();
+        let values = |i: usize| run.column(role.at(i)).map_or_else(Vec::new, Series::to_vec);
         let variables = variables.iter().enumerate();
         variables
             .map(|(i, v)| (v.name.clone(), values(i)))
@@ -281,10 +288,30 @@ pub(crate) fn recorded(study: &Study, plant: &Plant, step: f64) -> Result<Table,
     let seen = own(&plant.outputs, Role::Measured).into_iter();
     let seen = seen.chain(inputs.clone());
     let seen = seen.map(|(name, values)| (header(settings, &name).to_owned(), values));
-    let time = (log_time(plant, settings), run.times().to_vec());
+    let time = (log_time(plant, settings), run.time.to_vec());
     let truth = own(&plant.states, Role::State).into_iter().chain(inputs);
     let table = Table::from_columns([time].into_iter().chain(seen).collect())?;
     Ok(table.with_truth(truth.collect()))
+}
+
+/// The time between two samples of a filter.
+pub(crate) fn sample_step(settings: &SimulateSettings) -> f64 {
+    settings.sample_step.unwrap_or(settings.row_step())
+}
+
+/// The study's plant with an observer that follows its sensors.
+pub(crate) fn closed_loop(
+    study: &Study,
+    plant: &Plant,
+    observer: &Observer,
+) -> Result<Simulation, Error> {
+    let settings = settings(study)?;
+    let open = open_loop(study, settings, plant)?;
+    Ok(Simulation {
+        observer: Some(systems::observer(plant, observer)?),
+        inputs: systems::inputs(study, plant, settings, observer)?,
+        ..open
+    })
 }
 
 /// The study's plant under its inputs and with its noise, without an observer.

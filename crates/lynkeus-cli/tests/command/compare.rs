@@ -254,3 +254,77 @@ fn the_cost_of_a_sample_is_that_of_the_run() {
         assert!(cost > 0.0, "{family}: {found}");
     }
 }
+
+/// A log without true values: the figures of each family are those of `tune` at the study's own values.
+#[test]
+fn a_log_without_truth_is_judged_by_what_is_foretold() {
+    let folder = spring();
+    folder.change("s.toml", "output_step = 0.25", "output_step = 0.1");
+    let noises = "[sensors]\nnoise = { y = 0.05 }\n[process_noise]\nv = 0.01\n";
+    folder.write(
+        "s.toml",
+        &folder.read("s.toml").replace("[sensors]\n", noises),
+    );
+    folder.change("s.toml", "[process_noise]\nv = 0.01\n", "");
+    let text = folder.read("s.toml") + "[process_noise]\nv = 0.01\n";
+    folder.write("s.toml", &text);
+    let ended = folder.run(&[
+        "simulate", "s.toml", "-q", "-o", "o.csv", "--log", "log.csv",
+    ]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let found = compared(&folder, &["log.csv"]);
+    assert_eq!(found["against"], "nothing");
+    for (place, family, keys) in [
+        (0, "triangular", "theta = [3]"),
+        (1, "ekf", "process_noise = [1]"),
+    ] {
+        let theta = if family == "ekf" { "" } else { "theta = 3" };
+        let own = text.replace("theta = 3", &format!("family = \"{family}\"\n{theta}"));
+        folder.write("t.toml", &format!("{own}[tune]\nkeys = {{ {keys} }}\n"));
+        let tuned = folder.run(&["tune", "t.toml", "--log", "log.csv", "--json"]);
+        assert_eq!(tuned.code, 0, "{}", tuned.err);
+        let tuned = tuned.json();
+        let (tuned, own) = (&tuned["knee"], &found["families"][place]);
+        for name in ["held_out_error", "innovation", "ljung_box", "outside_band"] {
+            assert!(tuned[name].is_number(), "{name}");
+            assert_eq!(tuned[name], own[name], "{family}: {name}");
+        }
+        assert_eq!(own["nll_per_reading"].is_number(), family == "ekf");
+        if family == "ekf" {
+            assert_eq!(tuned["nll_per_reading"], own["nll_per_reading"]);
+            assert_eq!(own["readings"], 201);
+        }
+    }
+    let told = folder.run(&["compare", "s.toml", "log.csv", "--plot", "c.svg"]);
+    let head = told
+        .out
+        .lines()
+        .find(|line| line.starts_with("family"))
+        .unwrap();
+    assert!(
+        head.contains("held-out error") && !head.contains("RMS"),
+        "{}",
+        told.out
+    );
+    let row = told
+        .out
+        .lines()
+        .find(|line| line.starts_with("ekf "))
+        .unwrap();
+    assert!(!row.contains('\u{2013}'), "{row}");
+    assert!(folder.read("c.svg").contains("log L per reading"));
+    // with true values, and in simulation, there are errors instead
+    assert!(
+        compared(&folder, &[])["families"][1]
+            .get("held_out_error")
+            .is_none()
+    );
+    // too short for the blocks of [tune]: told, and nothing else is lost
+    let log = folder.read("log.csv");
+    let short: Vec<&str> = log.lines().take(30).collect();
+    folder.write("short.csv", &(short.join("\n") + "\n"));
+    let found = compared(&folder, &["short.csv"]);
+    let reason = found["families"][1]["unforetold"].as_str().unwrap();
+    assert!(reason.contains("too short for 20 blocks"), "{reason}");
+    assert!(found["families"][1].get("held_out_error").is_none());
+}

@@ -218,33 +218,358 @@ fn a_sensor_that_is_not_scored_is_told_of() {
     );
 }
 
-/// Whatever else the study lacks: what to sweep, or the filter's name.
-#[test]
-fn a_filter_is_refused() {
+/// x' = 0.5 − 0.5 x of two sensors, the second twice the first and seldom there.
+const LAG: &str = "model Lag input Real u(min = 0, max = 2); Real x(start = 1, min = -5, max = 5); output Real y = x; output Real z = 2*x; equation der(x) = u - 0.5*x; end Lag;";
+
+const LAG_STUDY: &str = "plant = \"m.mo\"
+[sensors]
+measured = [\"y\", \"z\"]
+noise = { y = 0.1, z = 0.3 } # of the data sheet
+[observer]
+family = \"ekf\"
+initial_variance = { x = 0.04 }
+[process_noise]
+x = 0.02
+[simulate]
+until = 100
+output_step = 0.2
+inputs = { u = \"0.5\" }
+";
+
+/// The plant with a log of its simulation, in which z has a reading in every third row.
+fn lag(tune: &str) -> Folder {
     let folder = Folder::empty();
-    let study = "plant = \"m.mo\"\nprocess_noise = { x = 0.1 }\nsensors = { noise = { y = 0.1 } }\nsimulate = { until = 9, output_step = 0.1 }\n";
-    let model = |y: &str| {
-        format!(
-            "model M Real x(start = 1, min = -9, max = 9); output Real y = {y}; equation der(x) = -x; end M;"
-        )
+    folder.write("m.mo", LAG);
+    folder.write("s.toml", &format!("{LAG_STUDY}{tune}"));
+    let ended = folder.run(&[
+        "simulate", "s.toml", "-q", "-o", "o.csv", "--log", "log.csv",
+    ]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let log = emptied(&folder.read("log.csv"), "z", |row| !row.is_multiple_of(3));
+    folder.write("log.csv", &log);
+    folder
+}
+
+/// Readings of y and z, row by row; NaN where there is none.
+fn readings(folder: &Folder) -> Vec<[f64; 2]> {
+    let log = folder.read("log.csv");
+    let header: Vec<&str> = log.lines().next().unwrap().split(',').collect();
+    let place = |name: &str| header.iter().position(|h| *h == name).unwrap();
+    let (y, z) = (place("y"), place("z"));
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        [y, z].map(|at| cells[at].parse().unwrap_or(f64::NAN))
     };
-    let named = "observer = { family = \"ekf\" }\n";
-    for (y, rest) in [
-        (
-            "x",
-            format!("{named}tune = {{ keys = {{ gate = [3, 5] }} }}\n"),
-        ),
-        ("x", named.to_owned()),
-        // nothing but a filter fits
-        ("x^2", String::new()),
-        ("x^2", "tune = { keys = { gate = [3, 5] } }\n".to_owned()),
-    ] {
-        folder.write("m.mo", &model(y));
-        folder.write("s.toml", &format!("{study}{rest}"));
-        let ended = folder.run(&["tune", "s.toml"]);
-        assert_eq!(ended.code, 2, "{}", ended.out);
-        assert!(ended.err.contains("the filter \"ekf\""), "{}", ended.err);
+    log.lines().skip(1).map(row).collect()
+}
+
+/// The Kalman filter of the lag, one sensor after the other, which is as likely as both at once: what it
+/// expects of each row, and −log of the likelihood of all readings.
+fn kalman(rows: &[[f64; 2]], density: f64, noises: [f64; 2]) -> (Vec<[f64; 2]>, f64) {
+    const A: f64 = 0.5;
+    const H: f64 = 0.2;
+    let phi = (-A * H).exp();
+    let (mut x, mut p, mut nll) = (1.0, 0.04, 0.0);
+    let mut expected = vec![];
+    for (k, readings) in rows.iter().enumerate() {
+        if k > 0 {
+            x = phi * x + (1.0 - phi) / A * 0.5;
+            p = phi * phi * p + density * (1.0 - phi * phi) / (2.0 * A);
+        }
+        expected.push([x, 2.0 * x]);
+        for ((slope, y), noise) in [1.0, 2.0].into_iter().zip(readings).zip(noises) {
+            if y.is_finite() {
+                let s = slope * slope * p + noise * noise;
+                let off = y - slope * x;
+                nll += 0.5 * ((std::f64::consts::TAU * s).ln() + off * off / s);
+                x += p * slope / s * off;
+                p *= noise * noise / s;
+            }
+        }
     }
+    (expected, nll)
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let squares: Vec<f64> = values.map(|x| x * x).collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+/// The root mean square over the sensors of that of y − ŷ in such rows, over the span of each.
+fn error(rows: &[[f64; 2]], expected: &[[f64; 2]], counts: impl Fn(usize) -> bool) -> f64 {
+    let each = [0, 1].map(|sensor| {
+        let all = || rows.iter().map(|row| row[sensor]).filter(|y| y.is_finite());
+        let span = all().fold(f64::MIN, f64::max) - all().fold(f64::MAX, f64::min);
+        let pairs = rows.iter().zip(expected).enumerate();
+        let off = pairs.filter(|(k, (y, _))| counts(*k) && y[sensor].is_finite());
+        rms(off.map(|(_, (y, hat))| (y[sensor] - hat[sensor]) / span))
+    });
+    rms(each.into_iter())
+}
+
+fn near(found: &serde_json::Value, expected: f64) {
+    let found = found.as_f64().unwrap();
+    let off = (found - expected).abs();
+    assert!(off <= 1e-6 * expected.abs(), "{found} is not {expected}");
+}
+
+/// Densities and noises on a log: the likelihood, the error on held-out samples and the innovation are those
+/// of a Kalman filter that is written out here, and the most likely one is written into the study.
+#[test]
+fn noises_of_a_filter_are_judged_by_their_likelihood() {
+    let folder = lag(
+        "[tune]\nkeys = { process_noise.x = [0.0002, 0.002, 0.02, 0.2], \"noise.y\" = { from = 0.05, to = 0.2, points = 3 } }\n",
+    );
+    let rows = readings(&folder);
+    let count = rows.len();
+    let answer = swept(&folder, "s.toml", "log.csv");
+    // the last quarter of each of 20 blocks
+    let block = |row: usize| (0..20).rfind(|b| b * count / 20 <= row).unwrap();
+    let is_out = |row: usize| {
+        let (from, to) = (block(row) * count / 20, (block(row) + 1) * count / 20);
+        row >= to - (0.25 * (to - from) as f64).round() as usize
+    };
+    let left = rows.iter().enumerate();
+    let left: Vec<[f64; 2]> = left
+        .map(|(k, row)| if is_out(k) { [f64::NAN; 2] } else { *row })
+        .collect();
+    let total = rows.iter().flatten().filter(|y| y.is_finite()).count();
+    let swept_rows = answer["rows"].as_array().unwrap();
+    assert_eq!(swept_rows.len(), 12);
+    for row in swept_rows {
+        let key = |name: &str| row["keys"][name].as_f64().unwrap();
+        let (density, noises) = (key("process_noise.x"), [key("noise.y"), 0.3]);
+        let (expected, nll) = kalman(&rows, density, noises);
+        near(&row["nll_per_reading"], nll / total as f64);
+        assert_eq!(row["readings"], total);
+        near(
+            &row["innovation"],
+            error(&rows, &expected, |k| k >= count / 20),
+        );
+        let (foretold, _) = kalman(&left, density, noises);
+        let scored = |k: usize| k >= count / 20 && is_out(k);
+        near(&row["held_out_error"], error(&rows, &foretold, scored));
+        assert!(row["ljung_box"].is_number() && row.get("sampling_margin").is_none());
+    }
+    let nll = |row: &serde_json::Value| row["nll_per_reading"].as_f64().unwrap();
+    let least = swept_rows.iter().min_by(|a, b| nll(a).total_cmp(&nll(b)));
+    let knee = &answer["knee"];
+    assert_eq!(knee, least.unwrap());
+    assert_eq!(
+        knee["keys"]["process_noise.x"], 0.02,
+        "that of the simulation"
+    );
+    assert_eq!(knee["keys"]["noise.y"], 0.1);
+    // what counts of the study's declarations
+    let counted = answer["declared"].to_string();
+    assert!(counted.contains("process noise"), "{counted}");
+    let text = folder.run(&["tune", "s.toml", "--log", "log.csv", "--plot", "t.svg"]);
+    assert!(
+        text.out.contains(
+            "knee: process_noise.x = 0.02, noise.y = 0.1 (\u{2212}log likelihood per reading"
+        ),
+        "{}",
+        text.out
+    );
+    let picture = folder.read("t.svg");
+    assert!(picture.contains("log likelihood per reading"));
+    assert!(picture.contains("knee, and the study: 0.02"));
+
+    let before = folder.read("s.toml");
+    let other = before
+        .replace("x = 0.02", "x = 1e-5")
+        .replace("y = 0.1,", "y = 1,");
+    folder.write("s.toml", &other);
+    let ended = folder.run(&["tune", "s.toml", "--log", "log.csv", "--write", "-q"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert_eq!(folder.read("s.toml"), before);
+}
+
+/// What is as likely within 95 %: the logarithm of the likelihood is at most 1.92 less.
+#[test]
+fn what_is_nearly_as_likely_is_told() {
+    let folder = lag("[tune]\nkeys = { process_noise = { from = 0.25, to = 4, points = 41 } }\n");
+    let answer = swept(&folder, "s.toml", "log.csv");
+    let rows = answer["rows"].as_array().unwrap();
+    let total = answer["knee"]["readings"].as_f64().unwrap();
+    let nll = |row: &serde_json::Value| total * row["nll_per_reading"].as_f64().unwrap();
+    let least = nll(&answer["knee"]);
+    let good = rows.iter().filter(|row| nll(row) <= least + 1.92);
+    let good: Vec<f64> = good
+        .map(|row| row["keys"]["process_noise"].as_f64().unwrap())
+        .collect();
+    assert!((3..41).contains(&good.len()), "{good:?}");
+    let ends = answer["nearly_as_good"].as_array().unwrap();
+    assert_eq!(ends[0], good[0]);
+    assert_eq!(ends[1], good[good.len() - 1]);
+    let told = folder
+        .run(&["tune", "s.toml", "--log", "log.csv", "-q"])
+        .out;
+    assert!(
+        told.contains("; as likely within 95 % from process_noise \u{d7} = "),
+        "{told}"
+    );
+}
+
+/// A gate that keeps readings out has a likelihood of fewer readings, which is no likelihood of the same.
+#[test]
+fn a_gate_is_judged_by_what_is_held_out() {
+    let folder = lag("[tune]\nkeys = { gate = [0.5, 1, 3, 6] }\n");
+    let answer = swept(&folder, "s.toml", "log.csv");
+    let rows = answer["rows"].as_array().unwrap();
+    let figure = |row: &serde_json::Value, name: &str| row[name].as_f64().unwrap();
+    assert!(figure(&rows[0], "readings") < figure(&rows[3], "readings"));
+    assert!(figure(&rows[0], "nll_per_reading") < figure(&rows[3], "nll_per_reading"));
+    let least = rows
+        .iter()
+        .min_by(|a, b| figure(a, "held_out_error").total_cmp(&figure(b, "held_out_error")));
+    assert_eq!(&answer["knee"], least.unwrap());
+    let notes = answer["notes"].to_string();
+    assert!(notes.contains("likelihoods cannot be compared"), "{notes}");
+}
+
+/// Every filter has a likelihood, and settings of its own; a linear plant knows no difference.
+#[test]
+fn settings_of_every_filter_are_swept() {
+    let folder = lag("[tune]\nkeys = { process_noise.x = [0.02] }\n");
+    let nll = |folder: &Folder| {
+        let answer = swept(folder, "s.toml", "log.csv");
+        answer["knee"]["nll_per_reading"].as_f64().unwrap()
+    };
+    let extended = nll(&folder);
+    for (family, keys) in [("ukf", "alpha = [0.5, 1]"), ("mhe", "horizon = [5]")] {
+        let text = folder
+            .read("s.toml")
+            .replace("\"ekf\"", &format!("\"{family}\""));
+        let text = text.replace("process_noise.x = [0.02]", keys);
+        let other = Folder::empty();
+        other.write("m.mo", LAG);
+        other.write("s.toml", &text);
+        other.write("log.csv", &folder.read("log.csv"));
+        let found = nll(&other);
+        assert!(
+            (found / extended - 1.0).abs() < 1e-6,
+            "{family}: {found} {extended}"
+        );
+    }
+}
+
+/// In simulation a filter has the figures of observers, on samples. The noises that are swept are the
+/// filter's: the simulation keeps the study's.
+#[test]
+fn a_filter_is_judged_in_simulation() {
+    let folder = lag("[tune]\nkeys = { process_noise.x = [0.0002, 0.02, 2] }\n");
+    let sweep = |folder: &Folder| {
+        let ended = folder.run(&["tune", "s.toml", "--json"]);
+        assert_eq!(ended.code, 0, "{}", ended.err);
+        ended.json()
+    };
+    let answer = sweep(&folder);
+    assert_eq!(
+        answer["knee"]["keys"]["process_noise.x"], 0.02,
+        "{answer:#}"
+    );
+    // as `simulate` has it: every row is a sample
+    let run = folder.run(&["simulate", "s.toml", "-q", "-o", "run.csv"]);
+    assert_eq!(run.code, 0, "{}", run.err);
+    let (header, rows) = crate::csv(&folder.read("run.csv"));
+    let at = |name: &str| header.iter().position(|h| h == name).unwrap();
+    let (x, hat) = (at("x"), at("x_hat"));
+    let errors: Vec<f64> = rows
+        .iter()
+        .map(|row| (row[hat] - row[x]).abs() / 10.0)
+        .collect();
+    let inner: f64 = errors[1..errors.len() - 1].iter().sum();
+    let mean = (inner + (errors[0] + errors[errors.len() - 1]) / 2.0) / (errors.len() - 1) as f64;
+    near(&answer["knee"]["mean_error"], mean);
+    assert!(answer["knee"].get("sampling_margin").is_none());
+    let drawn = folder.run(&["tune", "s.toml", "-q", "--plot", "t.svg"]);
+    assert_eq!(drawn.code, 0, "{}", drawn.err);
+    let picture = folder.read("t.svg");
+    assert!(picture.contains("made by the noise") && !picture.contains("stable step"));
+    // whatever stands in the study of the family: where no other has the key it is a filter
+    folder.change("s.toml", "family = \"ekf\"", "");
+    folder.change("s.toml", "initial_variance = { x = 0.04 }", "");
+    let found = folder.run(&["tune", "s.toml", "--json"]);
+    assert_eq!(found.code, 0, "{}", found.err);
+    assert!(
+        found.json()["notes"]
+            .to_string()
+            .contains("one of the family ekf")
+    );
+    // without keys it is all of [process_noise]
+    folder.write(
+        "m.mo",
+        &LAG.replace("y = x;", "y = x^2;")
+            .replace("z = 2*x;", "z = x^2;"),
+    );
+    folder.change(
+        "s.toml",
+        "[tune]\nkeys = { process_noise.x = [0.0002, 0.02, 2] }\n",
+        "",
+    );
+    let found = sweep(&folder);
+    assert_eq!(found["keys"][0]["key"], "process_noise");
+    assert_eq!(found["rows"].as_array().unwrap().len(), 21);
+    folder.change("s.toml", "[process_noise]\nx = 0.02\n", "");
+    let ended = folder.run(&["tune", "s.toml"]);
+    assert_eq!(ended.code, 2, "{}", ended.out);
+    assert!(
+        ended
+            .err
+            .contains("nothing to sweep: the study has no [process_noise]"),
+        "{}",
+        ended.err
+    );
+}
+
+#[test]
+fn noises_that_cannot_be_swept_are_refused() {
+    let keys = |keys: &str| format!("{LAG_STUDY}[tune]\nkeys = {{ {keys} }}\n");
+    let folder = lag("");
+    for (study, words) in [
+        (
+            keys("process_noise.x = [0.1, -0.1]"),
+            "expected numbers >= 0, found -0.1",
+        ),
+        (
+            keys("noise.y = { from = -1, to = 1, scale = \"linear\" }"),
+            "expected numbers >= 0, found -1",
+        ),
+        (
+            keys("process_noise.w = [1]"),
+            "no estimated quantity is called \"w\"",
+        ),
+        (keys("noise.x = [1]"), "no output is called \"x\""),
+        (keys("alpha = [1]"), "\"alpha\" belongs to another family"),
+        (
+            keys("noise = [1], gate = [-3]"),
+            "`gate` of [observer]: expected",
+        ),
+        (
+            keys("noise.y = [1]").replace(
+                "\"ekf\"\ninitial_variance = { x = 0.04 }",
+                "\"triangular\"\ntheta = 2",
+            ),
+            "\"noise.y\" is swept for filters, which weigh readings by it, and the study's family is \"triangular\"",
+        ),
+    ] {
+        folder.write("s.toml", &study);
+        for log in [&["--log", "log.csv"][..], &[]] {
+            let ended = folder.run(&[&["tune", "s.toml"], log].concat());
+            assert_eq!(ended.code, 2, "{study}: {}", ended.out);
+            assert!(ended.err.contains(words), "{}", ended.err);
+            assert!(ended.err.contains("s.toml:"), "{}", ended.err);
+        }
+    }
+    // whichever command reads the study
+    folder.write("s.toml", &keys("process_noise.w = [1]"));
+    let ended = folder.run(&["check", "s.toml"]);
+    assert!(
+        ended.err.contains("no estimated quantity is called \"w\""),
+        "{}",
+        ended.err
+    );
 }
 
 /// The study has no θ: the picture must not say that it has.

@@ -9,14 +9,16 @@ pub(crate) const TUNE: [KeySpec; 5] = [
     KeySpec {
         name: "keys",
         shape: Shape::As(
-            "table: key of `[observer]`, or an entry of one such as `\"theta[1]\"` = list of numbers, or `{ from, to, points, scale }`",
+            "table: key of `[observer]`, or an entry of one such as `\"theta[1]\"`; for filters also `process_noise.NAME` and `noise.OUTPUT` = list of numbers, or `{ from, to, points, scale }`",
             &Shape::Table(&Shape::Either(&[
                 Shape::List(&Shape::Number),
                 Shape::Section(&[&RANGE]),
+                // `noise.y` is a table in a table
+                Shape::Table(&VALUES),
             ])),
         ),
         default: "see [tuning](tune.md)",
-        meaning: "what is swept; several keys make a grid. The values of a key that is a list are factors on all its numbers. `points` is 21, `scale` `\"log\"` (or `\"linear\"`)",
+        meaning: "what is swept; several keys make a grid. The values of a key that is a list, of `process_noise` and of `noise` as a whole are factors on all its numbers. `points` is 21, `scale` `\"log\"` (or `\"linear\"`)",
     },
     KeySpec {
         name: "tolerance",
@@ -46,6 +48,9 @@ pub(crate) const TUNE: [KeySpec; 5] = [
         meaning: "on a log: number of blocks",
     },
 ];
+
+/// The values of a key.
+const VALUES: Shape = Shape::Either(&[Shape::List(&Shape::Number), Shape::Section(&[&RANGE])]);
 
 /// A range of values in `keys` of `[tune]`.
 pub(crate) const RANGE: [KeySpec; 4] = [

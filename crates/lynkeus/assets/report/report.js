@@ -419,7 +419,7 @@ function key() {
         entries.push(["present", "the slider"]);
     }
     if (isWide) {
-        entries.push(["good", "within 10 % of the knee"]);
+        entries.push(["good", compromise.nearly]);
     }
     for (const [name, text] of entries) {
         const entry = document.createElement("span");

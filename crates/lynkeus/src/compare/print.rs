@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::entries::Named;
+use crate::tune::Foretold;
 use crate::{Answer, Doubt};
 
 use super::{Against, Compared, Comparison, Interval, Run};
@@ -51,6 +52,12 @@ struct Figures<'a> {
     settling_time: Option<f64>,
     /// scatter of the estimates from sample to sample, in widths of the declared ranges
     roughness: Option<f64>,
+    /// how well it foretells the log, where that has no true values
+    #[serde(flatten)]
+    foretold: Option<&'a Foretold>,
+    /// why that is not known, or not of all of the log
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unforetold: Option<&'a str>,
     /// computing time of a sample, in seconds
     seconds_per_sample: f64,
     /// whether nothing speaks against it
@@ -77,6 +84,8 @@ impl<'a> From<&'a Run> for Figures<'a> {
             peak: run.peak,
             settling_time: run.settling,
             roughness: run.roughness,
+            foretold: run.foretold.as_ref(),
+            unforetold: run.unforetold.as_deref(),
             seconds_per_sample: run.per_sample,
             credible: run.doubt.is_none(),
             doubts: &run.outcome.doubts,
@@ -116,7 +125,9 @@ impl Answer for Comparison {
         let against = match self.against {
             Against::Simulation => "against the simulated plant",
             Against::Log => "against the columns of the log that are not read",
-            Against::Nothing => "the log has no true values",
+            Against::Nothing => {
+                "the log has no true values: judged by what is foretold of its readings"
+            }
         };
         let sampled = self
             .interval
@@ -124,10 +135,15 @@ impl Answer for Comparison {
             .map(|interval| format!(", {interval}"));
         let sampled = sampled.unwrap_or_default();
         let mut document = Document::new(format!("{}: {against}{sampled}", self.plant));
-        document.part().table(self.table());
+        let is_known = self.against != Against::Nothing;
+        document.part().table(match is_known {
+            true => self.table(),
+            false => self.foretold(),
+        });
         for (family, run) in self.runs() {
-            if let Some(doubt) = &run.doubt {
-                document.part().line(format!("{family}: {doubt}"));
+            let unforetold = run.unforetold.iter();
+            for reason in unforetold.chain(&run.doubt) {
+                document.part().line(format!("{family}: {reason}"));
             }
         }
         for row in &self.rows {
@@ -135,7 +151,10 @@ impl Answer for Comparison {
                 document.part().line(format!("{}: {reason}", row.family));
             }
         }
-        document.part().line("RMS over the last half; peak and roughness (the scatter from sample to sample) in widths of the declared ranges; settling within 5 % of them");
+        document.part().line(match is_known {
+            true => "RMS over the last half; peak and roughness (the scatter from sample to sample) in widths of the declared ranges; settling within 5 % of them",
+            false => "\u{2212}log likelihood of filters; errors on samples that are held out, and innovations, in spans of the readings; Ljung\u{2013}Box per lag: 1 where innovations are white, and 0.05 of their autocorrelations are then outside of the band; roughness (the scatter of estimates from sample to sample) in widths of the declared ranges",
+        });
         document
     }
 
@@ -163,6 +182,39 @@ impl Comparison {
         rows.filter_map(|row| Some((row.family, row.run.as_ref().ok()?)))
     }
 
+    /// Of a log without true values.
+    fn foretold(&self) -> Table {
+        let titles = [
+            "family",
+            "\u{2212}log L/reading",
+            "held-out error",
+            "innovation",
+            "Ljung\u{2013}Box",
+            "outside band",
+            "roughness",
+            "µs/sample",
+        ];
+        let rows = self.runs().map(|(family, run)| {
+            let found = run.foretold.clone().unwrap_or_default();
+            let judged = [
+                found.held_out_error,
+                found.innovation,
+                found.ljung_box,
+                found.outside_band,
+                run.roughness,
+            ];
+            let judged = judged.map(|x| Cell::number(x, |x| figures(x, 3)));
+            // of many readings small differences tell
+            let likely = Cell::number(found.nll_per_reading, |x| figures(x, 6));
+            [family.into(), likely]
+                .into_iter()
+                .chain(judged)
+                .chain([cost(run)])
+                .collect()
+        });
+        Table::new(titles).with(rows)
+    }
+
     fn table(&self) -> Table {
         let first = self.runs().next();
         let settled = first.map_or(&[][..], |(_, run)| &run.settled);
@@ -183,12 +235,16 @@ impl Comparison {
             });
             let judged = rms.chain([run.peak, run.settling, run.roughness]);
             let judged = judged.map(|x| Cell::number(x, |x| figures(x, 3)));
-            let cost = Cell::Number(figures(1e6 * run.per_sample, 2));
             std::iter::once(family.into())
                 .chain(judged)
-                .chain([cost])
+                .chain([cost(run)])
                 .collect()
         });
         Table::new(titles).with(rows)
     }
+}
+
+/// Microseconds of a sample.
+fn cost(run: &Run) -> Cell {
+    Cell::Number(figures(1e6 * run.per_sample, 2))
 }

@@ -6,9 +6,10 @@ use std::time::Instant;
 use lynkeus_model::Plant;
 use lynkeus_observers::Family;
 
+use crate::crew::within;
 use crate::judge::accuracy::SETTLED;
 use crate::prepare::Prepared;
-use crate::tune::errors::Errors;
+use crate::tune::{self, Foretold, errors::Errors};
 use crate::{Error, Outcome, Quantity, Study, Table, estimate};
 use lynkeus_study::{BetweenSamples, Name};
 
@@ -38,6 +39,10 @@ pub struct Run {
     pub roughness: Option<f64>,
     /// seconds of computing per sample, examination and design left out
     pub per_sample: f64,
+    /// how well it foretells a log that has no true values
+    pub foretold: Option<Foretold>,
+    /// why that is not known, or not of all of the log
+    pub unforetold: Option<String>,
     /// why the estimate is not credible, where it is not
     pub doubt: Option<String>,
     /// the estimates
@@ -78,7 +83,20 @@ pub(super) fn run_all(
             is_ended |= told.is_break();
             told
         };
-        let run = timed(&prepared, |p| estimate::estimated(p, table, part));
+        let mut run = timed(&prepared, |p| estimate::estimated(p, table, part));
+        if let Ok(run) = &mut run
+            && run.peak.is_none()
+        {
+            let watch = &mut |_| part(1.0);
+            let found = tune::foretold(&prepared, table, &mut within(&own.budget, watch));
+            match found {
+                Err(error) if is_ended => return Err(error),
+                Err(error) => run.unforetold = Some(error.to_string()),
+                Ok((foretold, failure)) => {
+                    (run.foretold, run.unforetold) = (Some(foretold), failure);
+                }
+            }
+        }
         match run {
             Err(error) if is_ended => return Err(error),
             run => rows.push(Compared {
@@ -170,6 +188,8 @@ fn judged(prepared: &Prepared<'_>, outcome: Outcome, seconds: f64) -> Run {
             .filter(|_| is_known)
             .and_then(|first| errors.settling(&[first], SETTLED)),
         roughness: rough.reduce(f64::max),
+        foretold: None,
+        unforetold: None,
         per_sample: seconds / outcome.time.len().max(1) as f64,
         doubt: outcome.refusal().map(|e| e.to_string()),
         outcome,

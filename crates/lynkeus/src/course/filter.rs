@@ -18,7 +18,7 @@ use crate::course::{Course, Samples};
 use crate::prepare::Prepared;
 use crate::words::explain;
 use crate::{Error, Series, Study};
-use lynkeus_study::Smoothing;
+use lynkeus_study::{Records, Smoothing};
 use lynkeus_table::series::Store;
 
 pub(crate) mod noise;
@@ -37,12 +37,13 @@ pub(crate) fn run(
     let (study, augmented) = (prepared.study(), prepared.augmented());
     let mut course = Course {
         keeps_innovations: study.estimate.innovations,
+        records: study.records,
         ..Course::default()
     };
     let notes = &mut course.notes;
     let filter = blueprint(prepared, design, samples, settings, notes)?;
     let mut filter = filter.estimator().map_err(explain)?;
-    if study.records {
+    if study.records != Records::Nothing {
         filter.keep_record();
     }
     let n = filter.names().len();
@@ -107,7 +108,7 @@ pub(crate) fn together(
 ) -> Option<Vec<Result<Course, Error>>> {
     let study = prepared.study();
     let rows: usize = runs.iter().map(|(_, samples)| samples.time.len()).sum();
-    if study.records || runs.len() < 2 || rows < WORTHWHILE {
+    if study.records != Records::Nothing || runs.len() < 2 || rows < WORTHWHILE {
         return None;
     }
     let (mut filters, mut courses) = (vec![], vec![]);

@@ -6,7 +6,7 @@ use crate::Series;
 use lynkeus_table::series::Store;
 
 /// What a [`Trajectory`](lynkeus_run::Trajectory) holds in memory, in columns that may be longer.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Recorded {
     pub time: Series,
     columns: Vec<Recording>,
@@ -14,7 +14,7 @@ pub(crate) struct Recorded {
     pub store: Store,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Recording {
     column: Column,
     values: Series,

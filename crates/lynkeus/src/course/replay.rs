@@ -10,6 +10,7 @@ use crate::course::corrections::Corrections;
 use crate::course::trace::Trace;
 use crate::course::{Course, Samples, add_row};
 use crate::{Error, Study};
+use lynkeus_study::Records;
 
 /// Rows between two looks at whether there is room for them.
 const LOOK: usize = 1 << 16;
@@ -54,7 +55,11 @@ pub(crate) fn replay(
         course,
         (estimates, deviations, estimator.innovations().len()),
     );
-    course.corrections = Corrections::of(estimator, &course.store);
+    match course.records {
+        Records::Nothing => {}
+        Records::Likelihood => course.predicted = course.columns(estimator.sensors()),
+        Records::All => course.corrections = Corrections::of(estimator, &course.store),
+    }
     let mut half = Halfway::default();
     let first = match &mut watch.checkpoint {
         None => 0,
@@ -82,8 +87,12 @@ pub(crate) fn replay(
             add_row(columns, row.iter().copied());
         }
         judge(course, time, estimator.innovations().iter().copied());
-        if let (Some(corrections), Some(record)) = (&mut course.corrections, estimator.record()) {
-            corrections.add(record);
+        if let Some(record) = estimator.record() {
+            course.log_likelihood += record.log_likelihood;
+            add_row(&mut course.predicted, record.predicted.iter().copied());
+            if let Some(corrections) = &mut course.corrections {
+                corrections.add(record);
+            }
         }
         if row == rows / 2 {
             half = Halfway::at(estimator, watch.checkpoint.is_some());

@@ -10,7 +10,6 @@ use super::errors::Portion;
 use super::uncertainty::Known;
 use super::unknown::{Kind, Scale, Unknown};
 use crate::rewrite::{Assignment, Change, rewritten};
-use crate::tune::brief;
 use crate::{Answer, Error, Series};
 
 crate::answer::displayed!(Fit);
@@ -260,4 +259,9 @@ fn to_digits_of(value: f64, sd: f64) -> String {
         true => lynkeus_words::figures(value, 2 + ratio.log10().ceil() as usize),
         false => brief(value),
     }
+}
+
+/// Three significant digits.
+fn brief(x: f64) -> String {
+    lynkeus_words::figures(x, 3)
 }

@@ -5,10 +5,11 @@ use std::collections::HashSet;
 use lynkeus_model::Plant;
 use lynkeus_observers::{FAMILIES, Family};
 
+use crate::prepare::declared::Declared;
 use crate::prepare::headers::refuse_stray_columns;
 use crate::prepare::spread::Spread;
 use crate::{Error, Study, near, prepare::systems};
-use lynkeus_study::Name;
+use lynkeus_study::{Name, Noise, Swept};
 
 /// Refuses a study in which any section names what the plant does not have.
 ///
@@ -31,9 +32,35 @@ pub(crate) fn refuse_strangers(study: &Study, plant: &Plant) -> Result<(), Error
     {
         // another observer may have been put in the place of the one that is tuned
         study.refuse_strange_keys(false)?;
+        refuse_strange_noises(study, plant)?;
         asked(study)?;
     }
     Ok(())
+}
+
+/// Refuses noises to sweep of what has none.
+fn refuse_strange_noises(study: &Study, plant: &Plant) -> Result<(), Error> {
+    let mut declared = study.clone();
+    let mut is_swept = false;
+    for (name, _) in &study.tune.keys {
+        let own = |text: String| Name {
+            text,
+            place: name.place.clone(),
+        };
+        match Swept::read(&name.text) {
+            Some(Swept::Density(Some(of))) => declared.process_noise.push((own(of), 0.0)),
+            Some(Swept::Noise(Some(of))) => {
+                let noise = (own(of), Noise::Absolute(0.0));
+                declared.sensors.noise.push(noise);
+            }
+            _ => continue,
+        }
+        is_swept = true;
+    }
+    match is_swept {
+        true => Declared::new(&declared, plant).map(drop),
+        false => Ok(()),
+    }
 }
 
 /// Refuses `unknown` states: every observer estimates those. `plant` is the model's, no parameter of it a state.

@@ -19,7 +19,7 @@ use lynkeus_export::curly::c::prefix;
 use crate::course::columns::Log;
 use crate::prepare::Prepared;
 use crate::print::{device::causal, head::file_name};
-use crate::tune::slider::Ground;
+use crate::tune::bench::Ground;
 use crate::{
     CheckOptions, Error, Study, Table, certify, check, course::fixed_steps, estimate, prepare,
 };

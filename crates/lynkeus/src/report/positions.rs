@@ -9,8 +9,6 @@ use lynkeus_study::Name;
 
 /// Positions to either side of the study's own.
 const TO_A_SIDE: usize = 5;
-/// The last of them divides or multiplies the process noise of a filter by this.
-const NOISE_REACH: f64 = 100.0;
 
 /// What a slider moves, and where to.
 #[derive(Clone, Debug)]
@@ -86,7 +84,7 @@ fn noises(study: &Study) -> Option<Positions> {
     if study.process_noise.is_empty() {
         return None;
     }
-    let axis = Axis::of_factors("process noise", NOISE_REACH, TO_A_SIDE);
+    let axis = Axis::of_densities(TO_A_SIDE);
     let position = |&factor: &f64| {
         let mut study = study.clone();
         let densities = study.process_noise.iter_mut();
@@ -99,7 +97,7 @@ fn noises(study: &Study) -> Option<Positions> {
         }
     };
     Some(Positions {
-        label: axis.key.clone(),
+        label: axis.key.replace('_', " "),
         all: axis.values.iter().map(position).collect(),
         axis,
     })

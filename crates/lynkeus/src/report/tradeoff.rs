@@ -3,17 +3,21 @@
 use std::ops::ControlFlow;
 
 use lynkeus_answer::Document;
-use lynkeus_answer::document::{Cell, Table};
+use lynkeus_answer::document::{self, Cell};
 use lynkeus_observers::Design;
 use serde::Serialize;
 
 use super::html::{element, words};
 use super::positions::Positions;
-use crate::Error;
+use crate::course::columns::Log;
 use crate::entries::Named;
-use crate::prepare::Prepared;
-use crate::tune::slider::{self, Ground};
-use crate::tune::{Axis, Row, Sweep, axis, brief, shortened};
+use crate::prepare::{Prepared, headers};
+use crate::tune::bench::Ground;
+use crate::tune::{self, Axis, Row, Sweep, axis, shortened};
+use crate::{Error, Series, Table};
+
+/// Rows of a log that are judged: each is replayed twice for every position.
+const ROWS: usize = 5_000;
 
 /// What is drawn, in simulation and on a log.
 const DRAWN: &[&str] = &[
@@ -45,6 +49,7 @@ pub(super) struct Drawn {
     own: Option<usize>,
     knee: Option<usize>,
     good: Option<[f64; 2]>,
+    nearly: String,
     figures: Named<Vec<Option<f64>>>,
 }
 
@@ -67,7 +72,14 @@ impl Tradeoff {
             told
         };
         let (axis, grid) = (positions.axis.clone(), positions.grid());
-        let sweep = slider::at(prepared, design, axis, &grid, ground, watch);
+        let first = match ground {
+            Ground::Log(table) => first(prepared, table),
+            Ground::Simulation { .. } => Ok(None),
+        };
+        let sweep = first.and_then(|first| {
+            let ground = first.as_ref().map_or(ground, Ground::Log);
+            tune::along(prepared, design, axis, &grid, ground, watch)
+        });
         Ok(Self {
             sweep: match sweep {
                 Err(error) if is_ended => return Err(error),
@@ -77,7 +89,7 @@ impl Tradeoff {
             is_filter: design.observer.filter.is_some(),
             has_truth: matches!(ground, Ground::Simulation { .. }),
             first: match ground {
-                Ground::Log(table) => Some(slider::ROWS).filter(|most| table.rows() > *most),
+                Ground::Log(table) => Some(ROWS).filter(|most| table.rows() > *most),
                 Ground::Simulation { .. } => None,
             },
         })
@@ -98,6 +110,7 @@ impl Tradeoff {
             own: self.own(),
             knee: sweep.knee,
             good: sweep.good().map(|good| [*good.start(), *good.end()]),
+            nearly: sweep.nearly("the knee"),
             figures: figures
                 .map(|(place, measure)| (measure.name.to_owned(), column(place)))
                 .collect(),
@@ -141,7 +154,9 @@ impl Tradeoff {
         } else {
             "A faster observer"
         };
-        let read = if self.has_truth {
+        let read = if self.is_filter && !self.has_truth {
+            "A log has no truth: each position is judged by how likely it holds the readings, and beside that by how well it foretells samples that it is not shown. At the knee the likelihood is greatest."
+        } else if self.has_truth {
             "Each point is a position of the slider: the further down, the nearer to the truth it would be without noise; the further left, the less noise it passes on. At the knee the error that is left with both is least."
         } else {
             "A log has no truth: each position is judged by how well it foretells samples that it is not shown. At the knee that error is least."
@@ -155,19 +170,19 @@ impl Tradeoff {
                 "Errors are mean magnitudes over quantities and time, as shares of each quantity's range, in the study's simulation with noise, without it, and their difference: the figures of lynkeus tune."
             }
             (true, true) => {
-                "Errors are mean magnitudes over quantities and time, as shares of each quantity's range, on samples of the study's simulation with noise, without it, and their difference: the figures that lynkeus tune has for observers."
+                "Errors are mean magnitudes over quantities and time, as shares of each quantity's range, on samples of the study's simulation with noise, without it, and their difference: the figures of lynkeus tune."
             }
             (false, false) => {
                 "Errors are root mean squares, as shares of each reading's range: the figures of lynkeus tune --log."
             }
             (false, true) => {
-                "Errors are root mean squares, as shares of each reading's range, as lynkeus tune --log has them for observers."
+                "Errors are root mean squares, as shares of each reading's range; the likelihood is that of all readings: the figures of lynkeus tune --log."
             }
         }
     }
 
     /// A row for every position.
-    fn table(&self, sweep: &Sweep) -> Table {
+    fn table(&self, sweep: &Sweep) -> document::Table {
         let titles = sweep.measures.iter().map(|measure| {
             let unit = sweep.time_unit.as_ref().filter(|_| measure.is_time);
             match unit {
@@ -180,11 +195,12 @@ impl Tradeoff {
             .chain([String::new()]);
         let rows = sweep.rows.iter().enumerate().map(|(place, row)| {
             let values = row.values.iter().map(|x| Cell::Number(axis::shown(*x)));
-            let figures = row.figures.iter().map(|x| Cell::number(*x, brief));
+            let figures = sweep.measures.iter().zip(&row.figures);
+            let figures = figures.map(|(measure, x)| Cell::number(*x, |x| measure.shown(x)));
             let remark = Cell::from(self.remark(sweep, place, row));
             values.chain(figures).chain([remark]).collect()
         });
-        Table::new(titles).with(rows).dense()
+        document::Table::new(titles).with(rows).dense()
     }
 
     fn remark(&self, sweep: &Sweep, place: usize, row: &Row) -> String {
@@ -195,6 +211,23 @@ impl Tradeoff {
     }
 }
 
+/// The first rows of a log that has more than are judged, as far as the study reads them.
+fn first(prepared: &Prepared<'_>, table: &Table) -> Result<Option<Table>, Error> {
+    let log = Log::read(prepared, table)?;
+    if log.samples.time.len() <= ROWS {
+        return Ok(None);
+    }
+    let settings = &prepared.study().estimate;
+    let augmented = prepared.augmented();
+    let outputs = augmented.outputs.iter().map(|o| o.variable.name.as_str());
+    let names = outputs.chain(augmented.inputs.iter().map(|u| u.name.as_str()));
+    let headers = names.map(|name| headers::header(settings, name).to_owned());
+    let part = |values: &Series| values.part(0, ROWS);
+    let signals = headers.zip(log.samples.columns().map(part));
+    let time = (log.time.clone(), part(&log.samples.time));
+    Table::from_columns(std::iter::once(time).chain(signals).collect()).map(Some)
+}
+
 /// Whether any row has this figure.
 fn has(sweep: &Sweep, measure: usize) -> bool {
     sweep.rows.iter().any(|row| row.figure(measure).is_some())
@@ -203,7 +236,7 @@ fn has(sweep: &Sweep, measure: usize) -> bool {
 /// What the values are of.
 fn swept(sweep: &Sweep) -> String {
     let label = sweep.axes.first().map(Axis::label).unwrap_or_default();
-    label.replace("theta", "\u{3b8}")
+    label.replace("theta", "\u{3b8}").replace('_', " ")
 }
 
 /// Where the knee is, and what is nearly as good.
@@ -211,12 +244,14 @@ fn best(sweep: &Sweep, knee: &Row) -> String {
     let is_factor = sweep.axes.first().is_some_and(|axis| axis.is_factor);
     let sign = if is_factor { "" } else { "= " };
     let at = knee.values.first().copied().map(axis::shown);
-    let title = sweep.measures.first().map_or("", |measure| measure.title);
-    let least = knee.figure(0).map_or(String::new(), brief);
+    let decides = sweep.measures.get(sweep.objective);
+    let title = decides.map_or("", |measure| measure.title);
+    let least = decides.zip(knee.figure(sweep.objective));
+    let least = least.map_or(String::new(), |(measure, x)| measure.shown(x));
     let good = sweep.good().filter(|good| good.start() < good.end());
     let good = good.map(|good| {
         let (low, high) = (axis::shown(*good.start()), axis::shown(*good.end()));
-        format!("; from {low} to {high} it is within 10 % of that")
+        format!("; from {low} to {high} it is {}", sweep.nearly("that"))
     });
     format!(
         "The knee is at {} {sign}{} ({title}: {least}){}.",

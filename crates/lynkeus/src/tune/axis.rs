@@ -4,7 +4,7 @@ use lynkeus_expr::real::rounded;
 use lynkeus_observers::Value;
 
 use crate::{Error, Study};
-use lynkeus_study::{Name, Place, Scale, Values};
+use lynkeus_study::{Name, Noise, Place, Scale, Swept, Values};
 use lynkeus_table::significant;
 
 /// The keys that speed belongs to; the first that a study sets is swept where it does not say which.
@@ -13,18 +13,24 @@ const SPEED: &[&str] = &["theta", "poles", "alpha"];
 /// A default range reaches from the study's value divided by this to its multiple.
 const REACH: f64 = 4.0;
 
+/// Factors on all densities of a filter reach from the inverse of this to it where the study does not say.
+const NOISE_REACH: f64 = 100.0;
+
+/// How many of them to either side of 1.
+const TO_A_SIDE: usize = 10;
+
 /// Most combinations of values.
 const MOST_VALUES: usize = 100_000;
 
 /// Digits of a value that a range makes.
 const DIGITS: usize = 4;
 
-/// One key of `[observer]` and the values that it takes.
+/// One key and the values that it takes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
-    /// The key as the study writes it: `theta`, `theta[1]`.
+    /// The key as the study writes it: `theta`, `theta[1]`, `process_noise.x`.
     pub key: String,
-    /// The key is a list and the values are factors on all of its numbers.
+    /// The values are factors on all numbers of a list or a table.
     pub is_factor: bool,
     /// The values, in the order of the study.
     pub values: Vec<f64>,
@@ -32,32 +38,28 @@ pub struct Axis {
     pub present: Option<f64>,
     /// The value that is proposed, where the study does not have the key.
     pub proposed: Option<f64>,
-    /// The key without indices.
-    base: String,
-    /// Its indices, from 0.
-    path: Vec<usize>,
+    /// What it is of a study.
+    swept: Swept,
     /// Where the study says which values it takes.
     place: Option<Place>,
 }
 
 impl Axis {
-    /// Of what is no key of `[observer]`: factors on what the study says, so many to either side of 1, the last
-    /// of them `reach` and its inverse.
-    pub(crate) fn of_factors(name: &str, reach: f64, to_a_side: usize) -> Self {
+    /// Of all densities: so many factors to either side of 1.
+    pub(crate) fn of_densities(to_a_side: usize) -> Self {
         let range = Values::Spread {
-            from: Some(1.0 / reach),
-            to: Some(reach),
+            from: Some(1.0 / NOISE_REACH),
+            to: Some(NOISE_REACH),
             points: 2 * to_a_side + 1,
             scale: Scale::Log,
         };
         Self {
-            key: name.to_owned(),
+            key: "process_noise".to_owned(),
             is_factor: true,
             values: spread(&range, None).unwrap_or_default(),
             present: Some(1.0),
             proposed: None,
-            base: name.to_owned(),
-            path: vec![],
+            swept: Swept::Density(None),
             place: None,
         }
     }
@@ -78,18 +80,50 @@ impl Axis {
         }
     }
 
-    /// The key without indices, and its indices from 0.
-    pub(crate) fn path(&self) -> (&str, &[usize]) {
-        (&self.base, &self.path)
+    /// What it is of a study.
+    pub(crate) fn swept(&self) -> &Swept {
+        &self.swept
     }
 
     /// A study with `value` at the key.
     fn set(&self, study: &mut Study, value: f64) {
+        match &self.swept {
+            Swept::Tuning(base, path) => self.set_tuning(study, base, path, value),
+            Swept::Density(Some(name)) => self.put(&mut study.process_noise, name, value),
+            Swept::Noise(Some(name)) => {
+                self.put(&mut study.sensors.noise, name, Noise::Absolute(value));
+            }
+            Swept::Density(None) => {
+                for (_, density) in &mut study.process_noise {
+                    *density = self.chosen(*density, value);
+                }
+            }
+            Swept::Noise(None) => {
+                for (_, noise) in &mut study.sensors.noise {
+                    let (Noise::Absolute(size) | Noise::Relative(size) | Noise::Uniform(size)) =
+                        noise;
+                    *size = self.chosen(*size, value);
+                }
+            }
+        }
+    }
+
+    fn put<T>(&self, said: &mut Vec<(Name, T)>, name: &str, value: T) {
+        match said.iter_mut().find(|(own, _)| own.text == name) {
+            Some((_, present)) => *present = value,
+            None => {
+                let (text, place) = (name.to_owned(), self.place.clone());
+                said.push((Name { text, place }, value));
+            }
+        }
+    }
+
+    fn set_tuning(&self, study: &mut Study, base: &str, path: &[usize], value: f64) {
         let values = &mut study.observer.tuning.values;
         let mut slot = values
-            .entry(self.base.clone())
+            .entry(base.to_owned())
             .or_insert(Value::Number(value));
-        for &index in &self.path {
+        for &index in path {
             let Value::List(entries) = slot else { return };
             let Some(entry) = entries.get_mut(index) else {
                 return;
@@ -98,7 +132,7 @@ impl Axis {
         }
         self.scale(slot, value);
         if let Some(place) = &self.place {
-            study.observer.comes_from(&self.base, place);
+            study.observer.comes_from(base, place);
         }
     }
 
@@ -148,6 +182,14 @@ pub(super) fn axes(study: &Study) -> Result<Vec<Axis>, Error> {
             .map(|(name, values)| axis(study, name, values))
             .collect();
     }
+    if is_filters(study) {
+        return match study.process_noise.is_empty() {
+            false => Ok(vec![Axis::of_densities(TO_A_SIDE)]),
+            true => Err(Error::input("nothing to sweep: the study has no [process_noise]")
+                .at(&study.file)
+                .hint("add [tune] with keys = { process_noise.NAME = { from = …, to = … } }, or noise.OUTPUT, or a key of [observer]")),
+        };
+    }
     match speed(study) {
         Some(key) => Ok(vec![axis(study, &Name::from(key), &Values::default())?]),
         None => Err(Error::input(format!(
@@ -159,14 +201,22 @@ pub(super) fn axes(study: &Study) -> Result<Vec<Axis>, Error> {
     }
 }
 
-/// The keys of `[observer]` that a study sweeps, without indices; none where there is nothing to sweep.
-pub(super) fn swept(study: &Study) -> Vec<String> {
-    let given = study.tune.keys.iter().map(|(name, _)| name.text.as_str());
-    let bases = given.filter_map(|key| Some(lynkeus_study::swept(key)?.0.to_owned()));
-    let bases: Vec<String> = bases.collect();
-    match bases.is_empty() {
-        true => speed(study).into_iter().map(str::to_owned).collect(),
-        false => bases,
+/// Whether the study names a filter.
+pub(super) fn is_filters(study: &Study) -> bool {
+    let named = study.observer.family.iter();
+    let mut families = named.filter_map(|name| lynkeus_observers::find(&name.text));
+    families.any(|family| family.is_filter())
+}
+
+/// What a study sweeps; nothing where there is nothing to sweep.
+pub(super) fn swept(study: &Study) -> Vec<Swept> {
+    let given = study.tune.keys.iter();
+    let given: Vec<Swept> = given
+        .filter_map(|(name, _)| Swept::read(&name.text))
+        .collect();
+    match given.is_empty() {
+        true => speed(study).and_then(Swept::read).into_iter().collect(),
+        false => given,
     }
 }
 
@@ -211,33 +261,58 @@ pub(crate) fn grid(study: &Study, axes: &[Axis]) -> Result<Vec<(Vec<f64>, Study)
 
 fn axis(study: &Study, name: &Name, values: &Values) -> Result<Axis, Error> {
     let refuse = |why: String| study.refuse_swept(name, &why);
-    let (base, path) = study.swept_key(name)?;
-    let present = present(study, base, &path).map_err(&refuse)?;
-    let is_factor = matches!(present, Some(Value::List(_)));
-    let present = match present {
-        Some(Value::Number(x)) => Some(*x),
-        Some(_) => Some(1.0),
-        None => None,
-    };
+    let swept = study.swept_key(name)?;
+    let (present, is_factor) = present(study, &swept).map_err(&refuse)?;
     let values = spread(values, present).ok_or_else(|| {
         refuse(format!("\"{name}\" needs the ends of its range")).hint(format!(
             "write {name} = {{ from = …, to = … }}; without them a range reaches from a quarter of the study's value, which must not be 0, to four times of it"
         ))
     })?;
+    let is_noise = !matches!(swept, Swept::Tuning(..));
+    if let Some(negative) = values.iter().find(|x| is_noise && **x < 0.0) {
+        return Err(refuse(format!(
+            "\"{name}\": expected numbers >= 0, found {negative}"
+        )));
+    }
     Ok(Axis {
         key: name.text.clone(),
         is_factor,
         values,
         present,
         proposed: None,
-        base: base.to_owned(),
-        path,
+        swept,
         place: name.place.clone(),
     })
 }
 
-/// What stands at the key: a number, or a list in which all entries are numbers in the end.
-fn present<'s>(study: &'s Study, base: &str, path: &[usize]) -> Result<Option<&'s Value>, String> {
+/// The number at a key, none where the study does not have it; 1 and that the values are factors where it is a
+/// list or a table in which all entries are numbers in the end.
+fn present(study: &Study, swept: &Swept) -> Result<(Option<f64>, bool), String> {
+    let factors = |is_there: bool, place: &str| match is_there {
+        true => Ok((Some(1.0), true)),
+        false => Err(format!("the study has no {place} for factors")),
+    };
+    match swept {
+        Swept::Tuning(base, path) => match tuning(study, base, path)? {
+            None => Ok((None, false)),
+            Some(Value::Number(x)) => Ok((Some(*x), false)),
+            Some(_) => Ok((Some(1.0), true)),
+        },
+        Swept::Density(Some(name)) => Ok((Name::best(&study.process_noise, name).copied(), false)),
+        Swept::Density(None) => factors(!study.process_noise.is_empty(), "[process_noise]"),
+        Swept::Noise(Some(name)) => match Name::best(&study.sensors.noise, name) {
+            None => Ok((None, false)),
+            Some(Noise::Absolute(x)) => Ok((Some(*x), false)),
+            Some(_) => Err(format!(
+                "the noise of {name} is no standard deviation; sweep `noise`, whose values are factors on all of them"
+            )),
+        },
+        Swept::Noise(None) => factors(!study.sensors.noise.is_empty(), "`noise` of [sensors]"),
+    }
+}
+
+/// What stands at a key of `[observer]`.
+fn tuning<'s>(study: &'s Study, base: &str, path: &[usize]) -> Result<Option<&'s Value>, String> {
     let Some(mut value) = study.observer.tuning.values.get(base) else {
         return match path {
             [] => Ok(None),

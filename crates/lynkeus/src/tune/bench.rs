@@ -1,28 +1,48 @@
 //! What values are judged on: a simulation or a log, with observers or a filter.
 
+use lynkeus_observers::Design;
+
 use super::measures::{self, Measure};
 use super::record::Record;
-use super::reference::Reference;
-use super::{Row, filtered, replay, trial};
+use super::trial::{Simulated, Trial};
+use super::{Row, replay};
 use crate::crew::Watch;
 use crate::prepare::Prepared;
-use crate::{Error, ErrorKind, Study, Table};
+use crate::{Error, ErrorKind, Table};
 
-/// What a value is judged on.
+/// What values are judged on.
+#[derive(Clone, Copy)]
+pub(crate) enum Ground<'t> {
+    /// a log
+    Log(&'t Table),
+    /// the study's simulation; filters have a sample every `step`
+    Simulation { step: f64 },
+}
+
+/// The ground prepared: the same for every value.
 pub(super) enum Bench<'a> {
-    Simulation(Box<Reference>),
+    Simulation(Box<Simulated>),
     Log(Box<Record<'a>>),
-    /// a filter's
-    Samples(Box<filtered::Simulated>),
-    /// a filter's
-    SamplesOfLog(Box<Record<'a>>),
 }
 
 impl<'a> Bench<'a> {
-    pub fn new(prepared: &Prepared<'_>, log: Option<&'a Table>) -> Result<Self, Error> {
-        Ok(match log {
-            Some(table) => Self::Log(Box::new(Record::new(prepared, table)?)),
-            None => Self::Simulation(Box::new(Reference::new(prepared)?)),
+    /// For values of a filter, or of observers.
+    ///
+    /// # Errors
+    /// A study that cannot be simulated; a log that is too short.
+    pub fn new(
+        prepared: &Prepared<'_>,
+        filter: Option<&Design>,
+        ground: Ground<'a>,
+    ) -> Result<Self, Error> {
+        Ok(match ground {
+            Ground::Log(table) => {
+                Self::Log(Box::new(Record::new(prepared, table, filter.is_some())?))
+            }
+            Ground::Simulation { step } => {
+                let sampled = filter.map(|design| (&design.observer, step));
+                Self::Simulation(Box::new(Simulated::new(prepared, sampled)?))
+            }
         })
     }
 
@@ -40,43 +60,25 @@ impl<'a> Bench<'a> {
             }
             Err(error) => return Err(error),
         };
-        let is_filter = design.observer.filter.is_some();
         match self {
-            Self::Simulation(_) | Self::Log(_) if is_filter => Err(filter_refused(
-                prepared.study(),
-                design.examination.family.name(),
-            )),
-            Self::Simulation(reference) => {
-                trial::simulated(prepared, &design, reference, row, watch)
+            Self::Simulation(ground) => {
+                Trial::new(prepared, Design::clone(&design), ground)?.judge(row, watch)
             }
-            Self::Log(record) | Self::SamplesOfLog(record) => {
-                replay::logged(prepared, design, record, row, watch)
-            }
-            Self::Samples(samples) => filtered::simulated(prepared, &design, samples, row, watch),
+            Self::Log(record) => replay::logged(prepared, design, record, row, watch),
         }
     }
 
     pub fn notes(&self) -> &[String] {
         match self {
-            Self::Simulation(reference) => &reference.notes,
-            Self::Samples(samples) => &samples.reference.notes,
-            Self::Log(record) | Self::SamplesOfLog(record) => &record.notes,
+            Self::Simulation(ground) => &ground.reference.notes,
+            Self::Log(record) => &record.notes,
         }
     }
 
     pub fn measures(&self) -> &'static [Measure] {
         match self {
-            Self::Simulation(_) | Self::Samples(_) => measures::SIMULATED,
-            Self::Log(_) | Self::SamplesOfLog(_) => measures::LOGGED,
+            Self::Simulation(ground) => measures::simulated(ground.is_filters()),
+            Self::Log(record) => measures::of_log(record.is_filters),
         }
     }
-}
-
-/// A filter's equations without its updates are the plant alone.
-pub(super) fn filter_refused(study: &Study, family: &str) -> Error {
-    Error::input(format!(
-        "`tune` judges observers whose correction is in their equations: expected another family than the filter \"{family}\""
-    ))
-    .at(&study.file)
-    .hint("name another `family` in [observer], if `lynkeus check` finds one that fits; `lynkeus compare` judges filters as they are")
 }

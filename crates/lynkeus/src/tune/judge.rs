@@ -1,125 +1,71 @@
-//! What the runs of one value say of it, whoever made them.
+//! What the runs of one value in simulation say of it.
 
-use lynkeus_model::Plant;
-use lynkeus_observers::{Estimate, Observer, Signal};
-use lynkeus_run::{Column, Role, Trajectory};
+use lynkeus_observers::{Estimate, Signal};
+use lynkeus_run::Role;
 
 use super::errors::{Errors, rms, run_away};
 use super::reference::Reference;
+use super::trial::{Trial, Under};
 use super::{Peak, Row, measures};
 use crate::crew::{Watch, part};
-use crate::{Error, Study, prepare::systems};
+use crate::simulate::Ran;
+use crate::{Error, prepare::systems};
 
-/// A run of the plant and of what estimates it.
-pub(super) trait Run {
-    /// Times of the rows.
-    fn times(&self) -> Vec<f64>;
-    /// One column by row; none where the run does not have it.
-    fn column(&self, column: Column) -> Option<Vec<f64>>;
-}
-
-impl Run for Trajectory {
-    fn times(&self) -> Vec<f64> {
-        Self::times(self).to_vec()
-    }
-
-    fn column(&self, column: Column) -> Option<Vec<f64>> {
-        Self::column(self, column).map(<[f64]>::to_vec)
-    }
-}
-
-/// What a value is run under.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Under {
-    /// sensors without noise
-    Exact,
-    Noise,
-    /// sensors without noise, and `disturbance` of `[tune]` on the plant's inputs
-    Disturbance,
-}
-
-/// The runs of one value.
-pub(super) trait Runs {
-    type Run: Run;
-
-    /// A run, or why its estimate is none.
+impl Trial<'_> {
+    /// Fills the row in; an estimate that diverges is a row with the reason.
     ///
     /// # Errors
     /// A study that cannot be simulated.
-    fn run(&self, under: Under, watch: &mut Watch<'_>) -> Result<Result<Self::Run, String>, Error>;
-
-    /// The longest stable step over the step of the sensor, along the exact run; none where
-    /// nothing is corrected between samples.
-    fn margin(&self, exact: &Self::Run) -> Option<f64>;
-}
-
-/// What the runs are measured by.
-pub(super) struct Judge<'a> {
-    pub study: &'a Study,
-    pub plant: &'a Plant,
-    pub observer: Observer,
-    pub reference: &'a Reference,
-}
-
-impl Judge<'_> {
-    /// Fills the row in; the reason where a run failed.
-    ///
-    /// # Errors
-    /// A study that cannot be simulated.
-    pub fn judge(
-        &self,
-        row: &mut Row,
-        runs: &impl Runs,
-        watch: &mut Watch<'_>,
-    ) -> Result<Option<String>, Error> {
-        let is_disturbed = !self.study.tune.disturbance.is_empty();
+    pub fn judge(&self, mut row: Row, watch: &mut Watch<'_>) -> Result<Row, Error> {
+        let is_disturbed = !self.prepared.study().tune.disturbance.is_empty();
         let parts = if is_disturbed { 3 } else { 2 };
-        let run = match runs.run(Under::Exact, &mut part(watch, 0, parts))? {
+        let run = match self.run(Under::Exact, &mut part(watch, 0, parts))? {
             Ok(run) => run,
-            Err(reason) => return Ok(Some(reason)),
+            Err(reason) => return Ok(row.failed(reason)),
         };
         let exact = self.errors(&run);
         if let Some(reason) = run_away(&exact.scaled) {
-            return Ok(Some(reason));
+            return Ok(row.failed(reason));
         }
-        self.exact(row, &exact, &run);
-        row.set(measures::SAMPLING_MARGIN, runs.margin(&run));
+        self.exact(&mut row, &exact, &run);
+        row.set(measures::SAMPLING_MARGIN, self.margin(&run));
         let mut failure = None;
-        match runs.run(Under::Noise, &mut part(watch, 1, parts))? {
-            Ok(run) => self.noisy(row, &exact, &run),
+        match self.run(Under::Noise, &mut part(watch, 1, parts))? {
+            Ok(run) => self.noisy(&mut row, &exact, &run),
             Err(reason) => failure = Some(format!("with noise: {reason}")),
         }
         if is_disturbed {
-            let run = runs.run(Under::Disturbance, &mut part(watch, 2, parts))?;
+            let run = self.run(Under::Disturbance, &mut part(watch, 2, parts))?;
             let bound = run.map(|run| self.errors(&run).from(self.reference.tail).largest());
             row.set(measures::ULTIMATE_BOUND, bound.clone().ok().flatten());
             let reason = bound.err().map(|e| format!("under the disturbance: {e}"));
             failure = failure.or(reason);
         }
-        Ok(failure)
+        row.failure = failure;
+        Ok(row)
     }
 
     /// Scaled errors of the estimates, in the observer's order; an input is what the plant has
     /// of it, disturbance included.
-    fn errors(&self, run: &impl Run) -> Errors {
+    fn errors(&self, run: &Ran) -> Errors {
         let error = |(place, estimate): (usize, &Estimate)| {
-            let column = systems::column_of(self.plant, &estimate.variable)?;
-            let (estimate, truth) = (run.column(Role::Estimate.at(place))?, run.column(column)?);
+            let column = systems::column_of(self.prepared.plant(), &estimate.variable)?;
+            let (estimate, truth) = (run.course.estimates.get(place)?, run.run.column(column)?);
             let scale = self.reference.scale(column);
             let pairs = estimate.iter().zip(truth);
             Some(pairs.map(|(hat, x)| (hat - x) / scale).collect())
         };
-        let estimates = self.observer.estimates.iter().enumerate();
+        let estimates = self.design.observer.estimates.iter().enumerate();
         Errors {
-            time: run.times(),
+            time: run.run.time.to_vec(),
             scaled: estimates.filter_map(error).collect(),
         }
     }
 
     /// The figures of the run without noise.
-    fn exact(&self, row: &mut Row, exact: &Errors, run: &impl Run) {
+    fn exact(&self, row: &mut Row, exact: &Errors, run: &Ran) {
         let Reference { starts, tail, .. } = self.reference;
-        let settling = exact.settling(starts, self.study.tune.tolerance);
+        let settling = exact.settling(starts, self.prepared.study().tune.tolerance);
         row.set(measures::SETTLING_TIME, settling);
         row.set(measures::ULTIMATE_BOUND, exact.from(*tail).largest());
         row.set(measures::EXACT_ERROR, Some(exact.mean()));
@@ -127,19 +73,19 @@ impl Judge<'_> {
             return;
         };
         row.set(measures::PEAK_ERROR, Some(size));
-        let estimate = self.observer.estimates.get(quantity);
-        let course = run.column(Role::Estimate.at(quantity));
+        let estimate = self.design.observer.estimates.get(quantity);
+        let course = run.course.estimates.get(quantity);
         row.peak = estimate.and_then(|estimate| {
             Some(Peak {
                 name: estimate.variable.name.clone(),
-                estimate: *course?.get(at)?,
+                estimate: course?.get(at)?,
                 time: *exact.time.get(at)?,
             })
         });
     }
 
     /// The figures of the run with noise, against the one without.
-    fn noisy(&self, row: &mut Row, exact: &Errors, run: &impl Run) {
+    fn noisy(&self, row: &mut Row, exact: &Errors, run: &Ran) {
         let noisy = self.errors(run);
         let caused = noisy.minus(exact);
         let level = self.noise_level(run);
@@ -153,18 +99,18 @@ impl Judge<'_> {
     }
 
     /// The root mean square of the scaled noise of the measured outputs, as drawn, in the tail.
-    fn noise_level(&self, run: &impl Run) -> f64 {
+    fn noise_level(&self, run: &Ran) -> f64 {
         let drawn = |signal: &Signal| {
-            let place = systems::output_of(self.plant, signal)?;
+            let place = systems::output_of(self.prepared.plant(), signal)?;
             let (exact, measured) = (Role::Output.at(place), Role::Measured.at(place));
             let scale = self.reference.scale(exact);
-            let (exact, measured) = (run.column(exact)?, run.column(measured)?);
+            let (exact, measured) = (run.run.column(exact)?, run.run.column(measured)?);
             let pairs = exact.iter().zip(measured);
             Some(pairs.map(|(y, m)| (m - y) / scale).collect::<Vec<f64>>())
         };
-        let measured = self.observer.measured.iter();
+        let measured = self.design.observer.measured.iter();
         let noise = Errors {
-            time: run.times(),
+            time: run.run.time.to_vec(),
             scaled: measured.filter_map(drawn).collect(),
         };
         let squares: Vec<f64> = noise

@@ -1,14 +1,14 @@
 //! Which tuning is best: a sweep in simulation or on a log.
 //!
 //! Every value of the swept keys is a row of figures ([`Measure`]); the knee is the row whose
-//! first figure is least: the mean error with noise in simulation, the prediction error of
-//! held-out samples on a log. `docs/tune.md` defines them all.
+//! first figure is least: the mean error with noise in simulation; on a log the prediction error of
+//! held-out samples, or for filters −log of the likelihood. `docs/tune.md` defines them all.
 
 pub(crate) mod axis;
-mod bench;
+pub(crate) mod bench;
 mod disturbed;
 pub(crate) mod errors;
-mod filtered;
+mod foretold;
 mod holdout;
 mod judge;
 mod measures;
@@ -21,30 +21,36 @@ mod replay;
 mod report;
 mod rewrite;
 mod row;
-pub(crate) mod slider;
 mod speed;
 mod trial;
 pub(crate) mod whiteness;
 
 use std::ops::ControlFlow;
 
+use lynkeus_observers::Design;
+
+pub use crate::rewrite::Change;
 pub use axis::Axis;
+pub use foretold::Foretold;
 pub use measures::Measure;
 #[cfg(test)]
 pub(crate) use report::SweepReport;
-pub(crate) use report::{brief, shortened};
-pub use rewrite::Change;
+pub(crate) use report::shortened;
 pub use row::{Peak, Row};
 
 use crate::crew::within;
 use crate::prepare::Prepared;
 use crate::prepare::declared::{Account, Declared};
-use crate::{Error, Study, Table, crew, prepare};
-use bench::{Bench, filter_refused};
+use crate::{Error, Study, Table, crew, prepare, prepare::systems, simulate};
+use bench::{Bench, Ground};
+use lynkeus_study::Swept;
 use pinned::pinned;
+use record::Record;
 
-/// Rows whose first figure is at most this many times the least are nearly as good as the knee.
+/// Rows whose figure is at most this many times the least are nearly as good as the knee,
 const NEARLY: f64 = 1.1;
+/// and those whose logarithm of the likelihood is at most this less: 95 % by the likelihood ratio.
+const LIKELY: f64 = 1.92;
 
 /// What a sweep gives.
 #[derive(Clone, Debug)]
@@ -59,7 +65,10 @@ pub struct Sweep {
     pub measures: &'static [Measure],
     /// A row for every combination of values, the last key's fastest.
     pub rows: Vec<Row>,
-    /// The row whose first figure is least; none where every row failed.
+    /// The figure that decides, by its place: the first, but for filters on a log whose rows count
+    /// different readings.
+    pub objective: usize,
+    /// The row where it is least; none where every row failed.
     pub knee: Option<usize>,
     /// The unit of time, if the study states it.
     pub time_unit: Option<String>,
@@ -80,7 +89,6 @@ pub fn tune(
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Sweep, Error> {
     // what the study says wrongly is told before anything is computed
-    refuse_named_filter(study)?;
     let given = axis::axes(study);
     if !study.tune.keys.is_empty() {
         given?;
@@ -88,18 +96,28 @@ pub fn tune(
     let plant = prepare::plant(study)?;
     let pinned = pinned(&Prepared::new(study, &plant)?)?;
     let study = &pinned.study;
-    refuse_named_filter(study)?;
     let mut axes = axis::axes(study)?;
-    let is_proposed = |axis: &&mut Axis| pinned.proposed == Some(axis.path().0);
+    let is_proposed = |axis: &&mut Axis| match axis.swept() {
+        Swept::Tuning(base, _) => pinned.proposed == Some(base),
+        _ => false,
+    };
     for axis in axes.iter_mut().filter(is_proposed) {
         axis.proposed = axis.present.take();
     }
     let grid = axis::grid(study, &axes)?;
     let prepared = Prepared::new(study, &plant)?;
-    let bench = Bench::new(&prepared, log)?;
+    let is_filters = axis::is_filters(study);
+    let filter = is_filters.then(|| prepared.design()).transpose()?;
+    let ground = match log {
+        Some(table) => Ground::Log(table),
+        None => Ground::Simulation {
+            step: simulate::sample_step(systems::settings(study)?),
+        },
+    };
+    let bench = Bench::new(&prepared, filter.as_deref(), ground)?;
     let mut sweep = judged(&prepared, &bench, axes, &grid, watch)?;
     sweep.notes.splice(0..0, pinned.notes);
-    sweep.declared = account(prepared.declared(), log.is_none());
+    sweep.declared = account(prepared.declared(), log.is_none(), is_filters);
     sweep.log = log.map(|table| table.file().to_owned());
     let at_an_end = sweep.at_an_end().map(|(axis, value)| {
         format!(
@@ -110,6 +128,38 @@ pub fn tune(
     });
     sweep.notes.extend(at_an_end);
     Ok(sweep)
+}
+
+/// What is said of the values of an axis, each with its study, by observers like a design.
+///
+/// # Errors
+/// A study that cannot be simulated; a log that is too short.
+pub(crate) fn along(
+    prepared: &Prepared<'_>,
+    design: &Design,
+    axis: Axis,
+    grid: &[(Vec<f64>, Study)],
+    ground: Ground<'_>,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Sweep, Error> {
+    let filter = design.observer.filter.as_ref().map(|_| design);
+    let bench = Bench::new(prepared, filter, ground)?;
+    judged(prepared, &bench, vec![axis], grid, watch)
+}
+
+/// How well the observer of a study foretells a log, and why it does not to its end.
+///
+/// # Errors
+/// A study or a log that cannot be used; a log that is too short.
+pub(crate) fn foretold(
+    prepared: &Prepared<'_>,
+    table: &Table,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<(Foretold, Option<String>), Error> {
+    let design = prepared.design()?;
+    let record = Record::new(prepared, table, design.observer.filter.is_some())?;
+    let judged = replay::foretold(prepared, design, &record, watch)?;
+    Ok((judged.foretold, judged.failure))
 }
 
 /// Every study of a grid on a bench.
@@ -146,6 +196,13 @@ fn judged(
         watch,
     )?;
     let mut notes = bench.notes().to_vec();
+    let objective = match are_of_the_same_readings(&rows) {
+        true => measures::OBJECTIVE,
+        false => {
+            notes.push("the values take different numbers of readings, whose likelihoods cannot be compared: the knee is the least error on held-out samples".to_owned());
+            measures::FILTERS_HELD_OUT
+        }
+    };
     let ended = |spent| format!("the sweep is not whole: {spent}");
     notes.extend(study.budget.marked().map(ended));
     Ok(Sweep {
@@ -153,7 +210,8 @@ fn judged(
         log: None,
         measures: bench.measures(),
         axes,
-        knee: least(&rows),
+        objective,
+        knee: least(&rows, objective),
         rows,
         time_unit: study.time_unit.clone(),
         declared: Account::default(),
@@ -161,8 +219,16 @@ fn judged(
     })
 }
 
-/// What the figures count; on a log they are of its own noise and samples.
-fn account(declared: &Declared, is_simulated: bool) -> Account {
+/// Whether likelihoods, where rows have them, are of as many readings: a gate may keep some out.
+fn are_of_the_same_readings(rows: &[Row]) -> bool {
+    let mut counts = rows.iter().filter_map(|row| row.readings);
+    let first = counts.next();
+    counts.all(|count| Some(count) == first)
+}
+
+/// What the figures count; on a log they are of its own noise and samples, which filters weigh by the
+/// study's.
+fn account(declared: &Declared, is_simulated: bool, is_filters: bool) -> Account {
     let Declared {
         ranges,
         noise,
@@ -178,8 +244,8 @@ fn account(declared: &Declared, is_simulated: bool) -> Account {
     Account::default()
         .counts(ranges)
         .counts(limits)
-        .counts_if(is_simulated, noise, measured)
-        .counts_if(is_simulated, process_noise, measured)
+        .counts_if(is_simulated || is_filters, noise, measured)
+        .counts_if(is_simulated || is_filters, process_noise, measured)
         .counts_if(is_simulated, samples, "the log has its own")
         .leaves(
             disturbances,
@@ -189,21 +255,10 @@ fn account(declared: &Declared, is_simulated: bool) -> Account {
         .leaves(input_derivatives, promised)
 }
 
-/// A filter that the study names has nothing to sweep, whatever its keys.
-fn refuse_named_filter(study: &Study) -> Result<(), Error> {
-    let named = study.observer.family.as_ref();
-    let family = named.and_then(|name| lynkeus_observers::find(&name.text));
-    match family.filter(|family| family.is_filter()) {
-        Some(filter) => Err(filter_refused(study, filter.name())),
-        None => Ok(()),
-    }
-}
-
-fn least(rows: &[Row]) -> Option<usize> {
-    let objective = |row: &Row| row.figure(measures::OBJECTIVE);
+fn least(rows: &[Row], objective: usize) -> Option<usize> {
     let judged = rows.iter().enumerate();
     judged
-        .filter_map(|(i, row)| Some((i, objective(row)?)))
+        .filter_map(|(i, row)| Some((i, row.figure(objective)?)))
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .map(|(i, _)| i)
 }
@@ -215,18 +270,36 @@ impl Sweep {
     }
 
     /// The range of the first key's values around the knee that are all nearly as good, the other
-    /// keys being those of the knee: the first figure is within 10 % of the least.
+    /// keys being those of the knee: within 10 % of the least error, or as likely within 95 %.
     pub fn good(&self) -> Option<std::ops::RangeInclusive<f64>> {
         let knee = self.chosen()?;
         let at = *knee.values.first()?;
-        let limit = NEARLY * knee.figure(measures::OBJECTIVE)?;
-        let beside = self.points(measures::OBJECTIVE, |row| self.beside_knee(row));
+        let least = knee.figure(self.objective)?;
+        let limit = match self.likely_readings() {
+            Some(readings) => least + LIKELY / readings as f64,
+            None => NEARLY * least,
+        };
+        let beside = self.points(self.objective, |row| self.beside_knee(row));
         let (up_to, beyond) = beside.split_at(beside.partition_point(|(x, _)| *x <= at));
         let is_good = |(_, y): &&(f64, f64)| *y <= limit;
         let low = up_to.iter().rev().take_while(is_good).last();
         let high = beyond.iter().take_while(is_good).last();
         let end = |found: Option<&(f64, f64)>| found.map_or(at, |(x, _)| *x);
         Some(end(low)..=end(high))
+    }
+
+    /// The readings of the knee, where a likelihood decides.
+    fn likely_readings(&self) -> Option<usize> {
+        let readings = self.chosen()?.readings;
+        readings.filter(|_| self.objective == measures::OBJECTIVE)
+    }
+
+    /// What makes a value nearly as good as the best, which is called so.
+    pub(crate) fn nearly(&self, best: &str) -> String {
+        match self.likely_readings() {
+            Some(_) => "as likely within 95 %".to_owned(),
+            None => format!("within 10 % of {best}"),
+        }
     }
 
     /// The axis at whose end the knee is: the best value may lie beyond.
@@ -296,8 +369,9 @@ mod tests {
             plant: String::new(),
             log: None,
             axes: vec![],
-            measures: measures::LOGGED,
-            knee: least(&rows),
+            measures: measures::of_log(false),
+            objective: measures::OBJECTIVE,
+            knee: least(&rows, measures::OBJECTIVE),
             rows,
             time_unit: None,
             declared: Account::default(),

@@ -5,6 +5,9 @@ use super::{Sweep, measures};
 use crate::Error;
 use lynkeus_plot::{Curve, Figure, Kind, Mark, Panel, Scale};
 
+/// Values that make each reading so much less likely, in logarithms, are out of sight.
+const UNLIKELY: f64 = 2.0;
+
 impl Sweep {
     /// The figures over the first key's values as SVG text. With several keys, the curve through
     /// the knee is drawn boldly and those of the other combinations palely.
@@ -68,7 +71,7 @@ impl Sweep {
     fn failures(&self) -> Vec<Mark> {
         let failed = self.rows.iter().filter(|row| self.beside_knee(row));
         failed
-            .filter(|row| row.figure(measures::OBJECTIVE).is_none())
+            .filter(|row| row.figure(self.objective).is_none())
             .filter_map(|row| row.values.first().copied())
             .map(Mark::Failed)
             .collect()
@@ -104,8 +107,19 @@ impl Sweep {
             measures::ULTIMATE_BOUND,
             measures::SAMPLING_MARGIN,
         ];
-        let others = others.into_iter().map(|measure| self.panel(measure));
+        let others = others.into_iter().filter(|m| *m < self.measures.len());
+        let others = others.map(|measure| self.panel(measure));
         [mean].into_iter().chain(others).collect()
+    }
+
+    /// Up to which value a figure is drawn.
+    fn most_drawn(&self, measure: usize) -> f64 {
+        let is_likelihood = self.measures.get(measure) == Some(&measures::LIKELIHOOD);
+        let all = self.rows.iter().filter_map(|row| row.figure(measure));
+        match is_likelihood {
+            true => all.fold(f64::INFINITY, f64::min) + UNLIKELY,
+            false => f64::INFINITY,
+        }
     }
 
     /// One figure: a curve for every combination of the keys after the first.
@@ -118,12 +132,14 @@ impl Sweep {
             }
         }
         let knee = self.chosen().and_then(|row| row.values.get(1..));
+        let most = self.most_drawn(measure);
         let curve = |others: &&[f64]| {
             let kind = match knee == Some(*others) {
                 true => Kind::Main,
                 false => Kind::Pale,
             };
-            let points = self.points(measure, |row| row.values.get(1..) == Some(*others));
+            let mut points = self.points(measure, |row| row.values.get(1..) == Some(*others));
+            points.retain(|(_, y)| *y <= most || y.is_nan());
             Curve::through(kind, points)
         };
         let found = self.measures.get(measure);
@@ -139,6 +155,7 @@ impl Sweep {
             },
             upwards: match found.map(|m| m.name) {
                 Some("ultimate_bound") => Scale::Log,
+                _ if found == Some(&measures::LIKELIHOOD) => Scale::Whole,
                 _ => Scale::FromZero,
             },
             curves: combinations.iter().map(curve).collect(),

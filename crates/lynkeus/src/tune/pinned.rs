@@ -22,7 +22,7 @@ pub(super) struct Pinned {
 /// are swept; else the first that may fit and has them.
 ///
 /// # Errors
-/// Keys of `[observer]` that cannot be used.
+/// Keys of `[observer]` that cannot be used; keys to sweep that no family has together.
 pub(super) fn pinned(prepared: &Prepared<'_>) -> Result<Pinned, Error> {
     let study = prepared.study();
     let as_it_is = || Pinned {
@@ -37,7 +37,7 @@ pub(super) fn pinned(prepared: &Prepared<'_>) -> Result<Pinned, Error> {
     let Some(choice) = prepared.choice()? else {
         return Ok(as_it_is());
     };
-    let owns = |family: &dyn Family| swept.iter().all(|key| family.owns(key));
+    let owns = |family: &dyn Family| swept.iter().all(|key| key.is_of(family));
     let may_fit = |e: &&Examination| e.fit() != Standing::Refuted && owns(e.family);
     let family = match owns(choice.family) {
         true => Some(choice.family),
@@ -48,7 +48,15 @@ pub(super) fn pinned(prepared: &Prepared<'_>) -> Result<Pinned, Error> {
             .map(|e| e.family),
     };
     let Some(family) = family else {
-        return Ok(as_it_is());
+        let names = study.tune.keys.iter();
+        let names: Vec<&str> = names.map(|(name, _)| name.text.as_str()).collect();
+        let message = format!(
+            "`keys` of [tune]: no family that may fit has all of {}",
+            names.join(", ")
+        );
+        return Err(Error::input(message)
+            .at(&study.file)
+            .hint("name the family with `family` in [observer], and sweep keys that it has"));
     };
     let mut pinned = as_it_is();
     let proposal = choice.proposal.as_ref();

@@ -15,15 +15,17 @@ use crate::judge::outcome::{interrupted_on, is_observers_answer};
 use crate::prepare::Prepared;
 use crate::thrifty::thrifty;
 use crate::words::in_words;
-use crate::{Error, Series, Table, course::lines, course::replay};
-use lynkeus_study::BetweenSamples;
+use crate::{Error, Series, Study, Table, course::lines, course::replay};
+use lynkeus_study::{BetweenSamples, Records};
 
 /// What is the same for all values.
 #[derive(Clone, Debug)]
 pub(super) struct Record<'t> {
     pub log: Log<'t>,
     pub plan: Plan,
-    /// every sample, the switch off
+    /// filters take the samples that there are, observers have a switch
+    pub is_filters: bool,
+    /// every sample
     pub whole: Replayed,
     /// with samples held out
     pub parts: Replayed,
@@ -31,7 +33,7 @@ pub(super) struct Record<'t> {
     pub notes: Vec<String>,
 }
 
-/// Samples for a switchable observer: the switch is the last of the inputs.
+/// Samples for a filter, or for a switchable observer: the switch is the last of the inputs.
 #[derive(Clone, Debug)]
 pub(super) struct Replayed {
     pub samples: Samples,
@@ -43,38 +45,32 @@ impl<'t> Record<'t> {
     ///
     /// # Errors
     /// As of [`Log::read`] and [`Plan::new`]; a sensor of which nothing is left.
-    pub fn new(prepared: &Prepared<'_>, table: &'t Table) -> Result<Self, Error> {
+    pub fn new(prepared: &Prepared<'_>, table: &'t Table, is_filters: bool) -> Result<Self, Error> {
         let log = Log::read(prepared, table)?;
         let study = prepared.study();
         let plan = Plan::new(study, &log.samples)?;
         let between = study.estimate.between_samples;
-        let parts = match log.samples.have_gaps() {
+        let parts = match is_filters {
+            true => held_out(&log.samples, &plan, BetweenSamples::Hold),
             // the switch alone decides, and no value stands in for another
-            false => log.samples.clone(),
-            true => held_out(&log.samples, &plan, between),
+            false if !log.samples.have_gaps() => log.samples.clone(),
+            false => held_out(&log.samples, &plan, between),
         };
-        let mut notes = [&log.warnings[..], &log.notes].concat();
-        for (i, output) in prepared.augmented().outputs.iter().enumerate() {
-            let name = &output.variable.name;
-            let is_left = |readings: &Series| readings.iter().any(f64::is_finite);
-            if !parts.readings.get(i).is_some_and(is_left) {
-                return Err(Error::input(format!("every reading of {name} is held out"))
-                    .at(&study.file)
-                    .hint(FEWER));
-            }
-            let scored = log.samples.readings.get(i).into_iter().flatten();
-            let mut scored = scored.zip(plan.scored());
-            if !scored.any(|(y, is_scored)| is_scored && y.is_finite()) {
-                notes.push(format!(
-                    "no reading of {name} is held out after the first block: it is not among the held-out samples that are judged; fewer `blocks` of [tune] may change that"
-                ));
-            }
-        }
+        let notes = [
+            &log.warnings[..],
+            &log.notes,
+            &unscored(prepared, &log, &plan, &parts)?,
+        ];
+        // an observer whose readings lie on lines knows what comes
         let causal = match between {
-            BetweenSamples::Linear => BetweenSamples::Hold,
-            causal => causal,
+            BetweenSamples::Linear if !is_filters => BetweenSamples::Hold,
+            between => between,
         };
         let off = vec![0.0; plan.held_out.len()];
+        let switched = |samples, switch| match is_filters {
+            true => samples,
+            false => switched(samples, switch),
+        };
         Ok(Self {
             whole: Replayed {
                 samples: switched(log.samples.clone(), off),
@@ -84,9 +80,10 @@ impl<'t> Record<'t> {
                 samples: switched(parts, plan.held_out.clone()),
                 between,
             },
+            notes: notes.concat(),
+            is_filters,
             log,
             plan,
-            notes,
         })
     }
 
@@ -105,8 +102,9 @@ impl<'t> Record<'t> {
         let inputs = self.log.inputs(prepared, sources)?;
         let mut record = self.clone();
         for replayed in [&mut record.whole, &mut record.parts] {
+            let known = self.log.samples.inputs.len();
             let own = &mut replayed.samples.inputs;
-            own.splice(..own.len() - 1, inputs.iter().cloned());
+            own.splice(..known, inputs.iter().cloned());
         }
         Ok(Cow::Owned(record))
     }
@@ -114,11 +112,6 @@ impl<'t> Record<'t> {
     /// The readings of the measured outputs, by output.
     pub fn readings(&self) -> &[Series] {
         &self.log.samples.readings
-    }
-
-    /// The samples less those that are held out, without a switch: for what takes readings when they are there.
-    pub fn left(&self) -> Samples {
-        held_out(&self.log.samples, &self.plan, BetweenSamples::Hold)
     }
 
     /// The root mean square over outputs of each one's error on the scored rows, over the span
@@ -134,6 +127,36 @@ impl<'t> Record<'t> {
         let errors: Vec<f64> = pairs.filter_map(error).collect();
         (!errors.is_empty()).then(|| rms(&errors))
     }
+}
+
+/// Notes of outputs of which no reading is scored.
+///
+/// # Errors
+/// An output of which no reading is left.
+fn unscored(
+    prepared: &Prepared<'_>,
+    log: &Log<'_>,
+    plan: &Plan,
+    parts: &Samples,
+) -> Result<Vec<String>, Error> {
+    let mut notes = vec![];
+    for (i, output) in prepared.augmented().outputs.iter().enumerate() {
+        let name = &output.variable.name;
+        let is_left = |readings: &Series| readings.iter().any(f64::is_finite);
+        if !parts.readings.get(i).is_some_and(is_left) {
+            return Err(Error::input(format!("every reading of {name} is held out"))
+                .at(&prepared.study().file)
+                .hint(FEWER));
+        }
+        let scored = log.samples.readings.get(i).into_iter().flatten();
+        let mut scored = scored.zip(plan.scored());
+        if !scored.any(|(y, is_scored)| is_scored && y.is_finite()) {
+            notes.push(format!(
+                "no reading of {name} is held out after the first block: it is not among the held-out samples that are judged; fewer `blocks` of [tune] may change that"
+            ));
+        }
+    }
+    Ok(notes)
 }
 
 /// From the least to the greatest of the values that are there, or the magnitude of a constant,
@@ -189,14 +212,31 @@ pub(super) fn course(
     study.estimate.deviations = false;
     study.estimate.innovations = false;
     study.estimate.smoothing = None;
+    study.records = match design.observer.filter {
+        Some(_) => Records::Likelihood,
+        None => Records::Nothing,
+    };
     let prepared = prepared.run_by(&study)?;
     let mut run = run_settings(&study.estimate);
     run.method = thrifty(run.method, samples.time.len() as f64);
     let watch = &mut replay::Watch::only(watch);
     let mut course = course_of(&prepared, design, samples, run, watch)?;
     course.check()?;
+    let told = told(&mut course, place, &study)?;
+    Ok(told.map(|()| course))
+}
+
+/// Why the estimate of a run is none, where it is none.
+///
+/// # Errors
+/// A run that ended early for another reason.
+pub(super) fn told(
+    course: &mut Course,
+    place: &str,
+    study: &Study,
+) -> Result<Result<(), String>, Error> {
     match course.ended.take() {
-        None => Ok(Ok(course)),
+        None => Ok(Ok(())),
         Some(error) if is_observers_answer(&error) => Ok(Err(in_words(&error))),
         Some(error) => Err(interrupted_on(error, place, &study.file)),
     }
@@ -205,7 +245,7 @@ pub(super) fn course(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Study, prepare};
+    use crate::prepare;
     use std::path::Path;
 
     /// A log of 60 rows, every third of them empty, whose readings that are held out say `lie`.
@@ -229,9 +269,9 @@ mod tests {
             .unwrap()
         };
         let honest = log(&|_| false);
-        let plan = Record::new(&prepared, &honest).unwrap().plan;
+        let plan = Record::new(&prepared, &honest, false).unwrap().plan;
         let table = log(&|row| plan.held_out[row] > 0.0);
-        let record = Record::new(&prepared, &table).unwrap();
+        let record = Record::new(&prepared, &table, false).unwrap();
         assert_eq!(record.plan, plan);
         record.parts.samples.readings[0].to_vec()
     }

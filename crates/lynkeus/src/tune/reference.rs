@@ -5,13 +5,14 @@ use std::ops::ControlFlow;
 
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
-use lynkeus_run::{Column, Events, Level, Noise, Role, Trajectory};
+use lynkeus_run::{Column, Events, Level, Noise, Role};
 
+use crate::course::recorded::Recorded;
 use crate::crew::within;
 use crate::prepare::Prepared;
 use crate::prepare::systems;
 use crate::prepare::systems::settings;
-use crate::simulate::{ended_early, open_loop};
+use crate::simulate::{alone, open_loop};
 use crate::words::explain;
 use crate::{Error, Study};
 
@@ -50,12 +51,10 @@ impl Reference {
     pub fn new(prepared: &Prepared<'_>) -> Result<Self, Error> {
         let (study, plant) = (prepared.study(), prepared.plant());
         let settings = settings(study)?;
-        let mut alone = open_loop(study, settings, plant)?;
-        let stated = std::mem::take(&mut alone.noise);
+        let mut open = open_loop(study, settings, plant)?;
+        let stated = std::mem::take(&mut open.noise);
         let watch = &mut |_| ControlFlow::Continue(());
-        let truth = alone
-            .run_watched(&mut within(&study.budget, watch))
-            .map_err(|interrupted| ended_early(interrupted.error, study))?;
+        let truth = alone(study, &open, &mut within(&study.budget, watch))?;
         let scales = scales(plant, &truth);
         let starts = starts(study, plant)?;
         let last = starts.last().copied().unwrap_or(settings.start);
@@ -65,7 +64,7 @@ impl Reference {
         let noise = noise(stated, plant, &measured, &truth, &mut notes);
         Ok(Self {
             tail: (last + settings.until) / 2.0,
-            sample_step: noise.sample_step.unwrap_or(alone.output_step),
+            sample_step: noise.sample_step.unwrap_or(open.output_step),
             scales,
             starts,
             noise,
@@ -94,14 +93,14 @@ impl Reference {
 
 /// The declared range, else the largest magnitude in the run, else 1. An output that shows a
 /// state takes that state's.
-fn scales(plant: &Plant, truth: &Trajectory) -> Scales {
+fn scales(plant: &Plant, truth: &Recorded) -> Scales {
     let scale = |variable: &Variable, column: Column| {
         let range = variable.max - variable.min;
         if range.is_finite() && range > 0.0 {
             return range;
         }
-        let values = truth.column(column).unwrap_or_default();
-        let largest = values.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let values = truth.column(column).into_iter().flatten();
+        let largest = values.fold(0.0, |m: f64, x| m.max(x.abs()));
         if largest > 0.0 { largest } else { 1.0 }
     };
     let shown = |output: &Variable, column: Column| {
@@ -144,7 +143,7 @@ fn noise(
     stated: Noise,
     plant: &Plant,
     measured: &[&str],
-    truth: &Trajectory,
+    truth: &Recorded,
     notes: &mut Vec<String>,
 ) -> Noise {
     let is_noisy = |name: &&str| {
@@ -157,9 +156,9 @@ fn noise(
     let outputs = plant.outputs.iter().enumerate();
     let outputs = outputs.filter(|(_, o)| measured.contains(&o.name.as_str()));
     let level = |(place, output): (usize, &Variable)| {
-        let values = truth.column(Role::Output.at(place)).unwrap_or_default();
-        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let values = || truth.column(Role::Output.at(place)).into_iter().flatten();
+        let low = values().fold(f64::INFINITY, f64::min);
+        let high = values().fold(f64::NEG_INFINITY, f64::max);
         let span = if high > low { high - low } else { high.abs() };
         (output.name.clone(), Level::Absolute(DEFAULT_NOISE * span))
     };

@@ -1,12 +1,14 @@
 //! One value on a log: how well held-out samples are predicted, and how white the innovation is.
 
+use lynkeus_run::filter::SensorHealth;
+
+use super::Row;
 use super::errors::{rms, run_away};
-use super::filtered;
+use super::foretold::Foretold;
 use super::holdout::{predicted, switchable};
 use super::record::{Record, Replayed, course, span};
 use super::speed::longest_step;
 use super::whiteness::{Whiteness, whiteness};
-use super::{Row, measures};
 use crate::course::Course;
 use crate::course::inputs::supplied;
 use crate::crew::{Watch, part};
@@ -21,61 +23,107 @@ use lynkeus_table::series::steps;
 /// A study or a log that cannot be used.
 pub(super) fn logged(
     prepared: &Prepared<'_>,
-    mut design: StudyDesign,
+    design: StudyDesign,
     record: &Record<'_>,
     mut row: Row,
     watch: &mut Watch<'_>,
 ) -> Result<Row, Error> {
+    let judged = foretold(prepared, design, record, watch)?;
+    let found = judged.foretold;
+    let figures = [
+        found.nll_per_reading,
+        found.held_out_error,
+        found.innovation,
+        found.ljung_box,
+        found.outside_band,
+        judged.margin,
+    ];
+    let own = match record.is_filters {
+        true => &figures[..5],
+        false => &figures[1..],
+    };
+    for (measure, figure) in own.iter().enumerate() {
+        row.set(measure, *figure);
+    }
+    row.readings = found.readings;
+    row.failure = judged.failure;
+    Ok(row)
+}
+
+/// What a log says of an estimate.
+#[derive(Debug, Default)]
+pub(super) struct Judged {
+    pub foretold: Foretold,
+    /// the longest stable step over the longest of the log; none of filters
+    margin: Option<f64>,
+    /// why a replay failed
+    pub failure: Option<String>,
+}
+
+/// Replays a log twice: with all samples, and without those that are held out.
+///
+/// # Errors
+/// A study or a log that cannot be used.
+pub(super) fn foretold(
+    prepared: &Prepared<'_>,
+    mut design: StudyDesign,
+    record: &Record<'_>,
+    watch: &mut Watch<'_>,
+) -> Result<Judged, Error> {
     let sources = supplied(prepared, &mut design)?;
     let record = &record.supplied(prepared, &sources)?;
     start_at_readings(prepared, &record.log.samples, &mut design);
-    let failure = if design.observer.filter.is_some() {
-        filtered::held_out(prepared, &design, record, &mut row, watch)?
-    } else {
+    if !record.is_filters {
         design.observer = switchable(prepared.plant(), &design.observer);
-        let replay = Replay {
-            prepared,
-            design,
-            record,
-        };
-        replay.judge(&mut row, watch)?
-    };
-    match failure {
-        None => Ok(row),
-        Some(reason) => Ok(row.failed(reason)),
     }
+    let replay = Replay {
+        prepared,
+        design,
+        record,
+    };
+    let mut judged = Judged::default();
+    judged.failure = replay.judge(&mut judged, watch)?;
+    Ok(judged)
 }
 
 /// One value on a log.
 struct Replay<'a> {
     prepared: &'a Prepared<'a>,
-    /// its observer is switchable
+    /// an observer is switchable
     design: StudyDesign,
     record: &'a Record<'a>,
 }
 
 impl Replay<'_> {
-    /// Fills the row in; the reason where a replay failed.
-    fn judge(&self, row: &mut Row, watch: &mut Watch<'_>) -> Result<Option<String>, Error> {
+    /// Fills in what is judged; the reason where a replay failed.
+    fn judge(&self, judged: &mut Judged, watch: &mut Watch<'_>) -> Result<Option<String>, Error> {
         match self.run(&self.record.whole, &mut part(watch, 0, 2))? {
             Ok(run) => {
-                if let Some(reason) = self.judge_innovation(row, &run) {
+                if let Some(reason) = self.judge_innovation(&mut judged.foretold, &run) {
                     return Ok(Some(reason));
                 }
-                row.set(measures::LOG_MARGIN, self.margin(&run)?);
+                match self.record.is_filters {
+                    true => judge_likelihood(&mut judged.foretold, &run),
+                    false => judged.margin = self.margin(&run)?,
+                }
             }
             Err(reason) => return Ok(Some(reason)),
         }
         match self.run(&self.record.parts, &mut part(watch, 1, 2))? {
             Ok(run) => {
-                let predicted = predicted(&self.design.observer, &run);
-                row.set(
-                    measures::HELD_OUT_ERROR,
-                    self.record.held_out_error(predicted),
-                );
+                let predicted = self.predicted(&run);
+                judged.foretold.held_out_error = self.record.held_out_error(predicted);
                 Ok(None)
             }
             Err(reason) => Ok(Some(format!("with samples held out: {reason}"))),
+        }
+    }
+
+    /// What is expected of each measured output, by row.
+    fn predicted<'c>(&self, run: &'c Course) -> &'c [Series] {
+        match self.record.is_filters {
+            true => &run.predicted,
+            false => predicted(&self.design.observer, run),
         }
     }
 
@@ -91,7 +139,7 @@ impl Replay<'_> {
 
     /// The innovation of a replay that looks at no later sample, past the first block, in the
     /// rows with readings; the reason where it shows that the estimate runs away.
-    fn judge_innovation(&self, row: &mut Row, run: &Course) -> Option<String> {
+    fn judge_innovation(&self, found: &mut Foretold, run: &Course) -> Option<String> {
         let innovation = |(values, prediction): (&Series, &Series)| -> Vec<f64> {
             let pairs = values.iter().zip(prediction).skip(self.record.plan.first);
             // over all rows: not within the loop over them
@@ -99,22 +147,21 @@ impl Replay<'_> {
             let readings = pairs.filter(|(y, _)| y.is_finite());
             readings.map(|(y, hat)| (y - hat) / span).collect()
         };
-        let predicted = predicted(&self.design.observer, run);
-        let pairs = self.record.readings().iter().zip(predicted);
+        let pairs = self.record.readings().iter().zip(self.predicted(run));
         let all: Vec<Vec<f64>> = pairs.map(innovation).filter(|i| !i.is_empty()).collect();
         let reason = run_away(&all);
         if reason.is_some() {
             return reason;
         }
         let sizes: Vec<f64> = all.iter().map(|series| rms(series)).collect();
-        row.set(measures::INNOVATION, Some(rms(&sizes)));
+        found.innovation = Some(rms(&sizes));
         let white: Vec<Whiteness> = all.iter().filter_map(|series| whiteness(series)).collect();
         let mean = |of: fn(&Whiteness) -> f64| {
             let sum: f64 = white.iter().map(of).sum();
             (!white.is_empty()).then(|| sum / white.len() as f64)
         };
-        row.set(measures::LJUNG_BOX, mean(|w| w.ljung_box));
-        row.set(measures::OUTSIDE_BAND, mean(|w| w.outside));
+        found.ljung_box = mean(|w| w.ljung_box);
+        found.outside_band = mean(|w| w.outside);
         None
     }
 
@@ -143,6 +190,15 @@ impl Replay<'_> {
     }
 }
 
+/// How likely a filter held the readings that it took, the first among them.
+fn judge_likelihood(found: &mut Foretold, run: &Course) {
+    let count = |sensor: &SensorHealth| sensor.taken + sensor.at_limit;
+    let readings: usize = run.sensors.iter().map(count).sum();
+    let mean = -run.log_likelihood / readings as f64;
+    found.nll_per_reading = Some(mean).filter(|mean| mean.is_finite());
+    found.readings = Some(readings);
+}
+
 #[cfg(test)]
 mod tests {
     use std::ops::ControlFlow;
@@ -162,7 +218,7 @@ mod tests {
         let table = Table::load(folder.join("log.csv")).unwrap();
         let plant = prepare::plant(&study).unwrap();
         let prepared = Prepared::new(&study, &plant).unwrap();
-        let record = Record::new(&prepared, &table).unwrap();
+        let record = Record::new(&prepared, &table, false).unwrap();
         let mut design = prepared.design().unwrap();
         design.observer = switchable(&plant, &design.observer);
         let system = systems::observer(&plant, &design.observer).unwrap();

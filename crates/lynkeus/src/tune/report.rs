@@ -4,12 +4,12 @@ use std::fmt;
 
 use lynkeus_answer::Document;
 use lynkeus_answer::document::{Cell, Table};
-use lynkeus_expr::real::rounded;
 use lynkeus_words::counted;
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::axis::shown;
+use super::measures::brief;
 use super::{Peak, Row, Sweep};
 use crate::entries::Named;
 use crate::prepare::declared::Account;
@@ -28,9 +28,10 @@ pub(crate) struct SweepReport<'a> {
     keys: Vec<SweptKey<'a>>,
     /// the study's own value of each key
     present: Named<Option<f64>>,
-    /// the tuning of the least error
+    /// the tuning of the least error; of filters on a log the most likely one
     knee: Option<SweptRow<'a>>,
-    /// values of the first key whose error is within 10 % of that, `[smallest, largest]`
+    /// values of the first key whose error is within 10 % of that, `[smallest, largest]`; of filters on a log
+    /// those that are as likely within 95 %: the logarithm of the likelihood is at most 1.92 less
     nearly_as_good: Option<[f64; 2]>,
     /// each tuning
     rows: Vec<SweptRow<'a>>,
@@ -44,9 +45,9 @@ pub(crate) struct SweepReport<'a> {
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 struct SweptKey<'a> {
-    /// the key of `[observer]`
+    /// the key of `[observer]`, or `process_noise.NAME`, `noise.OUTPUT`
     key: &'a str,
-    /// whether its values are factors on all numbers of a list
+    /// whether its values are factors on all numbers of a list, or of a section
     factor: bool,
 }
 
@@ -63,6 +64,9 @@ struct SweptRow<'a> {
     /// the largest error, where it is known
     #[serde(skip_serializing_if = "Option::is_none")]
     peak: Option<&'a Peak>,
+    /// readings that the likelihood counts; of filters on a log
+    #[serde(skip_serializing_if = "Option::is_none")]
+    readings: Option<usize>,
     /// why there are no figures
     #[serde(skip_serializing_if = "Option::is_none")]
     failure: Option<&'a str>,
@@ -121,6 +125,7 @@ impl Sweep {
             keys: keys.map(|(axis, x)| (axis.key.clone(), *x)).collect(),
             figures: figures.map(|(m, x)| (m.name.to_owned(), *x)).collect(),
             peak: row.peak.as_ref(),
+            readings: row.readings,
             failure: row.failure.as_deref(),
         }
     }
@@ -132,36 +137,29 @@ impl Sweep {
         let at: Vec<String> = pairs
             .map(|(axis, x)| format!("{} = {}", axis.label(), shown(*x)))
             .collect();
-        let first = self.measures.first()?;
-        let least = row.figure(0).map_or(String::new(), brief);
-        let mut text = format!("knee: {} ({} {least})", at.join(", "), first.title);
+        let decides = self.measures.get(self.objective)?;
+        let least = row
+            .figure(self.objective)
+            .map_or(String::new(), |x| decides.shown(x));
+        let mut text = format!("knee: {} ({} {least})", at.join(", "), decides.title);
         let good = self.good().filter(|g| g.start() < g.end());
         if let (Some(good), Some(axis)) = (good, self.axes.first()) {
             let (low, high) = (shown(*good.start()), shown(*good.end()));
             text += &format!(
-                "; within 10 % of it from {} = {low} to {high}",
+                "; {} from {} = {low} to {high}",
+                self.nearly("it"),
                 axis.label()
             );
         }
         if let Some(peak) = &row.peak {
             text += &format!(
                 "; its largest error is at t = {}, where {} is estimated at {}",
-                brief(peak.time),
+                brief(peak.time, 3),
                 peak.name,
-                brief(peak.estimate)
+                brief(peak.estimate, 3)
             );
         }
         Some(text)
-    }
-}
-
-/// Three significant digits.
-pub(crate) fn brief(x: f64) -> String {
-    let rounded = rounded(x, 3);
-    match rounded.abs() {
-        1e5.. => format!("{rounded:e}"),
-        y if y > 0.0 && y < 1e-4 => format!("{rounded:e}"),
-        _ => format!("{rounded}"),
     }
 }
 
@@ -222,7 +220,8 @@ impl Sweep {
         let titles = keys.chain(measures).chain([String::new()]);
         let rows = self.rows.iter().enumerate().map(|(place, row)| {
             let values = row.values.iter().map(|x| Cell::Number(shown(*x)));
-            let figures = row.figures.iter().map(|x| Cell::number(*x, brief));
+            let figures = self.measures.iter().zip(&row.figures);
+            let figures = figures.map(|(measure, x)| Cell::number(*x, |x| measure.shown(x)));
             let knee = (self.knee == Some(place)).then(|| "\u{2190} knee".to_owned());
             let failure = row.failure.as_deref().map(shortened);
             let remarks: Vec<String> = knee.into_iter().chain(failure).collect();

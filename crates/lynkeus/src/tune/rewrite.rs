@@ -1,36 +1,11 @@
-//! The chosen values into the study file, of which everything else stays as it is.
+//! The chosen values into the study file.
 
-use std::ops::Range;
-
-use toml_edit::{Document, Item, Table, Value};
+use lynkeus_study::Swept;
 
 use super::axis::shown;
 use super::{Axis, Sweep};
 use crate::Error;
-
-/// What editors of some systems put before a text.
-const MARK: &str = "\u{feff}";
-
-/// What was changed at a key.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Change {
-    /// The key as the sweep has it: `theta`, `theta[1]`.
-    pub key: String,
-    /// What stood there; none where the key is new.
-    pub from: Option<String>,
-    /// What stands there now.
-    pub to: String,
-}
-
-impl std::fmt::Display for Change {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match &self.from {
-            Some(from) if *from == self.to => write!(f, "{} stays {}", self.key, self.to),
-            Some(from) => write!(f, "{}: {from} becomes {}", self.key, self.to),
-            None => write!(f, "{} = {} is new", self.key, self.to),
-        }
-    }
-}
+use crate::rewrite::{Assignment, Change, rewritten};
 
 impl Sweep {
     /// The study's text with the values of the knee at the swept keys, and what changed. Only
@@ -40,178 +15,34 @@ impl Sweep {
     /// There is no knee, or `text` is not the study that was swept.
     pub fn rewritten(&self, text: &str) -> Result<(String, Vec<Change>), Error> {
         let knee = self.chosen().ok_or_else(|| self.refusal())?;
-        let (mark, mut text) = match text.strip_prefix(MARK) {
-            Some(rest) => (MARK, rest.to_owned()),
-            None => ("", text.to_owned()),
-        };
-        let mut changes = vec![];
-        for (axis, value) in self.axes.iter().zip(&knee.values) {
-            // one key after the other, as the sweep set them
-            let change;
-            (text, change) = put(&text, axis, *value)?;
-            changes.push(change);
-        }
-        parsed(&text)?;
-        Ok((format!("{mark}{text}"), changes))
-    }
-}
-
-fn parsed(text: &str) -> Result<Document<&str>, Error> {
-    Document::parse(text).map_err(|e| Error::input(format!("not a TOML file: {e}")))
-}
-
-/// A piece of the text and what replaces it.
-struct Edit {
-    range: Range<usize>,
-    by: String,
-}
-
-fn put(text: &str, axis: &Axis, value: f64) -> Result<(String, Change), Error> {
-    let document = parsed(text)?;
-    let (base, path) = axis.path();
-    let key = axis.key.clone();
-    let Some(item) = document.get("observer") else {
-        let (end, to) = (line_end(text), shown(value));
-        let change = Change {
-            key,
-            from: None,
-            to: to.clone(),
-        };
-        let section = format!("{text}{end}[observer]{end}{base} = {to}{end}");
-        return Ok((section, change));
-    };
-    let Some(observer) = item.as_table_like() else {
-        return Err(Error::input("[observer] of the study is no table"));
-    };
-    let Some(present) = observer.get(base) else {
-        let to = shown(value);
-        let edit = addition(text, item, &format!("{base} = {to}"))
-            .ok_or_else(|| Error::input(format!("cannot see where `{base}` belongs")))?;
-        let change = Change {
-            key,
-            from: None,
-            to,
-        };
-        return Ok((edited(text, 0..text.len(), &[edit]), change));
-    };
-    let gone = || Error::input(format!("[observer] no longer has `{}`", axis.key));
-    let mut slot = present.as_value().ok_or_else(gone)?;
-    for &index in path {
-        let entries = slot.as_array().ok_or_else(gone)?;
-        slot = entries.get(index).ok_or_else(gone)?;
-    }
-    let place = slot.span().ok_or_else(gone)?;
-    let mut edits = vec![];
-    scale(slot, axis, value, &mut edits)?;
-    let change = Change {
-        key,
-        from: text.get(place.clone()).map(str::to_owned),
-        to: edited(text, place, &edits),
-    };
-    Ok((edited(text, 0..text.len(), &edits), change))
-}
-
-/// Replaces a number, or every number of a list.
-fn scale(slot: &Value, axis: &Axis, value: f64, edits: &mut Vec<Edit>) -> Result<(), Error> {
-    if let Some(entries) = slot.as_array() {
-        return entries
+        let axes = self.axes.iter().zip(knee.values.iter().copied());
+        let written: Vec<_> = axes
+            .map(|(axis, value)| (axis, written(axis, value)))
+            .collect();
+        let assignments = written
             .iter()
-            .try_for_each(|e| scale(e, axis, value, edits));
+            .map(|(axis, written)| assignment(axis, written));
+        rewritten(text, assignments)
     }
-    if let Some(parts) = slot.as_inline_table() {
-        // a conjugate pair of poles
-        return parts
-            .iter()
-            .try_for_each(|(_, e)| scale(e, axis, value, edits));
-    }
-    let whole = slot.as_integer().map(|i| i as f64);
-    let (Some(present), Some(range)) = (slot.as_float().or(whole), slot.span()) else {
-        return Err(Error::input(format!(
-            "`{}` is no longer a number",
-            axis.key
-        )));
+}
+
+/// What is written at an axis for a number that stands there.
+fn written(axis: &Axis, value: f64) -> impl Fn(Option<f64>) -> String {
+    move |present| shown(present.map_or(value, |present| axis.chosen(present, value)))
+}
+
+fn assignment<'a>(axis: &'a Axis, written: &'a dyn Fn(Option<f64>) -> String) -> Assignment<'a> {
+    let name = |name: &'a Option<String>| name.as_deref().map(|name| (name, &[][..]));
+    let (tables, place): (&'static [&'static str], _) = match axis.swept() {
+        Swept::Tuning(base, path) => (&["observer"], Some((base.as_str(), &path[..]))),
+        Swept::Density(of) => (&["process_noise"], name(of)),
+        Swept::Noise(of) => (&["sensors", "noise"], name(of)),
     };
-    let chosen = axis.chosen(present, value);
-    if chosen != present {
-        // else as it was written
-        let by = shown(chosen);
-        edits.push(Edit { range, by });
-    }
-    Ok(())
-}
-
-/// A piece of `text` with the edits in it, which come in its order.
-fn edited(text: &str, piece: Range<usize>, edits: &[Edit]) -> String {
-    let mut out = String::new();
-    let mut at = piece.start;
-    for edit in edits {
-        out.push_str(text.get(at..edit.range.start).unwrap_or_default());
-        out.push_str(&edit.by);
-        at = edit.range.end;
-    }
-    out.push_str(text.get(at..piece.end).unwrap_or_default());
-    out
-}
-
-/// How `[observer]`, however it is written, gets a key: after its last one.
-fn addition(text: &str, observer: &Item, assignment: &str) -> Option<Edit> {
-    let insert = |at: usize, by: String| Some(Edit { range: at..at, by });
-    match observer {
-        Item::Value(Value::InlineTable(table)) => {
-            let ends = table.iter().filter_map(|(_, value)| value.span());
-            match ends.map(|span| span.end).max() {
-                Some(end) => insert(end, format!(", {assignment}")),
-                None => insert(table.span()?.start + 1, format!(" {assignment} ")),
-            }
-        }
-        Item::Table(table) => {
-            let header = table.span().filter(|_| !table.is_implicit());
-            if let Some(end) = last_end(table).or(header.map(|span| span.end)) {
-                let prefix = if table.is_dotted() { "observer." } else { "" };
-                return Some(new_line(text, end, &format!("{prefix}{assignment}")));
-            }
-            // only tables in it, such as [observer.initial]: its own comes before them
-            let inner = table.iter().filter_map(|(_, item)| item.span());
-            let first = inner.map(|span| span.start).min()?;
-            let end = line_end(text);
-            let start = text.get(..first)?.rfind('\n').map_or(0, |i| i + 1);
-            insert(start, format!("[observer]{end}{assignment}{end}{end}"))
-        }
-        _ => None,
-    }
-}
-
-/// Where the last value ends that stands in a table itself.
-fn last_end(table: &Table) -> Option<usize> {
-    let end = |item: &Item| match item {
-        Item::Value(value) => value.span().map(|span| span.end),
-        Item::Table(inner) if inner.is_dotted() => last_end(inner),
-        _ => None,
-    };
-    table.iter().filter_map(|(_, item)| end(item)).max()
-}
-
-/// A line below the one in which `end` is.
-fn new_line(text: &str, end: usize, line: &str) -> Edit {
-    let (at, by) = match text.get(end..).and_then(|rest| rest.find('\n')) {
-        Some(more) => {
-            let at = end + more + 1;
-            let above = text.get(..at).unwrap_or_default();
-            (
-                at,
-                format!("{line}{}", line_end(above.get(end..).unwrap_or_default())),
-            )
-        }
-        None => (text.len(), format!("{}{line}", line_end(text))),
-    };
-    Edit { range: at..at, by }
-}
-
-/// The line end that a text uses.
-fn line_end(text: &str) -> &'static str {
-    match text.contains("\r\n") {
-        true => "\r\n",
-        false => "\n",
+    Assignment {
+        key: axis.key.clone(),
+        tables,
+        place,
+        written,
     }
 }
 
@@ -223,14 +54,15 @@ mod tests {
 
     fn sweep(text: &str, values: &[f64]) -> Sweep {
         let axes = axis::axes(&Study::parse(text, "s.toml").unwrap()).unwrap();
-        let mut row = Row::empty(values, measures::SIMULATED.len());
+        let mut row = Row::empty(values, measures::simulated(false).len());
         row.set(measures::TOTAL_ERROR, Some(1.0));
         Sweep {
             plant: "P".to_owned(),
             log: None,
             axes,
-            measures: measures::SIMULATED,
+            measures: measures::simulated(false),
             rows: vec![row],
+            objective: measures::OBJECTIVE,
             knee: Some(0),
             time_unit: None,
             declared: crate::Account::default(),
@@ -339,6 +171,83 @@ mod tests {
             assert_eq!(new, format!("{text}{end}[observer]{end}theta = 2{end}"));
             assert_eq!(changes[0].to_string(), "theta = 2 is new");
         }
+    }
+
+    #[test]
+    fn noises_are_written_where_they_stand() {
+        let filter = "observer = { family = \"ekf\" }\n";
+        for (keys, values, text, new) in [
+            (
+                "process_noise.x = [1], noise.y = [1]",
+                &[0.5, 2.0][..],
+                "[process_noise]\nx = 0.1 # slow\n[sensors]\nnoise = { y = 1 }\n",
+                "[process_noise]\nx = 0.5 # slow\n[sensors]\nnoise = { y = 2 }\n",
+            ),
+            (
+                "process_noise.w = [1]",
+                &[0.5],
+                "process_noise.x = 1\n[sensors]\nmeasured = [\"y\"]\n",
+                "process_noise.x = 1\nprocess_noise.w = 0.5\n[sensors]\nmeasured = [\"y\"]\n",
+            ),
+            (
+                "process_noise.\"x[1]\" = [1], noise.y = [1]",
+                &[0.5, 2.0],
+                "[process_noise]\r\nx = 1\r\n[sensors]\r\nmeasured = [\"y\"]\r\n",
+                "[process_noise]\r\nx = 1\r\n\"x[1]\" = 0.5\r\n[sensors]\r\nmeasured = [\"y\"]\r\nnoise = { y = 2 }\r\n",
+            ),
+            (
+                "process_noise.w = [1], noise.y = [1]",
+                &[0.5, 2.0],
+                "plant = 'p'\n",
+                "plant = 'p'\n\n[process_noise]\nw = 0.5\n\n[sensors.noise]\ny = 2\n",
+            ),
+            (
+                "noise.y = [1]",
+                &[2.0],
+                "sensors = { noise.z = 1 }\n",
+                "sensors = { noise.z = 1, noise.y = 2 }\n",
+            ),
+            (
+                "noise.y = [1]",
+                &[2.0],
+                "sensors.noise.z = 1\n[plot]\n",
+                "sensors.noise.z = 1\nsensors.noise.y = 2\n[plot]\n",
+            ),
+            (
+                "noise.y = [1]",
+                &[2.0],
+                "[sensors]\nnoise.z = 1\n[sensors.limits]\ny = [0, 1]\n",
+                "[sensors]\nnoise.z = 1\nnoise.y = 2\n[sensors.limits]\ny = [0, 1]\n",
+            ),
+            (
+                "noise.y = [1]",
+                &[2.0],
+                "[sensors.limits]\ny = [0, 1]\n",
+                "[sensors]\nnoise = { y = 2 }\n\n[sensors.limits]\ny = [0, 1]\n",
+            ),
+        ] {
+            let sweep = sweep(&format!("{filter}tune.keys = {{ {keys} }}"), values);
+            let (found, _) = sweep.rewritten(text).unwrap();
+            assert_eq!(found, new);
+            // it is the study that was meant
+            Study::parse(&found, "s.toml").unwrap();
+        }
+    }
+
+    #[test]
+    fn all_noises_are_multiplied() {
+        let sections = "process_noise = { x = 0.1, v = 3 }\nsensors.noise = { y = \"5%\", z = { uniform = 1 } }\n";
+        let keys =
+            "observer = { family = \"ekf\" }\ntune.keys = { process_noise = [2], noise = [2] }\n";
+        let (found, changes) = sweep(&format!("{keys}{sections}"), &[2.0, 3.0])
+            .rewritten(sections)
+            .unwrap();
+        let new = "process_noise = { x = 0.2, v = 6 }\nsensors.noise = { y = \"15%\", z = { uniform = 3 } }\n";
+        assert_eq!(found, new);
+        assert_eq!(
+            changes[0].to_string(),
+            "process_noise: x = 0.1, v = 3 becomes x = 0.2, v = 6"
+        );
     }
 
     #[test]

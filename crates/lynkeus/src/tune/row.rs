@@ -11,6 +11,8 @@ pub struct Row {
     pub figures: Vec<Option<f64>>,
     /// Where the largest error of the exact run is; only in simulation.
     pub peak: Option<Peak>,
+    /// Readings that the likelihood counts; of filters on a log.
+    pub readings: Option<usize>,
     /// Why figures are missing, if a run failed.
     pub failure: Option<String>,
 }
@@ -33,6 +35,7 @@ impl Row {
             values: values.to_vec(),
             figures: vec![None; measures],
             peak: None,
+            readings: None,
             failure: None,
         }
     }

@@ -153,7 +153,23 @@ fn a_filter_on_a_log_foretells_what_it_is_not_shown() {
     folder.write("study.toml", &text);
     let data = data(&page(&folder, &["study.toml", "log.csv"]));
     let found = numbers(&figures(&data)["held_out_error"]);
-    assert_eq!(figures(&data).len(), 1);
+    assert_eq!(figures(&data).len(), 2);
+    // a position multiplies all densities, as a value of `tune` does
+    let factors = numbers(&data["tradeoff"]["values"]);
+    folder.write(
+        "tune.toml",
+        &format!("{text}\n[tune]\nkeys = {{ process_noise = {factors:?} }}\n"),
+    );
+    let tuned = folder.run(&["tune", "tune.toml", "--log", "log.csv", "--json"]);
+    assert_eq!(tuned.code, 0, "{}", tuned.err);
+    let tuned = tuned.json();
+    let rows = tuned["rows"].as_array().unwrap();
+    for (row, found) in rows.iter().zip(&found) {
+        let expected = row["held_out_error"].as_f64().unwrap();
+        assert!((found / expected - 1.0).abs() <= 1e-4, "{found} {expected}");
+    }
+    let knee = data["tradeoff"]["knee"].as_u64().unwrap() as usize;
+    assert_eq!(rows[knee]["keys"], tuned["knee"]["keys"]);
     let whole = folder.read("log.csv");
     let (header, rows) = csv(&whole);
     let level = header.iter().position(|h| h == "level").unwrap();

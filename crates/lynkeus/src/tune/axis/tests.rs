@@ -74,8 +74,7 @@ fn a_grid_is_counted_without_overflow() {
             values: vec![1.0; points],
             present: None,
             proposed: None,
-            base: (*key).to_owned(),
-            path: vec![],
+            swept: Swept::Tuning((*key).to_owned(), vec![]),
             place: None,
         };
         let axes: Vec<Axis> = keys.iter().map(axis).collect();
@@ -124,6 +123,68 @@ fn a_slider_has_the_studys_own_value_in_its_middle() {
     let poles = around(&study("observer = { poles = [-2, -3] }"), 5).unwrap();
     assert_eq!((poles.is_factor, poles.values[5]), (true, 1.0));
     assert_eq!(around(&study(""), 5), None);
-    let noise = Axis::of_factors("process noise", 100.0, 2);
+    let noise = Axis::of_densities(2);
     assert_eq!(noise.values, [0.01, 0.1, 1.0, 10.0, 100.0]);
+}
+
+#[test]
+fn noises_are_swept_for_filters() {
+    let text = "observer = { family = \"ekf\" }\nprocess_noise = { x = 0.1, v = 2 }\nsensors = { noise = { y = 0.5, z = \"5%\" } }\n";
+    let [all] = &axes(&study(text)).unwrap()[..] else {
+        panic!()
+    };
+    assert_eq!(
+        (all.label().as_str(), all.values.len()),
+        ("process_noise \u{d7}", 21)
+    );
+    assert_eq!([all.values[0], all.values[20]], [0.01, 100.0]);
+    let keys = "tune = { keys = { process_noise.w = [3], noise.y = {}, \"process_noise.x\" = [7], noise = [2] } }\n";
+    let whole =
+        "tune = { keys = { process_noise.w = [3], noise.y = {}, \"process_noise.x\" = [7] } }\n";
+    // a key `noise` and one in it are the same table of TOML
+    assert!(Study::parse(&format!("{text}{keys}"), "s.toml").is_err());
+    let s = study(&format!("{text}{whole}"));
+    let found = axes(&s).unwrap();
+    let present: Vec<Option<f64>> = found.iter().map(|axis| axis.present).collect();
+    assert_eq!(present, [None, Some(0.5), Some(0.1)]);
+    assert_eq!([found[1].values[0], found[1].values[20]], [0.125, 2.0]);
+    let (values, last) = grid(&s, &found).unwrap().pop().unwrap();
+    assert_eq!(values, [3.0, 2.0, 7.0]);
+    let densities: Vec<(&str, f64)> = last
+        .process_noise
+        .iter()
+        .map(|(name, density)| (name.text.as_str(), *density))
+        .collect();
+    assert_eq!(densities, [("x", 7.0), ("v", 2.0), ("w", 3.0)]);
+    assert_eq!(last.sensors.noise[0].1, Noise::Absolute(2.0));
+
+    let s = study(&format!("{text}tune = {{ keys = {{ noise = [2] }} }}"));
+    let (_, last) = grid(&s, &axes(&s).unwrap()).unwrap().pop().unwrap();
+    assert_eq!(last.sensors.noise[0].1, Noise::Absolute(1.0));
+    assert_eq!(last.sensors.noise[1].1, Noise::Relative(0.1));
+}
+
+#[test]
+fn noises_that_cannot_be_swept_are_refused_with_their_place() {
+    let e =
+        refusal("observer = { family = \"ekf\" }\ntune = { keys = { process_noise.x = [1, -1] } }");
+    assert!(e.starts_with("s.toml:2:"), "{e}");
+    assert!(e.contains("expected numbers >= 0, found -1"), "{e}");
+    let e = refusal(
+        "observer = { family = \"triangular\", theta = 1 }\ntune = { keys = { noise.y = [1] } }",
+    );
+    assert!(e.contains("\"noise.y\" is swept for filters"), "{e}");
+    assert!(e.contains("family is \"triangular\""), "{e}");
+    let e = refusal(
+        "observer = { family = \"ekf\" }\nsensors = { noise = { y = \"5%\" } }\ntune = { keys = { noise.y = [1] } }",
+    );
+    assert!(e.contains("is no standard deviation"), "{e}");
+    let e = refusal("observer = { family = \"ekf\" }\ntune = { keys = { process_noise = [1] } }");
+    assert!(
+        e.contains("the study has no [process_noise] for factors"),
+        "{e}"
+    );
+    assert!(
+        refusal("observer = { family = \"ekf\" }").contains("the study has no [process_noise]")
+    );
 }
