@@ -51,6 +51,7 @@ ANSWERS = {
     "RunReport": ("Study.simulate` and :meth:`lynkeus.Study.estimate`", "Simulation` or :class:`lynkeus.Estimation"),
     "MonteCarloReport": ("Study.simulate` with ``runs``", "MonteCarlo"),
     "SweepReport": ("Study.tune`", "Sweep"),
+    "FitReport": ("Study.fit`", "Fit"),
     "ComparisonReport": ("Study.compare`", "Comparison"),
 }
 #: entries of which the answer itself makes more

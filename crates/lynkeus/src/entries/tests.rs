@@ -10,6 +10,7 @@ use crate::certify::CertificateReport;
 use crate::check::CheckReport;
 use crate::compare::ComparisonReport;
 use crate::design::Report as DesignReport;
+use crate::fit::FitReport;
 use crate::judge::outcome::RunReport;
 use crate::monte_carlo::MonteCarloReport;
 use crate::precision::HowWellReport;
@@ -28,6 +29,7 @@ fn the_schema_of_answers_is_the_committed_one() {
         generator.subschema_for::<RunReport<'static>>(),
         generator.subschema_for::<MonteCarloReport<'static>>(),
         generator.subschema_for::<SweepReport<'static>>(),
+        generator.subschema_for::<FitReport<'static>>(),
         generator.subschema_for::<ComparisonReport<'static>>(),
     ];
     let schema = json!({
