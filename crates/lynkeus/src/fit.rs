@@ -6,6 +6,8 @@ mod errors;
 mod json;
 mod known;
 mod logs;
+#[cfg(feature = "plot")]
+mod picture;
 mod plant;
 mod problem;
 mod search;
@@ -48,6 +50,7 @@ pub struct Fit {
     pub plant: String,
     /// what was fitted to
     pub logs: Vec<String>,
+    pub(crate) time_unit: Option<String>,
     pub(crate) unknowns: Vec<Unknown>,
     /// −log L, without the share of priors
     pub nll: f64,
@@ -458,6 +461,7 @@ impl Work<'_> {
                 .iter()
                 .map(|log| log.place.clone())
                 .collect(),
+            time_unit: self.study.time_unit.clone(),
             unknowns: self.problem.unknowns.to_vec(),
             nll: found.point.nll,
             nll_at_start: begin.nll,

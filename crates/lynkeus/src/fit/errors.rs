@@ -32,8 +32,19 @@ pub(crate) struct Portion {
 pub(crate) struct Rows {
     /// number of the log, and time
     pub at: Vec<(usize, f64)>,
-    /// by output: reading − prediction, its deviation, and the error of the plant alone
-    pub columns: Vec<(String, [Vec<f64>; 3])>,
+    /// by output
+    pub columns: Vec<Innovations>,
+}
+
+/// Of one output, row by row; no number where it did not report.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Innovations {
+    pub output: String,
+    /// reading − prediction
+    pub innovation: Vec<f64>,
+    pub deviation: Vec<f64>,
+    /// reading − what the plant alone does
+    pub free_run: Vec<f64>,
 }
 
 #[derive(Clone, Copy, Default)]
@@ -66,22 +77,22 @@ pub(super) fn errors<'p>(
     outputs: &[String],
     values: &[f64],
 ) -> Result<(Vec<Errors>, Rows), Error> {
-    let mut rows = Rows {
-        at: vec![],
-        columns: outputs
-            .iter()
-            .map(|name| (name.clone(), Default::default()))
-            .collect(),
-    };
     let logs = problem.logs;
-    for (place, log) in logs.iter().enumerate() {
-        rows.at.extend(log.time.iter().map(|t| (place + 1, *t)));
-    }
-    for (_, columns) in &mut rows.columns {
-        columns
-            .iter_mut()
-            .for_each(|c| c.resize(rows.at.len(), f64::NAN));
-    }
+    let times = logs.iter().enumerate();
+    let at: Vec<(usize, f64)> = times
+        .flat_map(|(place, log)| log.time.iter().map(move |t| (place + 1, *t)))
+        .collect();
+    let column = || vec![f64::NAN; at.len()];
+    let columns = outputs.iter().map(|output| Innovations {
+        output: output.clone(),
+        innovation: column(),
+        deviation: column(),
+        free_run: column(),
+    });
+    let mut rows = Rows {
+        columns: columns.collect(),
+        at,
+    };
     let count = outputs.len();
     // by output: fitted and held out, of what is fitted and of the plant alone
     let mut sums = vec![[[Sum::default(); 2]; 2]; count];
@@ -93,14 +104,14 @@ pub(super) fn errors<'p>(
             problem.score(place, values, Which::All, |seen| {
                 let is_held_out = usize::from(seen.row >= log.fitted);
                 sums[seen.sensor][way][is_held_out].add(seen.innovation, seen.variance);
-                let columns = &mut rows.columns[seen.sensor].1;
+                let columns = &mut rows.columns[seen.sensor];
                 let at = first + seen.row;
                 if way == 1 {
-                    columns[2][at] = seen.innovation;
+                    columns.free_run[at] = seen.innovation;
                     return;
                 }
-                columns[0][at] = seen.innovation;
-                columns[1][at] = seen.variance.sqrt();
+                columns.innovation[at] = seen.innovation;
+                columns.deviation[at] = seen.variance.sqrt();
                 if is_held_out == 0 {
                     scaled[seen.sensor].push(seen.innovation / seen.variance.sqrt());
                 }

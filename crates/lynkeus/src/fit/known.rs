@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use super::problem::{Point, Problem};
 use super::unknown::{Kind, Unknown};
 use crate::Error;
-use crate::prepare::{self, Prepared};
+use crate::prepare::{self, Prepared, calibrate};
 use crate::words::explain;
 
 /// The time for what the sensors can tell at all.
@@ -40,6 +40,8 @@ pub(super) fn exact(
     }
     let study = prepared.study();
     let sensors = prepare::sensors(study, symbolic);
+    // unknown inputs wander slowly, as the filter has them
+    let symbolic = &calibrate::constant_inputs(symbolic.clone(), &sensors.unknown);
     let is_fitted = |place: usize| {
         let mut starts = unknowns.iter();
         starts.any(|u| matches!(u.kind, Kind::Start { state, .. } if state == place))
@@ -51,7 +53,6 @@ pub(super) fn exact(
     let known = states.filter(|(place, _)| is_exact(*place) && !is_fitted(*place));
     let question = Question {
         measured: sensors.measured,
-        unknown: sensors.unknown,
         disturbances: sensors.disturbances,
         parameters: true,
         known_starts: known.map(|(_, state)| state.name.clone()).collect(),

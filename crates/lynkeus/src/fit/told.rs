@@ -43,13 +43,22 @@ impl Answer for Fit {
         if self.logs.len() > 1 {
             all.insert(0, ("log".to_owned(), numbers.into()));
         }
-        for (name, columns) in &self.rows.columns {
-            let headers = ["innovation", "innovation_sd", "free_run_error"];
-            for (header, column) in headers.iter().zip(columns) {
-                all.push((format!("{name}_{header}"), column.clone().into()));
+        for own in &self.rows.columns {
+            let columns = [
+                ("innovation", &own.innovation),
+                ("innovation_sd", &own.deviation),
+                ("free_run_error", &own.free_run),
+            ];
+            for (header, column) in columns {
+                all.push((format!("{}_{header}", own.output), column.clone().into()));
             }
         }
         all
+    }
+
+    #[cfg(feature = "plot")]
+    fn svg(&self) -> Result<Option<String>, Error> {
+        self.figure().to_svg().map(Some).map_err(Error::from)
     }
 
     fn refusal(&self) -> Option<Error> {
