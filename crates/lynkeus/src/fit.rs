@@ -50,7 +50,8 @@ pub struct Fit {
     pub plant: String,
     /// what was fitted to
     pub logs: Vec<String>,
-    pub(crate) time_unit: Option<String>,
+    /// the unit of time, where the study names it
+    pub time_unit: Option<String>,
     pub(crate) unknowns: Vec<Unknown>,
     /// −log L, without the share of priors
     pub nll: f64,

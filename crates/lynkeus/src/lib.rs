@@ -87,8 +87,6 @@ mod rewrite;
 
 pub mod tune;
 
-mod fit;
-
 mod check;
 
 mod certify;
@@ -99,6 +97,8 @@ mod compare;
 
 #[cfg(feature = "plot")]
 mod figure;
+
+mod fit;
 
 pub mod monte_carlo;
 
