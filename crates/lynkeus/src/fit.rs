@@ -221,8 +221,11 @@ struct Work<'w> {
 /// What −log L may change by where steps are halved.
 const SETTLED: f64 = 1e-4;
 
-/// Halvings of the usual interval between rows.
-const HALVINGS: usize = 12;
+/// The same as a share of −log L, at the start: there nothing fits yet.
+const NEARLY: f64 = 1e-5;
+
+/// Most halvings of the usual interval between rows, at the start and at the end.
+const HALVINGS: [usize; 2] = [5, 8];
 
 impl Work<'_> {
     fn done(
@@ -261,8 +264,12 @@ impl Work<'_> {
         let interval = intervals.fold(f64::INFINITY, f64::min);
         self.problem.step = Step::AtMost(interval);
         let mut point = self.problem.at(z)?;
-        for _ in 0..HALVINGS {
-            let Some(next) = self.halved(&point.z)? else {
+        for _ in 0..HALVINGS[0] {
+            if self.study.budget.spent().is_some() {
+                break;
+            }
+            let tolerance = SETTLED.max(NEARLY * point.value.abs());
+            let Some(next) = self.halved(&point, tolerance)? else {
                 return Ok(point);
             };
             point = next;
@@ -271,15 +278,13 @@ impl Work<'_> {
     }
 
     /// The same point at half the steps, which are kept where that changes it.
-    fn halved(&mut self, z: &DVector<f64>) -> Result<Option<Point>, Error> {
+    fn halved(&mut self, coarse: &Point, tolerance: f64) -> Result<Option<Point>, Error> {
         let Step::AtMost(length) = self.problem.step else {
             return Ok(None);
         };
-        let coarse = self.problem.at(z.clone())?;
         self.problem.step = Step::AtMost(0.5 * length);
-        let fine = self.problem.at(z.clone())?;
-        let change = (fine.value - coarse.value).abs();
-        if change < SETTLED && fine.value.is_finite() {
+        let fine = self.problem.at(coarse.z.clone())?;
+        if (fine.value - coarse.value).abs() < tolerance {
             self.problem.step = Step::AtMost(length);
             return Ok(None);
         }
@@ -318,11 +323,15 @@ impl Work<'_> {
 
     /// At steps that are short enough there, too, and with noises at their least where that is as good.
     fn settled(&mut self, mut best: Found) -> Result<Found, Error> {
-        for _ in 0..HALVINGS {
-            if best.is_ended || self.halved(&best.point.z)?.is_none() {
+        for _ in 0..HALVINGS[1] {
+            if best.is_ended {
                 break;
             }
-            best = self.again(best.point.z.clone(), &vec![false; best.point.z.len()])?;
+            let Some(fine) = self.halved(&best.point, SETTLED)? else {
+                break;
+            };
+            let free = vec![false; fine.z.len()];
+            best = self.again(fine.z, &free)?;
         }
         let mut held = vec![false; best.point.z.len()];
         for i in 0..held.len() {
@@ -408,6 +417,12 @@ impl Work<'_> {
     }
 
     fn warn(&mut self, best: &Found, optima: &[Optimum]) {
+        if best.point.confined > 0 {
+            self.warnings.push(format!(
+                "the model has no value where the estimate was: at {} rows it was put back into its declared range",
+                best.point.confined
+            ));
+        }
         for (i, unknown) in self.problem.unknowns.iter().enumerate() {
             if !best.is_bound[i] {
                 continue;

@@ -150,6 +150,7 @@ impl Case {
             process_noise: (0..self.n)
                 .map(|i| if is_noisy(i) { q.node() } else { zero })
                 .collect(),
+            ranges: vec![],
             start: states
                 .iter()
                 .map(|_| (start.node(), g.constant(0.2).node()))
@@ -298,6 +299,7 @@ fn the_information_is_fisher_s() {
             limits: None,
         }],
         process_noise: vec![zero],
+        ranges: vec![],
         start: vec![(c.node(), zero)],
         parameters: vec![c.node(), r.node()],
     })
@@ -368,6 +370,7 @@ fn a_plant_without_parameters_has_a_value() {
             limits: None,
         }],
         process_noise: vec![number(0.0)],
+        ranges: vec![],
         start: vec![(number(0.0), number(0.0))],
         parameters: vec![],
     })

@@ -6,7 +6,7 @@ use lynkeus_expr::Node;
 use lynkeus_model::Plant;
 use lynkeus_observers::FilterTuning;
 use lynkeus_run::Level;
-use lynkeus_run::filter::{Likelihood, ParametricLevel, ParametricPlant, ParametricSensor};
+use lynkeus_run::filter::{Likelihood, Limits, ParametricLevel, ParametricPlant, ParametricSensor};
 use lynkeus_structure::AugmentedPlant;
 
 use super::unknown::{Kind, Unknown};
@@ -131,6 +131,14 @@ impl Source<'_> {
             inputs: symbolic.inputs.iter().map(|input| input.node).collect(),
             sensors: sensors.collect::<Result<_, Error>>()?,
             process_noise: symbolic.states.iter().enumerate().map(density).collect(),
+            ranges: symbolic
+                .states
+                .iter()
+                .map(|state| Limits {
+                    low: state.min,
+                    high: state.max,
+                })
+                .collect(),
             start: symbolic.states.iter().enumerate().map(start).collect(),
             parameters: symbols,
         };

@@ -22,6 +22,8 @@ pub(crate) struct Point {
     /// without the prior's share
     pub nll: f64,
     pub readings: usize,
+    /// intervals on which the plant had no value where the estimate was
+    pub confined: usize,
 }
 
 /// A log with the function of the unknowns that it is.
@@ -78,6 +80,7 @@ impl Problem<'_> {
             information: DMatrix::zeros(n, n),
             nll: 0.0,
             readings: 0,
+            confined: 0,
             z,
         };
         for place in 0..self.terms.len() {
@@ -85,6 +88,7 @@ impl Problem<'_> {
             let places = &self.terms[place].places;
             point.nll += score.value;
             point.readings += score.readings;
+            point.confined += score.confined;
             for (i, &p) in places.iter().enumerate() {
                 point.gradient[p] += score.gradient[i];
                 for (j, &q) in places.iter().enumerate() {

@@ -44,6 +44,8 @@ pub struct Score {
     pub information: Vec<f64>,
     /// how many readings there were
     pub readings: usize,
+    /// intervals on which the plant had no value where the estimate was ([`ParametricPlant::ranges`])
+    pub confined: usize,
 }
 
 /// [`Score`]s of one plant: compiled once, for any log and any θ.
@@ -69,6 +71,7 @@ pub struct Score {
 ///         limits: None,
 ///     }],
 ///     process_noise: vec![number(0.0)],
+///     ranges: vec![],
 ///     start: vec![(level.node(), number(0.0))],
 ///     parameters: vec![level.node()],
 /// })?;
@@ -168,6 +171,7 @@ struct Passes<const L: usize> {
     begin: Code<L>,
     /// of t, h, u, x̂, S and θ: x̂ and S a step later
     predict: Code<L>,
+    spare: Option<Spare<L>>,
     sensors: Vec<Sensor<L>>,
     inputs: usize,
     states: usize,
@@ -175,6 +179,16 @@ struct Passes<const L: usize> {
     /// x̂ at the row before its readings count
     at: Vec<Bundle<L>>,
     seen: Tangents,
+}
+
+/// For intervals on which the plant has no value where the estimate is.
+#[derive(Clone, Debug)]
+struct Spare<const L: usize> {
+    /// as the other, of the plant that sees the states within their ranges
+    predict: Code<L>,
+    ranges: Vec<Limits>,
+    /// x̂ and S at the row
+    before: Vec<Bundle<L>>,
 }
 
 /// A sensor's code.
@@ -222,16 +236,26 @@ impl<const L: usize> Passes<L> {
                     .transpose()?,
             })
         });
-        let count = passes(parameters, L);
+        let belief = vec![vec![[0.0; L]; 2 * sample.numbers()]; passes(parameters, L)];
+        let has_ends = |range: &Limits| range.low.is_finite() || range.high.is_finite();
+        let spare = match plant.ranges.iter().any(has_ends) {
+            false => None,
+            true => Some(Spare {
+                predict: sample.confined(compile)?,
+                ranges: plant.ranges.clone(),
+                before: belief.clone(),
+            }),
+        };
         Ok(Self {
             parameters,
             begin: sample.begin(compile)?,
             predict: sample.predict(compile)?,
+            spare,
             sensors: sensors.collect::<Result<_>>()?,
             inputs: plant.inputs.len(),
             states,
-            belief: vec![vec![[0.0; L]; 2 * sample.numbers()]; count],
-            at: vec![vec![[0.0; L]; 2 * states]; count],
+            at: vec![vec![[0.0; L]; 2 * states]; belief.len()],
+            belief,
             seen: Tangents {
                 dν: vec![0.0; parameters],
                 dσ2: vec![0.0; parameters],
@@ -264,7 +288,7 @@ impl<const L: usize> Passes<L> {
                 return Err(Error::NoNumber { signal, value });
             }
             if let Some(from) = before.filter(|from| *from != row.t) {
-                self.advance(from, row.t, step, &inputs)?;
+                score.confined += usize::from(self.advance(from, row.t, step, &inputs)?);
             }
             before = Some(row.t);
             inputs.clear();
@@ -282,6 +306,9 @@ impl<const L: usize> Passes<L> {
     fn place(&mut self, parameters: &[f64]) {
         self.begin.place(parameters);
         self.predict.place(parameters);
+        if let Some(spare) = &mut self.spare {
+            spare.predict.place(parameters);
+        }
         for sensor in &mut self.sensors {
             sensor.correct.place(parameters);
             if let Some(limited) = &mut sensor.limited {
@@ -291,21 +318,45 @@ impl<const L: usize> Passes<L> {
         }
     }
 
-    /// From one row to the next.
-    fn advance(&mut self, from: f64, to: f64, step: Step, inputs: &[f64]) -> Result<()> {
+    /// From one row to the next; whether the estimate had to be put where the plant has a value.
+    fn advance(&mut self, from: f64, to: f64, step: Step, inputs: &[f64]) -> Result<bool> {
         if to < from {
             let (reached, time) = (from, to);
             return Err(Error::TimeBefore { reached, time });
         }
         let steps = fixed_steps(from, to, step.length(to - from).unwrap_or(to - from))?;
-        for i in 0..steps {
-            let [t, next] = [i, i + 1].map(|i| instant(from, to, steps, i));
-            for (pass, belief) in self.belief.iter_mut().enumerate() {
-                let next = self.predict.run(pass, [&[t, next - t], inputs], &[belief]);
-                belief.copy_from_slice(next);
+        let interval = Interval {
+            from,
+            to,
+            steps,
+            inputs,
+        };
+        let Some(spare) = &mut self.spare else {
+            interval.run(&mut self.predict, &mut self.belief);
+            return Ok(false);
+        };
+        for (before, belief) in spare.before.iter_mut().zip(&self.belief) {
+            before.copy_from_slice(belief);
+        }
+        interval.run(&mut self.predict, &mut self.belief);
+        let is_value = |x: &[f64; L]| x[0].is_finite();
+        if self.belief[0].iter().all(is_value) {
+            return Ok(false);
+        }
+        for (before, belief) in spare.before.iter().zip(&mut self.belief) {
+            belief.copy_from_slice(before);
+            let half = belief.len() / 2;
+            for (i, range) in spare.ranges.iter().enumerate() {
+                let x = belief[i][0];
+                let inside = x.max(range.low).min(range.high);
+                if inside != x {
+                    belief[i] = [inside; L];
+                    belief[half + i] = [0.0; L];
+                }
             }
         }
-        Ok(())
+        interval.run(&mut spare.predict, &mut self.belief);
+        Ok(true)
     }
 
     /// The readings of a row, one after the other; h and its slopes are those at the estimate before them.
@@ -377,6 +428,26 @@ impl<const L: usize> Passes<L> {
     }
 }
 
+/// From one row to the next by equal steps.
+struct Interval<'i> {
+    from: f64,
+    to: f64,
+    steps: usize,
+    inputs: &'i [f64],
+}
+
+impl Interval<'_> {
+    fn run<const L: usize>(&self, code: &mut Code<L>, belief: &mut [Bundle<L>]) {
+        for i in 0..self.steps {
+            let [t, next] = [i, i + 1].map(|i| instant(self.from, self.to, self.steps, i));
+            for (pass, belief) in belief.iter_mut().enumerate() {
+                let next = code.run(pass, [&[t, next - t], self.inputs], &[belief]);
+                belief.copy_from_slice(next);
+            }
+        }
+    }
+}
+
 /// ν and R with which a reading at an end corrects, with their tangents; none where it says nothing. `found`
 /// are ν, σ² and R of the end as a reading.
 fn weighed<const L: usize>(end: End, found: &[[f64; L]]) -> Option<[[f64; L]; 4]> {
@@ -426,6 +497,7 @@ impl Score {
             gradient: vec![0.0; parameters],
             information: vec![0.0; parameters * parameters],
             readings: 0,
+            confined: 0,
         }
     }
 

@@ -23,6 +23,9 @@ pub struct ParametricPlant<'g> {
     pub sensors: Vec<ParametricSensor>,
     /// spectral density of the white noise on each derivative
     pub process_noise: Vec<Node>,
+    /// where the plant is known to have values, one per state, or none: where it has none at an estimate, this
+    /// is put there, and the plant's expressions see it limited to that until the next row
+    pub ranges: Vec<Limits>,
     /// the first estimate of each state, and its standard deviation
     pub start: Vec<(Node, Node)>,
     /// symbols of θ

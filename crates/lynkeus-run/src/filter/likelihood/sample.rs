@@ -17,8 +17,7 @@ type Compile<const L: usize> = fn(&Tape) -> Option<Function<L>>;
 /// The expressions of a sample.
 pub(super) struct Sample<'p, 'g> {
     plant: &'p ParametricPlant<'g>,
-    /// F and C: row, column and entry
-    slopes: Vec<(usize, usize, Node)>,
+    /// C: row, column and entry
     views: Vec<(usize, usize, Node)>,
     h: Expr<'g>,
     reading: Expr<'g>,
@@ -45,7 +44,6 @@ impl<'p, 'g> Sample<'p, 'g> {
         let outputs: Vec<Node> = plant.sensors.iter().map(|sensor| sensor.output).collect();
         let mut sample = Self {
             plant,
-            slopes: jacobian::forward(g, &plant.derivatives, &plant.states).entries,
             views: jacobian::forward(g, &outputs, &plant.states).entries,
             h: g.fresh("h"),
             reading: g.fresh("y"),
@@ -70,7 +68,7 @@ impl<'p, 'g> Sample<'p, 'g> {
                 .iter()
                 .map(|_| self.plant.graph.fresh("S").node());
             self.root = fresh.collect();
-            let (_, predicted) = self.predicted();
+            let (_, predicted) = self.predicted(&self.plant.derivatives);
             let corrected =
                 (0..self.plant.sensors.len()).map(|sensor| self.corrected(sensor, None).root);
             let roots: Vec<Vec<Term<'g>>> = corrected.chain([predicted]).collect();
@@ -144,17 +142,18 @@ impl<'p, 'g> Sample<'p, 'g> {
     }
 
     /// x̂ and S after a step.
-    fn predicted(&self) -> (Vec<Term<'g>>, Vec<Term<'g>>) {
+    fn predicted(&self, derivatives: &[Node]) -> (Vec<Term<'g>>, Vec<Term<'g>>) {
         let (plant, n) = (self.plant, self.plant.states.len());
         let rest = plant.inputs.iter().chain(&plant.parameters);
         let inputs = [plant.time].into_iter().chain(plant.states.iter().copied());
         let inputs: Vec<Node> = inputs.chain(rest.copied()).collect();
-        let places: Vec<(usize, usize)> = self.slopes.iter().map(|s| (s.0, s.1)).collect();
-        let slopes: Vec<Node> = self.slopes.iter().map(|s| s.2).collect();
+        let f = jacobian::forward(plant.graph, derivatives, &plant.states).entries;
+        let places: Vec<(usize, usize)> = f.iter().map(|s| (s.0, s.1)).collect();
+        let slopes: Vec<Node> = f.iter().map(|s| s.2).collect();
         let flow = Flow {
             graph: plant.graph,
             inputs: &inputs,
-            derivatives: &plant.derivatives,
+            derivatives,
             slopes: &slopes,
             places: &places,
             noise: plant.process_noise.iter().map(|&q| self.term(q)).collect(),
@@ -166,8 +165,33 @@ impl<'p, 'g> Sample<'p, 'g> {
     }
 
     pub fn predict<const L: usize>(&self, compile: Compile<L>) -> Result<Code<L>> {
+        self.predict_by(&self.plant.derivatives, compile)
+    }
+
+    /// The same with the states limited to their ranges.
+    pub fn confined<const L: usize>(&self, compile: Compile<L>) -> Result<Code<L>> {
+        let (plant, g) = (self.plant, self.plant.graph);
+        let limited = plant.states.iter().zip(&plant.ranges).map(|(&x, range)| {
+            let mut image = g.expr(x);
+            if range.high.is_finite() {
+                image = image.min(g.constant(range.high));
+            }
+            if range.low.is_finite() {
+                image = image.max(g.constant(range.low));
+            }
+            (x, image.node())
+        });
+        let derivatives = g.substitute(&plant.derivatives, &limited.collect());
+        self.predict_by(&derivatives, compile)
+    }
+
+    fn predict_by<const L: usize>(
+        &self,
+        derivatives: &[Node],
+        compile: Compile<L>,
+    ) -> Result<Code<L>> {
         let plant = self.plant;
-        let (x, root) = self.predicted();
+        let (x, root) = self.predicted(derivatives);
         let known = [&[plant.time, self.h.node()][..], &plant.inputs].concat();
         let moves = [&plant.states[..], &self.root].concat();
         self.code((&known, &moves), &self.nodes((&x, &root)), compile)
