@@ -386,3 +386,92 @@ fn a_plant_without_parameters_has_a_value() {
         "{value} beside {expected}"
     );
 }
+
+/// A tank that the log empties: the plant has no value below 0, where readings push the estimate. The filter puts it
+/// into its range, and so does the likelihood; its derivatives are those of that.
+#[test]
+fn an_estimate_without_a_value_is_put_into_its_range() {
+    let g = Graph::new();
+    let [time, x, k] = ["time", "x", "k"].map(|name| g.symbol(name));
+    let number = |value: f64| g.constant(value).node();
+    let range = Limits {
+        low: 0.01,
+        high: 10.0,
+    };
+    let inside = x.min(g.constant(range.high)).max(g.constant(range.low));
+    let value = 0.9;
+    let derivative = |k: Expr<'_>, x: Expr<'_>| (-(k * x.sqrt())).node();
+    let mut likelihood = Likelihood::new(&ParametricPlant {
+        graph: &g,
+        time: time.node(),
+        states: vec![x.node()],
+        derivatives: vec![derivative(k, x)],
+        inputs: vec![],
+        sensors: vec![ParametricSensor {
+            output: x.node(),
+            noise: ParametricLevel::Variance(number(0.04)),
+            limits: None,
+        }],
+        process_noise: vec![number(0.1)],
+        ranges: vec![range],
+        start: vec![(number(1.0), number(0.3))],
+        parameters: vec![k.node()],
+    })
+    .unwrap();
+    let log: Log = [1.0, 0.4, -0.9, -0.5, 0.3, 0.2]
+        .iter()
+        .enumerate()
+        .map(|(i, y)| (0.3 * i as f64, vec![*y], vec![]))
+        .collect();
+    let score = likelihood
+        .score(&[value], rows(&log), Step::Substeps(1))
+        .unwrap();
+    assert!(score.confined > 0);
+
+    let fixed = g.constant(value);
+    let model = NoisyModel::new(&NoisyPlant {
+        graph: &g,
+        time: time.node(),
+        states: vec![("x".into(), x.node(), 1.0)],
+        derivatives: vec![derivative(fixed, x)],
+        inputs: vec![],
+        sensors: vec![Sensor {
+            name: "y".into(),
+            output: x.node(),
+            noise: Level::Absolute(0.2),
+            limits: None,
+        }],
+        process_noise: vec![0.1],
+        initial_variance: vec![0.09],
+        ranges: vec![range],
+        confined: Some(vec![derivative(fixed, inside)]),
+    })
+    .unwrap();
+    let run = EstimatorSettings {
+        method: Method::Rk4(Step::Substeps(1)),
+        ..EstimatorSettings::default()
+    };
+    let settings = FilterSettings::of(FilterKind::Extended);
+    let mut filter = Blueprint::filter(model, settings, run).estimator().unwrap();
+    filter.keep_record();
+    let mut expected = 0.0;
+    for (t, readings, _) in &log {
+        filter.push(*t, readings).unwrap();
+        expected -= filter.record().unwrap().log_likelihood;
+    }
+    assert!(
+        (score.value - expected).abs() < 1e-11,
+        "{} beside {expected}",
+        score.value
+    );
+    let mut value_at = |k: f64| {
+        let score = likelihood.score(&[k], rows(&log), Step::Substeps(1));
+        score.unwrap().value
+    };
+    let h = 1e-4;
+    let difference = (value_at(value + h) - value_at(value - h)) / (2.0 * h);
+    assert!(
+        (score.gradient[0] - difference).abs() < 1e-6,
+        "{difference}"
+    );
+}
