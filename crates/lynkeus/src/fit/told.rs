@@ -58,7 +58,7 @@ impl Answer for Fit {
 
     #[cfg(feature = "plot")]
     fn svg(&self) -> Result<Option<String>, Error> {
-        self.figure().to_svg().map(Some).map_err(Error::from)
+        self.figure().to_svg().map(Some)
     }
 
     fn refusal(&self) -> Option<Error> {
