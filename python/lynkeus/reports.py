@@ -28,6 +28,7 @@ __all__ = [
     "ComparisonReport",
     "Condition",
     "Constant",
+    "Correlation",
     "Counted",
     "Declared",
     "DesignEntries",
@@ -37,6 +38,11 @@ __all__ = [
     "Excitation",
     "Excursion",
     "FamilyFit",
+    "FitEntries",
+    "FitReport",
+    "FittedErrors",
+    "FittedOptimum",
+    "FittedValue",
     "Frozen",
     "Health",
     "HiddenBy",
@@ -57,6 +63,7 @@ __all__ = [
     "OutsideBox",
     "Peak",
     "Point",
+    "PortionErrors",
     "Proof",
     "ProofSummary",
     "Proposal",
@@ -974,6 +981,111 @@ class SweepReport(SweepEntries, Record):
     notes: list[str]
     """what you should know"""
     _ITEMS: ClassVar = {"keys": list[SweptKey]}
+
+
+class FittedValue(Record):
+    """A value that was found."""
+
+    value: float
+    """the value"""
+    sd: float | None
+    """its standard deviation; none at a bound"""
+    interval: list[float] | None
+    """95 %"""
+    at_bound: bool
+    """whether it is at a bound"""
+
+
+class Correlation(Record):
+    """Correlations of the errors of what is not at a bound."""
+
+    names: list[str]
+    """what stands in each row"""
+    matrix: list[list[float | None]]
+    """row by row"""
+
+
+class FittedOptimum(Record):
+    """An end of searches."""
+
+    nll: float
+    """−log L there"""
+    found: int
+    """how many searches ended there"""
+
+
+class PortionErrors(Record):
+    """Errors of predictions in some of the rows."""
+
+    readings: int
+    """readings there"""
+    one_step: float | None
+    """root mean square of the innovations"""
+    squares: float | None
+    """mean of the squared innovations over their variances: 1 where these are right"""
+    free_run: float | None
+    """root mean square error of the plant alone"""
+
+
+class FittedErrors(Record):
+    """Errors of predictions of an output."""
+
+    fitted: PortionErrors
+    """in the rows that were fitted"""
+    held_out: PortionErrors | None
+    """in those that were held out"""
+    ljung_box: float | None
+    """the statistic of Ljung and Box over its number of lags: about 1 where the innovations are white"""
+
+
+class FitEntries:
+    """What :meth:`lynkeus.Study.fit` answers."""
+
+    plant: str
+    """the name of the model"""
+    logs: list[str]
+    """what was fitted to"""
+    nll: float | None
+    """−log L at the values, without the share of priors"""
+    nll_at_start: float | None
+    """the same at the study's own values"""
+    aic: float | None
+    """Akaike's criterion, 2·nll + 2k with k values found"""
+    bic: float | None
+    """the Bayesian one, 2·nll + k·log(readings)"""
+    converged: bool
+    """whether nothing is left to gain nearby"""
+    readings: int
+    """readings that were fitted"""
+    evaluations: int
+    """how often −log L was computed"""
+    parameters: Named[FittedValue]
+    """parameters of the plant"""
+    noise: Named[FittedValue]
+    """noises of the sensors, as the study has them"""
+    process_noise: Named[FittedValue]
+    """spectral densities"""
+    initial: Named[list[FittedValue]]
+    """starts, one per log"""
+    correlation: Correlation
+    """how the errors of the values depend on each other"""
+    optima: list[FittedOptimum]
+    """different ends of the searches that converged, the best first"""
+    undetermined: list[str]
+    """what the logs do not tell"""
+    combinations: list[str]
+    """combinations of the parameters that the outputs tell nevertheless"""
+    errors: Named[FittedErrors]
+    """errors of predictions, by output"""
+    warnings: list[str]
+    """what speaks against the values"""
+
+
+class FitReport(FitEntries, Record):
+    """The summary of a :class:`lynkeus.Fit`."""
+
+    notes: list[str]
+    """what you should know"""
 
 
 class ComparedSampling(Record):

@@ -473,6 +473,65 @@ class TuneSection(TypedDict, total=False):
     """on a log: number of blocks (whole number ≥ 2; default: 20)"""
 
 
+class FitPriors(TypedDict):
+    """A value of ``priors`` in ``[fit]``."""
+
+    mean: Number
+    """the mean (number; default: required)"""
+
+    sd: Number
+    """the standard deviation (number > 0; default: required)"""
+
+
+class FitSection(TypedDict, total=False):
+    """which parameters and noises are found from logs (fit) (table; default: none)"""
+
+    parameters: Names | None
+    """parameters of the plant that are found, within the model's `min` and `max` or `bounds` (list of
+    parameters; default: none)"""
+
+    log: Names | None
+    """those that are searched as logarithms: their ranges must be positive. Noises and densities always are
+    (list of parameters; default: none)"""
+
+    noise: bool | Names | None
+    """measured outputs whose noise is found; the search starts at `noise` of `[sensors]`, or at the scatter
+    of the readings (true, or list of names; default: none)"""
+
+    process_noise: bool | Names | None
+    """states and unknown inputs whose spectral density is found; `true`: those with a density above 0 in
+    `[process_noise]`, where the search starts. What is neither found nor declared is 0 (true, or list of
+    names; default: none)"""
+
+    initial: Names | None
+    """states whose start is found, one for each log; their `initial_variance` counts as 0 (list of states;
+    default: none)"""
+
+    bounds: Mapping[str, Numbers] | None
+    """ranges of what is found, by the name of a parameter or a state, or `"noise.level"`,
+    `"process_noise.x"`, `"initial.x"` (table: name = `[least, greatest]`; default: `min` and `max` of the
+    model)"""
+
+    priors: Mapping[str, FitPriors] | None
+    """what was known before: a normal distribution under the same names (table: name = table; default: none)"""
+
+    objective: Literal["innovations", "simulation"] | None
+    """the likelihood of the filter's innovations, or of the errors of the plant alone: then all errors are
+    the sensors', and neither densities nor `initial_variance` are read (`"innovations"`, `"simulation"`;
+    default: `"innovations"`)"""
+
+    starts: Whole | None
+    """searches: from the study's own values, then from seeded points spread over the bounds (whole number ≥
+    1; default: 1)"""
+
+    seed: Whole | None
+    """seed of those points (whole number ≥ 0; default: 0)"""
+
+    held_out: Number | None
+    """share at the end of each log that is not fitted, but predicted and told beside (number between 0 and 1;
+    default: none)"""
+
+
 class CompareSection(TypedDict, total=False):
     """which families are compared (table; default: none)"""
 
@@ -549,6 +608,9 @@ class Sections(TypedDict, total=False):
 
     tune: TuneSection | None
     """which keys are swept, and what a value is judged by (table; default: none)"""
+
+    fit: FitSection | None
+    """which parameters and noises are found from logs (fit) (table; default: none)"""
 
     compare: CompareSection | Names | None
     """which families are compared (table; default: none)"""
