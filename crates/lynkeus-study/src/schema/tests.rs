@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::*;
 use crate::keys::{
-    CERTIFY, COMPARE, ESTIMATE, GENERATOR, INTEGRATOR, KEYS, PLOT, SENSORS, SIMULATE, TUNE,
+    CERTIFY, COMPARE, ESTIMATE, FIT, GENERATOR, INTEGRATOR, KEYS, PLOT, SENSORS, SIMULATE, TUNE,
 };
 
 const HEADER: &str = "| key | type | default | meaning |\n|---|---|---|---|\n";
@@ -60,7 +60,7 @@ fn the_schema_is_the_committed_one() {
 fn the_page_of_studies_shows_the_keys() {
     let path = document("study.md");
     let mut page = fs::read_to_string(&path).unwrap();
-    let tables: [(&str, &[KeySpec]); 11] = [
+    let tables: [(&str, &[KeySpec]); 12] = [
         ("\n## Top level\n", &KEYS),
         ("\n## `[sensors]`\n", &SENSORS),
         ("\n## `[observer]`\n", &OBSERVER),
@@ -70,6 +70,7 @@ fn the_page_of_studies_shows_the_keys() {
         ("\n### What makes an input\n", &GENERATOR),
         ("\n## The integrator\n", &INTEGRATOR),
         ("\n## `[tune]`\n", &TUNE),
+        ("\n## `[fit]`\n", &FIT),
         ("\n## `[compare]`\n", &COMPARE),
         ("\n## `[plot]`\n", &PLOT),
     ];
