@@ -23,6 +23,7 @@ from .results import (
     Comparison,
     Design,
     Estimation,
+    Fit,
     HowWell,
     MonteCarlo,
     Record,
@@ -33,7 +34,7 @@ from .results import (
 )
 from .study import Study
 from .systems import Driven, Functions, Observer
-from .verbs import certify, check, compare, design, estimate, how_well, simulate, tune
+from .verbs import certify, check, compare, design, estimate, fit, how_well, simulate, tune
 
 __all__ = [
     "Answer",
@@ -46,6 +47,7 @@ __all__ = [
     "Estimation",
     "Estimator",
     "Filtered",
+    "Fit",
     "Functions",
     "HowWell",
     "InputError",
@@ -78,6 +80,7 @@ __all__ = [
     "design",
     "estimate",
     "exp",
+    "fit",
     "floor",
     "how_well",
     "interp",

@@ -57,13 +57,20 @@ def collected(data: Any) -> Any:
     return data.collect() if polars is not None and isinstance(data, polars.LazyFrame) else data
 
 
-def given(data: Any) -> _lynkeus.Log | str:
+def given(data: Any, what: str = "the log") -> _lynkeus.Log | str:
     """The same for a call with limits, which reads the file of a path itself."""
     if isinstance(data, (str, os.PathLike)):
         path = os.fspath(data)
         if isinstance(path, str):
             return path
-    return log_of(data)
+    return log_of(data, what)
+
+
+def given_each(data: Any) -> list[_lynkeus.Log | str]:
+    """The same of one log, or of a list of them."""
+    if isinstance(data, (list, tuple)):
+        return [given(log, f"logs[{place}]") for place, log in enumerate(data)]
+    return [given(data, "logs")]
 
 
 def _gathered(columns: _Named) -> _lynkeus.Log:

@@ -107,7 +107,7 @@ class NotCredible(UserWarning):
 
 
 class LogWarning(UserWarning):
-    """A log contradicts itself, or values of it count nowhere."""
+    """A log contradicts itself, values of it count nowhere, or it tells little of a value that is fitted to it."""
 
 
 class TraceError(InputError, TypeError):

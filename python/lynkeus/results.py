@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ._types import LogLike, Names
+    from .study import Study
 
 Column: TypeAlias = NDArray[np.float64]
 _Report = TypeVar("_Report", bound=Record)
@@ -458,6 +459,57 @@ class Sweep(reports.SweepEntries, Table):
         return self._made(reports.SweepReport)
 
 
+class Fit(reports.FitEntries, Table):
+    """Values that were fitted to logs: ``fit.parameters["k"].value``, ``.sd``, ``.interval``. Its columns are the
+    innovations of every row, ``fit["y_innovation"]``, with their deviations and the errors of the plant alone."""
+
+    def __init__(self, core: _lynkeus.Answer | Kept, fitted: Study | None = None) -> None:
+        super().__init__(core)
+        self._fitted = fitted
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (Kept.of(self._core), self._fitted)
+
+    @cached_property
+    def summary(self) -> reports.FitReport:
+        """The answer for programs, as the command\'s ``--json`` prints it."""
+        return self._made(reports.FitReport)
+
+    @property
+    def is_credible(self) -> bool:
+        """Whether the search converged and the logs tell every value; else :attr:`refusal` says what is missing."""
+        return self.refusal is None
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """All values by what the table and ``correlation`` call them: ``k``, ``noise.y``, ``process_noise.x``,
+        ``initial.x[1]``, of the first log."""
+        found = {name: one.value for name, one in self.parameters.items()}
+        for kind, group in (("noise", self.noise), ("process_noise", self.process_noise)):
+            found |= {f"{kind}.{name}": one.value for name, one in group.items()}
+        for name, each in self.initial.items():
+            found |= {f"initial.{name}[{place}]": one.value for place, one in enumerate(each, 1)}
+        return found
+
+    def study(self) -> Study:
+        """The study with the values found, as ``lynkeus fit --write`` leaves it; the starts of several logs stay out
+        of it.
+
+        Returns
+        -------
+        Study
+            Another study; that which was fitted stays as it is.
+
+        Raises
+        ------
+        RefusedError, LimitError
+            The values are none of the plant's: :attr:`refusal` says why.
+        """
+        if self._fitted is None:
+            raise self.refusal or InputError("study: this fit goes without its study")
+        return self._fitted
+
+
 class HowWell(reports.HowWellEntries, Run):
     """Standard errors over the horizon; drawn with both axes logarithmic."""
 
@@ -488,15 +540,15 @@ class Comparison(reports.ComparisonEntries, Answer):
         raise KeyError(f"{family!r}: expected one of {names}")
 
 
-_Run = TypeVar("_Run", bound=Run)
+_Judged = TypeVar("_Judged", bound=Run | Fit)
 _Answer = TypeVar("_Answer", bound=Answer)
 
 #: where the method of the study is called, which its checks of arguments wrap
 _CALLER = 4
 
 
-def judged(run: _Run) -> _Run:
-    """A run, with a warning where it is not credible, or its log is not whole."""
+def judged(run: _Judged) -> _Judged:
+    """A run or a fit, with a warning where it is not credible, or its log is not whole."""
     if run.refusal is not None:
         warnings.warn(str(run.refusal), NotCredible, stacklevel=_CALLER)
     for text in run._core.warnings():

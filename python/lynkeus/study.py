@@ -13,11 +13,11 @@ from ._arguments import real, takes, whole, word, words
 from ._base import FILE, Base, plant_of, spelled, spoken
 from ._batched import Batched
 from ._export import EXPORT, Export, write
-from ._logs import given
+from ._logs import given, given_each
 from ._lynkeus import MEMORY
 from ._progress import Progress, Terms, told
 from ._toml import document, valid
-from ._types import LogLike, Names, Number, Numbers
+from ._types import ListOf, LogLike, Names, Number, Numbers
 from .errors import InputError, LimitError
 from .systems import Functions, Observer
 from .model import Model
@@ -27,6 +27,7 @@ from .results import (
     Comparison,
     Design,
     Estimation,
+    Fit,
     HowWell,
     MonteCarlo,
     Simulation,
@@ -41,6 +42,7 @@ from .sections import (
     CompareSection,
     EstimateSection,
     Family,
+    FitSection,
     ObserverSection,
     ParametersSection,
     PlotSection,
@@ -77,7 +79,7 @@ class Study(Batched):
         The section ``[observer]``, or the name of a family.
     box : mapping of str to float or list of float, optional
         Ranges narrower than the model's, in its units.
-    certify, simulate, estimate, tune, plot : dict, optional
+    certify, simulate, estimate, tune, fit, plot : dict, optional
         The sections of these names.
     compare : dict or list of str, optional
         The section ``[compare]``, or the names of families.
@@ -126,6 +128,7 @@ class Study(Batched):
         simulate: SimulateSection | None = None,
         estimate: EstimateSection | None = None,
         tune: TuneSection | None = None,
+        fit: FitSection | None = None,
         compare: CompareSection | Names | None = None,
         plot: PlotSection | None = None,
         tables: Literal["linear", "monotone"] | None = None,
@@ -141,6 +144,7 @@ class Study(Batched):
             "simulate": simulate,
             "estimate": estimate,
             "tune": tune,
+            "fit": fit,
             "compare": compare,
             "plot": plot,
             "measured": measured,
@@ -529,6 +533,52 @@ class Study(Batched):
         """
         with told(progress, "tuning") as tell:
             return Sweep(self._core.tune(None if log is None else given(log), Terms(time_limit, memory_limit, tell)))
+
+    @takes(profiles=flag, progress=told_of, **LIMITS)
+    def fit(
+        self,
+        logs: LogLike | ListOf[LogLike],
+        *,
+        profiles: bool = False,
+        progress: Progress = False,
+        time_limit: float | None = None,
+        memory_limit: float = MEMORY,
+    ) -> Fit:
+        """Parameters, noises, spectral densities and starts of ``[fit]`` from logs, by their likelihood.
+
+        Parameters
+        ----------
+        logs : path, mapping of columns, data frame, table or run, or a list of them
+            What the values are fitted to, each as of :meth:`estimate`. A start is found for each of them.
+        profiles : bool
+            Finds the intervals by profile likelihood: the other values are searched anew along each.
+        progress : bool or function
+            Shows how far it is, or calls the function with the share that is done, from 0 to 1.
+        time_limit : float, optional
+            What the call may take, in seconds.
+        memory_limit : float
+            What it may take, in MiB.
+
+        Returns
+        -------
+        Fit
+            ``parameters``, ``noise``, ``process_noise`` and ``initial`` with standard deviations and intervals;
+            columns of innovations.
+
+        Raises
+        ------
+        InputError
+            ``[fit]`` does not fit the study, the study cannot be run, or a log lacks what it reads.
+        RefusedError
+            The likelihood has no value at any start.
+        LimitError
+            A limit ended it before there was an answer.
+        """
+        with told(progress, "fitting") as tell:
+            found, text = self._core.fit(given_each(logs), profiles, Terms(time_limit, memory_limit, tell))
+        core = self._core
+        fitted = None if text is None else _lynkeus.Study.parse(text, core.file, core.plant, core.model, core)
+        return judged(Fit(found, None if fitted is None else Study._of(fitted)))
 
     @takes(progress=told_of, **LIMITS)
     def compare(

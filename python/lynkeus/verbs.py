@@ -10,9 +10,9 @@ from typing import Literal, TypeAlias, overload
 
 from ._lynkeus import MEMORY
 from ._progress import Progress
-from ._types import LogLike, Names
+from ._types import ListOf, LogLike, Names
 from .errors import ArgumentError
-from .results import Certificate, Check, Comparison, Design, Estimation, HowWell, MonteCarlo, Simulation, Sweep
+from .results import Certificate, Check, Comparison, Design, Estimation, Fit, HowWell, MonteCarlo, Simulation, Sweep
 from .study import Study
 
 _Study: TypeAlias = Study | str | os.PathLike[str]
@@ -304,6 +304,53 @@ def tune(
         A limit ended it before there was an answer.
     """
     return _study(study).tune(log, progress=progress, time_limit=time_limit, memory_limit=memory_limit)
+
+
+def fit(
+    study: _Study,
+    logs: LogLike | ListOf[LogLike],
+    *,
+    profiles: bool = False,
+    progress: Progress = False,
+    time_limit: float | None = None,
+    memory_limit: float = MEMORY,
+) -> Fit:
+    """Parameters, noises, spectral densities and starts of ``[fit]`` from logs, by their likelihood.
+
+    Parameters
+    ----------
+    study : Study or path
+        The study, or its file.
+    logs : path, mapping of columns, data frame, table or run, or a list of them
+        What the values are fitted to. A start is found for each of them.
+    profiles : bool
+        Finds the intervals by profile likelihood: the other values are searched anew along each.
+    progress : bool or function
+        Shows how far it is, or calls the function with the share that is done, from 0 to 1.
+    time_limit : float, optional
+        What the call may take, in seconds.
+    memory_limit : float
+        What it may take, in MiB.
+
+    Returns
+    -------
+    Fit
+        ``parameters``, ``noise``, ``process_noise`` and ``initial`` with standard deviations and intervals;
+        columns of innovations.
+
+    Raises
+    ------
+    InputError
+        ``[fit]`` does not fit the study, the study cannot be run, or a log lacks what it reads.
+    RefusedError
+        The likelihood has no value at any start.
+    LimitError
+        A limit ended it before there was an answer.
+    """
+    asked = _study(study)
+    return asked.fit(
+        logs, profiles=profiles, progress=progress, time_limit=time_limit, memory_limit=memory_limit
+    )
 
 
 def compare(

@@ -87,6 +87,10 @@ def test_logs_and_sweeps_answer_as_declared() -> None:
     swept = lynkeus.Study.load(folder / "study.toml").replace(tune={"keys": {"theta": [0.02, 0.03]}})
     assert not odd(swept.tune(folder / "log.csv"))
     assert not odd(swept.compare())
+    fitted = tank(observer="ekf", noise={"y": 0.01}, process_noise={"inflow": 0.1}, fit={"noise": True, "held_out": 0.25})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", lynkeus.LogWarning)
+        assert not odd(fitted.fit([log(), log(80)]))
 
 
 def test_what_is_rare_answers_as_declared() -> None:

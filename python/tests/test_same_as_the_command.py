@@ -16,6 +16,7 @@ import pytest
 import lynkeus
 
 from conftest import ROOT
+from tank_study import TEXT
 
 parquet = pytest.importorskip("pyarrow.parquet")
 
@@ -89,13 +90,33 @@ def test_runs(command: Path, study: str, tmp_path: Path) -> None:
     assert loaded.estimate(columns).summary["final"] == json.loads(text)["final"]
 
 
+def test_fits(command: Path, tmp_path: Path) -> None:
+    (tmp_path / "tank.mo").write_text(TEXT, encoding="utf-8")
+    study, log, file = tmp_path / "study.toml", tmp_path / "log.parquet", tmp_path / "fit.parquet"
+    study.write_text(
+        'plant = "tank.mo"\n[sensors]\nnoise = { y = 0.1 }\n[observer]\nfamily = "ekf"\n'
+        '[simulate]\nuntil = 20\noutput_step = 0.5\ninputs = { inflow = 1.2 }\n'
+        '[fit]\nnoise = true\ninitial = ["level"]\n',
+        encoding="utf-8",
+    )
+    loaded = lynkeus.Study.load(study)
+    code, _ = run(command, "simulate", str(study), "-q", "-o", str(file), "--log", str(log))
+    assert code == 0
+    fit = loaded.fit(log)
+    code, text = run(command, "fit", str(study), str(log), "--json", "-q", "--write", "-o", str(file))
+    same(fit, code, text, file)
+    assert fit.study().text == study.read_text(encoding="utf-8") != loaded.text
+
+
 def exit_code(error: lynkeus.LynkeusError) -> int:
     return 2 if isinstance(error, lynkeus.InputError) else 1
 
 
-def same(run: lynkeus.Run, code: int, text: str, file: Path) -> None:
+def same(run: lynkeus.Run | lynkeus.Fit, code: int, text: str, file: Path) -> None:
     assert run.is_credible == (code == 0)
-    assert without(run.summary) == without(json.loads(text))
+    told = json.loads(text)
+    told.pop("written", None)
+    assert without(run.summary) == without(told)
     written = parquet.read_table(file)
     assert written.column_names == run.columns
     for name in run.columns:

@@ -52,7 +52,7 @@ def test_changes_have_what_the_constructor_takes() -> None:
     assert set(sections.Changes.__annotations__) == {*sections.Sections.__annotations__, "plant", "model"}
 
 
-@pytest.mark.parametrize("name", ["check", "design", "certify", "how_well", "simulate", "estimate", "tune", "compare"])
+@pytest.mark.parametrize("name", ["check", "design", "certify", "how_well", "simulate", "estimate", "tune", "fit", "compare"])
 def test_verbs_take_what_methods_take(name: str) -> None:
     verb, method = inspect.signature(getattr(verbs, name)), inspect.signature(getattr(lynkeus.Study, name))
     assert list(verb.parameters.values())[1:] == list(method.parameters.values())[1:]

@@ -53,6 +53,9 @@ study.simulate().errors["level"].paek
 study.simulate(runs=3).final
 study.compare()["ekf"].rsm
 study.tune().knee.mean_error
+study.fit("a.csv").parameters["k"].sd + 1.0
+study.fit(3)
+study.fit(["a.csv"]).study().tune().kneee
 study.how_well().standard_error["level"] + 1.0
 study.estimate_each(["a.csv"])[0].erors
 study.estimator().health["sensor"]
@@ -137,6 +140,11 @@ rms: float | None = comparison["ekf"].rms["inflow"]
 knee = study.tune().knee
 if knee is not None and knee.peak is not None:
     print(knee.mean_error, knee.peak.time, knee.values_of_keys["theta"])
+fit = study.fit([run, {"t": run.t, "level": run.log["level"]}, Path("a.csv")], profiles=True)
+k: float = fit.parameters["k"].value + fit.values["noise.level"]
+white: float | None = fit.errors["level"].ljung_box
+residuals: NDArray[np.float64] = lynkeus.fit("study.toml", "log.csv")["level_innovation"]
+replayed = fit.study().estimate(run)
 sigma = study.how_well(sensors="outputs").standard_error["inflow"]
 known: float = 0.0 if sigma is None else sigma
 estimator = study.estimator()
@@ -214,6 +222,8 @@ def test_results_have_types(tmp_path: Path) -> None:
         "run.doubts": "list[Doubt]",
         "run.innovations": "Named[InnovationCounts]",
         "study.tune().rows": "list[SweptRow]",
+        "study.fit('a.csv').initial": "Named[list[FittedValue]]",
+        "study.fit('a.csv').study()": "Study",
         "lynkeus.sqrt(2.0)": "float",
         "lynkeus.simulate(study)": "Simulation",
         "lynkeus.simulate(study, runs=3)": "MonteCarlo",

@@ -65,6 +65,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Study.estimate_each": (STUDY.estimate_each, {"logs": [log()], "by": None, **BATCH}),
     "Study.sweep": (STUDY.sweep, {"changes": [{}], "log": None, **BATCH}),
     "Study.tune": (STUDY.tune, {"log": None, "progress": False, **LIMITS}),
+    "Study.fit": (STUDY.replace(fit={"noise": True}).fit, {"logs": log(), "profiles": False, "progress": False, **LIMITS}),
     "Study.compare": (STUDY.compare, {"log": None, "progress": False, **LIMITS}),
     "Study.plant": (STUDY.plant, {}),
     "Study.observer": (STUDY.observer, LIMITS),
@@ -124,6 +125,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     **{f"Log.{name}": (getattr(LOG, name), {"name": "t"}) for name in ("column", "values", "refusal", "origin")},
     **{name: (getattr(lynkeus, name), {"study": STUDY}) for name in ("check", "design", "certify", "how_well", "simulate")},
     **{name: (getattr(lynkeus, name), {"study": STUDY, "log": log()}) for name in ("estimate", "tune", "compare")},
+    "fit": (lynkeus.fit, {"study": STUDY, "logs": log()}),
     **{
         name: (getattr(lynkeus, name), dict.fromkeys(inspect.signature(getattr(lynkeus, name)).parameters, 1.0))
         for name in lynkeus.functions.__all__

@@ -1,5 +1,6 @@
 //! Studies, and what is asked of them.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -7,8 +8,8 @@ use lynkeus::precision::{self, Candidates};
 use lynkeus::prepare::Prepared;
 use lynkeus::study::Whole;
 use lynkeus::{
-    CheckOptions, Error, ExportOptions, FmiVersion, Precision, Records, Runner, Runners, Subject,
-    Target,
+    CheckOptions, Error, ExportOptions, FitOptions, FmiVersion, Precision, Records, Runner,
+    Runners, Subject, Target,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -261,6 +262,30 @@ impl Study {
             }
         });
         sweep.map(Answer::of)
+    }
+
+    /// The fit, and the study's text with the values found, where nothing speaks against these.
+    #[pyo3(signature = (logs, profiles=false, terms=None))]
+    fn fit(
+        &self,
+        py: Python<'_>,
+        logs: Vec<Given>,
+        profiles: bool,
+        terms: Option<Terms<'_>>,
+    ) -> PyResult<(Answer, Option<String>)> {
+        let options = FitOptions { profiles };
+        let terms = terms.unwrap_or_default();
+        let (fit, text) = self.ask(py, &terms, |study, watch| {
+            let tables = logs.iter().map(|log| log.table(study).map(Cow::into_owned));
+            let tables = tables.collect::<Result<Vec<_>, _>>()?;
+            let fit = lynkeus::fit(study, &tables, options, watch)?;
+            let text = match lynkeus::Answer::is_positive(&fit) {
+                true => Some(fit.rewritten(&self.text)?.0),
+                false => None,
+            };
+            Ok((fit, text))
+        })?;
+        Ok((Answer::of(fit), text))
     }
 
     #[pyo3(signature = (log=None, terms=None))]
