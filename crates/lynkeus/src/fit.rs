@@ -17,6 +17,7 @@ pub(crate) mod unknown;
 
 use std::ops::ControlFlow;
 
+use lynkeus_expr::Spent;
 use lynkeus_observers::kalman::EKF;
 use lynkeus_run::{Method, Step};
 use lynkeus_study::{Name, Objective};
@@ -74,6 +75,8 @@ pub struct Fit {
     /// what the user should know
     pub notes: Vec<String>,
     pub(crate) rows: errors::Rows,
+    /// the limit that ended the search
+    pub ended: Option<Spent>,
     pub(crate) file: String,
 }
 
@@ -459,6 +462,7 @@ impl Work<'_> {
         found: Found,
         optima: Vec<Optimum>,
     ) -> Result<Fit, Error> {
+        let is_ended = found.is_ended;
         let mut uncertainty = uncertainty::uncertainty(&self.problem, &found);
         self.profiles(&found, &mut uncertainty)?;
         let values = self.problem.values(&found.point.z);
@@ -492,6 +496,10 @@ impl Work<'_> {
             warnings: self.warnings,
             notes: self.notes,
             rows,
+            ended: match is_ended {
+                true => self.study.budget.spent(),
+                false => None,
+            },
             file: self.study.file.clone(),
         })
     }

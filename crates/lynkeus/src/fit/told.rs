@@ -68,6 +68,9 @@ impl Answer for Fit {
             let message = format!("the logs do not tell {names}");
             return at(Error::refused(message).hint(self.remedy()));
         }
+        if let Some(spent) = self.ended {
+            return at(Error::ended(spent));
+        }
         if !self.is_converged {
             let message = "the search did not converge: the values are the best so far";
             return at(Error::refused(message)
