@@ -134,6 +134,10 @@ pub fn fit(
         true => Some(terms_of(true)?),
         false => None,
     };
+    // half a likelihood is none
+    if let Some(spent) = study.budget.spent() {
+        return Err(Error::ended(spent).at(&study.file));
+    }
     let exact = known::exact(&prepared, &symbolic, &unknowns, &tuning.initial_variance)?;
     let problem = Problem {
         unknowns: &unknowns,
@@ -305,6 +309,9 @@ impl Work<'_> {
         let budget = &self.study.budget;
         let free = vec![false; begin.z.len()];
         let run = |problem: &Problem<'_>, k: usize, watch: &mut Watch<'_>| {
+            if k > 0 && budget.spent().is_some() {
+                return Ok((ended(begin.clone()), 0));
+            }
             let mut own = problem.clone();
             own.evaluations = 0;
             let mut steps = 0.0;
@@ -381,17 +388,13 @@ impl Work<'_> {
         begin: Point,
         flat: &[usize],
     ) -> Result<Fit, Error> {
-        let n = begin.z.len();
         let undetermined: Vec<String> = flat
             .iter()
             .map(|&i| self.problem.unknowns[i].label())
             .collect();
         let found = Found {
-            is_bound: vec![false; n],
-            hessian: nalgebra::DMatrix::zeros(n, n),
-            is_converged: false,
             is_ended: false,
-            point: begin,
+            ..ended(begin)
         };
         let mut fit = self.answer(plant, outputs, &found.point.clone(), found, vec![])?;
         fit.undetermined = undetermined;
@@ -433,7 +436,7 @@ impl Work<'_> {
             let value = unknown.value(best.point.z[i]);
             let is_least = value <= unknown.low * (1.0 + 1e-9);
             self.warnings
-                .push(match (unknown.kind.is_noise(), is_least) {
+                .push(match (unknown.reaches_zero(), is_least) {
                     (true, true) => format!("{}: the log cannot tell it from 0", unknown.words()),
                     _ => format!("{} is at its bound, {}", unknown.words(), short(value)),
                 });
@@ -504,7 +507,8 @@ impl Work<'_> {
         })
     }
 
-    /// Intervals by profile likelihood, where they are asked for, and of what is at a bound.
+    /// Intervals by profile likelihood, where they are asked for, and of what is at a bound; noises that are no more
+    /// than nothing are told of.
     fn profiles(&mut self, found: &Found, uncertainty: &mut Uncertainty) -> Result<(), Error> {
         if found.is_ended || !found.is_converged {
             return Ok(());
@@ -515,13 +519,34 @@ impl Work<'_> {
             None => ControlFlow::Continue(()),
         };
         for (i, known) in uncertainty.known.iter_mut().enumerate() {
+            let unknown = &self.problem.unknowns[i];
+            let is_noise = unknown.reaches_zero() && !known.is_bound;
+            let told = format!("{}: the log cannot tell it from 0", unknown.words());
+            let own = *known;
+            let is_nothing =
+                is_noise && uncertainty::is_nothing(&mut self.problem, found, i, &own, &mut pulse)?;
+            if is_nothing {
+                self.warnings.push(told);
+            }
             if self.options.profiles || known.is_bound {
-                let own = *known;
-                let interval = uncertainty::profile(&mut self.problem, found, i, &own, &mut pulse)?;
-                known.interval = interval.or(known.interval);
+                let problem = &mut self.problem;
+                let sides = uncertainty::profile(problem, found, i, &own, is_nothing, &mut pulse)?;
+                known.interval = sides.or(known.interval);
             }
         }
         Ok(())
+    }
+}
+
+/// A search that was told to stop before it began.
+fn ended(point: Point) -> Found {
+    let n = point.z.len();
+    Found {
+        is_bound: vec![false; n],
+        hessian: nalgebra::DMatrix::zeros(n, n),
+        is_converged: false,
+        is_ended: true,
+        point,
     }
 }
 

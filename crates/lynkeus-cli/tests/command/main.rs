@@ -10,6 +10,7 @@ mod families;
 mod faulty;
 mod filters;
 mod filters_noise;
+mod fit;
 mod fmu;
 mod fmu_calls;
 mod fmu_equations;

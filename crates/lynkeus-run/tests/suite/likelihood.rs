@@ -246,7 +246,7 @@ fn the_likelihood_is_the_filter_s() {
 /// Beside differences of order 6, which leave about 1e-9 of the value.
 #[test]
 fn derivatives_are_those_of_the_value() {
-    for seed in 0..40 {
+    for seed in 0..200 {
         let case = Case::new(seed);
         let mut likelihood = case.likelihood();
         let mut value = |θ: &[f64]| {

@@ -98,6 +98,16 @@ impl Unknown {
 /// Noises and densities without bounds of their own lie within this factor of their start.
 const REACH: f64 = 1e8;
 
+/// A range from less than so much of the start has nothing below it.
+const NEARLY: f64 = 1e-6;
+
+impl Unknown {
+    /// Whether it is a noise whose least value stands for 0.
+    pub fn reaches_zero(&self) -> bool {
+        self.kind.is_noise() && self.low <= NEARLY * self.start
+    }
+}
+
 /// All that a study asks for.
 ///
 /// # Errors
@@ -176,8 +186,26 @@ fn unknown(kind: Kind, variable: &Variable, start: f64) -> Unknown {
     }
 }
 
+/// What varies is no parameter any more.
+fn refuse_unknown(study: &Study) -> Result<(), Error> {
+    let is_unknown = |name: &&Name| {
+        let mut unknown = study.sensors.unknown.iter();
+        unknown.any(|other| other.is_or_has(&name.text) || name.is_or_has(&other.text))
+    };
+    let Some(name) = study.fit.parameters.iter().find(is_unknown) else {
+        return Ok(());
+    };
+    let message = format!(
+        "{} is in `unknown` of [sensors] and in `parameters` of [fit]",
+        name.text
+    );
+    let hint = "keep one: `unknown` estimates it along with the states, `fit` finds one value for the whole log";
+    Err(name.blame(Error::input(message).at(&study.file).hint(hint)))
+}
+
 fn parameters(study: &Study, symbolic: &Plant) -> Result<Vec<Unknown>, Error> {
     let settings = &study.fit;
+    refuse_unknown(study)?;
     let variables: Vec<Variable> = (symbolic.parameters.iter())
         .map(|p| Variable {
             start: p.value,
@@ -197,18 +225,14 @@ fn parameters(study: &Study, symbolic: &Plant) -> Result<Vec<Unknown>, Error> {
             "`log` of [fit] names {}, which is not among its `parameters`",
             variable.name
         );
-        return Err(Error::input(message).at(&study.file));
+        let named = (settings.log.iter()).find(|name| name.is_or_has(&variable.name));
+        let refusal = Error::input(message).at(&study.file);
+        return Err(match named {
+            Some(name) => name.blame(refusal),
+            None => refusal,
+        });
     }
     let of = |variable: &&Variable| {
-        let both = (study.sensors.unknown.iter()).find(|name| name.is_or_has(&variable.name));
-        if let Some(name) = both {
-            let message = format!(
-                "{} is in `unknown` of [sensors] and in `parameters` of [fit]",
-                variable.name
-            );
-            let hint = "keep one: `unknown` estimates it along with the states, `fit` finds one value for the whole log";
-            return Err(name.blame(Error::input(message).hint(hint)));
-        }
         let Some(start) = variable.start else {
             let message = format!(
                 "the parameter \"{}\" has no value to start from",
