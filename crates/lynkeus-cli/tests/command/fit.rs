@@ -534,6 +534,9 @@ fn a_sensor_s_range_is_censored() {
     holds(&answer["parameters"]["k"], K);
     holds(&answer["parameters"]["g"], G);
     holds(&answer["noise"]["y"], R);
+    // readings at an end say nothing of that
+    let squares = number(&answer["errors"]["y"]["fitted"]["squares"]);
+    assert!((0.7..1.2).contains(&squares), "{squares}");
     folder.change("study.toml", "limits = { y = [0.6, 1.7] }\n", "");
     let naive = fitted(&folder, &[]);
     assert!(number(&naive["parameters"]["g"]["value"]) < 0.95 * G);

@@ -36,7 +36,7 @@ pub(crate) struct Rows {
     pub columns: Vec<Innovations>,
 }
 
-/// Of one output, row by row; no number where it did not report.
+/// Of one output, row by row; no number where it did not report, or showed an end of its range.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Innovations {
     pub output: String,
@@ -102,6 +102,10 @@ pub(super) fn errors<'p>(
         let mut first = 0;
         for (place, log) in logs.iter().enumerate() {
             problem.score(place, values, Which::All, |seen| {
+                // of a reading at an end nobody knows how far it is off
+                if seen.is_at_end {
+                    return;
+                }
                 let is_held_out = usize::from(seen.row >= log.fitted);
                 sums[seen.sensor][way][is_held_out].add(seen.innovation, seen.variance);
                 let columns = &mut rows.columns[seen.sensor];

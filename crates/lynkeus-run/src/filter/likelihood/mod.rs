@@ -103,6 +103,8 @@ pub struct Seen {
     pub innovation: f64,
     /// its variance
     pub variance: f64,
+    /// whether the reading only says that y is there or beyond
+    pub is_at_end: bool,
 }
 
 impl Likelihood {
@@ -373,7 +375,8 @@ impl<const L: usize> Passes<L> {
                 continue;
             }
             let limits = self.sensors[sensor].limited.as_ref().map(|l| l.limits);
-            match limits.and_then(|limits| Some((limits, End::of(limits, reading)?))) {
+            let end = limits.and_then(|limits| Some((limits, End::of(limits, reading)?)));
+            match end {
                 Some((limits, end)) => self.take_end(sensor, row, (end, end.value(limits)), score),
                 None => self.take_reading(sensor, row, reading, score),
             }
@@ -382,6 +385,7 @@ impl<const L: usize> Passes<L> {
                 sensor,
                 innovation: self.seen.ν,
                 variance: self.seen.σ2,
+                is_at_end: end.is_some(),
             });
         }
     }
