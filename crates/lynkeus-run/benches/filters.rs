@@ -3,7 +3,8 @@
 use divan::{Bencher, black_box};
 use lynkeus_expr::Graph;
 use lynkeus_run::filter::{
-    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Row, Sensor, SigmaPoints,
+    FilterKind, FilterSettings, Likelihood, Limits, NoisyModel, NoisyPlant, ParametricLevel,
+    ParametricPlant, ParametricSensor, Row, Sensor, SigmaPoints,
 };
 use lynkeus_run::{Blueprint, Error, EstimatorSettings, Fleet, Level, Method, Step, Tolerances};
 
@@ -128,4 +129,71 @@ fn ukf(bencher: Bencher, n: usize) {
 #[divan::bench(args = [2, 8, 25, 61, 200], sample_count = 20)]
 fn mhe(bencher: Bencher, n: usize) {
     measure(bencher, n, FilterKind::MovingHorizon(10));
+}
+
+/// Cells of the plant whose likelihood is measured, and rows of its log.
+const CELLS: usize = 4;
+const ROWS: usize = 10_000;
+
+/// The same chain as a function of so many of: a rate for each cell, the noise, and densities.
+fn likelihood(count: usize) -> Result<Likelihood, Error> {
+    let g = Graph::new();
+    let (time, u) = (g.symbol("time"), g.symbol("u"));
+    let x: Vec<_> = (0..CELLS).map(|i| g.symbol(&format!("x[{i}]"))).collect();
+    let parameters: Vec<_> = (0..count).map(|i| g.symbol(&format!("p[{i}]"))).collect();
+    let value = |i: usize| match parameters.get(i) {
+        Some(parameter) => *parameter,
+        None => g.constant(VALUES[i]),
+    };
+    let cells = x.iter().enumerate();
+    let flow: Vec<_> = cells
+        .map(|(i, &x)| x * value(i) / (1.0 + x * 1.5))
+        .collect();
+    let dx = (0..CELLS).map(|i| (if i == 0 { u } else { flow[i - 1] } - flow[i]).node());
+    let range = Limits {
+        low: 0.0,
+        high: 10.0,
+    };
+    Likelihood::new(&ParametricPlant {
+        graph: &g,
+        time: time.node(),
+        states: x.iter().map(|x| x.node()).collect(),
+        derivatives: dx.collect(),
+        inputs: vec![u.node()],
+        sensors: vec![ParametricSensor {
+            output: x[CELLS - 1].node(),
+            noise: ParametricLevel::Variance(value(CELLS).powi(2).node()),
+            limits: None,
+        }],
+        process_noise: (0..CELLS).map(|i| value(CELLS + 1 + i).node()).collect(),
+        ranges: vec![range; CELLS],
+        start: vec![(g.constant(0.5).node(), g.constant(0.01).node()); CELLS],
+        parameters: parameters.iter().map(|p| p.node()).collect(),
+    })
+}
+
+/// What they are.
+const VALUES: [f64; 2 * CELLS + 1] = [2.5, 2.5, 2.5, 2.5, 0.02, 1e-6, 1e-6, 1e-6, 1e-6];
+
+/// −log L of a whole log, its gradient by so many parameters and Fisher's information; beside it a sample of
+/// [`ekf_rk4`] is the same filter without derivatives.
+#[divan::bench(args = [0, 1, 4, 8])]
+fn gradient(bencher: Bencher, parameters: usize) {
+    let mut likelihood = likelihood(parameters).unwrap_or_else(|error| panic!("{error}"));
+    let readings: Vec<[f64; 1]> = (0..ROWS)
+        .map(|k| [0.5 + 0.1 * (STEP * k as f64).sin()])
+        .collect();
+    let row = |k: usize| Row {
+        t: STEP * k as f64,
+        readings: &readings[k],
+        inputs: &[0.7],
+    };
+    bencher.bench_local(|| {
+        let score = likelihood.score(
+            black_box(&VALUES[..parameters]),
+            (0..ROWS).map(row),
+            Step::Substeps(1),
+        );
+        score.unwrap_or_else(|error| panic!("{error}")).value
+    });
 }
