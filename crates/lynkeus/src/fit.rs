@@ -333,15 +333,23 @@ impl Work<'_> {
 
     /// At steps that are short enough there, too, and with noises at their least where that is as good.
     fn settled(&mut self, mut best: Found) -> Result<Found, Error> {
+        let mut is_settled = false;
         for _ in 0..HALVINGS[1] {
             if best.is_ended {
                 break;
             }
             let Some(fine) = self.halved(&best.point, SETTLED)? else {
+                is_settled = true;
                 break;
             };
             let free = vec![false; fine.z.len()];
             best = self.again(fine.z, &free)?;
+        }
+        if let (false, false, Step::AtMost(step)) = (is_settled, best.is_ended, self.problem.step) {
+            self.warnings.push(format!(
+                "\u{2212}log L still changes by more than {SETTLED} where steps of {} are halved: the plant is stiff, or it jumps; method = \"rk4\" with a `step` in [estimate] says which steps count",
+                short(step)
+            ));
         }
         let mut held = vec![false; best.point.z.len()];
         for i in 0..held.len() {
