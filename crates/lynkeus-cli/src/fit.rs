@@ -10,7 +10,8 @@ use super::limits::{self, Limits};
 use super::output;
 use super::progress::Progress;
 use super::save::{Results, is_standard};
-use lynkeus::{Answer, Change, Error, Fit, FitOptions, visible};
+use super::written;
+use lynkeus::{Answer, Error, FitOptions};
 
 /// What it is fitted to and where the answer goes.
 #[derive(Debug, Args)]
@@ -66,7 +67,7 @@ pub(super) fn fit(path: &Path, options: &Options, limits: &Limits) -> Result<Exi
     // values that are none of the plant's do not get into the study
     let is_written = options.write && fit.is_positive();
     let (text, changes) = match is_written {
-        true => rewritten(path, &fit)?,
+        true => written::study(path, |text| fit.rewritten(text))?,
         false => (String::new(), vec![]),
     };
     output::remarks(&fit, options.quiet);
@@ -75,38 +76,8 @@ pub(super) fn fit(path: &Path, options: &Options, limits: &Limits) -> Result<Exi
     if is_written {
         results.put(path, text)?;
     }
-    show(&fit, &changes, path, options, &mut results);
+    let asked = options.write.then_some((path, &changes[..]));
+    written::show(&fit, asked, options.json, &mut results);
     results.keep()?;
     Ok(limits::code(&source.study, output::verdict(&fit)))
-}
-
-/// The study with the values found.
-fn rewritten(path: &Path, fit: &Fit) -> Result<(String, Vec<Change>), Error> {
-    let text = std::fs::read_to_string(path).map_err(|e| {
-        Error::input(format!("cannot read the study again: {e}")).at(path.display())
-    })?;
-    fit.rewritten(&text)
-        .map_err(|error| error.at(path.display()))
-}
-
-/// The fit in words or as JSON, with what was written; where standard output has a result, that is a note.
-fn show(fit: &Fit, changes: &[Change], path: &Path, options: &Options, results: &mut Results) {
-    let told: Vec<String> = changes
-        .iter()
-        .map(|c| format!("{}: {c}", path.display()))
-        .collect();
-    if results.has_printed() {
-        return told.iter().for_each(|change| output::note(change));
-    }
-    if options.json {
-        let mut answer = fit.to_json();
-        if options.write {
-            let words: Vec<String> = changes.iter().map(Change::to_string).collect();
-            answer["written"] = words.into();
-        }
-        return results.print(&output::json(&answer));
-    }
-    results.answer(false, fit);
-    told.iter()
-        .for_each(|change| results.print(&format!("{}\n", visible::lines(change))));
 }

@@ -15,6 +15,7 @@ mod run;
 mod save;
 mod signals;
 mod tune;
+mod written;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

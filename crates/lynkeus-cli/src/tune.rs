@@ -10,8 +10,8 @@ use super::limits::{self, Limits};
 use super::output;
 use super::progress::Progress;
 use super::save::{Results, is_standard};
-use lynkeus::tune::{Change, Sweep};
-use lynkeus::{Error, visible};
+use super::written;
+use lynkeus::Error;
 
 /// On what it is judged and where the answer goes.
 #[derive(Debug, Args)]
@@ -61,7 +61,7 @@ pub(super) fn tune(path: &Path, options: &Options, limits: &Limits) -> Result<Ex
         return Err(sweep.refusal().at(&source.study.file));
     }
     let (text, changes) = match options.write {
-        true => rewritten(path, &sweep)?,
+        true => written::study(path, |text| sweep.rewritten(text))?,
         false => (String::new(), vec![]),
     };
     output::remarks(&sweep, options.quiet);
@@ -73,38 +73,8 @@ pub(super) fn tune(path: &Path, options: &Options, limits: &Limits) -> Result<Ex
     if options.write {
         results.put(path, text)?;
     }
-    show(&sweep, &changes, path, options, &mut results);
+    let asked = options.write.then_some((path, &changes[..]));
+    written::show(&sweep, asked, options.json, &mut results);
     results.keep()?;
     Ok(limits::code(&source.study, ExitCode::SUCCESS))
-}
-
-/// The study with the knee's values.
-fn rewritten(path: &Path, sweep: &Sweep) -> Result<(String, Vec<Change>), Error> {
-    let text = std::fs::read_to_string(path).map_err(|e| {
-        Error::input(format!("cannot read the study again: {e}")).at(path.display())
-    })?;
-    let rewritten = sweep.rewritten(&text);
-    rewritten.map_err(|error| error.at(path.display()))
-}
-
-/// The sweep in words or as JSON, with what was written; where standard output has a result, that is a note.
-fn show(sweep: &Sweep, changes: &[Change], path: &Path, options: &Options, results: &mut Results) {
-    let told: Vec<String> = changes
-        .iter()
-        .map(|c| format!("{}: {c}", path.display()))
-        .collect();
-    if results.has_printed() {
-        return told.iter().for_each(|change| output::note(change));
-    }
-    if options.json {
-        let mut answer = sweep.to_json();
-        if options.write {
-            let words: Vec<String> = changes.iter().map(Change::to_string).collect();
-            answer["written"] = words.into();
-        }
-        return results.print(&output::json(&answer));
-    }
-    results.answer(false, sweep);
-    told.iter()
-        .for_each(|change| results.print(&format!("{}\n", visible::lines(change))));
 }
