@@ -56,7 +56,7 @@ fn innovations(own: &Innovations, time: &Series, rows: usize) -> Panel {
     // where the plant alone is fitted it is the same
     let is_other = |(alone, innovation): (&f64, &f64)| alone.is_finite() && alone != innovation;
     if alone.into_iter().any(is_other) {
-        curves.push(curve(Kind::Grey, "error of the plant alone", &own.free_run));
+        curves.push(curve(Kind::Pale, "error of the plant alone", &own.free_run));
     }
     Panel {
         name: format!("{}_innovation", own.output),
