@@ -234,6 +234,9 @@ const NEARLY: f64 = 1e-5;
 /// Most halvings of the usual interval between rows, at the start and at the end.
 const HALVINGS: [usize; 2] = [5, 8];
 
+/// One row of so many may be one at which the plant has no value where the estimate is.
+const CONFINED: usize = 10;
+
 impl Work<'_> {
     fn done(
         mut self,
@@ -255,7 +258,10 @@ impl Work<'_> {
         let Some(best) = ends.into_iter().next() else {
             return Err(self.no_value());
         };
-        let best = self.settled(best)?;
+        let mut best = self.settled(best)?;
+        // a filter that is put back at every other row is none whose likelihood means something
+        let rows: usize = self.problem.logs.iter().map(|log| log.fitted).sum();
+        best.is_converged &= CONFINED * best.point.confined <= rows;
         self.told(plant, outputs, &begin, best, optima)
     }
 
