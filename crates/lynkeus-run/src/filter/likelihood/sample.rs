@@ -204,7 +204,10 @@ impl<'p, 'g> Sample<'p, 'g> {
         let own = self.views.iter().filter(|view| view.0 == sensor);
         let views: Vec<(usize, Node)> = own.map(|view| (view.1, view.2)).collect();
         // as they are at the estimate before the row's readings
-        let all: Vec<Node> = [output]
+        let level = match self.plant.sensors[sensor].noise {
+            ParametricLevel::Variance(level) | ParametricLevel::Share(level) => level,
+        };
+        let all: Vec<Node> = [output, level]
             .into_iter()
             .chain(views.iter().map(|v| v.1))
             .collect();
@@ -216,7 +219,7 @@ impl<'p, 'g> Sample<'p, 'g> {
             .zip(self.at.iter().copied());
         let all = g.substitute(&all, &moved.collect());
         let mut slopes: Vec<Term<'g>> = vec![None; n];
-        for ((column, _), &slope) in views.iter().zip(&all[1..]) {
+        for ((column, _), &slope) in views.iter().zip(&all[2..]) {
             slopes[*column] = self.term(slope);
         }
         let (x, root) = self.belief();
@@ -227,12 +230,13 @@ impl<'p, 'g> Sample<'p, 'g> {
             Some([innovation, noise]) => (innovation, Some(noise)),
             None => (self.reading - predicted, None),
         };
+        let level = g.expr(all[1]);
         let noise = |spread: Term<'g>| match (given, self.plant.sensors[sensor].noise) {
             (Some(given), _) => given,
-            (None, ParametricLevel::Variance(variance)) => g.expr(variance),
-            (None, ParametricLevel::Share(share)) => {
+            (None, ParametricLevel::Variance(_)) => level,
+            (None, ParametricLevel::Share(_)) => {
                 let square = sum(Some(predicted * predicted), spread);
-                g.expr(share).powi(2) * square.unwrap_or(g.constant(0.0))
+                level.powi(2) * square.unwrap_or(g.constant(0.0))
             }
         };
         corrected((&x, &root), &slopes, innovation, noise)
