@@ -500,7 +500,7 @@ class Plant:
                 numbers[channel.name] = value
             if all(name in self.numbers for name in e.symbols()) and not e.has_time():
                 continue
-            if e.op == "symbol":
+            if e.op == "symbol" and e.value not in self.columns:
                 named[channel.name] = e.value
                 continue
             if e not in made:

@@ -166,8 +166,10 @@ class Tables:
             condition = str(record["conditionId"])
             found[condition] = {}
             for name, cell in record.items():
+                if name in ("conditionId", "conditionName"):
+                    continue
                 value = self.override(cell, f"condition {condition}: {name}")
-                if name not in ("conditionId", "conditionName") and value is not None:
+                if value is not None:
                     found[condition][name] = value
         return found
 

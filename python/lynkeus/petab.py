@@ -20,7 +20,7 @@ import math
 import os
 import sys
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -31,16 +31,14 @@ from ._petab_plant import Plant, jacobian
 from ._petab_sbml import Sbml
 from ._petab_tables import Parameter, Prior, Tables
 from ._progress import Progress
-from .errors import InputError, LynkeusError, RefusedError
+from .errors import InputError, LynkeusError
 from .model import Model
 from .results import Fit
-from .sections import EstimateSection, FitPriors, FitSection
+from .sections import FitPriors, FitSection
 from .study import Study
 
-#: what −log L may change by, as a share of it, where steps are halved for the last time
-_SETTLED = 1e-9
-#: most halvings of the usual time between two rows
-_HALVINGS = 16
+#: the relative tolerance at which −log L and simulations are computed
+_TOLERANCE = 1e-13
 
 __all__ = ["Parameter", "Prior", "Problem", "load", "main"]
 
@@ -180,7 +178,7 @@ class Problem:
         """
         if isinstance(values, Fit):
             return float(values.nll) + self.constant
-        return self._settled(values)[1] + self.constant
+        return float(self._still(values).nll_at_start) + self.constant
 
     def simulations(self, values: Fit | Mapping[str, float] | None = None) -> np.ndarray[Any, Any]:
         """What the model has in the place of the measurements, row by row of their table.
@@ -195,7 +193,7 @@ class Problem:
         array
             In the units of the measurements.
         """
-        run = values if isinstance(values, Fit) else self._settled(values)[0]
+        run = values if isinstance(values, Fit) else self._still(values)
         plant = self._plant
         found = np.full(len(plant.tables.measurements), math.nan)
         logs = run["log"] if "log" in run.columns else np.ones(len(run["t"]))
@@ -238,42 +236,23 @@ class Problem:
                 raise InputError(f"{self._plant.tables.path}: {what}")
         return self.study.replace(parameters=given)
 
-    def _settled(self, values: Mapping[str, float] | None) -> tuple[Fit, float]:
-        """A fit that has nowhere to go, and −log L at steps that are short enough."""
-        before = math.inf
-        for run in self._finer(values):
-            found = float(run.nll_at_start)
-            if abs(found - before) <= _SETTLED * max(1.0, abs(found)):
-                break
-            before = found
-        # what halved steps leave of the error
-        return run, found + ((found - before) / 15.0 if math.isfinite(before) else 0.0)
-
-    def _finer(self, values: Mapping[str, float] | None) -> Iterator[Fit]:
-        """Fits that have nowhere to go, at steps that are halved as long as somebody asks."""
+    def _still(self, values: Mapping[str, float] | None) -> Fit:
+        """A fit that has nowhere to go, by short steps."""
         study = self.study if values is None else self.at(values)
         given = self.values(values)
         name, one = next(iter(self._plant.fitted.items()))
         value = math.log10(given[name]) if one.is_power else given[name]
         ends = [value, value + 1e-12 * (abs(value) or 1.0)]
-        fixed: FitSection = {"parameters": [one.name], "log": None, "priors": None, "bounds": {one.name: ends}}
-        study = study.replace(fit=fixed)
-        gaps = np.concatenate([np.diff(log["t"]) for log in self.logs])
-        step = float(np.median(gaps)) if len(gaps) else 1.0
-        is_told = False
-        for k in range(_HALVINGS):
-            at_steps: EstimateSection = {"method": "rk4", "step": step / 2.0**k}
-            try:
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore")
-                    run = study.replace(estimate=at_steps).fit(self.logs)
-            except RefusedError:
-                # steps that are too long for a stiff plant
-                if k + 1 == _HALVINGS and not is_told:
-                    raise
-                continue
-            is_told = True
-            yield run
+        fixed: FitSection = {
+            "parameters": [one.name],
+            "log": None,
+            "priors": None,
+            "bounds": {one.name: ends},
+            "starts": 1,
+        }
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return study.replace(fit=fixed, estimate={"rtol": _TOLERANCE}).fit(self.logs)
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Writes ``plant.mo``, ``study.toml`` and a log for each condition.

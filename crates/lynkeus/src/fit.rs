@@ -114,7 +114,7 @@ pub fn fit(
     }
     let logs = tables
         .iter()
-        .map(|table| FittedLog::new(&prepared, &design, table));
+        .map(|table| FittedLog::new(&prepared, &design, table, tables.len() > 1));
     let logs = logs.collect::<Result<Vec<_>, _>>()?;
     let symbolic = plant::symbolic(&study)?;
     let unknowns = unknown::unknowns(&prepared, &symbolic, &logs)?;
@@ -147,6 +147,8 @@ pub fn fit(
         logs: &logs,
         terms,
         step: Step::Auto,
+        is_implicit: false,
+        tolerance: 1.0,
         most_confined: usize::MAX,
         evaluations: 0,
     };
@@ -493,11 +495,15 @@ impl Work<'_> {
         self.profiles(&found, &mut uncertainty)?;
         let values = self.problem.values(&found.point.z);
         let alone = self.alone.as_mut();
+        let is_implicit = self.problem.is_implicit;
         let alone = alone.map(|terms| Problem {
             terms: std::mem::take(terms),
             ..self.problem.clone()
         });
         let mut alone = alone;
+        if let Some(alone) = &mut alone {
+            alone.implicit(is_implicit);
+        }
         let (errors, rows) =
             errors::errors(&mut self.problem, alone.as_mut(), &self.outputs, &values)?;
         let coloured = errors.iter().filter(|own| own.are_coloured());

@@ -42,6 +42,10 @@ pub(crate) struct Problem<'a> {
     /// one per log
     pub terms: Vec<Term>,
     pub step: Step,
+    /// by implicit steps
+    pub is_implicit: bool,
+    /// a factor of all that −log L may be wrong by
+    pub tolerance: f64,
     /// where the plant has no value in more intervals than so many, −log L has none: steps are too long there
     pub most_confined: usize,
     pub evaluations: usize,

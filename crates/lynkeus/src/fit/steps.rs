@@ -23,9 +23,13 @@ const MOST_STEPS: usize = 2_000_000;
 /// One row of so many may be one at which the plant has no value where the estimate is.
 const CONFINED: usize = 10;
 
+/// What a study's relative tolerance is where it does not say: a smaller one makes all others here as much smaller.
+const USUAL: f64 = 1e-9;
+
 impl Problem<'_> {
     /// A point at such steps of the study's method that shorter ones hardly change −log L. Steps that are too long for
     /// a stiff plant throw its estimates out of every range: such a point counts only where shorter ones do not help.
+    /// A plant alone then has implicit ones.
     ///
     /// # Errors
     /// As [`Problem::at`].
@@ -35,38 +39,88 @@ impl Problem<'_> {
         method: &Method,
         budget: &Budget,
     ) -> Result<Point, Error> {
-        if let Method::Rk4(step) = method {
-            self.step = *step;
-            return self.at(z);
+        match method {
+            Method::Rk4(step) => {
+                self.step = *step;
+                return self.at(z);
+            }
+            Method::Adaptive(t) | Method::Explicit(t) | Method::Stiff(t) => {
+                self.tolerance = (t.relative / USUAL).min(1.0);
+            }
         }
+        let mut found: Option<Point> = None;
+        if !matches!(method, Method::Stiff(_)) {
+            let (point, is_settled) = self.halving(&z, budget, HALVINGS)?;
+            if is_settled || matches!(method, Method::Explicit(_)) || budget.spent().is_some() {
+                return Ok(point);
+            }
+            found = Some(point).filter(|point| self.is_sound(point));
+        }
+        let explicit = self.step;
+        if self.implicit(true) {
+            let (point, is_settled) = self.halving(&z, budget, HALVINGS)?;
+            let is_better = found.is_none() && self.is_sound(&point);
+            if is_settled || is_better || budget.spent().is_some() {
+                return Ok(point);
+            }
+        }
+        self.implicit(false);
+        match found {
+            Some(point) => {
+                self.step = explicit;
+                Ok(point)
+            }
+            None => Ok(self.halving(&z, budget, u32::MAX)?.0),
+        }
+    }
+
+    /// By implicit steps from here on, or not; whether there are such.
+    pub fn implicit(&mut self, is_implicit: bool) -> bool {
+        let mut all = true;
+        for term in &mut self.terms {
+            all &= term.likelihood.implicit(is_implicit);
+        }
+        self.is_implicit = is_implicit && all;
+        all
+    }
+
+    /// A point at steps that are halved until that hardly changes −log L; whether it came to that.
+    /// Where the plant has no value they are halved `most` times at most.
+    fn halving(
+        &mut self,
+        z: &DVector<f64>,
+        budget: &Budget,
+        most: u32,
+    ) -> Result<(Point, bool), Error> {
+        let finer = (-self.tolerance.log2() / 4.0).ceil() as u32;
         let intervals = self.logs.iter().map(FittedLog::interval);
         let usual = intervals.fold(f64::INFINITY, f64::min);
         self.step = Step::AtMost(usual);
-        let first = self.at(z)?;
+        let first = self.at(z.clone())?;
         let mut point = first.clone();
         let mut length = usual;
         for halving in 1.. {
             let is_enough = match self.is_sound(&point) {
-                true => halving > HALVINGS,
-                false => self.rows() << halving > MOST_STEPS,
+                true => halving > HALVINGS + finer,
+                false => halving > most || self.rows() << halving > MOST_STEPS,
             };
             if is_enough || budget.spent().is_some() {
                 break;
             }
-            let tolerance = SETTLED.max(NEARLY * point.value.abs());
+            let tolerance = self.tolerance * SETTLED.max(NEARLY * point.value.abs());
             self.step = Step::AtMost(0.5 * length);
             let fine = self.at(point.z.clone())?;
             if self.is_sound(&point) && (fine.value - point.value).abs() < tolerance {
                 self.step = Step::AtMost(length);
-                return Ok(point);
+                return Ok((point, true));
             }
             (point, length) = (fine, 0.5 * length);
         }
         if self.is_sound(&point) {
-            return Ok(point);
+            return Ok((point, false));
         }
         self.step = Step::AtMost(usual);
-        Ok(first)
+        Ok((first, false))
     }
 
     /// The same point at half the steps, which are kept where that changes it.
@@ -79,7 +133,7 @@ impl Problem<'_> {
         };
         self.step = Step::AtMost(0.5 * length);
         let fine = self.at(coarse.z.clone())?;
-        if (fine.value - coarse.value).abs() < SETTLED {
+        if (fine.value - coarse.value).abs() < self.tolerance * SETTLED {
             self.step = Step::AtMost(length);
             return Ok(None);
         }

@@ -10,6 +10,7 @@
 mod code;
 mod plant;
 mod sample;
+mod stiff;
 
 use lynkeus_expr::Tape;
 use lynkeus_native::Function;
@@ -122,8 +123,17 @@ impl Likelihood {
         }))
     }
 
+    /// From now on by implicit steps, for stiff plants, or not; whether it has such: those of a plant alone, which no
+    /// noise disturbs and whose start is known, have them unless their equations are too many.
+    pub fn implicit(&mut self, is_implicit: bool) -> bool {
+        match &mut self.0 {
+            Wide::Four(passes) => passes.implicit(is_implicit),
+            Wide::Eight(passes) => passes.implicit(is_implicit),
+        }
+    }
+
     /// −log L of a log at θ, its gradient and Fisher's information; from row to row by such steps of Runge and
-    /// Kutta ([`Step::Auto`]: one).
+    /// Kutta ([`Step::Auto`]: one), or of Rosenbrock's kind ([`Self::implicit`]).
     ///
     /// # Errors
     /// [`Error::Setting`] for another number of parameters, readings or inputs, a step that is no length or too
@@ -173,6 +183,9 @@ struct Passes<const L: usize> {
     begin: Code<L>,
     /// of t, h, u, x̂, S and θ: x̂ and S a step later
     predict: Code<L>,
+    /// the same by a step for stiff equations
+    implicit: Option<Code<L>>,
+    is_implicit: bool,
     spare: Option<Spare<L>>,
     sensors: Vec<Sensor<L>>,
     inputs: usize,
@@ -252,6 +265,8 @@ impl<const L: usize> Passes<L> {
             parameters,
             begin: sample.begin(compile)?,
             predict: sample.predict(compile)?,
+            implicit: sample.implicit(compile)?,
+            is_implicit: false,
             spare,
             sensors: sensors.collect::<Result<_>>()?,
             inputs: plant.inputs.len(),
@@ -264,6 +279,11 @@ impl<const L: usize> Passes<L> {
                 ..Tangents::default()
             },
         })
+    }
+
+    fn implicit(&mut self, is_implicit: bool) -> bool {
+        self.is_implicit = is_implicit && self.implicit.is_some();
+        self.implicit.is_some()
     }
 
     fn score<'a>(
@@ -308,6 +328,9 @@ impl<const L: usize> Passes<L> {
     fn place(&mut self, parameters: &[f64]) {
         self.begin.place(parameters);
         self.predict.place(parameters);
+        if let Some(implicit) = &mut self.implicit {
+            implicit.place(parameters);
+        }
         if let Some(spare) = &mut self.spare {
             spare.predict.place(parameters);
         }
@@ -333,14 +356,18 @@ impl<const L: usize> Passes<L> {
             steps,
             inputs,
         };
+        let predict = match &mut self.implicit {
+            Some(implicit) if self.is_implicit => implicit,
+            _ => &mut self.predict,
+        };
         let Some(spare) = &mut self.spare else {
-            interval.run(&mut self.predict, &mut self.belief);
+            interval.run(predict, &mut self.belief);
             return Ok(false);
         };
         for (before, belief) in spare.before.iter_mut().zip(&self.belief) {
             before.copy_from_slice(belief);
         }
-        interval.run(&mut self.predict, &mut self.belief);
+        interval.run(predict, &mut self.belief);
         let is_value = |x: &[f64; L]| x[0].is_finite();
         if self.belief[0].iter().all(is_value) {
             return Ok(false);

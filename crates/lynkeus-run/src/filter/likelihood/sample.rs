@@ -8,6 +8,7 @@ use lynkeus_native::Function;
 
 use super::code::Code;
 use super::plant::{ParametricLevel, ParametricPlant};
+use super::stiff::Alone;
 use crate::classical::{Term, sum};
 use crate::filter::expressions::{Corrected, Flow, corrected};
 use crate::{Error, Result};
@@ -171,6 +172,26 @@ impl<'p, 'g> Sample<'p, 'g> {
 
     pub fn predict<const L: usize>(&self, compile: Compile<L>) -> Result<Code<L>> {
         self.predict_by(&self.plant.derivatives, compile)
+    }
+
+    /// The same of a plant alone by a step for stiff equations.
+    pub fn implicit<const L: usize>(&self, compile: Compile<L>) -> Result<Option<Code<L>>> {
+        let plant = self.plant;
+        if !self.pattern.is_empty() {
+            return Ok(None);
+        }
+        let alone = Alone {
+            graph: plant.graph,
+            time: plant.time,
+            states: &plant.states,
+            derivatives: &plant.derivatives,
+        };
+        let Some(x) = alone.step(self.h) else {
+            return Ok(None);
+        };
+        let known = [&[plant.time, self.h.node()][..], &plant.inputs].concat();
+        let x: Vec<Node> = x.into_iter().map(Expr::node).collect();
+        self.code((&known, &plant.states), &x, compile).map(Some)
     }
 
     /// The same with the states limited to their ranges.
