@@ -326,7 +326,7 @@ _RELATED: dict[str, Callable[[float, float], bool]] = {
 _COMPUTED: dict[str, Callable[..., float]] = {
     "log": math.log, "log10": math.log10, "exp": math.exp, "sqrt": math.sqrt, "sin": math.sin, "cos": math.cos,
     "tan": math.tan, "asin": math.asin, "acos": math.acos, "atan": math.atan, "sinh": math.sinh,
-    "cosh": math.cosh, "tanh": math.tanh, "abs": abs, "floor": math.floor, "ceil": math.ceil, "min": min,
+    "cosh": math.cosh, "tanh": math.tanh, "abs": math.fabs, "floor": math.floor, "ceil": math.ceil, "min": min,
     "max": max, "mod": lambda a, b: a - math.floor(a / b) * b, "sign": lambda a: float((a > 0) - (a < 0)),
 }
 

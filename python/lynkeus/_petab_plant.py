@@ -126,9 +126,8 @@ class Plant:
     def _fitted(self, own: Parameter) -> Fitted:
         lower, upper = own.lower, own.upper
         prior = own.prior
-        on_scale = {"lin": lambda x: x, "log": math.exp, "log10": lambda x: 10.0**x}[own.scale]
         if prior is not None and prior.kind in ("uniform", "parameterScaleUniform"):
-            ends = prior.numbers if prior.kind == "uniform" else tuple(on_scale(x) for x in prior.numbers)
+            ends = prior.numbers if prior.kind == "uniform" else tuple(own.off_scale(x) for x in prior.numbers)
             lower, upper = max(lower, ends[0]), min(upper, ends[1])
             prior = None
         if math.isnan(lower) or math.isnan(upper) or not lower < upper:

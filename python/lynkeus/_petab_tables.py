@@ -38,6 +38,15 @@ class Parameter:
     estimate: bool
     prior: Prior | None = None
 
+    def off_scale(self, value: float) -> float:
+        """Of a value on its scale the linear one."""
+        match self.scale:
+            case "log":
+                return math.exp(value)
+            case "log10":
+                return math.pow(10.0, value)
+        return value
+
 
 @dataclass(frozen=True)
 class Observable:

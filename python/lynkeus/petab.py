@@ -174,11 +174,13 @@ class Problem:
         Returns
         -------
         float
-            −log L.
+            −log L; infinite where the model has no value.
         """
         if isinstance(values, Fit):
-            return float(values.nll) + self.constant
-        return float(self._still(values).nll_at_start) + self.constant
+            found = values.nll
+        else:
+            found = self._still(values).nll_at_start
+        return math.inf if found is None else found + self.constant
 
     def simulations(self, values: Fit | Mapping[str, float] | None = None) -> np.ndarray[Any, Any]:
         """What the model has in the place of the measurements, row by row of their table.

@@ -587,11 +587,12 @@ fn exact(rate: f64) -> f64 {
 #[test]
 fn implicit_steps_are_of_order_four() {
     let error = |steps| (driven(3.0, steps, true).value - exact(3.0)).abs();
-    for (coarse, fine) in [(10, 20), (20, 40), (40, 80)] {
-        let ratio = error(coarse) / error(fine);
-        assert!((13.0..19.0).contains(&ratio), "{coarse}: {ratio}");
+    for steps in [4, 8] {
+        let ratio = error(steps) / error(2 * steps);
+        assert!((11.0..24.0).contains(&ratio), "{steps}: {ratio}");
     }
-    assert!(error(80) < 1e-8, "{}", error(80));
+    // its published coefficients are good to ten digits
+    assert!(error(80) < 1e-9, "{}", error(80));
 }
 
 #[test]

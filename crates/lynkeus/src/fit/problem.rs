@@ -42,6 +42,8 @@ pub(crate) struct Problem<'a> {
     /// one per log
     pub terms: Vec<Term>,
     pub step: Step,
+    /// how often that is halved
+    pub halvings: u32,
     /// by implicit steps
     pub is_implicit: bool,
     /// a factor of all that −log L may be wrong by

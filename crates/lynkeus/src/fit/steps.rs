@@ -56,7 +56,7 @@ impl Problem<'_> {
             }
             found = Some(point).filter(|point| self.is_sound(point));
         }
-        let explicit = self.step;
+        let explicit = self.halvings;
         if self.implicit(true) {
             let (point, is_settled) = self.halving(&z, budget, HALVINGS)?;
             let is_better = found.is_none() && self.is_sound(&point);
@@ -67,7 +67,7 @@ impl Problem<'_> {
         self.implicit(false);
         match found {
             Some(point) => {
-                self.step = explicit;
+                self.shorten(explicit);
                 Ok(point)
             }
             None => Ok(self.halving(&z, budget, u32::MAX)?.0),
@@ -75,7 +75,7 @@ impl Problem<'_> {
     }
 
     /// By implicit steps from here on, or not; whether there are such.
-    pub fn implicit(&mut self, is_implicit: bool) -> bool {
+    fn implicit(&mut self, is_implicit: bool) -> bool {
         let mut all = true;
         for term in &mut self.terms {
             all &= term.likelihood.implicit(is_implicit);
@@ -94,11 +94,10 @@ impl Problem<'_> {
     ) -> Result<(Point, bool), Error> {
         let finer = (-self.tolerance.log2() / 4.0).ceil() as u32;
         let intervals = self.logs.iter().map(FittedLog::interval);
-        let usual = intervals.fold(f64::INFINITY, f64::min);
-        self.step = Step::AtMost(usual);
+        self.step = Step::AtMost(intervals.fold(f64::INFINITY, f64::min));
+        self.shorten(0);
         let first = self.at(z.clone())?;
         let mut point = first.clone();
-        let mut length = usual;
         for halving in 1.. {
             let is_enough = match self.is_sound(&point) {
                 true => halving > HALVINGS + finer,
@@ -108,19 +107,33 @@ impl Problem<'_> {
                 break;
             }
             let tolerance = self.tolerance * SETTLED.max(NEARLY * point.value.abs());
-            self.step = Step::AtMost(0.5 * length);
+            self.shorten(halving);
             let fine = self.at(point.z.clone())?;
             if self.is_sound(&point) && (fine.value - point.value).abs() < tolerance {
-                self.step = Step::AtMost(length);
+                self.shorten(halving - 1);
                 return Ok((point, true));
             }
-            (point, length) = (fine, 0.5 * length);
+            point = fine;
         }
         if self.is_sound(&point) {
             return Ok((point, false));
         }
-        self.step = Step::AtMost(usual);
+        self.shorten(0);
         Ok((first, false))
+    }
+
+    /// Steps that are halved so often, in every interval between two rows.
+    fn shorten(&mut self, halvings: u32) {
+        self.halvings = halvings;
+        for term in &mut self.terms {
+            term.likelihood.shorten(1 << halvings);
+        }
+    }
+
+    /// Steps as another problem has them.
+    pub fn step_as(&mut self, is_implicit: bool, halvings: u32) {
+        self.implicit(is_implicit);
+        self.shorten(halvings);
     }
 
     /// The same point at half the steps, which are kept where that changes it.
@@ -128,13 +141,14 @@ impl Problem<'_> {
     /// # Errors
     /// As [`Problem::at`].
     pub fn halved(&mut self, coarse: &Point) -> Result<Option<Point>, Error> {
-        let Step::AtMost(length) = self.step else {
+        if !matches!(self.step, Step::AtMost(_)) {
             return Ok(None);
-        };
-        self.step = Step::AtMost(0.5 * length);
+        }
+        let halvings = self.halvings;
+        self.shorten(halvings + 1);
         let fine = self.at(coarse.z.clone())?;
         if (fine.value - coarse.value).abs() < self.tolerance * SETTLED {
-            self.step = Step::AtMost(length);
+            self.shorten(halvings);
             return Ok(None);
         }
         Ok(Some(fine))

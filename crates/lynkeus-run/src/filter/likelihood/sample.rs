@@ -174,6 +174,13 @@ impl<'p, 'g> Sample<'p, 'g> {
         self.predict_by(&self.plant.derivatives, compile)
     }
 
+    /// Which inputs move the states.
+    pub fn drives(&self) -> Vec<bool> {
+        let symbols = self.plant.graph.symbols_of(&self.plant.derivatives);
+        let inputs = self.plant.inputs.iter();
+        inputs.map(|input| symbols.contains(input)).collect()
+    }
+
     /// The same of a plant alone by a step for stiff equations.
     pub fn implicit<const L: usize>(&self, compile: Compile<L>) -> Result<Option<Code<L>>> {
         let plant = self.plant;

@@ -81,7 +81,7 @@ pub(super) struct Alone<'a, 'g> {
 }
 
 impl<'g> Alone<'_, 'g> {
-    /// x after a step of length h; none where the matrix is too large to be eliminated by expressions.
+    /// x after a step of length h, above 0; none where the matrix is too large to be eliminated by expressions.
     pub fn step(&self, h: Expr<'g>) -> Option<Vec<Expr<'g>>> {
         let g = self.graph;
         let factors = self.factors(h)?;
