@@ -27,6 +27,9 @@ from ._petab_sbml import Quantity, Sbml
 from ._petab_tables import Measurement, Parameter, Tables, placeholders
 from .errors import InputError
 
+#: so many times the longest of the finite times, or 1, is as good as infinite
+LONG = 1e8
+
 #: the value of an input in a log at a time; the second time is that of the next row
 Column = Callable[[int, float, float], float]
 
@@ -72,26 +75,38 @@ class Plant:
     def __init__(self, tables: Tables, sbml: Sbml) -> None:
         self.tables, self.sbml = tables, sbml
         self.notes: list[str] = []
-        #: names of conditions, one for each log
-        self.logs = list(dict.fromkeys(one.condition for one in tables.measurements))
-        self.places = {condition: place for place, condition in enumerate(self.logs)}
+        #: the conditions of each log: that of the steady state before it, or none, and its own
+        self.logs = list(dict.fromkeys(one.log for one in tables.measurements))
+        self.places = {log: place for place, log in enumerate(self.logs)}
         ends = [0.0] * len(self.logs)
         for one in tables.measurements:
-            place = self.places[one.condition]
-            ends[place] = max(ends[place], one.time)
+            place = self.places[one.log]
+            if math.isfinite(one.time):
+                ends[place] = max(ends[place], one.time)
         self.ends = ends
+        #: a time after which a steady state is reached
+        self.long = LONG * (max(ends) or 1.0)
+        for one in tables.measurements:
+            if one.time == math.inf and ends[self.places[one.log]] > 0:
+                what = f"row {one.row + 1}: a steady state (time = inf) in a condition with other times"
+                raise tables.refused("measurement", what)
+        #: the log and the condition of each phase: before a log, and of it
+        self.phases = [
+            (place, condition) for place, log in enumerate(self.logs) for condition in log if condition
+        ]
+        self.first = [next(k for k, one in enumerate(self.phases) if one[0] == place) for place in range(len(ends))]
         self.used = {*sbml.quantities, *tables.parameters, *tables.observables, sbml.name}
         #: instants beside those of the measurements at which something jumps
         self.breaks: list[set[float]] = [set() for _ in self.logs]
         self.columns: dict[str, Column] = {}
-        #: inputs that are the same throughout a log
+        #: inputs that are the same throughout a phase
         self.constants: dict[str, list[float]] = {}
-        self.patterns: dict[tuple[float, ...], str] = {}
+        self.patterns: dict[tuple[str, tuple[float, ...]], str] = {}
         self.numbers: dict[str, float] = {}
         self.fitted: dict[str, Fitted] = {}
         #: what formulas of the model and of observables mean by a name
         self.means: dict[str, Expr] = {}
-        self.starts: dict[str, Expr] = {}
+        self.starts: dict[tuple[str, bool], Expr] = {}
         #: declarations and equations
         self.states: list[tuple[str, Expr | None, Expr]] = []
         self.variables: list[tuple[str, Expr]] = []
@@ -163,7 +178,7 @@ class Plant:
     # what differs from log to log
 
     def _overridden(self) -> dict[str, list[Expr | None]]:
-        conditions = [self.tables.conditions[name] for name in self.logs]
+        conditions = [self.tables.conditions[name] for _, name in self.phases]
         names = dict.fromkeys(name for condition in conditions for name in condition)
         found: dict[str, list[Expr | None]] = {}
         for name in names:
@@ -181,7 +196,7 @@ class Plant:
         return found
 
     def varying(self, name: str, values: list[Expr]) -> Expr:
-        """What has these values in the logs, in parameters and inputs."""
+        """What has these values in the phases, in parameters and inputs."""
         if all(value == values[0] for value in values):
             return values[0]
         terms: list[Expr] = []
@@ -191,16 +206,22 @@ class Plant:
             terms.append(symbol(self._constant(name if is_all else f"{name}_value", numbers)))
         for one in dict.fromkeys(value for value in values if value.op != "number"):
             pattern = tuple(float(value == one) for value in values)
-            if pattern not in self.patterns:
-                self.patterns[pattern] = self._constant("case", list(pattern))
-            terms.append(times(symbol(self.patterns[pattern]), one))
+            terms.append(times(symbol(self._constant("case", list(pattern))), one))
         return total(terms)
 
     def _constant(self, name: str, values: list[float]) -> str:
-        own = name if name in self.sbml.quantities and name not in self.columns else self.fresh(name)
-        self.constants[own] = values
-        self.columns[own] = lambda log, t, after: values[log]
-        return own
+        """An input with these values in the phases."""
+        key = (name, tuple(values))
+        if key not in self.patterns:
+            own = name if name in self.sbml.quantities and name not in self.columns else self.fresh(name)
+            self.patterns[key] = own
+            self.constants[own] = values
+            self.columns[own] = lambda log, t, after: values[self.phase(log, t)]
+        return self.patterns[key]
+
+    def phase(self, log: int, t: float) -> int:
+        """That of a log at a time."""
+        return self.first[log] + int(bool(self.logs[log][0]) and t >= 0)
 
     # the model
 
@@ -216,38 +237,41 @@ class Plant:
             if own.id not in self.tables.parameters and own.id not in self.numbers:
                 self._take(own)
 
-    def start(self, name: str, within: tuple[str, ...] = ()) -> Expr:
-        """Where something starts, in parameters and inputs."""
-        if name in self.starts:
-            return self.starts[name]
-        if name in within:
-            raise self.sbml.refused(f"the starts of {', '.join(within)} need each other")
-        self.starts[name] = self._start(name, (*within, name))
-        return self.starts[name]
+    def start(self, name: str, is_first: bool = True, within: tuple[str, ...] = ()) -> Expr:
+        """Where something starts, in parameters and inputs: at the first phase of each log, or at each phase."""
+        key = (name, is_first)
+        if key not in self.starts:
+            if name in within:
+                raise self.sbml.refused(f"the starts of {', '.join(within)} need each other")
+            self.starts[key] = self._start(name, is_first, (*within, name))
+        return self.starts[key]
 
-    def _start(self, name: str, within: tuple[str, ...]) -> Expr:
+    def _start(self, name: str, is_first: bool, within: tuple[str, ...]) -> Expr:
         if name in self.means:
             return self.means[name]
         own = self.sbml.quantities.get(name)
         if name in self.tables.parameters or name in self.numbers or own is None:
             return symbol(name)
         if own.rule is not None and own.rule[0] == "assignment":
-            return self.at_start(own.rule[1], within)
-        given = self.overridden.get(name, [None])
-        default = None
+            return self.at_start(own.rule[1], is_first, within)
+        given = self.overridden.get(name, [None] * len(self.phases))
+        default = number(0.0)
         if any(value is None for value in given):
             said = self.sbml.start(own)
             if said is None:
                 raise self.sbml.refused(f"nothing says where {name} starts")
-            default = self.at_start(said, within)
+            default = self.at_start(said, is_first, within)
         values = [default if value is None else value for value in given]
-        return self.varying(name if not self.sbml.is_state(own) else f"{name}_start", [v for v in values if v])
+        if is_first:
+            values = [values[self.first[log]] for log, _ in self.phases]
+        stays = is_first and any(before for before, _ in self.logs)
+        return self.varying(f"{name}_start" if stays or self.sbml.is_state(own) else name, values)
 
-    def at_start(self, e: Expr, within: tuple[str, ...] = ()) -> Expr:
+    def at_start(self, e: Expr, is_first: bool, within: tuple[str, ...] = ()) -> Expr:
         def change(part: Expr) -> Expr | None:
             if part.op == "time":
                 return number(0.0)
-            return self.start(part.value, within) if part.op == "symbol" else None
+            return self.start(part.value, is_first, within) if part.op == "symbol" else None
 
         return e.changed(change)
 
@@ -255,25 +279,34 @@ class Plant:
         if own.rule is not None and own.rule[0] == "assignment":
             self.variables.append((own.id, self.named(own.rule[1])))
             return
-        start = self.start(own.id)
         is_dense = own.kind == "species" and not own.is_amount and own.rule is None
         varies = is_dense and self.sbml.varies(own.compartment)
         size = symbol(own.compartment)
         if not self.sbml.is_state(own):
+            start = self.start(own.id, is_first=False)
             if varies:
                 start = over(times(start, self.start(own.compartment)), size)
             self._hold(own.id, start)
             return
+        start = self.start(own.id)
         derivative = self.named(self.sbml.derivative(own))
         if is_dense and not varies:
             derivative = over(derivative, self.named(size))
-        if varies:
-            # the amount is what reactions change
-            amount = self.fresh(f"{own.id}_amount")
-            self.variables.append((own.id, over(symbol(amount), size)))
-            self._state(amount, times(start, self.start(own.compartment)), derivative)
-        else:
-            self._state(own.id, start, derivative)
+        if not varies:
+            self._state(own.id, start, derivative, self._resets(own.id))
+            return
+        if self._resets(own.id):
+            raise self.sbml.refused(f"{own.id} starts anew after a steady state, in a compartment that varies")
+        # the amount is what reactions change
+        amount = self.fresh(f"{own.id}_amount")
+        self.variables.append((own.id, over(symbol(amount), size)))
+        self._state(amount, times(start, self.start(own.compartment)), derivative, {})
+
+    def _resets(self, name: str) -> dict[int, Expr]:
+        """The phases after a steady state at which a state starts anew, and where."""
+        given = self.overridden.get(name, [])
+        later = (k for k, (log, _) in enumerate(self.phases) if k != self.first[log])
+        return {k: value for k in later if given and (value := given[k]) is not None}
 
     def _hold(self, name: str, value: Expr) -> None:
         """Something that stays."""
@@ -284,14 +317,25 @@ class Plant:
         else:
             self.variables.append((name, value))
 
-    def _state(self, name: str, start: Expr, derivative: Expr) -> None:
-        if not any(one in self.columns for one in start.symbols()):
+    def _state(self, name: str, start: Expr, derivative: Expr, resets: dict[int, Expr]) -> None:
+        is_same = not any(one in self.columns for one in start.symbols())
+        if is_same and not resets:
             self.states.append((name, start, derivative))
             return
         # a start of a plant is the same in all logs: what it has moved since starts at 0 in each of them
         moved = self.fresh(f"{name}_moved")
-        self.variables.append((name, total([start, symbol(moved)])))
+        whole = total([start, symbol(moved)])
         self.states.append((moved, number(0.0), derivative))
+        if resets:
+            # what it was in the steady state before is kept, and left out from then on
+            kept = self.fresh(f"{name}_before")
+            is_before = [float(k in self.first and bool(self.logs[log][0])) for k, (log, _) in enumerate(self.phases)]
+            factor = times(symbol(self._constant("before", is_before)), number(LONG / self.long))
+            self.states.append((kept, number(0.0), times(factor, Expr("-", (whole, symbol(kept))))))
+            none = number(0.0)
+            put = [Expr("-", (resets[k], symbol(kept))) if k in resets else none for k in range(len(self.phases))]
+            whole = total([whole, self.varying(f"{name}_put", put)])
+        self.variables.append((name, whole))
 
     # what is measured
 
@@ -301,7 +345,7 @@ class Plant:
         for one in self.tables.measurements:
             self._check_placeholders(one)
             shape = tuple((name, None if e.op == "number" else e) for name, e in sorted(one.overrides.items()))
-            at = (one.observable, shape, one.condition, one.time)
+            at = (one.observable, shape, one.log, one.time)
             groups[one.observable, shape, count[at]].append(one)
             count[at] += 1
         of: dict[str, int] = defaultdict(int)
@@ -324,7 +368,7 @@ class Plant:
         observable = self.tables.observables[own[0].observable]
         values: dict[str, Expr] = {}
         for placeholder, first in own[0].overrides.items():
-            numbers = {(self.places[one.condition], one.time): one.overrides[placeholder] for one in own}
+            numbers = {(self.places[one.log], self.instant(one)): one.overrides[placeholder] for one in own}
             if all(value == first for value in numbers.values()):
                 values[placeholder] = self.named(first)
             else:
@@ -357,6 +401,7 @@ class Plant:
         for channel in self.channels:
             channel.formula = self._stepped(channel.formula)
             channel.noise = self._stepped(channel.noise)
+        self._refuse_time()
 
     def _stepped(self, e: Expr) -> Expr:
         def change(part: Expr) -> Expr | None:
@@ -387,7 +432,7 @@ class Plant:
             )
             return None
         for log, end in enumerate(self.ends):
-            values = self.numbers | {name: own[log] for name, own in self.constants.items()}
+            values = self._known(self.phase(log, 0.0))
             at = [computed(difference, values, t) for t in (0.0, 1.0, 2.75)]
             slope = at[1] - at[0]
             if abs(at[2] - at[0] - 2.75 * slope) > 1e-9 * max(map(abs, at)):
@@ -398,20 +443,42 @@ class Plant:
                 self.breaks[log].add(instant)
 
         def column(log: int, t: float, after: float) -> float:
-            values = self.numbers | {name: own[log] for name, own in self.constants.items()}
-            return computed(whole, values, 0.5 * (t + after))
+            # what comes to a steady state does so after all jumps
+            at = 0.5 * (t + after) if t >= 0 else self.long
+            return computed(whole, self._known(self.phase(log, t)), at)
 
         name = self.fresh("step")
         self.columns[name] = column
         return Expr(">", (symbol(name), number(0.5)))
 
+    def _known(self, phase: int) -> dict[str, float]:
+        """Numbers and inputs of a phase."""
+        return self.numbers | {name: own[phase] for name, own in self.constants.items()}
+
+    @property
+    def settles(self) -> bool:
+        """Whether something comes to a steady state."""
+        return any(before for before, _ in self.logs) or any(
+            one.time == math.inf for one in self.tables.measurements
+        )
+
+    def _refuse_time(self) -> None:
+        """What goes on with time comes to no steady state."""
+        whole = [e for _, _, e in self.states] + [e for _, e in self.variables]
+        if any(before for before, _ in self.logs) and any(e.has_time() for e in whole):
+            raise self.sbml.refused("a steady state is asked of equations that go on with time")
+
     # what becomes of it
 
     def times(self, log: int) -> list[float]:
         """The rows of a log: the start, the measurements, and where something jumps."""
-        condition = self.logs[log]
-        own = {one.time for one in self.tables.measurements if one.condition == condition}
-        return sorted({0.0, *own, *self.breaks[log]})
+        own = {self.instant(one) for one in self.tables.measurements if self.places[one.log] == log}
+        before = {-self.long} if self.logs[log][0] else set()
+        return sorted({0.0, *before, *own, *self.breaks[log]})
+
+    def instant(self, one: Measurement) -> float:
+        """The row of a measurement."""
+        return one.time if math.isfinite(one.time) else self.long
 
     def table(self, log: int) -> dict[str, np.ndarray[Any, Any]]:
         """The columns of a log by their names."""
@@ -424,8 +491,8 @@ class Plant:
         for channel in self.channels:
             readings = np.full(len(at), math.nan)
             for one in channel.measurements:
-                if self.places[one.condition] == log:
-                    readings[rows[one.time]] = transformed(one.value, channel.transformation)
+                if self.places[one.log] == log:
+                    readings[rows[self.instant(one)]] = transformed(one.value, channel.transformation)
             found[channel.name] = readings
         return found
 

@@ -64,7 +64,9 @@ class Measurement:
     """A row of the table of measurements."""
 
     observable: str
-    condition: str
+    #: the condition in whose steady state it begins, or none, and that under which it is made
+    log: tuple[str, str]
+    #: infinite in a steady state
     time: float
     value: float
     #: what stands for the placeholders of its observable's formulas
@@ -79,7 +81,7 @@ class Tables:
     Raises
     ------
     InputError
-        What is not read: preequilibration, steady states, noise that is not normal.
+        What is not read: noise that is not normal, names of nothing, cells that are no numbers.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -200,17 +202,12 @@ class Tables:
         if name not in self.observables:
             raise self.refused("measurement", f'row {i + 1}: no observable is called "{name}"')
         before = word(row.get("preequilibrationConditionId"))
-        if before:
-            raise self.refused(
-                "measurement", f'row {i + 1}: preequilibration (under "{before}"), which is not read'
-            )
         condition = word(row.get("simulationConditionId"))
-        if condition not in self.conditions:
-            raise self.refused("measurement", f'row {i + 1}: no condition is called "{condition}"')
+        for one in (before or condition, condition):
+            if one not in self.conditions:
+                raise self.refused("measurement", f'row {i + 1}: no condition is called "{one}"')
         time, value = real(row["time"]), real(row["measurement"])
-        if not math.isfinite(time):
-            raise self.refused("measurement", f"row {i + 1}: a steady state (time = {time}), which is not read")
-        if time < 0:
+        if not time >= 0:
             raise self.refused("measurement", f"row {i + 1}: expected a time from 0 on, found {time}")
         transformation = self.observables[name].transformation
         if transformation != "lin" and value <= 0:
@@ -222,7 +219,7 @@ class Tables:
                 own = self.override(cell, f"row {i + 1}")
                 if own is not None:
                     overrides[f"{kind}Parameter{k + 1}_{name}"] = own
-        return Measurement(name, condition, time, value, overrides, i)
+        return Measurement(name, (before, condition), time, value, overrides, i)
 
 
 def word(cell: Any) -> str:

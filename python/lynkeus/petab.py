@@ -34,7 +34,7 @@ from ._progress import Progress
 from .errors import InputError, LynkeusError
 from .model import Model
 from .results import Fit
-from .sections import FitPriors, FitSection
+from .sections import EstimateSection, FitPriors, FitSection
 from .study import Study
 
 #: the relative tolerance at which −log L and simulations are computed
@@ -53,7 +53,7 @@ class Problem:
     logs : list of dict
         Columns by their names, one log for each condition.
     conditions : list of str
-        The conditions of these logs.
+        The conditions of these logs; after that of the steady state in which one begins.
     parameters : dict of str to Parameter
         The table of parameters, by id.
     outputs : dict of str to str
@@ -81,9 +81,13 @@ class Problem:
         priors = {one.name: cast(FitPriors, one.prior) for one in plant.fitted.values() if one.prior}
         if priors:
             fit["priors"] = priors
-        self.study = Study(model, noise=noise or None, observer={"family": "ekf"}, fit=fit)
+        # a steady state is as far away as steps of Runge and Kutta do not reach
+        estimate: EstimateSection | None = {"method": "stiff"} if plant.settles else None
+        self.study = Study(
+            model, noise=noise or None, observer={"family": "ekf"}, fit=fit, estimate=estimate
+        )
         self.logs: list[dict[str, np.ndarray[Any, Any]]] = [plant.table(i) for i in range(len(plant.logs))]
-        self.conditions: list[str] = list(plant.logs)
+        self.conditions: list[str] = [" ".join(filter(None, log)) for log in plant.logs]
         self.parameters: dict[str, Parameter] = dict(tables.parameters)
         self.outputs: dict[str, str] = {one.name: one.observable for one in plant.channels}
         self.constant: float = math.fsum(
@@ -203,9 +207,9 @@ class Problem:
             off = run[f"{channel.name}_innovation"]
             rows = {(int(log) - 1, float(t)): row for row, (log, t) in enumerate(zip(logs, run["t"], strict=True))}
             for one in channel.measurements:
-                row = rows[plant.places[one.condition], one.time]
-                read = self.logs[plant.places[one.condition]]
-                reading = read[channel.name][np.searchsorted(read["t"], one.time)]
+                place, at = plant.places[one.log], plant.instant(one)
+                row, read = rows[place, at], self.logs[place]
+                reading = read[channel.name][np.searchsorted(read["t"], at)]
                 value = reading - off[row]
                 match channel.transformation:
                     case "log":

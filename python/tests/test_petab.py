@@ -267,7 +267,9 @@ xmlns="http://www.w3.org/1998/Math/MathML"><cn>1</cn></math></eventAssignment></
         ({"observables": ("B\ts", "B + unheard\ts")}, 'observable b: nothing is called "unheard"'),
         ({"observables": ("B\ts", "B +* 2\ts")}, "observable b: expected a formula"),
         ({"conditions": ("dose", "doze")}, 'the model has nothing called "doze"'),
-        ({"measurements": ("a\trest\t0.5", "a\trest\tinf")}, "row 1: a steady state (time = inf)"),
+        ({"measurements": ("a\trest\t0.5", "a\trest\tinf")}, "row 1: a steady state (time = inf) in a condition"),
+        ({"measurements": ("a\trest\t0.5", "a\trest\t-0.5")}, "row 1: expected a time from 0 on, found -0.5"),
+        ({"measurements": ("a\trest\t0.5", "a\tresting\t0.5")}, 'row 1: no condition is called "resting"'),
         ({"measurements": ("scale_1\t0.03", "\t0.03")}, "row 1: nothing stands for observableParameter1_a"),
         ({"parameters": ("1e-3\t1e3\t0.8", "0\t1e3\t0.8")}, "k1: a log10 scale from 0"),
         ({"model": ("<ci>half</ci>", "<apply><factorial/><ci>half</ci></apply>")}, 'the function "factorial"'),
@@ -279,14 +281,44 @@ def test_what_is_not_read_is_refused_by_name(written: Written, changes: Any, tol
     assert told in str(caught.value) and ".yaml" in str(caught.value)
 
 
-def test_preequilibration_is_refused(written: Written, rows: list[list[str]]) -> None:
-    path = written(measurements=("observableId", "preequilibrationConditionId\tobservableId"))
-    table = path.with_name("measurements.tsv")
-    head, *rest = table.read_text().splitlines()
-    table.write_text("\n".join([head, *(f"rest\t{line}" for line in rest), ""]))
-    with pytest.raises(lynkeus.InputError, match='row 1: preequilibration \\(under "rest"\\)'):
-        lynkeus.petab.load(path)
-    assert lynkeus.petab.main([str(path), "-o", str(path.parent / "out")]) == 2
+#: what is fed settles: A comes to dose/k1, B to 4 dose/k2, and W, which would not, stays out
+STEADY = MODEL.replace('<cn>1.3</cn>', '<cn>1e99</cn>').replace(
+    '<listOfProducts><speciesReference species="W" stoichiometry="1" constant="true"/></listOfProducts>', ""
+)
+
+
+def test_a_log_may_begin_in_a_steady_state(tmp_path: Path) -> None:
+    (tmp_path / "problem.yaml").write_text(YAML)
+    (tmp_path / "model.xml").write_text(STEADY)
+    (tmp_path / "parameters.tsv").write_text("\n".join(PARAMETERS.splitlines()[:4]) + "\n")
+    conditions = "conditionId\tdose\tB\nfed\t0.9\t0.25\nkept\t0.3\tNaN\nanew\t0\t2\n"
+    (tmp_path / "conditions.tsv").write_text(conditions)
+    (tmp_path / "observables.tsv").write_text(
+        "observableId\tobservableFormula\tnoiseFormula\na\tA\t0.1\nb\tB\t0.1\n"
+    )
+    rows = "observableId\tpreequilibrationConditionId\tsimulationConditionId\ttime\tmeasurement\n"
+    for condition in ("kept", "anew"):
+        for t in (0, 1, 4):
+            rows += f"a\tfed\t{condition}\t{t}\t0.7\nb\tfed\t{condition}\t{t}\t1.1\n"
+    rows += "a\t\tfed\tinf\t1\nb\t\tfed\tinf\t5\n"
+    (tmp_path / "measurements.tsv").write_text(rows)
+    problem = lynkeus.petab.load(tmp_path / "problem.yaml")
+    assert problem.conditions == ["fed kept", "fed anew", "fed"]
+
+    k1, k2 = TRUTH["k1"], TRUTH["k2"]
+    expected: list[float] = []
+    for dose, b in ((0.3, 4 * 0.9 / k2), (0.0, 2.0)):
+        for t in (0.0, 1.0, 4.0):
+            f: Any = lambda t, x, dose=dose: [dose - k1 * x[0], 2 * k1 * x[0] - 0.5 * k2 * x[1]]
+            x = np.array([0.9 / k1, b])
+            if t > 0:
+                x = integrate.solve_ivp(f, (0.0, t), x, rtol=1e-12, atol=1e-12).y[:, -1]
+            expected += [*x]
+    expected += [0.9 / k1, 4 * 0.9 / k2]
+    np.testing.assert_allclose(problem.simulations(), expected, rtol=1e-6)
+    found = np.array([float(line.split("\t")[4]) for line in rows.splitlines()[1:]])
+    nll = np.sum(0.5 * ((found - expected) / 0.1) ** 2 + 0.5 * math.log(2 * math.pi * 0.01))
+    assert problem.nll() == pytest.approx(nll, abs=1e-4)
 
 
 def test_a_package_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, written: Written) -> None:

@@ -376,15 +376,17 @@ impl<const L: usize> Passes<L> {
             let (reached, time) = (from, to);
             return Err(Error::TimeBefore { reached, time });
         }
-        let steps = fixed_steps(from, to, step.length(to - from).unwrap_or(to - from))?;
         let is_graded = jumps && self.is_implicit;
+        let length = step.length(to - from).unwrap_or(to - from);
+        let steps = match is_graded {
+            // those that grow reach any distance
+            true => GRADED * ((to - from) / length).clamp(1.0, MOST_GRADED).ceil() as usize,
+            false => fixed_steps(from, to, length)?,
+        };
         let interval = Interval {
             from,
             to,
-            steps: match is_graded {
-                true => GRADED * self.times * steps,
-                false => self.times * steps,
-            },
+            steps: self.times * steps,
             is_graded,
             inputs,
         };
@@ -503,6 +505,9 @@ struct Interval<'i> {
 
 /// So many times as many steps where they grow.
 const GRADED: usize = 16;
+
+/// More steps than so many are as so many where they grow.
+const MOST_GRADED: f64 = 64.0;
 
 /// The logarithm of the last of them over the first.
 const GROWTH: f64 = 25.0;
