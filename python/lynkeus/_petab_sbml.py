@@ -12,7 +12,7 @@ from ._petab_math import Expr, Reader, number, over, symbol, times, total
 from .errors import InputError
 
 
-#: packages of SBML that change what the equations are
+#: packages of SBML that change what the equations are; `comp` where it has submodels
 FOREIGN = frozenset(("arrays", "comp", "distrib", "dyn", "multi", "qual", "spatial"))
 
 
@@ -93,7 +93,8 @@ class Sbml:
         model = self.model
         for i in range(self.document.getNumPlugins()):
             package = self.document.getPlugin(i).getPackageName()
-            if package in FOREIGN:
+            parts = model.getPlugin("comp") if package == "comp" else None
+            if package in FOREIGN and (parts is None or parts.getNumSubmodels() > 0):
                 raise self.refused(f'the package "{package}" of SBML, which is not read')
         for event in model.getListOfEvents():
             raise self.refused(f'the event "{event.getId()}": expected a model without events')
