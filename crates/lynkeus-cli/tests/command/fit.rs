@@ -539,6 +539,7 @@ fn a_limit_leaves_the_best_so_far() {
 fn a_noise_that_is_none_is_told_so() {
     let folder = folder(&format!("{ALL}\nprocess_noise = [\"x\"]"));
     let (mut at_bound, mut told) = (0, 0);
+    let without = folder.read("study.toml");
     for seed in 0..12 {
         folder.write("log.csv", &log(1.1, 0.0, 100 + seed, noisy));
         let answer = fitted(&folder, &["--profiles"]);
@@ -555,6 +556,15 @@ fn a_noise_that_is_none_is_told_so() {
         assert_eq!(is_told, low < 1e-6, "{answer:#}");
         assert!(value <= high && high < 0.02, "{answer:#}");
         holds(&answer["noise"]["y"], R);
+        // with the density at the end of its interval −log L is half of 2.71 higher
+        if x["at_bound"] == true {
+            let own = without.replace("process_noise = [\"x\"]", "")
+                + &format!("[process_noise]\nx = {high:e}\n");
+            folder.write("study.toml", &own);
+            let rise = number(&fitted(&folder, &[])["nll"]) - number(&answer["nll"]);
+            assert!((rise - 1.3528).abs() < 0.01, "{rise}");
+            folder.write("study.toml", &without);
+        }
     }
     assert!(at_bound >= 3 && told >= 10, "{at_bound} {told}");
     // where there is one, it is told
