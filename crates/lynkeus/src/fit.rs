@@ -3,14 +3,17 @@
 //! `docs/fit.md` says what is made least, how, and what every figure of the answer is.
 
 mod errors;
+pub(crate) mod function;
 mod json;
 mod known;
 mod logs;
 #[cfg(feature = "plot")]
 mod picture;
 mod plant;
+mod posed;
 mod problem;
 mod search;
+mod steps;
 mod told;
 mod uncertainty;
 pub(crate) mod unknown;
@@ -18,24 +21,24 @@ pub(crate) mod unknown;
 use std::ops::ControlFlow;
 
 use lynkeus_expr::Spent;
-use lynkeus_observers::kalman::EKF;
-use lynkeus_run::{Method, Step};
-use lynkeus_study::{Name, Objective};
+use lynkeus_run::Step;
+use lynkeus_study::Objective;
 use lynkeus_words::short;
 use nalgebra::DVector;
 
 use crate::crew::{Watch, every};
-use crate::prepare::{self, Prepared, systems};
+use crate::prepare::{self, Prepared};
 use crate::{Error, Study, Table};
 use errors::Errors;
 #[cfg(test)]
 pub(crate) use json::FitReport;
 use known::Exact;
-use logs::FittedLog;
+use posed::Posed;
 use problem::{Point, Problem, Term};
 use search::{Found, search};
+use steps::SETTLED;
 use uncertainty::Uncertainty;
-use unknown::{Kind, Unknown};
+use unknown::Unknown;
 
 /// What is asked beside the study.
 #[derive(Clone, Copy, Debug, Default)]
@@ -99,48 +102,30 @@ pub fn fit(
     options: FitOptions,
     watch: &mut Watch<'_>,
 ) -> Result<Fit, Error> {
-    let (study, notes) = with_filter(study)?;
+    let (study, notes) = posed::with_filter(study)?;
     let plant = prepare::plant(&study)?;
     let prepared = Prepared::new(&study, &plant)?;
     let design = prepared.design()?;
-    let Some(tuning) = &design.observer.filter else {
-        return Err(Error::input("fit needs a filter").at(&study.file));
-    };
-    if tables.is_empty() {
-        return Err(Error::input("fit needs a log").at(&study.file));
-    }
-    let logs = tables
-        .iter()
-        .map(|table| FittedLog::new(&prepared, &design, table));
-    let logs = logs.collect::<Result<Vec<_>, _>>()?;
+    let logs = posed::logs(&prepared, &design, tables)?;
     let symbolic = plant::symbolic(&study)?;
-    let unknowns = unknown::unknowns(&prepared, &symbolic, &logs)?;
-    let seen = prepare::seen_by(&study, &symbolic, &prepare::sensors(&study, &symbolic))?;
-    let terms_of = |is_alone: bool| -> Result<Vec<Term>, Error> {
-        let plant = plant::Source {
-            prepared: &prepared,
-            symbolic: &seen,
-            tuning,
-            is_alone,
-        };
-        terms(&plant, &unknowns, &logs)
-    };
+    let posed = Posed::new(&prepared, &design, &symbolic, &logs)?;
+    let unknowns = &posed.unknowns;
     let is_alone = study.fit.objective == Objective::Simulation;
-    let terms = terms_of(is_alone)?;
+    let terms = posed.terms(is_alone)?;
     // without corrections nothing says what an unknown input does
     let is_driven = prepared.augmented().states.len() == prepared.augmented().plant_states();
     let alone = match is_driven {
         true if is_alone => Some(terms.clone()),
-        true => Some(terms_of(true)?),
+        true => Some(posed.terms(true)?),
         false => None,
     };
     // half a likelihood is none
     if let Some(spent) = study.budget.spent() {
         return Err(Error::ended(spent).at(&study.file));
     }
-    let exact = known::exact(&prepared, &symbolic, &unknowns, &tuning.initial_variance)?;
+    let exact = posed.exact()?;
     let problem = Problem {
-        unknowns: &unknowns,
+        unknowns,
         logs: &logs,
         terms,
         step: Step::Auto,
@@ -155,62 +140,9 @@ pub fn fit(
         warnings: vec![],
         notes,
     };
-    work.notes
-        .extend(logs.iter().flat_map(|log| log.notes.clone()));
-    work.warnings
-        .extend(logs.iter().flat_map(|log| log.warnings.clone()));
-    if tuning.gate.is_some() || tuning.projects {
-        work.notes
-            .push("the gate and `bounds` of [observer] are left out of the likelihood".to_owned());
-    }
-    let outputs = seen
-        .outputs
-        .iter()
-        .map(|o| o.variable.name.clone())
-        .collect();
-    work.done(&plant.name, outputs, watch)
-}
-
-/// One per log; logs whose states start alike have one likelihood.
-fn terms(
-    plant: &plant::Source<'_>,
-    unknowns: &[Unknown],
-    logs: &[FittedLog],
-) -> Result<Vec<Term>, Error> {
-    let mut terms: Vec<Term> = vec![];
-    for (place, log) in logs.iter().enumerate() {
-        let is_own = |kind: Kind| !matches!(kind, Kind::Start { log, .. } if log != place);
-        let own: Vec<(usize, &Unknown)> = (unknowns.iter().enumerate())
-            .filter(|(_, unknown)| is_own(unknown.kind))
-            .collect();
-        let places = own.iter().map(|(place, _)| *place).collect();
-        let likelihood = match terms.first() {
-            Some(first) if log.starts == logs[0].starts => first.likelihood.clone(),
-            _ => plant.likelihood(&own, &log.starts)?,
-        };
-        terms.push(Term { likelihood, places });
-    }
-    Ok(terms)
-}
-
-/// The study by the filter whose innovations are fitted.
-fn with_filter(study: &Study) -> Result<(Study, Vec<String>), Error> {
-    let mut own = study.clone();
-    let mut notes = vec![];
-    let family = study
-        .observer
-        .family
-        .as_ref()
-        .map(|name| name.text.as_str());
-    if family != Some(EKF.name()) {
-        if let (Some(family), Objective::Innovations) = (family, study.fit.objective) {
-            notes.push(format!(
-                "the likelihood is that of family = \"ekf\": {family} has none whose derivatives are known"
-            ));
-        }
-        own.observer.family = Some(Name::from(EKF.name()));
-    }
-    Ok((own, notes))
+    work.notes.extend(posed.notes());
+    work.warnings.extend(posed.warnings());
+    work.done(&plant.name, posed.outputs(), watch)
 }
 
 /// A fit under way.
@@ -225,14 +157,8 @@ struct Work<'w> {
     notes: Vec<String>,
 }
 
-/// What −log L may change by where steps are halved.
-const SETTLED: f64 = 1e-4;
-
-/// The same as a share of −log L, at the start: there nothing fits yet.
-const NEARLY: f64 = 1e-5;
-
-/// Most halvings of the usual interval between rows, at the start and at the end.
-const HALVINGS: [usize; 2] = [5, 8];
+/// Most halvings of the steps at the end.
+const HALVINGS: usize = 8;
 
 /// One row of so many may be one at which the plant has no value where the estimate is.
 const CONFINED: usize = 10;
@@ -244,7 +170,7 @@ impl Work<'_> {
         outputs: Vec<String>,
         watch: &mut Watch<'_>,
     ) -> Result<Fit, Error> {
-        let begin = self.begin()?;
+        let begin = self.problem.begin(self.study)?;
         if begin.value.is_finite() {
             let flat = known::undetermined(&mut self.problem, &begin)?;
             if !flat.is_empty() {
@@ -263,45 +189,6 @@ impl Work<'_> {
         let rows: usize = self.problem.logs.iter().map(|log| log.fitted).sum();
         best.is_converged &= CONFINED * best.point.confined <= rows;
         self.told(plant, outputs, &begin, best, optima)
-    }
-
-    /// The study's own values, at steps that are short enough.
-    fn begin(&mut self) -> Result<Point, Error> {
-        let starts = self.problem.unknowns.iter().map(|u| u.start);
-        let z = self.problem.searched(starts);
-        if let Method::Rk4(step) = systems::method(&self.study.estimate.method) {
-            self.problem.step = step;
-            return self.problem.at(z);
-        }
-        let intervals = self.problem.logs.iter().map(FittedLog::interval);
-        let interval = intervals.fold(f64::INFINITY, f64::min);
-        self.problem.step = Step::AtMost(interval);
-        let mut point = self.problem.at(z)?;
-        for _ in 0..HALVINGS[0] {
-            if self.study.budget.spent().is_some() {
-                break;
-            }
-            let tolerance = SETTLED.max(NEARLY * point.value.abs());
-            let Some(next) = self.halved(&point, tolerance)? else {
-                return Ok(point);
-            };
-            point = next;
-        }
-        Ok(point)
-    }
-
-    /// The same point at half the steps, which are kept where that changes it.
-    fn halved(&mut self, coarse: &Point, tolerance: f64) -> Result<Option<Point>, Error> {
-        let Step::AtMost(length) = self.problem.step else {
-            return Ok(None);
-        };
-        self.problem.step = Step::AtMost(0.5 * length);
-        let fine = self.problem.at(coarse.z.clone())?;
-        if (fine.value - coarse.value).abs() < tolerance {
-            self.problem.step = Step::AtMost(length);
-            return Ok(None);
-        }
-        Ok(Some(fine))
     }
 
     /// From the study's own values, and from those that are spread over the bounds.
@@ -340,11 +227,11 @@ impl Work<'_> {
     /// At steps that are short enough there, too, and with noises at their least where that is as good.
     fn settled(&mut self, mut best: Found) -> Result<Found, Error> {
         let mut is_settled = false;
-        for _ in 0..HALVINGS[1] {
+        for _ in 0..HALVINGS {
             if best.is_ended {
                 break;
             }
-            let Some(fine) = self.halved(&best.point, SETTLED)? else {
+            let Some(fine) = self.problem.halved(&best.point, SETTLED)? else {
                 is_settled = true;
                 break;
             };
