@@ -34,6 +34,7 @@ pub struct LikelihoodFunction {
     logs: Vec<FittedLog>,
     terms: Vec<Term>,
     step: Step,
+    most_confined: usize,
 }
 
 /// −log L at a point with its derivatives.
@@ -85,6 +86,7 @@ pub fn likelihood(study: &Study, tables: &[Table]) -> Result<LikelihoodFunction,
         logs: &logs,
         terms: posed.terms(study.fit.objective == Objective::Simulation)?,
         step: Step::Auto,
+        most_confined: usize::MAX,
         evaluations: 0,
     };
     problem.begin(&study)?;
@@ -109,6 +111,7 @@ pub fn likelihood(study: &Study, tables: &[Table]) -> Result<LikelihoodFunction,
         plain: own(true),
         priors: posed.unknowns.iter().map(|u| u.prior).collect(),
         step: problem.step,
+        most_confined: problem.most_confined,
         terms: problem.terms,
         logs,
     })
@@ -226,6 +229,7 @@ impl LikelihoodFunction {
             logs: &self.logs,
             terms: std::mem::take(&mut self.terms),
             step: self.step,
+            most_confined: self.most_confined,
             evaluations: 0,
         };
         let found = work(&mut problem);
