@@ -3,6 +3,7 @@
 //! `docs/fit.md` says what is made least, how, and what every figure of the answer is.
 
 mod errors;
+mod experiment;
 mod json;
 mod known;
 mod logs;
@@ -28,6 +29,7 @@ use crate::crew::{Watch, every};
 use crate::prepare::{self, Prepared, systems};
 use crate::{Error, Study, Table};
 use errors::Errors;
+use experiment::Ahead;
 #[cfg(test)]
 pub(crate) use json::FitReport;
 use known::Exact;
@@ -42,6 +44,8 @@ use unknown::{Kind, Unknown};
 pub struct FitOptions {
     /// intervals by profile likelihood
     pub profiles: bool,
+    /// how well the values would be known with one more log
+    pub next_experiment: bool,
 }
 
 /// The answer of `lynkeus fit`.
@@ -69,6 +73,8 @@ pub struct Fit {
     /// what the logs do not tell
     pub undetermined: Vec<String>,
     pub(crate) exact: Exact,
+    /// where that is asked
+    pub(crate) ahead: Option<Ahead>,
     pub(crate) errors: Vec<Errors>,
     /// what speaks against the values
     pub warnings: Vec<String>,
@@ -116,16 +122,18 @@ pub fn fit(
     let symbolic = plant::symbolic(&study)?;
     let unknowns = unknown::unknowns(&prepared, &symbolic, &logs)?;
     let seen = prepare::seen_by(&study, &symbolic, &prepare::sensors(&study, &symbolic))?;
+    let is_alone = study.fit.objective == Objective::Simulation;
+    let source = plant::Source {
+        prepared: &prepared,
+        symbolic: &seen,
+        tuning,
+        is_alone,
+        further: &[],
+    };
     let terms_of = |is_alone: bool| -> Result<Vec<Term>, Error> {
-        let plant = plant::Source {
-            prepared: &prepared,
-            symbolic: &seen,
-            tuning,
-            is_alone,
-        };
+        let plant = plant::Source { is_alone, ..source };
         terms(&plant, &unknowns, &logs)
     };
-    let is_alone = study.fit.objective == Objective::Simulation;
     let terms = terms_of(is_alone)?;
     // without corrections nothing says what an unknown input does
     let is_driven = prepared.augmented().states.len() == prepared.augmented().plant_states();
@@ -148,6 +156,7 @@ pub fn fit(
     };
     let mut work = Work {
         study: &study,
+        source,
         options,
         problem,
         alone,
@@ -216,6 +225,7 @@ fn with_filter(study: &Study) -> Result<(Study, Vec<String>), Error> {
 /// A fit under way.
 struct Work<'w> {
     study: &'w Study,
+    source: plant::Source<'w>,
     options: FitOptions,
     problem: Problem<'w>,
     /// the plant alone, log by log
@@ -482,6 +492,7 @@ impl Work<'_> {
         let is_ended = found.is_ended;
         let mut uncertainty = uncertainty::uncertainty(&self.problem, &found);
         self.profiles(&found, &mut uncertainty)?;
+        let ahead = self.ahead(&found)?;
         let values = self.problem.values(&found.point.z);
         let alone = self.alone.as_mut();
         let alone = alone.map(|terms| Problem {
@@ -509,6 +520,7 @@ impl Work<'_> {
             optima,
             undetermined: vec![],
             exact: self.exact,
+            ahead,
             errors,
             warnings: self.warnings,
             notes: self.notes,
@@ -519,6 +531,16 @@ impl Work<'_> {
             },
             file: self.study.file.clone(),
         })
+    }
+
+    /// The next experiment, where it is asked for.
+    fn ahead(&mut self, found: &Found) -> Result<Option<Ahead>, Error> {
+        if !self.options.next_experiment {
+            return Ok(None);
+        }
+        let (ahead, notes) = experiment::ahead(self.source, self.study, &self.problem, found)?;
+        self.notes.extend(notes);
+        Ok(Some(ahead))
     }
 
     /// Intervals by profile likelihood, where they are asked for, and of what is at a bound; noises that are no more
