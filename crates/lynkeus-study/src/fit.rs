@@ -25,8 +25,9 @@ pub struct FitSettings {
     pub priors: Vec<(Name, Prior)>,
     /// What is least at the best values.
     pub objective: Objective,
-    /// The study's own values and so many further ones less one, from which the search starts.
-    pub starts: usize,
+    /// The study's own values and so many further ones less one, from which the search starts; without a number
+    /// from further ones where the first end is doubtful.
+    pub starts: Option<usize>,
     /// Seed of those.
     pub seed: u64,
     /// The share at the end of each log that is not fitted, but predicted.
@@ -59,7 +60,7 @@ impl Default for FitSettings {
             bounds: vec![],
             priors: vec![],
             objective: Objective::Innovations,
-            starts: 1,
+            starts: None,
             seed: 0,
             held_out: None,
             candidates: vec![],
@@ -118,7 +119,7 @@ pub(super) fn read(entry: Entry<'_>) -> Result<FitSettings, Error> {
             .unwrap_or(Objective::Innovations),
         starts: section
             .optional("starts", |e| e.whole(1))?
-            .map_or(1, |n| usize::try_from(n).unwrap_or(usize::MAX)),
+            .map(|n| usize::try_from(n).unwrap_or(usize::MAX)),
         seed: section.optional("seed", |e| e.whole(0))?.unwrap_or(0),
         held_out: section.optional("held_out", super::tune::share)?,
         candidates: simulate::pairs(section.take("candidates"), candidate)?,

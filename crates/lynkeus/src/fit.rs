@@ -12,6 +12,8 @@ mod picture;
 mod plant;
 mod problem;
 mod search;
+mod starts;
+mod steps;
 mod told;
 mod uncertainty;
 pub(crate) mod unknown;
@@ -20,9 +22,9 @@ use std::ops::ControlFlow;
 
 use lynkeus_expr::Spent;
 use lynkeus_observers::kalman::EKF;
-use lynkeus_run::{Method, Step};
+use lynkeus_run::Step;
 use lynkeus_study::{Name, Objective};
-use lynkeus_words::short;
+use lynkeus_words::{counted, short};
 use nalgebra::DVector;
 
 use crate::crew::{Watch, every};
@@ -36,6 +38,7 @@ use known::Exact;
 use logs::FittedLog;
 use problem::{Point, Problem, Term};
 use search::{Found, search};
+use steps::SETTLED;
 use uncertainty::Uncertainty;
 use unknown::{Kind, Unknown};
 
@@ -152,14 +155,17 @@ pub fn fit(
         logs: &logs,
         terms,
         step: Step::Auto,
+        most_confined: usize::MAX,
         evaluations: 0,
     };
+    let outputs = seen.outputs.iter().map(|o| o.variable.name.clone());
     let mut work = Work {
         study: &study,
         source,
         options,
         problem,
         alone,
+        outputs: outputs.collect(),
         exact,
         warnings: vec![],
         notes,
@@ -172,12 +178,7 @@ pub fn fit(
         work.notes
             .push("the gate and `bounds` of [observer] are left out of the likelihood".to_owned());
     }
-    let outputs = seen
-        .outputs
-        .iter()
-        .map(|o| o.variable.name.clone())
-        .collect();
-    work.done(&plant.name, outputs, watch)
+    work.done(&plant.name, watch)
 }
 
 /// One per log; logs whose states start alike have one likelihood.
@@ -230,38 +231,30 @@ struct Work<'w> {
     problem: Problem<'w>,
     /// the plant alone, log by log
     alone: Option<Vec<Term>>,
+    /// names of what is measured
+    outputs: Vec<String>,
     exact: Exact,
     warnings: Vec<String>,
     notes: Vec<String>,
 }
 
-/// What −log L may change by where steps are halved.
-const SETTLED: f64 = 1e-4;
-
-/// The same as a share of −log L, at the start: there nothing fits yet.
-const NEARLY: f64 = 1e-5;
-
-/// Most halvings of the usual interval between rows, at the start and at the end.
-const HALVINGS: [usize; 2] = [5, 8];
-
-/// One row of so many may be one at which the plant has no value where the estimate is.
-const CONFINED: usize = 10;
+/// Most halvings of the steps at the end.
+const HALVINGS: usize = 8;
 
 impl Work<'_> {
-    fn done(
-        mut self,
-        plant: &str,
-        outputs: Vec<String>,
-        watch: &mut Watch<'_>,
-    ) -> Result<Fit, Error> {
-        let begin = self.begin()?;
+    fn done(mut self, plant: &str, watch: &mut Watch<'_>) -> Result<Fit, Error> {
+        let starts = self.problem.unknowns.iter().map(|u| u.start);
+        let z = self.problem.searched(starts);
+        let method = systems::method(&self.study.estimate.method);
+        let begin = self.problem.stepped(z, &method, &self.study.budget)?;
+        self.problem.confine(&begin);
         if begin.value.is_finite() {
             let flat = known::undetermined(&mut self.problem, &begin)?;
             if !flat.is_empty() {
-                return self.untold(plant, outputs, begin, &flat);
+                return self.untold(plant, begin, &flat);
             }
         }
-        let mut ends = self.searches(&begin, watch)?;
+        let mut ends = self.ends(&begin, watch)?;
         ends.retain(|found| found.point.value.is_finite());
         ends.sort_by(|a, b| a.point.value.total_cmp(&b.point.value));
         let optima = optima(&ends);
@@ -269,59 +262,79 @@ impl Work<'_> {
             return Err(self.no_value());
         };
         let mut best = self.settled(best)?;
-        // a filter that is put back at every other row is none whose likelihood means something
-        let rows: usize = self.problem.logs.iter().map(|log| log.fitted).sum();
-        best.is_converged &= CONFINED * best.point.confined <= rows;
-        self.told(plant, outputs, &begin, best, optima)
+        best.is_converged &= self.problem.is_sound(&best.point);
+        self.told(plant, &begin, best, optima)
     }
 
-    /// The study's own values, at steps that are short enough.
-    fn begin(&mut self) -> Result<Point, Error> {
-        let starts = self.problem.unknowns.iter().map(|u| u.start);
-        let z = self.problem.searched(starts);
-        if let Method::Rk4(step) = systems::method(&self.study.estimate.method) {
-            self.problem.step = step;
-            return self.problem.at(z);
+    /// Where searches end: from the study's own values and as many further starts as it asks for. Where it asks for
+    /// none, from some if the first end is doubtful.
+    fn ends(&mut self, begin: &Point, watch: &mut Watch<'_>) -> Result<Vec<Found>, Error> {
+        let settings = &self.study.fit;
+        let count = settings.starts.unwrap_or(1);
+        let from = starts::spread(&self.problem, &begin.z, count, settings.seed);
+        let mut ends = self.searches(begin, &from, usize::MAX, watch)?;
+        if settings.starts.is_some() || self.study.budget.spent().is_some() {
+            return Ok(ends);
         }
-        let intervals = self.problem.logs.iter().map(FittedLog::interval);
-        let interval = intervals.fold(f64::INFINITY, f64::min);
-        self.problem.step = Step::AtMost(interval);
-        let mut point = self.problem.at(z)?;
-        for _ in 0..HALVINGS[0] {
-            if self.study.budget.spent().is_some() {
-                break;
-            }
-            let tolerance = SETTLED.max(NEARLY * point.value.abs());
-            let Some(next) = self.halved(&point, tolerance)? else {
-                return Ok(point);
-            };
-            point = next;
-        }
-        Ok(point)
-    }
-
-    /// The same point at half the steps, which are kept where that changes it.
-    fn halved(&mut self, coarse: &Point, tolerance: f64) -> Result<Option<Point>, Error> {
-        let Step::AtMost(length) = self.problem.step else {
-            return Ok(None);
+        let Some(doubt) = self.doubt(&ends[0])? else {
+            return Ok(ends);
         };
-        self.problem.step = Step::AtMost(0.5 * length);
-        let fine = self.problem.at(coarse.z.clone())?;
-        if (fine.value - coarse.value).abs() < tolerance {
-            self.problem.step = Step::AtMost(length);
-            return Ok(None);
+        let from = starts::best(&mut self.problem, &begin.z, settings.seed)?;
+        let further = self.searches(begin, &from, MOST_STEPS, watch)?;
+        let least = ends[0].point.value - SAME;
+        let is_better = |end: &&Found| end.point.value < least;
+        let better = further.iter().filter(is_better).count();
+        self.notes.push(format!(
+            "{doubt}, so {} were tried: {better} ended better",
+            counted(further.len(), "further start")
+        ));
+        let best = further.iter().filter(is_better);
+        let best = best.min_by(|a, b| a.point.value.total_cmp(&b.point.value));
+        match best {
+            Some(best) if best.is_ended => ends.push(self.again(best.point.z.clone(), &[])?),
+            _ => {}
         }
-        Ok(Some(fine))
+        ends.extend(further.into_iter().filter(|end| !end.is_ended));
+        Ok(ends)
     }
 
-    /// From the study's own values, and from those that are spread over the bounds.
-    fn searches(&mut self, begin: &Point, watch: &mut Watch<'_>) -> Result<Vec<Found>, Error> {
-        let starts = starts(
-            &self.problem,
-            begin,
-            self.study.fit.starts,
-            self.study.fit.seed,
-        );
+    /// What speaks against the end of a search.
+    fn doubt(&mut self, end: &Found) -> Result<Option<String>, Error> {
+        if !end.point.value.is_finite() {
+            return Ok(Some(
+                "the likelihood has no value at the study's own values".to_owned(),
+            ));
+        }
+        if !end.is_converged {
+            return Ok(Some("the first search did not converge".to_owned()));
+        }
+        let unknowns = self.problem.unknowns.iter().zip(&end.is_bound);
+        let mut at_bounds = unknowns.filter(|(u, is_bound)| **is_bound && !u.kind.is_noise());
+        if let Some((unknown, _)) = at_bounds.next() {
+            let name = unknown.words();
+            return Ok(Some(format!(
+                "the first search ended with {name} at its bound"
+            )));
+        }
+        let values = self.problem.values(&end.point.z);
+        let (errors, _) = errors::errors(&mut self.problem, None, &self.outputs, &values)?;
+        let coloured = errors.iter().find(|own| own.are_coloured());
+        Ok(coloured.map(|own| {
+            format!(
+                "the first search ended with errors of {} that are not white",
+                own.output
+            )
+        }))
+    }
+
+    /// Each from its start, by so many steps at most.
+    fn searches(
+        &mut self,
+        begin: &Point,
+        starts: &[DVector<f64>],
+        most: usize,
+        watch: &mut Watch<'_>,
+    ) -> Result<Vec<Found>, Error> {
         let budget = &self.study.budget;
         let free = vec![false; begin.z.len()];
         let run = |problem: &Problem<'_>, k: usize, watch: &mut Watch<'_>| {
@@ -330,11 +343,11 @@ impl Work<'_> {
             }
             let mut own = problem.clone();
             own.evaluations = 0;
-            let mut steps = 0.0;
+            let mut steps = 0;
             let mut pulse = || {
-                steps += 1.0;
-                let is_stopped = watch(1.0 - 1.0 / (1.0 + 0.1 * steps)).is_break();
-                match is_stopped || budget.spent().is_some() {
+                steps += 1;
+                let is_stopped = watch(1.0 - 1.0 / (1.0 + 0.1 * f64::from(steps))).is_break();
+                match is_stopped || steps as usize > most || budget.spent().is_some() {
                     true => ControlFlow::Break(()),
                     false => ControlFlow::Continue(()),
                 }
@@ -350,16 +363,15 @@ impl Work<'_> {
     /// At steps that are short enough there, too, and with noises at their least where that is as good.
     fn settled(&mut self, mut best: Found) -> Result<Found, Error> {
         let mut is_settled = false;
-        for _ in 0..HALVINGS[1] {
+        for _ in 0..HALVINGS {
             if best.is_ended {
                 break;
             }
-            let Some(fine) = self.halved(&best.point, SETTLED)? else {
+            let Some(fine) = self.problem.halved(&best.point)? else {
                 is_settled = true;
                 break;
             };
-            let free = vec![false; fine.z.len()];
-            best = self.again(fine.z, &free)?;
+            best = self.again(fine.z, &[])?;
         }
         if let (false, false, Step::AtMost(step)) = (is_settled, best.is_ended, self.problem.step) {
             self.warnings.push(format!(
@@ -385,7 +397,10 @@ impl Work<'_> {
         Ok(best)
     }
 
+    /// From here; those that are `held`, or none, stay.
     fn again(&mut self, z: DVector<f64>, held: &[bool]) -> Result<Found, Error> {
+        let free = vec![false; z.len()];
+        let held = if held.is_empty() { &free } else { held };
         let budget = self.study.budget.clone();
         let mut pulse = || match budget.spent() {
             Some(_) => ControlFlow::Break(()),
@@ -405,13 +420,7 @@ impl Work<'_> {
     }
 
     /// What the logs do not tell, before any search.
-    fn untold(
-        self,
-        plant: &str,
-        outputs: Vec<String>,
-        begin: Point,
-        flat: &[usize],
-    ) -> Result<Fit, Error> {
+    fn untold(self, plant: &str, begin: Point, flat: &[usize]) -> Result<Fit, Error> {
         let undetermined: Vec<String> = flat
             .iter()
             .map(|&i| self.problem.unknowns[i].label())
@@ -420,7 +429,7 @@ impl Work<'_> {
             is_ended: false,
             ..ended(begin)
         };
-        let mut fit = self.answer(plant, outputs, &found.point.clone(), found, vec![])?;
+        let mut fit = self.answer(plant, &found.point.clone(), found, vec![])?;
         fit.undetermined = undetermined;
         Ok(fit)
     }
@@ -428,7 +437,6 @@ impl Work<'_> {
     fn told(
         mut self,
         plant: &str,
-        outputs: Vec<String>,
         begin: &Point,
         best: Found,
         optima: Vec<Optimum>,
@@ -436,12 +444,14 @@ impl Work<'_> {
         let free: Vec<usize> = (0..best.point.z.len())
             .filter(|&i| !best.is_bound[i])
             .collect();
-        let flat = match best.is_ended {
-            true => vec![],
-            false => known::flat(&best.hessian, &free),
+        // beside an edge of where the plant has values there is no Hessian
+        let has_hessian = !best.is_ended && best.hessian.iter().all(|x| x.is_finite());
+        let flat = match has_hessian {
+            true => known::flat(&best.hessian, &free),
+            false => vec![],
         };
         self.warn(&best, &optima);
-        let mut fit = self.answer(plant, outputs, begin, best, optima)?;
+        let mut fit = self.answer(plant, begin, best, optima)?;
         fit.undetermined = flat.iter().map(|&i| fit.unknowns[i].label()).collect();
         Ok(fit)
     }
@@ -484,7 +494,6 @@ impl Work<'_> {
     fn answer(
         mut self,
         plant: &str,
-        outputs: Vec<String>,
         begin: &Point,
         found: Found,
         optima: Vec<Optimum>,
@@ -500,7 +509,16 @@ impl Work<'_> {
             ..self.problem.clone()
         });
         let mut alone = alone;
-        let (errors, rows) = errors::errors(&mut self.problem, alone.as_mut(), &outputs, &values)?;
+        let (errors, rows) =
+            errors::errors(&mut self.problem, alone.as_mut(), &self.outputs, &values)?;
+        let coloured = errors.iter().filter(|own| own.are_coloured());
+        let coloured: Vec<&str> = coloured.map(|own| own.output.as_str()).collect();
+        if !coloured.is_empty() && !is_ended {
+            self.warnings.push(format!(
+                "errors of {} are not white: the model misses something, and intervals are too narrow",
+                coloured.join(", ")
+            ));
+        }
         Ok(Fit {
             plant: plant.to_owned(),
             logs: self
@@ -586,54 +604,11 @@ fn ended(point: Point) -> Found {
     }
 }
 
-/// How far searches of noises, and of what has no bounds, start from the study's own values: a factor of 10, or that
-/// share of the value.
-const APART: f64 = 10.0;
-
-/// The study's own values, then points that fill the bounds evenly (the additive recurrence of M. Roberts, *The
-/// unreasonable effectiveness of quasirandom sequences*, 2018), moved by the seed.
-fn starts(problem: &Problem<'_>, begin: &Point, count: usize, seed: u64) -> Vec<DVector<f64>> {
-    let n = begin.z.len();
-    // the positive root of r^(n + 1) = r + 1
-    let mut root = 2.0_f64;
-    for _ in 0..60 {
-        root = (1.0 + root).powf(1.0 / (n as f64 + 1.0));
-    }
-    let ends = problem.unknowns.iter().zip(&begin.z).map(|(unknown, &z)| {
-        let (low, high) = (
-            unknown.searched(unknown.low),
-            unknown.searched(unknown.high),
-        );
-        let reach = match unknown.is_log {
-            true => APART.ln(),
-            false => z.abs().max(1.0),
-        };
-        let is_open = unknown.kind.is_noise() || !(high - low).is_finite();
-        match is_open {
-            true => ((z - reach).max(low), (z + reach).min(high)),
-            false => (low, high),
-        }
-    });
-    let ends: Vec<(f64, f64)> = ends.collect();
-    let shift = |i: usize| {
-        // SplitMix64
-        let mut x = seed.wrapping_add((i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (x >> 11) as f64 / (1_u64 << 53) as f64
-    };
-    let further = (1..count).map(|k| {
-        DVector::from_fn(n, |i, _| {
-            let share = (shift(i) + k as f64 / root.powi(i as i32 + 1)).fract();
-            let (low, high) = ends[i];
-            low + share * (high - low)
-        })
-    });
-    std::iter::once(begin.z.clone()).chain(further).collect()
-}
-
 /// Ends as one where their −log L differs by no more than this.
 const SAME: f64 = 1e-3;
+
+/// Steps after which a further search that is not yet better is given up.
+const MOST_STEPS: usize = 25;
 
 /// Different ends of searches that converged, the best first.
 fn optima(ends: &[Found]) -> Vec<Optimum> {

@@ -18,6 +18,8 @@ pub(crate) struct Flow<'f, 'g> {
     pub slopes: &'f [Node],
     pub places: &'f [(usize, usize)],
     pub noise: Vec<Term<'g>>,
+    /// columns of the covariance's root with smaller squares count as zeros
+    pub least_square: f64,
 }
 
 impl<'f, 'g> Flow<'f, 'g> {
@@ -37,6 +39,7 @@ impl<'f, 'g> Flow<'f, 'g> {
             slopes: &free.outputs[jacobian.outputs()],
             places: jacobian.places(),
             noise: noise.collect(),
+            least_square: 0.0,
         };
         (16 * noisy.len() * flow.places.len() <= LARGEST_STEP).then_some(flow)
     }
@@ -213,7 +216,7 @@ impl<'f, 'g> Flow<'f, 'g> {
             };
             squares.push(Some(square));
             // a column of zeros stays one
-            let is_there = nothing.less(square);
+            let is_there = self.graph.constant(self.least_square).less(square);
             let norm = is_there.select(square.sqrt(), nothing);
             let pivot = rows[k * n + k];
             let is_above = pivot.map(|pivot| nothing.less(pivot));

@@ -475,3 +475,62 @@ fn an_estimate_without_a_value_is_put_into_its_range() {
         "{difference}"
     );
 }
+
+/// A fast state without noise, whose uncertainty decays below every number, takes neither the value nor its
+/// derivatives from what it drives: those of the plant in which it has settled, whose slope by the rate k is nearly 0.
+#[test]
+fn what_has_decayed_leaves_the_derivatives() {
+    let score = |is_fast: bool| {
+        let g = Graph::new();
+        let names = ["time", "x", "z", "u", "k", "a"];
+        let [time, x, z, u, k, a] = names.map(|name| g.symbol(name));
+        let number = |value: f64| g.constant(value).node();
+        let [fast, own] = [(x, -k * (x - u)), (z, if is_fast { x } else { u } - a * z)];
+        let states = if is_fast { vec![fast, own] } else { vec![own] };
+        let mut likelihood = Likelihood::new(&ParametricPlant {
+            graph: &g,
+            time: time.node(),
+            states: states.iter().map(|(state, _)| state.node()).collect(),
+            derivatives: states.iter().map(|(_, slope)| slope.node()).collect(),
+            inputs: vec![u.node()],
+            sensors: vec![ParametricSensor {
+                output: z.node(),
+                noise: ParametricLevel::Variance(number(0.01)),
+                limits: None,
+            }],
+            process_noise: states
+                .iter()
+                .map(|(state, _)| number(if state.node() == z.node() { 1e-3 } else { 0.0 }))
+                .collect(),
+            ranges: vec![],
+            start: states.iter().map(|_| (number(1.0), number(0.1))).collect(),
+            parameters: vec![k.node(), a.node()],
+        })
+        .unwrap();
+        let log: Log = (0..40)
+            .map(|i| {
+                (
+                    0.2 * f64::from(i),
+                    vec![1.0 + 0.1 * f64::from(i).sin()],
+                    vec![1.0],
+                )
+            })
+            .collect();
+        let step = if is_fast { 1e-3 } else { 0.05 };
+        likelihood
+            .score(&[900.0, 0.9], rows(&log), Step::AtMost(step))
+            .unwrap()
+    };
+    let [fast, settled] = [true, false].map(score);
+    let off = |a: f64, b: f64| (a - b).abs() / (1.0 + b.abs());
+    assert!(
+        off(fast.value, settled.value) < 1e-3,
+        "{fast:?} beside {settled:?}"
+    );
+    assert!(
+        off(fast.gradient[1], settled.gradient[1]) < 1e-3,
+        "{fast:?} beside {settled:?}"
+    );
+    assert!(fast.gradient[0].abs() < 1e-5, "{fast:?}");
+    assert!(fast.information.iter().all(|x| x.is_finite()), "{fast:?}");
+}

@@ -142,7 +142,7 @@ pub(crate) const FIT: [KeySpec; 12] = [
     KeySpec {
         name: "starts",
         shape: Shape::Whole(1),
-        default: "1",
+        default: "1, and 4 further ones where the first ends at a bound, without convergence or with errors that are not white",
         meaning: "searches: from the study's own values, then from seeded points spread over the bounds",
     },
     KeySpec {

@@ -15,6 +15,16 @@ pub(crate) struct Errors {
     pub whiteness: Option<Whiteness>,
 }
 
+/// Ljung and Box's statistic over its lags above which nobody takes errors for white ones.
+const COLOURED: f64 = 3.0;
+
+impl Errors {
+    /// Whether they can be foretold from those before.
+    pub fn are_coloured(&self) -> bool {
+        self.whiteness.is_some_and(|w| w.ljung_box > COLOURED)
+    }
+}
+
 /// Over some of the rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Portion {

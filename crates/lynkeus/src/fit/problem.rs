@@ -42,6 +42,8 @@ pub(crate) struct Problem<'a> {
     /// one per log
     pub terms: Vec<Term>,
     pub step: Step,
+    /// where the plant has no value in more intervals than so many, −log L has none: steps are too long there
+    pub most_confined: usize,
     pub evaluations: usize,
 }
 
@@ -104,7 +106,7 @@ impl Problem<'_> {
             .iter()
             .chain(&point.information)
             .all(|x| x.is_finite());
-        if !is_finite || point.value.is_nan() {
+        if !is_finite || point.value.is_nan() || point.confined > self.most_confined {
             point.value = f64::INFINITY;
         }
         Ok(point)

@@ -14,6 +14,10 @@ use crate::{Error, Result};
 
 type Compile<const L: usize> = fn(&Tape) -> Option<Function<L>>;
 
+/// Derivatives of a reflection divide by the cube of a column's length, which must stay a number: what has decayed
+/// so far, without noise, is none of the uncertainty.
+const LEAST_SQUARE: f64 = 1e-180;
+
 /// The expressions of a sample.
 pub(super) struct Sample<'p, 'g> {
     plant: &'p ParametricPlant<'g>,
@@ -157,6 +161,7 @@ impl<'p, 'g> Sample<'p, 'g> {
             slopes: &slopes,
             places: &places,
             noise: plant.process_noise.iter().map(|&q| self.term(q)).collect(),
+            least_square: LEAST_SQUARE,
         };
         let next = flow.step(self.h, &flow.start());
         let mut root = flow.carried(&next, plant.graph.constant(1.0), &self.belief().1);
