@@ -471,7 +471,7 @@ impl Work<'_> {
             let is_least = value <= unknown.low * (1.0 + 1e-9);
             self.warnings
                 .push(match (unknown.reaches_zero(), is_least) {
-                    (true, true) => format!("{}: the log cannot tell it from 0", unknown.words()),
+                    (true, true) => unknown.not_told_from_0(),
                     _ => format!("{} is at its bound, {}", unknown.words(), short(value)),
                 });
         }
@@ -572,22 +572,9 @@ impl Work<'_> {
             Some(_) => ControlFlow::Break(()),
             None => ControlFlow::Continue(()),
         };
-        for (i, known) in uncertainty.known.iter_mut().enumerate() {
-            let unknown = &self.problem.unknowns[i];
-            let is_noise = unknown.reaches_zero() && !known.is_bound;
-            let told = format!("{}: the log cannot tell it from 0", unknown.words());
-            let own = *known;
-            let is_nothing =
-                is_noise && uncertainty::is_nothing(&mut self.problem, found, i, &own, &mut pulse)?;
-            if is_nothing {
-                self.warnings.push(told);
-            }
-            if self.options.profiles || known.is_bound {
-                let problem = &mut self.problem;
-                let sides = uncertainty::profile(problem, found, i, &own, is_nothing, &mut pulse)?;
-                known.interval = sides.or(known.interval);
-            }
-        }
+        let (problem, are_all) = (&mut self.problem, self.options.profiles);
+        let told = uncertainty::profiles(problem, found, uncertainty, are_all, &mut pulse)?;
+        self.warnings.extend(told);
         Ok(())
     }
 }
