@@ -183,6 +183,13 @@ fn what_is_not_told_may_be_made_known() {
         "{}",
         text.out
     );
+    // with another of the same nothing is won
+    let study = folder.read("study.toml");
+    let long = study + "[fit.candidates.long]\nduration = 30\n";
+    folder.write("study.toml", &long);
+    let text = folder.run(&["fit", "study.toml", "log.csv", "--next-experiment"]);
+    let vain = "none of them makes known what the logs do not tell";
+    assert!(text.out.contains(vain), "{}", text.out);
 }
 
 const DECAY: &str = r#"model Decay
@@ -258,11 +265,7 @@ fn what_is_foretold_comes_true() {
     let folder = Folder::empty();
     folder.write("plant.mo", DECAY);
     let first = |t: f64| {
-        if (t / 5.0) as usize % 2 == 0 {
-            1.0
-        } else {
-            0.2
-        }
+        if (t / 5.0) % 2.0 < 1.0 { 1.0 } else { 0.2 }
     };
     let steps = |t: f64| if t.sin() > 0.0 { 3.0 } else { -1.0 };
     folder.write("log.csv", &recorded(11, 200, 0.2, first, false));

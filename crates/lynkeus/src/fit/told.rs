@@ -252,6 +252,10 @@ impl Fit {
             ]
         });
         document.table(Table::new(titles).with(rows));
+        let is_vain = ahead.tried.iter().all(|next| next.determines.is_empty());
+        if !self.undetermined.is_empty() && is_vain {
+            document.line("none of them makes known what the logs do not tell");
+        }
     }
 
     /// The study's text with the values found, and what changed; the starts of several logs stay out of it.

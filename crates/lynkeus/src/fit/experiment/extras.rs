@@ -85,10 +85,7 @@ impl Extras {
                 .map(|row| row[first + i].abs());
             let reach = shown.filter(|y| y.is_finite()).fold(0.0, f64::max);
             let reach = if reach > 0.0 { reach } else { 1.0 };
-            // nobody knows it to more than two digits
-            let deviation = format!("{:.1e}", LEVEL * reach).parse();
-            let deviation = deviation.unwrap_or(LEVEL * reach);
-            extra.noise.get_or_insert(Noise::Absolute(deviation));
+            extra.noise.get_or_insert(one_in_a_hundred(reach));
         }
         Ok(())
     }
@@ -97,7 +94,13 @@ impl Extras {
 /// The noise of a sensor that shows what lies in this range.
 pub(super) fn usual(low: f64, high: f64) -> Option<Noise> {
     let range = high - low;
-    (range > 0.0 && range.is_finite()).then_some(Noise::Absolute(LEVEL * range))
+    (range > 0.0 && range.is_finite()).then(|| one_in_a_hundred(range))
+}
+
+/// To two digits: nobody knows it better.
+fn one_in_a_hundred(range: f64) -> Noise {
+    let deviation = LEVEL * range;
+    Noise::Absolute(format!("{deviation:.1e}").parse().unwrap_or(deviation))
 }
 
 /// The likelihood of a log with these sensors, too.
