@@ -3,6 +3,7 @@
 //! `docs/fit.md` says what is made least, how, and what every figure of the answer is.
 
 mod errors;
+mod experiment;
 pub(crate) mod function;
 mod json;
 mod known;
@@ -31,6 +32,7 @@ use crate::crew::{Watch, every};
 use crate::prepare::{self, Prepared};
 use crate::{Error, Study, Table};
 use errors::Errors;
+use experiment::Ahead;
 #[cfg(test)]
 pub(crate) use json::FitReport;
 use known::Exact;
@@ -46,6 +48,8 @@ use unknown::Unknown;
 pub struct FitOptions {
     /// intervals by profile likelihood
     pub profiles: bool,
+    /// how well the values would be known with one more log
+    pub next_experiment: bool,
 }
 
 /// The answer of `lynkeus fit`.
@@ -73,6 +77,8 @@ pub struct Fit {
     /// what the logs do not tell
     pub undetermined: Vec<String>,
     pub(crate) exact: Exact,
+    /// where that is asked
+    pub(crate) ahead: Option<Ahead>,
     pub(crate) errors: Vec<Errors>,
     /// what speaks against the values
     pub warnings: Vec<String>,
@@ -134,6 +140,7 @@ pub fn fit(
     };
     let mut work = Work {
         study: &study,
+        source: posed.source(is_alone),
         options,
         problem,
         alone,
@@ -150,6 +157,7 @@ pub fn fit(
 /// A fit under way.
 struct Work<'w> {
     study: &'w Study,
+    source: plant::Source<'w>,
     options: FitOptions,
     problem: Problem<'w>,
     /// the plant alone, log by log
@@ -392,7 +400,7 @@ impl Work<'_> {
             let is_least = value <= unknown.low * (1.0 + 1e-9);
             self.warnings
                 .push(match (unknown.reaches_zero(), is_least) {
-                    (true, true) => format!("{}: the log cannot tell it from 0", unknown.words()),
+                    (true, true) => unknown.not_told_from_0(),
                     _ => format!("{} is at its bound, {}", unknown.words(), short(value)),
                 });
         }
@@ -422,6 +430,7 @@ impl Work<'_> {
         let is_ended = found.is_ended;
         let mut uncertainty = uncertainty::uncertainty(&self.problem, &found);
         self.profiles(&found, &mut uncertainty)?;
+        let ahead = self.ahead(&found)?;
         let values = self.problem.values(&found.point.z);
         let alone = self.alone.as_mut();
         let steps = self.problem.steps;
@@ -462,6 +471,7 @@ impl Work<'_> {
             optima,
             undetermined: vec![],
             exact: self.exact,
+            ahead,
             errors,
             warnings: self.warnings,
             notes: self.notes,
@@ -472,6 +482,16 @@ impl Work<'_> {
             },
             file: self.study.file.clone(),
         })
+    }
+
+    /// The next experiment, where it is asked for.
+    fn ahead(&mut self, found: &Found) -> Result<Option<Ahead>, Error> {
+        if !self.options.next_experiment {
+            return Ok(None);
+        }
+        let (ahead, notes) = experiment::ahead(self.source, self.study, &self.problem, found)?;
+        self.notes.extend(notes);
+        Ok(Some(ahead))
     }
 
     /// Intervals by profile likelihood, where they are asked for, and of what is at a bound; noises that are no more
@@ -485,22 +505,9 @@ impl Work<'_> {
             Some(_) => ControlFlow::Break(()),
             None => ControlFlow::Continue(()),
         };
-        for (i, known) in uncertainty.known.iter_mut().enumerate() {
-            let unknown = &self.problem.unknowns[i];
-            let is_noise = unknown.reaches_zero() && !known.is_bound;
-            let told = format!("{}: the log cannot tell it from 0", unknown.words());
-            let own = *known;
-            let is_nothing =
-                is_noise && uncertainty::is_nothing(&mut self.problem, found, i, &own, &mut pulse)?;
-            if is_nothing {
-                self.warnings.push(told);
-            }
-            if self.options.profiles || known.is_bound {
-                let problem = &mut self.problem;
-                let sides = uncertainty::profile(problem, found, i, &own, is_nothing, &mut pulse)?;
-                known.interval = sides.or(known.interval);
-            }
-        }
+        let (problem, are_all) = (&mut self.problem, self.options.profiles);
+        let told = uncertainty::profiles(problem, found, uncertainty, are_all, &mut pulse)?;
+        self.warnings.extend(told);
         Ok(())
     }
 }

@@ -1,6 +1,7 @@
 //! Steps of Runge and Kutta that are short enough for −log L.
 
 use lynkeus_expr::Budget;
+use lynkeus_run::filter::Likelihood;
 use lynkeus_run::{Method, Step};
 use nalgebra::DVector;
 
@@ -36,6 +37,14 @@ pub(crate) struct Steps {
     pub is_implicit: bool,
     /// a factor of all that −log L may be wrong by
     pub tolerance: f64,
+}
+
+impl Steps {
+    /// From now on a likelihood of the same plant goes by them.
+    pub fn on(self, likelihood: &mut Likelihood) {
+        likelihood.implicit(self.is_implicit);
+        likelihood.shorten(1 << self.halvings);
+    }
 }
 
 impl Default for Steps {
