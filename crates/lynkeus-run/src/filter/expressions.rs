@@ -148,7 +148,7 @@ impl<'f, 'g> Flow<'f, 'g> {
         if width > n {
             let noise = (0..n).flat_map(|i| &row(i)[n..]);
             let noise: Vec<Term<'g>> = noise.map(|w| w.map(|w| scale * w)).collect();
-            let factor = self.factor(&noise);
+            let factor = factor(self.graph, &noise, n);
             rows.extend((0..n * n).map(|at| factor[at % n * n + at / n]));
         }
         let begin = rows.len();
@@ -161,97 +161,101 @@ impl<'f, 'g> Flow<'f, 'g> {
                 }
             }
         }
-        self.reflected(&mut rows)
+        let least = self.graph.constant(self.least_square);
+        reflected(self.graph, &mut rows, n, |_| least)
     }
+}
 
-    /// As [`Factor`](super::root::Factor).
-    fn factor(&self, matrix: &[Term<'g>]) -> Vec<Term<'g>> {
-        let n = self.states();
-        let nothing = self.graph.constant(0.0);
-        let mut lower: Vec<Term<'g>> = vec![None; n * n];
-        for j in 0..n {
-            let Some(diagonal) = matrix[j * n + j] else {
-                continue;
+/// As [`Factor`](super::root::Factor).
+pub(crate) fn factor<'g>(graph: &'g Graph, matrix: &[Term<'g>], n: usize) -> Vec<Term<'g>> {
+    let nothing = graph.constant(0.0);
+    let mut lower: Vec<Term<'g>> = vec![None; n * n];
+    for j in 0..n {
+        let Some(diagonal) = matrix[j * n + j] else {
+            continue;
+        };
+        let known =
+            |lower: &[Term<'g>], i: usize| dot(&lower[i * n..i * n + j], &lower[j * n..j * n + j]);
+        let pivot = match known(&lower, j) {
+            Some(known) => diagonal - known,
+            None => diagonal,
+        };
+        let noise = n as f64 * f64::EPSILON * diagonal.abs();
+        let is_there = noise.less(pivot);
+        let root = is_there.select(pivot.sqrt(), nothing);
+        lower[j * n + j] = Some(root);
+        for i in j + 1..n {
+            let rest = match (matrix[i * n + j], known(&lower, i)) {
+                (Some(entry), Some(known)) => Some(entry - known),
+                (None, Some(known)) => Some(-known),
+                (entry, None) => entry,
             };
-            let known = |lower: &[Term<'g>], i: usize| {
-                dot(&lower[i * n..i * n + j], &lower[j * n..j * n + j])
-            };
-            let pivot = match known(&lower, j) {
-                Some(known) => diagonal - known,
-                None => diagonal,
-            };
-            let noise = n as f64 * f64::EPSILON * diagonal.abs();
-            let is_there = noise.less(pivot);
-            let root = is_there.select(pivot.sqrt(), nothing);
-            lower[j * n + j] = Some(root);
-            for i in j + 1..n {
-                let rest = match (matrix[i * n + j], known(&lower, i)) {
-                    (Some(entry), Some(known)) => Some(entry - known),
-                    (None, Some(known)) => Some(-known),
-                    (entry, None) => entry,
+            lower[i * n + j] = rest.map(|rest| is_there.select(rest / root, nothing));
+        }
+    }
+    lower
+}
+
+/// As [`Root::of_rows`](super::root::Root::of_rows), without units, of rows of n entries; then the squares of the columns
+/// that were reflected. Columns whose squares are below their least count as zeros.
+pub(crate) fn reflected<'g>(
+    graph: &'g Graph,
+    rows: &mut [Term<'g>],
+    n: usize,
+    least_square: impl Fn(usize) -> Expr<'g>,
+) -> Vec<Term<'g>> {
+    let count = rows.len() / n;
+    let nothing = graph.constant(0.0);
+    let mut root = vec![None; n * n];
+    let mut squares = vec![];
+    for k in 0..n {
+        let column = |rows: &[Term<'g>]| -> Vec<(usize, Expr<'g>)> {
+            let all = (k..count).map(|r| (r, rows[r * n + k]));
+            all.filter_map(|(r, entry)| entry.map(|entry| (r, entry)))
+                .collect()
+        };
+        let own = column(rows);
+        let square = own.iter().map(|(_, entry)| entry.powi(2));
+        let Some(square) = square.reduce(|all, one| all + one) else {
+            continue;
+        };
+        squares.push(Some(square));
+        // a column of zeros stays one
+        let is_there = least_square(k).less(square);
+        let norm = is_there.select(square.sqrt(), nothing);
+        let pivot = rows[k * n + k];
+        let is_above = pivot.map(|pivot| nothing.less(pivot));
+        let turned = |is: Expr<'g>, value: Expr<'g>| is.select(-value, value);
+        let head = is_above.map_or(norm, |is| turned(is, norm));
+        let first = pivot.map_or(-head, |pivot| pivot - head);
+        let beta = is_there.select(-head * first, graph.constant(1.0));
+        rows[k * n + k] = Some(first);
+        let reflector = column(rows);
+        let sums: Vec<Term<'g>> = (k + 1..n)
+            .map(|j| {
+                let products = reflector.iter();
+                let products = products.map(|(r, v)| rows[r * n + j].map(|a| *v * a));
+                products.fold(None, sum)
+            })
+            .collect();
+        for (r, v) in reflector {
+            let factor = v / beta;
+            for (j, part) in (k + 1..n).zip(&sums) {
+                let Some(part) = part.map(|part| factor * part) else {
+                    continue;
                 };
-                lower[i * n + j] = rest.map(|rest| is_there.select(rest / root, nothing));
+                let entry = &mut rows[r * n + j];
+                *entry = Some(entry.map_or(-part, |entry| entry - part));
             }
         }
-        lower
-    }
-
-    /// As [`Root::of_rows`](super::root::Root::of_rows), without units.
-    fn reflected(&self, rows: &mut [Term<'g>]) -> Vec<Term<'g>> {
-        let n = self.states();
-        let count = rows.len() / n;
-        let nothing = self.graph.constant(0.0);
-        let mut root = vec![None; n * n];
-        let mut squares = vec![];
-        for k in 0..n {
-            let column = |rows: &[Term<'g>]| -> Vec<(usize, Expr<'g>)> {
-                let all = (k..count).map(|r| (r, rows[r * n + k]));
-                all.filter_map(|(r, entry)| entry.map(|entry| (r, entry)))
-                    .collect()
-            };
-            let own = column(rows);
-            let square = own.iter().map(|(_, entry)| entry.powi(2));
-            let Some(square) = square.reduce(|all, one| all + one) else {
-                continue;
-            };
-            squares.push(Some(square));
-            // a column of zeros stays one
-            let is_there = self.graph.constant(self.least_square).less(square);
-            let norm = is_there.select(square.sqrt(), nothing);
-            let pivot = rows[k * n + k];
-            let is_above = pivot.map(|pivot| nothing.less(pivot));
-            let turned = |is: Expr<'g>, value: Expr<'g>| is.select(-value, value);
-            let head = is_above.map_or(norm, |is| turned(is, norm));
-            let first = pivot.map_or(-head, |pivot| pivot - head);
-            let beta = is_there.select(-head * first, self.graph.constant(1.0));
-            rows[k * n + k] = Some(first);
-            let reflector = column(rows);
-            let sums: Vec<Term<'g>> = (k + 1..n)
-                .map(|j| {
-                    let products = reflector.iter();
-                    let products = products.map(|(r, v)| rows[r * n + j].map(|a| *v * a));
-                    products.fold(None, sum)
-                })
-                .collect();
-            for (r, v) in reflector {
-                let factor = v / beta;
-                for (j, part) in (k + 1..n).zip(&sums) {
-                    let Some(part) = part.map(|part| factor * part) else {
-                        continue;
-                    };
-                    let entry = &mut rows[r * n + j];
-                    *entry = Some(entry.map_or(-part, |entry| entry - part));
-                }
-            }
-            root[k * n + k] = Some(norm);
-            for j in k + 1..n {
-                let entry = rows[k * n + j];
-                root[j * n + k] = entry.map(|a| is_above.map_or(a, |is| turned(is, a)));
-            }
+        root[k * n + k] = Some(norm);
+        for j in k + 1..n {
+            let entry = rows[k * n + j];
+            root[j * n + k] = entry.map(|a| is_above.map_or(a, |is| turned(is, a)));
         }
-        root.extend(squares);
-        root
     }
+    root.extend(squares);
+    root
 }
 
 /// Their nodes, 0 where there is nothing.

@@ -3,7 +3,7 @@
 use lynkeus_expr::{Expr, Graph, Node};
 use lynkeus_run::filter::{
     FilterKind, FilterSettings, Likelihood, Limits, NoisyModel, NoisyPlant, ParametricLevel,
-    ParametricPlant, ParametricSensor, Row, Seen, Sensor,
+    ParametricPlant, ParametricSensor, Row, Seen, Sensor, SigmaPoints,
 };
 use lynkeus_run::{Blueprint, EstimatorSettings, Level, Method, Step};
 
@@ -124,6 +124,13 @@ impl Case {
     }
 
     fn likelihood(&self) -> Likelihood {
+        self.likelihood_by(|plant| Likelihood::new(plant))
+    }
+
+    fn likelihood_by(
+        &self,
+        make: impl FnOnce(&ParametricPlant<'_>) -> Result<Likelihood, lynkeus_run::Error>,
+    ) -> Likelihood {
         let g = &self.graph;
         let θ: Vec<Expr<'_>> = (0..self.values.len())
             .map(|i| g.symbol(&format!("p{i}")))
@@ -134,7 +141,7 @@ impl Case {
         let zero = g.constant(0.0).node();
         // noise acts on the last state alone where there are three
         let is_noisy = |i: usize| self.n != 3 || i == 2;
-        Likelihood::new(&ParametricPlant {
+        make(&ParametricPlant {
             graph: g,
             time,
             derivatives,
@@ -162,7 +169,7 @@ impl Case {
     }
 
     /// −log L of the filter of the library, whose corrections are other code.
-    fn filtered(&self) -> f64 {
+    fn filtered(&self, kind: FilterKind) -> f64 {
         let g = &self.graph;
         let θ: Vec<Node> = self.values.iter().map(|&v| g.constant(v).node()).collect();
         let (states, derivatives, outputs, [time, u]) = self.plant(&θ);
@@ -199,7 +206,7 @@ impl Case {
             method: Method::Rk4(Step::Substeps(1)),
             ..EstimatorSettings::default()
         };
-        let settings = FilterSettings::of(FilterKind::Extended);
+        let settings = FilterSettings::of(kind);
         let mut filter = Blueprint::filter(model, settings, run).estimator().unwrap();
         filter.keep_record();
         let mut sum = 0.0;
@@ -232,7 +239,7 @@ fn the_likelihood_is_the_filter_s() {
             continue;
         }
         shares += u32::from(case.is_share());
-        let expected = case.filtered();
+        let expected = case.filtered(FilterKind::Extended);
         let off = (score.value - expected).abs() / (1.0 + expected.abs());
         assert!(
             off < 1e-11,
@@ -243,12 +250,72 @@ fn the_likelihood_is_the_filter_s() {
     assert!(shares > 2, "{shares}");
 }
 
+/// Points with a negative weight at the centre, and the usual ones.
+const POINTS: [SigmaPoints; 2] = [
+    SigmaPoints {
+        alpha: 0.6,
+        beta: 0.0,
+        kappa: 0.5,
+    },
+    SigmaPoints {
+        alpha: 1.0,
+        beta: 0.0,
+        kappa: 0.0,
+    },
+];
+
+#[test]
+fn the_unscented_likelihood_is_the_filter_s() {
+    let (mut compared, mut signs) = (0, [0, 0]);
+    for seed in 0..60 {
+        let case = Case::new(seed);
+        let points = POINTS[seed as usize % 7 % 2];
+        let weights = points.weights(case.n).unwrap();
+        let mut is_left = false;
+        let see = |seen: Seen| {
+            let is_surprised = seen.innovation.powi(2) > 9.0 * seen.variance;
+            // points are drawn anew for a reading at an end, and a share counts otherwise where it is contradicted
+            is_left |= (seen.is_at_end && case.sensors > 1) || (case.is_share() && is_surprised);
+        };
+        let score = case
+            .likelihood_by(|plant| Likelihood::unscented(plant, points))
+            .watched(&case.values, rows(&case.log), Step::AtMost(1.0), see)
+            .unwrap();
+        if is_left {
+            continue;
+        }
+        compared += 1;
+        signs[usize::from(weights.centre < 0.0)] += 1;
+        let expected = case.filtered(FilterKind::Unscented(points));
+        let off = (score.value - expected).abs() / (1.0 + expected.abs());
+        assert!(off < 1e-9, "seed {seed}: {} beside {expected}", score.value);
+    }
+    assert!(
+        compared > 40 && signs.iter().all(|count| *count > 5),
+        "{compared} {signs:?}"
+    );
+}
+
 /// Beside differences of order 6, which leave about 1e-9 of the value.
 #[test]
 fn derivatives_are_those_of_the_value() {
     for seed in 0..200 {
         let case = Case::new(seed);
-        let mut likelihood = case.likelihood();
+        derivatives_hold(&case, case.likelihood());
+    }
+    for seed in 0..40 {
+        let case = Case::new(seed);
+        let points = POINTS[seed as usize % 7 % 2];
+        derivatives_hold(
+            &case,
+            case.likelihood_by(|plant| Likelihood::unscented(plant, points)),
+        );
+    }
+}
+
+fn derivatives_hold(case: &Case, mut likelihood: Likelihood) {
+    let seed = case.seed;
+    {
         let mut value = |θ: &[f64]| {
             likelihood
                 .score(θ, rows(&case.log), Step::AtMost(0.1))

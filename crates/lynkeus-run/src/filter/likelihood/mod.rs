@@ -11,10 +11,12 @@ mod code;
 mod plant;
 mod sample;
 mod stiff;
+mod unscented;
 
 use lynkeus_expr::Tape;
 use lynkeus_native::Function;
 
+use super::SigmaPoints;
 use super::censored::{End, Tail};
 use crate::integrator::{fixed_steps, instant};
 use crate::noise::Limits;
@@ -22,6 +24,7 @@ use crate::{Error, Method, Result, Step};
 use code::{Bundle, Code, passes};
 pub use plant::{ParametricLevel, ParametricPlant, ParametricSensor};
 use sample::Sample;
+use unscented::{Points, Unscented};
 
 /// A row of a log.
 #[derive(Clone, Copy, Debug)]
@@ -116,10 +119,38 @@ impl Likelihood {
     /// expressions.
     pub fn new(plant: &ParametricPlant<'_>) -> Result<Self> {
         let sample = Sample::new(plant)?;
-        let is_wide = lynkeus_native::widest() == 8 && plant.parameters.len() > 4;
+        Self::of(&sample, None)
+    }
+
+    /// The same along an unscented filter.
+    ///
+    /// # Errors
+    /// As [`Self::new`], and those of [`SigmaPoints::weights`].
+    pub fn unscented(plant: &ParametricPlant<'_>, points: SigmaPoints) -> Result<Self> {
+        let weights = points.weights(plant.states.len())?;
+        let shown = unscented::shown(plant);
+        let sample = Sample::full(&shown)?;
+        let own = Unscented {
+            plant,
+            sample: &sample,
+            weights,
+        };
+        Self::of(&sample, Some(&own))
+    }
+
+    fn of(sample: &Sample<'_, '_>, points: Option<&Unscented<'_, '_>>) -> Result<Self> {
+        let is_wide = lynkeus_native::widest() == 8 && sample.plant().parameters.len() > 4;
         Ok(Self(match is_wide {
-            true => Wide::Eight(Box::new(Passes::new(&sample, Function::<8>::compile)?)),
-            false => Wide::Four(Box::new(Passes::new(&sample, Function::<4>::compile)?)),
+            true => Wide::Eight(Box::new(Passes::new(
+                sample,
+                points,
+                Function::<8>::compile,
+            )?)),
+            false => Wide::Four(Box::new(Passes::new(
+                sample,
+                points,
+                Function::<4>::compile,
+            )?)),
         }))
     }
 
@@ -190,9 +221,11 @@ struct Passes<const L: usize> {
     /// of θ: x̂ and S at the start
     begin: Code<L>,
     /// of t, h, u, x̂, S and θ: x̂ and S a step later
-    predict: Code<L>,
+    predict: Predict<L>,
+    /// of t, u, x̂, S and θ, along an unscented filter: what the sensors show beside x̂
+    show: Option<Code<L>>,
     /// the same by a step for stiff equations
-    implicit: Option<Code<L>>,
+    implicit: Option<Predict<L>>,
     is_implicit: bool,
     /// so many times as many steps as are asked for
     times: usize,
@@ -208,11 +241,36 @@ struct Passes<const L: usize> {
     seen: Tangents,
 }
 
+/// From one row to the next.
+#[derive(Clone, Debug)]
+enum Predict<const L: usize> {
+    /// x̂ and S, step by step
+    Sample(Code<L>),
+    /// by points
+    Points(Box<Points<L>>),
+}
+
+impl<const L: usize> Predict<L> {
+    fn place(&mut self, parameters: &[f64]) {
+        match self {
+            Self::Sample(code) => code.place(parameters),
+            Self::Points(points) => points.place(parameters),
+        }
+    }
+
+    fn run(&mut self, interval: &Interval<'_>, belief: &mut [Bundle<L>]) {
+        match self {
+            Self::Sample(code) => interval.run(code, belief),
+            Self::Points(points) => points.run(interval, belief),
+        }
+    }
+}
+
 /// For intervals on which the plant has no value where the estimate is.
 #[derive(Clone, Debug)]
 struct Spare<const L: usize> {
     /// as the other, of the plant that sees the states within their ranges
-    predict: Code<L>,
+    predict: Predict<L>,
     ranges: Vec<Limits>,
     /// x̂ and S at the row
     before: Vec<Bundle<L>>,
@@ -246,7 +304,11 @@ struct Tangents {
 }
 
 impl<const L: usize> Passes<L> {
-    fn new(sample: &Sample<'_, '_>, compile: fn(&Tape) -> Option<Function<L>>) -> Result<Self> {
+    fn new(
+        sample: &Sample<'_, '_>,
+        points: Option<&Unscented<'_, '_>>,
+        compile: fn(&Tape) -> Option<Function<L>>,
+    ) -> Result<Self> {
         let plant = sample.plant();
         let (states, parameters) = (plant.states.len(), plant.parameters.len());
         let sensors = plant.sensors.iter().enumerate().map(|(i, sensor)| {
@@ -268,7 +330,14 @@ impl<const L: usize> Passes<L> {
         let spare = match plant.ranges.iter().any(has_ends) {
             false => None,
             true => Some(Spare {
-                predict: sample.confined(compile)?,
+                predict: match points {
+                    None => Predict::Sample(sample.confined(compile)?),
+                    Some(points) => {
+                        let n = points.plant.states.len();
+                        let limited = sample.limited();
+                        Predict::Points(Box::new(points.predict(&limited[..n], compile)?))
+                    }
+                },
                 ranges: plant.ranges.clone(),
                 before: belief.clone(),
             }),
@@ -276,8 +345,15 @@ impl<const L: usize> Passes<L> {
         Ok(Self {
             parameters,
             begin: sample.begin(compile)?,
-            predict: sample.predict(compile)?,
-            implicit: sample.implicit(compile)?,
+            predict: match points {
+                None => Predict::Sample(sample.predict(compile)?),
+                Some(points) => {
+                    let own = points.predict(&points.plant.derivatives, compile)?;
+                    Predict::Points(Box::new(own))
+                }
+            },
+            show: points.map(|points| points.show(compile)).transpose()?,
+            implicit: sample.implicit(compile)?.map(Predict::Sample),
             is_implicit: false,
             times: 1,
             drives: sample.drives(),
@@ -348,6 +424,9 @@ impl<const L: usize> Passes<L> {
     fn place(&mut self, parameters: &[f64]) {
         self.begin.place(parameters);
         self.predict.place(parameters);
+        if let Some(show) = &mut self.show {
+            show.place(parameters);
+        }
         if let Some(implicit) = &mut self.implicit {
             implicit.place(parameters);
         }
@@ -395,13 +474,13 @@ impl<const L: usize> Passes<L> {
             _ => &mut self.predict,
         };
         let Some(spare) = &mut self.spare else {
-            interval.run(predict, &mut self.belief);
+            predict.run(&interval, &mut self.belief);
             return Ok(false);
         };
         for (before, belief) in spare.before.iter_mut().zip(&self.belief) {
             before.copy_from_slice(belief);
         }
-        interval.run(predict, &mut self.belief);
+        predict.run(&interval, &mut self.belief);
         let is_value = |x: &[f64; L]| x[0].is_finite();
         if self.belief[0].iter().all(is_value) {
             return Ok(false);
@@ -418,12 +497,18 @@ impl<const L: usize> Passes<L> {
                 }
             }
         }
-        interval.run(&mut spare.predict, &mut self.belief);
+        spare.predict.run(&interval, &mut self.belief);
         Ok(true)
     }
 
     /// The readings of a row, one after the other; h and its slopes are those at the estimate before them.
     fn take(&mut self, row: &Row<'_>, score: &mut Score, see: &mut impl FnMut(Seen)) {
+        if let Some(show) = &mut self.show {
+            for (pass, belief) in self.belief.iter_mut().enumerate() {
+                let found = show.run(pass, [&[row.t], row.inputs], &[belief]);
+                belief.copy_from_slice(found);
+            }
+        }
         let n = self.states;
         for (at, belief) in self.at.iter_mut().zip(&self.belief) {
             let half = belief.len() / 2;

@@ -13,11 +13,11 @@ use crate::classical::{Term, sum};
 use crate::filter::expressions::{Corrected, Flow, corrected};
 use crate::{Error, Result};
 
-type Compile<const L: usize> = fn(&Tape) -> Option<Function<L>>;
+pub(super) type Compile<const L: usize> = fn(&Tape) -> Option<Function<L>>;
 
 /// Derivatives of a reflection divide by the cube of a column's length, which must stay a number: what has decayed
 /// so far, without noise, is none of the uncertainty.
-const LEAST_SQUARE: f64 = 1e-180;
+pub(super) const LEAST_SQUARE: f64 = 1e-180;
 
 /// The expressions of a sample.
 pub(super) struct Sample<'p, 'g> {
@@ -60,6 +60,27 @@ impl<'p, 'g> Sample<'p, 'g> {
         Ok(sample)
     }
 
+    /// With an S that is full.
+    pub fn full(plant: &'p ParametricPlant<'g>) -> Result<Self> {
+        let mut sample = Self::new(plant)?;
+        let n = plant.states.len();
+        let pattern = (0..n).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        sample.pattern = pattern.collect();
+        let fresh = sample.pattern.iter().map(|_| plant.graph.fresh("S").node());
+        sample.root = fresh.collect();
+        Ok(sample)
+    }
+
+    /// Symbols of x̂ and of the entries of S.
+    pub fn numbered(&self) -> Vec<Node> {
+        [&self.plant.states[..], &self.root].concat()
+    }
+
+    /// The symbol of a step's length.
+    pub fn length(&self) -> Expr<'g> {
+        self.h
+    }
+
     /// Every entry of S that a start, a step or a reading makes, or one of them after the others.
     fn find_pattern(&mut self) {
         let n = self.plant.states.len();
@@ -86,12 +107,12 @@ impl<'p, 'g> Sample<'p, 'g> {
         }
     }
 
-    fn term(&self, node: Node) -> Term<'g> {
+    pub fn term(&self, node: Node) -> Term<'g> {
         let is_nothing = self.plant.graph.constant_value(node) == Some(0.0);
         (!is_nothing).then(|| self.plant.graph.expr(node))
     }
 
-    fn belief(&self) -> (Vec<Term<'g>>, Vec<Term<'g>>) {
+    pub fn belief(&self) -> (Vec<Term<'g>>, Vec<Term<'g>>) {
         let (g, n) = (self.plant.graph, self.plant.states.len());
         let x = self.plant.states.iter().map(|&x| Some(g.expr(x))).collect();
         let mut root = vec![None; n * n];
@@ -101,7 +122,7 @@ impl<'p, 'g> Sample<'p, 'g> {
         (x, root)
     }
 
-    fn nodes(&self, (x, root): (&[Term<'g>], &[Term<'g>])) -> Vec<Node> {
+    pub fn nodes(&self, (x, root): (&[Term<'g>], &[Term<'g>])) -> Vec<Node> {
         let n = self.plant.states.len();
         let entries = self.pattern.iter().map(|&(i, j)| root[i * n + j]);
         let all = x.iter().copied().chain(entries);
@@ -118,7 +139,7 @@ impl<'p, 'g> Sample<'p, 'g> {
         self.plant
     }
 
-    fn code<const L: usize>(
+    pub fn code<const L: usize>(
         &self,
         (known, moves): (&[Node], &[Node]),
         outputs: &[Node],
@@ -203,6 +224,11 @@ impl<'p, 'g> Sample<'p, 'g> {
 
     /// The same with the states limited to their ranges.
     pub fn confined<const L: usize>(&self, compile: Compile<L>) -> Result<Code<L>> {
+        self.predict_by(&self.limited(), compile)
+    }
+
+    /// The derivatives of the states limited to their ranges.
+    pub fn limited(&self) -> Vec<Node> {
         let (plant, g) = (self.plant, self.plant.graph);
         let limited = plant.states.iter().zip(&plant.ranges).map(|(&x, range)| {
             let mut image = g.expr(x);
@@ -214,8 +240,7 @@ impl<'p, 'g> Sample<'p, 'g> {
             }
             (x, image.node())
         });
-        let derivatives = g.substitute(&plant.derivatives, &limited.collect());
-        self.predict_by(&derivatives, compile)
+        g.substitute(&plant.derivatives, &limited.collect())
     }
 
     fn predict_by<const L: usize>(
@@ -226,8 +251,11 @@ impl<'p, 'g> Sample<'p, 'g> {
         let plant = self.plant;
         let (x, root) = self.predicted(derivatives);
         let known = [&[plant.time, self.h.node()][..], &plant.inputs].concat();
-        let moves = [&plant.states[..], &self.root].concat();
-        self.code((&known, &moves), &self.nodes((&x, &root)), compile)
+        self.code(
+            (&known, &self.numbered()),
+            &self.nodes((&x, &root)),
+            compile,
+        )
     }
 
     /// By a reading, or by one of this innovation and variance of the noise.
