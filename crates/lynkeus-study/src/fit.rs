@@ -15,6 +15,8 @@ pub struct FitSettings {
     pub log: Vec<Name>,
     /// Outputs whose noise is found.
     pub noise: Chosen,
+    /// Outputs the standard deviation of whose noise is a parameter or a variable of the model: (output, which).
+    pub deviations: Vec<(Name, Name)>,
     /// States and unknown inputs whose spectral density is found.
     pub process_noise: Chosen,
     /// States whose start is found, one for each log; nothing is then uncertain about it.
@@ -55,6 +57,7 @@ impl Default for FitSettings {
             parameters: vec![],
             log: vec![],
             noise: Chosen::Named(vec![]),
+            deviations: vec![],
             process_noise: Chosen::Named(vec![]),
             initial: vec![],
             bounds: vec![],
@@ -106,11 +109,13 @@ pub(super) fn read(entry: Entry<'_>) -> Result<FitSettings, Error> {
         Ok::<_, Error>(names.unwrap_or_default())
     };
     let (parameters, log, initial) = (names("parameters")?, names("log")?, names("initial")?);
+    let (noise, deviations) = noise(section.take("noise"))?;
     Ok(FitSettings {
         parameters,
         log,
         initial,
-        noise: chosen(section.take("noise"))?,
+        noise,
+        deviations,
         process_noise: chosen(section.take("process_noise"))?,
         bounds: simulate::pairs(section.take("bounds"), range)?,
         priors: simulate::pairs(section.take("priors"), prior)?,
@@ -138,6 +143,25 @@ fn candidate(entry: Entry<'_>) -> Result<Candidate, Error> {
         every: section.optional("every", Entry::positive)?,
         duration: section.optional("duration", Entry::positive)?,
     })
+}
+
+/// Outputs whose noise is found, and those whose noise the model names.
+fn noise(entry: Option<Entry<'_>>) -> Result<(Chosen, Vec<(Name, Name)>), Error> {
+    let table = match entry {
+        Some(entry) if entry.is_table() => entry,
+        other => return Ok((chosen(other)?, vec![])),
+    };
+    let (mut found, mut named) = (vec![], vec![]);
+    for (output, value) in table.pairs()? {
+        let refusal = value.wrong("true, or the name of a parameter or a variable of the model");
+        match (value.as_boolean(), value.as_text()) {
+            (Some(true), _) => found.push(output),
+            (Some(false), _) => {}
+            (None, Some(_)) => named.push((output, value.name()?)),
+            (None, None) => return Err(refusal),
+        }
+    }
+    Ok((Chosen::Named(found), named))
 }
 
 fn chosen(entry: Option<Entry<'_>>) -> Result<Chosen, Error> {

@@ -120,7 +120,7 @@ pub fn fit(
     }
     let logs = tables
         .iter()
-        .map(|table| FittedLog::new(&prepared, &design, table));
+        .map(|table| FittedLog::new(&prepared, &design, table, tables.len() > 1));
     let logs = logs.collect::<Result<Vec<_>, _>>()?;
     let symbolic = plant::symbolic(&study)?;
     let unknowns = unknown::unknowns(&prepared, &symbolic, &logs)?;
@@ -155,6 +155,9 @@ pub fn fit(
         logs: &logs,
         terms,
         step: Step::Auto,
+        halvings: 0,
+        is_implicit: false,
+        tolerance: 1.0,
         most_confined: usize::MAX,
         evaluations: 0,
     };
@@ -376,7 +379,7 @@ impl Work<'_> {
         if let (false, false, Step::AtMost(step)) = (is_settled, best.is_ended, self.problem.step) {
             self.warnings.push(format!(
                 "\u{2212}log L still changes by more than {SETTLED} where steps of {} are halved: the plant is stiff, or it jumps; method = \"rk4\" with a `step` in [estimate] says which steps count",
-                short(step)
+                short(step / 2.0_f64.powi(self.problem.halvings as i32))
             ));
         }
         let mut held = vec![false; best.point.z.len()];
@@ -504,11 +507,15 @@ impl Work<'_> {
         let ahead = self.ahead(&found)?;
         let values = self.problem.values(&found.point.z);
         let alone = self.alone.as_mut();
+        let (is_implicit, halvings) = (self.problem.is_implicit, self.problem.halvings);
         let alone = alone.map(|terms| Problem {
             terms: std::mem::take(terms),
             ..self.problem.clone()
         });
         let mut alone = alone;
+        if let Some(alone) = &mut alone {
+            alone.step_as(is_implicit, halvings);
+        }
         let (errors, rows) =
             errors::errors(&mut self.problem, alone.as_mut(), &self.outputs, &values)?;
         let coloured = errors.iter().filter(|own| own.are_coloured());

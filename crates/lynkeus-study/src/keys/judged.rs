@@ -86,6 +86,9 @@ const CHOSEN: Shape = Shape::As(
     &Shape::Either(&[Shape::Flag, Shape::NAMES]),
 );
 
+/// The noise of an output.
+const NOISE_OF: Shape = Shape::Either(&[Shape::Flag, Shape::Text]);
+
 /// `[fit]`
 pub(crate) const FIT: [KeySpec; 12] = [
     KeySpec {
@@ -102,9 +105,12 @@ pub(crate) const FIT: [KeySpec; 12] = [
     },
     KeySpec {
         name: "noise",
-        shape: CHOSEN,
+        shape: Shape::As(
+            "true, list of names, or table: output = true, parameter or variable",
+            &Shape::Either(&[Shape::Flag, Shape::NAMES, Shape::Table(&NOISE_OF)]),
+        ),
         default: "none",
-        meaning: "measured outputs whose noise is found; the search starts at `noise` of `[sensors]`, or at the scatter of the readings",
+        meaning: "measured outputs whose noise is found; the search starts at `noise` of `[sensors]`, or at the scatter of the readings. In a table, a name says whose value the standard deviation is: `{ y = \"s\", z = \"s\" }` for a parameter that two sensors share; or a variable that computes it, of states and inputs, too",
     },
     KeySpec {
         name: "process_noise",

@@ -156,8 +156,7 @@ impl<'p, 'l> Judge<'p, 'l> {
     ) -> Result<Self, Error> {
         let (unknowns, values) = with_starts(problem, found);
         let own = own(problem, &unknowns);
-        let starts = &problem.logs[0].starts;
-        let likelihood = extras::likelihood(source, extras, &own, starts)?;
+        let likelihood = extras::likelihood(source, extras, problem, &own)?;
         let places = own.iter().map(|(place, _)| *place).collect();
         let told = problem.unknowns.len();
         let free: Vec<usize> = (0..told).filter(|&i| !found.is_bound[i]).collect();

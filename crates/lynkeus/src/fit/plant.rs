@@ -12,7 +12,7 @@ use lynkeus_structure::AugmentedPlant;
 use super::unknown::{Kind, Unknown};
 use crate::prepare::{self, Prepared};
 use crate::words::explain;
-use crate::{Error, Study};
+use crate::{Error, Study, near};
 
 /// The plant with the parameters that are found as symbols.
 ///
@@ -117,14 +117,15 @@ impl Source<'_> {
         let sensors = symbolic.outputs.iter().enumerate().map(|(i, output)| {
             let name = &output.variable.name;
             let level = declared.noise.of(name).map(|noise| Level::from(*noise));
-            let size = match (noises.get(&i), level) {
-                (Some(&symbol), _) => graph.expr(symbol),
+            let named = named(prepared.study(), symbolic.plant, name)?;
+            let size = match (noises.get(&i).copied().or(named), level) {
+                (Some(size), _) => graph.expr(size),
                 (None, Some(level)) if level.size() > 0.0 => graph.constant(level.size()),
                 (None, _) => return Err(no_noise(prepared.study(), name)),
             };
             Ok(ParametricSensor {
                 output: output.variable.node,
-                noise: noise(level, size),
+                noise: noise(level.filter(|_| named.is_none()), size),
                 limits: declared.limits.of(name).copied(),
             })
         });
@@ -173,6 +174,36 @@ fn parameter(plant: &Plant, name: &str) -> Node {
     let own = all.find(|variable| variable.name == name);
     // one that no equation reads is a symbol of its own
     own.map_or_else(|| plant.graph.fresh(name).node(), |variable| variable.node)
+}
+
+/// The parameter or the variable whose value the standard deviation of a sensor's noise is.
+///
+/// # Errors
+/// The model has neither.
+pub(super) fn named(study: &Study, plant: &Plant, output: &str) -> Result<Option<Node>, Error> {
+    let mut said = study.fit.deviations.iter();
+    let Some((_, name)) = said.find(|(sensor, _)| sensor.is_or_has(output)) else {
+        return Ok(None);
+    };
+    let is_found = study.fit.parameters.iter().any(|p| p.is_or_has(&name.text));
+    let parameters = plant.parameters.iter();
+    if let Some(own) = parameters.clone().find(|p| p.variable.name == name.text) {
+        let number = own.value.filter(|_| !is_found);
+        let number = number.map(|value| plant.graph.constant(value).node());
+        return Ok(Some(number.unwrap_or(own.variable.node)));
+    }
+    let variables = plant.outputs.iter().chain(&plant.algebraics);
+    if let Some(own) = variables.clone().find(|v| v.name == name.text) {
+        return Ok(Some(own.node));
+    }
+    let known = variables.chain(parameters.map(|p| &p.variable));
+    let known: Vec<&str> = known.map(|v| v.name.as_str()).collect();
+    let message = format!(
+        "`noise` of [fit]: no parameter or variable is called \"{}\"",
+        name.text
+    );
+    let refusal = Error::input(message).at(&study.file);
+    Err(name.blame(refusal.hint(near::suggest(&name.text, known))))
 }
 
 fn no_noise(study: &Study, name: &str) -> Error {

@@ -42,6 +42,12 @@ pub(crate) struct Problem<'a> {
     /// one per log
     pub terms: Vec<Term>,
     pub step: Step,
+    /// how often that is halved
+    pub halvings: u32,
+    /// by implicit steps
+    pub is_implicit: bool,
+    /// a factor of all that −log L may be wrong by
+    pub tolerance: f64,
     /// where the plant has no value in more intervals than so many, −log L has none: steps are too long there
     pub most_confined: usize,
     pub evaluations: usize,

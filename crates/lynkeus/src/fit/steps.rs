@@ -23,9 +23,13 @@ const MOST_STEPS: usize = 2_000_000;
 /// One row of so many may be one at which the plant has no value where the estimate is.
 const CONFINED: usize = 10;
 
+/// What a study's relative tolerance is where it does not say: a smaller one makes all others here as much smaller.
+const USUAL: f64 = 1e-9;
+
 impl Problem<'_> {
     /// A point at such steps of the study's method that shorter ones hardly change −log L. Steps that are too long for
     /// a stiff plant throw its estimates out of every range: such a point counts only where shorter ones do not help.
+    /// A plant alone then has implicit ones.
     ///
     /// # Errors
     /// As [`Problem::at`].
@@ -35,38 +39,101 @@ impl Problem<'_> {
         method: &Method,
         budget: &Budget,
     ) -> Result<Point, Error> {
-        if let Method::Rk4(step) = method {
-            self.step = *step;
-            return self.at(z);
+        match method {
+            Method::Rk4(step) => {
+                self.step = *step;
+                return self.at(z);
+            }
+            Method::Adaptive(t) | Method::Explicit(t) | Method::Stiff(t) => {
+                self.tolerance = (t.relative / USUAL).min(1.0);
+            }
         }
+        let mut found: Option<Point> = None;
+        if !matches!(method, Method::Stiff(_)) {
+            let (point, is_settled) = self.halving(&z, budget, HALVINGS)?;
+            if is_settled || matches!(method, Method::Explicit(_)) || budget.spent().is_some() {
+                return Ok(point);
+            }
+            found = Some(point).filter(|point| self.is_sound(point));
+        }
+        let explicit = self.halvings;
+        if self.implicit(true) {
+            let (point, is_settled) = self.halving(&z, budget, HALVINGS)?;
+            let is_better = found.is_none() && self.is_sound(&point);
+            if is_settled || is_better || budget.spent().is_some() {
+                return Ok(point);
+            }
+        }
+        self.implicit(false);
+        match found {
+            Some(point) => {
+                self.shorten(explicit);
+                Ok(point)
+            }
+            None => Ok(self.halving(&z, budget, u32::MAX)?.0),
+        }
+    }
+
+    /// By implicit steps from here on, or not; whether there are such.
+    fn implicit(&mut self, is_implicit: bool) -> bool {
+        let mut all = true;
+        for term in &mut self.terms {
+            all &= term.likelihood.implicit(is_implicit);
+        }
+        self.is_implicit = is_implicit && all;
+        all
+    }
+
+    /// A point at steps that are halved until that hardly changes −log L; whether it came to that.
+    /// Where the plant has no value they are halved `most` times at most.
+    fn halving(
+        &mut self,
+        z: &DVector<f64>,
+        budget: &Budget,
+        most: u32,
+    ) -> Result<(Point, bool), Error> {
+        let finer = (-self.tolerance.log2() / 4.0).ceil() as u32;
         let intervals = self.logs.iter().map(FittedLog::interval);
-        let usual = intervals.fold(f64::INFINITY, f64::min);
-        self.step = Step::AtMost(usual);
-        let first = self.at(z)?;
+        self.step = Step::AtMost(intervals.fold(f64::INFINITY, f64::min));
+        self.shorten(0);
+        let first = self.at(z.clone())?;
         let mut point = first.clone();
-        let mut length = usual;
         for halving in 1.. {
             let is_enough = match self.is_sound(&point) {
-                true => halving > HALVINGS,
-                false => self.rows() << halving > MOST_STEPS,
+                true => halving > HALVINGS + finer,
+                false => halving > most || self.rows() << halving > MOST_STEPS,
             };
             if is_enough || budget.spent().is_some() {
                 break;
             }
-            let tolerance = SETTLED.max(NEARLY * point.value.abs());
-            self.step = Step::AtMost(0.5 * length);
+            let tolerance = self.tolerance * SETTLED.max(NEARLY * point.value.abs());
+            self.shorten(halving);
             let fine = self.at(point.z.clone())?;
             if self.is_sound(&point) && (fine.value - point.value).abs() < tolerance {
-                self.step = Step::AtMost(length);
-                return Ok(point);
+                self.shorten(halving - 1);
+                return Ok((point, true));
             }
-            (point, length) = (fine, 0.5 * length);
+            point = fine;
         }
         if self.is_sound(&point) {
-            return Ok(point);
+            return Ok((point, false));
         }
-        self.step = Step::AtMost(usual);
-        Ok(first)
+        self.shorten(0);
+        Ok((first, false))
+    }
+
+    /// Steps that are halved so often, in every interval between two rows.
+    fn shorten(&mut self, halvings: u32) {
+        self.halvings = halvings;
+        for term in &mut self.terms {
+            term.likelihood.shorten(1 << halvings);
+        }
+    }
+
+    /// Steps as another problem has them.
+    pub fn step_as(&mut self, is_implicit: bool, halvings: u32) {
+        self.implicit(is_implicit);
+        self.shorten(halvings);
     }
 
     /// The same point at half the steps, which are kept where that changes it.
@@ -74,13 +141,14 @@ impl Problem<'_> {
     /// # Errors
     /// As [`Problem::at`].
     pub fn halved(&mut self, coarse: &Point) -> Result<Option<Point>, Error> {
-        let Step::AtMost(length) = self.step else {
+        if !matches!(self.step, Step::AtMost(_)) {
             return Ok(None);
-        };
-        self.step = Step::AtMost(0.5 * length);
+        }
+        let halvings = self.halvings;
+        self.shorten(halvings + 1);
         let fine = self.at(coarse.z.clone())?;
-        if (fine.value - coarse.value).abs() < SETTLED {
-            self.step = Step::AtMost(length);
+        if (fine.value - coarse.value).abs() < self.tolerance * SETTLED {
+            self.shorten(halvings);
             return Ok(None);
         }
         Ok(Some(fine))

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use nalgebra::{DMatrix, DVector};
 
 use super::problem::Problem;
-use super::search::{Found, positive, search};
+use super::search::{Found, least, positive};
 use crate::Error;
 
 /// 95 % of a normal distribution are within so many deviations.
@@ -220,8 +220,8 @@ fn is_nothing(
     start[i] = unknown.searched(unknown.low);
     let mut held = vec![false; start.len()];
     held[i] = true;
-    let least = search(problem, start, &held, watch)?.point.value;
-    Ok(2.0 * (least - found.point.value) <= RISES[1])
+    let (there, _) = least(problem, start, &held, watch)?;
+    Ok(2.0 * (there.value - found.point.value) <= RISES[1])
 }
 
 /// Where a profile has risen by so much.
@@ -249,6 +249,7 @@ impl Edge<'_, '_> {
         let goal = root(self.rise);
         let mut inside = (at, 0.0);
         let mut outside: Option<(f64, f64)> = None;
+        let mut width = f64::INFINITY;
         let mut next = at + sign * size * goal * 2.0_f64.sqrt();
         for _ in 0..TRIALS {
             let z = if sign > 0.0 {
@@ -260,7 +261,7 @@ impl Edge<'_, '_> {
                 return Ok(None);
             };
             let reached = root(rise);
-            if (reached - goal).abs() < 1e-4 * goal {
+            if (reached - goal).abs() < 1e-3 * goal {
                 return Ok(Some(z));
             }
             match reached < goal {
@@ -268,21 +269,23 @@ impl Edge<'_, '_> {
                 true => inside = (z, reached),
                 false => outside = Some((z, reached)),
             }
-            next = match outside {
-                None => {
-                    let slope = (reached / (z - at).abs()).max(f64::MIN_POSITIVE);
-                    let far = (goal / slope).min(4.0 * (z - at).abs());
-                    at + sign * far.max(1.2 * (z - at).abs())
-                }
-                Some(outside) if outside.1.is_finite() => {
-                    let share = (goal - inside.1) / (outside.1 - inside.1);
-                    inside.0 + share.clamp(0.05, 0.95) * (outside.0 - inside.0)
-                }
-                Some(outside) => 0.5 * (inside.0 + outside.0),
+            let Some(outside) = outside else {
+                let slope = (reached / (z - at).abs()).max(f64::MIN_POSITIVE);
+                let far = (goal / slope).min(4.0 * (z - at).abs());
+                next = at + sign * far.max(1.5 * (z - at).abs());
+                continue;
             };
-            if outside.is_some_and(|o| (o.0 - inside.0).abs() < 1e-9 * (1.0 + at.abs())) {
+            let now = (outside.0 - inside.0).abs();
+            if now < 1e-9 * (1.0 + at.abs()) {
                 return Ok(Some(inside.0));
             }
+            // where the rise has a knee, the secant would only creep
+            let share = match outside.1.is_finite() && now <= 0.5 * width {
+                true => ((goal - inside.1) / (outside.1 - inside.1)).clamp(0.02, 0.98),
+                false => 0.5,
+            };
+            width = now;
+            next = inside.0 + share * (outside.0 - inside.0);
         }
         Ok(Some(inside.0))
     }
@@ -292,14 +295,15 @@ impl Edge<'_, '_> {
         start[self.held] = z;
         let mut held = vec![false; start.len()];
         held[self.held] = true;
-        let found = search(self.problem, start, &held, self.watch)?;
-        if found.is_ended {
+        let (point, is_done) = least(self.problem, start, &held, self.watch)?;
+        if !is_done {
             return Ok(None);
         }
-        if found.point.value.is_finite() {
-            self.from = found.point.z.clone();
+        let rise = point.value - self.least;
+        // from far off nobody finds back
+        if rise <= 4.0 * self.rise {
+            self.from = point.z;
         }
-        let rise = found.point.value - self.least;
         self.points.push((z, rise));
         Ok(Some(rise))
     }

@@ -277,6 +277,14 @@ fn noises(prepared: &Prepared<'_>, logs: &[FittedLog]) -> Result<Vec<Unknown>, E
             &outputs,
         )?,
     };
+    let named = prepared.study().fit.deviations.iter();
+    let named: Vec<Name> = named.map(|(output, _)| output.clone()).collect();
+    meant(
+        prepared.study(),
+        ("noise", "measured output"),
+        &named,
+        &outputs,
+    )?;
     let of = |variable: &Variable| {
         let place = outputs.iter().position(|o| o.name == variable.name);
         let place = place.unwrap_or_default();
