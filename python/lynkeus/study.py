@@ -19,6 +19,7 @@ from ._progress import Progress, Terms, told
 from ._toml import document, valid
 from ._types import ListOf, LogLike, Names, Number, Numbers
 from .errors import InputError, LimitError
+from .likelihood import Likelihood, likelihood
 from .systems import Functions, Observer
 from .model import Model
 from .results import (
@@ -584,6 +585,35 @@ class Study(Batched):
         core = self._core
         fitted = None if text is None else _lynkeus.Study.parse(text, core.file, core.plant, core.model, core)
         return judged(Fit(found, None if fitted is None else Study._of(fitted)))
+
+    @takes(**LIMITS)
+    def likelihood(
+        self, logs: LogLike | ListOf[LogLike], *, time_limit: float | None = None, memory_limit: float = MEMORY
+    ) -> Likelihood:
+        """What :meth:`fit` makes least, as a function for optimisers and samplers of others.
+
+        Parameters
+        ----------
+        logs : path, mapping of columns, data frame, table or run, or a list of them
+            As of :meth:`fit`.
+        time_limit : float, optional
+            What making it may take, in seconds.
+        memory_limit : float
+            What that may take, in MiB.
+
+        Returns
+        -------
+        Likelihood
+            ``nll``, ``gradient``, ``hessian``, ``innovations``, ``log_posterior`` of θ.
+
+        Raises
+        ------
+        InputError
+            As of :meth:`fit`.
+        LimitError
+            A limit ended it.
+        """
+        return likelihood(self._core.likelihood(given_each(logs), Terms(time_limit, memory_limit)), self)
 
     @takes(progress=told_of, **LIMITS)
     def compare(

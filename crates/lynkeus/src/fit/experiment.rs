@@ -156,7 +156,9 @@ impl<'p, 'l> Judge<'p, 'l> {
     ) -> Result<Self, Error> {
         let (unknowns, values) = with_starts(problem, found);
         let own = own(problem, &unknowns);
-        let likelihood = extras::likelihood(source, extras, problem, &own)?;
+        let starts = &problem.logs[0].starts;
+        let mut likelihood = extras::likelihood(source, extras, &own, starts)?;
+        problem.steps.on(&mut likelihood);
         let places = own.iter().map(|(place, _)| *place).collect();
         let told = problem.unknowns.len();
         let free: Vec<usize> = (0..told).filter(|&i| !found.is_bound[i]).collect();
@@ -195,7 +197,7 @@ impl<'p, 'l> Judge<'p, 'l> {
         let own: Vec<f64> = self.places.iter().map(|&p| self.values[p]).collect();
         let score = self
             .likelihood
-            .score(&own, experiment.rows(), self.problem.step)
+            .score(&own, experiment.rows(), self.problem.steps.length)
             .map_err(explain)?;
         if !score.value.is_finite() || score.information.iter().any(|x| !x.is_finite()) {
             return Ok(None);

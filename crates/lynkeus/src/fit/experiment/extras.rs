@@ -103,15 +103,15 @@ fn one_in_a_hundred(range: f64) -> Noise {
     Noise::Absolute(format!("{deviation:.1e}").parse().unwrap_or(deviation))
 }
 
-/// The likelihood of a log with these sensors, too, by the steps of the problem.
+/// The likelihood of a log with these sensors, too.
 ///
 /// # Errors
 /// As [`Source::likelihood`].
 pub(super) fn likelihood(
     source: Source<'_>,
     extras: &[Extra],
-    problem: &Problem<'_>,
     own: &[(usize, &Unknown)],
+    starts: &[f64],
 ) -> Result<Likelihood, Error> {
     let further: Vec<Further> = extras
         .iter()
@@ -126,10 +126,7 @@ pub(super) fn likelihood(
         further: &further,
         ..source
     };
-    let mut likelihood = source.likelihood(own, &problem.logs[0].starts)?;
-    likelihood.implicit(problem.is_implicit);
-    likelihood.shorten(1 << problem.halvings);
-    Ok(likelihood)
+    source.likelihood(own, starts)
 }
 
 /// The plant alone at the values found.
@@ -159,10 +156,12 @@ impl Predictor {
         let outputs = source.symbolic.outputs.iter();
         let declared = &source.prepared.declared().limits;
         let limits = outputs.map(|o| declared.of(&o.variable.name).copied());
+        let mut likelihood = likelihood(source, extras, &own, &problem.logs[0].starts)?;
+        problem.steps.on(&mut likelihood);
         Ok(Self {
-            likelihood: likelihood(source, extras, problem, &own)?,
+            likelihood,
             values: own.iter().map(|(place, _)| values[*place]).collect(),
-            step: problem.step,
+            step: problem.steps.length,
             limits: limits
                 .chain(extras.iter().map(|extra| extra.limits))
                 .collect(),
