@@ -15,6 +15,7 @@ from .functions import abs as abs
 from .functions import acos, asin, atan, atan2, ceil, cos, cosh, exp, floor, interp, log, log10
 from .functions import maximum, minimum, sign, sin, sinh, sqrt, tan, tanh, where
 from .filtered import Filtered
+from .likelihood import Innovations, Likelihood
 from .model import Model
 from .results import (
     Answer,
@@ -50,7 +51,9 @@ __all__ = [
     "Fit",
     "Functions",
     "HowWell",
+    "Innovations",
     "InputError",
+    "Likelihood",
     "LimitError",
     "Log",
     "LogWarning",

@@ -93,7 +93,7 @@ class Functions:
         ArgumentError, InputError
             A vector has no numbers, or not as many as there are names.
         """
-        return self._core.f(t, _vector("x", x), _vector("u", u))
+        return self._core.f(t, vector("x", x), vector("u", u))
 
     def h(self, t: float, x: ArrayLike, u: ArrayLike = ()) -> Column:
         """The outputs.
@@ -117,7 +117,7 @@ class Functions:
         ArgumentError, InputError
             A vector has no numbers, or not as many as there are names.
         """
-        return self._core.h(t, _vector("x", x), _vector("u", u))
+        return self._core.h(t, vector("x", x), vector("u", u))
 
     def jacobian_x(self, t: float, x: ArrayLike, u: ArrayLike = ()) -> NDArray[np.float64]:
         """The slopes of f, from the derivatives of the equations.
@@ -141,7 +141,7 @@ class Functions:
         ArgumentError, InputError
             A vector has no numbers, or not as many as there are names.
         """
-        return self._core.jacobian_x(t, _vector("x", x), _vector("u", u))
+        return self._core.jacobian_x(t, vector("x", x), vector("u", u))
 
     @takes(language=word)
     def source(self, language: Literal["python", "casadi"] = "python") -> str:
@@ -425,7 +425,8 @@ class Driven:
         return self.system.h(t, x, self.u(t))
 
 
-def _vector(name: str, values: ArrayLike) -> Column:
+def vector(name: str, values: ArrayLike) -> Column:
+    """Numbers in one row."""
     try:
         given = np.asarray(values)
         # NumPy would make NaN of None, and numbers of texts

@@ -224,6 +224,8 @@ def test_results_have_types(tmp_path: Path) -> None:
         "study.tune().rows": "list[SweptRow]",
         "study.fit('a.csv').initial": "Named[list[FittedValue]]",
         "study.fit('a.csv').study()": "Study",
+        "study.likelihood('a.csv').nll([1.0])": "float",
+        "study.likelihood('a.csv').innovations([1.0])": "list[Innovations]",
         "lynkeus.sqrt(2.0)": "float",
         "lynkeus.simulate(study)": "Simulation",
         "lynkeus.simulate(study, runs=3)": "MonteCarlo",

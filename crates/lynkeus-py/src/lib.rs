@@ -10,6 +10,7 @@ mod away;
 mod errors;
 mod estimator;
 mod functions;
+mod likelihood;
 mod log;
 mod sections;
 mod study;
@@ -25,6 +26,8 @@ mod _lynkeus {
     use crate::estimator::Estimator;
     #[pymodule_export]
     use crate::functions::{Functions, families};
+    #[pymodule_export]
+    use crate::likelihood::Likelihood;
     #[pymodule_export]
     use crate::log::Log;
     #[pymodule_export]

@@ -19,6 +19,7 @@ use crate::away::{Terms, Watch, away};
 use crate::errors::{exception, from_source};
 use crate::estimator::Estimator;
 use crate::functions::Functions;
+use crate::likelihood::Likelihood;
 use crate::log::Given;
 use crate::sections;
 
@@ -265,19 +266,22 @@ impl Study {
     }
 
     /// The fit, and the study's text with the values found, where nothing speaks against these.
-    #[pyo3(signature = (logs, profiles=false, terms=None))]
+    #[pyo3(signature = (logs, profiles=false, next_experiment=false, terms=None))]
     fn fit(
         &self,
         py: Python<'_>,
         logs: Vec<Given>,
         profiles: bool,
+        next_experiment: bool,
         terms: Option<Terms<'_>>,
     ) -> PyResult<(Answer, Option<String>)> {
-        let options = FitOptions { profiles };
+        let options = FitOptions {
+            profiles,
+            next_experiment,
+        };
         let terms = terms.unwrap_or_default();
         let (fit, text) = self.ask(py, &terms, |study, watch| {
-            let tables = logs.iter().map(|log| log.table(study).map(Cow::into_owned));
-            let tables = tables.collect::<Result<Vec<_>, _>>()?;
+            let tables = tables(&logs, study)?;
             let fit = lynkeus::fit(study, &tables, options, watch)?;
             let text = match lynkeus::Answer::is_positive(&fit) {
                 true => Some(fit.rewritten(&self.text)?.0),
@@ -286,6 +290,22 @@ impl Study {
             Ok((fit, text))
         })?;
         Ok((Answer::of(fit), text))
+    }
+
+    /// What `fit` makes least.
+    #[pyo3(signature = (logs, terms=None))]
+    fn likelihood(
+        &self,
+        py: Python<'_>,
+        logs: Vec<Given>,
+        terms: Option<Terms<'_>>,
+    ) -> PyResult<Likelihood> {
+        let terms = terms.unwrap_or_default();
+        self.ask(py, &terms, |study, _| {
+            let tables = tables(&logs, study)?;
+            let function = lynkeus::likelihood(study, &tables)?;
+            Ok(Likelihood::new(function, tables))
+        })
     }
 
     #[pyo3(signature = (log=None, terms=None))]
@@ -389,6 +409,12 @@ impl Study {
             work(&study, watch)
         })
     }
+}
+
+/// What the study asks for of each log.
+fn tables(logs: &[Given], study: &lynkeus::Study) -> Result<Vec<lynkeus::Table>, Error> {
+    let tables = logs.iter().map(|log| log.table(study).map(Cow::into_owned));
+    tables.collect()
 }
 
 /// A file's name and content.

@@ -1,9 +1,9 @@
 //! `[fit]`: what is found from logs, within what, and by what it is judged.
 
-use super::Name;
-use super::keys::{FIT, PRIOR};
+use super::keys::{CANDIDATE, FIT, PRIOR};
 use super::section::Entry;
-use super::simulate;
+use super::simulate::{self, Expression};
+use super::{Name, Noise, sensors};
 use lynkeus_answer::Error;
 
 /// What `fit` finds.
@@ -34,6 +34,21 @@ pub struct FitSettings {
     pub seed: u64,
     /// The share at the end of each log that is not fitted, but predicted.
     pub held_out: Option<f64>,
+    /// Experiments that could be made, by names of the user's own.
+    pub candidates: Vec<(Name, Candidate)>,
+}
+
+/// An experiment that could be made; what it does not say is as in the first log.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Candidate {
+    /// Further sensors, by the outputs or states that they show.
+    pub sensors: Vec<(Name, Noise)>,
+    /// Known inputs as expressions of time.
+    pub inputs: Vec<(Name, Expression)>,
+    /// The usual time between two rows.
+    pub every: Option<f64>,
+    /// How long it lasts.
+    pub duration: Option<f64>,
 }
 
 impl Default for FitSettings {
@@ -51,6 +66,7 @@ impl Default for FitSettings {
             starts: None,
             seed: 0,
             held_out: None,
+            candidates: vec![],
         }
     }
 }
@@ -111,6 +127,21 @@ pub(super) fn read(entry: Entry<'_>) -> Result<FitSettings, Error> {
             .map(|n| usize::try_from(n).unwrap_or(usize::MAX)),
         seed: section.optional("seed", |e| e.whole(0))?.unwrap_or(0),
         held_out: section.optional("held_out", super::tune::share)?,
+        candidates: simulate::pairs(section.take("candidates"), candidate)?,
+    })
+}
+
+fn candidate(entry: Entry<'_>) -> Result<Candidate, Error> {
+    let mut section = entry.section("a candidate of [fit]", &CANDIDATE)?;
+    Ok(Candidate {
+        sensors: simulate::pairs(section.take("sensors"), |entry| {
+            let refusal = entry.wrong("a noise above 0: without noise one reading would tell all");
+            let noise = sensors::noise(entry)?;
+            (noise.size() > 0.0).then_some(noise).ok_or(refusal)
+        })?,
+        inputs: simulate::pairs(section.take("inputs"), simulate::expression)?,
+        every: section.optional("every", Entry::positive)?,
+        duration: section.optional("duration", Entry::positive)?,
     })
 }
 

@@ -3,12 +3,15 @@
 //! `docs/fit.md` says what is made least, how, and what every figure of the answer is.
 
 mod errors;
+mod experiment;
+pub(crate) mod function;
 mod json;
 mod known;
 mod logs;
 #[cfg(feature = "plot")]
 mod picture;
 mod plant;
+mod posed;
 mod problem;
 mod search;
 mod starts;
@@ -20,31 +23,33 @@ pub(crate) mod unknown;
 use std::ops::ControlFlow;
 
 use lynkeus_expr::Spent;
-use lynkeus_observers::kalman::EKF;
 use lynkeus_run::Step;
-use lynkeus_study::{Name, Objective};
+use lynkeus_study::Objective;
 use lynkeus_words::{counted, short};
 use nalgebra::DVector;
 
 use crate::crew::{Watch, every};
-use crate::prepare::{self, Prepared, systems};
+use crate::prepare::{self, Prepared};
 use crate::{Error, Study, Table};
 use errors::Errors;
+use experiment::Ahead;
 #[cfg(test)]
 pub(crate) use json::FitReport;
 use known::Exact;
-use logs::FittedLog;
+use posed::Posed;
 use problem::{Point, Problem, Term};
 use search::{Found, search};
-use steps::SETTLED;
+use steps::{SETTLED, Steps};
 use uncertainty::Uncertainty;
-use unknown::{Kind, Unknown};
+use unknown::Unknown;
 
 /// What is asked beside the study.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FitOptions {
     /// intervals by profile likelihood
     pub profiles: bool,
+    /// how well the values would be known with one more log
+    pub next_experiment: bool,
 }
 
 /// The answer of `lynkeus fit`.
@@ -72,6 +77,8 @@ pub struct Fit {
     /// what the logs do not tell
     pub undetermined: Vec<String>,
     pub(crate) exact: Exact,
+    /// where that is asked
+    pub(crate) ahead: Option<Ahead>,
     pub(crate) errors: Vec<Errors>,
     /// what speaks against the values
     pub warnings: Vec<String>,
@@ -102,124 +109,55 @@ pub fn fit(
     options: FitOptions,
     watch: &mut Watch<'_>,
 ) -> Result<Fit, Error> {
-    let (study, notes) = with_filter(study)?;
+    let (study, notes) = posed::with_filter(study)?;
     let plant = prepare::plant(&study)?;
     let prepared = Prepared::new(&study, &plant)?;
     let design = prepared.design()?;
-    let Some(tuning) = &design.observer.filter else {
-        return Err(Error::input("fit needs a filter").at(&study.file));
-    };
-    if tables.is_empty() {
-        return Err(Error::input("fit needs a log").at(&study.file));
-    }
-    let logs = tables
-        .iter()
-        .map(|table| FittedLog::new(&prepared, &design, table, tables.len() > 1));
-    let logs = logs.collect::<Result<Vec<_>, _>>()?;
+    let logs = posed::logs(&prepared, &design, tables)?;
     let symbolic = plant::symbolic(&study)?;
-    let unknowns = unknown::unknowns(&prepared, &symbolic, &logs)?;
-    let seen = prepare::seen_by(&study, &symbolic, &prepare::sensors(&study, &symbolic))?;
-    let terms_of = |is_alone: bool| -> Result<Vec<Term>, Error> {
-        let plant = plant::Source {
-            prepared: &prepared,
-            symbolic: &seen,
-            tuning,
-            is_alone,
-        };
-        terms(&plant, &unknowns, &logs)
-    };
+    let posed = Posed::new(&prepared, &design, &symbolic, &logs)?;
     let is_alone = study.fit.objective == Objective::Simulation;
-    let terms = terms_of(is_alone)?;
+    let terms = posed.terms(is_alone)?;
     // without corrections nothing says what an unknown input does
     let is_driven = prepared.augmented().states.len() == prepared.augmented().plant_states();
     let alone = match is_driven {
         true if is_alone => Some(terms.clone()),
-        true => Some(terms_of(true)?),
+        true => Some(posed.terms(true)?),
         false => None,
     };
     // half a likelihood is none
     if let Some(spent) = study.budget.spent() {
         return Err(Error::ended(spent).at(&study.file));
     }
-    let exact = known::exact(&prepared, &symbolic, &unknowns, &tuning.initial_variance)?;
+    let exact = posed.exact()?;
     let problem = Problem {
-        unknowns: &unknowns,
+        unknowns: &posed.unknowns,
         logs: &logs,
         terms,
-        step: Step::Auto,
-        halvings: 0,
-        is_implicit: false,
-        tolerance: 1.0,
+        steps: Steps::default(),
         most_confined: usize::MAX,
         evaluations: 0,
     };
-    let outputs = seen.outputs.iter().map(|o| o.variable.name.clone());
     let mut work = Work {
         study: &study,
+        source: posed.source(is_alone),
         options,
         problem,
         alone,
-        outputs: outputs.collect(),
+        outputs: posed.outputs(),
         exact,
         warnings: vec![],
         notes,
     };
-    work.notes
-        .extend(logs.iter().flat_map(|log| log.notes.clone()));
-    work.warnings
-        .extend(logs.iter().flat_map(|log| log.warnings.clone()));
-    if tuning.gate.is_some() || tuning.projects {
-        work.notes
-            .push("the gate and `bounds` of [observer] are left out of the likelihood".to_owned());
-    }
+    work.notes.extend(posed.notes());
+    work.warnings.extend(posed.warnings());
     work.done(&plant.name, watch)
-}
-
-/// One per log; logs whose states start alike have one likelihood.
-fn terms(
-    plant: &plant::Source<'_>,
-    unknowns: &[Unknown],
-    logs: &[FittedLog],
-) -> Result<Vec<Term>, Error> {
-    let mut terms: Vec<Term> = vec![];
-    for (place, log) in logs.iter().enumerate() {
-        let is_own = |kind: Kind| !matches!(kind, Kind::Start { log, .. } if log != place);
-        let own: Vec<(usize, &Unknown)> = (unknowns.iter().enumerate())
-            .filter(|(_, unknown)| is_own(unknown.kind))
-            .collect();
-        let places = own.iter().map(|(place, _)| *place).collect();
-        let likelihood = match terms.first() {
-            Some(first) if log.starts == logs[0].starts => first.likelihood.clone(),
-            _ => plant.likelihood(&own, &log.starts)?,
-        };
-        terms.push(Term { likelihood, places });
-    }
-    Ok(terms)
-}
-
-/// The study by the filter whose innovations are fitted.
-fn with_filter(study: &Study) -> Result<(Study, Vec<String>), Error> {
-    let mut own = study.clone();
-    let mut notes = vec![];
-    let family = study
-        .observer
-        .family
-        .as_ref()
-        .map(|name| name.text.as_str());
-    if family != Some(EKF.name()) {
-        if let (Some(family), Objective::Innovations) = (family, study.fit.objective) {
-            notes.push(format!(
-                "the likelihood is that of family = \"ekf\": {family} has none whose derivatives are known"
-            ));
-        }
-        own.observer.family = Some(Name::from(EKF.name()));
-    }
-    Ok((own, notes))
 }
 
 /// A fit under way.
 struct Work<'w> {
     study: &'w Study,
+    source: plant::Source<'w>,
     options: FitOptions,
     problem: Problem<'w>,
     /// the plant alone, log by log
@@ -236,11 +174,7 @@ const HALVINGS: usize = 8;
 
 impl Work<'_> {
     fn done(mut self, plant: &str, watch: &mut Watch<'_>) -> Result<Fit, Error> {
-        let starts = self.problem.unknowns.iter().map(|u| u.start);
-        let z = self.problem.searched(starts);
-        let method = systems::method(&self.study.estimate.method);
-        let begin = self.problem.stepped(z, &method, &self.study.budget)?;
-        self.problem.confine(&begin);
+        let begin = self.problem.begin(self.study)?;
         if begin.value.is_finite() {
             let flat = known::undetermined(&mut self.problem, &begin)?;
             if !flat.is_empty() {
@@ -366,10 +300,12 @@ impl Work<'_> {
             };
             best = self.again(fine.z, &[])?;
         }
-        if let (false, false, Step::AtMost(step)) = (is_settled, best.is_ended, self.problem.step) {
+        if let (false, false, Step::AtMost(step)) =
+            (is_settled, best.is_ended, self.problem.steps.length)
+        {
             self.warnings.push(format!(
                 "\u{2212}log L still changes by more than {SETTLED} where steps of {} are halved: the plant is stiff, or it jumps; method = \"rk4\" with a `step` in [estimate] says which steps count",
-                short(step / 2.0_f64.powi(self.problem.halvings as i32))
+                short(step / 2.0_f64.powi(self.problem.steps.halvings as i32))
             ));
         }
         let mut held = vec![false; best.point.z.len()];
@@ -464,7 +400,7 @@ impl Work<'_> {
             let is_least = value <= unknown.low * (1.0 + 1e-9);
             self.warnings
                 .push(match (unknown.reaches_zero(), is_least) {
-                    (true, true) => format!("{}: the log cannot tell it from 0", unknown.words()),
+                    (true, true) => unknown.not_told_from_0(),
                     _ => format!("{} is at its bound, {}", unknown.words(), short(value)),
                 });
         }
@@ -494,16 +430,17 @@ impl Work<'_> {
         let is_ended = found.is_ended;
         let mut uncertainty = uncertainty::uncertainty(&self.problem, &found);
         self.profiles(&found, &mut uncertainty)?;
+        let ahead = self.ahead(&found)?;
         let values = self.problem.values(&found.point.z);
         let alone = self.alone.as_mut();
-        let (is_implicit, halvings) = (self.problem.is_implicit, self.problem.halvings);
+        let steps = self.problem.steps;
         let alone = alone.map(|terms| Problem {
             terms: std::mem::take(terms),
             ..self.problem.clone()
         });
         let mut alone = alone;
         if let Some(alone) = &mut alone {
-            alone.step_as(is_implicit, halvings);
+            alone.step_as(steps);
         }
         let (errors, rows) =
             errors::errors(&mut self.problem, alone.as_mut(), &self.outputs, &values)?;
@@ -534,6 +471,7 @@ impl Work<'_> {
             optima,
             undetermined: vec![],
             exact: self.exact,
+            ahead,
             errors,
             warnings: self.warnings,
             notes: self.notes,
@@ -544,6 +482,16 @@ impl Work<'_> {
             },
             file: self.study.file.clone(),
         })
+    }
+
+    /// The next experiment, where it is asked for.
+    fn ahead(&mut self, found: &Found) -> Result<Option<Ahead>, Error> {
+        if !self.options.next_experiment {
+            return Ok(None);
+        }
+        let (ahead, notes) = experiment::ahead(self.source, self.study, &self.problem, found)?;
+        self.notes.extend(notes);
+        Ok(Some(ahead))
     }
 
     /// Intervals by profile likelihood, where they are asked for, and of what is at a bound; noises that are no more
@@ -557,22 +505,9 @@ impl Work<'_> {
             Some(_) => ControlFlow::Break(()),
             None => ControlFlow::Continue(()),
         };
-        for (i, known) in uncertainty.known.iter_mut().enumerate() {
-            let unknown = &self.problem.unknowns[i];
-            let is_noise = unknown.reaches_zero() && !known.is_bound;
-            let told = format!("{}: the log cannot tell it from 0", unknown.words());
-            let own = *known;
-            let is_nothing =
-                is_noise && uncertainty::is_nothing(&mut self.problem, found, i, &own, &mut pulse)?;
-            if is_nothing {
-                self.warnings.push(told);
-            }
-            if self.options.profiles || known.is_bound {
-                let problem = &mut self.problem;
-                let sides = uncertainty::profile(problem, found, i, &own, is_nothing, &mut pulse)?;
-                known.interval = sides.or(known.interval);
-            }
-        }
+        let (problem, are_all) = (&mut self.problem, self.options.profiles);
+        let told = uncertainty::profiles(problem, found, uncertainty, are_all, &mut pulse)?;
+        self.warnings.extend(told);
         Ok(())
     }
 }

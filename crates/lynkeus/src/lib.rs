@@ -128,6 +128,7 @@ pub use design::{DesignReport, design};
 pub use estimate::live::estimator;
 pub use estimate::{estimate, estimate_resumed, side_by_side};
 pub use export::export;
+pub use fit::function::{LikelihoodFunction, LikelihoodPoint, LogInnovations, likelihood};
 pub use fit::{Fit, FitOptions, fit};
 pub use judge::accuracy::{Accuracy, Coverage, Settling};
 pub use judge::frozen::Frozen;

@@ -91,10 +91,10 @@ fn of_noises(prepared: &Prepared<'_>, symbolic: &Plant) -> Result<Vec<String>, E
 }
 
 /// A share of the largest eigenvalue of a correlation below which it is rounding.
-const ROUNDING: f64 = 1e-12;
+pub(super) const ROUNDING: f64 = 1e-12;
 
 /// A share of a direction below which an unknown is not in it.
-const SHARE: f64 = 1e-3;
+pub(super) const SHARE: f64 = 1e-3;
 
 /// The unknowns that can change together without a change of −log L to second order, by their places.
 pub(super) fn flat(matrix: &DMatrix<f64>, free: &[usize]) -> Vec<usize> {

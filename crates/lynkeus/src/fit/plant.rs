@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use lynkeus_expr::Node;
+use lynkeus_expr::{Expr, Node};
 use lynkeus_model::Plant;
 use lynkeus_observers::FilterTuning;
 use lynkeus_run::Level;
@@ -36,6 +36,16 @@ pub(super) struct Source<'s> {
     pub tuning: &'s FilterTuning,
     /// the plant alone: it starts where it is said to, and nothing disturbs it
     pub is_alone: bool,
+    /// sensors beside the study's
+    pub further: &'s [Further],
+}
+
+/// A sensor that the study does not have.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Further {
+    pub output: Node,
+    pub level: Level,
+    pub limits: Option<Limits>,
 }
 
 impl Source<'_> {
@@ -54,6 +64,7 @@ impl Source<'_> {
             symbolic,
             tuning,
             is_alone,
+            further,
         } = *self;
         let graph = symbolic.graph();
         let number = |value: f64| graph.constant(value).node();
@@ -114,14 +125,15 @@ impl Source<'_> {
             };
             Ok(ParametricSensor {
                 output: output.variable.node,
-                noise: match level.filter(|_| named.is_none()) {
-                    Some(Level::Relative(_)) => ParametricLevel::Share(size.node()),
-                    Some(Level::Uniform(_)) => {
-                        ParametricLevel::Variance((size.powi(2) / 3.0).node())
-                    }
-                    _ => ParametricLevel::Variance(size.powi(2).node()),
-                },
+                noise: noise(level.filter(|_| named.is_none()), size),
                 limits: declared.limits.of(name).copied(),
+            })
+        });
+        let further = further.iter().map(|sensor| {
+            Ok(ParametricSensor {
+                output: sensor.output,
+                noise: noise(Some(sensor.level), graph.constant(sensor.level.size())),
+                limits: sensor.limits,
             })
         });
         let plant = ParametricPlant {
@@ -130,7 +142,7 @@ impl Source<'_> {
             states: symbolic.states.iter().map(|state| state.node).collect(),
             derivatives: symbolic.derivatives.clone(),
             inputs: symbolic.inputs.iter().map(|input| input.node).collect(),
-            sensors: sensors.collect::<Result<_, Error>>()?,
+            sensors: sensors.chain(further).collect::<Result<_, Error>>()?,
             process_noise: symbolic.states.iter().enumerate().map(density).collect(),
             ranges: symbolic
                 .states
@@ -144,6 +156,15 @@ impl Source<'_> {
             parameters: symbols,
         };
         Likelihood::new(&plant).map_err(explain)
+    }
+}
+
+/// A noise of this size, of the kind that it is.
+fn noise(level: Option<Level>, size: Expr<'_>) -> ParametricLevel {
+    match level {
+        Some(Level::Relative(_)) => ParametricLevel::Share(size.node()),
+        Some(Level::Uniform(_)) => ParametricLevel::Variance((size.powi(2) / 3.0).node()),
+        _ => ParametricLevel::Variance(size.powi(2).node()),
     }
 }
 

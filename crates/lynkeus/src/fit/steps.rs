@@ -1,12 +1,14 @@
 //! Steps of Runge and Kutta that are short enough for −log L.
 
 use lynkeus_expr::Budget;
+use lynkeus_run::filter::Likelihood;
 use lynkeus_run::{Method, Step};
 use nalgebra::DVector;
 
 use super::logs::FittedLog;
 use super::problem::{Point, Problem};
-use crate::Error;
+use crate::prepare::systems;
+use crate::{Error, Study};
 
 /// What −log L may change by where steps are halved.
 pub(super) const SETTLED: f64 = 1e-4;
@@ -26,14 +28,57 @@ const CONFINED: usize = 10;
 /// What a study's relative tolerance is where it does not say: a smaller one makes all others here as much smaller.
 const USUAL: f64 = 1e-9;
 
+/// The steps from one row to the next.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Steps {
+    pub length: Step,
+    /// how often that is halved
+    pub halvings: u32,
+    pub is_implicit: bool,
+    /// a factor of all that −log L may be wrong by
+    pub tolerance: f64,
+}
+
+impl Steps {
+    /// From now on a likelihood of the same plant goes by them.
+    pub fn on(self, likelihood: &mut Likelihood) {
+        likelihood.implicit(self.is_implicit);
+        likelihood.shorten(1 << self.halvings);
+    }
+}
+
+impl Default for Steps {
+    fn default() -> Self {
+        Self {
+            length: Step::Auto,
+            halvings: 0,
+            is_implicit: false,
+            tolerance: 1.0,
+        }
+    }
+}
+
 impl Problem<'_> {
+    /// The study's own values, at steps that are short enough; from there on as [`Self::confine`] has it.
+    ///
+    /// # Errors
+    /// As [`Problem::at`].
+    pub fn begin(&mut self, study: &Study) -> Result<Point, Error> {
+        let starts = self.unknowns.iter().map(|u| u.start);
+        let z = self.searched(starts);
+        let method = systems::method(&study.estimate.method);
+        let begin = self.stepped(z, &method, &study.budget)?;
+        self.confine(&begin);
+        Ok(begin)
+    }
+
     /// A point at such steps of the study's method that shorter ones hardly change −log L. Steps that are too long for
     /// a stiff plant throw its estimates out of every range: such a point counts only where shorter ones do not help.
     /// A plant alone then has implicit ones.
     ///
     /// # Errors
     /// As [`Problem::at`].
-    pub fn stepped(
+    fn stepped(
         &mut self,
         z: DVector<f64>,
         method: &Method,
@@ -41,11 +86,11 @@ impl Problem<'_> {
     ) -> Result<Point, Error> {
         match method {
             Method::Rk4(step) => {
-                self.step = *step;
+                self.steps.length = *step;
                 return self.at(z);
             }
             Method::Adaptive(t) | Method::Explicit(t) | Method::Stiff(t) => {
-                self.tolerance = (t.relative / USUAL).min(1.0);
+                self.steps.tolerance = (t.relative / USUAL).min(1.0);
             }
         }
         let mut found: Option<Point> = None;
@@ -56,7 +101,7 @@ impl Problem<'_> {
             }
             found = Some(point).filter(|point| self.is_sound(point));
         }
-        let explicit = self.halvings;
+        let explicit = self.steps.halvings;
         if self.implicit(true) {
             let (point, is_settled) = self.halving(&z, budget, HALVINGS)?;
             let is_better = found.is_none() && self.is_sound(&point);
@@ -80,7 +125,7 @@ impl Problem<'_> {
         for term in &mut self.terms {
             all &= term.likelihood.implicit(is_implicit);
         }
-        self.is_implicit = is_implicit && all;
+        self.steps.is_implicit = is_implicit && all;
         all
     }
 
@@ -92,9 +137,9 @@ impl Problem<'_> {
         budget: &Budget,
         most: u32,
     ) -> Result<(Point, bool), Error> {
-        let finer = (-self.tolerance.log2() / 4.0).ceil() as u32;
+        let finer = (-self.steps.tolerance.log2() / 4.0).ceil() as u32;
         let intervals = self.logs.iter().map(FittedLog::interval);
-        self.step = Step::AtMost(intervals.fold(f64::INFINITY, f64::min));
+        self.steps.length = Step::AtMost(intervals.fold(f64::INFINITY, f64::min));
         self.shorten(0);
         let first = self.at(z.clone())?;
         let mut point = first.clone();
@@ -106,7 +151,7 @@ impl Problem<'_> {
             if is_enough || budget.spent().is_some() {
                 break;
             }
-            let tolerance = self.tolerance * SETTLED.max(NEARLY * point.value.abs());
+            let tolerance = self.steps.tolerance * SETTLED.max(NEARLY * point.value.abs());
             self.shorten(halving);
             let fine = self.at(point.z.clone())?;
             if self.is_sound(&point) && (fine.value - point.value).abs() < tolerance {
@@ -124,16 +169,17 @@ impl Problem<'_> {
 
     /// Steps that are halved so often, in every interval between two rows.
     fn shorten(&mut self, halvings: u32) {
-        self.halvings = halvings;
+        self.steps.halvings = halvings;
         for term in &mut self.terms {
             term.likelihood.shorten(1 << halvings);
         }
     }
 
-    /// Steps as another problem has them.
-    pub fn step_as(&mut self, is_implicit: bool, halvings: u32) {
-        self.implicit(is_implicit);
-        self.shorten(halvings);
+    /// By such steps.
+    pub fn step_as(&mut self, steps: Steps) {
+        self.steps = steps;
+        self.implicit(steps.is_implicit);
+        self.shorten(steps.halvings);
     }
 
     /// The same point at half the steps, which are kept where that changes it.
@@ -141,13 +187,13 @@ impl Problem<'_> {
     /// # Errors
     /// As [`Problem::at`].
     pub fn halved(&mut self, coarse: &Point) -> Result<Option<Point>, Error> {
-        if !matches!(self.step, Step::AtMost(_)) {
+        if !matches!(self.steps.length, Step::AtMost(_)) {
             return Ok(None);
         }
-        let halvings = self.halvings;
+        let halvings = self.steps.halvings;
         self.shorten(halvings + 1);
         let fine = self.at(coarse.z.clone())?;
-        if (fine.value - coarse.value).abs() < self.tolerance * SETTLED {
+        if (fine.value - coarse.value).abs() < self.steps.tolerance * SETTLED {
             self.shorten(halvings);
             return Ok(None);
         }

@@ -106,6 +106,11 @@ impl Unknown {
     pub fn reaches_zero(&self) -> bool {
         self.kind.is_noise() && self.low <= NEARLY * self.start
     }
+
+    /// That it does not stand out.
+    pub fn not_told_from_0(&self) -> String {
+        format!("{}: the log cannot tell it from 0", self.words())
+    }
 }
 
 /// All that a study asks for.
