@@ -85,16 +85,16 @@ class Tables:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path = os.fspath(path)
+        self.path: str = os.fspath(path)
         library = needed("petab.v1", "lynkeus.petab")
         try:
             self.problem: Any = library.Problem.from_yaml(self.path)
         except (OSError, ValueError, KeyError, TypeError, NotImplementedError) as error:
             raise InputError(f"{self.path}: {error}") from error
-        self.parameters = {one.id: one for one in map(self._parameter, *self._rows("parameter"))}
-        self.observables = {one.id: one for one in map(self._observable, *self._rows("observable"))}
-        self.conditions = self._conditions()
-        self.measurements = [self._measurement(i, row) for i, row in enumerate(self._records("measurement"))]
+        self.parameters: dict[str, Parameter] = {one.id: one for one in map(self._parameter, *self._rows("parameter"))}
+        self.observables: dict[str, Observable] = {one.id: one for one in map(self._observable, *self._rows("observable"))}
+        self.conditions: dict[str, dict[str, Expr]] = self._conditions()
+        self.measurements: list[Measurement] = [self._measurement(i, row) for i, row in enumerate(self._records("measurement"))]
         if not self.measurements:
             raise self.refused("measurement", "there is no measurement")
 

@@ -521,9 +521,11 @@ class FitSection(TypedDict, total=False):
     """those that are searched as logarithms: their ranges must be positive. Noises and densities always are
     (list of parameters; default: none)"""
 
-    noise: bool | Names | None
+    noise: bool | Names | Mapping[str, bool | str] | None
     """measured outputs whose noise is found; the search starts at `noise` of `[sensors]`, or at the scatter
-    of the readings (true, or list of names; default: none)"""
+    of the readings. In a table, a name says whose value the standard deviation is: `{ y = "s", z = "s" }`
+    for a parameter that two sensors share; or a variable that computes it, of states and inputs, too
+    (true, list of names, or table: output = true, parameter or variable; default: none)"""
 
     process_noise: bool | Names | None
     """states and unknown inputs whose spectral density is found; `true`: those with a density above 0 in
