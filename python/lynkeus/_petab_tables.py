@@ -6,6 +6,7 @@ import math
 import os
 from collections import Counter
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from ._optional import needed
@@ -88,6 +89,10 @@ class Tables:
         self.path: str = os.fspath(path)
         library = needed("petab.v1", "lynkeus.petab")
         try:
+            said = needed("yaml", "lynkeus.petab").safe_load(Path(self.path).read_text("utf-8"))
+            version = str(said["format_version"])
+            if not version.startswith("1"):
+                raise ValueError(f"expected a problem of version 1, found version {version}")
             self.problem: Any = library.Problem.from_yaml(self.path)
         except (OSError, ValueError, KeyError, TypeError, NotImplementedError) as error:
             raise InputError(f"{self.path}: {error}") from error
