@@ -73,29 +73,30 @@ class Plant:
     """
 
     def __init__(self, tables: Tables, sbml: Sbml) -> None:
-        self.tables, self.sbml = tables, sbml
+        self.tables: Tables = tables
+        self.sbml: Sbml = sbml
         self.notes: list[str] = []
         #: the conditions of each log: that of the steady state before it, or none, and its own
-        self.logs = list(dict.fromkeys(one.log for one in tables.measurements))
-        self.places = {log: place for place, log in enumerate(self.logs)}
+        self.logs: list[tuple[str, str]] = list(dict.fromkeys(one.log for one in tables.measurements))
+        self.places: dict[tuple[str, str], int] = {log: place for place, log in enumerate(self.logs)}
         ends = [0.0] * len(self.logs)
         for one in tables.measurements:
             place = self.places[one.log]
             if math.isfinite(one.time):
                 ends[place] = max(ends[place], one.time)
-        self.ends = ends
+        self.ends: list[float] = ends
         #: a time after which a steady state is reached
-        self.long = LONG * (max(ends) or 1.0)
+        self.long: float = LONG * (max(ends) or 1.0)
         for one in tables.measurements:
             if one.time == math.inf and ends[self.places[one.log]] > 0:
                 what = f"row {one.row + 1}: a steady state (time = inf) in a condition with other times"
                 raise tables.refused("measurement", what)
         #: the log and the condition of each phase: before a log, and of it
-        self.phases = [
+        self.phases: list[tuple[int, str]] = [
             (place, condition) for place, log in enumerate(self.logs) for condition in log if condition
         ]
-        self.first = [next(k for k, one in enumerate(self.phases) if one[0] == place) for place in range(len(ends))]
-        self.used = {*sbml.quantities, *tables.parameters, *tables.observables, sbml.name}
+        self.first: list[int] = [next(k for k, one in enumerate(self.phases) if one[0] == place) for place in range(len(ends))]
+        self.used: set[str] = {*sbml.quantities, *tables.parameters, *tables.observables, sbml.name}
         #: instants beside those of the measurements at which something jumps
         self.breaks: list[set[float]] = [set() for _ in self.logs]
         self.columns: dict[str, Column] = {}
@@ -110,8 +111,9 @@ class Plant:
         #: declarations and equations
         self.states: list[tuple[str, Expr | None, Expr]] = []
         self.variables: list[tuple[str, Expr]] = []
+        self.deviations: list[tuple[str, Expr]] = []
         self._take_parameters()
-        self.overridden = self._overridden()
+        self.overridden: dict[str, list[Expr | None]] = self._overridden()
         self._take_quantities()
         self.channels: list[Channel] = []
         self._take_observables()
@@ -394,7 +396,7 @@ class Plant:
     # what jumps at known times
 
     def _find_jumps(self) -> None:
-        self.inlined = {name: e for name, e in self.variables}
+        self.inlined: dict[str, Expr] = {name: e for name, e in self.variables}
         self.jumps: dict[Expr, Expr | None] = {}
         self.states = [(name, start, self._stepped(e)) for name, start, e in self.states]
         self.variables = [(name, self._stepped(e)) for name, e in self.variables]
@@ -548,7 +550,7 @@ class Plant:
         """The standard deviations that are numbers, and those that parameters or variables of the plant are."""
         numbers: dict[str, float] = {}
         named: dict[str, str] = {}
-        self.deviations: list[tuple[str, Expr]] = []
+        self.deviations.clear()
         made: dict[Expr, str] = {}
         nominal = self.numbers | {one.name: one.start for one in self.fitted.values()}
         for channel in self.channels:

@@ -59,15 +59,15 @@ class Sbml:
     """
 
     def __init__(self, path: str | os.PathLike[str], document: Any | None = None) -> None:
-        self.file = os.fspath(path)
+        self.file: str = os.fspath(path)
         sbml = needed("libsbml", "lynkeus.petab")
-        self.sbml = sbml
-        self.document = sbml.readSBMLFromFile(self.file) if document is None else document
+        self.sbml: Any = sbml
+        self.document: Any = sbml.readSBMLFromFile(self.file) if document is None else document
         self._refuse_errors()
-        self.model = self.document.getModel()
+        self.model: Any = self.document.getModel()
         if self.model is None:
             raise self.refused("there is no model in it")
-        self.name = self.model.getId() or "Problem"
+        self.name: str = self.model.getId() or "Problem"
         self._refuse_foreign()
         self.functions: dict[str, tuple[list[str], Expr]] = {}
         for one in self.model.getListOfFunctionDefinitions():

@@ -6,6 +6,7 @@ import math
 import os
 from collections import Counter
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from ._optional import needed
@@ -85,16 +86,20 @@ class Tables:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path = os.fspath(path)
+        self.path: str = os.fspath(path)
         library = needed("petab.v1", "lynkeus.petab")
         try:
+            said = needed("yaml", "lynkeus.petab").safe_load(Path(self.path).read_text("utf-8"))
+            version = str(said["format_version"])
+            if not version.startswith("1"):
+                raise ValueError(f"expected a problem of version 1, found version {version}")
             self.problem: Any = library.Problem.from_yaml(self.path)
         except (OSError, ValueError, KeyError, TypeError, NotImplementedError) as error:
             raise InputError(f"{self.path}: {error}") from error
-        self.parameters = {one.id: one for one in map(self._parameter, *self._rows("parameter"))}
-        self.observables = {one.id: one for one in map(self._observable, *self._rows("observable"))}
-        self.conditions = self._conditions()
-        self.measurements = [self._measurement(i, row) for i, row in enumerate(self._records("measurement"))]
+        self.parameters: dict[str, Parameter] = {one.id: one for one in map(self._parameter, *self._rows("parameter"))}
+        self.observables: dict[str, Observable] = {one.id: one for one in map(self._observable, *self._rows("observable"))}
+        self.conditions: dict[str, dict[str, Expr]] = self._conditions()
+        self.measurements: list[Measurement] = [self._measurement(i, row) for i, row in enumerate(self._records("measurement"))]
         if not self.measurements:
             raise self.refused("measurement", "there is no measurement")
 

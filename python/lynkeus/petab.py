@@ -83,7 +83,7 @@ class Problem:
             fit["priors"] = priors
         # a steady state is as far away as steps of Runge and Kutta do not reach
         estimate: EstimateSection | None = {"method": "stiff"} if plant.settles else None
-        self.study = Study(
+        self.study: Study = Study(
             model, noise=noise or None, observer={"family": "ekf"}, fit=fit, estimate=estimate
         )
         self.logs: list[dict[str, np.ndarray[Any, Any]]] = [plant.table(i) for i in range(len(plant.logs))]
@@ -306,7 +306,7 @@ def load(path: str | os.PathLike[str]) -> Problem:
     Raises
     ------
     InputError
-        It cannot be read, or has what is not read: events, preequilibration, steady states, noise that is not normal.
+        It cannot be read, or has what is not read: events, delays, noise that is not normal.
     ImportError
         The packages petab and python-libsbml are not there.
     """

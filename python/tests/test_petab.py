@@ -263,6 +263,7 @@ xmlns="http://www.w3.org/1998/Math/MathML"><cn>1</cn></math></eventAssignment></
     [
         ({"model": ("</model>", EVENT)}, 'the event "kick": expected a model without events'),
         ({"model": ('fast="false"', 'fast="true"')}, 'the fast reaction "turn"'),
+        ({"problem": ("format_version: 1", "format_version: 2.0.0")}, "expected a problem of version 1, found version 2"),
         ({"observables": ("log10", "log2")}, 'b: expected the transformation lin, log or log10, found "log2"'),
         ({"observables": ("B\ts", "B + unheard\ts")}, 'observable b: nothing is called "unheard"'),
         ({"observables": ("B\ts", "B +* 2\ts")}, "observable b: expected a formula"),
