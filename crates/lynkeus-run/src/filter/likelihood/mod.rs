@@ -114,7 +114,9 @@ impl Likelihood {
     /// [`Error::MissingInput`] for an expression that reads another symbol, [`Error::Setting`] for wrong numbers of
     /// expressions.
     pub fn new(plant: &ParametricPlant<'_>) -> Result<Self> {
-        let sample = Sample::new(plant)?;
+        plant.check()?;
+        let plant = plant.by_distance();
+        let sample = Sample::new(&plant);
         let is_wide = lynkeus_native::widest() == 8 && plant.parameters.len() > 4;
         Ok(Self(match is_wide {
             true => Wide::Eight(Box::new(Passes::new(&sample, Function::<8>::compile)?)),

@@ -8,9 +8,9 @@ use lynkeus_native::Function;
 
 use super::code::Code;
 use super::plant::{ParametricLevel, ParametricPlant};
+use crate::Result;
 use crate::classical::{Term, sum};
 use crate::filter::expressions::{Corrected, Flow, corrected};
-use crate::{Error, Result};
 
 type Compile<const L: usize> = fn(&Tape) -> Option<Function<L>>;
 
@@ -33,18 +33,8 @@ pub(super) struct Sample<'p, 'g> {
 }
 
 impl<'p, 'g> Sample<'p, 'g> {
-    pub fn new(plant: &'p ParametricPlant<'g>) -> Result<Self> {
+    pub fn new(plant: &'p ParametricPlant<'g>) -> Self {
         let (g, n) = (plant.graph, plant.states.len());
-        let counts = [
-            plant.derivatives.len(),
-            plant.process_noise.len(),
-            plant.start.len(),
-        ];
-        if n == 0 || counts.iter().any(|count| *count != n) {
-            let expected =
-                "one derivative, density and start for each state, of which there are some";
-            return Err(Error::setting("states", expected, n));
-        }
         let outputs: Vec<Node> = plant.sensors.iter().map(|sensor| sensor.output).collect();
         let mut sample = Self {
             plant,
@@ -56,7 +46,7 @@ impl<'p, 'g> Sample<'p, 'g> {
             root: vec![],
         };
         sample.find_pattern();
-        Ok(sample)
+        sample
     }
 
     /// Every entry of S that a start, a step or a reading makes, or one of them after the others.
