@@ -235,7 +235,11 @@ class Study:
     ) -> list[Answer | BaseException]: ...
     def tune(self, log: Log | str | None, terms: _Terms | None = None) -> Answer: ...
     def fit(
-        self, logs: list[Log | str], profiles: bool = False, terms: _Terms | None = None
+        self,
+        logs: list[Log | str],
+        profiles: bool = False,
+        next_experiment: bool = False,
+        terms: _Terms | None = None,
     ) -> tuple[Answer, str | None]:
         """The fit, and the text of the study with the values found, where nothing speaks against these."""
 

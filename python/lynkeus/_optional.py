@@ -6,7 +6,7 @@ import importlib
 from typing import Any
 
 #: what is installed where a package's name is not enough
-_EXTRA = {"ray": "'ray[data]'"}
+_EXTRA = {"ray": "'ray[data]'", "libsbml": "'lynkeus[petab]'", "petab": "'lynkeus[petab]'"}
 
 
 def needed(module: str, what: str) -> Any:

@@ -58,6 +58,7 @@ __all__ = [
     "MonteCarloReport",
     "Named",
     "Next",
+    "NextExperiment",
     "OneToOne",
     "Outside",
     "OutsideBox",
@@ -1038,6 +1039,37 @@ class FittedErrors(Record):
     """the statistic of Ljung and Box over its number of lags: about 1 where the innovations are white"""
 
 
+class NextExperiment(Record):
+    """How well the values would be known with one more log."""
+
+    name: str
+    """what is done: a name of the study's, or words"""
+    rows: int
+    """rows of the log"""
+    readings: int
+    """readings in it"""
+    duration: float
+    """from its first row to its last"""
+    sensors: list[str]
+    """sensors beside the study's, with their noise"""
+    worst: str | None
+    """the value that would then be known worst, as a share of it"""
+    relative_sd: float | None
+    """its relative standard error"""
+    factor: float | None
+    """the same over that of the value that is known worst now; ``None`` where the logs do not tell all values"""
+    volume: float | None
+    """the D criterion: volume of the ellipsoid of errors over what it is now"""
+    trace: float | None
+    """the A criterion: sum of the squared relative standard errors over what it is now"""
+    sd: Named[float | None]
+    """the standard error of each value, by what ``correlation`` calls it"""
+    determines: list[str]
+    """what the logs do not tell, and would with this one"""
+    undetermined: list[str]
+    """what they would not tell even so"""
+
+
 class FitEntries:
     """What :meth:`lynkeus.Study.fit` answers."""
 
@@ -1077,6 +1109,8 @@ class FitEntries:
     """combinations of the parameters that the outputs tell nevertheless"""
     errors: Named[FittedErrors]
     """errors of predictions, by output"""
+    next_experiment: list[NextExperiment] | None
+    """how well the values would be known with one more log, the best first; where that is asked"""
     warnings: list[str]
     """what speaks against the values"""
 

@@ -483,6 +483,33 @@ class FitPriors(TypedDict):
     """the standard deviation (number > 0; default: required)"""
 
 
+class FitCandidatesSensors(TypedDict):
+    """A value of ``candidates.sensors`` in ``[fit]``."""
+
+    uniform: Number
+    """every error up to ± this, in the output's unit, is equally likely and none is larger (number ≥ 0;
+    default: required)"""
+
+
+class FitCandidates(TypedDict, total=False):
+    """A value of ``candidates`` in ``[fit]``."""
+
+    sensors: Mapping[str, Number | str | FitCandidatesSensors]
+    """sensors that there are in this experiment beside `measured`, with their noise (table: output or state =
+    noise, as in `noise` of `[sensors]`; default: none)"""
+
+    inputs: Mapping[str, Number | str]
+    """known inputs; they are held from one row to the next (table: name = number, or Modelica expression of
+    `time` as text; default: those of the first log, over again)"""
+
+    every: Number
+    """the usual time between two rows; sensors that report at some rows only do so at as many of them (number
+    > 0; default: that of the first log)"""
+
+    duration: Number
+    """how long it lasts (number > 0; default: that of the first log)"""
+
+
 class FitSection(TypedDict, total=False):
     """which parameters and noises are found from logs (fit) (table; default: none)"""
 
@@ -522,7 +549,8 @@ class FitSection(TypedDict, total=False):
 
     starts: Whole | None
     """searches: from the study's own values, then from seeded points spread over the bounds (whole number ≥
-    1; default: 1)"""
+    1; default: 1, and 4 further ones where the first ends at a bound, without convergence or with errors
+    that are not white)"""
 
     seed: Whole | None
     """seed of those points (whole number ≥ 0; default: 0)"""
@@ -530,6 +558,10 @@ class FitSection(TypedDict, total=False):
     held_out: Number | None
     """share at the end of each log that is not fitted, but predicted and told beside (number between 0 and 1;
     default: none)"""
+
+    candidates: Mapping[str, FitCandidates] | None
+    """experiments of which `--next-experiment` tells how much better the values would be known, under names
+    of your own (table: name = table; default: see the next experiment)"""
 
 
 class CompareSection(TypedDict, total=False):

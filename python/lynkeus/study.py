@@ -535,12 +535,13 @@ class Study(Batched):
         with told(progress, "tuning") as tell:
             return Sweep(self._core.tune(None if log is None else given(log), Terms(time_limit, memory_limit, tell)))
 
-    @takes(profiles=flag, progress=told_of, **LIMITS)
+    @takes(profiles=flag, next_experiment=flag, progress=told_of, **LIMITS)
     def fit(
         self,
         logs: LogLike | ListOf[LogLike],
         *,
         profiles: bool = False,
+        next_experiment: bool = False,
         progress: Progress = False,
         time_limit: float | None = None,
         memory_limit: float = MEMORY,
@@ -553,6 +554,8 @@ class Study(Batched):
             What the values are fitted to, each as of :meth:`estimate`. A start is found for each of them.
         profiles : bool
             Finds the intervals by profile likelihood: the other values are searched anew along each.
+        next_experiment : bool
+            Tells how well the values would be known with one more log, by candidates of ``[fit]`` or usual ones.
         progress : bool or function
             Shows how far it is, or calls the function with the share that is done, from 0 to 1.
         time_limit : float, optional
@@ -576,7 +579,9 @@ class Study(Batched):
             A limit ended it before there was an answer.
         """
         with told(progress, "fitting") as tell:
-            found, text = self._core.fit(given_each(logs), profiles, Terms(time_limit, memory_limit, tell))
+            found, text = self._core.fit(
+                given_each(logs), profiles, next_experiment, Terms(time_limit, memory_limit, tell)
+            )
         core = self._core
         fitted = None if text is None else _lynkeus.Study.parse(text, core.file, core.plant, core.model, core)
         return judged(Fit(found, None if fitted is None else Study._of(fitted)))

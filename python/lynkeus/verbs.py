@@ -311,6 +311,7 @@ def fit(
     logs: LogLike | ListOf[LogLike],
     *,
     profiles: bool = False,
+    next_experiment: bool = False,
     progress: Progress = False,
     time_limit: float | None = None,
     memory_limit: float = MEMORY,
@@ -325,6 +326,8 @@ def fit(
         What the values are fitted to. A start is found for each of them.
     profiles : bool
         Finds the intervals by profile likelihood: the other values are searched anew along each.
+    next_experiment : bool
+        Tells how well the values would be known with one more log, by candidates of ``[fit]`` or usual ones.
     progress : bool or function
         Shows how far it is, or calls the function with the share that is done, from 0 to 1.
     time_limit : float, optional
@@ -349,7 +352,12 @@ def fit(
     """
     asked = _study(study)
     return asked.fit(
-        logs, profiles=profiles, progress=progress, time_limit=time_limit, memory_limit=memory_limit
+        logs,
+        profiles=profiles,
+        next_experiment=next_experiment,
+        progress=progress,
+        time_limit=time_limit,
+        memory_limit=memory_limit,
     )
 
 

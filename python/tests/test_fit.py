@@ -154,6 +154,30 @@ def test_a_value_at_its_bound_is_warned_of() -> None:
     assert found.parameters["k"].at_bound and found.parameters["k"].value == pytest.approx(0.6)
 
 
+def test_the_next_experiment_is_told() -> None:
+    fit = {"parameters": ["k"], "noise": True, "candidates": {"long": {"duration": 89.25}}}
+    found = leaking(fit=fit).fit(recorded(), next_experiment=True)
+    assert found.next_experiment is not None
+    long, again = found.next_experiment
+    assert (long.name, again.name) == ("long", "the same again")
+    assert long.readings == 358 and again.readings == 120
+    assert long.worst == "k" and long.factor is not None and again.factor is not None
+    # half the variance where the log tells as much again
+    assert long.factor < again.factor and abs(again.factor - 0.5**0.5) < 0.02
+    assert long.sd["k"] is not None and long.sd["noise.y"] is not None
+    # of twins a gauge of the level tells the product only
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", lynkeus.NotCredible)
+        twins = lynkeus.Study(
+            TWINS,
+            noise={"y": 0.02},
+            observer={"family": "ekf", "initial_variance": {"level": 0.01}},
+            fit={"parameters": ["a", "b"]},
+        ).fit({"t": [0.0, 1.0, 2.0, 3.0], "y": [4.0, 2.4, 1.5, 0.9]}, next_experiment=True)
+    assert twins.next_experiment is not None
+    assert all(one.undetermined == ["a", "b"] for one in twins.next_experiment)
+
+
 def test_what_is_wrong_is_refused() -> None:
     with pytest.raises(lynkeus.InputError, match="no parameter is called \"kk\""):
         leaking(fit={"parameters": ["kk"]}).fit(recorded())

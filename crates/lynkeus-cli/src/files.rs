@@ -17,6 +17,9 @@ pub(super) struct Files {
     printed: Option<&'static str>,
 }
 
+/// The role of a study that is changed in its place.
+pub(super) const CHANGED: &str = "--write";
+
 /// A file with its place in the command.
 #[derive(Debug)]
 struct Named {
@@ -95,7 +98,7 @@ impl Files {
             .iter()
             .try_for_each(Named::is_called_as_it_is)?;
         let mut to_files = self.results.iter().filter(|r| !is_standard(&r.path));
-        to_files.try_for_each(|r| save::probe(&r.path))
+        to_files.try_for_each(|r| save::probe(&r.path, r.role == CHANGED))
     }
 
     fn standard(&self) -> Result<(), Error> {

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+use super::files;
 use super::inputs::{self, Source};
 use super::limits::{self, Limits};
 use super::output;
@@ -25,6 +26,9 @@ pub(super) struct Options {
     /// Intervals by profile likelihood: the other values are searched anew along each
     #[arg(long)]
     profiles: bool,
+    /// How well the values would be known with one more log: by another sensor, sampling or input
+    #[arg(long)]
+    next_experiment: bool,
     /// Write the innovations of every row as CSV ("-": standard output)
     #[arg(short, long, value_name = "FILE.csv")]
     output: Option<PathBuf>,
@@ -46,7 +50,7 @@ pub(super) fn fit(path: &Path, options: &Options, limits: &Limits) -> Result<Exi
     }
     let source = Source::load(path, limits.budget())?;
     let files = match options.write {
-        true => source.plant().writes("--write", Some(path)),
+        true => source.plant().writes(files::CHANGED, Some(path)),
         false => source.files(),
     };
     let logs = options.logs.iter();
@@ -60,6 +64,7 @@ pub(super) fn fit(path: &Path, options: &Options, limits: &Limits) -> Result<Exi
     let tables = tables.collect::<Result<Vec<_>, _>>()?;
     let asked = FitOptions {
         profiles: options.profiles,
+        next_experiment: options.next_experiment,
     };
     let mut progress = Progress::new("fitting", options.quiet);
     let fit = lynkeus::fit(&source.study, &tables, asked, &mut progress.watch())?;

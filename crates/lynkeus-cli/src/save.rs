@@ -184,8 +184,9 @@ impl Results {
     }
 }
 
-/// Refuses a path that cannot be written, before the work is done.
-pub(super) fn probe(path: &Path) -> Result<(), Error> {
+/// Refuses a path that cannot be written, before the work is done. A file that is marked as read-only counts as one
+/// even where the user's rights would do, unless it is the very one that the command is asked to change.
+pub(super) fn probe(path: &Path, is_changed: bool) -> Result<(), Error> {
     let place = destination(path);
     let shown = path.display();
     if place.file_name().is_none() || shown.to_string().ends_with(std::path::MAIN_SEPARATOR) {
@@ -199,7 +200,7 @@ pub(super) fn probe(path: &Path) -> Result<(), Error> {
             return Err(Error::input(why).hint("name a file in it"));
         }
         Ok(data) if !data.is_file() => return Ok(()),
-        Ok(data) if data.permissions().readonly() => {
+        Ok(data) if data.permissions().readonly() && !is_changed => {
             let why = format!("cannot write {shown}: the file is read-only");
             return Err(Error::input(why).hint("allow writing to it, or give another name"));
         }

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+use super::files;
 use super::inputs::{self, Source};
 use super::limits::{self, Limits};
 use super::output;
@@ -43,7 +44,7 @@ pub(super) fn tune(path: &Path, options: &Options, limits: &Limits) -> Result<Ex
     }
     let source = Source::load(path, limits.budget())?;
     let files = match options.write {
-        true => source.plant().writes("--write", Some(path)),
+        true => source.plant().writes(files::CHANGED, Some(path)),
         false => source.files(),
     };
     files

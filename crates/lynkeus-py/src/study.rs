@@ -266,15 +266,19 @@ impl Study {
     }
 
     /// The fit, and the study's text with the values found, where nothing speaks against these.
-    #[pyo3(signature = (logs, profiles=false, terms=None))]
+    #[pyo3(signature = (logs, profiles=false, next_experiment=false, terms=None))]
     fn fit(
         &self,
         py: Python<'_>,
         logs: Vec<Given>,
         profiles: bool,
+        next_experiment: bool,
         terms: Option<Terms<'_>>,
     ) -> PyResult<(Answer, Option<String>)> {
-        let options = FitOptions { profiles };
+        let options = FitOptions {
+            profiles,
+            next_experiment,
+        };
         let terms = terms.unwrap_or_default();
         let (fit, text) = self.ask(py, &terms, |study, watch| {
             let tables = tables(&logs, study)?;

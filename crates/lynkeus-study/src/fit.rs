@@ -1,9 +1,9 @@
 //! `[fit]`: what is found from logs, within what, and by what it is judged.
 
-use super::Name;
-use super::keys::{FIT, PRIOR};
+use super::keys::{CANDIDATE, FIT, PRIOR};
 use super::section::Entry;
-use super::simulate;
+use super::simulate::{self, Expression};
+use super::{Name, Noise, sensors};
 use lynkeus_answer::Error;
 
 /// What `fit` finds.
@@ -15,6 +15,8 @@ pub struct FitSettings {
     pub log: Vec<Name>,
     /// Outputs whose noise is found.
     pub noise: Chosen,
+    /// Outputs the standard deviation of whose noise is a parameter or a variable of the model: (output, which).
+    pub deviations: Vec<(Name, Name)>,
     /// States and unknown inputs whose spectral density is found.
     pub process_noise: Chosen,
     /// States whose start is found, one for each log; nothing is then uncertain about it.
@@ -32,6 +34,21 @@ pub struct FitSettings {
     pub seed: u64,
     /// The share at the end of each log that is not fitted, but predicted.
     pub held_out: Option<f64>,
+    /// Experiments that could be made, by names of the user's own.
+    pub candidates: Vec<(Name, Candidate)>,
+}
+
+/// An experiment that could be made; what it does not say is as in the first log.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Candidate {
+    /// Further sensors, by the outputs or states that they show.
+    pub sensors: Vec<(Name, Noise)>,
+    /// Known inputs as expressions of time.
+    pub inputs: Vec<(Name, Expression)>,
+    /// The usual time between two rows.
+    pub every: Option<f64>,
+    /// How long it lasts.
+    pub duration: Option<f64>,
 }
 
 impl Default for FitSettings {
@@ -40,6 +57,7 @@ impl Default for FitSettings {
             parameters: vec![],
             log: vec![],
             noise: Chosen::Named(vec![]),
+            deviations: vec![],
             process_noise: Chosen::Named(vec![]),
             initial: vec![],
             bounds: vec![],
@@ -48,6 +66,7 @@ impl Default for FitSettings {
             starts: None,
             seed: 0,
             held_out: None,
+            candidates: vec![],
         }
     }
 }
@@ -90,11 +109,13 @@ pub(super) fn read(entry: Entry<'_>) -> Result<FitSettings, Error> {
         Ok::<_, Error>(names.unwrap_or_default())
     };
     let (parameters, log, initial) = (names("parameters")?, names("log")?, names("initial")?);
+    let (noise, deviations) = noise(section.take("noise"))?;
     Ok(FitSettings {
         parameters,
         log,
         initial,
-        noise: chosen(section.take("noise"))?,
+        noise,
+        deviations,
         process_noise: chosen(section.take("process_noise"))?,
         bounds: simulate::pairs(section.take("bounds"), range)?,
         priors: simulate::pairs(section.take("priors"), prior)?,
@@ -106,7 +127,41 @@ pub(super) fn read(entry: Entry<'_>) -> Result<FitSettings, Error> {
             .map(|n| usize::try_from(n).unwrap_or(usize::MAX)),
         seed: section.optional("seed", |e| e.whole(0))?.unwrap_or(0),
         held_out: section.optional("held_out", super::tune::share)?,
+        candidates: simulate::pairs(section.take("candidates"), candidate)?,
     })
+}
+
+fn candidate(entry: Entry<'_>) -> Result<Candidate, Error> {
+    let mut section = entry.section("a candidate of [fit]", &CANDIDATE)?;
+    Ok(Candidate {
+        sensors: simulate::pairs(section.take("sensors"), |entry| {
+            let refusal = entry.wrong("a noise above 0: without noise one reading would tell all");
+            let noise = sensors::noise(entry)?;
+            (noise.size() > 0.0).then_some(noise).ok_or(refusal)
+        })?,
+        inputs: simulate::pairs(section.take("inputs"), simulate::expression)?,
+        every: section.optional("every", Entry::positive)?,
+        duration: section.optional("duration", Entry::positive)?,
+    })
+}
+
+/// Outputs whose noise is found, and those whose noise the model names.
+fn noise(entry: Option<Entry<'_>>) -> Result<(Chosen, Vec<(Name, Name)>), Error> {
+    let table = match entry {
+        Some(entry) if entry.is_table() => entry,
+        other => return Ok((chosen(other)?, vec![])),
+    };
+    let (mut found, mut named) = (vec![], vec![]);
+    for (output, value) in table.pairs()? {
+        let refusal = value.wrong("true, or the name of a parameter or a variable of the model");
+        match (value.as_boolean(), value.as_text()) {
+            (Some(true), _) => found.push(output),
+            (Some(false), _) => {}
+            (None, Some(_)) => named.push((output, value.name()?)),
+            (None, None) => return Err(refusal),
+        }
+    }
+    Ok((Chosen::Named(found), named))
 }
 
 fn chosen(entry: Option<Entry<'_>>) -> Result<Chosen, Error> {

@@ -6,7 +6,7 @@ mod judged;
 use lynkeus_observers::{KeySpec, REQUIRED, Shape};
 use lynkeus_run::Tolerances;
 
-pub(super) use judged::{COMPARE, FIT, PLOT, PRIOR, RANGE, TUNE};
+pub(super) use judged::{CANDIDATE, COMPARE, FIT, PLOT, PRIOR, RANGE, TUNE};
 
 /// A number, or a Modelica expression of time.
 const EXPRESSION: Shape = Shape::Either(&[Shape::Number, Shape::Text]);
@@ -115,6 +115,9 @@ pub(super) const SECTIONS: [KeySpec; 11] = [
     },
 ];
 
+/// How noisy a sensor is.
+const LEVEL: Shape = Shape::Either(&[Shape::NotNegative, Shape::Text, Shape::Section(&[&NOISE])]);
+
 /// `[sensors]`
 pub(super) const SENSORS: [KeySpec; 5] = [
     KeySpec {
@@ -148,11 +151,7 @@ pub(super) const SENSORS: [KeySpec; 5] = [
         name: "noise",
         shape: Shape::As(
             "table: output = number, text `\"5%\"`, or `{ uniform = number }`",
-            &Shape::Table(&Shape::Either(&[
-                Shape::NotNegative,
-                Shape::Text,
-                Shape::Section(&[&NOISE]),
-            ])),
+            &Shape::Table(&LEVEL),
         ),
         default: "no noise",
         meaning: "white measurement noise: its standard deviation, in the output's unit or as a share of its present value; or uniform noise, every error up to ± the number (in the output's unit) equally likely and none larger. Used by `simulate`, `tune`, the [filters](ekf.md), [`check --how-well`](precision.md) and [`certify`](certificates.md)",

@@ -48,7 +48,7 @@ use toml::de::DeTable;
 
 pub use certify::{Box, CertifySettings};
 pub use estimate::{BetweenSamples, EstimateSettings, Smoothing};
-pub use fit::{Chosen, FitSettings, Objective, Prior};
+pub use fit::{Candidate, Chosen, FitSettings, Objective, Prior};
 pub use generator::Generator;
 pub use observer::ObserverSettings;
 pub use schema::schema;

@@ -94,7 +94,7 @@ fn names(entry: Option<Entry<'_>>) -> Result<Vec<Name>, Error> {
     entry.map_or(Ok(Vec::new()), |e| e.list_of(Entry::name))
 }
 
-fn noise(entry: Entry<'_>) -> Result<Noise, Error> {
+pub(super) fn noise(entry: Entry<'_>) -> Result<Noise, Error> {
     let refusal = entry.wrong(
         "a standard deviation >= 0, a share such as \"5%\", or a bound such as { uniform = 0.05 }",
     );

@@ -180,6 +180,19 @@ impl Table {
     /// a number and is none, a decimal mark cannot be told (the message gives the line), or every
     /// cell is missing.
     pub fn times(&self, name: &str) -> Result<&Series, Error> {
+        let values = self.cells(name)?;
+        let column = self.find(name)?;
+        match column.missing == values.len() {
+            true => Err(self.without_number(column)),
+            false => Ok(values),
+        }
+    }
+
+    /// The same, of which every cell may be missing.
+    ///
+    /// # Errors
+    /// As [`Table::times`], but for the last.
+    pub fn cells(&self, name: &str) -> Result<&Series, Error> {
         let column = self.find(name)?;
         if let Some(refusal) = &column.refusal {
             return Err(
@@ -188,10 +201,7 @@ impl Table {
                     .hint(refusal.hint),
             );
         }
-        match column.missing == column.values.len() {
-            true => Err(self.without_number(column)),
-            false => Ok(&column.values),
-        }
+        Ok(&column.values)
     }
 
     /// A column of numbers in which cells may be missing: those are NaN.

@@ -3,6 +3,7 @@
 //! `docs/fit.md` says what is made least, how, and what every figure of the answer is.
 
 mod errors;
+mod experiment;
 pub(crate) mod function;
 mod json;
 mod known;
@@ -31,13 +32,14 @@ use crate::crew::{Watch, every};
 use crate::prepare::{self, Prepared};
 use crate::{Error, Study, Table};
 use errors::Errors;
+use experiment::Ahead;
 #[cfg(test)]
 pub(crate) use json::FitReport;
 use known::Exact;
 use posed::Posed;
 use problem::{Point, Problem, Term};
 use search::{Found, search};
-use steps::SETTLED;
+use steps::{SETTLED, Steps};
 use uncertainty::Uncertainty;
 use unknown::Unknown;
 
@@ -46,6 +48,8 @@ use unknown::Unknown;
 pub struct FitOptions {
     /// intervals by profile likelihood
     pub profiles: bool,
+    /// how well the values would be known with one more log
+    pub next_experiment: bool,
 }
 
 /// The answer of `lynkeus fit`.
@@ -73,6 +77,8 @@ pub struct Fit {
     /// what the logs do not tell
     pub undetermined: Vec<String>,
     pub(crate) exact: Exact,
+    /// where that is asked
+    pub(crate) ahead: Option<Ahead>,
     pub(crate) errors: Vec<Errors>,
     /// what speaks against the values
     pub warnings: Vec<String>,
@@ -128,12 +134,13 @@ pub fn fit(
         unknowns: &posed.unknowns,
         logs: &logs,
         terms,
-        step: Step::Auto,
+        steps: Steps::default(),
         most_confined: usize::MAX,
         evaluations: 0,
     };
     let mut work = Work {
         study: &study,
+        source: posed.source(is_alone),
         options,
         problem,
         alone,
@@ -150,6 +157,7 @@ pub fn fit(
 /// A fit under way.
 struct Work<'w> {
     study: &'w Study,
+    source: plant::Source<'w>,
     options: FitOptions,
     problem: Problem<'w>,
     /// the plant alone, log by log
@@ -292,10 +300,12 @@ impl Work<'_> {
             };
             best = self.again(fine.z, &[])?;
         }
-        if let (false, false, Step::AtMost(step)) = (is_settled, best.is_ended, self.problem.step) {
+        if let (false, false, Step::AtMost(step)) =
+            (is_settled, best.is_ended, self.problem.steps.length)
+        {
             self.warnings.push(format!(
                 "\u{2212}log L still changes by more than {SETTLED} where steps of {} are halved: the plant is stiff, or it jumps; method = \"rk4\" with a `step` in [estimate] says which steps count",
-                short(step)
+                short(step / 2.0_f64.powi(self.problem.steps.halvings as i32))
             ));
         }
         let mut held = vec![false; best.point.z.len()];
@@ -390,7 +400,7 @@ impl Work<'_> {
             let is_least = value <= unknown.low * (1.0 + 1e-9);
             self.warnings
                 .push(match (unknown.reaches_zero(), is_least) {
-                    (true, true) => format!("{}: the log cannot tell it from 0", unknown.words()),
+                    (true, true) => unknown.not_told_from_0(),
                     _ => format!("{} is at its bound, {}", unknown.words(), short(value)),
                 });
         }
@@ -420,13 +430,18 @@ impl Work<'_> {
         let is_ended = found.is_ended;
         let mut uncertainty = uncertainty::uncertainty(&self.problem, &found);
         self.profiles(&found, &mut uncertainty)?;
+        let ahead = self.ahead(&found)?;
         let values = self.problem.values(&found.point.z);
         let alone = self.alone.as_mut();
+        let steps = self.problem.steps;
         let alone = alone.map(|terms| Problem {
             terms: std::mem::take(terms),
             ..self.problem.clone()
         });
         let mut alone = alone;
+        if let Some(alone) = &mut alone {
+            alone.step_as(steps);
+        }
         let (errors, rows) =
             errors::errors(&mut self.problem, alone.as_mut(), &self.outputs, &values)?;
         let coloured = errors.iter().filter(|own| own.are_coloured());
@@ -456,6 +471,7 @@ impl Work<'_> {
             optima,
             undetermined: vec![],
             exact: self.exact,
+            ahead,
             errors,
             warnings: self.warnings,
             notes: self.notes,
@@ -466,6 +482,16 @@ impl Work<'_> {
             },
             file: self.study.file.clone(),
         })
+    }
+
+    /// The next experiment, where it is asked for.
+    fn ahead(&mut self, found: &Found) -> Result<Option<Ahead>, Error> {
+        if !self.options.next_experiment {
+            return Ok(None);
+        }
+        let (ahead, notes) = experiment::ahead(self.source, self.study, &self.problem, found)?;
+        self.notes.extend(notes);
+        Ok(Some(ahead))
     }
 
     /// Intervals by profile likelihood, where they are asked for, and of what is at a bound; noises that are no more
@@ -479,22 +505,9 @@ impl Work<'_> {
             Some(_) => ControlFlow::Break(()),
             None => ControlFlow::Continue(()),
         };
-        for (i, known) in uncertainty.known.iter_mut().enumerate() {
-            let unknown = &self.problem.unknowns[i];
-            let is_noise = unknown.reaches_zero() && !known.is_bound;
-            let told = format!("{}: the log cannot tell it from 0", unknown.words());
-            let own = *known;
-            let is_nothing =
-                is_noise && uncertainty::is_nothing(&mut self.problem, found, i, &own, &mut pulse)?;
-            if is_nothing {
-                self.warnings.push(told);
-            }
-            if self.options.profiles || known.is_bound {
-                let problem = &mut self.problem;
-                let sides = uncertainty::profile(problem, found, i, &own, is_nothing, &mut pulse)?;
-                known.interval = sides.or(known.interval);
-            }
-        }
+        let (problem, are_all) = (&mut self.problem, self.options.profiles);
+        let told = uncertainty::profiles(problem, found, uncertainty, are_all, &mut pulse)?;
+        self.warnings.extend(told);
         Ok(())
     }
 }

@@ -29,6 +29,7 @@ mod long;
 mod mentioned;
 mod messages;
 mod names;
+mod next_experiment;
 #[path = "../../../lynkeus/tests/normal/mod.rs"]
 mod normal;
 mod observability;

@@ -166,12 +166,25 @@ fn permissions_are_kept_and_obeyed() {
         &["design", "study.toml", "-o", "public.txt"],
         &["read-only"],
     );
+    // the file that it is asked to change is changed where the user's rights do, and keeps its mark
     allow("study.toml", 0o444);
-    refused(
-        &folder,
-        &["tune", "study.toml", "--write"],
-        &["study.toml", "read-only"],
-    );
+    let before = folder.read("study.toml");
+    let may = std::fs::OpenOptions::new()
+        .write(true)
+        .open(at("study.toml"));
+    match may {
+        Ok(_) => {
+            let ended = folder.run(&["tune", "study.toml", "--write"]);
+            assert_eq!(ended.code, 0, "{}", ended.err);
+            assert_ne!(folder.read("study.toml"), before);
+        }
+        Err(_) => refused(
+            &folder,
+            &["tune", "study.toml", "--write"],
+            &["study.toml", "cannot write"],
+        ),
+    }
+    assert_eq!(mode("study.toml"), 0o444);
 }
 
 /// Before anything is computed: the study cannot be run, and that is not what is told.

@@ -581,3 +581,119 @@ fn the_order_of_the_states_does_not_matter() {
         );
     }
 }
+
+/// −log L of x' = −λ(x − cos t) − sin t, which starts off the curve at 1.5, x(1) = cos 1 + ½ e^{−λ}, and of z' = −z²x(t)
+/// beside it, read once at t = 1 as 0 with variance 1 each, less log 2π: ½(x² + z²).
+fn driven(rate: f64, steps: usize, is_implicit: bool) -> lynkeus_run::filter::Score {
+    let g = Graph::new();
+    let [time, x, z, λ] = ["time", "x", "z", "λ"].map(|name| g.symbol(name));
+    let number = |value: f64| g.constant(value).node();
+    let sensor = |output: Expr<'_>| ParametricSensor {
+        output: output.node(),
+        noise: ParametricLevel::Variance(number(1.0)),
+        limits: None,
+    };
+    let mut likelihood = Likelihood::new(&ParametricPlant {
+        graph: &g,
+        time: time.node(),
+        states: vec![x.node(), z.node()],
+        derivatives: vec![
+            (-λ * (x - time.cos()) - time.sin()).node(),
+            (-z * z * x).node(),
+        ],
+        inputs: vec![],
+        sensors: vec![sensor(x), sensor(z)],
+        process_noise: vec![number(0.0), number(0.0)],
+        ranges: vec![],
+        start: vec![(number(1.5), number(0.0)), (number(1.0), number(0.0))],
+        parameters: vec![λ.node()],
+    })
+    .unwrap();
+    assert!(likelihood.implicit(is_implicit));
+    let rows = [(0.0, [f64::NAN; 2]), (1.0, [0.0; 2])];
+    let rows = rows.iter().map(|(t, readings)| Row {
+        t: *t,
+        readings,
+        inputs: &[],
+    });
+    let mut score = likelihood
+        .score(&[rate], rows, Step::Substeps(steps))
+        .unwrap();
+    score.value -= std::f64::consts::TAU.ln();
+    score
+}
+
+/// Its value in closed form: 1/z = 1 + ∫x.
+fn exact(rate: f64) -> f64 {
+    let fast = (-rate).exp();
+    let x = 1.0_f64.cos() + 0.5 * fast;
+    let z = 1.0 / (1.0 + 1.0_f64.sin() + 0.5 * (1.0 - fast) / rate);
+    0.5 * (x * x + z * z)
+}
+
+#[test]
+fn implicit_steps_are_of_order_four() {
+    let error = |steps| (driven(3.0, steps, true).value - exact(3.0)).abs();
+    for steps in [4, 8] {
+        let ratio = error(steps) / error(2 * steps);
+        assert!((11.0..24.0).contains(&ratio), "{steps}: {ratio}");
+    }
+    // its published coefficients are good to ten digits
+    assert!(error(80) < 1e-9, "{}", error(80));
+}
+
+#[test]
+fn implicit_steps_hold_where_explicit_ones_do_not() {
+    let rate = 1e5;
+    let [implicit, explicit] = [true, false].map(|is| driven(rate, 40, is));
+    assert!(explicit.value.is_nan() || explicit.value.abs() > 1e3);
+    assert!((implicit.value - exact(rate)).abs() < 1e-6, "{implicit:?}");
+    let h = 1e-3 * rate;
+    let [more, less] = [rate + h, rate - h].map(|rate| driven(rate, 40, true).value);
+    let difference = 0.5 * (more - less) / h;
+    assert!(
+        (implicit.gradient[0] - difference).abs() < 1e-5 * difference.abs(),
+        "{} beside {difference}",
+        implicit.gradient[0]
+    );
+}
+
+#[test]
+fn a_noise_may_depend_on_the_state() {
+    let g = Graph::new();
+    let [time, x, θ] = ["time", "x", "θ"].map(|name| g.symbol(name));
+    let number = |value: f64| g.constant(value).node();
+    let mut likelihood = Likelihood::new(&ParametricPlant {
+        graph: &g,
+        time: time.node(),
+        states: vec![x.node()],
+        derivatives: vec![(-θ * x).node()],
+        inputs: vec![],
+        sensors: vec![ParametricSensor {
+            output: x.node(),
+            noise: ParametricLevel::Variance((0.1 + θ * x).powi(2).node()),
+            limits: None,
+        }],
+        process_noise: vec![number(0.0)],
+        ranges: vec![],
+        start: vec![(number(2.0), number(0.0))],
+        parameters: vec![θ.node()],
+    })
+    .unwrap();
+    // by hand: x = 2 e^{−θt}, σ = 0.1 + θx
+    let by_hand = |θ: f64| {
+        let x = 2.0 * (-θ).exp();
+        let σ = 0.1 + θ * x;
+        0.5 * ((1.5 - x) / σ).powi(2) + σ.ln() + 0.5 * std::f64::consts::TAU.ln()
+    };
+    let rows = [(0.0, [f64::NAN]), (1.0, [1.5])];
+    let rows = rows.iter().map(|(t, readings)| Row {
+        t: *t,
+        readings,
+        inputs: &[],
+    });
+    let score = likelihood.score(&[0.4], rows, Step::Substeps(50)).unwrap();
+    assert!((score.value - by_hand(0.4)).abs() < 1e-8);
+    let slope = (by_hand(0.4 + 1e-5) - by_hand(0.4 - 1e-5)) / 2e-5;
+    assert!((score.gradient[0] - slope).abs() < 1e-7, "{score:?}");
+}

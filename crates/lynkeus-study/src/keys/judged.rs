@@ -2,7 +2,7 @@
 
 use lynkeus_observers::{KeySpec, REQUIRED, Shape};
 
-use super::EXPRESSION;
+use super::{EXPRESSION, LEVEL};
 
 /// `[tune]`
 pub(crate) const TUNE: [KeySpec; 5] = [
@@ -86,8 +86,11 @@ const CHOSEN: Shape = Shape::As(
     &Shape::Either(&[Shape::Flag, Shape::NAMES]),
 );
 
+/// The noise of an output.
+const NOISE_OF: Shape = Shape::Either(&[Shape::Flag, Shape::Text]);
+
 /// `[fit]`
-pub(crate) const FIT: [KeySpec; 11] = [
+pub(crate) const FIT: [KeySpec; 12] = [
     KeySpec {
         name: "parameters",
         shape: Shape::As("list of parameters", &Shape::NAMES),
@@ -102,9 +105,12 @@ pub(crate) const FIT: [KeySpec; 11] = [
     },
     KeySpec {
         name: "noise",
-        shape: CHOSEN,
+        shape: Shape::As(
+            "true, list of names, or table: output = true, parameter or variable",
+            &Shape::Either(&[Shape::Flag, Shape::NAMES, Shape::Table(&NOISE_OF)]),
+        ),
         default: "none",
-        meaning: "measured outputs whose noise is found; the search starts at `noise` of `[sensors]`, or at the scatter of the readings",
+        meaning: "measured outputs whose noise is found; the search starts at `noise` of `[sensors]`, or at the scatter of the readings. In a table, a name says whose value the standard deviation is: `{ y = \"s\", z = \"s\" }` for a parameter that two sensors share; or a variable that computes it, of states and inputs, too",
     },
     KeySpec {
         name: "process_noise",
@@ -156,6 +162,46 @@ pub(crate) const FIT: [KeySpec; 11] = [
         shape: Shape::Share,
         default: "none",
         meaning: "share at the end of each log that is not fitted, but predicted and told beside",
+    },
+    KeySpec {
+        name: "candidates",
+        shape: Shape::Table(&Shape::Section(&[&CANDIDATE])),
+        default: "see [the next experiment](fit.md#the-next-experiment)",
+        meaning: "experiments of which `--next-experiment` tells how much better the values would be known, under names of your own",
+    },
+];
+
+/// An experiment in `candidates` of `[fit]`.
+pub(crate) const CANDIDATE: [KeySpec; 4] = [
+    KeySpec {
+        name: "sensors",
+        shape: Shape::As(
+            "table: output or state = noise, as in `noise` of `[sensors]`",
+            &Shape::Table(&LEVEL),
+        ),
+        default: "none",
+        meaning: "sensors that there are in this experiment beside `measured`, with their noise",
+    },
+    KeySpec {
+        name: "inputs",
+        shape: Shape::As(
+            "table: name = number, or Modelica expression of `time` as text",
+            &Shape::Table(&EXPRESSION),
+        ),
+        default: "those of the first log, over again",
+        meaning: "known inputs; they are held from one row to the next",
+    },
+    KeySpec {
+        name: "every",
+        shape: Shape::Positive,
+        default: "that of the first log",
+        meaning: "the usual time between two rows; sensors that report at some rows only do so at as many of them",
+    },
+    KeySpec {
+        name: "duration",
+        shape: Shape::Positive,
+        default: "that of the first log",
+        meaning: "how long it lasts",
     },
 ];
 

@@ -65,6 +65,18 @@ impl<'t> Log<'t> {
     /// Columns that the study names or its observers read and the log does not have, or not as
     /// numbers; times that are no order.
     pub fn read(prepared: &Prepared<'_>, table: &'t Table) -> Result<Self, Error> {
+        Self::with(prepared, table, false)
+    }
+
+    /// One of several, in which a sensor may not have reported at all.
+    ///
+    /// # Errors
+    /// As [`Log::read`].
+    pub fn one_of(prepared: &Prepared<'_>, table: &'t Table) -> Result<Self, Error> {
+        Self::with(prepared, table, true)
+    }
+
+    fn with(prepared: &Prepared<'_>, table: &'t Table, may_lack: bool) -> Result<Self, Error> {
         let (study, plant) = (prepared.study(), prepared.plant());
         let settings = &study.estimate;
         let augmented = prepared.augmented();
@@ -83,7 +95,7 @@ impl<'t> Log<'t> {
             lost.iter().find(|lost| lost.column == own)
         });
         let warnings = warnings.flat_map(|lost| told(lost, &time)).collect();
-        let samples = samples(&table, &time, settings, augmented)?;
+        let samples = samples(&table, &time, settings, augmented, may_lack)?;
         notes.extend(gaps(&table, settings, &time, augmented));
         Ok(Self {
             table,
@@ -144,9 +156,12 @@ fn samples(
     time_header: &str,
     settings: &EstimateSettings,
     augmented: &AugmentedPlant<'_>,
+    may_lack: bool,
 ) -> Result<Samples, Error> {
+    let is_empty = |name: &str| may_lack && table.missing(header(settings, name)) == table.rows();
     let reading = |name: &str| match settings.strict {
         true => table.column(header(settings, name)).cloned(),
+        false if is_empty(name) => table.cells(header(settings, name)).cloned(),
         false => table.readings(header(settings, name)).cloned(),
     };
     let input = |name: &str| match is_made(table, settings, name) {

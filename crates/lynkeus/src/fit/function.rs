@@ -1,6 +1,5 @@
 //! −log L as a function of what `[fit]` names, for optimisers and samplers of others.
 
-use lynkeus_run::Step;
 use lynkeus_study::{Objective, Prior};
 use nalgebra::{DMatrix, DVector};
 
@@ -9,6 +8,7 @@ use super::plant;
 use super::posed::{self, Posed};
 use super::problem::{Problem, Rows, Term};
 use super::search::hessian;
+use super::steps::Steps;
 use super::unknown::Unknown;
 use crate::prepare::{self, Prepared};
 use crate::{Error, Study, Table};
@@ -33,7 +33,7 @@ pub struct LikelihoodFunction {
     priors: Vec<Option<Prior>>,
     logs: Vec<FittedLog>,
     terms: Vec<Term>,
-    step: Step,
+    steps: Steps,
     most_confined: usize,
 }
 
@@ -85,7 +85,7 @@ pub fn likelihood(study: &Study, tables: &[Table]) -> Result<LikelihoodFunction,
         unknowns: &posed.unknowns,
         logs: &logs,
         terms: posed.terms(study.fit.objective == Objective::Simulation)?,
-        step: Step::Auto,
+        steps: Steps::default(),
         most_confined: usize::MAX,
         evaluations: 0,
     };
@@ -110,7 +110,7 @@ pub fn likelihood(study: &Study, tables: &[Table]) -> Result<LikelihoodFunction,
         searched: own(false),
         plain: own(true),
         priors: posed.unknowns.iter().map(|u| u.prior).collect(),
-        step: problem.step,
+        steps: problem.steps,
         most_confined: problem.most_confined,
         terms: problem.terms,
         logs,
@@ -228,7 +228,7 @@ impl LikelihoodFunction {
             },
             logs: &self.logs,
             terms: std::mem::take(&mut self.terms),
-            step: self.step,
+            steps: self.steps,
             most_confined: self.most_confined,
             evaluations: 0,
         };

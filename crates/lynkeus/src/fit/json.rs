@@ -4,6 +4,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::errors::{Errors, Portion};
+use super::experiment::NextExperiment;
 use super::uncertainty::Known;
 use super::unknown::{Kind, Unknown};
 use super::{Fit, Optimum};
@@ -49,6 +50,9 @@ pub(crate) struct FitReport<'a> {
     combinations: Vec<&'a str>,
     /// errors of predictions, by output
     errors: Named<FittedErrors>,
+    /// how well the values would be known with one more log, the best first; where that is asked
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next_experiment: Option<&'a [NextExperiment]>,
     /// what speaks against the values
     warnings: &'a [String],
     /// what you should know
@@ -157,6 +161,7 @@ impl Fit {
             errors: (self.errors.iter())
                 .map(|errors| (errors.output.clone(), errors.into()))
                 .collect(),
+            next_experiment: self.ahead.as_ref().map(|ahead| &ahead.tried[..]),
             warnings: &self.warnings,
             notes: &self.notes,
         })

@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
+use lynkeus_expr::Node;
 use lynkeus_model::Plant;
 use lynkeus_observability::{Quantity, Question, Symmetry, Verdict, analyse};
 use lynkeus_study::Objective;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
+use super::plant;
 use super::problem::{Point, Problem};
 use super::unknown::{Kind, Unknown};
 use crate::Error;
@@ -60,10 +62,12 @@ pub(super) fn exact(
         ..Question::default()
     };
     let answer = analyse(symbolic, &question).map_err(|e| explain(e).at(&study.file))?;
+    let of_noises = of_noises(prepared, symbolic)?;
     let hidden = answer.quantities.iter().filter(|(asked, kind)| {
         *kind == Quantity::Parameter
             && asked.verdict == Verdict::Unobservable
             && parameters.contains(&asked.name.as_str())
+            && !of_noises.contains(&asked.name)
     });
     let hidden: Vec<String> = hidden.map(|(asked, _)| asked.name.clone()).collect();
     let moves = |s: &&Symmetry| s.moves.iter().any(|name| hidden.contains(name));
@@ -73,11 +77,24 @@ pub(super) fn exact(
     })
 }
 
+/// The parameters that noises depend on: how far readings scatter tells them, whatever the outputs do.
+fn of_noises(prepared: &Prepared<'_>, symbolic: &Plant) -> Result<Vec<String>, Error> {
+    let measured = prepared.augmented().outputs.iter();
+    let levels = measured
+        .map(|output| plant::named(prepared.study(), symbolic, &output.variable.name))
+        .collect::<Result<Vec<_>, _>>()?;
+    let levels: Vec<Node> = levels.into_iter().flatten().collect();
+    let symbols = symbolic.graph.symbols_of(&levels);
+    let all = symbolic.parameters.iter().map(|p| &p.variable);
+    let own = all.filter(|variable| symbols.contains(&variable.node));
+    Ok(own.map(|variable| variable.name.clone()).collect())
+}
+
 /// A share of the largest eigenvalue of a correlation below which it is rounding.
-const ROUNDING: f64 = 1e-12;
+pub(super) const ROUNDING: f64 = 1e-12;
 
 /// A share of a direction below which an unknown is not in it.
-const SHARE: f64 = 1e-3;
+pub(super) const SHARE: f64 = 1e-3;
 
 /// The unknowns that can change together without a change of −log L to second order, by their places.
 pub(super) fn flat(matrix: &DMatrix<f64>, free: &[usize]) -> Vec<usize> {

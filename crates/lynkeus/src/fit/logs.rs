@@ -30,14 +30,20 @@ pub(crate) struct FittedLog {
 }
 
 impl FittedLog {
+    /// In one of several logs a sensor may not have reported at all.
+    ///
     /// # Errors
     /// Columns that the log does not have, times that are no order, no reading to fit.
     pub fn new(
         prepared: &Prepared<'_>,
         design: &StudyDesign,
         table: &Table,
+        is_one_of_several: bool,
     ) -> Result<Self, Error> {
-        let log = Log::read(prepared, table)?;
+        let log = match is_one_of_several {
+            true => Log::one_of(prepared, table)?,
+            false => Log::read(prepared, table)?,
+        };
         let mut design = design.clone();
         start_at_readings(prepared, &log.samples, &mut design);
         let samples = log.samples;

@@ -1,11 +1,13 @@
 //! What is left of the readings at the values found, drawn.
 
-use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Panel, Scale};
+use lynkeus_plot::{Band, Curve, Extent, Figure, Kind, Mark, Panel, Scale};
 
 use super::Fit;
 use super::errors::Innovations;
+use super::uncertainty::Profile;
 use crate::Series;
 use crate::figure::over_time;
+use crate::tune::whiteness::{autocorrelations, band};
 
 /// Outputs that are drawn at most.
 const OUTPUTS: usize = 4;
@@ -13,12 +15,9 @@ const OUTPUTS: usize = 4;
 /// Lags of the autocorrelation.
 const LAGS: usize = 40;
 
-/// 95 % of the autocorrelations of a white series of n are within ± this/√n.
-const WHITE: f64 = 1.96;
-
 impl Fit {
     /// Of each output the innovations of the first log with their band, the error of the plant alone, and the
-    /// autocorrelation of the innovations over their deviations.
+    /// autocorrelation of the innovations over their deviations; then the profiles that were asked for.
     pub fn figure(&self) -> Figure {
         let rows = self.rows.at.partition_point(|(log, _)| *log == 1);
         let time: Vec<f64> = self.rows.at[..rows].iter().map(|(_, t)| *t).collect();
@@ -28,9 +27,74 @@ impl Fit {
             let innovations = innovations(own, &time, rows);
             std::iter::once(innovations).chain(autocorrelation(own, rows))
         });
+        let panels = panels.chain(self.uncertainty.profiles.iter().map(|p| self.profile(p)));
         let log = self.logs.first().map_or("", String::as_str);
         let title = format!("{}: what is left of {log}", self.plant);
         over_time(title, self.time_unit.as_deref(), panels.collect())
+    }
+}
+
+/// Steps of a profile's curve between two of its points.
+const BETWEEN: usize = 16;
+
+impl Fit {
+    /// −log L along a value, the others being the best, with the line that bounds its interval.
+    fn profile(&self, profile: &Profile) -> Panel {
+        let unknown = &self.unknowns[profile.place];
+        let known = &self.uncertainty.known[profile.place];
+        let most = 2.5 * profile.rise;
+        let points = &profile.points;
+        // the root of the rise, negative below the least, is nearly straight
+        let root = |&(value, rise): &(f64, f64)| {
+            let sign = if value < known.value { -1.0 } else { 1.0 };
+            (unknown.searched(value), sign * rise.max(0.0).sqrt())
+        };
+        let between = points.windows(2).flat_map(|pair| {
+            let [(z0, r0), (z1, r1)] = [root(&pair[0]), root(&pair[1])];
+            (0..BETWEEN).map(move |k| {
+                let share = k as f64 / BETWEEN as f64;
+                let at = |a: f64, b: f64| a + share * (b - a);
+                (at(z0, z1), at(r0, r1))
+            })
+        });
+        let curve = between.chain(points.last().map(root));
+        let curve = curve.map(|(z, root)| (unknown.value(z), root * root));
+        let curve: Vec<_> = curve.filter(|(_, rise)| *rise <= most).collect();
+        let [first, last] = [curve.first(), curve.last()].map(|end| end.map_or(0.0, |end| end.0));
+        let is_least = known
+            .interval
+            .is_some_and(|(low, _)| low <= unknown.low && low < first);
+        let first = if is_least && unknown.reaches_zero() {
+            0.0
+        } else {
+            first
+        };
+        let line = [first, last].map(|value| (value, profile.rise));
+        let ends = known.interval.map(|(low, high)| low..high);
+        let interval = ends.filter(|ends| ends.start >= first || ends.end <= last);
+        Panel {
+            name: format!("{}_profile", unknown.label()),
+            caption: format!(
+                "{}: rise of \u{2212}log L, by its value; the others are searched anew",
+                unknown.label()
+            ),
+            curves: vec![
+                Curve::through(Kind::Estimated, curve).named("profile"),
+                Curve::through(Kind::Grey, line)
+                    .named(format!("bound of the interval, {:.2}", profile.rise)),
+            ],
+            marks: interval
+                .map(|ends| Mark::Good(ends.start.max(first)..ends.end.min(last)))
+                .into_iter()
+                .chain([Mark::Chosen(known.value, "value found".to_owned())])
+                .collect(),
+            upwards: Scale::FromZero,
+            across: Some(match first < last {
+                true => Scale::Within(first..last),
+                false => Scale::Parameter,
+            }),
+            ..Panel::default()
+        }
     }
 }
 
@@ -79,17 +143,10 @@ fn autocorrelation(own: &Innovations, rows: usize) -> Option<Panel> {
         .map(|(ν, sd)| ν / sd)
         .filter(|z| z.is_finite())
         .collect();
-    let lags = LAGS.min(scaled.len() / 5);
-    let power: f64 = scaled.iter().map(|z| z * z).sum();
-    if lags < 2 || power <= 0.0 {
-        return None;
-    }
-    let correlation = |lag: usize| {
-        let pairs = scaled.iter().zip(&scaled[lag..]);
-        pairs.map(|(a, b)| a * b).sum::<f64>() / power
-    };
-    let points = (1..=lags).map(|lag| (lag as f64, correlation(lag)));
-    let band = WHITE / (scaled.len() as f64).sqrt();
+    let correlations = autocorrelations(&scaled, LAGS).filter(|all| all.len() > 1)?;
+    let lags = correlations.len();
+    let points = (1..=lags).map(|lag| lag as f64).zip(correlations);
+    let band = band(scaled.len());
     let ends = Series::from(vec![0.0, lags as f64 + 1.0]);
     Some(Panel {
         name: format!("{}_autocorrelation", own.output),

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use lynkeus_expr::Node;
+use lynkeus_expr::{Expr, Node};
 use lynkeus_model::Plant;
 use lynkeus_observers::FilterTuning;
 use lynkeus_run::Level;
@@ -12,7 +12,7 @@ use lynkeus_structure::AugmentedPlant;
 use super::unknown::{Kind, Unknown};
 use crate::prepare::{self, Prepared};
 use crate::words::explain;
-use crate::{Error, Study};
+use crate::{Error, Study, near};
 
 /// The plant with the parameters that are found as symbols.
 ///
@@ -36,6 +36,16 @@ pub(super) struct Source<'s> {
     pub tuning: &'s FilterTuning,
     /// the plant alone: it starts where it is said to, and nothing disturbs it
     pub is_alone: bool,
+    /// sensors beside the study's
+    pub further: &'s [Further],
+}
+
+/// A sensor that the study does not have.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Further {
+    pub output: Node,
+    pub level: Level,
+    pub limits: Option<Limits>,
 }
 
 impl Source<'_> {
@@ -54,6 +64,7 @@ impl Source<'_> {
             symbolic,
             tuning,
             is_alone,
+            further,
         } = *self;
         let graph = symbolic.graph();
         let number = |value: f64| graph.constant(value).node();
@@ -106,21 +117,23 @@ impl Source<'_> {
         let sensors = symbolic.outputs.iter().enumerate().map(|(i, output)| {
             let name = &output.variable.name;
             let level = declared.noise.of(name).map(|noise| Level::from(*noise));
-            let size = match (noises.get(&i), level) {
-                (Some(&symbol), _) => graph.expr(symbol),
+            let named = named(prepared.study(), symbolic.plant, name)?;
+            let size = match (noises.get(&i).copied().or(named), level) {
+                (Some(size), _) => graph.expr(size),
                 (None, Some(level)) if level.size() > 0.0 => graph.constant(level.size()),
                 (None, _) => return Err(no_noise(prepared.study(), name)),
             };
             Ok(ParametricSensor {
                 output: output.variable.node,
-                noise: match level {
-                    Some(Level::Relative(_)) => ParametricLevel::Share(size.node()),
-                    Some(Level::Uniform(_)) => {
-                        ParametricLevel::Variance((size.powi(2) / 3.0).node())
-                    }
-                    _ => ParametricLevel::Variance(size.powi(2).node()),
-                },
+                noise: noise(level.filter(|_| named.is_none()), size),
                 limits: declared.limits.of(name).copied(),
+            })
+        });
+        let further = further.iter().map(|sensor| {
+            Ok(ParametricSensor {
+                output: sensor.output,
+                noise: noise(Some(sensor.level), graph.constant(sensor.level.size())),
+                limits: sensor.limits,
             })
         });
         let plant = ParametricPlant {
@@ -129,7 +142,7 @@ impl Source<'_> {
             states: symbolic.states.iter().map(|state| state.node).collect(),
             derivatives: symbolic.derivatives.clone(),
             inputs: symbolic.inputs.iter().map(|input| input.node).collect(),
-            sensors: sensors.collect::<Result<_, Error>>()?,
+            sensors: sensors.chain(further).collect::<Result<_, Error>>()?,
             process_noise: symbolic.states.iter().enumerate().map(density).collect(),
             ranges: symbolic
                 .states
@@ -146,12 +159,51 @@ impl Source<'_> {
     }
 }
 
+/// A noise of this size, of the kind that it is.
+fn noise(level: Option<Level>, size: Expr<'_>) -> ParametricLevel {
+    match level {
+        Some(Level::Relative(_)) => ParametricLevel::Share(size.node()),
+        Some(Level::Uniform(_)) => ParametricLevel::Variance((size.powi(2) / 3.0).node()),
+        _ => ParametricLevel::Variance(size.powi(2).node()),
+    }
+}
+
 /// The symbol of a parameter.
 fn parameter(plant: &Plant, name: &str) -> Node {
     let mut all = plant.parameters.iter().map(|p| &p.variable);
     let own = all.find(|variable| variable.name == name);
     // one that no equation reads is a symbol of its own
     own.map_or_else(|| plant.graph.fresh(name).node(), |variable| variable.node)
+}
+
+/// The parameter or the variable whose value the standard deviation of a sensor's noise is.
+///
+/// # Errors
+/// The model has neither.
+pub(super) fn named(study: &Study, plant: &Plant, output: &str) -> Result<Option<Node>, Error> {
+    let mut said = study.fit.deviations.iter();
+    let Some((_, name)) = said.find(|(sensor, _)| sensor.is_or_has(output)) else {
+        return Ok(None);
+    };
+    let is_found = study.fit.parameters.iter().any(|p| p.is_or_has(&name.text));
+    let parameters = plant.parameters.iter();
+    if let Some(own) = parameters.clone().find(|p| p.variable.name == name.text) {
+        let number = own.value.filter(|_| !is_found);
+        let number = number.map(|value| plant.graph.constant(value).node());
+        return Ok(Some(number.unwrap_or(own.variable.node)));
+    }
+    let variables = plant.outputs.iter().chain(&plant.algebraics);
+    if let Some(own) = variables.clone().find(|v| v.name == name.text) {
+        return Ok(Some(own.node));
+    }
+    let known = variables.chain(parameters.map(|p| &p.variable));
+    let known: Vec<&str> = known.map(|v| v.name.as_str()).collect();
+    let message = format!(
+        "`noise` of [fit]: no parameter or variable is called \"{}\"",
+        name.text
+    );
+    let refusal = Error::input(message).at(&study.file);
+    Err(name.blame(refusal.hint(near::suggest(&name.text, known))))
 }
 
 fn no_noise(study: &Study, name: &str) -> Error {

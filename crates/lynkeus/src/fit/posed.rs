@@ -49,7 +49,7 @@ pub(super) fn logs(
     }
     let logs = tables
         .iter()
-        .map(|table| FittedLog::new(prepared, design, table));
+        .map(|table| FittedLog::new(prepared, design, table, tables.len() > 1));
     logs.collect()
 }
 
@@ -89,17 +89,23 @@ impl<'s> Posed<'s> {
         })
     }
 
+    /// What a likelihood is made of, of the plant alone or along the filter.
+    pub fn source(&self, is_alone: bool) -> Source<'_> {
+        Source {
+            prepared: self.prepared,
+            symbolic: &self.seen,
+            tuning: self.tuning,
+            is_alone,
+            further: &[],
+        }
+    }
+
     /// One per log, of the plant alone or along the filter; logs whose states start alike have one likelihood.
     ///
     /// # Errors
     /// As [`Source::likelihood`].
     pub fn terms(&self, is_alone: bool) -> Result<Vec<Term>, Error> {
-        let source = Source {
-            prepared: self.prepared,
-            symbolic: &self.seen,
-            tuning: self.tuning,
-            is_alone,
-        };
+        let source = self.source(is_alone);
         let mut terms: Vec<Term> = vec![];
         for (place, log) in self.logs.iter().enumerate() {
             let is_own = |kind: Kind| !matches!(kind, Kind::Start { log, .. } if log != place);

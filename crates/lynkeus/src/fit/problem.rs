@@ -1,10 +1,10 @@
 //! What is made least: −log L over all logs, and what was known before.
 
-use lynkeus_run::Step;
 use lynkeus_run::filter::{Likelihood, Score, Seen};
 use nalgebra::{DMatrix, DVector};
 
 use super::logs::FittedLog;
+use super::steps::Steps;
 use super::unknown::Unknown;
 use crate::Error;
 use crate::words::explain;
@@ -41,7 +41,7 @@ pub(crate) struct Problem<'a> {
     pub logs: &'a [FittedLog],
     /// one per log
     pub terms: Vec<Term>,
-    pub step: Step,
+    pub steps: Steps,
     /// where the plant has no value in more intervals than so many, −log L has none: steps are too long there
     pub most_confined: usize,
     pub evaluations: usize,
@@ -128,7 +128,7 @@ impl Problem<'_> {
         };
         let score = term
             .likelihood
-            .watched(&own, log.rows(count), self.step, see);
+            .watched(&own, log.rows(count), self.steps.length, see);
         score.map_err(|error| explain(error).at(&log.place))
     }
 

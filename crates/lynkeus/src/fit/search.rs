@@ -46,25 +46,10 @@ pub(crate) fn search(
     held: &[bool],
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<Found, Error> {
-    let point = problem.at(start)?;
-    let mut descent = Descent {
-        ranges: problem.ranges(),
-        held: held.to_vec(),
-        scale: DVector::zeros(point.z.len()),
-        damping: 1e-3,
-        growth: 2.0,
-        point,
-        problem,
-        is_ended: false,
-    };
+    let mut descent = Descent::new(problem, start, held)?;
+    descent.score(watch)?;
     if !descent.point.value.is_finite() {
         return Ok(descent.found(None));
-    }
-    for _ in 0..STEPS[0] {
-        let matrix = descent.point.information.clone();
-        if !descent.goes_on(&matrix, watch)? {
-            break;
-        }
     }
     descent.damping = 0.0;
     descent.growth = 2.0;
@@ -83,6 +68,22 @@ pub(crate) fn search(
     Ok(descent.found(last))
 }
 
+/// The least −log L near a point, and whether the search came to its end: by scoring alone, which is enough for the
+/// height of a valley.
+///
+/// # Errors
+/// As [`Problem::at`].
+pub(crate) fn least(
+    problem: &mut Problem<'_>,
+    start: DVector<f64>,
+    held: &[bool],
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<(Point, bool), Error> {
+    let mut descent = Descent::new(problem, start, held)?;
+    descent.score(watch)?;
+    Ok((descent.point, !descent.is_ended))
+}
+
 struct Descent<'d, 'p> {
     problem: &'d mut Problem<'p>,
     point: Point,
@@ -96,7 +97,36 @@ struct Descent<'d, 'p> {
     is_ended: bool,
 }
 
-impl Descent<'_, '_> {
+impl<'d, 'p> Descent<'d, 'p> {
+    fn new(
+        problem: &'d mut Problem<'p>,
+        start: DVector<f64>,
+        held: &[bool],
+    ) -> Result<Self, Error> {
+        let point = problem.at(start)?;
+        Ok(Self {
+            ranges: problem.ranges(),
+            held: held.to_vec(),
+            scale: DVector::zeros(point.z.len()),
+            damping: 1e-3,
+            growth: 2.0,
+            point,
+            problem,
+            is_ended: false,
+        })
+    }
+
+    /// By Fisher's information.
+    fn score(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) -> Result<(), Error> {
+        for _ in 0..STEPS[0] {
+            let matrix = self.point.information.clone();
+            if !self.point.value.is_finite() || !self.goes_on(&matrix, watch)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     /// At a bound, and pressed against it.
     fn is_bound(&self, i: usize) -> bool {
         let ((low, high), z, g) = (self.ranges[i], self.point.z[i], self.point.gradient[i]);

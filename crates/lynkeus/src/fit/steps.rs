@@ -1,6 +1,7 @@
 //! Steps of Runge and Kutta that are short enough for −log L.
 
 use lynkeus_expr::Budget;
+use lynkeus_run::filter::Likelihood;
 use lynkeus_run::{Method, Step};
 use nalgebra::DVector;
 
@@ -24,6 +25,39 @@ const MOST_STEPS: usize = 2_000_000;
 /// One row of so many may be one at which the plant has no value where the estimate is.
 const CONFINED: usize = 10;
 
+/// What a study's relative tolerance is where it does not say: a smaller one makes all others here as much smaller.
+const USUAL: f64 = 1e-9;
+
+/// The steps from one row to the next.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Steps {
+    pub length: Step,
+    /// how often that is halved
+    pub halvings: u32,
+    pub is_implicit: bool,
+    /// a factor of all that −log L may be wrong by
+    pub tolerance: f64,
+}
+
+impl Steps {
+    /// From now on a likelihood of the same plant goes by them.
+    pub fn on(self, likelihood: &mut Likelihood) {
+        likelihood.implicit(self.is_implicit);
+        likelihood.shorten(1 << self.halvings);
+    }
+}
+
+impl Default for Steps {
+    fn default() -> Self {
+        Self {
+            length: Step::Auto,
+            halvings: 0,
+            is_implicit: false,
+            tolerance: 1.0,
+        }
+    }
+}
+
 impl Problem<'_> {
     /// The study's own values, at steps that are short enough; from there on as [`Self::confine`] has it.
     ///
@@ -40,6 +74,7 @@ impl Problem<'_> {
 
     /// A point at such steps of the study's method that shorter ones hardly change −log L. Steps that are too long for
     /// a stiff plant throw its estimates out of every range: such a point counts only where shorter ones do not help.
+    /// A plant alone then has implicit ones.
     ///
     /// # Errors
     /// As [`Problem::at`].
@@ -49,38 +84,102 @@ impl Problem<'_> {
         method: &Method,
         budget: &Budget,
     ) -> Result<Point, Error> {
-        if let Method::Rk4(step) = method {
-            self.step = *step;
-            return self.at(z);
+        match method {
+            Method::Rk4(step) => {
+                self.steps.length = *step;
+                return self.at(z);
+            }
+            Method::Adaptive(t) | Method::Explicit(t) | Method::Stiff(t) => {
+                self.steps.tolerance = (t.relative / USUAL).min(1.0);
+            }
         }
+        let mut found: Option<Point> = None;
+        if !matches!(method, Method::Stiff(_)) {
+            let (point, is_settled) = self.halving(&z, budget, HALVINGS)?;
+            if is_settled || matches!(method, Method::Explicit(_)) || budget.spent().is_some() {
+                return Ok(point);
+            }
+            found = Some(point).filter(|point| self.is_sound(point));
+        }
+        let explicit = self.steps.halvings;
+        if self.implicit(true) {
+            let (point, is_settled) = self.halving(&z, budget, HALVINGS)?;
+            let is_better = found.is_none() && self.is_sound(&point);
+            if is_settled || is_better || budget.spent().is_some() {
+                return Ok(point);
+            }
+        }
+        self.implicit(false);
+        match found {
+            Some(point) => {
+                self.shorten(explicit);
+                Ok(point)
+            }
+            None => Ok(self.halving(&z, budget, u32::MAX)?.0),
+        }
+    }
+
+    /// By implicit steps from here on, or not; whether there are such.
+    fn implicit(&mut self, is_implicit: bool) -> bool {
+        let mut all = true;
+        for term in &mut self.terms {
+            all &= term.likelihood.implicit(is_implicit);
+        }
+        self.steps.is_implicit = is_implicit && all;
+        all
+    }
+
+    /// A point at steps that are halved until that hardly changes −log L; whether it came to that.
+    /// Where the plant has no value they are halved `most` times at most.
+    fn halving(
+        &mut self,
+        z: &DVector<f64>,
+        budget: &Budget,
+        most: u32,
+    ) -> Result<(Point, bool), Error> {
+        let finer = (-self.steps.tolerance.log2() / 4.0).ceil() as u32;
         let intervals = self.logs.iter().map(FittedLog::interval);
-        let usual = intervals.fold(f64::INFINITY, f64::min);
-        self.step = Step::AtMost(usual);
-        let first = self.at(z)?;
+        self.steps.length = Step::AtMost(intervals.fold(f64::INFINITY, f64::min));
+        self.shorten(0);
+        let first = self.at(z.clone())?;
         let mut point = first.clone();
-        let mut length = usual;
         for halving in 1.. {
             let is_enough = match self.is_sound(&point) {
-                true => halving > HALVINGS,
-                false => self.rows() << halving > MOST_STEPS,
+                true => halving > HALVINGS + finer,
+                false => halving > most || self.rows() << halving > MOST_STEPS,
             };
             if is_enough || budget.spent().is_some() {
                 break;
             }
-            let tolerance = SETTLED.max(NEARLY * point.value.abs());
-            self.step = Step::AtMost(0.5 * length);
+            let tolerance = self.steps.tolerance * SETTLED.max(NEARLY * point.value.abs());
+            self.shorten(halving);
             let fine = self.at(point.z.clone())?;
             if self.is_sound(&point) && (fine.value - point.value).abs() < tolerance {
-                self.step = Step::AtMost(length);
-                return Ok(point);
+                self.shorten(halving - 1);
+                return Ok((point, true));
             }
-            (point, length) = (fine, 0.5 * length);
+            point = fine;
         }
         if self.is_sound(&point) {
-            return Ok(point);
+            return Ok((point, false));
         }
-        self.step = Step::AtMost(usual);
-        Ok(first)
+        self.shorten(0);
+        Ok((first, false))
+    }
+
+    /// Steps that are halved so often, in every interval between two rows.
+    fn shorten(&mut self, halvings: u32) {
+        self.steps.halvings = halvings;
+        for term in &mut self.terms {
+            term.likelihood.shorten(1 << halvings);
+        }
+    }
+
+    /// By such steps.
+    pub fn step_as(&mut self, steps: Steps) {
+        self.steps = steps;
+        self.implicit(steps.is_implicit);
+        self.shorten(steps.halvings);
     }
 
     /// The same point at half the steps, which are kept where that changes it.
@@ -88,13 +187,14 @@ impl Problem<'_> {
     /// # Errors
     /// As [`Problem::at`].
     pub fn halved(&mut self, coarse: &Point) -> Result<Option<Point>, Error> {
-        let Step::AtMost(length) = self.step else {
+        if !matches!(self.steps.length, Step::AtMost(_)) {
             return Ok(None);
-        };
-        self.step = Step::AtMost(0.5 * length);
+        }
+        let halvings = self.steps.halvings;
+        self.shorten(halvings + 1);
         let fine = self.at(coarse.z.clone())?;
-        if (fine.value - coarse.value).abs() < SETTLED {
-            self.step = Step::AtMost(length);
+        if (fine.value - coarse.value).abs() < self.steps.tolerance * SETTLED {
+            self.shorten(halvings);
             return Ok(None);
         }
         Ok(Some(fine))

@@ -28,6 +28,7 @@ impl Answer for Fit {
         self.tell_quality(&mut document);
         document.part().table(self.errors_table());
         self.tell_correlations(&mut document);
+        self.tell_ahead(&mut document);
         document
     }
 
@@ -214,6 +215,49 @@ impl Fit {
 }
 
 impl Fit {
+    /// The next experiment, where it is asked for.
+    fn tell_ahead(&self, document: &mut Document) {
+        let Some(ahead) = &self.ahead else {
+            return;
+        };
+        let percent = |x: f64| format!("{} %", brief(100.0 * x));
+        let now = match &ahead.now {
+            Some((name, share)) => {
+                format!("with these logs {name} is known to ±{}", percent(*share))
+            }
+            None => "these logs do not tell all values".to_owned(),
+        };
+        document.part().line(format!("the next experiment: {now}"));
+        let titles = [
+            "with one more log",
+            "readings",
+            "worst",
+            "sd/value",
+            "× now",
+            "volume ×",
+            "trace ×",
+            "makes known",
+        ];
+        let number = |x: Option<f64>| Cell::number(x, brief);
+        let rows = ahead.tried.iter().map(|next| {
+            vec![
+                Cell::from(next.name.clone()),
+                Cell::number(Some(next.readings as f64), |x| format!("{x}")),
+                Cell::from(next.worst.clone().unwrap_or_default()),
+                Cell::number(next.relative_sd, percent),
+                number(next.factor),
+                number(next.volume),
+                number(next.trace),
+                Cell::from(next.determines.join(", ")),
+            ]
+        });
+        document.table(Table::new(titles).with(rows));
+        let is_vain = ahead.tried.iter().all(|next| next.determines.is_empty());
+        if !self.undetermined.is_empty() && is_vain {
+            document.line("none of them makes known what the logs do not tell");
+        }
+    }
+
     /// The study's text with the values found, and what changed; the starts of several logs stay out of it.
     ///
     /// # Errors

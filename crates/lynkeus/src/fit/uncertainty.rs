@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use nalgebra::{DMatrix, DVector};
 
 use super::problem::Problem;
-use super::search::{Found, positive, search};
+use super::search::{Found, least, positive};
 use crate::Error;
 
 /// 95 % of a normal distribution are within so many deviations.
@@ -31,6 +31,19 @@ pub(crate) struct Uncertainty {
     /// places of those that are not at a bound
     pub free: Vec<usize>,
     pub correlation: DMatrix<f64>,
+    /// profiles that were asked for
+    pub profiles: Vec<Profile>,
+}
+
+/// Values of one unknown with how much −log L rises there, the others being the best.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Profile {
+    /// the place of the unknown
+    pub place: usize,
+    /// in the order of values
+    pub points: Vec<(f64, f64)>,
+    /// where its interval ends
+    pub rise: f64,
 }
 
 /// From the Hessian at the end of a search.
@@ -68,6 +81,7 @@ pub(super) fn uncertainty(problem: &Problem<'_>, found: &Found) -> Uncertainty {
         known,
         free,
         correlation,
+        profiles: vec![],
     }
 }
 
@@ -84,20 +98,75 @@ fn normal(problem: &Problem<'_>, i: usize, value: f64, sd: f64) -> (f64, f64) {
     (low.max(unknown.low), high.min(unknown.high))
 }
 
-/// The interval in which −log L, the other unknowns being the best for each value, stays as low as 95 % of logs
-/// let it; one-sided at a bound, and of a noise that is no more than nothing.
+/// Sets intervals by profile likelihood: of all values, or of what is at a bound or no more than nothing. Returned is
+/// what speaks against them.
 ///
 /// # Errors
 /// As [`Problem::at`].
-pub(super) fn profile(
+pub(super) fn profiles(
     problem: &mut Problem<'_>,
     found: &Found,
-    i: usize,
-    known: &Known,
-    is_nothing: bool,
+    uncertainty: &mut Uncertainty,
+    are_all: bool,
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<Vec<String>, Error> {
+    let (mut warnings, mut cut) = (vec![], vec![]);
+    for i in 0..uncertainty.known.len() {
+        let known = uncertainty.known[i];
+        let unknown = &problem.unknowns[i];
+        let may_be_nothing = unknown.reaches_zero() && !known.is_bound;
+        let is_nothing = may_be_nothing && is_nothing(problem, found, i, &known, watch)?;
+        if is_nothing {
+            warnings.push(unknown.not_told_from_0());
+        }
+        if !(are_all || known.is_bound || is_nothing) {
+            continue;
+        }
+        let mut points = vec![(found.point.z[i], 0.0)];
+        let is_one_sided = known.is_bound || is_nothing;
+        let rise = 0.5 * RISES[usize::from(is_one_sided)];
+        match sides(
+            problem,
+            found,
+            (i, &known, is_nothing),
+            rise,
+            &mut points,
+            watch,
+        )? {
+            Some(sides) => uncertainty.known[i].interval = Some(sides),
+            None => cut.push(unknown.words()),
+        }
+        if are_all {
+            points.retain(|(_, rise)| rise.is_finite());
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let values = points.into_iter();
+            uncertainty.profiles.push(Profile {
+                place: i,
+                points: values.map(|(z, rise)| (unknown.value(z), rise)).collect(),
+                rise,
+            });
+        }
+    }
+    if !cut.is_empty() {
+        warnings.push(format!(
+            "a limit ended the profiles of {}: what they have of intervals is by their deviations",
+            cut.join(", ")
+        ));
+    }
+    Ok(warnings)
+}
+
+/// The interval in which −log L, the other unknowns being the best for each value, rises by no more than 95 % of logs
+/// let it; one-sided at a bound, and of a noise that is no more than nothing. None where it was told to stop.
+fn sides(
+    problem: &mut Problem<'_>,
+    found: &Found,
+    (i, known, is_nothing): (usize, &Known, bool),
+    rise: f64,
+    points: &mut Vec<(f64, f64)>,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<Option<(f64, f64)>, Error> {
-    let unknown = problem.unknowns[i].clone();
+    let unknown = &problem.unknowns[i];
     let mut ends = [unknown.low, unknown.high];
     for (side, end) in ends.iter_mut().enumerate() {
         let sign = [-1.0, 1.0][side];
@@ -107,7 +176,6 @@ pub(super) fn profile(
         if is_there || (is_nothing && side == 0) {
             continue;
         }
-        let rise = 0.5 * RISES[usize::from(known.is_bound || is_nothing)];
         let size = match known.sd {
             Some(sd) => sd / unknown.slope(known.value).abs(),
             None if unknown.is_log => 1.0,
@@ -119,6 +187,7 @@ pub(super) fn profile(
             from: found.point.z.clone(),
             least: found.point.value,
             rise,
+            points,
             watch,
         };
         match edge.find(at, sign, size, limit)? {
@@ -136,7 +205,7 @@ const CLEAR: f64 = 0.25;
 ///
 /// # Errors
 /// As [`Problem::at`].
-pub(super) fn is_nothing(
+fn is_nothing(
     problem: &mut Problem<'_>,
     found: &Found,
     i: usize,
@@ -151,8 +220,8 @@ pub(super) fn is_nothing(
     start[i] = unknown.searched(unknown.low);
     let mut held = vec![false; start.len()];
     held[i] = true;
-    let least = search(problem, start, &held, watch)?.point.value;
-    Ok(2.0 * (least - found.point.value) <= RISES[1])
+    let (there, _) = least(problem, start, &held, watch)?;
+    Ok(2.0 * (there.value - found.point.value) <= RISES[1])
 }
 
 /// Where a profile has risen by so much.
@@ -164,6 +233,8 @@ struct Edge<'e, 'p> {
     from: DVector<f64>,
     least: f64,
     rise: f64,
+    /// those that were tried, with how far it rises
+    points: &'e mut Vec<(f64, f64)>,
     watch: &'e mut dyn FnMut() -> ControlFlow<()>,
 }
 
@@ -178,6 +249,7 @@ impl Edge<'_, '_> {
         let goal = root(self.rise);
         let mut inside = (at, 0.0);
         let mut outside: Option<(f64, f64)> = None;
+        let mut width = f64::INFINITY;
         let mut next = at + sign * size * goal * 2.0_f64.sqrt();
         for _ in 0..TRIALS {
             let z = if sign > 0.0 {
@@ -189,7 +261,7 @@ impl Edge<'_, '_> {
                 return Ok(None);
             };
             let reached = root(rise);
-            if (reached - goal).abs() < 1e-4 * goal {
+            if (reached - goal).abs() < 1e-3 * goal {
                 return Ok(Some(z));
             }
             match reached < goal {
@@ -197,21 +269,23 @@ impl Edge<'_, '_> {
                 true => inside = (z, reached),
                 false => outside = Some((z, reached)),
             }
-            next = match outside {
-                None => {
-                    let slope = (reached / (z - at).abs()).max(f64::MIN_POSITIVE);
-                    let far = (goal / slope).min(4.0 * (z - at).abs());
-                    at + sign * far.max(1.2 * (z - at).abs())
-                }
-                Some(outside) if outside.1.is_finite() => {
-                    let share = (goal - inside.1) / (outside.1 - inside.1);
-                    inside.0 + share.clamp(0.05, 0.95) * (outside.0 - inside.0)
-                }
-                Some(outside) => 0.5 * (inside.0 + outside.0),
+            let Some(outside) = outside else {
+                let slope = (reached / (z - at).abs()).max(f64::MIN_POSITIVE);
+                let far = (goal / slope).min(4.0 * (z - at).abs());
+                next = at + sign * far.max(1.5 * (z - at).abs());
+                continue;
             };
-            if outside.is_some_and(|o| (o.0 - inside.0).abs() < 1e-9 * (1.0 + at.abs())) {
+            let now = (outside.0 - inside.0).abs();
+            if now < 1e-9 * (1.0 + at.abs()) {
                 return Ok(Some(inside.0));
             }
+            // where the rise has a knee, the secant would only creep
+            let share = match outside.1.is_finite() && now <= 0.5 * width {
+                true => ((goal - inside.1) / (outside.1 - inside.1)).clamp(0.02, 0.98),
+                false => 0.5,
+            };
+            width = now;
+            next = inside.0 + share * (outside.0 - inside.0);
         }
         Ok(Some(inside.0))
     }
@@ -221,13 +295,16 @@ impl Edge<'_, '_> {
         start[self.held] = z;
         let mut held = vec![false; start.len()];
         held[self.held] = true;
-        let found = search(self.problem, start, &held, self.watch)?;
-        if found.is_ended {
+        let (point, is_done) = least(self.problem, start, &held, self.watch)?;
+        if !is_done {
             return Ok(None);
         }
-        if found.point.value.is_finite() {
-            self.from = found.point.z.clone();
+        let rise = point.value - self.least;
+        // from far off nobody finds back
+        if rise <= 4.0 * self.rise {
+            self.from = point.z;
         }
-        Ok(Some(found.point.value - self.least))
+        self.points.push((z, rise));
+        Ok(Some(rise))
     }
 }

@@ -106,6 +106,11 @@ impl Unknown {
     pub fn reaches_zero(&self) -> bool {
         self.kind.is_noise() && self.low <= NEARLY * self.start
     }
+
+    /// That it does not stand out.
+    pub fn not_told_from_0(&self) -> String {
+        format!("{}: the log cannot tell it from 0", self.words())
+    }
 }
 
 /// All that a study asks for.
@@ -272,6 +277,14 @@ fn noises(prepared: &Prepared<'_>, logs: &[FittedLog]) -> Result<Vec<Unknown>, E
             &outputs,
         )?,
     };
+    let named = prepared.study().fit.deviations.iter();
+    let named: Vec<Name> = named.map(|(output, _)| output.clone()).collect();
+    meant(
+        prepared.study(),
+        ("noise", "measured output"),
+        &named,
+        &outputs,
+    )?;
     let of = |variable: &Variable| {
         let place = outputs.iter().position(|o| o.name == variable.name);
         let place = place.unwrap_or_default();

@@ -4,6 +4,7 @@
 //! export's, once for every position of a slider.
 
 mod data;
+mod fitted;
 mod html;
 mod knob;
 mod positions;
@@ -23,6 +24,7 @@ use crate::tune::bench::Ground;
 use crate::{
     CheckOptions, Error, Study, Table, certify, check, course::fixed_steps, estimate, prepare,
 };
+use fitted::Fitted;
 use knob::Knob;
 use positions::Positions;
 use told::{Told, without_folder};
@@ -99,6 +101,7 @@ pub fn report(
         Some(positions) => Some(Tradeoff::new(&as_it_is, &design, positions, ground, watch)?),
         None => None,
     };
+    let fitted = log.and_then(|log| Fitted::new(study, log, watch));
     let samples = Log::read(&prepared, table)?.samples;
     notes.extend_from_slice(&outcome.warnings);
     notes.extend_from_slice(&outcome.notes);
@@ -120,6 +123,7 @@ pub fn report(
             None => "a simulation of the study".to_owned(),
         },
         checked: checked(&named),
+        fitted,
         certified,
         data: data::json(&prepared, &outcome, &samples, &moving, tradeoff.as_ref()),
         tradeoff,

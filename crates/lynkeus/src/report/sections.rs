@@ -29,6 +29,9 @@ impl Told<'_> {
             ),
             section("design", "The design", &self.design()),
             section("certificate", "What is guaranteed", &certificate),
+            self.fitted.as_ref().map_or_else(String::new, |fitted| {
+                section("fit", "What the log says of the values", &fitted.html())
+            }),
             self.remarks(),
         ];
         let version = env!("CARGO_PKG_VERSION");

@@ -3,6 +3,7 @@
 use lynkeus_model::{Diagnostic, Plant};
 use serde_json::Value;
 
+use super::fitted::Fitted;
 use super::knob::Knob;
 use super::tradeoff::Tradeoff;
 use crate::print::head::file_name;
@@ -16,6 +17,8 @@ pub(super) struct Told<'a> {
     pub source: String,
     pub outcome: Outcome,
     pub checked: Result<check::Report, Error>,
+    /// where the study has `[fit]`
+    pub fitted: Option<Fitted>,
     pub certified: Result<certify::CertifyReport, Error>,
     pub moving: Result<Knob, Error>,
     pub tradeoff: Option<Tradeoff>,

@@ -19,7 +19,22 @@ pub(crate) struct Whiteness {
 /// lags 1 to 20, or a fifth of its length if that is less. None for a series too short or all zero.
 pub(crate) fn whiteness(series: &[f64]) -> Option<Whiteness> {
     let n = series.len();
-    let lags = MOST_LAGS.min(n / 5);
+    let correlations = autocorrelations(series, MOST_LAGS)?;
+    let lags = correlations.len();
+    let band = band(n);
+    let outside = correlations.iter().filter(|r| r.abs() > band).count();
+    let terms = correlations.iter().zip(1..);
+    let sum: f64 = terms.map(|(r, lag)| r * r / (n - lag) as f64).sum();
+    Some(Whiteness {
+        ljung_box: (n * (n + 2)) as f64 * sum / lags as f64,
+        outside: outside as f64 / lags as f64,
+    })
+}
+
+/// Autocorrelations of a series around zero at lags from 1 to this one, or to a fifth of its length if that is less.
+/// None for a series too short or all zero.
+pub(crate) fn autocorrelations(series: &[f64], most: usize) -> Option<Vec<f64>> {
+    let lags = most.min(series.len() / 5);
     let power: f64 = series.iter().map(|x| x * x).sum();
     if lags == 0 || power.is_nan() || power <= 0.0 {
         return None;
@@ -28,15 +43,12 @@ pub(crate) fn whiteness(series: &[f64]) -> Option<Whiteness> {
         let pairs = series.iter().zip(series.iter().skip(lag));
         pairs.map(|(a, b)| a * b).sum::<f64>() / power
     };
-    let correlations: Vec<f64> = (1..=lags).map(correlation).collect();
-    let band = BAND / (n as f64).sqrt();
-    let outside = correlations.iter().filter(|r| r.abs() > band).count();
-    let terms = correlations.iter().zip(1..);
-    let sum: f64 = terms.map(|(r, lag)| r * r / (n - lag) as f64).sum();
-    Some(Whiteness {
-        ljung_box: (n * (n + 2)) as f64 * sum / lags as f64,
-        outside: outside as f64 / lags as f64,
-    })
+    Some((1..=lags).map(correlation).collect())
+}
+
+/// 95 % of the autocorrelations of a white series of this length are no further from zero.
+pub(crate) fn band(length: usize) -> f64 {
+    BAND / (length as f64).sqrt()
 }
 
 #[cfg(test)]

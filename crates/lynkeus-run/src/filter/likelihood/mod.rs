@@ -10,6 +10,7 @@
 mod code;
 mod plant;
 mod sample;
+mod stiff;
 
 use lynkeus_expr::Tape;
 use lynkeus_native::Function;
@@ -124,8 +125,25 @@ impl Likelihood {
         }))
     }
 
+    /// From now on by implicit steps, for stiff plants, or not; whether it has such: those of a plant alone, which no
+    /// noise disturbs and whose start is known, have them unless their equations are too many.
+    pub fn implicit(&mut self, is_implicit: bool) -> bool {
+        match &mut self.0 {
+            Wide::Four(passes) => passes.implicit(is_implicit),
+            Wide::Eight(passes) => passes.implicit(is_implicit),
+        }
+    }
+
+    /// From now on by so many times as many steps in every interval between two rows.
+    pub fn shorten(&mut self, times: usize) {
+        match &mut self.0 {
+            Wide::Four(passes) => passes.times = times.max(1),
+            Wide::Eight(passes) => passes.times = times.max(1),
+        }
+    }
+
     /// −log L of a log at θ, its gradient and Fisher's information; from row to row by such steps of Runge and
-    /// Kutta ([`Step::Auto`]: one).
+    /// Kutta ([`Step::Auto`]: one), or of Rosenbrock's kind ([`Self::implicit`]).
     ///
     /// # Errors
     /// [`Error::Setting`] for another number of parameters, readings or inputs, a step that is no length or too
@@ -175,6 +193,13 @@ struct Passes<const L: usize> {
     begin: Code<L>,
     /// of t, h, u, x̂, S and θ: x̂ and S a step later
     predict: Code<L>,
+    /// the same by a step for stiff equations
+    implicit: Option<Code<L>>,
+    is_implicit: bool,
+    /// so many times as many steps as are asked for
+    times: usize,
+    /// inputs that move the states
+    drives: Vec<bool>,
     spare: Option<Spare<L>>,
     sensors: Vec<Sensor<L>>,
     inputs: usize,
@@ -254,6 +279,10 @@ impl<const L: usize> Passes<L> {
             parameters,
             begin: sample.begin(compile)?,
             predict: sample.predict(compile)?,
+            implicit: sample.implicit(compile)?,
+            is_implicit: false,
+            times: 1,
+            drives: sample.drives(),
             spare,
             sensors: sensors.collect::<Result<_>>()?,
             inputs: plant.inputs.len(),
@@ -266,6 +295,11 @@ impl<const L: usize> Passes<L> {
                 ..Tangents::default()
             },
         })
+    }
+
+    fn implicit(&mut self, is_implicit: bool) -> bool {
+        self.is_implicit = is_implicit && self.implicit.is_some();
+        self.implicit.is_some()
     }
 
     fn score<'a>(
@@ -284,6 +318,7 @@ impl<const L: usize> Passes<L> {
         }
         let mut before: Option<f64> = None;
         let mut inputs: Vec<f64> = vec![];
+        let mut jumps = true;
         for (place, row) in rows.into_iter().enumerate() {
             check("number of readings", self.sensors.len(), row.readings.len())?;
             check("number of inputs", self.inputs, row.inputs.len())?;
@@ -292,8 +327,13 @@ impl<const L: usize> Passes<L> {
                 return Err(Error::NoNumber { signal, value });
             }
             if let Some(from) = before.filter(|from| *from != row.t) {
-                score.confined += usize::from(self.advance(from, row.t, step, &inputs)?);
+                score.confined += usize::from(self.advance((from, row.t), step, &inputs, jumps)?);
+                jumps = false;
             }
+            let moved = inputs.iter().zip(row.inputs).zip(&self.drives);
+            jumps |= moved
+                .into_iter()
+                .any(|((old, new), drives)| *drives && old != new);
             before = Some(row.t);
             inputs.clear();
             inputs.extend_from_slice(row.inputs);
@@ -310,6 +350,9 @@ impl<const L: usize> Passes<L> {
     fn place(&mut self, parameters: &[f64]) {
         self.begin.place(parameters);
         self.predict.place(parameters);
+        if let Some(implicit) = &mut self.implicit {
+            implicit.place(parameters);
+        }
         if let Some(spare) = &mut self.spare {
             spare.predict.place(parameters);
         }
@@ -322,27 +365,45 @@ impl<const L: usize> Passes<L> {
         }
     }
 
-    /// From one row to the next; whether the estimate had to be put where the plant has a value.
-    fn advance(&mut self, from: f64, to: f64, step: Step, inputs: &[f64]) -> Result<bool> {
+    /// From one row to the next, where what drives the plant may have jumped; whether the estimate had to be put where
+    /// the plant has a value.
+    fn advance(
+        &mut self,
+        (from, to): (f64, f64),
+        step: Step,
+        inputs: &[f64],
+        jumps: bool,
+    ) -> Result<bool> {
         if to < from {
             let (reached, time) = (from, to);
             return Err(Error::TimeBefore { reached, time });
         }
-        let steps = fixed_steps(from, to, step.length(to - from).unwrap_or(to - from))?;
+        let is_graded = jumps && self.is_implicit;
+        let length = step.length(to - from).unwrap_or(to - from);
+        let steps = match is_graded {
+            // those that grow reach any distance
+            true => GRADED * ((to - from) / length).clamp(1.0, MOST_GRADED).ceil() as usize,
+            false => fixed_steps(from, to, length)?,
+        };
         let interval = Interval {
             from,
             to,
-            steps,
+            steps: self.times * steps,
+            is_graded,
             inputs,
         };
+        let predict = match &mut self.implicit {
+            Some(implicit) if self.is_implicit => implicit,
+            _ => &mut self.predict,
+        };
         let Some(spare) = &mut self.spare else {
-            interval.run(&mut self.predict, &mut self.belief);
+            interval.run(predict, &mut self.belief);
             return Ok(false);
         };
         for (before, belief) in spare.before.iter_mut().zip(&self.belief) {
             before.copy_from_slice(belief);
         }
-        interval.run(&mut self.predict, &mut self.belief);
+        interval.run(predict, &mut self.belief);
         let is_value = |x: &[f64; L]| x[0].is_finite();
         if self.belief[0].iter().all(is_value) {
             return Ok(false);
@@ -434,20 +495,43 @@ impl<const L: usize> Passes<L> {
     }
 }
 
-/// From one row to the next by equal steps.
+/// From one row to the next by equal steps, or by steps that grow from one to the next.
 struct Interval<'i> {
     from: f64,
     to: f64,
     steps: usize,
+    /// what is fast goes where it settles: from something below a 10⁻¹⁰ of the interval on
+    is_graded: bool,
     inputs: &'i [f64],
 }
 
+/// So many times as many steps where they grow.
+const GRADED: usize = 16;
+
+/// More steps than so many are as so many where they grow.
+const MOST_GRADED: f64 = 64.0;
+
+/// The logarithm of the last of them over the first.
+const GROWTH: f64 = 25.0;
+
 impl Interval<'_> {
+    /// Where a step begins, and its length.
+    fn step(&self, i: usize) -> [f64; 2] {
+        if self.is_graded {
+            let grown = |i: usize| (GROWTH * i as f64 / self.steps as f64).exp_m1();
+            let scale = (self.to - self.from) / GROWTH.exp_m1();
+            let [begin, end] = [i, i + 1].map(|i| scale * grown(i));
+            return [self.from + begin, end - begin];
+        }
+        let [t, next] = [i, i + 1].map(|i| instant(self.from, self.to, self.steps, i));
+        [t, next - t]
+    }
+
     fn run<const L: usize>(&self, code: &mut Code<L>, belief: &mut [Bundle<L>]) {
         for i in 0..self.steps {
-            let [t, next] = [i, i + 1].map(|i| instant(self.from, self.to, self.steps, i));
+            let [t, h] = self.step(i);
             for (pass, belief) in belief.iter_mut().enumerate() {
-                let next = code.run(pass, [&[t, next - t], self.inputs], &[belief]);
+                let next = code.run(pass, [&[t, h], self.inputs], &[belief]);
                 belief.copy_from_slice(next);
             }
         }

@@ -7,7 +7,8 @@ use crate::{Error, Result};
 
 /// A plant with its sensors and noises as functions of parameters θ.
 ///
-/// Everything is an expression of one graph: f and h of time, states, inputs and θ; noises and starts of θ alone.
+/// Everything is an expression of one graph: f and h of time, states, inputs and θ; noises of sensors of the same, as
+/// the estimate is before the row's readings; densities and starts of θ alone.
 #[derive(Clone, Debug)]
 pub struct ParametricPlant<'g> {
     /// the graph of all expressions
@@ -97,7 +98,7 @@ pub struct ParametricSensor {
     pub limits: Option<Limits>,
 }
 
-/// The noise of a sensor as a function of θ.
+/// The noise of a sensor.
 #[derive(Clone, Copy, Debug)]
 pub enum ParametricLevel {
     /// its variance

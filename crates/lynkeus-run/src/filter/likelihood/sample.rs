@@ -8,6 +8,7 @@ use lynkeus_native::Function;
 
 use super::code::Code;
 use super::plant::{ParametricLevel, ParametricPlant};
+use super::stiff::Alone;
 use crate::Result;
 use crate::classical::{Term, sum};
 use crate::filter::expressions::{Corrected, Flow, corrected};
@@ -163,6 +164,33 @@ impl<'p, 'g> Sample<'p, 'g> {
         self.predict_by(&self.plant.derivatives, compile)
     }
 
+    /// Which inputs move the states.
+    pub fn drives(&self) -> Vec<bool> {
+        let symbols = self.plant.graph.symbols_of(&self.plant.derivatives);
+        let inputs = self.plant.inputs.iter();
+        inputs.map(|input| symbols.contains(input)).collect()
+    }
+
+    /// The same of a plant alone by a step for stiff equations.
+    pub fn implicit<const L: usize>(&self, compile: Compile<L>) -> Result<Option<Code<L>>> {
+        let plant = self.plant;
+        if !self.pattern.is_empty() {
+            return Ok(None);
+        }
+        let alone = Alone {
+            graph: plant.graph,
+            time: plant.time,
+            states: &plant.states,
+            derivatives: &plant.derivatives,
+        };
+        let Some(x) = alone.step(self.h) else {
+            return Ok(None);
+        };
+        let known = [&[plant.time, self.h.node()][..], &plant.inputs].concat();
+        let x: Vec<Node> = x.into_iter().map(Expr::node).collect();
+        self.code((&known, &plant.states), &x, compile).map(Some)
+    }
+
     /// The same with the states limited to their ranges.
     pub fn confined<const L: usize>(&self, compile: Compile<L>) -> Result<Code<L>> {
         let (plant, g) = (self.plant, self.plant.graph);
@@ -199,7 +227,10 @@ impl<'p, 'g> Sample<'p, 'g> {
         let own = self.views.iter().filter(|view| view.0 == sensor);
         let views: Vec<(usize, Node)> = own.map(|view| (view.1, view.2)).collect();
         // as they are at the estimate before the row's readings
-        let all: Vec<Node> = [output]
+        let level = match self.plant.sensors[sensor].noise {
+            ParametricLevel::Variance(level) | ParametricLevel::Share(level) => level,
+        };
+        let all: Vec<Node> = [output, level]
             .into_iter()
             .chain(views.iter().map(|v| v.1))
             .collect();
@@ -211,7 +242,7 @@ impl<'p, 'g> Sample<'p, 'g> {
             .zip(self.at.iter().copied());
         let all = g.substitute(&all, &moved.collect());
         let mut slopes: Vec<Term<'g>> = vec![None; n];
-        for ((column, _), &slope) in views.iter().zip(&all[1..]) {
+        for ((column, _), &slope) in views.iter().zip(&all[2..]) {
             slopes[*column] = self.term(slope);
         }
         let (x, root) = self.belief();
@@ -222,12 +253,13 @@ impl<'p, 'g> Sample<'p, 'g> {
             Some([innovation, noise]) => (innovation, Some(noise)),
             None => (self.reading - predicted, None),
         };
+        let level = g.expr(all[1]);
         let noise = |spread: Term<'g>| match (given, self.plant.sensors[sensor].noise) {
             (Some(given), _) => given,
-            (None, ParametricLevel::Variance(variance)) => g.expr(variance),
-            (None, ParametricLevel::Share(share)) => {
+            (None, ParametricLevel::Variance(_)) => level,
+            (None, ParametricLevel::Share(_)) => {
                 let square = sum(Some(predicted * predicted), spread);
-                g.expr(share).powi(2) * square.unwrap_or(g.constant(0.0))
+                level.powi(2) * square.unwrap_or(g.constant(0.0))
             }
         };
         corrected((&x, &root), &slopes, innovation, noise)
