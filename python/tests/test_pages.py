@@ -5,9 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+import lynkeus
 from conftest import ROOT
 
 #: sections of others, which need more than NumPy and matplotlib
@@ -38,6 +41,24 @@ def test_blocks_run(page: str) -> None:
     assert blocks(page)
     for block in blocks(page):
         exec(compile(block, page, "exec"), names)
+
+
+@pytest.mark.usefixtures("in_a_copy")
+def test_optimisers_and_samplers_end_where_the_fit_does() -> None:
+    for needed in ("scipy", "jax", "emcee"):
+        pytest.importorskip(needed)
+    text = (ROOT / "docs/python.md").read_text(encoding="utf-8")
+    names: dict[str, Any] = {"lynkeus": lynkeus}
+    for title in ("## Fitting to logs", "### A likelihood for optimisers and samplers"):
+        section = re.split(r"^##", text.split(f"\n{title}\n")[1], flags=re.MULTILINE)[0]
+        for block in re.findall(r"^```python\n(.*?)^```$", section, re.MULTILINE | re.DOTALL):
+            exec(compile(block, title, "exec"), names)
+    fit, theta = names["fit"], names["ended"].x
+    sd = np.array([fit.parameters["k"].sd, fit.noise["y"].sd])
+    np.testing.assert_allclose(theta, names["theta"], rtol=1e-5)
+    np.testing.assert_allclose(names["sd"], sd, rtol=1e-3)
+    np.testing.assert_allclose(names["slopes"] / theta, names["likelihood"].gradient(theta), rtol=1e-6)
+    np.testing.assert_allclose(names["sample"].std(axis=0), sd, rtol=0.1)
 
 
 @pytest.mark.usefixtures("in_a_copy")

@@ -290,7 +290,10 @@ impl Scaled {
 }
 
 /// Steps of the differences, in standard deviations.
-const DIFFERENCE: f64 = 0.02;
+const DIFFERENCE: f64 = 0.01;
+
+/// A value that is a smaller share of its start has no size of its own.
+const LEAST: f64 = 1e-4;
 
 /// The Hessian at a point over the unknowns that are free, by differences of exact gradients to fourth order.
 ///
@@ -309,9 +312,13 @@ pub(crate) fn hessian(
             information if information > 0.0 => information.sqrt().recip(),
             _ => 1.0,
         };
-        // a logarithm has a size of its own
-        let is_log = problem.unknowns[i].is_log;
-        let size = if is_log { size.min(1.0) } else { size };
+        // what a log hardly tells may deviate by many times itself
+        let unknown = &problem.unknowns[i];
+        let own = match unknown.is_log {
+            true => 1.0,
+            false => point.z[i].abs().max(LEAST * unknown.start.abs()),
+        };
+        let size = if own > 0.0 { size.min(own) } else { size };
         let (low, high) = ranges[i];
         let room = (point.z[i] - low).min(high - point.z[i]);
         let h = match room > 0.0 {

@@ -118,8 +118,9 @@ impl Likelihood {
     /// [`Error::MissingInput`] for an expression that reads another symbol, [`Error::Setting`] for wrong numbers of
     /// expressions.
     pub fn new(plant: &ParametricPlant<'_>) -> Result<Self> {
-        let sample = Sample::new(plant)?;
-        Self::of(&sample, None)
+        plant.check()?;
+        let plant = plant.by_distance();
+        Self::of(&Sample::new(&plant), None)
     }
 
     /// The same along an unscented filter.
@@ -127,9 +128,10 @@ impl Likelihood {
     /// # Errors
     /// As [`Self::new`], and those of [`SigmaPoints::weights`].
     pub fn unscented(plant: &ParametricPlant<'_>, points: SigmaPoints) -> Result<Self> {
+        plant.check()?;
         let weights = points.weights(plant.states.len())?;
         let shown = unscented::shown(plant);
-        let sample = Sample::full(&shown)?;
+        let sample = Sample::full(&shown);
         let own = Unscented {
             plant,
             sample: &sample,

@@ -9,9 +9,9 @@ use lynkeus_native::Function;
 use super::code::Code;
 use super::plant::{ParametricLevel, ParametricPlant};
 use super::stiff::Alone;
+use crate::Result;
 use crate::classical::{Term, sum};
 use crate::filter::expressions::{Corrected, Flow, corrected};
-use crate::{Error, Result};
 
 pub(super) type Compile<const L: usize> = fn(&Tape) -> Option<Function<L>>;
 
@@ -34,18 +34,8 @@ pub(super) struct Sample<'p, 'g> {
 }
 
 impl<'p, 'g> Sample<'p, 'g> {
-    pub fn new(plant: &'p ParametricPlant<'g>) -> Result<Self> {
+    pub fn new(plant: &'p ParametricPlant<'g>) -> Self {
         let (g, n) = (plant.graph, plant.states.len());
-        let counts = [
-            plant.derivatives.len(),
-            plant.process_noise.len(),
-            plant.start.len(),
-        ];
-        if n == 0 || counts.iter().any(|count| *count != n) {
-            let expected =
-                "one derivative, density and start for each state, of which there are some";
-            return Err(Error::setting("states", expected, n));
-        }
         let outputs: Vec<Node> = plant.sensors.iter().map(|sensor| sensor.output).collect();
         let mut sample = Self {
             plant,
@@ -57,18 +47,18 @@ impl<'p, 'g> Sample<'p, 'g> {
             root: vec![],
         };
         sample.find_pattern();
-        Ok(sample)
+        sample
     }
 
     /// With an S that is full.
-    pub fn full(plant: &'p ParametricPlant<'g>) -> Result<Self> {
-        let mut sample = Self::new(plant)?;
+    pub fn full(plant: &'p ParametricPlant<'g>) -> Self {
+        let mut sample = Self::new(plant);
         let n = plant.states.len();
         let pattern = (0..n).flat_map(|i| (0..=i).map(move |j| (i, j)));
         sample.pattern = pattern.collect();
         let fresh = sample.pattern.iter().map(|_| plant.graph.fresh("S").node());
         sample.root = fresh.collect();
-        Ok(sample)
+        sample
     }
 
     /// Symbols of x̂ and of the entries of S.

@@ -230,21 +230,26 @@ impl<'g> Unscented<'_, 'g> {
         compile: Compile<L>,
     ) -> Result<Points<L>> {
         let (plant, g, n) = (self.plant, self.plant.graph, self.states());
+        // the root of W begins at the noise; that of P, which draws the points, as the filter's does
+        let order = plant.order();
+        let ordered = |nodes: &[Node]| -> Vec<Node> { order.iter().map(|&i| nodes[i]).collect() };
+        let [states, derivatives] = [&plant.states[..], derivatives].map(ordered);
         let rest = plant.inputs.iter().chain(&plant.parameters);
-        let inputs = [plant.time].into_iter().chain(plant.states.iter().copied());
+        let inputs = [plant.time].into_iter().chain(states.iter().copied());
         let inputs: Vec<Node> = inputs.chain(rest.copied()).collect();
-        let f = jacobian::forward(g, derivatives, &plant.states).entries;
+        let f = jacobian::forward(g, &derivatives, &states).entries;
         let places: Vec<(usize, usize)> = f.iter().map(|s| (s.0, s.1)).collect();
         let slopes: Vec<Node> = f.iter().map(|s| s.2).collect();
-        let noise = plant.process_noise.iter();
-        let noise: Vec<Term<'g>> = noise.map(|&q| self.sample.term(q)).collect();
+        let noise = ordered(&plant.process_noise).into_iter();
+        let noise: Vec<Term<'g>> = noise.map(|q| self.sample.term(q)).collect();
+        let is_noisy = noise.iter().any(Option::is_some);
         let flow = Flow {
             graph: g,
             inputs: &inputs,
-            derivatives,
+            derivatives: &derivatives,
             slopes: &slopes,
             places: &places,
-            noise: noise.clone(),
+            noise,
             least_square: LEAST_SQUARE,
         };
         let still = Flow {
@@ -252,21 +257,29 @@ impl<'g> Unscented<'_, 'g> {
             ..flow
         };
         let h = self.sample.length();
-        let fresh = |count: usize| -> Vec<Expr<'g>> { (0..count).map(|_| g.fresh("p")).collect() };
-        let points: Vec<Vec<Expr<'g>>> = (0..=2 * n).map(|_| fresh(n)).collect();
-        // the root of W, what the noise comes to along the centre: carried step by step, it needs no factor of a W
-        // whose columns nearly agree
-        let is_noisy = noise.iter().any(Option::is_some);
-        let centre = |w: &[Term<'g>]| {
-            let mut z = flow.start();
-            let own = points[0].iter().map(|x| Some(*x));
-            own.enumerate().for_each(|(i, x)| z[i] = x);
-            let next = flow.step(h, &z);
-            let root = match is_noisy {
-                true => flow.carried(&next, g.constant(1.0), w),
-                false => vec![None; n * n],
-            };
-            (next, root)
+        let points: Vec<Vec<Expr<'g>>> = (0..=2 * n)
+            .map(|_| (0..n).map(|_| g.fresh("p")).collect())
+            .collect();
+        let begin = |point: &[Expr<'g>], width: usize| {
+            let mut z: Vec<Term<'g>> = order.iter().map(|&i| Some(point[i])).collect();
+            z.resize(n + n * width, None);
+            z
+        };
+        let end = |next: &[Term<'g>]| {
+            let mut x = vec![None; n];
+            order.iter().zip(next).for_each(|(&i, next)| x[i] = *next);
+            x
+        };
+        // W is carried as its root, step by step: a factor of a W whose columns nearly agree is none
+        let centre = |w: &[Term<'g>]| match is_noisy {
+            false => (still.step(h, &begin(&points[0], n)), vec![None; n * n]),
+            true => {
+                let mut z = flow.start();
+                z[..n].copy_from_slice(&begin(&points[0], 0));
+                let next = flow.step(h, &z);
+                let root = flow.carried(&next, g.constant(1.0), w);
+                (next, root)
+            }
         };
         let mut w: Vec<Term<'g>> = vec![None; n * n];
         let (next, root) = loop {
@@ -279,16 +292,11 @@ impl<'g> Unscented<'_, 'g> {
             more.into_iter().for_each(|at| w[at] = Some(g.fresh("w")));
         };
         let places: Vec<usize> = (0..n * n).filter(|&at| w[at].is_some()).collect();
-        let moved = points[1..].iter().flat_map(|point| {
-            let mut z: Vec<Term<'g>> = point.iter().map(|x| Some(*x)).collect();
-            z.resize(n + n * n, None);
-            let mut next = still.step(h, &z);
-            next.truncate(n);
-            next
-        });
+        let moved = points[1..].iter();
+        let moved = moved.flat_map(|point| end(&still.step(h, &begin(point, n))));
         let nothing = g.constant(0.0);
         let node = |term: Term<'g>| term.unwrap_or(nothing).node();
-        let stepped: Vec<Node> = (next[..n].iter().copied().chain(moved))
+        let stepped: Vec<Node> = (end(&next).into_iter().chain(moved))
             .chain(places.iter().map(|&at| root[at]))
             .map(node)
             .collect();
@@ -310,10 +318,11 @@ impl<'g> Unscented<'_, 'g> {
             parts.map(|(x, mean)| Some(*x - *mean)).collect()
         });
         let deviations: Vec<Vec<Term<'g>>> = deviations.collect();
-        let extra = match is_noisy {
-            true => (0..n * n).map(|at| w[at % n * n + at / n]).collect(),
-            false => vec![],
-        };
+        let mut extra = vec![None; if is_noisy { n * n } else { 0 }];
+        for (place, entry) in extra.iter_mut().enumerate() {
+            let own = order.iter().position(|&i| i == place % n);
+            *entry = own.and_then(|own| w[own * n + place / n]);
+        }
         let root = self.spread(&deviations, extra, n);
         let gathered = self.nodes(mean.into_iter().map(Some).collect(), &root, n);
         let known = [&[plant.time, h.node()][..], &plant.inputs].concat();
