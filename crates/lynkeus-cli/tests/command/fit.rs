@@ -823,3 +823,33 @@ fn a_stiff_plant_alone_has_implicit_steps() {
     }
     assert!((number(&found["nll"]) - number(&slow["nll"])).abs() < 1e-3);
 }
+
+/// On a linear plant both filters are one; on another they are not, and each has its own likelihood.
+#[test]
+fn an_unscented_filter_has_its_own_likelihood() {
+    let folder = folder(&format!("{ALL}\nprocess_noise = [\"x\"]"));
+    folder.write("log.csv", &log(1.1, 0.02, 3, noisy));
+    let both = |folder: &Folder| {
+        ["ekf", "ukf"].map(|family| {
+            let study = folder.read("study.toml");
+            folder.write(
+                "own.toml",
+                &study.replace("\"ekf\"", &format!("\"{family}\"")),
+            );
+            let ended = folder.run(&["fit", "own.toml", "log.csv", "--json"]);
+            assert_eq!(ended.code, 0, "{}", ended.err);
+            assert!(!ended.err.contains("note:"), "{}", ended.err);
+            ended.json()
+        })
+    };
+    let [ekf, ukf] = both(&folder);
+    assert!((number(&ekf["nll"]) - number(&ukf["nll"])).abs() < 1e-6);
+    for name in ["k", "g"] {
+        let [a, b] = [&ekf, &ukf].map(|answer| number(&answer["parameters"][name]["value"]));
+        assert!((a - b).abs() < 1e-5 * b, "{name}: {a} beside {b}");
+    }
+    folder.change("plant.mo", "-k*x + g*u", "-k*x + 0.05*sin(3*x) + g*u");
+    let [ekf, ukf] = both(&folder);
+    let apart = (number(&ekf["nll"]) - number(&ukf["nll"])).abs();
+    assert!((1e-5..1.0).contains(&apart), "{apart}");
+}

@@ -6,7 +6,9 @@ use lynkeus_expr::{Expr, Node};
 use lynkeus_model::Plant;
 use lynkeus_observers::FilterTuning;
 use lynkeus_run::Level;
-use lynkeus_run::filter::{Likelihood, Limits, ParametricLevel, ParametricPlant, ParametricSensor};
+use lynkeus_run::filter::{
+    FilterKind, Likelihood, Limits, ParametricLevel, ParametricPlant, ParametricSensor,
+};
 use lynkeus_structure::AugmentedPlant;
 
 use super::unknown::{Kind, Unknown};
@@ -155,7 +157,11 @@ impl Source<'_> {
             start: symbolic.states.iter().enumerate().map(start).collect(),
             parameters: symbols,
         };
-        Likelihood::new(&plant).map_err(explain)
+        let likelihood = match tuning.kind {
+            FilterKind::Unscented(points) if !is_alone => Likelihood::unscented(&plant, points),
+            _ => Likelihood::new(&plant),
+        };
+        likelihood.map_err(explain)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use lynkeus_model::Plant;
 use lynkeus_observers::FilterTuning;
-use lynkeus_observers::kalman::EKF;
+use lynkeus_observers::kalman::{EKF, UKF};
 use lynkeus_structure::AugmentedPlant;
 use lynkeus_study::{Name, Objective};
 
@@ -23,7 +23,7 @@ pub(super) fn with_filter(study: &Study) -> Result<(Study, Vec<String>), Error> 
         .family
         .as_ref()
         .map(|name| name.text.as_str());
-    if family != Some(EKF.name()) {
+    if ![EKF, UKF].iter().any(|own| family == Some(own.name())) {
         if let (Some(family), Objective::Innovations) = (family, study.fit.objective) {
             notes.push(format!(
                 "the likelihood is that of family = \"ekf\": {family} has none whose derivatives are known"
