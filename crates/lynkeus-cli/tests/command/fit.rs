@@ -33,9 +33,9 @@ initial_variance = { x = 0.04 }
 "#;
 
 /// What the logs are made of.
-const K: f64 = 0.6;
+pub(crate) const K: f64 = 0.6;
 const G: f64 = 1.2;
-const R: f64 = 0.1;
+pub(crate) const R: f64 = 0.1;
 
 /// Readings of x by its exact solution, 200 in 40 s; `read` gives that of x by two random numbers.
 fn log(start: f64, density: f64, seed: u64, read: impl Fn(f64, f64) -> f64) -> String {
@@ -76,13 +76,13 @@ pub(crate) fn fitted(folder: &Folder, more: &[&str]) -> Value {
     ended.json()
 }
 
-fn number(value: &Value) -> f64 {
+pub(crate) fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or(f64::NAN)
 }
 
 /// The value is the truth by no more than three of its standard deviations.
 #[track_caller]
-fn holds(found: &Value, truth: f64) {
+pub(crate) fn holds(found: &Value, truth: f64) {
     let [value, sd] = ["value", "sd"].map(|key| number(&found[key]));
     assert!((value - truth).abs() < 3.0 * sd, "{truth}: {found:#}");
     assert!(sd < 0.2 * truth, "{found:#}");
@@ -690,138 +690,6 @@ fn a_simulated_log_gives_back_its_plant() {
     holds(&answer["parameters"]["k"], K);
     holds(&answer["parameters"]["g"], G);
     holds(&answer["noise"]["y"], 0.2);
-}
-
-const SHARED: &str = r#"model Decay
-  parameter Real k(min = 0.05, max = 5) = 0.5;
-  parameter Real s(min = 0.001, max = 5) = 0.3;
-  input Real u;
-  Real x(start = 1, fixed = true);
-  Real wide = 2*s;
-  output Real y = x;
-  output Real z = 3*x;
-equation
-  der(x) = -k*x + u;
-end Decay;
-"#;
-
-const NAMED: &str = r#"plant = "plant.mo"
-[observer]
-family = "ekf"
-[fit]
-objective = "simulation"
-parameters = ["k", "s"]
-log = ["s"]
-noise = { y = "s", z = "wide" }
-"#;
-
-/// Two sensors whose noises are s and 2s, by the exact solution for u = 1.
-fn shared_log(has_z: bool) -> String {
-    let mut normal = Normal(5);
-    let mut text = "t,y,z,u\n".to_owned();
-    for row in 0..150 {
-        let t = 0.05 * f64::from(row);
-        let x = 1.0 / K + (1.0 - 1.0 / K) * (-K * t).exp();
-        let (y, z) = (x + R * normal.next(), 3.0 * x + 2.0 * R * normal.next());
-        match has_z {
-            true => text += &format!("{t},{y},{z},1\n"),
-            false => text += &format!("{t},{y},,1\n"),
-        }
-    }
-    text
-}
-
-#[test]
-fn sensors_may_share_a_noise_that_is_a_parameter() {
-    let folder = Folder::empty();
-    folder.write("plant.mo", SHARED);
-    folder.write("study.toml", NAMED);
-    folder.write("log.csv", &shared_log(true));
-    let answer = fitted(&folder, &["-o", "rows.csv"]);
-    holds(&answer["parameters"]["k"], K);
-    holds(&answer["parameters"]["s"], R);
-    assert!(answer["noise"].as_object().unwrap().is_empty());
-    // s² is the mean of the squares, each over its factor
-    let rows = folder.read("rows.csv");
-    let mut header = rows.lines().next().unwrap().split(',');
-    let places = ["y_innovation", "z_innovation"].map(|name| {
-        let place = header.clone().position(|column| column == name);
-        place.unwrap_or_else(|| {
-            panic!(
-                "{name} is not among {:?}",
-                header.by_ref().collect::<Vec<_>>()
-            )
-        })
-    });
-    let squares = rows.lines().skip(1).map(|row| {
-        let cells: Vec<f64> = row.split(',').map(|cell| cell.parse().unwrap()).collect();
-        cells[places[0]].powi(2) + (0.5 * cells[places[1]]).powi(2)
-    });
-    let least = (squares.sum::<f64>() / 300.0).sqrt();
-    let s = number(&answer["parameters"]["s"]["value"]);
-    assert!((s - least).abs() < 1e-4 * s, "{s} beside {least}");
-    for (found, told) in [
-        (
-            "z = \"widely\"",
-            "no parameter or variable is called \"widely\"",
-        ),
-        ("q = \"wide\"", "no measured output is called \"q\""),
-        (
-            "z = 3",
-            "true, or the name of a parameter or a variable of the model",
-        ),
-    ] {
-        folder.write("study.toml", &NAMED.replace("z = \"wide\"", found));
-        let ended = folder.run(&["fit", "study.toml", "log.csv"]);
-        assert_eq!(ended.code, 2, "{}", ended.err);
-        assert!(ended.err.contains(told), "{}", ended.err);
-    }
-}
-
-#[test]
-fn a_sensor_may_be_silent_in_one_of_several_logs() {
-    let folder = Folder::empty();
-    folder.write("plant.mo", SHARED);
-    folder.write("study.toml", NAMED);
-    folder.write("log.csv", &shared_log(false));
-    folder.write("other.csv", &shared_log(true));
-    let alone = folder.run(&["fit", "study.toml", "log.csv"]);
-    assert_eq!(alone.code, 2);
-    assert!(
-        alone.err.contains("column \"z\" has no number"),
-        "{}",
-        alone.err
-    );
-    let both = folder.run(&["fit", "study.toml", "log.csv", "other.csv", "--json"]);
-    assert_eq!(both.code, 0, "{}", both.err);
-    assert_eq!(both.json()["readings"], 450);
-    assert_eq!(both.json()["errors"]["z"]["fitted"]["readings"], 150);
-}
-
-#[test]
-fn a_stiff_plant_alone_has_implicit_steps() {
-    let folder = Folder::empty();
-    let stiff = SHARED
-        .replace(
-            "Real wide = 2*s;",
-            "Real wide = 2*s;\n  Real fast(start = 1, fixed = true);",
-        )
-        .replace(
-            "der(x) = -k*x + u;",
-            "der(x) = -k*fast + u;\n  der(fast) = 1e7*(x - fast);",
-        );
-    folder.write("plant.mo", &stiff);
-    folder.write("study.toml", NAMED);
-    folder.write("log.csv", &shared_log(true));
-    let found = fitted(&folder, &[]);
-    // fast follows x within 1e-7
-    folder.write("plant.mo", SHARED);
-    let slow = fitted(&folder, &[]);
-    for name in ["k", "s"] {
-        let [a, b] = [&found, &slow].map(|answer| number(&answer["parameters"][name]["value"]));
-        assert!((a - b).abs() < 1e-4 * b, "{name}: {a} beside {b}");
-    }
-    assert!((number(&found["nll"]) - number(&slow["nll"])).abs() < 1e-3);
 }
 
 /// On a linear plant both filters are one; on another they are not, and each has its own likelihood.

@@ -11,6 +11,7 @@ mod faulty;
 mod filters;
 mod filters_noise;
 mod fit;
+mod fit_noise;
 mod fit_shown;
 mod fmu;
 mod fmu_calls;

@@ -71,7 +71,9 @@ fn pick(random: &mut Normal, count: usize) -> usize {
 impl Plant {
     pub fn new(seed: u64) -> Self {
         let random = &mut Normal(seed);
-        (0..8).for_each(|_| drop(random.uniform()));
+        (0..8).for_each(|_| {
+            random.uniform();
+        });
         let n = 1 + pick(random, 4);
         let rows = (0..n).map(|_| Row {
             decay: pick(random, 4),
