@@ -124,7 +124,7 @@ impl Case {
     }
 
     fn likelihood(&self) -> Likelihood {
-        self.likelihood_by(|plant| Likelihood::new(plant))
+        self.likelihood_by(Likelihood::new)
     }
 
     fn likelihood_by(
