@@ -267,7 +267,7 @@ def test_what_is_wrong_is_refused() -> None:
         leaking(fit={}).likelihood(recorded())
     with pytest.raises(lynkeus.LimitError):
         leaking().likelihood(recorded(), time_limit=0.0)
-    assert leaking(observer="ukf").likelihood(recorded()).notes == leaking(observer="ukf").fit(recorded()).notes != []
+    assert leaking(observer="mhe").likelihood(recorded()).notes == leaking(observer="mhe").fit(recorded()).notes != []
 
 
 def test_a_log_that_contradicts_itself_is_warned_of() -> None:

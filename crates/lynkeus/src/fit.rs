@@ -37,9 +37,9 @@ use experiment::Ahead;
 pub(crate) use json::FitReport;
 use known::Exact;
 use posed::Posed;
-use problem::{Point, Problem, Term};
+use problem::{Point, Problem, Steps, Term};
 use search::{Found, search};
-use steps::{SETTLED, Steps};
+use steps::SETTLED;
 use uncertainty::Uncertainty;
 use unknown::Unknown;
 
@@ -200,6 +200,13 @@ impl Work<'_> {
         let count = settings.starts.unwrap_or(1);
         let from = starts::spread(&self.problem, &begin.z, count, settings.seed);
         let mut ends = self.searches(begin, &from, usize::MAX, watch)?;
+        let done = ends.iter().filter(|end| !end.is_ended).count();
+        if (1..ends.len()).contains(&done) {
+            self.warnings.push(format!(
+                "a limit ended the search: {done} of {} starts were searched from to the end",
+                ends.len()
+            ));
+        }
         if settings.starts.is_some() || self.study.budget.spent().is_some() {
             return Ok(ends);
         }
@@ -207,6 +214,9 @@ impl Work<'_> {
             return Ok(ends);
         };
         let from = starts::best(&mut self.problem, &begin.z, settings.seed)?;
+        if from.is_empty() {
+            return Ok(ends);
+        }
         let further = self.searches(begin, &from, MOST_STEPS, watch)?;
         let least = ends[0].point.value - SAME;
         let is_better = |end: &&Found| end.point.value < least;
@@ -375,14 +385,30 @@ impl Work<'_> {
             .collect();
         // beside an edge of where the plant has values there is no Hessian
         let has_hessian = !best.is_ended && best.hessian.iter().all(|x| x.is_finite());
+        // short of the end the Hessian says nothing yet of what the logs tell
         let flat = match has_hessian {
-            true => known::flat(&best.hessian, &free),
+            true if best.is_converged => {
+                let mut flat = known::flat(&best.hessian, &free);
+                flat.extend(free.iter().filter(|&&i| self.is_faint(&best, i)));
+                flat.sort_unstable();
+                flat.dedup();
+                flat
+            }
+            true => known::flat(&best.point.information, &free),
             false => vec![],
         };
         self.warn(&best, &optima);
         let mut fit = self.answer(plant, begin, best, optima)?;
         fit.undetermined = flat.iter().map(|&i| fit.unknowns[i].label()).collect();
         Ok(fit)
+    }
+
+    /// Whether a value could be anything in its range and far beyond, as where all readings are at an end of theirs.
+    fn is_faint(&self, best: &Found, i: usize) -> bool {
+        let (low, high) = self.problem.ranges()[i];
+        let range = Some(high - low).filter(|range| range.is_finite());
+        let width = range.unwrap_or(1.0).max(best.point.z[i].abs());
+        best.hessian[(i, i)].sqrt().recip() > FAINT * width
     }
 
     fn warn(&mut self, best: &Found, optima: &[Optimum]) {
@@ -526,6 +552,9 @@ fn ended(point: Point) -> Found {
 
 /// Ends as one where their −log L differs by no more than this.
 const SAME: f64 = 1e-3;
+
+/// So many of its range a value's standard deviation is where the logs tell nothing of it.
+const FAINT: f64 = 1e4;
 
 /// Steps after which a further search that is not yet better is given up.
 const MOST_STEPS: usize = 25;

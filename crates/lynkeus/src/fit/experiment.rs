@@ -7,9 +7,10 @@
 //! Designs*, 1992.
 
 mod candidates;
+mod extra;
 mod extras;
 
-use lynkeus_run::filter::{Likelihood, Row};
+use lynkeus_run::filter::Likelihood;
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 use serde::Serialize;
 
@@ -22,7 +23,8 @@ use crate::entries::{Named, finite};
 use crate::words::explain;
 use crate::{Error, Study};
 use candidates::{Candidate, Experiment};
-use extras::{Extra, Predictor};
+use extra::Extra;
+use extras::{Predictor, own, with_starts};
 
 /// What is known of the next experiment.
 #[derive(Clone, Debug, Default)]
@@ -365,43 +367,5 @@ impl<'p, 'l> Judge<'p, 'l> {
             determines: names(&determines),
             undetermined: names(flat),
         }
-    }
-}
-
-/// The values with the starts of the log to come, which are those of the first one.
-fn with_starts(problem: &Problem<'_>, found: &Found) -> (Vec<Unknown>, Vec<f64>) {
-    let mut unknowns = problem.unknowns.to_vec();
-    let mut values = problem.values(&found.point.z);
-    let next = problem.logs.len();
-    for (place, unknown) in problem.unknowns.iter().enumerate() {
-        if let Kind::Start { state, log: 0 } = unknown.kind {
-            unknowns.push(Unknown {
-                kind: Kind::Start { state, log: next },
-                ..unknown.clone()
-            });
-            values.push(values[place]);
-        }
-    }
-    (unknowns, values)
-}
-
-/// Those that a log to come depends on, with their places.
-fn own<'u>(problem: &Problem<'_>, unknowns: &'u [Unknown]) -> Vec<(usize, &'u Unknown)> {
-    let next = problem.logs.len();
-    let is_own = |kind: Kind| !matches!(kind, Kind::Start { log, .. } if log != next);
-    let all = unknowns.iter().enumerate();
-    all.filter(|(_, unknown)| is_own(unknown.kind)).collect()
-}
-
-impl Experiment {
-    /// As a likelihood reads it.
-    fn rows(&self) -> impl Iterator<Item = Row<'_>> {
-        let [outputs, inputs] = self.widths;
-        let time = self.time.iter().enumerate();
-        time.map(move |(k, &t)| Row {
-            t,
-            readings: &self.readings[k * outputs..(k + 1) * outputs],
-            inputs: &self.inputs[k * inputs..(k + 1) * inputs],
-        })
     }
 }

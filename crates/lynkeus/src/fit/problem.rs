@@ -1,10 +1,10 @@
 //! What is made least: −log L over all logs, and what was known before.
 
+use lynkeus_run::Step;
 use lynkeus_run::filter::{Likelihood, Score, Seen};
 use nalgebra::{DMatrix, DVector};
 
 use super::logs::FittedLog;
-use super::steps::Steps;
 use super::unknown::Unknown;
 use crate::Error;
 use crate::words::explain;
@@ -32,6 +32,36 @@ pub(crate) struct Term {
     pub likelihood: Likelihood,
     /// the places of the unknowns that it depends on
     pub places: Vec<usize>,
+}
+
+/// The steps from one row to the next.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Steps {
+    pub length: Step,
+    /// how often that is halved
+    pub halvings: u32,
+    pub is_implicit: bool,
+    /// a factor of all that −log L may be wrong by
+    pub tolerance: f64,
+}
+
+impl Steps {
+    /// From now on a likelihood of the same plant goes by them.
+    pub fn on(self, likelihood: &mut Likelihood) {
+        likelihood.implicit(self.is_implicit);
+        likelihood.shorten(1 << self.halvings);
+    }
+}
+
+impl Default for Steps {
+    fn default() -> Self {
+        Self {
+            length: Step::Auto,
+            halvings: 0,
+            is_implicit: false,
+            tolerance: 1.0,
+        }
+    }
 }
 
 /// What a fit makes least.

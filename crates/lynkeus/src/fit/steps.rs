@@ -1,12 +1,11 @@
 //! Steps of Runge and Kutta that are short enough for −log L.
 
 use lynkeus_expr::Budget;
-use lynkeus_run::filter::Likelihood;
 use lynkeus_run::{Method, Step};
 use nalgebra::DVector;
 
 use super::logs::FittedLog;
-use super::problem::{Point, Problem};
+use super::problem::{Point, Problem, Steps};
 use crate::prepare::systems;
 use crate::{Error, Study};
 
@@ -27,36 +26,6 @@ const CONFINED: usize = 10;
 
 /// What a study's relative tolerance is where it does not say: a smaller one makes all others here as much smaller.
 const USUAL: f64 = 1e-9;
-
-/// The steps from one row to the next.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Steps {
-    pub length: Step,
-    /// how often that is halved
-    pub halvings: u32,
-    pub is_implicit: bool,
-    /// a factor of all that −log L may be wrong by
-    pub tolerance: f64,
-}
-
-impl Steps {
-    /// From now on a likelihood of the same plant goes by them.
-    pub fn on(self, likelihood: &mut Likelihood) {
-        likelihood.implicit(self.is_implicit);
-        likelihood.shorten(1 << self.halvings);
-    }
-}
-
-impl Default for Steps {
-    fn default() -> Self {
-        Self {
-            length: Step::Auto,
-            halvings: 0,
-            is_implicit: false,
-            tolerance: 1.0,
-        }
-    }
-}
 
 impl Problem<'_> {
     /// The study's own values, at steps that are short enough; from there on as [`Self::confine`] has it.

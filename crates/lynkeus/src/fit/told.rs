@@ -134,8 +134,8 @@ impl Fit {
                 Cell::from(unknown.label()),
                 Cell::number(Some(known.value), digits),
                 number(known.sd),
-                number(low),
-                number(high),
+                Cell::number(low, digits),
+                Cell::number(high, digits),
                 number(Some(unknown.start)),
                 Cell::from(remark),
             ]

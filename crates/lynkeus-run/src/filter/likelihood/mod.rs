@@ -8,6 +8,7 @@
 //! inverse is the covariance of what it finds (K. J. Åström, *Automatica* 16 (1980) 551–574).
 
 mod code;
+mod interval;
 mod plant;
 mod sample;
 mod stiff;
@@ -18,10 +19,11 @@ use lynkeus_native::Function;
 
 use super::SigmaPoints;
 use super::censored::{End, Tail};
-use crate::integrator::{fixed_steps, instant};
+use crate::integrator::fixed_steps;
 use crate::noise::Limits;
 use crate::{Error, Method, Result, Step};
 use code::{Bundle, Code, passes};
+use interval::{GRADED, Interval, MOST_GRADED};
 pub use plant::{ParametricLevel, ParametricPlant, ParametricSensor};
 use sample::Sample;
 use unscented::{Points, Unscented};
@@ -577,49 +579,6 @@ impl<const L: usize> Passes<L> {
             belief.copy_from_slice(found);
         }
         score.count_end(end, &self.seen);
-    }
-}
-
-/// From one row to the next by equal steps, or by steps that grow from one to the next.
-struct Interval<'i> {
-    from: f64,
-    to: f64,
-    steps: usize,
-    /// what is fast goes where it settles: from something below a 10⁻¹⁰ of the interval on
-    is_graded: bool,
-    inputs: &'i [f64],
-}
-
-/// So many times as many steps where they grow.
-const GRADED: usize = 16;
-
-/// More steps than so many are as so many where they grow.
-const MOST_GRADED: f64 = 64.0;
-
-/// The logarithm of the last of them over the first.
-const GROWTH: f64 = 25.0;
-
-impl Interval<'_> {
-    /// Where a step begins, and its length.
-    fn step(&self, i: usize) -> [f64; 2] {
-        if self.is_graded {
-            let grown = |i: usize| (GROWTH * i as f64 / self.steps as f64).exp_m1();
-            let scale = (self.to - self.from) / GROWTH.exp_m1();
-            let [begin, end] = [i, i + 1].map(|i| scale * grown(i));
-            return [self.from + begin, end - begin];
-        }
-        let [t, next] = [i, i + 1].map(|i| instant(self.from, self.to, self.steps, i));
-        [t, next - t]
-    }
-
-    fn run<const L: usize>(&self, code: &mut Code<L>, belief: &mut [Bundle<L>]) {
-        for i in 0..self.steps {
-            let [t, h] = self.step(i);
-            for (pass, belief) in belief.iter_mut().enumerate() {
-                let next = code.run(pass, [&[t, h], self.inputs], &[belief]);
-                belief.copy_from_slice(next);
-            }
-        }
     }
 }
 

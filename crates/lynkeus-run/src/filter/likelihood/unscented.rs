@@ -7,9 +7,10 @@
 use lynkeus_expr::{Expr, Node, jacobian};
 
 use super::code::{Bundle, Code};
+use super::interval::Interval;
 use super::plant::{ParametricPlant, ParametricSensor};
 use super::sample::{Compile, LEAST_SQUARE, Sample};
-use super::{Interval, Result};
+use crate::Result;
 use crate::classical::{Term, sum};
 use crate::filter::Weights;
 use crate::filter::expressions::{Flow, factor, reflected};

@@ -4,9 +4,10 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{Node, Tape};
 use lynkeus_model::Variable;
+use lynkeus_run::filter::Row;
 use lynkeus_study::{self, Expression, Name};
 
-use super::extras::{Extra, usual};
+use super::extra::{Extra, usual};
 use crate::fit::logs::FittedLog;
 use crate::fit::plant::Source;
 use crate::prepare::{self, systems};
@@ -65,6 +66,17 @@ pub(super) struct Experiment {
 }
 
 impl Experiment {
+    /// As a likelihood reads it.
+    pub fn rows(&self) -> impl Iterator<Item = Row<'_>> {
+        let [outputs, inputs] = self.widths;
+        let time = self.time.iter().enumerate();
+        time.map(move |(k, &t)| Row {
+            t,
+            readings: &self.readings[k * outputs..(k + 1) * outputs],
+            inputs: &self.inputs[k * inputs..(k + 1) * inputs],
+        })
+    }
+
     pub fn readings(&self) -> usize {
         self.readings.iter().filter(|y| y.is_finite()).count()
     }

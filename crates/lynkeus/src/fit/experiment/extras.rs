@@ -1,45 +1,17 @@
 //! Sensors that are not there yet, and what all sensors are expected to show.
 
-use lynkeus_expr::Node;
 use lynkeus_run::filter::{Likelihood, Limits};
 use lynkeus_study::Noise;
 
 use super::candidates::{Candidate, Experiment};
-use super::{own, with_starts};
+use super::extra::{Extra, one_in_a_hundred};
 use crate::Error;
 use crate::fit::logs::FittedLog;
 use crate::fit::plant::{Further, Source};
 use crate::fit::problem::Problem;
 use crate::fit::search::Found;
-use crate::fit::unknown::Unknown;
-use crate::words::{explain, number};
-
-/// The noise of a sensor of which nothing is said, as a share of its range.
-const LEVEL: f64 = 0.01;
-
-/// A sensor that is not there yet.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Extra {
-    /// the output or state that it shows
-    pub name: String,
-    pub node: Node,
-    /// none where it follows from how far the output goes
-    pub noise: Option<Noise>,
-    pub limits: Option<Limits>,
-}
-
-impl Extra {
-    /// `x ±0.1`
-    pub fn words(&self) -> String {
-        let noise = match self.noise {
-            None => String::new(),
-            Some(Noise::Absolute(deviation)) => format!(" \u{b1}{}", number(deviation)),
-            Some(Noise::Relative(share)) => format!(" \u{b1}{} %", number(100.0 * share)),
-            Some(Noise::Uniform(bound)) => format!(" evenly within \u{b1}{}", number(bound)),
-        };
-        format!("{}{noise}", self.name)
-    }
-}
+use crate::fit::unknown::{Kind, Unknown};
+use crate::words::explain;
 
 /// All of them, so that one likelihood serves every candidate: a sensor that does not report is none.
 pub(super) struct Extras {
@@ -89,18 +61,6 @@ impl Extras {
         }
         Ok(())
     }
-}
-
-/// The noise of a sensor that shows what lies in this range.
-pub(super) fn usual(low: f64, high: f64) -> Option<Noise> {
-    let range = high - low;
-    (range > 0.0 && range.is_finite()).then(|| one_in_a_hundred(range))
-}
-
-/// To two digits: nobody knows it better.
-fn one_in_a_hundred(range: f64) -> Noise {
-    let deviation = LEVEL * range;
-    Noise::Absolute(format!("{deviation:.1e}").parse().unwrap_or(deviation))
 }
 
 /// The likelihood of a log with these sensors, too.
@@ -208,4 +168,29 @@ fn inside(limits: Option<Limits>) -> f64 {
         (false, true) => high - high.abs() - 1.0,
         (false, false) => 0.0,
     }
+}
+
+/// The values with the starts of the log to come, which are those of the first one.
+pub(super) fn with_starts(problem: &Problem<'_>, found: &Found) -> (Vec<Unknown>, Vec<f64>) {
+    let mut unknowns = problem.unknowns.to_vec();
+    let mut values = problem.values(&found.point.z);
+    let next = problem.logs.len();
+    for (place, unknown) in problem.unknowns.iter().enumerate() {
+        if let Kind::Start { state, log: 0 } = unknown.kind {
+            unknowns.push(Unknown {
+                kind: Kind::Start { state, log: next },
+                ..unknown.clone()
+            });
+            values.push(values[place]);
+        }
+    }
+    (unknowns, values)
+}
+
+/// Those that a log to come depends on, with their places.
+pub(super) fn own<'u>(problem: &Problem<'_>, unknowns: &'u [Unknown]) -> Vec<(usize, &'u Unknown)> {
+    let next = problem.logs.len();
+    let is_own = |kind: Kind| !matches!(kind, Kind::Start { log, .. } if log != next);
+    let all = unknowns.iter().enumerate();
+    all.filter(|(_, unknown)| is_own(unknown.kind)).collect()
 }
