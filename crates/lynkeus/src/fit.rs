@@ -213,11 +213,20 @@ impl Work<'_> {
         let Some(doubt) = self.doubt(&ends[0])? else {
             return Ok(ends);
         };
-        let from = starts::best(&mut self.problem, &begin.z, settings.seed)?;
+        let from = starts::best(
+            &mut self.problem,
+            &begin.z,
+            settings.seed,
+            &self.study.budget,
+        )?;
         if from.is_empty() {
             return Ok(ends);
         }
         let further = self.searches(begin, &from, MOST_STEPS, watch)?;
+        if self.study.budget.spent().is_some() {
+            self.warnings
+                .push(format!("{doubt}; a limit cut further starts short"));
+        }
         let least = ends[0].point.value - SAME;
         let is_better = |end: &&Found| end.point.value < least;
         let better = further.iter().filter(is_better).count();
@@ -300,16 +309,25 @@ impl Work<'_> {
     /// At steps that are short enough there, too, and with noises at their least where that is as good.
     fn settled(&mut self, mut best: Found) -> Result<Found, Error> {
         let mut is_settled = false;
+        let mut steps = self.problem.steps;
         for _ in 0..HALVINGS {
-            if best.is_ended {
+            if best.is_ended || self.problem.is_shortest() {
                 break;
             }
             let Some(fine) = self.problem.halved(&best.point)? else {
                 is_settled = true;
                 break;
             };
-            best = self.again(fine.z, &[])?;
+            // an end that has a value is worth more than shorter steps that have none
+            if !fine.value.is_finite() {
+                continue;
+            }
+            let next = self.again(fine.z, &[])?;
+            if next.point.value.is_finite() {
+                (best, steps) = (next, self.problem.steps);
+            }
         }
+        self.problem.step_as(steps);
         if let (false, false, Step::AtMost(step)) =
             (is_settled, best.is_ended, self.problem.steps.length)
         {
@@ -330,7 +348,6 @@ impl Work<'_> {
             if there.value <= best.point.value + SETTLED {
                 held[i] = true;
                 best = self.again(z, &held)?;
-                best.is_bound[i] = true;
             }
         }
         Ok(best)

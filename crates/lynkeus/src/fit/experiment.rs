@@ -121,7 +121,9 @@ pub(super) fn ahead(
         let (a, b) = (key(a), key(b));
         a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
     });
-    let now = judge.worst(&now).filter(|_| now.flat.is_empty());
+    // starts of the log to come are not what these logs should tell
+    let is_told = now.flat.iter().all(|&i| i >= problem.unknowns.len());
+    let now = judge.worst(&now).filter(|_| is_told);
     let now = now.map(|(place, share)| (judge.unknowns[place].label(), share));
     Ok((Ahead { now, tried }, notes))
 }

@@ -1,5 +1,6 @@
 //! Where searches start.
 
+use lynkeus_expr::Budget;
 use nalgebra::DVector;
 
 use super::problem::Problem;
@@ -68,9 +69,14 @@ pub(super) fn best(
     problem: &mut Problem<'_>,
     begin: &DVector<f64>,
     seed: u64,
+    budget: &Budget,
 ) -> Result<Vec<DVector<f64>>, Error> {
     let all = spread(problem, begin, LOOKED_AT + 1, seed);
-    let points = all.into_iter().skip(1).map(|z| problem.at(z));
+    let within = all
+        .into_iter()
+        .skip(1)
+        .take_while(|_| budget.spent().is_none());
+    let points = within.map(|z| problem.at(z));
     let mut points = points.collect::<Result<Vec<_>, _>>()?;
     points.retain(|point| point.value.is_finite());
     points.sort_by(|a, b| a.value.total_cmp(&b.value));

@@ -151,6 +151,12 @@ impl Problem<'_> {
         self.shorten(steps.halvings);
     }
 
+    /// Whether steps of half the length are too many.
+    pub fn is_shortest(&self) -> bool {
+        // a few halvings are worth their time on any log
+        self.steps.halvings > 2 && self.rows() << (self.steps.halvings + 1) > MOST_STEPS
+    }
+
     /// The same point at half the steps, which are kept where that changes it.
     ///
     /// # Errors

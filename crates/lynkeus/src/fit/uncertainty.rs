@@ -287,7 +287,7 @@ impl Edge<'_, '_> {
             width = now;
             next = inside.0 + share * (outside.0 - inside.0);
         }
-        Ok(Some(inside.0))
+        Ok(Some(outside.map_or(limit, |_| inside.0)))
     }
 
     fn rise_at(&mut self, z: f64) -> Result<Option<f64>, Error> {
