@@ -573,7 +573,8 @@ const SAME: f64 = 1e-3;
 /// So many of its range a value's standard deviation is where the logs tell nothing of it.
 const FAINT: f64 = 1e4;
 
-/// Steps after which a further search that is not yet better is given up.
+/// Trials of a step, damped ones too, after which a further search ends; the best of those goes on where it is better
+/// than the first.
 const MOST_STEPS: usize = 25;
 
 /// Different ends of searches that converged, the best first.

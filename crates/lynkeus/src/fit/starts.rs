@@ -6,8 +6,8 @@ use nalgebra::DVector;
 use super::problem::Problem;
 use crate::Error;
 
-/// How far searches of noises, and of what has no bounds, start from the study's own values: a factor of 10, or that
-/// share of the value.
+/// How far searches of noises, and of logarithms without bounds, start from the study's own values: a factor of 10;
+/// others without bounds by the value itself, or by 1.
 const APART: f64 = 10.0;
 
 /// The study's own values, then points that fill the bounds evenly (the additive recurrence of M. Roberts, *The
