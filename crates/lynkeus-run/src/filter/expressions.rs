@@ -3,6 +3,7 @@
 
 use lynkeus_expr::{Expr, Graph, Node};
 
+use super::order::by_distance;
 use crate::Jacobian;
 use crate::classical::{Term, classical_step, sum};
 use crate::equations::Equations;
@@ -64,6 +65,14 @@ impl<'f, 'g> Flow<'f, 'g> {
 
     fn is_noisy(&self) -> bool {
         self.noise.iter().any(Option::is_some)
+    }
+
+    /// The states from the noise on, as its factor goes.
+    fn order(&self) -> Vec<usize> {
+        let noisy: Vec<bool> = self.noise.iter().map(Option::is_some).collect();
+        let slopes = self.places.iter().copied().zip(self.slopes.iter().copied());
+        let order = by_distance(self.graph, &noisy, slopes);
+        order.unwrap_or_else(|| (0..self.states()).collect())
     }
 
     fn term(&self, node: Node) -> Term<'g> {
@@ -146,10 +155,16 @@ impl<'f, 'g> Flow<'f, 'g> {
         let row = |i: usize| &next[n + i * width..n + (i + 1) * width];
         let mut rows = vec![];
         if width > n {
-            let noise = (0..n).flat_map(|i| &row(i)[n..]);
+            let order = self.order();
+            let noise = order
+                .iter()
+                .flat_map(|&i| order.iter().map(move |&j| row(i)[n + j]));
             let noise: Vec<Term<'g>> = noise.map(|w| w.map(|w| scale * w)).collect();
             let factor = factor(self.graph, &noise, n);
-            rows.extend((0..n * n).map(|at| factor[at % n * n + at / n]));
+            rows.resize(n * n, None);
+            for (i, &place) in order.iter().enumerate() {
+                (0..n).for_each(|k| rows[k * n + place] = factor[i * n + k]);
+            }
         }
         let begin = rows.len();
         rows.resize(begin + n * n, None);

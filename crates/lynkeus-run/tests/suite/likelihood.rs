@@ -89,6 +89,11 @@ impl Case {
         self.seed.is_multiple_of(4) && self.sensors == 1
     }
 
+    /// Noise acts on one state alone where there are three.
+    fn is_noisy(&self, state: usize) -> bool {
+        self.n != 3 || state == self.seed as usize / 4 % 3
+    }
+
     fn noise(&self, r: Expr<'_>) -> ParametricLevel {
         match self.is_share() {
             true => ParametricLevel::Share((SHARE * r).node()),
@@ -139,9 +144,6 @@ impl Case {
         let (states, derivatives, outputs, [time, u]) = self.plant(&nodes);
         let [q, r, start] = [0, 1, 2].map(|k| θ[self.n + k]);
         let zero = g.constant(0.0).node();
-        // noise acts on the first state alone where there are three; of the others the filter's W has the order in
-        // which they stand
-        let is_noisy = |i: usize| self.n != 3 || i == 0;
         make(&ParametricPlant {
             graph: g,
             time,
@@ -156,7 +158,7 @@ impl Case {
                 })
                 .collect(),
             process_noise: (0..self.n)
-                .map(|i| if is_noisy(i) { q.node() } else { zero })
+                .map(|i| if self.is_noisy(i) { q.node() } else { zero })
                 .collect(),
             ranges: vec![],
             start: states
@@ -196,7 +198,7 @@ impl Case {
                 })
                 .collect(),
             process_noise: (0..self.n)
-                .map(|i| if self.n != 3 || i == 0 { q } else { 0.0 })
+                .map(|i| if self.is_noisy(i) { q } else { 0.0 })
                 .collect(),
             initial_variance: vec![0.2 * 0.2; self.n],
             ranges: vec![],

@@ -121,8 +121,7 @@ impl Likelihood {
     /// expressions.
     pub fn new(plant: &ParametricPlant<'_>) -> Result<Self> {
         plant.check()?;
-        let plant = plant.by_distance();
-        Self::of(&Sample::new(&plant), None)
+        Self::of(&Sample::new(plant), None)
     }
 
     /// The same along an unscented filter.
