@@ -487,6 +487,7 @@ impl Work<'_> {
         }
         let (errors, rows) =
             errors::errors(&mut self.problem, alone.as_mut(), &self.outputs, &values)?;
+        self.warn_of_certain(&rows);
         let coloured = errors.iter().filter(|own| own.are_coloured());
         let coloured: Vec<&str> = coloured.map(|own| own.output.as_str()).collect();
         if !coloured.is_empty() && !is_ended {
@@ -525,6 +526,20 @@ impl Work<'_> {
             },
             file: self.study.file.clone(),
         })
+    }
+
+    /// Readings that do not count: neither the model nor the sensor leaves room for an error.
+    fn warn_of_certain(&mut self, rows: &errors::Rows) {
+        for column in &rows.columns {
+            let certain = column.deviation.iter().filter(|d| **d == 0.0).count();
+            if certain > 0 {
+                self.warnings.push(format!(
+                    "{} of {} did not count: the model is certain of it, and a share of 0 is no noise; state the noise in the unit of the output",
+                    counted(certain, "reading"),
+                    column.output
+                ));
+            }
+        }
     }
 
     /// The next experiment, where it is asked for.

@@ -315,19 +315,18 @@ pub(crate) fn projected<'g>(root: &[Term<'g>], c: &[Term<'g>]) -> Vec<Term<'g>> 
     (0..n).map(projected).collect()
 }
 
-/// Carlson's update of x̂ and S by a reading that is `innovation` off; `slopes` is the row of C. The variance of
-/// its noise, which is not 0, is a function of how uncertain the output is. As [`Root::update`](super::root::Root::update).
+/// Carlson's update of x̂ and S by a reading that is `innovation` off; `slopes` is the row of C, `noise` the variance of
+/// its noise, which is not 0. As [`Root::update`](super::root::Root::update).
 pub(crate) fn corrected<'g>(
     (x, root): (&[Term<'g>], &[Term<'g>]),
     slopes: &[Term<'g>],
     innovation: Expr<'g>,
-    noise: impl Fn(Term<'g>) -> Expr<'g>,
+    noise: Expr<'g>,
 ) -> Corrected<'g> {
     let n = x.len();
     let mut root = root.to_vec();
     let projected = projected(&root, slopes);
     let spread = dot(&projected, &projected);
-    let noise = noise(spread);
     let variance = spread.map_or(noise, |spread| spread + noise);
     let mut gain: Vec<Term<'g>> = vec![None; n];
     let mut alpha = noise;

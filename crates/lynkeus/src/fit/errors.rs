@@ -66,6 +66,10 @@ struct Sum {
 
 impl Sum {
     fn add(&mut self, innovation: f64, variance: f64) {
+        if variance == 0.0 {
+            // it does not count, either
+            return;
+        }
         self.count += 1;
         self.squares += innovation * innovation;
         self.scaled += innovation * innovation / variance;
@@ -126,7 +130,7 @@ pub(super) fn errors<'p>(
                 }
                 columns.innovation[at] = seen.innovation;
                 columns.deviation[at] = seen.variance.sqrt();
-                if is_held_out == 0 {
+                if is_held_out == 0 && seen.variance > 0.0 {
                     scaled[seen.sensor].push(seen.innovation / seen.variance.sqrt());
                 }
             })?;
