@@ -48,6 +48,7 @@ mod runs;
 mod said;
 mod samples;
 mod scatter;
+mod screens;
 mod story;
 mod tables;
 mod texts;
