@@ -29,7 +29,7 @@ const LATE: f64 = 1e-6;
 
 /// An experiment that could be made.
 #[derive(Clone, Debug)]
-pub(in crate::fit) struct Candidate {
+pub(crate) struct Candidate {
     /// what the study calls it, or what it is
     name: Title,
     pub(super) extras: Vec<Extra>,
