@@ -57,11 +57,14 @@ fn write(to: &mut Vec<u8>, x: f64, digits: usize) {
         };
         return to.extend_from_slice(name);
     }
-    let quick = match digits {
-        ..=DIGITS => Decimal::rounded(x, digits),
-        _ => Decimal::told(x),
+    let (quick, count) = match digits {
+        ..=DIGITS => (rounded(x.abs(), digits), digits),
+        _ => (told(x.abs()), TELLING),
     };
-    let decimal = quick.unwrap_or_else(|| Decimal::any(x, digits));
+    let decimal = match quick {
+        Some((whole, point)) => Decimal::of(x.is_sign_negative(), whole, count, point),
+        None => Decimal::any(x, digits),
+    };
     decimal.write(to);
 }
 
@@ -86,48 +89,49 @@ fn scaled(x: f64, digits: usize) -> Option<(f64, f64, i32)> {
     (least <= scaled && scaled < most).then_some((scaled, power, point))
 }
 
+/// x = 0.whole · 10^point to so many digits, at most [`DIGITS`]; none where x is out of reach or so close to the middle
+/// of two such numbers that the shortest decimal number for x may be on its other side.
+fn rounded(x: f64, digits: usize) -> Option<(i64, i32)> {
+    let (scaled, _, point) = scaled(x, digits)?;
+    let whole = scaled as i64;
+    let part = scaled - whole as f64;
+    // x is rounded, and so is the product: by 2⁻⁵³ of 10¹² each, far less than this
+    let is_clear = (part - 0.5).abs() > 1e-3;
+    is_clear.then(|| (whole + i64::from(part > 0.5), point))
+}
+
+/// x = 0.whole · 10^point with all digits that tell x from other numbers, where [these](TELLING) are enough.
+fn told(x: f64) -> Option<(i64, i32)> {
+    let (scaled, power, point) = scaled(x, TELLING)?;
+    let whole = (scaled + 0.5) as i64;
+    (whole as f64 / power == x).then_some((whole, point))
+}
+
+/// The eight digits of a number below 10⁸, a byte each, the first one the lowest: two numbers below 10⁴ side by side,
+/// then four below 10², then eight. A product and a shift are a quotient, which is exact for so small numbers.
+fn eight(x: u64) -> u64 {
+    let fours = x / 10_000 | (x % 10_000) << 32;
+    let hundreds = (fours * 10_486 >> 20) & 0x7f_0000_007f;
+    let twos = hundreds | (fours - 100 * hundreds) << 16;
+    let tens = (twos * 103 >> 10) & 0x000f_000f_000f_000f;
+    tens | (twos - 10 * tens) << 8
+}
+
 impl Decimal {
-    /// To so many digits, at most [`DIGITS`]; none where x is out of reach or so close to the middle of two such
-    /// numbers that the shortest decimal number for x may be on its other side.
-    fn rounded(x: f64, digits: usize) -> Option<Self> {
-        let (scaled, _, point) = scaled(x.abs(), digits)?;
-        let whole = scaled.floor();
-        let part = scaled - whole;
-        // x is rounded, and so is the product: by 2⁻⁵³ of 10¹² each, far less than this
-        if (part - 0.5).abs() < 1e-3 {
-            return None;
-        }
-        let whole = whole as u64 + u64::from(part > 0.5);
-        Some(Self::of(x, whole, digits, point))
-    }
-
-    /// All digits that tell x from other numbers, where they are few.
-    fn told(x: f64) -> Option<Self> {
-        let (scaled, power, point) = scaled(x.abs(), TELLING)?;
-        let whole = scaled.round();
-        (whole / power == x.abs()).then(|| Self::of(x, whole as u64, TELLING, point))
-    }
-
-    /// ±0.whole · 10^point, where `whole` has so many digits, or is 1 and so many zeros.
-    fn of(x: f64, mut whole: u64, count: usize, mut point: i32) -> Self {
+    /// 0.whole · 10^point, where `whole` has so many digits, or is 1 and so many zeros.
+    fn of(negative: bool, mut whole: i64, count: usize, mut point: i32) -> Self {
         if whole as f64 >= POWERS[count] {
             whole /= 10;
             point += 1;
         }
+        let sixteen = whole.unsigned_abs() * 10_u64.pow(16 - count as u32);
+        let halves = [sixteen / 100_000_000, sixteen % 100_000_000];
         let mut digits = [b'0'; 20];
-        let mut rest = whole;
-        for pair in digits[..count].rchunks_mut(2) {
-            let two = (rest % 100) as u8;
-            rest /= 100;
-            let (last, before) = (two % 10, two / 10);
-            match pair {
-                [first, second] => (*first, *second) = (b'0' + before, b'0' + last),
-                [only] => *only = b'0' + last,
-                _ => {}
-            }
+        for (place, half) in digits.chunks_exact_mut(8).zip(halves) {
+            place.copy_from_slice(&(eight(half) + u64::from_ne_bytes([b'0'; 8])).to_le_bytes());
         }
         let mut decimal = Self {
-            negative: x.is_sign_negative(),
+            negative,
             digits,
             count,
             point,
@@ -307,6 +311,16 @@ mod tests {
         };
         assert_eq!(significant(x), any(DIGITS), "{x:e}");
         assert_eq!(exact(x), any(usize::MAX), "{x:e}");
+    }
+
+    #[test]
+    fn eight_digits_are_those_of_the_number() {
+        let told = |x: u64| x.to_string().bytes().map(|b| b - b'0').collect::<Vec<u8>>();
+        for x in (0..10_000).flat_map(|x| [x, 10_000 * x, 9_999 * 10_000 + x, 10_001 * x]) {
+            let digits = eight(x).to_le_bytes();
+            let (zeros, own) = digits.split_at(8 - told(x).len());
+            assert!(zeros.iter().all(|d| *d == 0) && own == told(x), "{x}");
+        }
     }
 
     #[test]
