@@ -255,8 +255,10 @@ fn account(declared: &Declared, in_mean_square: bool) -> Account {
         disturbances,
         slew,
         input_derivatives,
+        screens,
     } = declared;
     Account::default()
+        .leaves(screens, "a proof is for readings that come")
         .counts(ranges)
         .counts(noise)
         .counts(limits)

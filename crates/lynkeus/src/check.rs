@@ -165,9 +165,11 @@ fn account(declared: &Declared) -> Account {
         disturbances,
         slew,
         input_derivatives,
+        screens,
     } = declared;
     let elsewhere = "`certify` counts it, and `check --how-well`";
     Account::default()
+        .leaves(screens, "they are of logs")
         .counts(ranges)
         .counts(input_derivatives)
         .leaves(noise, elsewhere)

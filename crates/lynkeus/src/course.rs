@@ -12,6 +12,7 @@ pub(crate) mod quantity;
 pub(crate) mod recorded;
 pub(crate) mod replay;
 pub(crate) mod sampled;
+mod screen;
 pub(crate) mod trace;
 
 use lynkeus_expr::Spent;

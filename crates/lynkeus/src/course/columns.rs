@@ -6,7 +6,7 @@ use std::path::Path;
 
 use lynkeus_structure::AugmentedPlant;
 
-use crate::course::Samples;
+use crate::course::{Samples, screen};
 use crate::prepare::Prepared;
 use crate::prepare::headers::{further_headers, header, log_time, refuse_seconds, time_of};
 use crate::{Error, Series, Study, Table, visible};
@@ -95,7 +95,8 @@ impl<'t> Log<'t> {
             lost.iter().find(|lost| lost.column == own)
         });
         let warnings = warnings.flat_map(|lost| told(lost, &time)).collect();
-        let samples = samples(&table, &time, settings, augmented, may_lack)?;
+        let mut samples = samples(&table, &time, settings, augmented, may_lack)?;
+        notes.extend(screened(prepared, &mut samples));
         notes.extend(gaps(&table, settings, &time, augmented));
         Ok(Self {
             table,
@@ -187,6 +188,30 @@ fn samples(
         readings: readings.collect::<Result<_, _>>()?,
         inputs: inputs.collect::<Result<_, _>>()?,
     })
+}
+
+/// Leaves out of the readings what the study says are none, and tells how many.
+fn screened(prepared: &Prepared<'_>, samples: &mut Samples) -> Vec<String> {
+    let mut notes = vec![];
+    let outputs = prepared
+        .augmented()
+        .outputs
+        .iter()
+        .map(|o| &o.variable.name);
+    for (name, readings) in outputs.zip(&mut samples.readings) {
+        for screen in prepared.declared().screens.of(name).into_iter().flatten() {
+            let (left, count) = screen::screened(readings, *screen);
+            if count > 0 {
+                notes.push(format!(
+                    "{name}: {count} of {} cells {} and count as no readings",
+                    readings.len(),
+                    screen::words(*screen)
+                ));
+            }
+            *readings = left;
+        }
+    }
+    notes
 }
 
 /// A column as an input reads it.

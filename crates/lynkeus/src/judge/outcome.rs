@@ -394,11 +394,13 @@ fn account(declared: &Declared, design: &Design, is_weighed: bool) -> Account {
         disturbances,
         slew,
         input_derivatives,
+        screens,
     } = declared;
     let is_filter = design.observer.filter.is_some();
     let unweighed = "the gain is chosen without it: `sd` of [estimate] counts it, and `certify`";
     let promised = "a promise of what the inputs do: `certify` counts it";
     Account::default()
+        .counts(screens)
         .counts(ranges)
         .counts(samples)
         .counts_if(is_weighed, noise, unweighed)

@@ -135,8 +135,10 @@ fn account(declared: &Declared, counts_process_noise: bool) -> Account {
         disturbances,
         slew,
         input_derivatives,
+        screens,
     } = declared;
     Account::default()
+        .leaves(screens, "they are of logs: every simulated reading counts")
         .counts(ranges)
         .counts(noise)
         .counts(limits)

@@ -15,7 +15,7 @@ use lynkeus_structure::{AugmentedPlant, range};
 use crate::words::explain;
 use crate::{Error, Study, near, prepare::calibrate, prepare::systems};
 pub use account::Account;
-use lynkeus_study::{Name, Noise};
+use lynkeus_study::{Name, Noise, Screen};
 
 /// One kind of declaration: what is said of single quantities, by their names.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,6 +46,8 @@ pub(crate) struct Declared {
     pub slew: Kind<f64>,
     /// bounds of |u'|, |u''|, …, by known input
     pub input_derivatives: Kind<Vec<f64>>,
+    /// which cells of a log are no readings, by output
+    pub screens: Kind<Vec<Screen>>,
 }
 
 impl Declared {
@@ -132,8 +134,33 @@ impl Declared {
                 &study.certify.input_derivatives,
                 &known,
             )?,
+            screens: screens(&sensors.screens, &outputs)?,
         })
     }
+}
+
+/// All that is said of an output; of one kind what its own name says comes before what an array's does.
+fn screens(given: &[(Name, Screen)], outputs: &[String]) -> Result<Kind<Vec<Screen>>, Error> {
+    let mut said: BTreeMap<String, Vec<Screen>> = BTreeMap::new();
+    let kinds = [
+        ("plausible", "`plausible` of [sensors]"),
+        ("repeats", "`repeats` of [sensors]"),
+        ("frozen", "`frozen` of [sensors]"),
+    ];
+    for (place, (name, key)) in kinds.into_iter().enumerate() {
+        let is_own = |screen: &Screen| match screen {
+            Screen::Plausible(..) => place == 0,
+            Screen::Repeats => place == 1,
+            Screen::Frozen(_) => place == 2,
+        };
+        let own = given.iter().filter(|(_, screen)| is_own(screen));
+        let own: Vec<(Name, Screen)> = own.cloned().collect();
+        let own = Kind::read(name, key, "output", &own, outputs)?;
+        for (output, screen) in own.said {
+            said.entry(output).or_default().push(screen);
+        }
+    }
+    Ok(Kind::new("cells that are no readings", said))
 }
 
 /// The states and inputs of which the model or `[box]` declares an end.

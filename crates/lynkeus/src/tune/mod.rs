@@ -238,10 +238,16 @@ fn account(declared: &Declared, is_simulated: bool, is_filters: bool) -> Account
         disturbances,
         slew,
         input_derivatives,
+        screens,
     } = declared;
     let measured = "the log's own is in its readings";
     let promised = "a promise of what the inputs do: `certify` counts it";
     Account::default()
+        .counts_if(
+            !is_simulated,
+            screens,
+            "they are of logs: every simulated reading counts",
+        )
         .counts(ranges)
         .counts(limits)
         .counts_if(is_simulated || is_filters, noise, measured)
