@@ -110,11 +110,11 @@ fn told(x: f64) -> Option<(i64, i32)> {
 /// The eight digits of a number below 10⁸, a byte each, the first one the lowest: two numbers below 10⁴ side by side,
 /// then four below 10², then eight. A product and a shift are a quotient, which is exact for so small numbers.
 fn eight(x: u64) -> u64 {
-    let fours = x / 10_000 | (x % 10_000) << 32;
-    let hundreds = (fours * 10_486 >> 20) & 0x7f_0000_007f;
-    let twos = hundreds | (fours - 100 * hundreds) << 16;
-    let tens = (twos * 103 >> 10) & 0x000f_000f_000f_000f;
-    tens | (twos - 10 * tens) << 8
+    let fours = (x / 10_000) | ((x % 10_000) << 32);
+    let hundreds = ((fours * 10_486) >> 20) & 0x7f_0000_007f;
+    let twos = hundreds | ((fours - 100 * hundreds) << 16);
+    let tens = ((twos * 103) >> 10) & 0x000f_000f_000f_000f;
+    tens | ((twos - 10 * tens) << 8)
 }
 
 impl Decimal {
