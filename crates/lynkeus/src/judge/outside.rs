@@ -147,18 +147,22 @@ struct Followed<'q> {
     /// time and value at the first of them
     first: Option<(f64, f64)>,
     farthest: f64,
+    /// how far that is beyond the side
+    beyond: f64,
     stretches: Vec<RangeInclusive<usize>>,
 }
 
 impl<'q> Followed<'q> {
     fn new(side: &'q Dimension, values: &'q Series) -> Self {
+        let farthest = values.first().unwrap_or(f64::NAN);
         Self {
             side,
             values: values.iter(),
             slack: slack(side, values),
             count: 0,
             first: None,
-            farthest: values.first().unwrap_or(f64::NAN),
+            farthest,
+            beyond: beyond(side, farthest),
             stretches: vec![],
         }
     }
@@ -168,12 +172,12 @@ impl<'q> Followed<'q> {
         let Some(x) = self.values.next() else {
             return false;
         };
-        let beyond = |x: f64| (self.side.min - x).max(x - self.side.max);
+        let beyond = beyond(self.side, x);
         // the last of several; a missing value is none of them
-        if self.farthest.is_nan() || beyond(x) >= beyond(self.farthest) {
-            self.farthest = x;
+        if self.farthest.is_nan() || beyond >= self.beyond {
+            (self.farthest, self.beyond) = (x, beyond);
         }
-        if beyond(x) <= self.slack || x.is_nan() {
+        if beyond <= self.slack || x.is_nan() {
             return false;
         }
         self.count += 1;
@@ -197,6 +201,11 @@ impl<'q> Followed<'q> {
             stretches: self.stretches,
         })
     }
+}
+
+/// How far a value is beyond a side; of one inside, less than zero.
+fn beyond(side: &Dimension, x: f64) -> f64 {
+    (side.min - x).max(x - side.max)
 }
 
 /// What counts as rounding beside a side: a share of its width, or where that is none of the
