@@ -24,10 +24,11 @@ use lynkeus_structure::{Sensors, determined, uniformity};
 use lynkeus_words::{Words, counted};
 use serde_json::Value;
 
+use crate::course::run::refuse_settings;
 use crate::prepare::Prepared;
 use crate::prepare::declared::{Account, Declared};
 use crate::words::{condition, explain, listed};
-use crate::{Answer, Error, ErrorKind, Study, estimate, prepare, prepare::calibrate};
+use crate::{Answer, Error, ErrorKind, Study, prepare, prepare::calibrate};
 #[cfg(test)]
 pub(crate) use json::CheckReport;
 use knowledge::Sorted;
@@ -148,7 +149,7 @@ fn refuse(prepared: &Prepared<'_>) -> Result<(), Error> {
         return Ok(());
     }
     match prepared.design() {
-        Ok(design) => estimate::refuse_settings(prepared, &design),
+        Ok(design) => refuse_settings(prepared, &design),
         Err(error) if error.kind() == ErrorKind::Input => Err(error),
         Err(_) => Ok(()),
     }

@@ -15,7 +15,7 @@ use serde::Serialize;
 pub(crate) use print::ComparisonReport;
 pub use run::{Compared, Run, Settled};
 use run::{of_family, run_all};
-pub use samples::{Interval, Resolution};
+pub use samples::Interval;
 
 use crate::prepare::Prepared;
 use crate::prepare::mentioned::asked;

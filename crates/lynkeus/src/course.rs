@@ -1,17 +1,23 @@
-//! What an observer makes of samples, whatever kind of observer it is.
+//! The one engine of experiments: a study's plant through time, and an observer over samples of it or of a log.
+//! What simulates, estimates, sweeps or compares asks here.
 
 pub(crate) mod checkpoint;
 pub(crate) mod columns;
 pub(crate) mod corrections;
 pub(crate) mod doubt;
+pub(crate) mod ended;
 pub(crate) mod filter;
 pub(crate) mod fixed_steps;
 pub(crate) mod inputs;
 pub(crate) mod lines;
+pub(crate) mod plant;
 pub(crate) mod quantity;
 pub(crate) mod recorded;
 pub(crate) mod replay;
+pub(crate) mod rig;
+pub(crate) mod run;
 pub(crate) mod sampled;
+pub(crate) mod sampling;
 pub(crate) mod trace;
 
 use lynkeus_expr::Spent;

@@ -13,8 +13,9 @@ use lynkeus_structure::AugmentedPlant;
 use serde::Serialize;
 
 use super::assumptions;
+use crate::course::rig::Rig;
 use crate::prepare::Prepared;
-use crate::simulate::{self, Rig};
+use crate::simulate;
 use crate::thrifty::thrifty;
 use crate::words::number;
 use crate::{Error, Outcome};

@@ -7,8 +7,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use lynkeus_model::Plant;
 
 use crate::course::filter::keep_compiled;
+use crate::course::rig::Rig;
 use crate::prepare::{Prepared, StudyDesign, is_certified_gain};
-use crate::simulate::{self, Rig};
+use crate::simulate;
 use crate::{Error, Outcome, Study, Table, choose, estimate, prepare, prepare::systems};
 use lynkeus_study::SimulateSettings;
 

@@ -1,7 +1,6 @@
-//! How densely a simulation is sampled, so that the samples do not decide the comparison.
+//! The families on a simulation, sampled so densely that the samples do not decide the comparison.
 
 use std::fmt;
-use std::time::{Duration, Instant};
 
 use lynkeus_model::Plant;
 use lynkeus_observers::Family;
@@ -9,8 +8,9 @@ use lynkeus_words::short;
 use serde::Serialize;
 
 use super::run::{Compared, Watch, run_all};
-use crate::{Error, Study, prepare::systems, simulate};
-use lynkeus_study::{BetweenSamples, SimulateSettings};
+use crate::course::sampling::{Resolution, Sampling, sampling};
+use crate::{Error, Study, Table};
+use lynkeus_study::BetweenSamples;
 
 /// How a simulation was sampled.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -31,26 +31,6 @@ pub struct Interval {
     pub unit: Option<String>,
 }
 
-/// Why a simulation was sampled at its interval.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-pub enum Resolution {
-    /// the study says so: its sensors have noise, or a `sample_step`
-    #[serde(rename = "study")]
-    Study,
-    /// at twice the interval every error is nearly the same
-    #[serde(rename = "errors have settled")]
-    Settled,
-    /// at half the interval there would be too many rows, or it would take too long
-    #[serde(rename = "cost")]
-    Cost,
-}
-
-/// No more rows than this for the sake of the interval alone,
-const ROWS: f64 = 20_000.0;
-/// and none more where those at hand took so long.
-const LONG: Duration = Duration::from_secs(4);
-
 /// Errors that differ by no more than this share of the larger one are the same.
 const SAME: f64 = 0.25;
 
@@ -64,58 +44,38 @@ pub(super) fn simulated(
     families: &[&'static dyn Family],
     watch: Watch<'_>,
 ) -> Result<(Vec<Compared>, Interval), Error> {
-    let settings = systems::settings(study)?;
-    let interval = |step, resolution| Interval {
-        step,
-        resolution,
-        unit: study.time_unit.clone(),
-    };
-    if let Some(step) = systems::sampled_every(study, settings) {
-        let table = simulate::recorded(study, plant, step)?;
-        let rows = run_all(study, plant, families, &table, watch)?;
-        return Ok((rows, interval(step, Resolution::Study)));
-    }
     let mut continuous = study.clone();
     continuous.estimate.between_samples = BetweenSamples::Linear;
-    let (step, resolution) = refined(&continuous, plant, families, settings, watch)?;
-    let table = simulate::recorded(study, plant, step)?;
-    let last = &mut |done: f64| watch(0.5 + 0.5 * done);
-    let rows = run_all(&continuous, plant, families, &table, last)?;
-    Ok((rows, interval(step, resolution)))
-}
-
-/// The interval at which the errors have settled. Windows of many samples take long and see what
-/// the other filters see: they are not asked.
-fn refined(
-    study: &Study,
-    plant: &Plant,
-    families: &[&'static dyn Family],
-    settings: &SimulateSettings,
-    watch: Watch<'_>,
-) -> Result<(f64, Resolution), Error> {
-    let quick: Vec<&'static dyn Family> = families
-        .iter()
-        .copied()
-        .filter(|family| !family.owns(WINDOW))
-        .collect();
-    let mut step = settings.row_step();
-    let mut coarse: Option<Vec<Compared>> = None;
+    // windows of many samples take long and see what the other filters see: they are not asked
+    let quick = families.iter().copied();
+    let quick: Vec<&'static dyn Family> = quick.filter(|family| !family.owns(WINDOW)).collect();
     let mut from = 0.0;
-    loop {
+    let errors = &mut |table: &Table| {
         let to = from + (0.5 - from) / 2.0;
         let part = &mut |done: f64| watch(from + done * (to - from));
-        let table = simulate::recorded(study, plant, step)?;
-        let since = Instant::now();
-        let fine = run_all(study, plant, &quick, &table, part)?;
-        if coarse.is_some_and(|coarse| are_same(&coarse, &fine)) {
-            return Ok((step, Resolution::Settled));
+        let found = run_all(&continuous, plant, &quick, table, part)?;
+        from = to;
+        Ok(found)
+    };
+    let Sampling {
+        table,
+        step,
+        resolution,
+    } = sampling(study, plant, errors, &|a, b| are_same(a, b))?;
+    let rows = match resolution {
+        Resolution::Study => run_all(study, plant, families, &table, watch)?,
+        Resolution::Settled | Resolution::Cost => {
+            let last = &mut |done: f64| watch(0.5 + 0.5 * done);
+            run_all(&continuous, plant, families, &table, last)?
         }
-        let is_long = since.elapsed() > LONG || study.budget.spent().is_some();
-        if is_long || 2.0 * (settings.until - settings.start) / step > ROWS {
-            return Ok((step, Resolution::Cost));
-        }
-        (coarse, from, step) = (Some(fine), to, step / 2.0);
-    }
+    };
+    let unit = study.time_unit.clone();
+    let interval = Interval {
+        step,
+        resolution,
+        unit,
+    };
+    Ok((rows, interval))
 }
 
 /// The key of families that look at a window of samples.

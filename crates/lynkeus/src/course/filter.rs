@@ -9,13 +9,14 @@ use lynkeus_observers::{Design, FilterTuning, Signal};
 use lynkeus_run::filter::{
     FilterKind, FilterSettings, Health, Limits, NoisyModel, NoisyPlant, Sensor, Smoothed,
 };
-use lynkeus_run::{Blueprint, EstimatorSettings, Fleet};
+use lynkeus_run::{Blueprint, EstimatorSettings, Fleet, Updates};
 use lynkeus_structure::AugmentedPlant;
 use lynkeus_words::short;
 
 use crate::course::replay::{Watch, replay, replay_together};
 use crate::course::{Course, Samples};
 use crate::prepare::Prepared;
+use crate::prepare::systems::run_settings;
 use crate::words::explain;
 use crate::{Error, Series, Study};
 use lynkeus_study::{Records, Smoothing};
@@ -133,6 +134,29 @@ pub(crate) fn together(
         done.map(|()| course)
     });
     Some(all.collect())
+}
+
+/// The standard deviations of the design's filter on readings that stand for those that will come.
+///
+/// # Errors
+/// As [`blueprint`].
+pub(crate) fn foreseen(
+    prepared: &Prepared<'_>,
+    design: &Design,
+    samples: &Samples,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Vec<Series>, Error> {
+    let run = run_settings(&prepared.study().estimate);
+    let mut blueprint = blueprint(prepared, design, samples, run, &mut vec![])?;
+    if let Updates::Filter { settings, .. } = &mut blueprint.updates {
+        settings.foresees = true;
+    }
+    let mut filter = blueprint.estimator().map_err(explain)?;
+    let mut course = Course::default();
+    let count = filter.names().len();
+    let watch = &mut Watch::only(watch);
+    replay(&mut filter, samples, count, &mut course, watch)?;
+    Ok(course.deviations.unwrap_or_default())
 }
 
 /// What the design's filter is made of.

@@ -5,10 +5,11 @@ use lynkeus_run::{Blueprint, Estimator};
 
 use crate::course::Samples;
 use crate::course::inputs::{on_device, refuse_derivatives};
-use crate::estimate::run_settings;
+use crate::course::{filter, sampled};
+use crate::prepare::systems::run_settings;
 use crate::prepare::{self, Prepared};
 use crate::words::explain;
-use crate::{Error, Study, course::filter, course::sampled};
+use crate::{Error, Study};
 use lynkeus_study::{BetweenSamples, EstimateSettings};
 
 /// The estimator of a study, waiting for its first sample: measured outputs, then known inputs, in

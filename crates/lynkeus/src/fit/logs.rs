@@ -5,7 +5,7 @@ use lynkeus_run::filter::Row;
 use crate::course::Samples;
 use crate::course::columns::Log;
 use crate::course::filter::noise;
-use crate::estimate::start_at_readings;
+use crate::course::run::start_at_readings;
 use crate::prepare::{Prepared, StudyDesign};
 use crate::{Error, Table};
 

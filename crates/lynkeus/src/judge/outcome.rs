@@ -23,7 +23,7 @@ use crate::prepare::headers::{Headers, log_time};
 use crate::prepare::systems::hat;
 use crate::prepare::{Prepared, StudyDesign};
 use crate::words::in_words;
-use crate::{Error, Quantity, Series, Study, judge::expected, judge::saturated, prepare::headers};
+use crate::{Error, Quantity, Series, judge::expected, judge::saturated, prepare::headers};
 use lynkeus_study::{EstimateSettings, Name};
 use lynkeus_table::Instant;
 
@@ -544,77 +544,12 @@ fn alarms(watches: &[Watch]) -> Vec<String> {
         .collect()
 }
 
-/// What becomes of a run that ended before its last row: one that a limit ended is not whole,
-/// and an answer says something of the estimate; both keep their rows.
-///
-/// # Errors
-/// Any other end, or one before the first row.
-pub(crate) fn settle(
-    course: &mut Course,
-    rows: usize,
-    study: &Study,
-    place: &str,
-    is_answer: fn(&RunError) -> bool,
-) -> Result<(), Error> {
-    match (course.ended.take(), study.budget.marked()) {
-        (None, _) => Ok(()),
-        (Some(error @ RunError::Cancelled { .. }), Some(spent)) if spent != Spent::Cancelled => {
-            (course.ended, course.limit) = (Some(error), Some(spent));
-            Ok(())
-        }
-        (Some(error), _) if rows > 0 && is_answer(&error) => {
-            course.ended = Some(error);
-            Ok(())
-        }
-        (Some(error), _) => Err(interrupted_on(error, place, &study.file)),
-    }
-}
-
 /// That a limit ended a run, in words.
 fn not_whole(spent: Spent, error: &RunError) -> String {
     match error {
         RunError::Cancelled { time } => format!("the run is not whole: {spent} at t = {time}"),
         _ => format!("the run is not whole: {spent}"),
     }
-}
-
-/// The same where the observer alone is integrated: readings, or its tuning, may take it to where no number
-/// of steps is enough.
-pub(crate) fn is_observers_answer(error: &RunError) -> bool {
-    let is_steep = matches!(
-        error,
-        RunError::StepBudget { .. } | RunError::TooStiff { .. }
-    );
-    is_steep || is_answer(error)
-}
-
-/// Whether the end of a run says something of the estimate, and not of the input.
-pub(crate) fn is_answer(error: &RunError) -> bool {
-    matches!(
-        error,
-        RunError::Diverged { .. }
-            | RunError::DeviationDiverged { .. }
-            | RunError::NotFinite { .. }
-            | RunError::StepUnderflow { .. }
-            | RunError::Singular { .. }
-    )
-}
-
-/// A run on a log that ended early; what is wrong with a setting is the study's fault, not the log's.
-pub(crate) fn interrupted_on(error: RunError, log: &str, study: &str) -> Error {
-    let is_setting = matches!(error, RunError::Setting { .. } | RunError::TooStiff { .. });
-    interrupted(error, if is_setting { study } else { log })
-}
-
-/// A run that ended early: no result; an estimate that left every bound is an
-/// answer, everything else is a fault of the input.
-pub(crate) fn interrupted(error: RunError, place: &str) -> Error {
-    let text = in_words(&error);
-    let told = match is_answer(&error) {
-        true => Error::refused(text),
-        false => Error::input(text),
-    };
-    told.caused_by(error).at(place)
 }
 
 /// The measured outputs of which `values` knows the values.

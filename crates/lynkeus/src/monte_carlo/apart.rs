@@ -9,9 +9,10 @@ use super::ends::{Clipped, Sensor};
 use super::runs::{Again, Failure, Followed, Track, Whole};
 use super::statistics::of_runs;
 use super::together::{Figures, Screened};
+use crate::course::rig::Rig;
 use crate::crew::{self, Watch};
 use crate::prepare::Prepared;
-use crate::simulate::{self, Rig};
+use crate::simulate;
 use crate::words::in_words;
 use crate::{Error, Study};
 

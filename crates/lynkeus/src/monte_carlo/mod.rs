@@ -19,10 +19,10 @@ use std::sync::OnceLock;
 
 use lynkeus_model::{Plant, Variable};
 
+use crate::course::rig::Rig;
 use crate::prepare::Prepared;
 use crate::prepare::headers::Headers;
 use crate::prepare::systems::column_of;
-use crate::simulate::Rig;
 use crate::{Error, Study, prepare, prepare::systems};
 use apart::{Job, room};
 use ends::Sensor;

@@ -3,11 +3,13 @@
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable, parse_expression};
 use lynkeus_observers::{Monitor, Observer, Signal};
-use lynkeus_run::{Column, Margin, Method, Role, Step, System, Tolerances};
+use lynkeus_run::{Column, EstimatorSettings, Margin, Method, Role, Step, System, Tolerances};
 
 use crate::words::explain;
 use crate::{Error, Study};
-use lynkeus_study::{self, Expression, Name, Rk4Step, SimulateSettings, Solver};
+use lynkeus_study::{
+    self, BetweenSamples, EstimateSettings, Expression, Name, Rk4Step, SimulateSettings, Solver,
+};
 
 /// The study's `[simulate]`.
 pub(crate) fn settings(study: &Study) -> Result<&SimulateSettings, Error> {
@@ -280,5 +282,17 @@ pub(crate) fn method(method: &lynkeus_study::Method) -> Method {
                 Solver::Stiff => Method::Stiff(tolerances),
             }
         }
+    }
+}
+
+/// The study's settings as the runner has them.
+pub(crate) fn run_settings(settings: &EstimateSettings) -> EstimatorSettings {
+    EstimatorSettings {
+        between: match settings.between_samples {
+            // the inter-sample predictor is not the integrator's business
+            BetweenSamples::Hold | BetweenSamples::Predict => lynkeus_run::BetweenSamples::Hold,
+            BetweenSamples::Linear => lynkeus_run::BetweenSamples::Linear,
+        },
+        method: method(&settings.method),
     }
 }

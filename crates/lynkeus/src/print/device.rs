@@ -6,7 +6,7 @@ use lynkeus_model::Variable;
 use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Level, Updates};
 
-use crate::estimate::at_readings;
+use crate::course::run::at_readings;
 use crate::prepare::Prepared;
 use crate::prepare::headers::Headers;
 use crate::prepare::systems::hat;

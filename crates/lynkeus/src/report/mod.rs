@@ -18,6 +18,7 @@ use std::ops::ControlFlow;
 use lynkeus_export::curly::c::prefix;
 
 use crate::course::columns::Log;
+use crate::course::sampling::Sampling;
 use crate::prepare::Prepared;
 use crate::print::{device::causal, head::file_name};
 use crate::tune::bench::Ground;
@@ -77,7 +78,7 @@ pub fn report(
     };
     let (table, ground) = match (log, &recorded) {
         (Some(log), _) => (log, Ground::Log(log)),
-        (None, Some(run::Simulated { table, step })) => (table, Ground::Simulation { step: *step }),
+        (None, Some(Sampling { table, step, .. })) => (table, Ground::Simulation { step: *step }),
         (None, None) => return Err(Error::input("neither a log nor a simulation")),
     };
     let design = prepared.design()?;

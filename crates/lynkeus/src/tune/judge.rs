@@ -7,8 +7,8 @@ use super::errors::{Errors, rms, run_away};
 use super::reference::Reference;
 use super::trial::{Trial, Under};
 use super::{Peak, Row, measures};
+use crate::course::plant::Ran;
 use crate::crew::{Watch, part};
-use crate::simulate::Ran;
 use crate::{Error, prepare::systems};
 
 impl Trial<'_> {

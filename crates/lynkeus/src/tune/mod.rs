@@ -38,10 +38,11 @@ pub(crate) use report::SweepReport;
 pub(crate) use report::shortened;
 pub use row::{Peak, Row};
 
+use crate::course::plant::sample_step;
 use crate::crew::within;
 use crate::prepare::Prepared;
 use crate::prepare::declared::{Account, Declared};
-use crate::{Error, Study, Table, crew, prepare, prepare::systems, simulate};
+use crate::{Error, Study, Table, crew, prepare, prepare::systems};
 use bench::{Bench, Ground};
 use lynkeus_study::Swept;
 use pinned::pinned;
@@ -111,7 +112,7 @@ pub fn tune(
     let ground = match log {
         Some(table) => Ground::Log(table),
         None => Ground::Simulation {
-            step: simulate::sample_step(systems::settings(study)?),
+            step: sample_step(systems::settings(study)?),
         },
     };
     let bench = Bench::new(&prepared, filter.as_deref(), ground)?;

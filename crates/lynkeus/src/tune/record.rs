@@ -7,15 +7,16 @@ use lynkeus_observers::Design;
 use super::errors::rms;
 use super::holdout::{FEWER, Plan};
 use crate::course::columns::Log;
+use crate::course::ended::{interrupted_on, is_observers_answer};
 use crate::course::inputs::{Source, are_logged};
-use crate::course::{Course, Samples};
+use crate::course::run::course_of;
+use crate::course::{Course, Samples, lines, replay};
 use crate::crew::Watch;
-use crate::estimate::{course_of, run_settings};
-use crate::judge::outcome::{interrupted_on, is_observers_answer};
 use crate::prepare::Prepared;
+use crate::prepare::systems::run_settings;
 use crate::thrifty::thrifty;
 use crate::words::in_words;
-use crate::{Error, Series, Study, Table, course::lines, course::replay};
+use crate::{Error, Series, Study, Table};
 use lynkeus_study::{BetweenSamples, Records};
 
 /// What is the same for all values.

@@ -7,12 +7,11 @@ use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_run::{Column, Events, Level, Noise, Role};
 
+use crate::course::plant::{alone, open_loop};
 use crate::course::recorded::Recorded;
-use crate::crew::within;
 use crate::prepare::Prepared;
 use crate::prepare::systems;
 use crate::prepare::systems::settings;
-use crate::simulate::{alone, open_loop};
 use crate::words::explain;
 use crate::{Error, Study};
 
@@ -53,8 +52,7 @@ impl Reference {
         let settings = settings(study)?;
         let mut open = open_loop(study, settings, plant)?;
         let stated = std::mem::take(&mut open.noise);
-        let watch = &mut |_| ControlFlow::Continue(());
-        let truth = alone(study, &open, &mut within(&study.budget, watch))?;
+        let truth = alone(study, &open, &mut |_| ControlFlow::Continue(()))?;
         let scales = scales(plant, &truth);
         let starts = starts(study, plant)?;
         let last = starts.last().copied().unwrap_or(settings.start);

@@ -11,8 +11,8 @@ use super::speed::longest_step;
 use super::whiteness::{Whiteness, whiteness};
 use crate::course::Course;
 use crate::course::inputs::supplied;
+use crate::course::run::start_at_readings;
 use crate::crew::{Watch, part};
-use crate::estimate::start_at_readings;
 use crate::prepare::{Prepared, StudyDesign};
 use crate::{Error, Series, prepare::systems};
 use lynkeus_table::series::steps;
@@ -207,7 +207,7 @@ mod tests {
     use lynkeus_run::{BetweenSamples, Estimator, EstimatorSettings};
 
     use super::*;
-    use crate::estimate::run_settings;
+    use crate::prepare::systems::run_settings;
     use crate::{Study, Table, prepare};
 
     /// An estimator that takes the rows one by one knows nothing of gaps, nor of files.

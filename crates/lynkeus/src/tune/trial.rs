@@ -9,12 +9,10 @@ use super::disturbed::disturbed;
 use super::record::{course, told};
 use super::reference::Reference;
 use super::speed::{longest_step, transparent};
-use crate::course::Samples;
-use crate::course::recorded::Recorded;
-use crate::crew::{Watch, within};
+use crate::course::plant::{self, Ran, Shown, closed_loop, open_loop};
+use crate::crew::Watch;
 use crate::prepare::Prepared;
 use crate::prepare::systems::{self, monitor_column, settings};
-use crate::simulate::{Ran, alone, closed_loop, open_loop, seen};
 use crate::thrifty::thrifty;
 use crate::{Error, ErrorKind};
 
@@ -43,13 +41,6 @@ struct Sampled {
     noisy: Shown,
     /// none where no disturbance is stated; or why the plant has no run under it
     disturbed: Option<Result<Shown, String>>,
-}
-
-/// A run of the plant, and what its sensors show.
-#[derive(Debug)]
-struct Shown {
-    plant: Recorded,
-    samples: Samples,
 }
 
 impl Simulated {
@@ -115,13 +106,14 @@ fn shown(
     observer: &Observer,
     simulation: &Simulation,
 ) -> Result<Shown, Error> {
-    let study = prepared.study();
     let watch = &mut |_| ControlFlow::Continue(());
-    let run = alone(study, simulation, &mut within(&study.budget, watch))?;
-    Ok(Shown {
-        samples: seen(prepared.plant(), observer, &run),
-        plant: run,
-    })
+    plant::shown(
+        prepared.study(),
+        prepared.plant(),
+        observer,
+        simulation,
+        watch,
+    )
 }
 
 /// A disturbed run with the inputs as they are read, those of the exact one; why there is none where
@@ -200,7 +192,7 @@ impl<'a> Trial<'a> {
                 let (samples, between) = (&shown.samples, study.estimate.between_samples);
                 let place = &study.file;
                 let course = course(self.prepared, &self.design, samples, between, place, watch)?;
-                let run = shown.plant.clone();
+                let run = shown.run.clone();
                 return Ok(course.map(|course| Ran { run, course }));
             }
         };

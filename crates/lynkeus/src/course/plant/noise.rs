@@ -13,7 +13,7 @@ use lynkeus_study::SimulateSettings;
 ///
 /// # Errors
 /// Names that the plant does not have.
-pub(super) fn noise(
+pub(crate) fn noise(
     study: &Study,
     settings: &SimulateSettings,
     plant: &Plant,
@@ -38,7 +38,7 @@ pub(super) fn noise(
 }
 
 /// Settles how often process noise is drawn, for all runs alike; says so where it is not often enough.
-pub(super) fn stirred(simulation: &mut Simulation) -> Option<String> {
+pub(crate) fn stirred(simulation: &mut Simulation) -> Option<String> {
     let draws = process_draws(simulation);
     simulation.noise.process_draws = Some(draws.per_sample);
     (!draws.are_enough).then(|| {
