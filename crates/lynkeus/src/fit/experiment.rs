@@ -19,12 +19,12 @@ use super::plant::Source;
 use super::problem::Problem;
 use super::search::{Found, positive};
 use super::unknown::{Kind, Unknown};
-use crate::entries::{Named, finite};
-use crate::words::explain;
 use crate::{Error, Study};
 use candidates::{Candidate, Experiment};
 use extra::Extra;
 use extras::{Predictor, own, with_starts};
+use lynkeus_experiment::entries::{Named, finite};
+use lynkeus_experiment::words::explain;
 
 /// What is known of the next experiment.
 #[derive(Clone, Debug, Default)]

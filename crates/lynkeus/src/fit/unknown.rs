@@ -3,9 +3,9 @@
 use lynkeus_model::{Plant, Variable};
 use lynkeus_study::{Chosen, FitSettings, Name, Noise, Objective, Prior};
 
-use crate::course::filter::noise;
-use crate::prepare::Prepared;
 use crate::{Error, Study, near};
+use lynkeus_experiment::course::filter::noise;
+use lynkeus_experiment::prepare::Prepared;
 
 use super::logs::FittedLog;
 

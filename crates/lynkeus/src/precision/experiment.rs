@@ -8,12 +8,13 @@ use lynkeus_observability::precision::{Deviation, Experiment, Quantity, Sensor, 
 use lynkeus_run::{Method, Tolerances};
 use lynkeus_structure::AugmentedPlant;
 
-use crate::course::plant::{alone, open_loop};
-use crate::course::recorded::Recorded;
-use crate::prepare::Prepared;
-use crate::prepare::declared::Declared;
-use crate::words::number;
-use crate::{Error, Study, prepare::systems};
+use crate::{Error, Study};
+use lynkeus_experiment::course::plant::{alone, open_loop};
+use lynkeus_experiment::course::recorded::Recorded;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::prepare::declared::Declared;
+use lynkeus_experiment::prepare::systems;
+use lynkeus_experiment::words::number;
 use lynkeus_study::{Noise, SimulateSettings};
 
 /// Horizons at which the errors are computed.

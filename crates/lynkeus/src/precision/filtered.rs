@@ -11,11 +11,11 @@ use lynkeus_observers::{Initial, Tuning, Value};
 use lynkeus_run::{Role, Simulation};
 
 use super::experiment::Setup;
-use crate::course::filter;
-use crate::course::plant::{alone, seen};
-use crate::crew::within;
-use crate::prepare::Prepared;
 use crate::{Error, Study};
+use lynkeus_experiment::course::filter;
+use lynkeus_experiment::course::plant::{alone, seen};
+use lynkeus_experiment::crew::within;
+use lynkeus_experiment::prepare::Prepared;
 use lynkeus_study::{Name, Noise};
 
 /// Nothing is known at the start: a standard deviation of so many ranges.

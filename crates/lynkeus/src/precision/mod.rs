@@ -14,13 +14,15 @@ mod words;
 
 use lynkeus_observability::precision::{Advice, Deviations, SensorSet};
 
-use crate::course::plant::open_loop;
-use crate::prepare::Prepared;
-use crate::prepare::declared::{Account, Declared};
-use crate::words::explain;
-use crate::{Error, Study, prepare, prepare::systems};
+use crate::{Error, Study};
 pub use experiment::{Assumed, Candidates, Options};
 use experiment::{Setup, ended};
+use lynkeus_experiment::course::plant::open_loop;
+use lynkeus_experiment::prepare;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::prepare::declared::{Account, Declared};
+use lynkeus_experiment::prepare::systems;
+use lynkeus_experiment::words::explain;
 #[cfg(test)]
 pub(crate) use report::HowWellReport;
 

@@ -7,11 +7,11 @@ use lynkeus_observers::Design;
 use lynkeus_words::short;
 
 use super::knob::Fixed;
-use crate::course::sampling::{Resolution, Sampling, sampling};
-use crate::prepare::Prepared;
-use crate::{
-    Accuracy, Error, ErrorKind, Outcome, Quantity, Study, Table, estimate, prepare::systems,
-};
+use crate::{Accuracy, Error, ErrorKind, Outcome, Quantity, Study, Table};
+use lynkeus_experiment::course::sampling::{Resolution, Sampling, sampling};
+use lynkeus_experiment::estimated;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::prepare::systems;
 
 /// Errors that differ by no more than this share of the larger one are the same,
 const SAME: f64 = 0.25;
@@ -55,7 +55,7 @@ pub(super) fn simulated(
 
 /// Errors on a log; none where the run does not reach its end.
 fn errors(prepared: &Prepared<'_>, table: &Table) -> Result<Option<Vec<Accuracy>>, Error> {
-    match estimate::estimated(prepared, table, &mut |_| ControlFlow::Continue(())) {
+    match estimated(prepared, table, &mut |_| ControlFlow::Continue(())) {
         Ok(outcome) => Ok(outcome.ended.is_none().then_some(outcome.accuracies)),
         Err(error) if error.kind() == ErrorKind::Refused => Ok(None),
         Err(error) => Err(error),
@@ -87,7 +87,7 @@ pub(super) fn fixed(
             Ok(fixed) => fixed,
             Err(why) => return Ok(Err(why)),
         };
-        let outcome = estimate::estimated(&prepared.run_by(&fixed.study)?, table, watch)?;
+        let outcome = estimated(&prepared.run_by(&fixed.study)?, table, watch)?;
         Ok(Ok((fixed, outcome)))
     };
     let mut best = match run(1, watch)? {
@@ -95,7 +95,7 @@ pub(super) fn fixed(
         done => return Ok(done),
     };
     // what controlled steps give, where they reach the end
-    let Ok(reference) = estimate::estimated(prepared, table, watch) else {
+    let Ok(reference) = estimated(prepared, table, watch) else {
         return Ok(Ok(best));
     };
     if reference.ended.is_some() {
