@@ -12,6 +12,7 @@ mod filters;
 mod filters_noise;
 mod fit;
 mod fit_noise;
+mod fit_search;
 mod fit_shown;
 mod fmu;
 mod fmu_calls;

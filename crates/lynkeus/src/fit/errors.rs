@@ -1,5 +1,7 @@
 //! Errors of predictions at the values found: one step ahead, and of the plant alone.
 
+use lynkeus_expr::Budget;
+
 use super::problem::{Problem, Rows as Which};
 use crate::Error;
 use lynkeus_experiment::tune::whiteness::{Whiteness, whiteness};
@@ -111,7 +113,8 @@ pub(super) fn errors<'p>(
         let Some(problem) = problem else { continue };
         let mut first = 0;
         for (place, log) in logs.iter().enumerate() {
-            problem.score(place, values, Which::All, |seen| {
+            // half a table is none
+            problem.score(place, values, Which::All, &Budget::default(), |seen| {
                 // of a reading at an end nobody knows how far it is off
                 if seen.is_at_end {
                     return;

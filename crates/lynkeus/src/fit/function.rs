@@ -1,5 +1,6 @@
 //! −log L as a function of what `[fit]` names, for optimisers and samplers of others.
 
+use lynkeus_expr::Budget;
 use lynkeus_study::{Objective, Prior};
 use nalgebra::{DMatrix, DVector};
 
@@ -87,6 +88,7 @@ pub fn likelihood(study: &Study, tables: &[Table]) -> Result<LikelihoodFunction,
         steps: Steps::default(),
         most_confined: usize::MAX,
         evaluations: 0,
+        budget: study.budget.clone(),
     };
     problem.begin(&study)?;
     // half a likelihood, and steps that are not settled, are none
@@ -207,7 +209,7 @@ impl LikelihoodFunction {
             .collect();
         self.with(false, |problem| {
             for (place, found) in all.iter_mut().enumerate().take(count) {
-                problem.score(place, values, Rows::All, |seen| {
+                problem.score(place, values, Rows::All, &Budget::default(), |seen| {
                     let at = seen.row * outputs + seen.sensor;
                     found.innovation[at] = seen.innovation;
                     found.variance[at] = seen.variance;
@@ -230,6 +232,7 @@ impl LikelihoodFunction {
             steps: self.steps,
             most_confined: self.most_confined,
             evaluations: 0,
+            budget: Budget::default(),
         };
         let found = work(&mut problem);
         self.terms = problem.terms;

@@ -200,7 +200,7 @@ impl From<&Known> for FittedValue {
 
 impl From<&Optimum> for FittedOptimum {
     fn from(optimum: &Optimum) -> Self {
-        let Optimum { nll, found } = *optimum;
+        let Optimum { nll, found, .. } = *optimum;
         Self { nll, found }
     }
 }

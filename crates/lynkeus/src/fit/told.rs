@@ -146,10 +146,13 @@ impl Fit {
     fn tell_quality(&self, document: &mut Document) {
         let count = self.unknowns.len() as f64;
         let bic = 2.0 * self.nll + count * (self.readings as f64).ln();
+        let at_start = match self.nll_at_start.is_finite() {
+            true => short(self.nll_at_start),
+            false => "none".to_owned(),
+        };
         document.part().line(format!(
-            "\u{2212}log L {} (at the start {}), AIC {}, BIC {}",
+            "\u{2212}log L {} (at the start {at_start}), AIC {}, BIC {}",
             short(self.nll),
-            short(self.nll_at_start),
             short(2.0 * self.nll + 2.0 * count),
             short(bic)
         ));

@@ -469,7 +469,7 @@ impl<const L: usize> Passes<L> {
         let interval = Interval {
             from,
             to,
-            steps: self.times * steps,
+            steps: steps.saturating_mul(self.times),
             is_graded,
             inputs,
         };
