@@ -139,7 +139,7 @@ pub(crate) fn together(
 /// The standard deviations of the design's filter on readings that stand for those that will come.
 ///
 /// # Errors
-/// As [`blueprint`].
+/// Noises of the study that do not fit.
 pub fn foreseen(
     prepared: &Prepared<'_>,
     design: &Design,

@@ -18,7 +18,7 @@ use crate::{Error, Series, Study, Table};
 use lynkeus_study::SimulateSettings;
 pub(crate) use noise::{noise, stirred};
 
-/// One run of a [`Rig`].
+/// One run of a [`Rig`](crate::course::rig::Rig).
 #[derive(Debug)]
 pub struct Ran {
     /// the plant

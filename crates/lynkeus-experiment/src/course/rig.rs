@@ -122,7 +122,7 @@ impl Rig {
     /// The run of a seed: its noise, its start and its parameters. `prepared` is the study's.
     ///
     /// # Errors
-    /// As [`simulate`].
+    /// As [`simulate`](crate::simulate()).
     pub fn run(
         &self,
         prepared: &Prepared<'_>,

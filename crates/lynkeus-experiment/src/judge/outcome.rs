@@ -108,7 +108,7 @@ pub struct Outcome {
     pub innovations: Vec<Innovations>,
     /// these row by row with their standard deviations, where they are asked for, under their headers
     pub innovation_columns: Vec<(String, Series)>,
-    /// what the corrections of a filter are made of, where [`Study::records`] asks for all of it
+    /// what the corrections of a filter are made of, where [`Study::records`](lynkeus_study::Study::records) asks for all of it
     pub corrections: Option<Corrections>,
     /// what the log writes for zero where its times are dates
     pub origin: Option<Instant>,
