@@ -28,14 +28,14 @@ use lynkeus_study::Objective;
 use lynkeus_words::{counted, short};
 use nalgebra::DVector;
 
-use crate::crew::{Watch, every};
-use crate::prepare::{self, Prepared};
 use crate::{Error, Study, Table};
 use errors::Errors;
 use experiment::{Ahead, Candidate};
 #[cfg(test)]
 pub(crate) use json::FitReport;
 use known::Exact;
+use lynkeus_experiment::crew::{Watch, every};
+use lynkeus_experiment::prepare::{self, Prepared};
 use posed::Posed;
 use problem::{Point, Problem, Steps, Term};
 use search::{Found, search};

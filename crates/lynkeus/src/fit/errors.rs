@@ -4,7 +4,7 @@ use lynkeus_expr::Budget;
 
 use super::problem::{Problem, Rows as Which};
 use crate::Error;
-use crate::tune::whiteness::{Whiteness, whiteness};
+use lynkeus_experiment::tune::whiteness::{Whiteness, whiteness};
 
 /// How well the readings of a sensor are predicted, in root mean square over all logs.
 #[derive(Clone, Debug, PartialEq)]

@@ -20,12 +20,12 @@ use super::problem::Problem;
 use super::search::{Found, positive};
 use super::unknown::{Kind, Unknown};
 use crate::Error;
-use crate::entries::{Named, finite};
-use crate::words::explain;
 pub(super) use candidates::Candidate;
 use candidates::Experiment;
 use extra::Extra;
 use extras::{Predictor, own, with_starts};
+use lynkeus_experiment::entries::{Named, finite};
+use lynkeus_experiment::words::explain;
 
 /// What is known of the next experiment.
 #[derive(Clone, Debug, Default)]

@@ -10,8 +10,8 @@ use super::posed::{self, Posed};
 use super::problem::{Problem, Rows, Steps, Term};
 use super::search::hessian;
 use super::unknown::Unknown;
-use crate::prepare::{self, Prepared};
 use crate::{Error, Study, Table};
+use lynkeus_experiment::prepare::{self, Prepared};
 
 /// −log L of a study's logs as a function of what its `[fit]` names, in the units of the study: noises as the study
 /// has them, no logarithms. The steps are settled at the study's own values, as [`fit`](super::fit) does before its

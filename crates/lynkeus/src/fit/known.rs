@@ -12,8 +12,8 @@ use super::plant;
 use super::problem::{Point, Problem};
 use super::unknown::{Kind, Unknown};
 use crate::Error;
-use crate::prepare::{self, Prepared, calibrate};
-use crate::words::explain;
+use lynkeus_experiment::prepare::{self, Prepared, calibrate};
+use lynkeus_experiment::words::explain;
 
 /// The time for what the sensors can tell at all.
 const EXACT: Duration = Duration::from_secs(10);

@@ -2,13 +2,13 @@
 
 use lynkeus_run::filter::Row;
 
-use crate::course::Samples;
-use crate::course::columns::Log;
-use crate::course::filter::noise;
-use crate::estimate::start_at_readings;
-use crate::prepare::{Prepared, StudyDesign};
-use crate::words::number;
 use crate::{Error, Table};
+use lynkeus_experiment::course::Samples;
+use lynkeus_experiment::course::columns::Log;
+use lynkeus_experiment::course::filter::noise;
+use lynkeus_experiment::course::run::start_at_readings;
+use lynkeus_experiment::prepare::{Prepared, StudyDesign};
+use lynkeus_experiment::words::number;
 
 /// A log as a fit reads it.
 #[derive(Clone, Debug)]

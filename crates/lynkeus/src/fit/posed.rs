@@ -11,9 +11,9 @@ use super::logs::FittedLog;
 use super::plant::Source;
 use super::problem::Term;
 use super::unknown::{self, Kind, Unknown};
-use crate::prepare::{self, Prepared, StudyDesign};
-use crate::words::explain;
 use crate::{Error, Study, Table};
+use lynkeus_experiment::prepare::{self, Prepared, StudyDesign};
+use lynkeus_experiment::words::explain;
 
 /// The study by the filter whose innovations are fitted, and what is to be said of that.
 pub(super) fn with_filter(study: &Study) -> Result<(Study, Vec<String>), Error> {

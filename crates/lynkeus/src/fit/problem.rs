@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::logs::FittedLog;
 use super::unknown::Unknown;
 use crate::Error;
-use crate::words::explain;
+use lynkeus_experiment::words::explain;
 
 /// −log L with the prior's share, where the search has it: parameters that are searched as logarithms are ones.
 #[derive(Clone, Debug)]

@@ -5,8 +5,8 @@ use nalgebra::DVector;
 
 use super::logs::FittedLog;
 use super::problem::{Point, Problem, Steps};
-use crate::prepare::systems;
 use crate::{Error, Study};
+use lynkeus_experiment::prepare::systems;
 
 /// What −log L may change by where steps are halved.
 pub(super) const SETTLED: f64 = 1e-4;

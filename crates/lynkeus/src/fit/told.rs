@@ -9,10 +9,10 @@ use super::Fit;
 use super::errors::Portion;
 use super::uncertainty::Known;
 use super::unknown::{Kind, Scale, Unknown};
-use crate::rewrite::{Assignment, Change, rewritten};
 use crate::{Answer, Error, Series};
+use lynkeus_experiment::rewrite::{Assignment, Change, rewritten};
 
-crate::answer::displayed!(Fit);
+lynkeus_experiment::displayed!(Fit);
 
 impl Answer for Fit {
     fn document(&self) -> Document {

@@ -3,10 +3,10 @@
 use lynkeus_model::{Plant, Variable};
 use lynkeus_study::{Chosen, FitSettings, Name, Noise, Objective, Prior};
 
-use crate::course::filter::noise;
-use crate::prepare::Prepared;
-use crate::words::number;
 use crate::{Error, Study, near};
+use lynkeus_experiment::course::filter::noise;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::words::number;
 
 use super::logs::FittedLog;
 

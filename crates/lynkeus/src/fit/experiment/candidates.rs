@@ -10,9 +10,9 @@ use lynkeus_study::{self, Expression, Name};
 use super::extra::{Extra, usual};
 use crate::fit::logs::FittedLog;
 use crate::fit::plant::Source;
-use crate::prepare::{self, systems};
-use crate::words::{explain, number};
 use crate::{Error, Study, near};
+use lynkeus_experiment::prepare::{self, systems};
+use lynkeus_experiment::words::{explain, number};
 
 /// Most rows of an experiment.
 const ROWS: f64 = 1e6;
