@@ -197,9 +197,9 @@ fn what_two_branches_tell_together_is_not_called_unobservable() {
     );
 }
 
-/// b' = −b + a: the error of b decays once a is known, and while a < 0 it is not.
+/// b' = −b + a: the error of b decays once a is known, and while a < 0 it is not: proved it is without a alone.
 #[test]
-fn decay_that_rests_on_a_branch_is_not_told() {
+fn decay_that_rests_on_a_branch_is_not_proved() {
     let detectability = |b: &str| {
         let model = format!(
             "Real a(start = 1, min = -2, max = 2); Real b(start = 0, min = -4, max = 4); output Real y = max(a, 0);
@@ -207,10 +207,10 @@ fn decay_that_rests_on_a_branch_is_not_told() {
         );
         let (report, _) = check(&model, "");
         assert_eq!(known(&report, "a")["known"], "in part of the box");
-        known(&report, "b")["known"].clone()
+        known(&report, "b")["proved"].clone()
     };
-    assert_eq!(detectability("-b + a"), "no");
-    assert_eq!(detectability("-b"), "decays");
+    assert_eq!(detectability("-b + a"), false);
+    assert_eq!(detectability("-b"), true);
 }
 
 /// z acts from the tenth second on: it is known then, and the point where it is hidden has its time.
