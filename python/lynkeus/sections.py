@@ -67,6 +67,18 @@ class SensorsSection(TypedDict, total=False):
     larger. Used by `simulate`, `tune`, the filters, `check --how-well` and `certify` (table: output =
     number, text `"5%"`, or `{ uniform = number }`; default: no noise)"""
 
+    plausible: Mapping[str, Numbers] | None
+    """a cell of a log outside of this range is no reading; a note says how many there are (table: output =
+    `[lowest, highest]`; default: none)"""
+
+    repeats: Mapping[str, Literal["missing"]] | None
+    """a cell of a log that equals the one before is no reading: a sensor that samples more slowly than the
+    log was held (table: output = `"missing"`; default: every cell is a reading)"""
+
+    frozen: Mapping[str, Whole] | None
+    """more equal cells of a log in a row than this are no readings from there on, until they change: the
+    sensor is stuck (table: output = whole number; default: none)"""
+
 
 #: spectral density (variance per unit of time) of white noise on a state's derivative; for an unknown input,
 #: how fast it wanders. Read by the filters, `sd` and `--how-well`; `simulate` moves the plant's states by it,

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use lynkeus::interrupt::interrupted;
 
+/// Steps of a bar, and how often a run looks at the clock.
 const STEPS: u64 = 1000;
 
 /// What is being done, for somebody who interrupts it.
@@ -60,6 +61,8 @@ pub(super) struct Progress {
     wanted: bool,
     terminal: bool,
     since: Instant,
+    /// the fraction at the last look at the clock
+    seen: f64,
     /// of the last line
     told: Instant,
     bar: Option<ProgressBar>,
@@ -73,6 +76,7 @@ impl Progress {
             wanted: !quiet,
             terminal: std::io::stderr().is_terminal(),
             since: Instant::now(),
+            seen: f64::NEG_INFINITY,
             told: Instant::now(),
             bar: None,
         }
@@ -90,6 +94,11 @@ impl Progress {
     }
 
     fn show(&mut self, fraction: f64) {
+        // a row of a log takes less than a look at the clock
+        if (fraction - self.seen).abs() * (STEPS as f64) < 1.0 {
+            return;
+        }
+        self.seen = fraction;
         if let Some(doing) = DOING.lock().ok().as_mut().and_then(|now| now.as_mut()) {
             doing.fraction = Some(fraction);
         }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use lynkeus_expr::{Graph, Node, jacobian};
 
+use crate::filter::by_distance;
 use crate::method::are_finite;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Evaluation, Events, Result, System};
@@ -128,6 +129,19 @@ impl Linearised {
     #[must_use]
     pub fn jacobians(&self) -> &Jacobians<Jacobian> {
         &self.jacobians
+    }
+}
+
+impl Linearised {
+    /// The places of the states in the order in which noise of such densities reaches them, as the factor of its
+    /// covariance goes with steps of Runge and Kutta; none where they stand so.
+    #[must_use]
+    pub fn order_of(&self, process_noise: &[f64]) -> Option<Vec<usize>> {
+        let noisy: Vec<bool> = process_noise.iter().map(|q| *q > 0.0).collect();
+        let (equations, state) = (self.system.equations(), &self.jacobians.state);
+        let slopes = &equations.roots.free.outputs[state.outputs()];
+        let slopes = state.places().iter().copied().zip(slopes.iter().copied());
+        by_distance(&equations.graph(), &noisy, slopes)
     }
 }
 

@@ -92,6 +92,10 @@ impl Level {
         let Level::Relative(share) = self else {
             return self.variance(predicted);
         };
+        if spread == 0.0 {
+            // no reading moves what is certain
+            return self.expected_variance(predicted, spread);
+        }
         let innovation = reading - predicted;
         let noise = |gain: f64| {
             let value = predicted + gain * innovation;

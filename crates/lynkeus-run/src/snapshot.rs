@@ -100,6 +100,7 @@ pub(crate) trait Persist {
 }
 
 impl Walk<'_> {
+    #[inline]
     pub fn word(&mut self, word: &mut u64) -> Result<(), Damaged> {
         match self {
             Walk::Save(words) => words.push(*word),
@@ -111,6 +112,7 @@ impl Walk<'_> {
         Ok(())
     }
 
+    #[inline]
     pub fn number(&mut self, number: &mut f64) -> Result<(), Damaged> {
         let mut bits = number.to_bits();
         self.word(&mut bits)?;
@@ -118,6 +120,7 @@ impl Walk<'_> {
         Ok(())
     }
 
+    #[inline]
     pub fn count(&mut self, count: &mut usize) -> Result<(), Damaged> {
         let mut word = *count as u64;
         self.word(&mut word)?;
@@ -134,6 +137,7 @@ impl Walk<'_> {
         }
     }
 
+    #[inline]
     pub fn flag(&mut self, flag: &mut bool) -> Result<(), Damaged> {
         let mut word = u64::from(*flag);
         self.word(&mut word)?;
@@ -142,6 +146,7 @@ impl Walk<'_> {
     }
 
     /// Numbers whose count never changes.
+    #[inline]
     pub fn numbers(&mut self, numbers: &mut [f64]) -> Result<(), Damaged> {
         match self {
             Walk::Save(words) => words.extend(numbers.iter().map(|x| x.to_bits())),
@@ -167,6 +172,7 @@ impl Walk<'_> {
     }
 
     /// What may be absent.
+    #[inline]
     pub fn optional<T: Default>(
         &mut self,
         value: &mut Option<T>,

@@ -211,7 +211,7 @@ impl<'p> AugmentedPlant<'p> {
     }
 
     /// h(t, x, u), one expression per measured output.
-    pub(crate) fn output_nodes(&self) -> Vec<Node> {
+    pub fn output_nodes(&self) -> Vec<Node> {
         self.outputs.iter().map(|o| o.variable.node).collect()
     }
 

@@ -148,7 +148,7 @@ impl Region {
 
     /// Halves the relatively widest side; none if every side is a point.
     pub(crate) fn split(&self, cell: &Cell) -> Option<[Cell; 2]> {
-        self.split_one_of(cell, (0..cell.len()).collect())
+        self.split_one_of(cell, 0..cell.len())
     }
 
     /// Halves the relatively widest of the sides of some symbols; none where these are all
@@ -163,15 +163,13 @@ impl Region {
             let side = &self.dimensions[i];
             symbols.contains(&side.symbol) && self.relative_width(i, &cell[i]) > finest
         };
-        self.split_one_of(cell, (0..cell.len()).filter(meant).collect())
+        self.split_one_of(cell, (0..cell.len()).filter(meant))
     }
 
-    fn split_one_of(&self, cell: &Cell, sides: Vec<usize>) -> Option<[Cell; 2]> {
-        let width = |i: usize| self.relative_width(i, &cell[i]);
-        let widest = sides
-            .into_iter()
-            .max_by(|&i, &j| width(i).total_cmp(&width(j)))?;
-        self.halves(cell, widest)
+    fn split_one_of(&self, cell: &Cell, sides: impl Iterator<Item = usize>) -> Option<[Cell; 2]> {
+        let sides = sides.map(|i| (i, self.relative_width(i, &cell[i])));
+        let widest = sides.max_by(|one, other| one.1.total_cmp(&other.1))?;
+        self.halves(cell, widest.0)
     }
 
     /// The cell cut along one side; none where that has nothing between its ends.

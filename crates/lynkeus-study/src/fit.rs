@@ -122,13 +122,20 @@ pub(super) fn read(entry: Entry<'_>) -> Result<FitSettings, Error> {
         objective: section
             .optional("objective", |e| e.choice(&objectives))?
             .unwrap_or(Objective::Innovations),
-        starts: section
-            .optional("starts", |e| e.whole(1))?
-            .map(|n| usize::try_from(n).unwrap_or(usize::MAX)),
+        starts: section.optional("starts", starts)?,
         seed: section.optional("seed", |e| e.whole(0))?.unwrap_or(0),
         held_out: section.optional("held_out", super::tune::share)?,
         candidates: simulate::pairs(section.take("candidates"), candidate)?,
     })
+}
+
+/// Most searches of a fit.
+const STARTS: usize = 100_000;
+
+fn starts(entry: Entry<'_>) -> Result<usize, Error> {
+    let refusal = entry.wrong(&format!("a whole number from 1 to {STARTS}"));
+    let whole = entry.whole(1).ok().and_then(|n| usize::try_from(n).ok());
+    whole.filter(|n| *n <= STARTS).ok_or(refusal)
 }
 
 fn candidate(entry: Entry<'_>) -> Result<Candidate, Error> {

@@ -119,7 +119,7 @@ pub(super) const SECTIONS: [KeySpec; 11] = [
 const LEVEL: Shape = Shape::Either(&[Shape::NotNegative, Shape::Text, Shape::Section(&[&NOISE])]);
 
 /// `[sensors]`
-pub(super) const SENSORS: [KeySpec; 5] = [
+pub(super) const SENSORS: [KeySpec; 8] = [
     KeySpec {
         name: "limits",
         shape: Shape::As(
@@ -155,6 +155,33 @@ pub(super) const SENSORS: [KeySpec; 5] = [
         ),
         default: "no noise",
         meaning: "white measurement noise: its standard deviation, in the output's unit or as a share of its present value; or uniform noise, every error up to ± the number (in the output's unit) equally likely and none larger. Used by `simulate`, `tune`, the [filters](ekf.md), [`check --how-well`](precision.md) and [`certify`](certificates.md)",
+    },
+    KeySpec {
+        name: "plausible",
+        shape: Shape::As(
+            "table: output = `[lowest, highest]`",
+            &Shape::Table(&Shape::List(&Shape::Number)),
+        ),
+        default: "none",
+        meaning: "a cell of a log outside of this range is no reading; a note says how many there are",
+    },
+    KeySpec {
+        name: "repeats",
+        shape: Shape::As(
+            "table: output = `\"missing\"`",
+            &Shape::Table(&Shape::Word(&["missing"])),
+        ),
+        default: "every cell is a reading",
+        meaning: "a cell of a log that equals the one before is no reading: a sensor that samples more slowly than the log was held",
+    },
+    KeySpec {
+        name: "frozen",
+        shape: Shape::As(
+            "table: output = whole number",
+            &Shape::Table(&Shape::Whole(1)),
+        ),
+        default: "none",
+        meaning: "more equal cells of a log in a row than this are no readings from there on, until they change: the sensor is stuck",
     },
 ];
 

@@ -52,7 +52,7 @@ pub use fit::{Candidate, Chosen, FitSettings, Objective, Prior};
 pub use generator::Generator;
 pub use observer::ObserverSettings;
 pub use schema::schema;
-pub use sensors::{Noise, Sensors};
+pub use sensors::{Noise, Screen, Sensors};
 pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
 pub use tune::{Scale, Swept, TuneSettings, Values};

@@ -4,7 +4,7 @@ use lynkeus_run::Level;
 
 use super::Name;
 use super::keys::{NOISE, SENSORS};
-use super::section::Entry;
+use super::section::{Entry, Section};
 use lynkeus_answer::Error;
 
 /// What the sensors see of the plant.
@@ -20,6 +20,19 @@ pub struct Sensors {
     pub noise: Vec<(Name, Noise)>,
     /// The range that a sensor can show: (output, lowest, highest reading).
     pub limits: Vec<(Name, f64, f64)>,
+    /// Which cells of a log are no readings, by output.
+    pub screens: Vec<(Name, Screen)>,
+}
+
+/// Why a cell of a log is no reading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Screen {
+    /// It is below the least or above the largest plausible one.
+    Plausible(f64, f64),
+    /// It equals the one before: what samples more slowly than the log was held.
+    Repeats,
+    /// So many before were equal to it: the sensor is stuck.
+    Frozen(u64),
 }
 
 /// White measurement noise.
@@ -71,6 +84,7 @@ pub(super) fn read(entry: Entry<'_>) -> Result<Sensors, Error> {
             .into_iter()
             .map(|(name, (low, high))| (name, low, high))
             .collect(),
+        screens: screens(&mut section)?,
         noise: match section.take("noise") {
             None => Vec::new(),
             Some(table) => table
@@ -80,6 +94,17 @@ pub(super) fn read(entry: Entry<'_>) -> Result<Sensors, Error> {
                 .collect::<Result<_, Error>>()?,
         },
     })
+}
+
+fn screens(section: &mut Section<'_>) -> Result<Vec<(Name, Screen)>, Error> {
+    let plausible =
+        |entry: Entry<'_>| limits(entry).map(|(low, high)| Screen::Plausible(low, high));
+    let repeats = |entry: Entry<'_>| entry.choice(&[("missing", Screen::Repeats)]);
+    let frozen = |entry: Entry<'_>| entry.whole(1).map(Screen::Frozen);
+    let mut all = super::simulate::pairs(section.take("plausible"), plausible)?;
+    all.extend(super::simulate::pairs(section.take("repeats"), repeats)?);
+    all.extend(super::simulate::pairs(section.take("frozen"), frozen)?);
+    Ok(all)
 }
 
 fn limits(entry: Entry<'_>) -> Result<(f64, f64), Error> {

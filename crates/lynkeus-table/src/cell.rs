@@ -1,6 +1,7 @@
 //! What one cell of a log says.
 
 use super::instant::{self, Instant};
+use super::number::POWERS;
 
 /// What a cell says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +38,46 @@ pub(super) enum Mark {
 
 /// Reads a trimmed cell.
 pub(super) fn read(text: &str) -> Cell {
+    plain(text.as_bytes()).unwrap_or_else(|| other_than_plain(text))
+}
+
+/// Digits of a cell that is read at once: as a whole number they are exact.
+const FEW: usize = 15;
+
+/// A cell of few digits, with a point perhaps: most are.
+fn plain(text: &[u8]) -> Option<Cell> {
+    let digits = text.strip_prefix(b"-").unwrap_or(text);
+    if digits.len() > FEW + 1 {
+        return None;
+    }
+    let (mut whole, mut point) = (0, None);
+    for (place, byte) in digits.iter().enumerate() {
+        match byte {
+            b'0'..=b'9' => whole = 10 * whole + u64::from(byte - b'0'),
+            b'.' if point.is_none() => point = Some(place),
+            _ => return None,
+        }
+    }
+    let count = digits.len() - usize::from(point.is_some());
+    if !(1..=FEW).contains(&count) {
+        return None;
+    }
+    let decimals = count - point.unwrap_or(count);
+    // of two exact numbers, so the nearest to the decimal number
+    let value = whole as f64 / POWERS[decimals];
+    let value = if digits.len() < text.len() {
+        -value
+    } else {
+        value
+    };
+    Some(match point {
+        None => Cell::Number(value),
+        Some(1..=3) if decimals == 3 && digits[0] != b'0' => Cell::Marked(value, Mark::ShortPoint),
+        Some(_) => Cell::Marked(value, Mark::Point),
+    })
+}
+
+fn other_than_plain(text: &str) -> Cell {
     match text.parse::<f64>() {
         Ok(value) if !value.is_finite() => Cell::Missing,
         Ok(value) => match text.find('.') {
@@ -112,7 +153,21 @@ fn grouped(text: &str) -> Option<(f64, Mark)> {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    proptest! {
+        #[test]
+        fn plain_cells_say_what_others_say(text in "[-+]?[0-9]{0,9}[.,]?[0-9]{0,9}") {
+            prop_assert_eq!(read(&text), other_than_plain(&text));
+            let told = |cell: Cell| match cell {
+                Cell::Number(x) | Cell::Marked(x, _) => x.to_bits(),
+                _ => 0,
+            };
+            prop_assert_eq!(told(read(&text)), told(other_than_plain(&text)));
+        }
+    }
 
     #[test]
     fn numbers_tell_their_marks() {

@@ -27,8 +27,12 @@ impl Lines {
 
     /// The next row stands on `line`.
     pub(super) fn push(&mut self, line: u64) {
-        if self.rows == 0 || self.of(self.rows) != line {
-            let row = self.rows;
+        let row = self.rows;
+        let expected = self
+            .runs
+            .last()
+            .map(|run| run.line + (row - run.row) as u64);
+        if expected != Some(line) {
             self.runs.push(Run { row, line });
         }
         self.rows += 1;

@@ -3,6 +3,16 @@
 /// Digits of an estimate in a table.
 const DIGITS: usize = 12;
 
+/// Digits that any two numbers of so many differ in, as numbers do: what has so many digits at most, and is read as
+/// x, is the shortest that is.
+const TELLING: usize = 15;
+
+/// Powers of ten that a number holds as they are: a product with one, or a quotient by one, is rounded once.
+pub(super) const POWERS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16,
+    1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
+];
+
 /// Decimal digits of a number x = ±0.d₁d₂d₃… · 10^point.
 struct Decimal {
     negative: bool,
@@ -47,13 +57,97 @@ fn write(to: &mut Vec<u8>, x: f64, digits: usize) {
         };
         return to.extend_from_slice(name);
     }
-    let mut buffer = zmij::Buffer::new();
-    let mut decimal = Decimal::read(buffer.format_finite(x));
-    decimal.round(digits);
+    let (quick, count) = match digits {
+        ..=DIGITS => (rounded(x.abs(), digits), digits),
+        _ => (told(x.abs()), TELLING),
+    };
+    let decimal = match quick {
+        Some((whole, point)) => Decimal::of(x.is_sign_negative(), whole, count, point),
+        None => Decimal::any(x, digits),
+    };
     decimal.write(to);
 }
 
+/// x·10^k with so many digits before its point, 10^k, and the point of x = 0.d₁d₂… · 10^point; none where 10^k is
+/// none of [`POWERS`].
+fn scaled(x: f64, digits: usize) -> Option<(f64, f64, i32)> {
+    // 1233/4096 is log₁₀ 2: the point, or one less
+    let binary = (x.to_bits() >> 52) as i32 - 1023;
+    let point = ((binary * 1233) >> 12) + 1;
+    let power = |point: i32| {
+        let k = usize::try_from(digits as i32 - point).ok()?;
+        POWERS.get(k).copied()
+    };
+    let (least, most) = (POWERS[digits - 1], POWERS[digits]);
+    let (scaled, power, point) = match power(point) {
+        Some(first) if x * first < most => (x * first, first, point),
+        _ => {
+            let second = power(point + 1)?;
+            (x * second, second, point + 1)
+        }
+    };
+    (least <= scaled && scaled < most).then_some((scaled, power, point))
+}
+
+/// x = 0.whole · 10^point to so many digits, at most [`DIGITS`]; none where x is out of reach or so close to the middle
+/// of two such numbers that the shortest decimal number for x may be on its other side.
+fn rounded(x: f64, digits: usize) -> Option<(i64, i32)> {
+    let (scaled, _, point) = scaled(x, digits)?;
+    let whole = scaled as i64;
+    let part = scaled - whole as f64;
+    // x is rounded, and so is the product: by 2⁻⁵³ of 10¹² each, far less than this
+    let is_clear = (part - 0.5).abs() > 1e-3;
+    is_clear.then(|| (whole + i64::from(part > 0.5), point))
+}
+
+/// x = 0.whole · 10^point with all digits that tell x from other numbers, where [these](TELLING) are enough.
+fn told(x: f64) -> Option<(i64, i32)> {
+    let (scaled, power, point) = scaled(x, TELLING)?;
+    let whole = (scaled + 0.5) as i64;
+    (whole as f64 / power == x).then_some((whole, point))
+}
+
+/// The eight digits of a number below 10⁸, a byte each, the first one the lowest: two numbers below 10⁴ side by side,
+/// then four below 10², then eight. A product and a shift are a quotient, which is exact for so small numbers.
+fn eight(x: u64) -> u64 {
+    let fours = (x / 10_000) | ((x % 10_000) << 32);
+    let hundreds = ((fours * 10_486) >> 20) & 0x7f_0000_007f;
+    let twos = hundreds | ((fours - 100 * hundreds) << 16);
+    let tens = ((twos * 103) >> 10) & 0x000f_000f_000f_000f;
+    tens | ((twos - 10 * tens) << 8)
+}
+
 impl Decimal {
+    /// 0.whole · 10^point, where `whole` has so many digits, or is 1 and so many zeros.
+    fn of(negative: bool, mut whole: i64, count: usize, mut point: i32) -> Self {
+        if whole as f64 >= POWERS[count] {
+            whole /= 10;
+            point += 1;
+        }
+        let sixteen = whole.unsigned_abs() * 10_u64.pow(16 - count as u32);
+        let halves = [sixteen / 100_000_000, sixteen % 100_000_000];
+        let mut digits = [b'0'; 20];
+        for (place, half) in digits.chunks_exact_mut(8).zip(halves) {
+            place.copy_from_slice(&(eight(half) + u64::from_ne_bytes([b'0'; 8])).to_le_bytes());
+        }
+        let mut decimal = Self {
+            negative,
+            digits,
+            count,
+            point,
+        };
+        decimal.trim();
+        decimal
+    }
+
+    /// To at most so many digits, of any finite number.
+    fn any(x: f64, digits: usize) -> Self {
+        let mut buffer = zmij::Buffer::new();
+        let mut decimal = Self::read(buffer.format_finite(x));
+        decimal.round(digits);
+        decimal
+    }
+
     /// From `-12.5e-3`.
     fn read(text: &str) -> Self {
         let text = text.as_bytes();
@@ -208,7 +302,61 @@ mod tests {
         }
     }
 
+    /// What the quick ways make is what any number becomes.
+    fn is_the_same(x: f64) {
+        let any = |digits| {
+            let mut bytes = vec![];
+            Decimal::any(x, digits).write(&mut bytes);
+            String::from_utf8(bytes).unwrap()
+        };
+        assert_eq!(significant(x), any(DIGITS), "{x:e}");
+        assert_eq!(exact(x), any(usize::MAX), "{x:e}");
+    }
+
+    #[test]
+    fn eight_digits_are_those_of_the_number() {
+        let told = |x: u64| x.to_string().bytes().map(|b| b - b'0').collect::<Vec<u8>>();
+        for x in (0..10_000).flat_map(|x| [x, 10_000 * x, 9_999 * 10_000 + x, 10_001 * x]) {
+            let digits = eight(x).to_le_bytes();
+            let (zeros, own) = digits.split_at(8 - told(x).len());
+            assert!(zeros.iter().all(|d| *d == 0) && own == told(x), "{x}");
+        }
+    }
+
+    #[test]
+    fn quick_numbers_at_the_ends_of_their_reach() {
+        for power in -25..25 {
+            let ten = 10_f64.powi(power);
+            let mut below = ten;
+            let mut above = ten;
+            for _ in 0..200 {
+                (below, above) = (below.next_down(), above.next_up());
+                [below, -above, 0.5 * below, 1.5 * above]
+                    .into_iter()
+                    .for_each(is_the_same);
+            }
+            // at 12 digits these are rounded, the one up, the other down
+            [1.0 - 4e-13, 1.0 - 6e-13, 1.0 + 4e-12, 1.0 + 6e-12]
+                .into_iter()
+                .for_each(|x| is_the_same(x * ten));
+        }
+    }
+
     proptest! {
+        #[test]
+        fn quick_numbers_of_few_digits(whole in any::<u64>(), digits in 1_u32..20, k in 0..40, off in -3_i64..4) {
+            let x = (whole % 10_u64.pow(digits)) as f64 / 10_f64.powi(k);
+            is_the_same(x);
+            is_the_same(f64::from_bits(x.to_bits().saturating_add_signed(off)));
+            // halves of the twelfth digit
+            is_the_same((whole % 1_000_000_000_000) as f64 / 10_f64.powi(k - 20) + 5.0 / 10_f64.powi(k - 19));
+        }
+
+        #[test]
+        fn quick_numbers_of_any_digits(x in -1e13..1e13, k in 0..25) {
+            is_the_same(x / 10_f64.powi(k));
+        }
+
         #[test]
         fn exact_reads_back(bits in any::<u64>()) {
             let x = f64::from_bits(bits);

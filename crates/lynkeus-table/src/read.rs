@@ -69,7 +69,6 @@ impl Table {
                 ..Self::default()
             },
             delimiter: b',',
-            scratch: String::new(),
         };
         reading.header()?;
         while reading.next()? {
@@ -84,7 +83,6 @@ struct Reading<R> {
     rows: Rows<R>,
     table: Table,
     delimiter: u8,
-    scratch: String,
 }
 
 impl<R: BufRead> Reading<R> {
@@ -101,10 +99,9 @@ impl<R: BufRead> Reading<R> {
                 "expected at most {MOST_COLUMNS} columns, found {count}"
             )));
         }
-        for index in 0..count {
-            let name = self.rows.cell(index, &mut self.scratch);
-            let name = name.map_err(|_| not_utf8(&self.table.file, self.rows.number()))?;
-            let column = Column::new(name, &self.table.store);
+        let names = self.rows.texts();
+        for name in names.map_err(|_| not_utf8(&self.table.file, self.rows.number()))? {
+            let column = Column::new(&name, &self.table.store);
             self.table.columns.push(column);
         }
         if !any || self.table.names().all(str::is_empty) {
@@ -126,10 +123,10 @@ impl<R: BufRead> Reading<R> {
         }
         let line = self.rows.number();
         self.table.lines.push(line);
-        for (index, column) in self.table.columns.iter_mut().enumerate() {
-            let text = self.rows.cell(index, &mut self.scratch);
-            let text = text.map_err(|_| not_utf8(&self.table.file, line))?;
-            column.push(text, line);
+        let texts = self.rows.texts();
+        let texts = texts.map_err(|_| not_utf8(&self.table.file, line))?;
+        for (column, text) in self.table.columns.iter_mut().zip(texts) {
+            column.push(&text, line);
         }
         match self.table.rows().is_multiple_of(SAMPLE) {
             true => self.table.store.check(),

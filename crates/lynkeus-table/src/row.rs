@@ -1,6 +1,8 @@
 //! Lines of a file, one by one, split into cells.
 
+use std::borrow::Cow;
 use std::io::{self, BufRead};
+use std::str::Utf8Error;
 
 /// Most bytes of a row.
 const LONGEST: usize = 4 << 20;
@@ -62,6 +64,9 @@ impl<R: BufRead> Rows<R> {
             if self.bytes.iter().any(|b| !b.is_ascii_whitespace()) {
                 break;
             }
+        }
+        if memchr::memchr2(b'"', 0, &self.bytes).is_none() {
+            return Ok(true);
         }
         // an open quote: the row goes on
         let mut is_open = is_odd(&self.bytes);
@@ -128,10 +133,10 @@ impl<R: BufRead> Rows<R> {
     pub(super) fn split(&mut self, delimiter: u8) -> usize {
         self.cells.clear();
         let (mut from, mut quoted) = (0, false);
-        for i in memchr::memchr2_iter(delimiter, b'"', &self.bytes) {
-            if self.bytes.get(i) == Some(&b'"') {
+        for (i, byte) in self.bytes.iter().enumerate() {
+            if *byte == b'"' {
                 quoted = !quoted;
-            } else if !quoted {
+            } else if *byte == delimiter && !quoted {
                 self.cells.push(trimmed(&self.bytes, from, i));
                 from = i + 1;
             }
@@ -141,25 +146,20 @@ impl<R: BufRead> Rows<R> {
         self.cells.len()
     }
 
-    /// The text of a cell; `scratch` is room for one with doubled quotes.
+    /// The texts of the cells.
     ///
     /// # Errors
-    /// It is not UTF-8.
-    pub(super) fn cell<'a>(
-        &'a self,
-        index: usize,
-        scratch: &'a mut String,
-    ) -> Result<&'a str, std::str::Utf8Error> {
-        let Some(cell) = self.cells.get(index) else {
-            return Ok("");
+    /// The row is not UTF-8.
+    pub(super) fn texts(&self) -> Result<impl Iterator<Item = Cow<'_, str>>, Utf8Error> {
+        let row = str::from_utf8(&self.bytes)?;
+        let text = |cell: &Cell| {
+            let text = row.get(cell.from..cell.to).unwrap_or_default();
+            match cell.doubled {
+                true => Cow::Owned(text.replace("\"\"", "\"")),
+                false => Cow::Borrowed(text),
+            }
         };
-        let bytes = self.bytes.get(cell.from..cell.to).unwrap_or_default();
-        let text = std::str::from_utf8(bytes)?;
-        if !cell.doubled {
-            return Ok(text);
-        }
-        *scratch = text.replace("\"\"", "\"");
-        Ok(scratch)
+        Ok(self.cells.iter().map(text))
     }
 }
 
@@ -199,11 +199,9 @@ mod tests {
         let mut rows = Rows::new(text.as_bytes());
         let mut found = vec![];
         while rows.next().unwrap() {
-            let count = rows.split(b',');
-            let mut room = String::new();
-            let cells = (0..count).map(|i| rows.cell(i, &mut room).unwrap().to_owned());
-            let cells = cells.collect();
-            found.push((rows.number(), cells));
+            rows.split(b',');
+            let cells = rows.texts().unwrap().map(Cow::into_owned);
+            found.push((rows.number(), cells.collect()));
         }
         found
     }

@@ -6,10 +6,12 @@ use lynkeus_observers::{Bounds, Certificate, Claim, Design, Tuning};
 use lynkeus_structure::{AugmentedPlant, Standing};
 use lynkeus_words::Words;
 
-use crate::judge::interval::{self, Intervals};
-use crate::prepare::declared::{Account, Declared};
-use crate::prepare::{Prepared, StudyDesign};
-use crate::{Correction, Error, Study, prepare, prepare::correction, simulate, words};
+use crate::{Correction, Error, Study};
+use lynkeus_experiment::judge::interval::{self, Intervals};
+use lynkeus_experiment::prepare::correction;
+use lynkeus_experiment::prepare::declared::{Account, Declared};
+use lynkeus_experiment::prepare::{Prepared, StudyDesign};
+use lynkeus_experiment::{prepare, words};
 
 mod assumptions;
 mod excited;
@@ -142,7 +144,7 @@ impl<'a> Task<'a> {
             correction::of(self.study, self.prepared.plant(), place, &design.observer)?;
         let run = self.study.simulate.as_ref();
         let go_on = &mut |_| ControlFlow::Continue(());
-        let run = run.map(|_| simulate::simulated(&self.prepared, go_on));
+        let run = run.map(|_| lynkeus_experiment::simulated(&self.prepared, go_on));
         let seen = run.as_ref().and_then(|run| run.as_ref().ok());
         let excited = match self.explore {
             true => Excited::of(&self.prepared, seen, place, family)?,
@@ -255,8 +257,10 @@ fn account(declared: &Declared, in_mean_square: bool) -> Account {
         disturbances,
         slew,
         input_derivatives,
+        screens,
     } = declared;
     Account::default()
+        .leaves(screens, "a proof is for readings that come")
         .counts(ranges)
         .counts(noise)
         .counts(limits)

@@ -24,14 +24,17 @@ use lynkeus_structure::{Sensors, determined, uniformity};
 use lynkeus_words::{Words, counted};
 use serde_json::Value;
 
-use crate::prepare::Prepared;
-use crate::prepare::declared::{Account, Declared};
-use crate::words::{condition, explain, listed};
-use crate::{Answer, Error, ErrorKind, Study, estimate, prepare, prepare::calibrate};
+use crate::{Answer, Error, ErrorKind, Study};
 #[cfg(test)]
 pub(crate) use json::CheckReport;
 use knowledge::Sorted;
 pub use knowledge::{Assumption, Knowledge, Known, Reserve};
+use lynkeus_experiment::course::run::refuse_settings;
+use lynkeus_experiment::prepare;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::prepare::calibrate;
+use lynkeus_experiment::prepare::declared::{Account, Declared};
+use lynkeus_experiment::words::{condition, explain, listed};
 use lynkeus_study::Name;
 pub use next::Next;
 pub use report::{CheckOptions, Report};
@@ -148,7 +151,7 @@ fn refuse(prepared: &Prepared<'_>) -> Result<(), Error> {
         return Ok(());
     }
     match prepared.design() {
-        Ok(design) => estimate::refuse_settings(prepared, &design),
+        Ok(design) => refuse_settings(prepared, &design),
         Err(error) if error.kind() == ErrorKind::Input => Err(error),
         Err(_) => Ok(()),
     }
@@ -165,9 +168,11 @@ fn account(declared: &Declared) -> Account {
         disturbances,
         slew,
         input_derivatives,
+        screens,
     } = declared;
     let elsewhere = "`certify` counts it, and `check --how-well`";
     Account::default()
+        .leaves(screens, "they are of logs")
         .counts(ranges)
         .counts(input_derivatives)
         .leaves(noise, elsewhere)
@@ -255,7 +260,7 @@ impl Report {
     }
 }
 
-crate::answer::displayed!(Report);
+lynkeus_experiment::displayed!(Report);
 
 impl Answer for Report {
     fn document(&self) -> Document {

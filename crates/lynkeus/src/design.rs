@@ -9,9 +9,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::certify::{self, Proof};
-use crate::entries::{Fit, Named, finite};
-use crate::prepare::correction::InjectionEntry;
 use crate::{Answer, CertifyReport, Error, Study};
+use lynkeus_experiment::entries::{Fit, Named, finite};
+use lynkeus_experiment::prepare::correction::InjectionEntry;
 
 /// The answer of `lynkeus design`.
 #[derive(Debug)]
@@ -99,7 +99,7 @@ pub(crate) fn tell_parameters(document: &mut Document, design: &Design) {
     document.heading("parameters").table(table);
 }
 
-crate::answer::displayed!(DesignReport);
+lynkeus_experiment::displayed!(DesignReport);
 
 impl Answer for DesignReport {
     fn document(&self) -> Document {

@@ -1,12 +1,12 @@
 //! A study's estimator as source code for other machines; what is exported otherwise is in `continuous`.
 
 use crate::ReportOptions;
-use crate::course::fixed_steps::{bends, hasty, stepped};
-use crate::course::inputs::on_device;
-use crate::estimate::live::blueprint;
-use crate::prepare::choice::Choice;
-use crate::prepare::{self, Prepared};
 use crate::{Error, Study, print::continuous, print::fmu, print::tunable};
+use lynkeus_experiment::blueprint;
+use lynkeus_experiment::course::fixed_steps::{bends, hasty, stepped};
+use lynkeus_experiment::course::inputs::on_device;
+use lynkeus_experiment::prepare::choice::Choice;
+use lynkeus_experiment::prepare::{self, Prepared};
 use lynkeus_export::Refusal;
 use lynkeus_export::curly::c::{self, Precision};
 

@@ -28,14 +28,14 @@ use lynkeus_study::Objective;
 use lynkeus_words::{counted, short};
 use nalgebra::DVector;
 
-use crate::crew::{Watch, every};
-use crate::prepare::{self, Prepared};
 use crate::{Error, Study, Table};
 use errors::Errors;
-use experiment::Ahead;
+use experiment::{Ahead, Candidate};
 #[cfg(test)]
 pub(crate) use json::FitReport;
 use known::Exact;
+use lynkeus_experiment::crew::{Watch, every};
+use lynkeus_experiment::prepare::{self, Prepared};
 use posed::Posed;
 use problem::{Point, Problem, Steps, Term};
 use search::{Found, search};
@@ -94,6 +94,8 @@ pub struct Fit {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Optimum {
     pub nll: f64,
+    /// with the prior's share
+    pub value: f64,
     /// by how many of them
     pub found: usize,
 }
@@ -125,11 +127,13 @@ pub fn fit(
         true => Some(posed.terms(true)?),
         false => None,
     };
-    // half a likelihood is none
-    if let Some(spent) = study.budget.spent() {
-        return Err(Error::ended(spent).at(&study.file));
-    }
     let exact = posed.exact()?;
+    let jumping = posed.jumping()?;
+    let source = posed.source(is_alone);
+    let planned = match (options.next_experiment, logs.first()) {
+        (true, Some(log)) => Some(Candidate::all(source, &study, log)?),
+        _ => None,
+    };
     let problem = Problem {
         unknowns: &posed.unknowns,
         logs: &logs,
@@ -137,15 +141,18 @@ pub fn fit(
         steps: Steps::default(),
         most_confined: usize::MAX,
         evaluations: 0,
+        budget: study.budget.clone(),
     };
     let mut work = Work {
         study: &study,
-        source: posed.source(is_alone),
-        options,
+        source,
+        are_profiled: options.profiles,
+        planned,
         problem,
         alone,
         outputs: posed.outputs(),
         exact,
+        jumping,
         warnings: vec![],
         notes,
     };
@@ -158,13 +165,18 @@ pub fn fit(
 struct Work<'w> {
     study: &'w Study,
     source: plant::Source<'w>,
-    options: FitOptions,
+    /// intervals of all values are by profile likelihood
+    are_profiled: bool,
+    /// the experiments that could be made next, where that is asked
+    planned: Option<Vec<Candidate>>,
     problem: Problem<'w>,
     /// the plant alone, log by log
     alone: Option<Vec<Term>>,
     /// names of what is measured
     outputs: Vec<String>,
     exact: Exact,
+    /// the parameters on which it depends where the model jumps, by their places
+    jumping: Vec<usize>,
     warnings: Vec<String>,
     notes: Vec<String>,
 }
@@ -175,9 +187,15 @@ const HALVINGS: usize = 8;
 impl Work<'_> {
     fn done(mut self, plant: &str, watch: &mut Watch<'_>) -> Result<Fit, Error> {
         let begin = self.problem.begin(self.study)?;
+        if let (false, Some(spent)) = (begin.value.is_finite(), self.study.budget.spent()) {
+            return Err(Error::ended(spent).at(&self.study.file));
+        }
         if begin.value.is_finite() {
             let flat = known::undetermined(&mut self.problem, &begin)?;
-            if !flat.is_empty() {
+            if let Some(place) = flat.iter().find(|i| self.jumping.contains(i)) {
+                return Err(self.no_slope(*place));
+            }
+            if !flat.is_empty() && !self.problem.is_spent() {
                 return self.untold(plant, begin, &flat);
             }
         }
@@ -213,12 +231,7 @@ impl Work<'_> {
         let Some(doubt) = self.doubt(&ends[0])? else {
             return Ok(ends);
         };
-        let from = starts::best(
-            &mut self.problem,
-            &begin.z,
-            settings.seed,
-            &self.study.budget,
-        )?;
+        let from = starts::best(&mut self.problem, &begin.z, settings.seed)?;
         if from.is_empty() {
             return Ok(ends);
         }
@@ -237,7 +250,7 @@ impl Work<'_> {
         let best = further.iter().filter(is_better);
         let best = best.min_by(|a, b| a.point.value.total_cmp(&b.point.value));
         match best {
-            Some(best) if best.is_ended => ends.push(self.again(best.point.z.clone(), &[])?),
+            Some(best) if best.is_ended => ends.push(self.again(best.point.clone(), None)?),
             _ => {}
         }
         ends.extend(further.into_iter().filter(|end| !end.is_ended));
@@ -281,10 +294,9 @@ impl Work<'_> {
         most: usize,
         watch: &mut Watch<'_>,
     ) -> Result<Vec<Found>, Error> {
-        let budget = &self.study.budget;
         let free = vec![false; begin.z.len()];
         let run = |problem: &Problem<'_>, k: usize, watch: &mut Watch<'_>| {
-            if k > 0 && budget.spent().is_some() {
+            if k > 0 && problem.is_spent() {
                 return Ok((ended(begin.clone()), 0));
             }
             let mut own = problem.clone();
@@ -293,12 +305,16 @@ impl Work<'_> {
             let mut pulse = || {
                 steps += 1;
                 let is_stopped = watch(1.0 - 1.0 / (1.0 + 0.1 * f64::from(steps))).is_break();
-                match is_stopped || steps as usize > most || budget.spent().is_some() {
+                match is_stopped || steps as usize > most {
                     true => ControlFlow::Break(()),
                     false => ControlFlow::Continue(()),
                 }
             };
-            let found = search(&mut own, starts[k].clone(), &free, &mut pulse)?;
+            let start = match starts[k] == begin.z {
+                true => begin.clone(),
+                false => own.at(starts[k].clone())?,
+            };
+            let found = search(&mut own, start, &free, &mut pulse)?;
             Ok((found, own.evaluations))
         };
         let ends = every(starts.len(), &self.problem, &run, watch)?;
@@ -311,7 +327,7 @@ impl Work<'_> {
         let mut is_settled = false;
         let mut steps = self.problem.steps;
         for _ in 0..HALVINGS {
-            if best.is_ended || self.problem.is_shortest() {
+            if best.is_ended || self.problem.is_shortest() || self.problem.is_spent() {
                 break;
             }
             let Some(fine) = self.problem.halved(&best.point)? else {
@@ -322,16 +338,18 @@ impl Work<'_> {
             if !fine.value.is_finite() {
                 continue;
             }
-            let next = self.again(fine.z, &[])?;
+            let next = self.again(fine, None)?;
             if next.point.value.is_finite() {
                 (best, steps) = (next, self.problem.steps);
             }
         }
         self.problem.step_as(steps);
+        // what a limit cut short is not known to be the end
+        best.is_ended |= self.problem.is_spent();
         if let (false, false, Step::AtMost(step)) =
             (is_settled, best.is_ended, self.problem.steps.length)
         {
-            self.warnings.push(format!(
+            self.warn_of(format!(
                 "\u{2212}log L still changes by more than {SETTLED} where steps of {} are halved: the plant is stiff, or it jumps; method = \"rk4\" with a `step` in [estimate] says which steps count",
                 short(step / 2.0_f64.powi(self.problem.steps.halvings as i32))
             ));
@@ -347,26 +365,41 @@ impl Work<'_> {
             let there = self.problem.at(z.clone())?;
             if there.value <= best.point.value + SETTLED {
                 held[i] = true;
-                best = self.again(z, &held)?;
+                best = self.again(there, Some(&held))?;
             }
         }
+        best.is_ended |= self.problem.is_spent();
         Ok(best)
     }
 
-    /// From here; those that are `held`, or none, stay.
-    fn again(&mut self, z: DVector<f64>, held: &[bool]) -> Result<Found, Error> {
-        let free = vec![false; z.len()];
-        let held = if held.is_empty() { &free } else { held };
-        let budget = self.study.budget.clone();
-        let mut pulse = || match budget.spent() {
-            Some(_) => ControlFlow::Break(()),
-            None => ControlFlow::Continue(()),
-        };
-        let mut found = search(&mut self.problem, z, held, &mut pulse)?;
+    /// A warning, once.
+    fn warn_of(&mut self, warning: String) {
+        if !self.warnings.contains(&warning) {
+            self.warnings.push(warning);
+        }
+    }
+
+    /// From here; those that are `held` stay.
+    fn again(&mut self, from: Point, held: Option<&[bool]>) -> Result<Found, Error> {
+        let free = vec![false; from.z.len()];
+        let held = held.unwrap_or(&free);
+        let mut found = search(&mut self.problem, from, held, &mut || {
+            ControlFlow::Continue(())
+        })?;
         for (is_bound, held) in found.is_bound.iter_mut().zip(held) {
             *is_bound |= held;
         }
         Ok(found)
+    }
+
+    fn no_slope(&self, place: usize) -> Error {
+        let name = self.problem.unknowns[place].words();
+        let message = format!(
+            "{name} moves where the model jumps: \u{2212}log L has steps along it, and no slope to search by"
+        );
+        Error::refused(message).at(&self.study.file).hint(
+            "write the jump as a steep smooth step, such as 1/(1 + exp(-(time - tau)/w)), or compare the \u{2212}log L of fits with one value each under [parameters]",
+        )
     }
 
     fn no_value(&self) -> Error {
@@ -385,7 +418,8 @@ impl Work<'_> {
             is_ended: false,
             ..ended(begin)
         };
-        let mut fit = self.answer(plant, &found.point.clone(), found, vec![])?;
+        let known = uncertainty::uncertainty(&self.problem, &found);
+        let mut fit = self.answer(plant, &found.point.clone(), (found, known), vec![])?;
         fit.undetermined = undetermined;
         Ok(fit)
     }
@@ -395,8 +429,9 @@ impl Work<'_> {
         plant: &str,
         begin: &Point,
         best: Found,
-        optima: Vec<Optimum>,
+        mut optima: Vec<Optimum>,
     ) -> Result<Fit, Error> {
+        let (best, known) = self.known(best, &mut optima)?;
         let free: Vec<usize> = (0..best.point.z.len())
             .filter(|&i| !best.is_bound[i])
             .collect();
@@ -415,7 +450,7 @@ impl Work<'_> {
             false => vec![],
         };
         self.warn(&best, &optima);
-        let mut fit = self.answer(plant, begin, best, optima)?;
+        let mut fit = self.answer(plant, begin, (best, known), optima)?;
         fit.undetermined = flat.iter().map(|&i| fit.unknowns[i].label()).collect();
         Ok(fit)
     }
@@ -429,6 +464,25 @@ impl Work<'_> {
     }
 
     fn warn(&mut self, best: &Found, optima: &[Optimum]) {
+        let jumping = self
+            .jumping
+            .iter()
+            .map(|&i| self.problem.unknowns[i].words());
+        let jumping: Vec<String> = jumping.collect();
+        if !jumping.is_empty() {
+            self.warnings.push(format!(
+                "{} may move where the model jumps, and no derivative sees that: a better value may be near",
+                jumping.join(", ")
+            ));
+        }
+        let count = self.problem.unknowns.len();
+        if best.point.readings <= count {
+            self.warnings.push(format!(
+                "{} for {}: nothing is left that could speak against them",
+                counted(best.point.readings, "reading"),
+                counted(count, "value")
+            ));
+        }
         if best.point.confined > 0 {
             self.warnings.push(format!(
                 "the model has no value where the estimate was: at {} rows it was put back into its declared range",
@@ -458,7 +512,7 @@ impl Work<'_> {
             self.warnings.push(format!(
                 "{} optima: the next one has a −log L that is {} larger",
                 optima.len(),
-                short(second.nll - first.nll)
+                short(second.value - first.value)
             ));
         }
     }
@@ -467,26 +521,23 @@ impl Work<'_> {
         mut self,
         plant: &str,
         begin: &Point,
-        found: Found,
+        (found, uncertainty): (Found, Uncertainty),
         optima: Vec<Optimum>,
     ) -> Result<Fit, Error> {
         let is_ended = found.is_ended;
-        let mut uncertainty = uncertainty::uncertainty(&self.problem, &found);
-        self.profiles(&found, &mut uncertainty)?;
         let ahead = self.ahead(&found)?;
         let values = self.problem.values(&found.point.z);
-        let alone = self.alone.as_mut();
         let steps = self.problem.steps;
-        let alone = alone.map(|terms| Problem {
-            terms: std::mem::take(terms),
+        let mut alone = self.alone.take().map(|terms| Problem {
+            terms,
             ..self.problem.clone()
         });
-        let mut alone = alone;
         if let Some(alone) = &mut alone {
             alone.step_as(steps);
         }
         let (errors, rows) =
             errors::errors(&mut self.problem, alone.as_mut(), &self.outputs, &values)?;
+        self.warn_of_certain(&rows);
         let coloured = errors.iter().filter(|own| own.are_coloured());
         let coloured: Vec<&str> = coloured.map(|own| own.output.as_str()).collect();
         if !coloured.is_empty() && !is_ended {
@@ -527,33 +578,69 @@ impl Work<'_> {
         })
     }
 
+    /// Readings that do not count: neither the model nor the sensor leaves room for an error.
+    fn warn_of_certain(&mut self, rows: &errors::Rows) {
+        for column in &rows.columns {
+            let certain = column.deviation.iter().filter(|d| **d == 0.0).count();
+            if certain > 0 {
+                self.warnings.push(format!(
+                    "{} of {} did not count: the model is certain of it, and a share of 0 is no noise; state the noise in the unit of the output",
+                    counted(certain, "reading"),
+                    column.output
+                ));
+            }
+        }
+    }
+
     /// The next experiment, where it is asked for.
     fn ahead(&mut self, found: &Found) -> Result<Option<Ahead>, Error> {
-        if !self.options.next_experiment {
+        let Some(planned) = self.planned.take() else {
             return Ok(None);
-        }
-        let (ahead, notes) = experiment::ahead(self.source, self.study, &self.problem, found)?;
+        };
+        let (ahead, notes) = experiment::ahead(self.source, planned, &self.problem, found)?;
         self.notes.extend(notes);
         Ok(Some(ahead))
     }
 
-    /// Intervals by profile likelihood, where they are asked for, and of what is at a bound; noises that are no more
-    /// than nothing are told of.
-    fn profiles(&mut self, found: &Found, uncertainty: &mut Uncertainty) -> Result<(), Error> {
-        if found.is_ended || !found.is_converged {
-            return Ok(());
+    /// The end with how well it is known: intervals by profile likelihood, where they are asked for, and of what is at
+    /// a bound; noises that are no more than nothing are told of. Where a profile meets a lower −log L, the search goes
+    /// on from there.
+    fn known(
+        &mut self,
+        mut best: Found,
+        optima: &mut Vec<Optimum>,
+    ) -> Result<(Found, Uncertainty), Error> {
+        for _ in 0..ROUNDS {
+            let mut uncertainty = uncertainty::uncertainty(&self.problem, &best);
+            if best.is_ended || !best.is_converged {
+                return Ok((best, uncertainty));
+            }
+            let (problem, are_all) = (&mut self.problem, self.are_profiled);
+            let told = uncertainty::profiles(problem, &best, &mut uncertainty, are_all)?;
+            let Some(better) = told.better else {
+                self.warnings.extend(told.warnings);
+                return Ok((best, uncertainty));
+            };
+            let before = best.point.value;
+            let next = self.again(better, None)?;
+            best = self.settled(next)?;
+            best.is_converged &= self.problem.is_sound(&best.point);
+            self.notes.push(format!(
+                "a profile met a lower \u{2212}log L, and the search went on from there: it is {} lower",
+                short(before - best.point.value)
+            ));
+            if best.is_converged {
+                optima.insert(0, Optimum::of(&best.point));
+            }
         }
-        let budget = self.study.budget.clone();
-        let mut pulse = || match budget.spent() {
-            Some(_) => ControlFlow::Break(()),
-            None => ControlFlow::Continue(()),
-        };
-        let (problem, are_all) = (&mut self.problem, self.options.profiles);
-        let told = uncertainty::profiles(problem, found, uncertainty, are_all, &mut pulse)?;
-        self.warnings.extend(told);
-        Ok(())
+        best.is_converged = false;
+        let uncertainty = uncertainty::uncertainty(&self.problem, &best);
+        Ok((best, uncertainty))
     }
 }
+
+/// Searches that go on from where a profile fell.
+const ROUNDS: usize = 6;
 
 /// A search that was told to stop before it began.
 fn ended(point: Point) -> Found {
@@ -582,12 +669,19 @@ fn optima(ends: &[Found]) -> Vec<Optimum> {
     let mut all: Vec<Optimum> = vec![];
     for end in ends.iter().filter(|end| end.is_converged) {
         match all.last_mut() {
-            Some(last) if (end.point.nll - last.nll).abs() <= SAME => last.found += 1,
-            _ => all.push(Optimum {
-                nll: end.point.nll,
-                found: 1,
-            }),
+            Some(last) if (end.point.value - last.value).abs() <= SAME => last.found += 1,
+            _ => all.push(Optimum::of(&end.point)),
         }
     }
     all
+}
+
+impl Optimum {
+    fn of(point: &Point) -> Self {
+        Self {
+            nll: point.nll,
+            value: point.value,
+            found: 1,
+        }
+    }
 }

@@ -55,52 +55,19 @@
 //! Features: `plot` (on by default) draws pictures, `parquet` reads and writes Parquet. The program
 //! `lynkeus` is a crate of its own, `lynkeus-cli`.
 //!
-//! The rooms below stand in their order: each uses only those before it, which a test sees to.
+//! What runs a study is the crate [`lynkeus_experiment`], whose names stand here, too: name them here. Here are what is
+//! known, proved and fitted, and what is told and printed for elsewhere. The rooms stand in their order: each uses only
+//! those before it, which a test sees to.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-// what all rooms need
-mod crew;
-mod entries;
-pub mod interrupt;
-mod thrifty;
-mod words;
-
-// from a study to its plant, its choice of an observer and the design
-pub mod prepare;
-
-// one observer over the rows of a log or a simulation, and what is kept of it
-mod course;
-
-// what an answer tells
-mod answer;
-
-// whether the result is credible, and what is said of it
-mod judge;
-
 // what the commands answer
-mod estimate;
-
-mod simulate;
-
-// chosen values into a study file
-mod rewrite;
-
-pub mod tune;
-
 mod check;
 
 mod certify;
 
 mod design;
 
-mod compare;
-
-#[cfg(feature = "plot")]
-mod figure;
-
 mod fit;
-
-pub mod monte_carlo;
 
 pub mod precision;
 
@@ -111,43 +78,45 @@ mod report;
 
 mod export;
 
-// the same study again and again
-mod choose;
+#[cfg(test)]
+mod answers_schema;
 
-pub use answer::Answer;
 pub use certify::{AtTheta, CertifyReport, Excitation, Excited, Strays, certify};
 pub use check::{Assumption, CheckOptions, Knowledge, Known, Next, Report, Reserve, check};
-pub use choose::runner::{Runner, Runners};
-pub use compare::{Against, Compared, Comparison, Interval, Resolution, Run, Settled, compare};
-pub use course::checkpoint::Checkpoint;
-pub use course::columns::log;
-pub use course::corrections::Corrections;
-pub use course::doubt::{Doubt, Kind as DoubtKind, Level as DoubtLevel};
-pub use course::quantity::Quantity;
 pub use design::{DesignReport, design};
-pub use estimate::live::estimator;
-pub use estimate::{estimate, estimate_resumed, side_by_side};
 pub use export::export;
 pub use fit::function::{LikelihoodFunction, LikelihoodPoint, LogInnovations, likelihood};
 pub use fit::{Fit, FitOptions, fit};
-pub use judge::accuracy::{Accuracy, Coverage, Settling};
-pub use judge::frozen::Frozen;
-pub use judge::interval::{Intervals, Sampled};
-pub use judge::outcome::{Outcome, Watch};
-pub use judge::outside::{Excursion, Outside};
-pub use monte_carlo::monte_carlo;
 pub use precision::precision;
-pub use prepare::choice::{Choice, Grounds, Proposal, Speed};
-pub use prepare::correction::{Correction, GainEntry, InjectionEntry};
-pub use prepare::declared::Account;
-pub use prepare::systems::observer as observer_system;
 pub use print::target::{Artifact, Export, ExportOptions, Subject, Target};
 pub use report::{Page, ReportOptions, report};
-pub use rewrite::Change;
-pub use simulate::simulate;
-pub use tune::tune;
 
-pub use words::explain;
+pub use lynkeus_experiment::monte_carlo::monte_carlo;
+pub use lynkeus_experiment::tune::tune;
+pub use lynkeus_experiment::{
+    Account, Accuracy, Against, Answer, Change, Checkpoint, Choice, Compared, Comparison,
+    Correction, Corrections, Coverage, Doubt, DoubtKind, DoubtLevel, Excursion, Frozen, GainEntry,
+    Grounds, InjectionEntry, Interval, Intervals, Outcome, Outside, Proposal, Quantity, Resolution,
+    Run, Runner, Runners, Sampled, Settled, Settling, Speed, Watch, compare, estimate,
+    estimate_resumed, estimator, explain, interrupt, log, observer_system, side_by_side, simulate,
+};
+
+/// From a study to its plant, its choice of an observer and the design.
+pub mod prepare {
+    pub use lynkeus_experiment::prepare::{Prepared, StudyDesign, plant, refuse_misfits};
+}
+
+/// Values of keys, tried: which is best.
+pub mod tune {
+    pub use lynkeus_experiment::tune::{Axis, Change, Foretold, Measure, Peak, Row, Sweep, tune};
+}
+
+/// Many runs of a study, each with a seed of its own.
+pub mod monte_carlo {
+    pub use lynkeus_experiment::monte_carlo::{
+        Again, Bands, Failure, MonteCarlo, Scattered, Settled, monte_carlo,
+    };
+}
 
 pub use lynkeus_answer::{Document, Error, ErrorKind, document, near, visible};
 pub use lynkeus_export::curly::c::Precision;

@@ -338,47 +338,16 @@ fn agree(seeds: &[u64]) {
     if !has("gcc") {
         return skipped("gcc is not there");
     }
-    let has_node = has("node");
-    let has_clang = has("clang");
-    if !has_node {
-        skipped("node is not there");
-    }
-    let mut kept = vec![];
-    for &seed in seeds {
+    let looked = seeds.iter().filter_map(|&seed| {
         let mut random = Normal(1000 + seed);
         let folder = Folder::empty();
         match seed % 2 {
             0 => example(&mut random, &folder, (seed / 2) as usize % OBSERVERS.len()),
             _ => filter(&mut random, &folder),
         }
-        let path = folder.path.path();
-        let made = folder.run(&["export", "s.toml", "--to", "c", "-o", "c"]);
-        let expected = estimated(path);
-        if made.code != 0 {
-            // what cannot be estimated is refused by both, in a sentence
-            assert!(expected.is_err(), "seed {seed}: {}", made.err);
-            continue;
-        }
-        match seed % 4 {
-            1 | 2 => compiled(path, &["-fsanitize=address,undefined"]),
-            3 if has_clang => compiled_by("clang", path, &[]),
-            _ => compiled(path, &[]),
-        }
-        let study = folder.read("s.toml");
-        let expected = expected.unwrap();
-        let off = difference(&expected, &replayed(path, &[]), &study);
-        assert!(off <= 1e-12, "seed {seed}: {off:e}\n{study}");
-        let looked = Looked {
-            seed,
-            folder,
-            expected,
-        };
-        if has_node {
-            javascript::check(&looked);
-        }
-        structured::check(&looked);
-        kept.push(looked);
-    }
+        look(seed, folder)
+    });
+    let kept: Vec<Looked> = looked.collect();
     let looked_at = kept.len();
     assert!(
         2 * looked_at >= seeds.len(),
@@ -386,6 +355,82 @@ fn agree(seeds: &[u64]) {
         seeds.len()
     );
     rust::check(&kept);
+}
+
+/// The languages but Rust on a study; none where it cannot be estimated.
+fn look(seed: u64, folder: Folder) -> Option<Looked> {
+    let path = folder.path.path();
+    let made = folder.run(&["export", "s.toml", "--to", "c", "-o", "c"]);
+    let expected = estimated(path);
+    if made.code != 0 {
+        // what cannot be estimated is refused by both, in a sentence
+        assert!(expected.is_err(), "seed {seed}: {}", made.err);
+        return None;
+    }
+    match seed % 4 {
+        1 | 2 => compiled(path, &["-fsanitize=address,undefined"]),
+        3 if has("clang") => compiled_by("clang", path, &[]),
+        _ => compiled(path, &[]),
+    }
+    let study = folder.read("s.toml");
+    let expected = expected.unwrap();
+    let off = difference(&expected, &replayed(path, &[]), &study);
+    assert!(off <= 1e-12, "seed {seed}: {off:e}\n{study}");
+    let looked = Looked {
+        seed,
+        folder,
+        expected,
+    };
+    match has("node") {
+        true => javascript::check(&looked),
+        false => skipped("node is not there"),
+    }
+    structured::check(&looked);
+    Some(looked)
+}
+
+/// The factor of the noise's covariance begins at the noise, wherever its state stands.
+#[test]
+fn noise_that_acts_far_away_is_carried_as_estimate_does() {
+    if !has("gcc") {
+        return skipped("gcc is not there");
+    }
+    let kinds = [("ekf", 1), ("ekf", 3), ("ukf", 1)];
+    let looked = kinds
+        .into_iter()
+        .zip(0..)
+        .map(|((family, substeps), seed)| {
+            let folder = Folder::empty();
+            folder.write(
+                "m.mo",
+                "model Chain
+  Real a(start = 0.3, min = -5, max = 5); Real b(start = 0.1, min = -5, max = 5);
+  Real c(start = 0, min = -5, max = 5); input Real u; output Real y = a;
+equation
+  der(a) = b - 0.1*a*a; der(b) = c - 0.3*b; der(c) = u - 0.5*c;
+end Chain;\n",
+            );
+            let study = format!(
+                "plant = \"m.mo\"\n[sensors]\nnoise = {{ y = 0.02 }}\n[process_noise]\nc = 0.7\n\
+             [observer]\nfamily = \"{family}\"\n\
+             [estimate]\nmethod = \"rk4\"\nsubsteps = {substeps}\nsd = true\n"
+            );
+            folder.write("s.toml", &study);
+            let rows = (0..60).map(|k| {
+                let t = 0.15 * f64::from(k);
+                format!(
+                    "{t:.2},{:.4},{:.4}\n",
+                    0.3 + 0.2 * t.sin(),
+                    0.5 * (2.0 * t).cos()
+                )
+            });
+            folder.write("log.csv", &format!("t,y,u\n{}", rows.collect::<String>()));
+            let looked = look(seed, folder).unwrap();
+            let code = looked.folder.read("c/chain.c");
+            assert!(code.contains("noise_order[3] = {2, 1, 0};"), "{code}");
+            looked
+        });
+    rust::check(&looked.collect::<Vec<_>>());
 }
 
 #[test]

@@ -375,7 +375,11 @@ fn what_does_not_fit_is_refused() {
             "objective = \"innovation\"",
             "\"innovations\", \"simulation\"",
         ),
-        ("starts = 0", "a whole number of at least 1"),
+        ("starts = 0", "a whole number from 1 to 100000"),
+        (
+            "starts = 9000000000000000000",
+            "a whole number from 1 to 100000",
+        ),
         (
             "parameter = [\"k\"]",
             "study.toml:14:1: unknown key \"parameter\" in [fit]; did you mean \"parameters\"?",

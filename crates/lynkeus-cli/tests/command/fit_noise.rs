@@ -135,3 +135,41 @@ fn a_stiff_plant_alone_has_implicit_steps() {
     }
     assert!((number(&found["nll"]) - number(&slow["nll"])).abs() < 1e-3);
 }
+
+/// At rest at 0 the share of the output is no noise: the reading there is told, and the others count.
+#[test]
+fn a_share_of_what_is_zero_for_certain_is_told() {
+    let folder = Folder::empty();
+    folder.write(
+        "plant.mo",
+        "model Filling
+  parameter Real k(min = 0.05, max = 5) = 0.5;
+  Real x(start = 0, fixed = true);
+  output Real y = x;
+equation
+  der(x) = 1 - k*x;
+end Filling;
+",
+    );
+    folder.write(
+        "study.toml",
+        "plant = \"plant.mo\"\n[sensors]\nnoise = { y = \"5%\" }\n[observer]\nfamily = \"ekf\"\n\
+         [fit]\nobjective = \"simulation\"\nparameters = [\"k\"]\n",
+    );
+    let mut normal = Normal(5);
+    let rows = (0..80).map(|row| {
+        let t = 0.05 * f64::from(row);
+        let x = (1.0 - (-K * t).exp()) / K;
+        format!("{t},{}\n", x * (1.0 + 0.05 * normal.next()))
+    });
+    folder.write("log.csv", &format!("t,y\n{}", rows.collect::<String>()));
+    let answer = fitted(&folder, &[]);
+    holds(&answer["parameters"]["k"], K);
+    assert_eq!(answer["readings"], 79);
+    let warnings = answer["warnings"].as_array().unwrap();
+    let is_told = |warning: &serde_json::Value| {
+        let told = warning.as_str().unwrap();
+        told.starts_with("1 reading of y did not count")
+    };
+    assert!(warnings.iter().any(is_told), "{warnings:?}");
+}

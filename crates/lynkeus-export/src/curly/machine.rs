@@ -192,11 +192,12 @@ const OWN: [&str; 6] = [
 ];
 
 /// And where the free flow has no covariance along it.
-const SHARED: [&str; 7] = [
+const SHARED: [&str; 8] = [
     "integrate",
     "along",
     "rows_of_noise",
     "process_noise",
+    "noise_order",
     "WIDTH",
     "CARRIED",
     "DIMENSION",
@@ -274,20 +275,13 @@ impl Machine {
         linear: &Linear<'_>,
         arguments: &Arguments,
     ) -> Result<(), Refusal> {
-        let Linear {
-            flow,
-            noise,
-            is_tuned,
-        } = linear;
+        let Linear { flow, noise, .. } = linear;
         let entries = flow.jacobians().state.places();
         let flow = flow.system();
         refuse_jumps(flow)?;
         let n = flow.states().len();
         let scale = noise.iter().fold(0.0_f64, |m, q| m.max(*q));
-        let (width, holds): (usize, &[&str]) = match scale > 0.0 {
-            true => (2 * n, &["noisy"]),
-            false => (n, &[]),
-        };
+        let width = if linear.is_noisy() { 2 * n } else { n };
         self.size(which.renamed("ENTRIES"), entries.len());
         self.size(which.renamed("ENTRIES_ROOM"), entries.len().max(1));
         if !which.shares() {
@@ -301,6 +295,9 @@ impl Machine {
             let shares: Vec<f64> = noise.iter().map(|q| q / scale).collect();
             tables += &table("process_noise", &shares);
         }
+        if let (Some(order), false) = (linear.flow.order_of(noise), which.shares()) {
+            tables += &places("noise_order", order.into_iter());
+        }
         self.tables += &which.renamed(&tables);
         let own = flow.expressions();
         let slopes = &own.outputs[..entries.len()];
@@ -311,16 +308,12 @@ impl Machine {
             arguments,
             &[Target::all("dx", n), Target::all("slopes", entries.len())],
         )?;
-        let scale = match is_tuned {
-            true => format!("R({scale:?}) * {NOISE_FACTOR}"),
-            false => format!("R({scale:?})"),
-        };
-        let along = chosen(ALONG, holds).replace("NOISE_SCALE", &scale);
-        let linearised = chosen(LINEARISED, holds);
+        let linearised = chosen(LINEARISED, linear.holds());
         let kind = if which == Which::Free { FIELD } else { "" };
         let own = [kind, &flow, &linearised].join("\n");
         self.add(&which.renamed(&own));
         if !which.shares() {
+            let along = linear.along(scale);
             self.add(&which.renamed(&[INTEGRATE, &along].join("\n")));
         }
         Ok(())
@@ -329,13 +322,35 @@ impl Machine {
     /// P = ΦPΦᵀ + W along a flow that is drafted already.
     pub fn carried(&mut self, which: Which, linear: &Linear<'_>) {
         if !which.is_carried() {
-            let holds: &[&str] = if linear.is_noisy() { &["noisy"] } else { &[] };
-            self.add(&which.renamed(&chosen(PREDICT, holds)));
+            self.add(&which.renamed(&chosen(PREDICT, linear.holds())));
         }
     }
 }
 
 impl Linear<'_> {
+    /// The functions that go along it, with W in units of the largest density.
+    fn along(&self, scale: f64) -> String {
+        let scale = match self.is_tuned {
+            true => format!("R({scale:?}) * {NOISE_FACTOR}"),
+            false => format!("R({scale:?})"),
+        };
+        let place = |at: &str| match self.flow.order_of(self.noise) {
+            None => at.to_owned(),
+            Some(_) => format!("noise_order[{at}]"),
+        };
+        chosen(ALONG, self.holds())
+            .replace("NOISE_SCALE", &scale)
+            .replace("PLACE_I", &place("i"))
+            .replace("PLACE_J", &place("j"))
+    }
+
+    fn holds(&self) -> &'static [&'static str] {
+        match self.is_noisy() {
+            true => &["noisy"],
+            false => &[],
+        }
+    }
+
     /// Whether anything disturbs the states.
     pub fn is_noisy(&self) -> bool {
         self.noise.iter().any(|q| *q > 0.0)

@@ -103,6 +103,9 @@ impl Persist for Sides {
         // none before the first interval
         let count = walk.length(self.sides.len())?;
         self.fit(count);
+        if count == 0 {
+            return Ok(());
+        }
         walk.numbers(&mut self.sides)?;
         walk.numbers(&mut self.levels)?;
         walk.numbers(&mut self.largest)?;

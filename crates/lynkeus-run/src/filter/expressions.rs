@@ -3,6 +3,7 @@
 
 use lynkeus_expr::{Expr, Graph, Node};
 
+use super::order::by_distance;
 use crate::Jacobian;
 use crate::classical::{Term, classical_step, sum};
 use crate::equations::Equations;
@@ -64,6 +65,14 @@ impl<'f, 'g> Flow<'f, 'g> {
 
     fn is_noisy(&self) -> bool {
         self.noise.iter().any(Option::is_some)
+    }
+
+    /// The states from the noise on, as its factor goes.
+    fn order(&self) -> Vec<usize> {
+        let noisy: Vec<bool> = self.noise.iter().map(Option::is_some).collect();
+        let slopes = self.places.iter().copied().zip(self.slopes.iter().copied());
+        let order = by_distance(self.graph, &noisy, slopes);
+        order.unwrap_or_else(|| (0..self.states()).collect())
     }
 
     fn term(&self, node: Node) -> Term<'g> {
@@ -146,10 +155,16 @@ impl<'f, 'g> Flow<'f, 'g> {
         let row = |i: usize| &next[n + i * width..n + (i + 1) * width];
         let mut rows = vec![];
         if width > n {
-            let noise = (0..n).flat_map(|i| &row(i)[n..]);
+            let order = self.order();
+            let noise = order
+                .iter()
+                .flat_map(|&i| order.iter().map(move |&j| row(i)[n + j]));
             let noise: Vec<Term<'g>> = noise.map(|w| w.map(|w| scale * w)).collect();
             let factor = factor(self.graph, &noise, n);
-            rows.extend((0..n * n).map(|at| factor[at % n * n + at / n]));
+            rows.resize(n * n, None);
+            for (i, &place) in order.iter().enumerate() {
+                (0..n).for_each(|k| rows[k * n + place] = factor[i * n + k]);
+            }
         }
         let begin = rows.len();
         rows.resize(begin + n * n, None);
@@ -300,19 +315,18 @@ pub(crate) fn projected<'g>(root: &[Term<'g>], c: &[Term<'g>]) -> Vec<Term<'g>> 
     (0..n).map(projected).collect()
 }
 
-/// Carlson's update of x̂ and S by a reading that is `innovation` off; `slopes` is the row of C. The variance of
-/// its noise, which is not 0, is a function of how uncertain the output is. As [`Root::update`](super::root::Root::update).
+/// Carlson's update of x̂ and S by a reading that is `innovation` off; `slopes` is the row of C, `noise` the variance of
+/// its noise, which is not 0. As [`Root::update`](super::root::Root::update).
 pub(crate) fn corrected<'g>(
     (x, root): (&[Term<'g>], &[Term<'g>]),
     slopes: &[Term<'g>],
     innovation: Expr<'g>,
-    noise: impl Fn(Term<'g>) -> Expr<'g>,
+    noise: Expr<'g>,
 ) -> Corrected<'g> {
     let n = x.len();
     let mut root = root.to_vec();
     let projected = projected(&root, slopes);
     let spread = dot(&projected, &projected);
-    let noise = noise(spread);
     let variance = spread.map_or(noise, |spread| spread + noise);
     let mut gain: Vec<Term<'g>> = vec![None; n];
     let mut alpha = noise;

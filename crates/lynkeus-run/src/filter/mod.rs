@@ -47,6 +47,7 @@ pub(crate) mod health;
 mod likelihood;
 mod mhe;
 mod model;
+mod order;
 mod profile;
 mod record;
 pub(crate) mod root;
@@ -64,6 +65,7 @@ pub use likelihood::{
 };
 pub(crate) use model::check_counts;
 pub use model::{NoisyModel, NoisyPlant, Sensor};
+pub(crate) use order::by_distance;
 pub use record::Record;
 pub use settings::{FilterKind, FilterSettings, SigmaPoints, Weights};
 pub use smoother::Smoothed;

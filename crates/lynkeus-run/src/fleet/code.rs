@@ -343,7 +343,7 @@ impl<'g> Correcting<'g> {
             // the first of them has moved nothing
             let moved = moved.fold(None, sum).filter(|_| place > 0);
             let rest = moved.map_or(innovation, |moved| innovation - moved);
-            let found = corrected((&x, &root), c, rest, |_| variance);
+            let found = corrected((&x, &root), c, rest, variance);
             let chosen = |(new, old): (&Term<'g>, &Term<'g>)| match (*new, *old) {
                 (None, None) => None,
                 (new, old) => {

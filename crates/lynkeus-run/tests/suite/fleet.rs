@@ -39,6 +39,8 @@ struct Kind {
     confined: bool,
     /// a start that is known exactly, of a state without noise
     certain: bool,
+    /// states that drive those before them, and noise on the last alone
+    far: bool,
 }
 
 /// A plant of random structure with a filter; `step` is how it is integrated.
@@ -65,12 +67,14 @@ fn filter(random: &mut Random, kind: Kind, step: Step) -> Blueprint {
                         false => read / (1.0 + read * read),
                     };
                     let weight = random.next();
-                    if random.is(0.4) {
+                    if random.is(0.4) && !(kind.far && j > i) {
                         sum + curved * weight
                     } else {
                         sum
                     }
                 });
+                let far = (kind.far && i + 1 < n).then(|| x[i + 1]);
+                let others = far.map_or(others, |next| others + next);
                 (others + u * random.next()).node()
             })
             .collect()
@@ -107,6 +111,10 @@ fn filter(random: &mut Random, kind: Kind, step: Step) -> Blueprint {
         }
     });
     let mut noise: Vec<f64> = noise.collect();
+    if kind.far {
+        noise[..n - 1].fill(0.0);
+        noise[n - 1] = 0.5;
+    }
     let mut initial_variance = vec![0.3; n];
     if kind.certain {
         (noise[0], initial_variance[0]) = (0.0, 0.0);
@@ -351,6 +359,10 @@ fn each_is_what_it_is_alone() {
             ..Kind::default()
         },
         Kind {
+            far: true,
+            ..Kind::default()
+        },
+        Kind {
             gate: true,
             limits: true,
             share: true,
@@ -359,9 +371,10 @@ fn each_is_what_it_is_alone() {
         },
     ];
     let mut happened = [0; 5];
-    for trial in 0..if cfg!(debug_assertions) { 90 } else { 270 } {
+    for trial in 0..if cfg!(debug_assertions) { 100 } else { 300 } {
         let kind = kinds[trial % kinds.len()];
-        let step = [Step::Substeps(1), Step::AtMost(0.15), Step::Substeps(3)][trial / 9 % 3];
+        let step =
+            [Step::Substeps(1), Step::AtMost(0.15), Step::Substeps(3)][trial / kinds.len() % 3];
         let found = run(trial as u64, kind, step);
         happened
             .iter_mut()

@@ -54,7 +54,7 @@ impl Case {
     fn new(seed: u64) -> Self {
         let mut random = Random(seed);
         let n = 1 + seed as usize % 4;
-        let sensors = 1 + seed as usize % 2;
+        let sensors = 1 + (seed + seed / 4) as usize % 2;
         let mut values: Vec<f64> = (0..n).map(|_| random.between(0.4, 1.6)).collect();
         values.extend([0.02, 0.05, 0.7].map(|v| v * random.between(0.5, 2.0)));
         let mut t = 0.0;
@@ -78,15 +78,21 @@ impl Case {
         }
     }
 
-    /// A sensor of every other plant with one does not show more than so much.
+    /// The sensor of some plants with one does not show more than so much.
     fn limits(&self) -> Option<Limits> {
         let (low, high) = (0.45, 0.75);
-        (self.seed % 4 == 2).then_some(Limits { low, high })
+        (self.seed % 4 == 2 && self.sensors == 1 && !self.is_share())
+            .then_some(Limits { low, high })
     }
 
     /// The noise of others grows with the output.
     fn is_share(&self) -> bool {
-        self.seed.is_multiple_of(4) && self.sensors == 1
+        self.seed / 4 % 3 == 1
+    }
+
+    /// Noise acts on one state alone where there are three.
+    fn is_noisy(&self, state: usize) -> bool {
+        self.n != 3 || state == self.seed as usize / 4 % 3
     }
 
     fn noise(&self, r: Expr<'_>) -> ParametricLevel {
@@ -139,9 +145,6 @@ impl Case {
         let (states, derivatives, outputs, [time, u]) = self.plant(&nodes);
         let [q, r, start] = [0, 1, 2].map(|k| θ[self.n + k]);
         let zero = g.constant(0.0).node();
-        // noise acts on the first state alone where there are three; of the others the filter's W has the order in
-        // which they stand
-        let is_noisy = |i: usize| self.n != 3 || i == 0;
         make(&ParametricPlant {
             graph: g,
             time,
@@ -156,7 +159,7 @@ impl Case {
                 })
                 .collect(),
             process_noise: (0..self.n)
-                .map(|i| if is_noisy(i) { q.node() } else { zero })
+                .map(|i| if self.is_noisy(i) { q.node() } else { zero })
                 .collect(),
             ranges: vec![],
             start: states
@@ -196,7 +199,7 @@ impl Case {
                 })
                 .collect(),
             process_noise: (0..self.n)
-                .map(|i| if self.n != 3 || i == 0 { q } else { 0.0 })
+                .map(|i| if self.is_noisy(i) { q } else { 0.0 })
                 .collect(),
             initial_variance: vec![0.2 * 0.2; self.n],
             ranges: vec![],
@@ -763,4 +766,91 @@ fn a_noise_may_depend_on_the_state() {
     assert!((score.value - by_hand(0.4)).abs() < 1e-8);
     let slope = (by_hand(0.4 + 1e-5) - by_hand(0.4 - 1e-5)) / 2e-5;
     assert!((score.gradient[0] - slope).abs() < 1e-7, "{score:?}");
+}
+
+/// The share of an output that is 0, and known to be, is no noise: such a reading, right or wrong, has no density; the
+/// filter is not corrected by it, and it does not count.
+#[test]
+fn a_reading_of_which_all_is_certain_does_not_count() {
+    let (share, at_end) = (0.1, 1.07);
+    for first in [0.0, 0.3] {
+        let g = Graph::new();
+        let [time, x, θ] = ["time", "x", "θ"].map(|name| g.symbol(name));
+        let number = |value: f64| g.constant(value).node();
+        let plant = ParametricPlant {
+            graph: &g,
+            time: time.node(),
+            states: vec![x.node()],
+            derivatives: vec![θ.node()],
+            inputs: vec![],
+            sensors: vec![ParametricSensor {
+                output: x.node(),
+                noise: ParametricLevel::Share(number(share)),
+                limits: None,
+            }],
+            process_noise: vec![number(0.0)],
+            ranges: vec![],
+            start: vec![(number(0.0), number(0.0))],
+            parameters: vec![θ.node()],
+        };
+        let log: Log = vec![(0.0, vec![first], vec![]), (1.0, vec![at_end], vec![])];
+        // by hand: of the second alone, x = θ and σ = 0.1 θ
+        let by_hand = |θ: f64| {
+            let σ = share * θ;
+            0.5 * ((at_end - θ) / σ).powi(2) + σ.ln() + 0.5 * std::f64::consts::TAU.ln()
+        };
+        let slope = (by_hand(0.9 + 1e-5) - by_hand(0.9 - 1e-5)) / 2e-5;
+        let both = [
+            Likelihood::new(&plant),
+            Likelihood::unscented(&plant, SigmaPoints::default()),
+        ];
+        for likelihood in both {
+            let mut seen = vec![];
+            let score = likelihood
+                .unwrap()
+                .watched(&[0.9], rows(&log), Step::Substeps(1), |found| {
+                    seen.push((found.innovation, found.variance));
+                })
+                .unwrap();
+            assert_eq!((score.readings, score.certain), (1, 1));
+            assert!((score.value - by_hand(0.9)).abs() < 1e-12, "{score:?}");
+            assert!((score.gradient[0] - slope).abs() < 1e-7, "{score:?}");
+            assert_eq!((seen[0], seen.len()), ((first, 0.0), 2));
+        }
+        for kind in [
+            FilterKind::Extended,
+            FilterKind::Unscented(SigmaPoints::default()),
+        ] {
+            let model = NoisyModel::new(&NoisyPlant {
+                graph: &g,
+                time: time.node(),
+                states: vec![("x".into(), x.node(), 0.0)],
+                derivatives: vec![number(0.9)],
+                inputs: vec![],
+                sensors: vec![Sensor {
+                    name: "y".into(),
+                    output: x.node(),
+                    noise: Level::Relative(share),
+                    limits: None,
+                }],
+                process_noise: vec![0.0],
+                initial_variance: vec![0.0],
+                ranges: vec![],
+                confined: None,
+            });
+            let run = EstimatorSettings {
+                method: Method::Rk4(Step::Substeps(1)),
+                ..EstimatorSettings::default()
+            };
+            let filter = Blueprint::filter(model.unwrap(), FilterSettings::of(kind), run);
+            let mut filter = filter.estimator().unwrap();
+            filter.keep_record();
+            let mut sum = 0.0;
+            for (t, readings, _) in &log {
+                filter.push(*t, readings).unwrap();
+                sum -= filter.record().unwrap().log_likelihood;
+            }
+            assert!((sum - by_hand(0.9)).abs() < 1e-12, "{sum}");
+        }
+    }
 }

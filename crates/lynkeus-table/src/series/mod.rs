@@ -12,8 +12,12 @@ pub use tail::Lent;
 use lynkeus_answer::Error;
 use tail::Tail;
 
-/// Numbers that go to the disk together; what is read of a long series at a time.
+/// Numbers that go to the disk together.
 const BLOCK: usize = 1 << 15;
+
+/// Numbers that are read of a long series at a time, an equal share of a block: they stay in a cache, those of
+/// other columns beside them.
+const PART: usize = 1 << 12;
 
 /// The numbers of one column, in the order of its rows. A long one is on disk, but for its end: it
 /// is read from its front to its end, a block at a time.
@@ -67,16 +71,25 @@ impl Series {
     }
 
     /// Adds a row.
+    #[inline]
     pub fn push(&mut self, x: f64) {
         let tail = self.tail.own();
-        if tail.len() >= BLOCK {
-            let (blocks, rest) = tail.as_chunks::<BLOCK>();
-            self.blocks
-                .extend(blocks.iter().map(|b| self.store.keep(b)));
-            *tail = rest.to_vec();
-            tail.reserve_exact(BLOCK - tail.len());
+        if tail.len() < BLOCK {
+            return tail.push(x);
         }
-        tail.push(x);
+        self.keep();
+        self.tail.own().push(x);
+    }
+
+    /// Takes whole blocks to the disk.
+    #[cold]
+    fn keep(&mut self) {
+        let tail = self.tail.own();
+        let (blocks, rest) = tail.as_chunks::<BLOCK>();
+        self.blocks
+            .extend(blocks.iter().map(|b| self.store.keep(b)));
+        *tail = rest.to_vec();
+        tail.reserve_exact(BLOCK - tail.len());
     }
 
     /// The number in a row; a long series is better [read on](Self::iter_from).
@@ -111,15 +124,16 @@ impl Series {
     /// The numbers from a row on.
     #[must_use]
     pub fn iter_from(&self, row: usize) -> Iter<'_> {
-        let next = (row / BLOCK).min(self.blocks.len());
+        let before = self.blocks.len() * BLOCK;
+        let next = (row - row % PART).min(before);
         let mut iter = Iter {
             series: self,
             tail: &self.tail,
             next,
-            block: vec![],
-            at: row - next * BLOCK,
+            part: vec![],
+            at: row - next,
         };
-        if next < self.blocks.len() {
+        if next < before {
             let at = iter.at;
             iter.turn();
             iter.at = at;
@@ -227,51 +241,59 @@ pub struct Iter<'s> {
     series: &'s Series,
     /// the numbers after all blocks
     tail: &'s [f64],
-    /// the block that is read next
+    /// the row from which on is read next
     next: usize,
-    /// the block that is being read; empty in the tail
-    block: Vec<f64>,
+    /// the part of a block that is being read; empty in the tail
+    part: Vec<f64>,
     at: usize,
 }
 
 impl Iter<'_> {
-    /// Goes to the next block, or to the tail after the last.
+    /// Goes to the next part, or to the tail after the last.
     fn turn(&mut self) {
         self.at = 0;
-        match self.series.blocks.get(self.next) {
+        match self.series.blocks.get(self.next / BLOCK) {
             Some(place) => {
-                self.next += 1;
-                self.block.resize(BLOCK, f64::NAN);
-                self.series.store.read(*place, 0, &mut self.block);
+                self.part.resize(PART, f64::NAN);
+                let from = self.next % BLOCK;
+                self.series.store.read(*place, from, &mut self.part);
+                self.next += PART;
             }
-            None => self.block = vec![],
+            None => self.part = vec![],
         }
+    }
+
+    /// The first number after a part; none after the tail.
+    #[cold]
+    fn turned(&mut self) -> Option<f64> {
+        if self.part.is_empty() {
+            return None;
+        }
+        self.turn();
+        self.next()
     }
 }
 
 impl Iterator for Iter<'_> {
     type Item = f64;
 
+    #[inline]
     fn next(&mut self) -> Option<f64> {
-        if !self.block.is_empty() {
-            if self.at == BLOCK {
-                self.turn();
-                return self.next();
-            }
-            let x = self.block.get(self.at).copied();
-            self.at += 1;
-            return x;
-        }
-        let x = self.tail.get(self.at).copied()?;
+        let present = match self.part.is_empty() {
+            true => self.tail,
+            false => &self.part,
+        };
+        let Some(x) = present.get(self.at) else {
+            return self.turned();
+        };
         self.at += 1;
-        Some(x)
+        Some(*x)
     }
 
     fn size_hint(&self) -> (usize, Option<usize>) {
-        let blocks = (self.series.blocks.len() - self.next) * BLOCK;
-        let left = match self.block.is_empty() {
+        let left = match self.part.is_empty() {
             true => self.tail.len().saturating_sub(self.at),
-            false => BLOCK - self.at + blocks + self.tail.len(),
+            false => PART - self.at + self.series.len() - self.next,
         };
         (left, Some(left))
     }

@@ -24,11 +24,18 @@ impl Tail {
     }
 
     /// The numbers, to be changed.
+    #[inline]
     pub fn own(&mut self) -> &mut Vec<f64> {
-        if let Some(lent) = self.lent.take() {
-            self.own = (*lent).as_ref().to_vec();
+        if self.lent.is_some() {
+            self.copy();
         }
         &mut self.own
+    }
+
+    #[cold]
+    fn copy(&mut self) {
+        self.own = self.to_vec();
+        self.lent = None;
     }
 
     /// Keeps the first so many.

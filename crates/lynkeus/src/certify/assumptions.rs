@@ -6,9 +6,9 @@ use lynkeus_observers::Assumptions;
 use lynkeus_structure::{AugmentedPlant, Dimension, Matrix, Region, range};
 
 use crate::Error;
-use crate::prepare::Prepared;
-use crate::prepare::declared::Declared;
-use crate::words::explain;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::prepare::declared::Declared;
+use lynkeus_experiment::words::explain;
 use lynkeus_study::Noise;
 
 /// Gaussian measurement errors are taken to stay within this many standard deviations.

@@ -13,11 +13,13 @@ use lynkeus_structure::AugmentedPlant;
 use serde::Serialize;
 
 use super::assumptions;
-use crate::prepare::Prepared;
-use crate::simulate::{self, Rig};
-use crate::thrifty::thrifty;
-use crate::words::number;
+use lynkeus_experiment::course::rig::Rig;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::simulated_by;
+
 use crate::{Error, Outcome};
+use lynkeus_experiment::thrifty::thrifty;
+use lynkeus_experiment::words::number;
 
 /// The monitor of λ_min(S).
 const MONITOR: &str = "excitation";
@@ -296,7 +298,7 @@ fn run(prepared: &Prepared<'_>, tuning: &Tuning) -> Result<Outcome, Error> {
     let simulation = &mut rig.simulation;
     let rows = (simulation.until - simulation.start) / simulation.output_step;
     simulation.method = thrifty(simulation.method, rows);
-    simulate::of_rig(prepared, rig, &mut |_| ControlFlow::Continue(()))
+    simulated_by(prepared, rig, &mut |_| ControlFlow::Continue(()))
 }
 
 /// From when on the last half of the rows is, and its end.

@@ -7,10 +7,10 @@ use serde_json::{Value, json};
 
 use super::excited::ExcitationEntry;
 use super::{CertifyReport, Excited, Strays};
-use crate::entries::{Condition, Named, Range, Verdict, finite, sides};
-use crate::judge::interval::SamplingLimits;
-use crate::prepare::correction::InjectionEntry;
-use crate::prepare::declared::Account;
+use lynkeus_experiment::entries::{Condition, Named, Range, Verdict, finite, sides};
+use lynkeus_experiment::judge::interval::SamplingLimits;
+use lynkeus_experiment::prepare::correction::InjectionEntry;
+use lynkeus_experiment::prepare::declared::Account;
 
 /// The answer of `certify`.
 #[derive(Debug, Serialize)]

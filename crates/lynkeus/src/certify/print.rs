@@ -9,8 +9,8 @@ use serde_json::Value;
 
 use super::CertifyReport;
 use crate::Answer;
-use crate::judge::interval::Intervals;
-use crate::words::{condition, number, side};
+use lynkeus_experiment::judge::interval::Intervals;
+use lynkeus_experiment::words::{condition, number, side};
 
 /// Where it is guaranteed.
 pub(crate) fn region(report: &CertifyReport) -> String {
@@ -47,7 +47,7 @@ impl CertifyReport {
     }
 }
 
-crate::answer::displayed!(CertifyReport);
+lynkeus_experiment::displayed!(CertifyReport);
 
 impl Answer for CertifyReport {
     fn document(&self) -> Document {

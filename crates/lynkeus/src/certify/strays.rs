@@ -5,9 +5,9 @@ use lynkeus_observers::Design;
 use lynkeus_structure::AugmentedPlant;
 use serde::Serialize;
 
-use crate::judge::outside::{self, Outside, outside};
-use crate::prepare::Prepared;
 use crate::{Error, Outcome, Quantity, Series};
+use lynkeus_experiment::judge::outside::{self, Outside, outside};
+use lynkeus_experiment::prepare::Prepared;
 
 /// Where the study's own plant and estimate are outside of the box.
 #[derive(Clone, Debug, Default, Serialize)]

@@ -10,9 +10,9 @@ use serde_json::{Value, json};
 
 use super::known::KnowledgeEntry;
 use super::{Next, Report, Uniform};
-use crate::entries::{Condition, Fit, Named, Point, Range, Verdict, finite, sides};
-use crate::prepare::choice::Chosen;
-use crate::prepare::declared::Account;
+use lynkeus_experiment::entries::{Condition, Fit, Named, Point, Range, Verdict, finite, sides};
+use lynkeus_experiment::prepare::choice::Chosen;
+use lynkeus_experiment::prepare::declared::Account;
 
 /// Parts of the singular set listed for machines.
 const LISTED: usize = 256;

@@ -6,7 +6,7 @@ use lynkeus_observability::{Answer, Verdict};
 use lynkeus_structure::detectability::{Detectability, Hidden, HiddenErrors, Observability};
 use lynkeus_structure::{self as structure, AugmentedPlant, Coordinate, Uniformity};
 
-use crate::words::{listed, number};
+use lynkeus_experiment::words::{listed, number};
 
 /// What can be known of one quantity.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,7 +4,7 @@ use lynkeus_structure::detectability::Detectability;
 use serde::Serialize;
 
 use super::{Assumption, Knowledge, Known, Reserve};
-use crate::entries::Named;
+use lynkeus_experiment::entries::Named;
 
 /// What can be known under an assumption on the unknown inputs.
 #[derive(Debug, Serialize)]

@@ -13,9 +13,9 @@ use serde::{Serialize, Serializer};
 use serde_json::Value;
 
 use crate::Study;
-use crate::prepare::Prepared;
-use crate::prepare::choice::{Choice, Grounds, Proposal};
-use crate::words::number;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::prepare::choice::{Choice, Grounds, Proposal};
+use lynkeus_experiment::words::number;
 
 /// What to do next.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -297,7 +297,7 @@ fn skeleton(prepared: &Prepared<'_>, observer: &str) -> String {
 /// Ten times the slowest time scale of the plant at its start, else 10.
 fn choice_of_span(prepared: &Prepared<'_>) -> f64 {
     let augmented = prepared.augmented();
-    let J = crate::prepare::modes::Start::of(augmented).jacobian(augmented);
+    let J = lynkeus_experiment::prepare::modes::Start::of(augmented).jacobian(augmented);
     let Some(modes) = J.and_then(spectrum::eigenvalues) else {
         return 10.0;
     };

@@ -9,9 +9,9 @@ use lynkeus_words::Words;
 
 use super::knowledge::in_part;
 use super::{CheckOptions, Report};
-use crate::words::explain;
-use crate::words::listed;
 use crate::{Error, Study};
+use lynkeus_experiment::words::explain;
+use lynkeus_experiment::words::listed;
 
 /// Symmetries told before the rest becomes a count.
 const TOLD: usize = 8;

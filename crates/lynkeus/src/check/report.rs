@@ -6,8 +6,8 @@ use lynkeus_observability::Answer;
 use lynkeus_observers::Examination;
 
 use super::{Knowledge, Next, Uniform};
-use crate::prepare::choice::Choice;
-use crate::prepare::declared::Account;
+use lynkeus_experiment::prepare::choice::Choice;
+use lynkeus_experiment::prepare::declared::Account;
 
 /// What to ask beside "which states, by which observer".
 #[derive(Clone, Debug, Default)]

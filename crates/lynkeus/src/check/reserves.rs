@@ -13,9 +13,10 @@ use lynkeus_structure::{
 
 use super::knowledge::{Assumption, Found, Knowledge, Known, Reserve};
 use super::{CheckOptions, observability};
-use crate::prepare::{Prepared, seen_by, sensors};
-use crate::words::explain;
-use crate::{Error, Study, prepare::calibrate};
+use crate::{Error, Study};
+use lynkeus_experiment::prepare::calibrate;
+use lynkeus_experiment::prepare::{Prepared, seen_by, sensors};
+use lynkeus_experiment::words::explain;
 
 /// Cells examined per end of an output's range.
 const CELLS: usize = 1000;

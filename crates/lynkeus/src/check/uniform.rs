@@ -3,7 +3,7 @@
 use lynkeus_answer::Document;
 use lynkeus_structure::{self as structure, Blind, Coordinate, Place, Uniformity};
 
-use crate::words::{number, side};
+use lynkeus_experiment::words::{number, side};
 use lynkeus_observability::{Answer, Quantity, Verdict};
 
 /// What was found on the box, and how far it may be said beside the verdicts on the

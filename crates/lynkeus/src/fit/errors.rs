@@ -1,8 +1,10 @@
 //! Errors of predictions at the values found: one step ahead, and of the plant alone.
 
+use lynkeus_expr::Budget;
+
 use super::problem::{Problem, Rows as Which};
 use crate::Error;
-use crate::tune::whiteness::{Whiteness, whiteness};
+use lynkeus_experiment::tune::whiteness::{Whiteness, whiteness};
 
 /// How well the readings of a sensor are predicted, in root mean square over all logs.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,6 +68,10 @@ struct Sum {
 
 impl Sum {
     fn add(&mut self, innovation: f64, variance: f64) {
+        if variance == 0.0 {
+            // it does not count, either
+            return;
+        }
         self.count += 1;
         self.squares += innovation * innovation;
         self.scaled += innovation * innovation / variance;
@@ -111,7 +117,8 @@ pub(super) fn errors<'p>(
         let Some(problem) = problem else { continue };
         let mut first = 0;
         for (place, log) in logs.iter().enumerate() {
-            problem.score(place, values, Which::All, |seen| {
+            // half a table is none
+            problem.score(place, values, Which::All, &Budget::default(), |seen| {
                 // of a reading at an end nobody knows how far it is off
                 if seen.is_at_end {
                     return;
@@ -126,7 +133,7 @@ pub(super) fn errors<'p>(
                 }
                 columns.innovation[at] = seen.innovation;
                 columns.deviation[at] = seen.variance.sqrt();
-                if is_held_out == 0 {
+                if is_held_out == 0 && seen.variance > 0.0 {
                     scaled[seen.sensor].push(seen.innovation / seen.variance.sqrt());
                 }
             })?;

@@ -11,20 +11,21 @@ mod extra;
 mod extras;
 
 use lynkeus_run::filter::Likelihood;
-use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix};
 use serde::Serialize;
 
-use super::known::{ROUNDING, SHARE};
+use super::known::{Knowledge, knowledge};
 use super::plant::Source;
 use super::problem::Problem;
 use super::search::{Found, positive};
 use super::unknown::{Kind, Unknown};
-use crate::entries::{Named, finite};
-use crate::words::explain;
-use crate::{Error, Study};
-use candidates::{Candidate, Experiment};
+use crate::Error;
+pub(super) use candidates::Candidate;
+use candidates::Experiment;
 use extra::Extra;
 use extras::{Predictor, own, with_starts};
+use lynkeus_experiment::entries::{Named, finite};
+use lynkeus_experiment::words::explain;
 
 /// What is known of the next experiment.
 #[derive(Clone, Debug, Default)]
@@ -67,13 +68,13 @@ pub(crate) struct NextExperiment {
     pub undetermined: Vec<String>,
 }
 
-/// Tries the study's candidates, or usual ones; also told is what the user should know.
+/// Tries candidates; also told is what the user should know.
 ///
 /// # Errors
-/// Candidates that do not fit the plant.
+/// As [`Source::likelihood`].
 pub(super) fn ahead(
     source: Source<'_>,
-    study: &Study,
+    planned: Vec<Candidate>,
     problem: &Problem<'_>,
     found: &Found,
 ) -> Result<(Ahead, Vec<String>), Error> {
@@ -81,16 +82,15 @@ pub(super) fn ahead(
     let Some(log) = problem.logs.first() else {
         return Ok((Ahead::default(), notes));
     };
-    let planned = Candidate::all(source, study, log)?;
     let (mut extras, planned) = extras::Extras::of(planned);
     let mut predictor = Predictor::new(source, problem, found, &extras.all)?;
     extras.settle(&mut predictor, log)?;
     let mut judge = Judge::new(source, problem, found, &extras.all)?;
-    let now = judge.knowledge(&judge.logs);
+    let now = knowledge(&judge.logs, &judge.free);
     let mut tried = vec![];
     let count = planned.len();
     for (k, (candidate, places)) in planned.into_iter().enumerate() {
-        if study.budget.spent().is_some() {
+        if problem.is_spent() {
             notes.push(format!(
                 "a limit left out {} of {count} candidates for the next experiment",
                 count - k
@@ -99,15 +99,23 @@ pub(super) fn ahead(
         }
         let sensors: Vec<&Extra> = places.iter().map(|&i| &extras.all[i]).collect();
         let name = candidate.words(&sensors);
-        let mut experiment = candidate.experiment(log, extras.all.len(), &places)?;
-        let is_valued = predictor.predict(&mut experiment)?;
-        let then = match is_valued {
-            true => judge.after(&experiment)?,
-            false => None,
+        // the answer does not fall with one candidate
+        let experiment = candidate.experiment(log, extras.all.len(), &places);
+        let (experiment, then) = match experiment.and_then(|e| judge.tried(&mut predictor, e)) {
+            Ok(tried) => tried,
+            Err(error) => {
+                notes.push(format!("the next experiment, {name}: {error}"));
+                continue;
+            }
         };
         if then.is_none() {
             notes.push(format!(
                 "the next experiment, {name}: the plant has no value there"
+            ));
+        }
+        for input in experiment.beyond(&source.symbolic.inputs) {
+            notes.push(format!(
+                "the next experiment, {name}: {input} leaves its declared range"
             ));
         }
         let sensors = sensors.iter().map(|extra| extra.words()).collect();
@@ -126,14 +134,6 @@ pub(super) fn ahead(
     let now = judge.worst(&now).filter(|_| is_told);
     let now = now.map(|(place, share)| (judge.unknowns[place].label(), share));
     Ok((Ahead { now, tried }, notes))
-}
-
-/// What is known of the values.
-struct Knowledge {
-    /// those that are not told, by their places
-    flat: Vec<usize>,
-    /// of the errors as the search has them, of those that are told
-    covariance: DMatrix<f64>,
 }
 
 /// The values with what the logs tell of them.
@@ -196,6 +196,19 @@ impl<'p, 'l> Judge<'p, 'l> {
         })
     }
 
+    /// An experiment with what is expected of it, and what would be known; none where the plant has no value.
+    fn tried(
+        &mut self,
+        predictor: &mut Predictor,
+        mut experiment: Experiment,
+    ) -> Result<(Experiment, Option<Knowledge>), Error> {
+        let then = match predictor.predict(&mut experiment)? {
+            true => self.after(&experiment)?,
+            false => None,
+        };
+        Ok((experiment, then))
+    }
+
     /// What would be known; none where the plant has no value.
     fn after(&mut self, experiment: &Experiment) -> Result<Option<Knowledge>, Error> {
         let own: Vec<f64> = self.places.iter().map(|&p| self.values[p]).collect();
@@ -214,45 +227,7 @@ impl<'p, 'l> Judge<'p, 'l> {
                 all[(p, q)] += score.information[i * count + j] * slope(p) * slope(q);
             }
         }
-        Ok(Some(self.knowledge(&all)))
-    }
-
-    /// What an information tells; of directions in which it has none nothing is counted.
-    fn knowledge(&self, information: &DMatrix<f64>) -> Knowledge {
-        let n = information.nrows();
-        let is_read = |i: &usize| information[(*i, *i)] > 0.0;
-        let (read, mut flat): (Vec<usize>, Vec<usize>) = self.free.iter().partition(|i| is_read(i));
-        let mut covariance = DMatrix::zeros(n, n);
-        if read.is_empty() {
-            return Knowledge { flat, covariance };
-        }
-        let scale = DVector::from_fn(read.len(), |i, _| {
-            information[(read[i], read[i])].sqrt().recip()
-        });
-        let unit = DMatrix::from_fn(read.len(), read.len(), |i, j| {
-            information[(read[i], read[j])] * scale[i] * scale[j]
-        });
-        let eigen = SymmetricEigen::new(unit);
-        let least = ROUNDING * eigen.eigenvalues.max();
-        for (value, direction) in eigen
-            .eigenvalues
-            .iter()
-            .zip(eigen.eigenvectors.column_iter())
-        {
-            for (i, &p) in read.iter().enumerate() {
-                if *value <= least {
-                    if direction[i].abs() > SHARE && !flat.contains(&p) {
-                        flat.push(p);
-                    }
-                    continue;
-                }
-                for (j, &q) in read.iter().enumerate() {
-                    covariance[(p, q)] += direction[i] * direction[j] / value * scale[i] * scale[j];
-                }
-            }
-        }
-        flat.sort_unstable();
-        Knowledge { flat, covariance }
+        Ok(Some(knowledge(&all, &self.free)))
     }
 
     /// The values that are judged: the parameters, else noises and densities, else what there is.

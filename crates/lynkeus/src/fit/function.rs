@@ -1,5 +1,6 @@
 //! −log L as a function of what `[fit]` names, for optimisers and samplers of others.
 
+use lynkeus_expr::Budget;
 use lynkeus_study::{Objective, Prior};
 use nalgebra::{DMatrix, DVector};
 
@@ -9,8 +10,8 @@ use super::posed::{self, Posed};
 use super::problem::{Problem, Rows, Steps, Term};
 use super::search::hessian;
 use super::unknown::Unknown;
-use crate::prepare::{self, Prepared};
 use crate::{Error, Study, Table};
+use lynkeus_experiment::prepare::{self, Prepared};
 
 /// −log L of a study's logs as a function of what its `[fit]` names, in the units of the study: noises as the study
 /// has them, no logarithms. The steps are settled at the study's own values, as [`fit`](super::fit) does before its
@@ -87,6 +88,7 @@ pub fn likelihood(study: &Study, tables: &[Table]) -> Result<LikelihoodFunction,
         steps: Steps::default(),
         most_confined: usize::MAX,
         evaluations: 0,
+        budget: study.budget.clone(),
     };
     problem.begin(&study)?;
     // half a likelihood, and steps that are not settled, are none
@@ -207,7 +209,7 @@ impl LikelihoodFunction {
             .collect();
         self.with(false, |problem| {
             for (place, found) in all.iter_mut().enumerate().take(count) {
-                problem.score(place, values, Rows::All, |seen| {
+                problem.score(place, values, Rows::All, &Budget::default(), |seen| {
                     let at = seen.row * outputs + seen.sensor;
                     found.innovation[at] = seen.innovation;
                     found.variance[at] = seen.variance;
@@ -230,6 +232,7 @@ impl LikelihoodFunction {
             steps: self.steps,
             most_confined: self.most_confined,
             evaluations: 0,
+            budget: Budget::default(),
         };
         let found = work(&mut problem);
         self.terms = problem.terms;

@@ -8,7 +8,7 @@ use super::experiment::NextExperiment;
 use super::uncertainty::Known;
 use super::unknown::{Kind, Unknown};
 use super::{Fit, Optimum};
-use crate::entries::{Named, finite};
+use lynkeus_experiment::entries::{Named, finite};
 
 /// The answer of `fit`.
 #[derive(Debug, Serialize)]
@@ -200,7 +200,7 @@ impl From<&Known> for FittedValue {
 
 impl From<&Optimum> for FittedOptimum {
     fn from(optimum: &Optimum) -> Self {
-        let Optimum { nll, found } = *optimum;
+        let Optimum { nll, found, .. } = *optimum;
         Self { nll, found }
     }
 }

@@ -12,8 +12,8 @@ use super::plant;
 use super::problem::{Point, Problem};
 use super::unknown::{Kind, Unknown};
 use crate::Error;
-use crate::prepare::{self, Prepared, calibrate};
-use crate::words::explain;
+use lynkeus_experiment::prepare::{self, Prepared, calibrate};
+use lynkeus_experiment::words::explain;
 
 /// The time for what the sensors can tell at all.
 const EXACT: Duration = Duration::from_secs(10);
@@ -91,37 +91,57 @@ fn of_noises(prepared: &Prepared<'_>, symbolic: &Plant) -> Result<Vec<String>, E
 }
 
 /// A share of the largest eigenvalue of a correlation below which it is rounding.
-pub(super) const ROUNDING: f64 = 1e-12;
+const ROUNDING: f64 = 1e-12;
 
 /// A share of a direction below which an unknown is not in it.
-pub(super) const SHARE: f64 = 1e-3;
+const SHARE: f64 = 1e-3;
 
-/// The unknowns that can change together without a change of −log L to second order, by their places.
-pub(super) fn flat(matrix: &DMatrix<f64>, free: &[usize]) -> Vec<usize> {
-    let alone = |i: &usize| matrix[(*i, *i)] <= 0.0 || !matrix[(*i, *i)].is_finite();
-    let (mut found, rest): (Vec<usize>, Vec<usize>) = free.iter().partition(|i| alone(i));
-    if rest.is_empty() {
-        return found;
+/// What an information tells of the unknowns.
+pub(super) struct Knowledge {
+    /// those that can change together without a change of −log L to second order, by their places
+    pub flat: Vec<usize>,
+    /// of the errors as the search has them, in the directions that are told
+    pub covariance: DMatrix<f64>,
+}
+
+/// What an information, or a Hessian, tells of the unknowns that are free.
+pub(super) fn knowledge(information: &DMatrix<f64>, free: &[usize]) -> Knowledge {
+    let n = information.nrows();
+    let is_read = |i: &usize| information[(*i, *i)] > 0.0 && information[(*i, *i)].is_finite();
+    let (read, mut flat): (Vec<usize>, Vec<usize>) = free.iter().partition(|i| is_read(i));
+    let mut covariance = DMatrix::zeros(n, n);
+    if read.is_empty() {
+        return Knowledge { flat, covariance };
     }
-    let scale = DVector::from_fn(rest.len(), |i, _| matrix[(rest[i], rest[i])].sqrt().recip());
-    let unit = DMatrix::from_fn(rest.len(), rest.len(), |i, j| {
-        matrix[(rest[i], rest[j])] * scale[i] * scale[j]
+    let scale = DVector::from_fn(read.len(), |i, _| {
+        information[(read[i], read[i])].sqrt().recip()
+    });
+    let unit = DMatrix::from_fn(read.len(), read.len(), |i, j| {
+        information[(read[i], read[j])] * scale[i] * scale[j]
     });
     let eigen = SymmetricEigen::new(unit);
-    let largest = eigen.eigenvalues.max();
-    for (place, value) in eigen.eigenvalues.iter().enumerate() {
-        if *value > ROUNDING * largest {
-            continue;
-        }
-        let direction = eigen.eigenvectors.column(place);
-        for (i, share) in direction.iter().enumerate() {
-            if share.abs() > SHARE && !found.contains(&rest[i]) {
-                found.push(rest[i]);
+    let least = ROUNDING * eigen.eigenvalues.max();
+    let directions = eigen.eigenvectors.column_iter();
+    for (value, direction) in eigen.eigenvalues.iter().zip(directions) {
+        for (i, &p) in read.iter().enumerate() {
+            if *value <= least {
+                if direction[i].abs() > SHARE && !flat.contains(&p) {
+                    flat.push(p);
+                }
+                continue;
+            }
+            for (j, &q) in read.iter().enumerate() {
+                covariance[(p, q)] += direction[i] * direction[j] / value * scale[i] * scale[j];
             }
         }
     }
-    found.sort_unstable();
-    found
+    flat.sort_unstable();
+    Knowledge { flat, covariance }
+}
+
+/// The unknowns that can change together without a change of −log L to second order, by their places.
+pub(super) fn flat(matrix: &DMatrix<f64>, free: &[usize]) -> Vec<usize> {
+    knowledge(matrix, free).flat
 }
 
 /// How far from the start it is looked again, as a share of a range or of a value.

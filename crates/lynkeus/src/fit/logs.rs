@@ -2,12 +2,13 @@
 
 use lynkeus_run::filter::Row;
 
-use crate::course::Samples;
-use crate::course::columns::Log;
-use crate::course::filter::noise;
-use crate::estimate::start_at_readings;
-use crate::prepare::{Prepared, StudyDesign};
 use crate::{Error, Table};
+use lynkeus_experiment::course::Samples;
+use lynkeus_experiment::course::columns::Log;
+use lynkeus_experiment::course::filter::noise;
+use lynkeus_experiment::course::run::start_at_readings;
+use lynkeus_experiment::prepare::{Prepared, StudyDesign};
+use lynkeus_experiment::words::number;
 
 /// A log as a fit reads it.
 #[derive(Clone, Debug)]
@@ -46,6 +47,12 @@ impl FittedLog {
         };
         let mut design = design.clone();
         start_at_readings(prepared, &log.samples, &mut design);
+        let place = log.table.place();
+        // of several logs nobody knows which one is meant
+        let named = |all: Vec<String>| match is_one_of_several {
+            true => all.iter().map(|told| format!("{place}: {told}")).collect(),
+            false => all,
+        };
         let samples = log.samples;
         let time = samples.time.to_vec();
         let widths = [samples.readings.len(), samples.inputs.len()];
@@ -65,6 +72,7 @@ impl FittedLog {
                 time.partition_point(|t| *t <= until)
             }
         };
+        refuse_gaps(&log.table.place(), &time)?;
         let fitted_readings = &readings[..fitted * widths[0]];
         if !fitted_readings.iter().any(|y| y.is_finite()) {
             return Err(
@@ -85,8 +93,8 @@ impl FittedLog {
                 .map(|(_, start)| *start)
                 .collect(),
             samples,
-            notes: log.notes,
-            warnings: log.warnings,
+            notes: named(log.notes),
+            warnings: named(log.warnings),
         })
     }
 
@@ -113,12 +121,37 @@ impl FittedLog {
 
     /// The usual time between two rows.
     pub fn interval(&self) -> f64 {
-        let mut steps: Vec<f64> = self.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        steps.retain(|step| *step > 0.0);
-        let middle = steps.len() / 2;
-        match steps.is_empty() {
-            true => 1.0,
-            false => *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
-        }
+        usual_interval(&self.time)
     }
+}
+
+fn usual_interval(time: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.retain(|step| *step > 0.0);
+    let middle = steps.len() / 2;
+    match steps.is_empty() {
+        true => 1.0,
+        false => *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
+    }
+}
+
+/// Usual intervals between two rows beyond which they are of two logs.
+const FARTHEST: f64 = 1e6;
+
+fn refuse_gaps(place: &str, time: &[f64]) -> Result<(), Error> {
+    let interval = usual_interval(time);
+    let mut pairs = time.windows(2);
+    let Some(gap) = pairs.find(|pair| pair[1] - pair[0] > FARTHEST * interval) else {
+        return Ok(());
+    };
+    let message = format!(
+        "no row between {} and {}, {:.1e} times the usual {}",
+        number(gap[0]),
+        number(gap[1]),
+        (gap[1] - gap[0]) / interval,
+        number(interval)
+    );
+    Err(Error::input(message)
+        .at(place)
+        .hint("give what is before and after as two logs: each starts anew"))
 }

@@ -6,8 +6,8 @@ use super::Fit;
 use super::errors::Innovations;
 use super::uncertainty::Profile;
 use crate::Series;
-use crate::figure::over_time;
-use crate::tune::whiteness::{autocorrelations, band};
+use lynkeus_experiment::figure::over_time;
+use lynkeus_experiment::tune::whiteness::{autocorrelations, band};
 
 /// Outputs that are drawn at most.
 const OUTPUTS: usize = 4;

@@ -12,9 +12,9 @@ use lynkeus_run::filter::{
 use lynkeus_structure::AugmentedPlant;
 
 use super::unknown::{Kind, Unknown};
-use crate::prepare::{self, Prepared};
-use crate::words::explain;
 use crate::{Error, Study, near};
+use lynkeus_experiment::prepare::{self, Prepared};
+use lynkeus_experiment::words::explain;
 
 /// The plant with the parameters that are found as symbols.
 ///

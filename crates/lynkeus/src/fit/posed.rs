@@ -1,9 +1,9 @@
 //! What a study asks of its logs: what is to be found, and the functions of it that the logs are.
 
-use lynkeus_model::Plant;
+use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::FilterTuning;
 use lynkeus_observers::kalman::{EKF, UKF};
-use lynkeus_structure::AugmentedPlant;
+use lynkeus_structure::{AugmentedPlant, Dimension, Verdict, regularity, steps};
 use lynkeus_study::{Name, Objective};
 
 use super::known::{self, Exact};
@@ -11,8 +11,9 @@ use super::logs::FittedLog;
 use super::plant::Source;
 use super::problem::Term;
 use super::unknown::{self, Kind, Unknown};
-use crate::prepare::{self, Prepared, StudyDesign};
 use crate::{Error, Study, Table};
+use lynkeus_experiment::prepare::{self, Prepared, StudyDesign};
+use lynkeus_experiment::words::explain;
 
 /// The study by the filter whose innovations are fitted, and what is to be said of that.
 pub(super) fn with_filter(study: &Study) -> Result<(Study, Vec<String>), Error> {
@@ -131,6 +132,44 @@ impl<'s> Posed<'s> {
         known::exact(self.prepared, self.symbolic, &self.unknowns, variances)
     }
 
+    /// The places of the parameters on which it depends where the model jumps, or may: no derivative sees that a jump
+    /// moves.
+    ///
+    /// # Errors
+    /// An expression that reads another symbol.
+    pub fn jumping(&self) -> Result<Vec<usize>, Error> {
+        let graph = self.seen.graph();
+        let all = [self.seen.derivatives.clone(), self.seen.output_nodes()].concat();
+        let seen = graph.with_residuals(&all);
+        let mut region = self.seen.region();
+        let mut asked = vec![];
+        for (place, unknown) in self.unknowns.iter().enumerate() {
+            let mut parameters = self.symbolic.parameters.iter().map(|p| &p.variable);
+            let is_own = |v: &&Variable| unknown.kind == Kind::Parameter && v.name == unknown.name;
+            let Some(own) = parameters.find(is_own) else {
+                continue;
+            };
+            region.dimensions.push(Dimension {
+                name: unknown.name.clone(),
+                symbol: own.node,
+                min: unknown.low,
+                max: unknown.high,
+                integer: false,
+            });
+            if seen.iter().any(|node| steps(graph, *node, &[own.node])) {
+                asked.push((place, own.node));
+            }
+        }
+        let mut found = vec![];
+        for (place, node) in asked {
+            let finding = regularity(graph, &all, &[node], &region).map_err(explain)?;
+            if finding.verdict != Verdict::Proved {
+                found.push(place);
+            }
+        }
+        Ok(found)
+    }
+
     /// Names of what is measured.
     pub fn outputs(&self) -> Vec<String> {
         let outputs = self.seen.outputs.iter();
@@ -147,9 +186,10 @@ impl<'s> Posed<'s> {
         logs.chain(left_out).collect()
     }
 
-    /// What of the logs contradicts itself, or counts nowhere.
+    /// What of the logs or of the study contradicts itself, or counts nowhere.
     pub fn warnings(&self) -> Vec<String> {
-        let logs = self.logs.iter();
-        logs.flat_map(|log| log.warnings.clone()).collect()
+        let logs = self.logs.iter().flat_map(|log| log.warnings.clone());
+        let beside = self.unknowns.iter().filter_map(Unknown::beside_its_prior);
+        logs.chain(beside).collect()
     }
 }

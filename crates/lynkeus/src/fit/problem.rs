@@ -1,5 +1,6 @@
 //! What is made least: −log L over all logs, and what was known before.
 
+use lynkeus_expr::Budget;
 use lynkeus_run::Step;
 use lynkeus_run::filter::{Likelihood, Score, Seen};
 use nalgebra::{DMatrix, DVector};
@@ -7,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::logs::FittedLog;
 use super::unknown::Unknown;
 use crate::Error;
-use crate::words::explain;
+use lynkeus_experiment::words::explain;
 
 /// −log L with the prior's share, where the search has it: parameters that are searched as logarithms are ones.
 #[derive(Clone, Debug)]
@@ -75,7 +76,12 @@ pub(crate) struct Problem<'a> {
     /// where the plant has no value in more intervals than so many, −log L has none: steps are too long there
     pub most_confined: usize,
     pub evaluations: usize,
+    /// once it is spent, nothing has a value any more
+    pub budget: Budget,
 }
+
+/// Rows after which the clock is looked at.
+const LOOK: usize = 16;
 
 /// Rows of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,7 +104,7 @@ impl Problem<'_> {
         z.map(|(z, unknown)| unknown.value(*z)).collect()
     }
 
-    /// −log L and its derivatives.
+    /// −log L and its derivatives; infinite where a limit struck on the way.
     ///
     /// # Errors
     /// A step of which there are too many.
@@ -116,7 +122,8 @@ impl Problem<'_> {
             z,
         };
         for place in 0..self.terms.len() {
-            let score = self.score(place, &values, Rows::Fitted, |_| {})?;
+            let budget = self.budget.clone();
+            let score = self.score(place, &values, Rows::Fitted, &budget, |_| {})?;
             let places = &self.terms[place].places;
             point.nll += score.value;
             point.readings += score.readings;
@@ -136,18 +143,25 @@ impl Problem<'_> {
             .iter()
             .chain(&point.information)
             .all(|x| x.is_finite());
-        if !is_finite || point.value.is_nan() || point.confined > self.most_confined {
+        let is_sound = is_finite && point.confined <= self.most_confined && !self.is_spent();
+        if !is_sound || point.value.is_nan() {
             point.value = f64::INFINITY;
         }
         Ok(point)
     }
 
-    /// The share of one log; `see` is told its innovations.
+    /// Whether a limit struck: what has been computed before still counts.
+    pub fn is_spent(&self) -> bool {
+        self.budget.spent().is_some()
+    }
+
+    /// The share of one log, or of its first rows where the budget ends; `see` is told its innovations.
     pub fn score(
         &mut self,
         place: usize,
         values: &[f64],
         rows: Rows,
+        budget: &Budget,
         see: impl FnMut(Seen),
     ) -> Result<Score, Error> {
         let (log, term) = (&self.logs[place], &mut self.terms[place]);
@@ -156,9 +170,10 @@ impl Problem<'_> {
             Rows::Fitted => log.fitted,
             Rows::All => log.time.len(),
         };
-        let score = term
-            .likelihood
-            .watched(&own, log.rows(count), self.steps.length, see);
+        let is_going = |k: usize| !k.is_multiple_of(LOOK) || budget.spent().is_none();
+        let rows = log.rows(count).enumerate();
+        let rows = rows.take_while(|(k, _)| is_going(*k)).map(|(_, row)| row);
+        let score = term.likelihood.watched(&own, rows, self.steps.length, see);
         score.map_err(|error| explain(error).at(&log.place))
     }
 

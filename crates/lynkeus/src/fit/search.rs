@@ -36,19 +36,20 @@ pub(crate) struct Found {
     pub is_ended: bool,
 }
 
-/// From one point downhill; unknowns that are `held` stay. `watch` is asked between steps whether to go on.
+/// From one point downhill; unknowns that are `held` stay. `watch` is asked before steps whether to go on.
 ///
 /// # Errors
 /// As [`Problem::at`].
 pub(crate) fn search(
     problem: &mut Problem<'_>,
-    start: DVector<f64>,
+    start: Point,
     held: &[bool],
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<Found, Error> {
-    let mut descent = Descent::new(problem, start, held)?;
+    let mut descent = Descent::new(problem, start, held);
     descent.score(watch)?;
     if !descent.point.value.is_finite() {
+        descent.is_ended = descent.problem.is_spent();
         return Ok(descent.found(None));
     }
     descent.damping = 0.0;
@@ -60,7 +61,8 @@ pub(crate) fn search(
         }
         let matrix = descent.hessian()?;
         let goes_on = descent.goes_on(&matrix, watch)?;
-        last = Some(matrix);
+        // one that a limit cut short is none
+        last = Some(matrix).filter(|_| !descent.is_ended);
         if !goes_on {
             break;
         }
@@ -77,11 +79,12 @@ pub(crate) fn least(
     problem: &mut Problem<'_>,
     start: DVector<f64>,
     held: &[bool],
-    watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<(Point, bool), Error> {
-    let mut descent = Descent::new(problem, start, held)?;
-    descent.score(watch)?;
-    Ok((descent.point, !descent.is_ended))
+    let start = problem.at(start)?;
+    let mut descent = Descent::new(problem, start, held);
+    descent.score(&mut || ControlFlow::Continue(()))?;
+    let is_done = !descent.is_ended && !descent.problem.is_spent();
+    Ok((descent.point, is_done))
 }
 
 struct Descent<'d, 'p> {
@@ -98,13 +101,8 @@ struct Descent<'d, 'p> {
 }
 
 impl<'d, 'p> Descent<'d, 'p> {
-    fn new(
-        problem: &'d mut Problem<'p>,
-        start: DVector<f64>,
-        held: &[bool],
-    ) -> Result<Self, Error> {
-        let point = problem.at(start)?;
-        Ok(Self {
+    fn new(problem: &'d mut Problem<'p>, point: Point, held: &[bool]) -> Self {
+        Self {
             ranges: problem.ranges(),
             held: held.to_vec(),
             scale: DVector::zeros(point.z.len()),
@@ -113,7 +111,7 @@ impl<'d, 'p> Descent<'d, 'p> {
             point,
             problem,
             is_ended: false,
-        })
+        }
     }
 
     /// By Fisher's information.
@@ -150,7 +148,7 @@ impl<'d, 'p> Descent<'d, 'p> {
             *largest = largest.max(matrix[(i, i)].abs());
         }
         loop {
-            if watch().is_break() {
+            if watch().is_break() || self.problem.is_spent() {
                 self.is_ended = true;
                 return Ok(false);
             }

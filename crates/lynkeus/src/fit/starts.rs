@@ -1,6 +1,5 @@
 //! Where searches start.
 
-use lynkeus_expr::Budget;
 use nalgebra::DVector;
 
 use super::problem::Problem;
@@ -33,7 +32,9 @@ pub(super) fn spread(
             true => APART.ln(),
             false => z.abs().max(1.0),
         };
-        let is_open = unknown.kind.is_noise() || !(high - low).is_finite();
+        // a logarithm without a bound of its own ends where numbers do
+        let is_endless = unknown.is_log && unknown.low == f64::MIN_POSITIVE;
+        let is_open = unknown.kind.is_noise() || is_endless || !(high - low).is_finite();
         match is_open {
             true => ((z - reach).max(low), (z + reach).min(high)),
             false => (low, high),
@@ -69,14 +70,9 @@ pub(super) fn best(
     problem: &mut Problem<'_>,
     begin: &DVector<f64>,
     seed: u64,
-    budget: &Budget,
 ) -> Result<Vec<DVector<f64>>, Error> {
     let all = spread(problem, begin, LOOKED_AT + 1, seed);
-    let within = all
-        .into_iter()
-        .skip(1)
-        .take_while(|_| budget.spent().is_none());
-    let points = within.map(|z| problem.at(z));
+    let points = all.into_iter().skip(1).map(|z| problem.at(z));
     let mut points = points.collect::<Result<Vec<_>, _>>()?;
     points.retain(|point| point.value.is_finite());
     points.sort_by(|a, b| a.value.total_cmp(&b.value));

@@ -1,13 +1,12 @@
 //! Steps of Runge and Kutta that are short enough for −log L.
 
-use lynkeus_expr::Budget;
 use lynkeus_run::{Method, Step};
 use nalgebra::DVector;
 
 use super::logs::FittedLog;
 use super::problem::{Point, Problem, Steps};
-use crate::prepare::systems;
 use crate::{Error, Study};
+use lynkeus_experiment::prepare::systems;
 
 /// What −log L may change by where steps are halved.
 pub(super) const SETTLED: f64 = 1e-4;
@@ -36,7 +35,7 @@ impl Problem<'_> {
         let starts = self.unknowns.iter().map(|u| u.start);
         let z = self.searched(starts);
         let method = systems::method(&study.estimate.method);
-        let begin = self.stepped(z, &method, &study.budget)?;
+        let begin = self.stepped(z, &method)?;
         self.confine(&begin);
         Ok(begin)
     }
@@ -47,12 +46,7 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// As [`Problem::at`].
-    fn stepped(
-        &mut self,
-        z: DVector<f64>,
-        method: &Method,
-        budget: &Budget,
-    ) -> Result<Point, Error> {
+    fn stepped(&mut self, z: DVector<f64>, method: &Method) -> Result<Point, Error> {
         match method {
             Method::Rk4(step) => {
                 self.steps.length = *step;
@@ -64,17 +58,17 @@ impl Problem<'_> {
         }
         let mut found: Option<Point> = None;
         if !matches!(method, Method::Stiff(_)) {
-            let (point, is_settled) = self.halving(&z, budget, HALVINGS)?;
-            if is_settled || matches!(method, Method::Explicit(_)) || budget.spent().is_some() {
+            let (point, is_settled) = self.halving(&z, HALVINGS)?;
+            if is_settled || matches!(method, Method::Explicit(_)) || self.is_spent() {
                 return Ok(point);
             }
             found = Some(point).filter(|point| self.is_sound(point));
         }
         let explicit = self.steps.halvings;
         if self.implicit(true) {
-            let (point, is_settled) = self.halving(&z, budget, HALVINGS)?;
+            let (point, is_settled) = self.halving(&z, HALVINGS)?;
             let is_better = found.is_none() && self.is_sound(&point);
-            if is_settled || is_better || budget.spent().is_some() {
+            if is_settled || is_better || self.is_spent() {
                 return Ok(point);
             }
         }
@@ -84,7 +78,7 @@ impl Problem<'_> {
                 self.shorten(explicit);
                 Ok(point)
             }
-            None => Ok(self.halving(&z, budget, u32::MAX)?.0),
+            None => Ok(self.halving(&z, u32::MAX)?.0),
         }
     }
 
@@ -100,12 +94,7 @@ impl Problem<'_> {
 
     /// A point at steps that are halved until that hardly changes −log L; whether it came to that.
     /// Where the plant has no value they are halved `most` times at most.
-    fn halving(
-        &mut self,
-        z: &DVector<f64>,
-        budget: &Budget,
-        most: u32,
-    ) -> Result<(Point, bool), Error> {
+    fn halving(&mut self, z: &DVector<f64>, most: u32) -> Result<(Point, bool), Error> {
         let finer = (-self.steps.tolerance.log2() / 4.0).ceil() as u32;
         let intervals = self.logs.iter().map(FittedLog::interval);
         self.steps.length = Step::AtMost(intervals.fold(f64::INFINITY, f64::min));
@@ -117,12 +106,16 @@ impl Problem<'_> {
                 true => halving > HALVINGS + finer,
                 false => halving > most || self.rows() << halving > MOST_STEPS,
             };
-            if is_enough || budget.spent().is_some() {
+            if is_enough || self.is_spent() {
                 break;
             }
             let tolerance = self.steps.tolerance * SETTLED.max(NEARLY * point.value.abs());
             self.shorten(halving);
             let fine = self.at(point.z.clone())?;
+            if self.is_spent() {
+                self.shorten(halving - 1);
+                break;
+            }
             if self.is_sound(&point) && (fine.value - point.value).abs() < tolerance {
                 self.shorten(halving - 1);
                 return Ok((point, true));

@@ -9,10 +9,10 @@ use super::Fit;
 use super::errors::Portion;
 use super::uncertainty::Known;
 use super::unknown::{Kind, Scale, Unknown};
-use crate::rewrite::{Assignment, Change, rewritten};
 use crate::{Answer, Error, Series};
+use lynkeus_experiment::rewrite::{Assignment, Change, rewritten};
 
-crate::answer::displayed!(Fit);
+lynkeus_experiment::displayed!(Fit);
 
 impl Answer for Fit {
     fn document(&self) -> Document {
@@ -146,10 +146,13 @@ impl Fit {
     fn tell_quality(&self, document: &mut Document) {
         let count = self.unknowns.len() as f64;
         let bic = 2.0 * self.nll + count * (self.readings as f64).ln();
+        let at_start = match self.nll_at_start.is_finite() {
+            true => short(self.nll_at_start),
+            false => "none".to_owned(),
+        };
         document.part().line(format!(
-            "\u{2212}log L {} (at the start {}), AIC {}, BIC {}",
+            "\u{2212}log L {} (at the start {at_start}), AIC {}, BIC {}",
             short(self.nll),
-            short(self.nll_at_start),
             short(2.0 * self.nll + 2.0 * count),
             short(bic)
         ));

@@ -1,10 +1,8 @@
 //! How well the values are known.
 
-use std::ops::ControlFlow;
-
 use nalgebra::{DMatrix, DVector};
 
-use super::problem::Problem;
+use super::problem::{Point, Problem};
 use super::search::{Found, least, positive};
 use crate::Error;
 
@@ -98,8 +96,20 @@ fn normal(problem: &Problem<'_>, i: usize, value: f64, sd: f64) -> (f64, f64) {
     (low.max(unknown.low), high.min(unknown.high))
 }
 
-/// Sets intervals by profile likelihood: of all values, or of what is at a bound or no more than nothing. Returned is
-/// what speaks against them.
+/// What profiles show beside intervals.
+#[derive(Debug, Default)]
+pub(super) struct Profiled {
+    /// what speaks against the values
+    pub warnings: Vec<String>,
+    /// a point that is better than the end of the search
+    pub better: Option<Point>,
+}
+
+/// −log L that is lower by more than this is found by a better search only.
+const BETTER: f64 = 1e-3;
+
+/// Sets intervals by profile likelihood: of all values, or of what is at a bound or no more than nothing. They end
+/// where one of them meets a better point.
 ///
 /// # Errors
 /// As [`Problem::at`].
@@ -108,34 +118,36 @@ pub(super) fn profiles(
     found: &Found,
     uncertainty: &mut Uncertainty,
     are_all: bool,
-    watch: &mut dyn FnMut() -> ControlFlow<()>,
-) -> Result<Vec<String>, Error> {
+) -> Result<Profiled, Error> {
     let (mut warnings, mut cut) = (vec![], vec![]);
+    let mut better = None;
     for i in 0..uncertainty.known.len() {
         let known = uncertainty.known[i];
         let unknown = &problem.unknowns[i];
         let may_be_nothing = unknown.reaches_zero() && !known.is_bound;
-        let is_nothing = may_be_nothing && is_nothing(problem, found, i, &known, watch)?;
+        let is_nothing = may_be_nothing && is_nothing(problem, found, i, &known)?;
         if is_nothing {
             warnings.push(unknown.not_told_from_0());
         }
         if !(are_all || known.is_bound || is_nothing) {
             continue;
         }
-        let mut points = vec![(found.point.z[i], 0.0)];
         let is_one_sided = known.is_bound || is_nothing;
         let rise = 0.5 * RISES[usize::from(is_one_sided)];
-        match sides(
-            problem,
-            found,
-            (i, &known, is_nothing),
-            rise,
-            &mut points,
-            watch,
-        )? {
+        let mut way = Way {
+            points: vec![(found.point.z[i], 0.0)],
+            better: None,
+        };
+        let sides = sides(problem, found, (i, &known, is_nothing), rise, &mut way)?;
+        if way.better.is_some() {
+            better = way.better;
+            break;
+        }
+        match sides {
             Some(sides) => uncertainty.known[i].interval = Some(sides),
             None => cut.push(unknown.words()),
         }
+        let mut points = way.points;
         if are_all {
             points.retain(|(_, rise)| rise.is_finite());
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -153,18 +165,25 @@ pub(super) fn profiles(
             cut.join(", ")
         ));
     }
-    Ok(warnings)
+    Ok(Profiled { warnings, better })
+}
+
+/// The points of a profile.
+struct Way {
+    /// values of the unknown, as it is searched, with how far −log L rises
+    points: Vec<(f64, f64)>,
+    better: Option<Point>,
 }
 
 /// The interval in which −log L, the other unknowns being the best for each value, rises by no more than 95 % of logs
-/// let it; one-sided at a bound, and of a noise that is no more than nothing. None where it was told to stop.
+/// let it; one-sided at a bound, and of a noise that is no more than nothing. None where a limit struck, or where it
+/// falls instead.
 fn sides(
     problem: &mut Problem<'_>,
     found: &Found,
     (i, known, is_nothing): (usize, &Known, bool),
     rise: f64,
-    points: &mut Vec<(f64, f64)>,
-    watch: &mut dyn FnMut() -> ControlFlow<()>,
+    way: &mut Way,
 ) -> Result<Option<(f64, f64)>, Error> {
     let unknown = &problem.unknowns[i];
     let mut ends = [unknown.low, unknown.high];
@@ -187,8 +206,7 @@ fn sides(
             from: found.point.z.clone(),
             least: found.point.value,
             rise,
-            points,
-            watch,
+            way,
         };
         match edge.find(at, sign, size, limit)? {
             Some(z) => *end = unknown.value(z),
@@ -210,7 +228,6 @@ fn is_nothing(
     found: &Found,
     i: usize,
     known: &Known,
-    watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<bool, Error> {
     if known.sd.is_some_and(|sd| sd < CLEAR * known.value) {
         return Ok(false);
@@ -220,7 +237,7 @@ fn is_nothing(
     start[i] = unknown.searched(unknown.low);
     let mut held = vec![false; start.len()];
     held[i] = true;
-    let (there, _) = least(problem, start, &held, watch)?;
+    let (there, _) = least(problem, start, &held)?;
     Ok(2.0 * (there.value - found.point.value) <= RISES[1])
 }
 
@@ -233,9 +250,7 @@ struct Edge<'e, 'p> {
     from: DVector<f64>,
     least: f64,
     rise: f64,
-    /// those that were tried, with how far it rises
-    points: &'e mut Vec<(f64, f64)>,
-    watch: &'e mut dyn FnMut() -> ControlFlow<()>,
+    way: &'e mut Way,
 }
 
 /// Values of the unknown that are tried on a side.
@@ -243,7 +258,7 @@ const TRIALS: usize = 40;
 
 impl Edge<'_, '_> {
     /// The edge on a side of `at`, by doubling, then by the secant of the root of the rise, which is nearly
-    /// straight; the limit where it is not reached. None where the search was told to stop.
+    /// straight; the limit where it is not reached. None where a limit struck, or where it falls instead.
     fn find(&mut self, at: f64, sign: f64, size: f64, limit: f64) -> Result<Option<f64>, Error> {
         let root = |rise: f64| rise.max(0.0).sqrt();
         let goal = root(self.rise);
@@ -295,16 +310,20 @@ impl Edge<'_, '_> {
         start[self.held] = z;
         let mut held = vec![false; start.len()];
         held[self.held] = true;
-        let (point, is_done) = least(self.problem, start, &held, self.watch)?;
+        let (point, is_done) = least(self.problem, start, &held)?;
+        let rise = point.value - self.least;
+        if rise < -BETTER {
+            self.way.better = Some(point);
+            return Ok(None);
+        }
         if !is_done {
             return Ok(None);
         }
-        let rise = point.value - self.least;
         // from far off nobody finds back
         if rise <= 4.0 * self.rise {
             self.from = point.z;
         }
-        self.points.push((z, rise));
+        self.way.points.push((z, rise));
         Ok(Some(rise))
     }
 }

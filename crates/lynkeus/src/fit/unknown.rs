@@ -3,9 +3,10 @@
 use lynkeus_model::{Plant, Variable};
 use lynkeus_study::{Chosen, FitSettings, Name, Noise, Objective, Prior};
 
-use crate::course::filter::noise;
-use crate::prepare::Prepared;
 use crate::{Error, Study, near};
+use lynkeus_experiment::course::filter::noise;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::words::number;
 
 use super::logs::FittedLog;
 
@@ -105,6 +106,21 @@ impl Unknown {
     /// Whether it is a noise whose least value stands for 0.
     pub fn reaches_zero(&self) -> bool {
         self.kind.is_noise() && self.low <= NEARLY * self.start
+    }
+
+    /// A prior that its bounds contradict.
+    pub fn beside_its_prior(&self) -> Option<String> {
+        let prior = self.prior?;
+        let is_inside = (self.low..=self.high).contains(&prior.mean);
+        (!is_inside).then(|| {
+            format!(
+                "the prior of {} has its mean, {}, outside of the bounds [{}, {}]",
+                self.words(),
+                number(prior.mean),
+                number(self.low),
+                number(self.high)
+            )
+        })
     }
 
     /// That it does not stand out.
@@ -238,6 +254,15 @@ fn parameters(study: &Study, symbolic: &Plant) -> Result<Vec<Unknown>, Error> {
         });
     }
     let of = |variable: &&Variable| {
+        if variable.integer {
+            let message = format!(
+                "the parameter \"{}\" is an Integer: nothing can be found along a gradient of it",
+                variable.name
+            );
+            return Err(Error::input(message)
+                .at(&study.file)
+                .hint("compare fits with one value each under [parameters], or declare it Real"));
+        }
         let Some(start) = variable.start else {
             let message = format!(
                 "the parameter \"{}\" has no value to start from",

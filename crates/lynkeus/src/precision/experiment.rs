@@ -5,15 +5,16 @@ use std::ops::ControlFlow;
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observability::precision::{Deviation, Experiment, Quantity, Sensor, Window};
-use lynkeus_run::{Method, Tolerances, Trajectory};
+use lynkeus_run::{Method, Tolerances};
 use lynkeus_structure::AugmentedPlant;
 
-use crate::crew::within;
-use crate::judge::outcome::interrupted;
-use crate::prepare::Prepared;
-use crate::prepare::declared::Declared;
-use crate::words::number;
-use crate::{Error, Study, prepare::systems, simulate};
+use crate::{Error, Study};
+use lynkeus_experiment::course::plant::{alone, open_loop};
+use lynkeus_experiment::course::recorded::Recorded;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::prepare::declared::Declared;
+use lynkeus_experiment::prepare::systems;
+use lynkeus_experiment::words::number;
 use lynkeus_study::{Noise, SimulateSettings};
 
 /// Horizons at which the errors are computed.
@@ -77,18 +78,17 @@ impl<'p> Setup<'p> {
     ) -> Result<Self, Error> {
         let (study, augmented) = (prepared.study(), prepared.augmented());
         let plant = augmented.plant;
-        let mut run = simulate::open_loop(study, settings, plant)?;
+        let mut run = open_loop(study, settings, plant)?;
         let step = settings.sample_step.unwrap_or(run.output_step);
         let span = horizon(study, settings, options, step)?;
         run.until = run.start + span;
         run.noise = lynkeus_run::Noise::default();
         let go_on = &mut |_| ControlFlow::Continue(());
-        let trajectory = run
-            .run_watched(&mut within(&study.budget, go_on))
-            .map_err(|error| {
-                ended(study).unwrap_or_else(|| interrupted(error.error, &study.file))
-            })?;
-        let reach = Reach { plant, trajectory };
+        let run_alone = alone(study, &run, go_on)?;
+        let reach = Reach {
+            plant,
+            run: run_alone,
+        };
         let measured: Vec<Variable> = augmented
             .outputs
             .iter()
@@ -185,16 +185,19 @@ fn candidates(plant: &Plant, measured: &[Variable], asked: Option<Candidates>) -
 /// How far values go along the run.
 struct Reach<'p> {
     plant: &'p Plant,
-    trajectory: Trajectory,
+    run: Recorded,
 }
 
 impl Reach<'_> {
     /// The greatest magnitude of a state, an input or an output.
     fn magnitude(&self, variable: &Variable) -> f64 {
         let column = systems::column_of(self.plant, variable);
-        let values = column.and_then(|column| self.trajectory.column(column));
-        let values = values.unwrap_or_default();
-        values.iter().map(|v| v.abs()).fold(0.0, f64::max)
+        let values = column.and_then(|column| self.run.column(column));
+        values
+            .into_iter()
+            .flatten()
+            .map(f64::abs)
+            .fold(0.0, f64::max)
     }
 
     /// The declared range, else the greatest magnitude, else 1.

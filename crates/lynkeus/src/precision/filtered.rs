@@ -7,16 +7,15 @@ use std::ops::ControlFlow;
 
 use lynkeus_model::Variable;
 use lynkeus_observability::precision::Deviation;
-use lynkeus_observers::{Design, Initial, Tuning, Value};
-use lynkeus_run::{Role, Simulation, Updates};
+use lynkeus_observers::{Initial, Tuning, Value};
+use lynkeus_run::{Role, Simulation};
 
 use super::experiment::Setup;
-use crate::course::replay::{Watch, replay};
-use crate::course::{Course, Samples};
-use crate::crew::within;
-use crate::prepare::Prepared;
-use crate::words::explain;
-use crate::{Error, Series, Study, course::filter, estimate};
+use crate::{Error, Study};
+use lynkeus_experiment::course::filter;
+use lynkeus_experiment::course::plant::{alone, seen};
+use lynkeus_experiment::crew::within;
+use lynkeus_experiment::prepare::Prepared;
 use lynkeus_study::{Name, Noise};
 
 /// Nothing is known at the start: a standard deviation of so many ranges.
@@ -28,51 +27,28 @@ pub(super) fn filtered(
     setup: &Setup<'_>,
     mut run: Simulation,
 ) -> Result<Option<Vec<Vec<f64>>>, Error> {
-    let plant = prepared.plant();
+    let (study, plant) = (prepared.study(), prepared.plant());
     let window = &setup.experiment.window;
     run.output_step = window.step;
     run.noise = lynkeus_run::Noise::default();
-    let budget = prepared.study().budget.clone();
     let watch = &mut |_: f64| ControlFlow::Continue(());
-    let Ok(truth) = run.run_watched(&mut within(&budget, watch)) else {
+    let Ok(truth) = alone(study, &run, watch) else {
         return Ok(None);
     };
-    let place = |variables: &[Variable], name: &str| variables.iter().position(|v| v.name == name);
-    let column = |role: Role, at: Option<usize>| {
-        at.and_then(|i| truth.column(role.at(i)))
-            .unwrap_or_default()
+    let first = |variables: &[Variable], role: Role, name: &str| {
+        let place = variables.iter().position(|v| v.name == name)?;
+        truth.column(role.at(place))?.first()
     };
     let start = |name: &str| {
-        let state = column(Role::State, place(&plant.states, name));
-        let input = column(Role::Input, place(&plant.inputs, name));
-        state.first().or(input.first()).copied()
+        let state = first(&plant.states, Role::State, name);
+        state.or(first(&plant.inputs, Role::Input, name))
     };
-    let own = study(prepared.study(), setup, &start);
+    let own = with_filter(study, setup, &start);
     let own = Prepared::new(&own, plant)?;
     let design = own.design()?;
-    let observer = &design.observer;
-    let samples = Samples {
-        time: truth.times().to_vec().into(),
-        readings: observer
-            .measured
-            .iter()
-            .map(|s| {
-                column(Role::Measured, place(&plant.outputs, &s.name))
-                    .to_vec()
-                    .into()
-            })
-            .collect(),
-        inputs: observer
-            .inputs
-            .iter()
-            .map(|s| {
-                column(Role::Input, place(&plant.inputs, &s.name))
-                    .to_vec()
-                    .into()
-            })
-            .collect(),
-    };
-    let deviations = foreseen(&own, &design, &samples, &mut within(&budget, watch))?;
+    let samples = seen(plant, &design.observer, &truth);
+    let watch = &mut within(&study.budget, watch);
+    let deviations = filter::foreseen(&own, &design, &samples, watch)?;
     let at = |&horizon: &usize| -> Option<Vec<f64>> {
         deviations
             .iter()
@@ -82,34 +58,8 @@ pub(super) fn filtered(
     Ok(window.horizons.iter().map(at).collect())
 }
 
-/// The standard deviations of the filter on readings that stand for those that will come.
-fn foreseen(
-    own: &Prepared<'_>,
-    design: &Design,
-    samples: &Samples,
-    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
-) -> Result<Vec<Series>, Error> {
-    let run = estimate::run_settings(&own.study().estimate);
-    let notes = &mut vec![];
-    let mut blueprint = filter::blueprint(own, design, samples, run, notes)?;
-    if let Updates::Filter { settings, .. } = &mut blueprint.updates {
-        settings.foresees = true;
-    }
-    let mut filter = blueprint.estimator().map_err(explain)?;
-    let mut course = Course::default();
-    let count = filter.names().len();
-    replay(
-        &mut filter,
-        samples,
-        count,
-        &mut course,
-        &mut Watch::only(watch),
-    )?;
-    Ok(course.deviations.unwrap_or_default())
-}
-
 /// The study with the filter for its observer, the noises as they were assumed, and a start at the truth.
-fn study(study: &Study, setup: &Setup<'_>, start: &dyn Fn(&str) -> Option<f64>) -> Study {
+fn with_filter(study: &Study, setup: &Setup<'_>, start: &dyn Fn(&str) -> Option<f64>) -> Study {
     let mut own = study.clone();
     let quantities = || {
         setup

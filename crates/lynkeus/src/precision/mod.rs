@@ -14,12 +14,15 @@ mod words;
 
 use lynkeus_observability::precision::{Advice, Deviations, SensorSet};
 
-use crate::prepare::Prepared;
-use crate::prepare::declared::{Account, Declared};
-use crate::words::explain;
-use crate::{Error, Study, prepare, prepare::systems, simulate};
+use crate::{Error, Study};
 pub use experiment::{Assumed, Candidates, Options};
 use experiment::{Setup, ended};
+use lynkeus_experiment::course::plant::open_loop;
+use lynkeus_experiment::prepare;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::prepare::declared::{Account, Declared};
+use lynkeus_experiment::prepare::systems;
+use lynkeus_experiment::words::explain;
 #[cfg(test)]
 pub(crate) use report::HowWellReport;
 
@@ -86,7 +89,7 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     let candidates: Vec<usize> = (0..found.sensors.len()).collect();
     let mut deviations: Vec<Deviations> = (0..found.horizons.len()).map(at).collect();
     let exact = deviations.iter().map(|d| d.present.clone()).collect();
-    let mut run = simulate::open_loop(study, settings, &plant)?;
+    let mut run = open_loop(study, settings, &plant)?;
     run.until = run.start + found.horizons.last().copied().unwrap_or_default();
     let filtered = filtered::filtered(&prepared, &setup, run)?;
     let counts_process_noise =
@@ -135,8 +138,10 @@ fn account(declared: &Declared, counts_process_noise: bool) -> Account {
         disturbances,
         slew,
         input_derivatives,
+        screens,
     } = declared;
     Account::default()
+        .leaves(screens, "they are of logs: every simulated reading counts")
         .counts(ranges)
         .counts(noise)
         .counts(limits)

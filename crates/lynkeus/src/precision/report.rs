@@ -5,9 +5,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::Report;
-use crate::entries::{Named, finite};
-use crate::prepare::declared::Account;
-use crate::prepare::headers::Headers;
+use lynkeus_experiment::entries::{Named, finite};
+use lynkeus_experiment::prepare::declared::Account;
+use lynkeus_experiment::prepare::headers::Headers;
 
 /// The answer of `check --how-well`.
 #[derive(Debug, Serialize)]

@@ -7,8 +7,8 @@ use lynkeus_words::counted;
 use serde_json::Value;
 
 use super::Report;
-use crate::words::number;
 use crate::{Answer, Series};
+use lynkeus_experiment::words::number;
 
 /// Quantities listed.
 const LISTED: usize = 12;
@@ -19,7 +19,7 @@ const COLUMNS: usize = 6;
 /// Sensor sets listed.
 const SETS: usize = 6;
 
-crate::answer::displayed!(Report);
+lynkeus_experiment::displayed!(Report);
 
 impl Answer for Report {
     fn document(&self) -> Document {

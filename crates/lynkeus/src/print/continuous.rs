@@ -5,13 +5,14 @@ mod settable;
 use lynkeus_model::Plant;
 use lynkeus_run::{Method, Step, System, fastest_at};
 
-use crate::course::fixed_steps::{Unsaid, bends, sound, steps};
-use crate::prepare::{self, Prepared};
 use crate::print::fmu::equations::{Equations, Texts};
 use crate::print::{
     head::designed, head::origin, target::Export, target::ExportOptions, target::Target,
 };
-use crate::{Error, FmiVersion, Precision, Study, prepare::systems};
+use crate::{Error, FmiVersion, Precision, Study};
+use lynkeus_experiment::course::fixed_steps::{Unsaid, bends, sound, steps};
+use lynkeus_experiment::prepare::systems;
+use lynkeus_experiment::prepare::{self, Prepared};
 use lynkeus_study::{self, Rk4Step};
 
 use settable::{Settled, settled};

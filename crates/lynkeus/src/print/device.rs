@@ -6,11 +6,11 @@ use lynkeus_model::Variable;
 use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Level, Updates};
 
-use crate::estimate::at_readings;
-use crate::prepare::Prepared;
-use crate::prepare::headers::Headers;
-use crate::prepare::systems::hat;
 use crate::{Error, Study, print::tunable};
+use lynkeus_experiment::course::run::at_readings;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::prepare::headers::Headers;
+use lynkeus_experiment::prepare::systems::hat;
 use lynkeus_study::BetweenSamples;
 
 /// What `print` makes of an estimator, with `about` at its head, and of notes on names.

@@ -5,8 +5,8 @@ use std::path::Path;
 use lynkeus_run::Blueprint;
 
 use crate::certify::region;
-use crate::course::fixed_steps::steps;
 use crate::{Study, design};
+use lynkeus_experiment::course::fixed_steps::steps;
 
 /// What `float` cannot hold, in words.
 pub(crate) fn beyond_float(lost: &[String]) -> Option<String> {

@@ -5,7 +5,7 @@ use lynkeus_observers::{Design, Tunable, Tuning};
 use lynkeus_run::{Blueprint, Updates};
 
 use crate::Error;
-use crate::prepare::{Prepared, StudyDesign};
+use lynkeus_experiment::prepare::{Prepared, StudyDesign};
 
 /// The design with what may be changed as symbols.
 pub(crate) fn design(prepared: &Prepared<'_>) -> Result<StudyDesign, Error> {

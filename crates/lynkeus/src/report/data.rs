@@ -6,9 +6,9 @@ use serde_json::{Value, json};
 
 use super::knob::Knob;
 use super::tradeoff::{Drawn, Tradeoff};
-use crate::course::Samples;
-use crate::prepare::Prepared;
 use crate::{Error, Outcome, Quantity, Series};
+use lynkeus_experiment::course::Samples;
+use lynkeus_experiment::prepare::Prepared;
 
 /// Rows that a page holds.
 pub(super) const ROWS: usize = 20_000;

@@ -6,9 +6,9 @@ use lynkeus_study::FitSettings;
 
 use super::html::{element, words};
 use crate::fit::{Fit, FitOptions, fit};
-use crate::prepare::share;
 use crate::print::head::file_name;
 use crate::{Answer, Error, Study, Table};
+use lynkeus_experiment::prepare::share;
 
 /// The share of the time that is left which a fit may take.
 const SHARE: f64 = 0.5;

@@ -5,11 +5,11 @@ use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Method, Step};
 
 use super::positions::{Position, Positions};
-use crate::course::fixed_steps::{stepped, steps};
-use crate::estimate::live::blueprint;
-use crate::prepare::Prepared;
 use crate::print::device::printed;
 use crate::{Error, Study};
+use lynkeus_experiment::blueprint;
+use lynkeus_experiment::course::fixed_steps::{stepped, steps};
+use lynkeus_experiment::prepare::Prepared;
 use lynkeus_study::{self, Rk4Step};
 
 /// The study's own estimator with fixed steps, as it runs in a page.

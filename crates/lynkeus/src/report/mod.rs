@@ -17,15 +17,17 @@ use std::ops::ControlFlow;
 
 use lynkeus_export::curly::c::prefix;
 
-use crate::course::columns::Log;
-use crate::prepare::Prepared;
 use crate::print::{device::causal, head::file_name};
-use crate::tune::bench::Ground;
-use crate::{
-    CheckOptions, Error, Study, Table, certify, check, course::fixed_steps, estimate, prepare,
-};
+use crate::{CheckOptions, Error, Study, Table, certify, check};
 use fitted::Fitted;
 use knob::Knob;
+use lynkeus_experiment::course::columns::Log;
+use lynkeus_experiment::course::fixed_steps;
+use lynkeus_experiment::course::sampling::Sampling;
+use lynkeus_experiment::estimated;
+use lynkeus_experiment::prepare;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::tune::bench::Ground;
 use positions::Positions;
 use told::{Told, without_folder};
 use tradeoff::Tradeoff;
@@ -77,7 +79,7 @@ pub fn report(
     };
     let (table, ground) = match (log, &recorded) {
         (Some(log), _) => (log, Ground::Log(log)),
-        (None, Some(run::Simulated { table, step })) => (table, Ground::Simulation { step: *step }),
+        (None, Some(Sampling { table, step, .. })) => (table, Ground::Simulation { step: *step }),
         (None, None) => return Err(Error::input("neither a log nor a simulation")),
     };
     let design = prepared.design()?;
@@ -92,7 +94,7 @@ pub fn report(
         Err(why) => {
             // the estimates are then the command's own
             notes.clear();
-            (Err(why), estimate::estimated(&as_it_is, table, watch)?)
+            (Err(why), estimated(&as_it_is, table, watch)?)
         }
     };
     // a filter that cannot move takes too long, or has no noises to move

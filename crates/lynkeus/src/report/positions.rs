@@ -2,9 +2,9 @@
 
 use lynkeus_observers::Design;
 
-use crate::prepare::Prepared;
-use crate::tune::{Axis, axis};
 use crate::{Error, Study};
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::tune::{Axis, axis};
 use lynkeus_study::Name;
 
 /// Positions to either side of the study's own.

@@ -1,26 +1,22 @@
 //! The estimates of a page: on which samples, and with which fixed steps.
 
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
 
 use lynkeus_model::Plant;
 use lynkeus_observers::Design;
 use lynkeus_words::short;
 
-use super::data::ROWS;
 use super::knob::Fixed;
-use crate::prepare::Prepared;
-use crate::{
-    Accuracy, Error, ErrorKind, Outcome, Quantity, Study, Table, estimate, prepare::systems,
-    simulate,
-};
+use crate::{Accuracy, Error, ErrorKind, Outcome, Quantity, Study, Table};
+use lynkeus_experiment::course::sampling::{Resolution, Sampling, sampling};
+use lynkeus_experiment::estimated;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::prepare::systems;
 
 /// Errors that differ by no more than this share of the larger one are the same,
 const SAME: f64 = 0.25;
 /// and those that are below this share of the largest error.
 const NONE: f64 = 0.01;
-/// No more samples are asked for where those at hand took so long.
-const LONG: Duration = Duration::from_secs(4);
 
 /// With fixed steps an estimate is to differ from the one with controlled steps by no more than
 /// this share of its largest value.
@@ -31,54 +27,35 @@ const HALVINGS: u32 = 8;
 /// What a run is told of, and what may stop it.
 pub(super) type Watch<'w> = &'w mut dyn FnMut(f64) -> ControlFlow<()>;
 
-/// Samples of a simulation.
-pub(super) struct Simulated {
-    pub table: Table,
-    /// from one to the next
-    pub step: f64,
-}
-
-/// The study's plant as a logger would have it, with what is true. Where the study says neither noise
-/// nor `sample_step`, samples are so dense that holding them decides nothing.
+/// The study's plant as a logger would have it, with what is true.
 pub(super) fn simulated(
     prepared: &Prepared<'_>,
     study: &Study,
     plant: &Plant,
     notes: &mut Vec<String>,
-) -> Result<Simulated, Error> {
+) -> Result<Sampling, Error> {
     let settings = systems::settings(study).map_err(|error| {
         error.hint("give a log after the study, or add [simulate] with `until` and `inputs`")
     })?;
-    if let Some(step) = systems::sampled_every(study, settings) {
-        let table = simulate::recorded(study, plant, step)?;
-        return Ok(Simulated { table, step });
+    let errors = &mut |table: &Table| errors(prepared, table);
+    let found = sampling(
+        study,
+        plant,
+        errors,
+        &|coarse, fine| matches!((coarse, fine), (Some(coarse), Some(fine)) if are_same(coarse, fine)),
+    )?;
+    if found.resolution != Resolution::Study && found.step < settings.row_step() {
+        notes.push(format!(
+            "the simulation is sampled every {}, as the study says neither `noise` nor `sample_step`",
+            short(found.step)
+        ));
     }
-    let since = Instant::now();
-    let first = settings.row_step();
-    let mut step = first;
-    let mut coarse: Option<Vec<Accuracy>> = None;
-    loop {
-        let table = simulate::recorded(study, plant, step)?;
-        let fine = errors(prepared, &table)?;
-        let is_settled =
-            matches!((&coarse, &fine), (Some(coarse), Some(fine)) if are_same(coarse, fine));
-        let too_many = 2.0 * (settings.until - settings.start) / step > ROWS as f64;
-        if is_settled || too_many || since.elapsed() > LONG || study.budget.spent().is_some() {
-            if step < first {
-                notes.push(format!(
-                    "the simulation is sampled every {}, as the study says neither `noise` nor `sample_step`",
-                    short(step)
-                ));
-            }
-            return Ok(Simulated { table, step });
-        }
-        (coarse, step) = (fine, step / 2.0);
-    }
+    Ok(found)
 }
 
 /// Errors on a log; none where the run does not reach its end.
 fn errors(prepared: &Prepared<'_>, table: &Table) -> Result<Option<Vec<Accuracy>>, Error> {
-    match estimate::estimated(prepared, table, &mut |_| ControlFlow::Continue(())) {
+    match estimated(prepared, table, &mut |_| ControlFlow::Continue(())) {
         Ok(outcome) => Ok(outcome.ended.is_none().then_some(outcome.accuracies)),
         Err(error) if error.kind() == ErrorKind::Refused => Ok(None),
         Err(error) => Err(error),
@@ -110,7 +87,7 @@ pub(super) fn fixed(
             Ok(fixed) => fixed,
             Err(why) => return Ok(Err(why)),
         };
-        let outcome = estimate::estimated(&prepared.run_by(&fixed.study)?, table, watch)?;
+        let outcome = estimated(&prepared.run_by(&fixed.study)?, table, watch)?;
         Ok(Ok((fixed, outcome)))
     };
     let mut best = match run(1, watch)? {
@@ -118,7 +95,7 @@ pub(super) fn fixed(
         done => return Ok(done),
     };
     // what controlled steps give, where they reach the end
-    let Ok(reference) = estimate::estimated(prepared, table, watch) else {
+    let Ok(reference) = estimated(prepared, table, watch) else {
         return Ok(Ok(best));
     };
     if reference.ended.is_some() {

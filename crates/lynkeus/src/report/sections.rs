@@ -9,8 +9,8 @@ use super::html::{element, section, words};
 use super::told::{Told, without_folder};
 use crate::check::tell_examination;
 use crate::print::head::file_name;
-use crate::words::number;
 use crate::{Answer, Error, design};
+use lynkeus_experiment::words::number;
 
 impl Told<'_> {
     /// The whole page, but for its script.

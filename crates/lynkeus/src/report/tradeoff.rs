@@ -9,12 +9,12 @@ use serde::Serialize;
 
 use super::html::{element, words};
 use super::positions::Positions;
-use crate::course::columns::Log;
-use crate::entries::Named;
-use crate::prepare::{Prepared, headers};
-use crate::tune::bench::Ground;
-use crate::tune::{self, Axis, Row, Sweep, axis, shortened};
 use crate::{Error, Series, Table};
+use lynkeus_experiment::course::columns::Log;
+use lynkeus_experiment::entries::Named;
+use lynkeus_experiment::prepare::{Prepared, headers};
+use lynkeus_experiment::tune::bench::Ground;
+use lynkeus_experiment::tune::{self, Axis, Row, Sweep, axis, shortened};
 
 /// Rows of a log that are judged: each is replayed twice for every position.
 const ROWS: usize = 5_000;

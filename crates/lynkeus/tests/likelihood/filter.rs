@@ -117,6 +117,13 @@ pub fn nll<N: Number>(plant: &Plant, theta: &[N]) -> N {
     filter.nll
 }
 
+/// A row of C, ŷ and R.
+struct Seen<N> {
+    c: Vec<N>,
+    h: N,
+    r: N,
+}
+
 impl<N: Number> Filter<'_, N> {
     /// By equal steps of Runge and Kutta.
     fn predict(&mut self, from: &Record, to: f64) {
@@ -183,40 +190,56 @@ impl<N: Number> Filter<'_, N> {
         }
     }
 
-    /// The readings of a row, one after the other; h and its slopes are those before them.
+    /// The readings of a row, one after the other; h, its slopes and the noises are those before them.
     fn take(&mut self, readings: &[Option<f64>]) {
         let n = self.x.len();
         let at = self.x.clone();
-        for (sensor, reading) in readings.iter().enumerate() {
-            let Some(reading) = *reading else { continue };
-            let mut c = vec![];
-            let mut h = N::of(0.0);
-            for j in 0..n {
-                let along = (0..n).map(|i| Dual(at[i].clone(), N::of(f64::from(u8::from(i == j)))));
-                let found = self.plant.output(sensor, &along.collect::<Vec<_>>());
-                c.push(found.1);
-                h = found.0;
-            }
+        let reported = readings.iter().enumerate();
+        let reported = reported.filter_map(|(sensor, reading)| Some((sensor, (*reading)?)));
+        let seen = reported.map(|(sensor, reading)| (sensor, reading, self.seen(sensor)));
+        for (sensor, reading, Seen { c, h, r }) in seen.collect::<Vec<_>>() {
             let moved = (0..n).map(|i| c[i].clone() * (self.x[i].clone() - at[i].clone()));
-            let expected = h + sum(moved);
-            let row = |i: usize| sum((0..n).map(|j| self.p[i][j].clone() * c[j].clone()));
-            let pc: Vec<N> = (0..n).map(row).collect();
-            let spread = sum((0..n).map(|i| c[i].clone() * pc[i].clone()));
-            let size = self.noises[sensor].clone();
-            let square = size.clone() * size;
-            let r = match self.plant.sensors[sensor].level {
-                Level::Deviation => square,
-                Level::Uniform => square / N::of(3.0),
-                Level::Share => square * (expected.clone() * expected.clone() + spread.clone()),
-            };
+            let (pc, spread) = self.spread(&c);
             let s = spread + r;
             let limit = self.plant.sensors[sensor].limit;
-            let off = N::of(reading) - expected;
+            let off = N::of(reading) - h - sum(moved);
             match limit.is_some_and(|limit| reading >= limit) {
                 true => self.beyond(&pc, off, s),
                 false => self.correct(&pc, off, s),
             }
         }
+    }
+
+    fn seen(&self, sensor: usize) -> Seen<N> {
+        let n = self.x.len();
+        let mut c = vec![];
+        let mut h = N::of(0.0);
+        for j in 0..n {
+            let along = (0..n).map(|i| {
+                let is_own = f64::from(u8::from(i == j));
+                Dual(self.x[i].clone(), N::of(is_own))
+            });
+            let found = self.plant.output(sensor, &along.collect::<Vec<_>>());
+            c.push(found.1);
+            h = found.0;
+        }
+        let size = self.noises[sensor].clone();
+        let square = size.clone() * size;
+        let r = match self.plant.sensors[sensor].level {
+            Level::Deviation => square,
+            Level::Uniform => square / N::of(3.0),
+            Level::Share => square * (h.clone() * h.clone() + self.spread(&c).1),
+        };
+        Seen { c, h, r }
+    }
+
+    /// Pc and cᵀPc.
+    fn spread(&self, c: &[N]) -> (Vec<N>, N) {
+        let n = self.x.len();
+        let row = |i: usize| sum((0..n).map(|j| self.p[i][j].clone() * c[j].clone()));
+        let pc: Vec<N> = (0..n).map(row).collect();
+        let spread = sum((0..n).map(|i| c[i].clone() * pc[i].clone()));
+        (pc, spread)
     }
 
     fn correct(&mut self, pc: &[N], off: N, s: N) {

@@ -20,13 +20,13 @@ static void rows_of_noise(const real *z, const real *w, real *rows)
     (void)w;
     for (int i = 0; i < STATES; i++) {
         for (int j = 0; j < STATES; j++) {
-            noise[i * STATES + j] = NOISE_SCALE * z[STATES + i * WIDTH + STATES + j];
+            noise[i * STATES + j] = NOISE_SCALE * z[STATES + PLACE_I * WIDTH + STATES + PLACE_J];
         }
     }
     factorise(noise, STATES, lower);
     for (int i = 0; i < STATES; i++) {
         for (int k = 0; k <= i; k++) {
-            rows[k * STATES + i] = lower[i * STATES + k];
+            rows[k * STATES + PLACE_I] = lower[i * STATES + k];
         }
     }
 }

@@ -52,6 +52,8 @@ pub struct Score {
     pub readings: usize,
     /// intervals on which the plant had no value where the estimate was ([`ParametricPlant::ranges`])
     pub confined: usize,
+    /// readings of which plant and sensor are certain: without a variance they have no density, and do not count
+    pub certain: usize,
 }
 
 /// [`Score`]s of one plant: compiled once, for any log and any θ.
@@ -107,7 +109,7 @@ pub struct Seen {
     pub sensor: usize,
     /// y − ŷ; of a reading at an end of its range the end less ŷ
     pub innovation: f64,
-    /// its variance
+    /// its variance; 0 of a reading of which plant and sensor are certain, which does not count
     pub variance: f64,
     /// whether the reading only says that y is there or beyond
     pub is_at_end: bool,
@@ -121,8 +123,7 @@ impl Likelihood {
     /// expressions.
     pub fn new(plant: &ParametricPlant<'_>) -> Result<Self> {
         plant.check()?;
-        let plant = plant.by_distance();
-        Self::of(&Sample::new(&plant), None)
+        Self::of(&Sample::new(plant), None)
     }
 
     /// The same along an unscented filter.
@@ -228,7 +229,9 @@ struct Passes<const L: usize> {
     predict: Predict<L>,
     /// of t, u, x̂, S and θ, along an unscented filter: what the sensors show beside x̂
     show: Option<Code<L>>,
-    /// the same by a step for stiff equations
+    /// of t, u, x̂, S and θ: the variances of noises that are shares of an output
+    levels: Option<Code<L>>,
+    /// from row to row by a step for stiff equations
     implicit: Option<Predict<L>>,
     is_implicit: bool,
     /// so many times as many steps as are asked for
@@ -240,7 +243,7 @@ struct Passes<const L: usize> {
     inputs: usize,
     states: usize,
     belief: Vec<Bundle<L>>,
-    /// x̂ at the row before its readings count
+    /// at the row before its readings count: x̂, and the variances of noises that are shares
     at: Vec<Bundle<L>>,
     seen: Tangents,
 }
@@ -283,7 +286,7 @@ struct Spare<const L: usize> {
 /// A sensor's code.
 #[derive(Clone, Debug)]
 struct Sensor<const L: usize> {
-    /// of t, y, u, x̂ at the row, x̂, S and θ: x̂ and S after it, ν and σ²
+    /// of t, y, u, what was known at the row, x̂, S and θ: x̂ and S after it, ν and σ²
     correct: Code<L>,
     limited: Option<Limited<L>>,
 }
@@ -357,6 +360,7 @@ impl<const L: usize> Passes<L> {
                 }
             },
             show: points.map(|points| points.show(compile)).transpose()?,
+            levels: sample.levels(compile)?,
             implicit: sample.implicit(compile)?.map(Predict::Sample),
             is_implicit: false,
             times: 1,
@@ -365,7 +369,7 @@ impl<const L: usize> Passes<L> {
             sensors: sensors.collect::<Result<_>>()?,
             inputs: plant.inputs.len(),
             states,
-            at: vec![vec![[0.0; L]; 2 * states]; belief.len()],
+            at: vec![vec![[0.0; L]; 2 * sample.known_before()]; belief.len()],
             belief,
             seen: Tangents {
                 dν: vec![0.0; parameters],
@@ -428,8 +432,8 @@ impl<const L: usize> Passes<L> {
     fn place(&mut self, parameters: &[f64]) {
         self.begin.place(parameters);
         self.predict.place(parameters);
-        if let Some(show) = &mut self.show {
-            show.place(parameters);
+        for code in self.show.iter_mut().chain(&mut self.levels) {
+            code.place(parameters);
         }
         if let Some(implicit) = &mut self.implicit {
             implicit.place(parameters);
@@ -469,7 +473,7 @@ impl<const L: usize> Passes<L> {
         let interval = Interval {
             from,
             to,
-            steps: self.times * steps,
+            steps: steps.saturating_mul(self.times),
             is_graded,
             inputs,
         };
@@ -514,10 +518,18 @@ impl<const L: usize> Passes<L> {
             }
         }
         let n = self.states;
-        for (at, belief) in self.at.iter_mut().zip(&self.belief) {
+        for (pass, (at, belief)) in self.at.iter_mut().zip(&self.belief).enumerate() {
+            let count = at.len() / 2;
+            let (values, tangents) = at.split_at_mut(count);
             let half = belief.len() / 2;
-            at[..n].copy_from_slice(&belief[..n]);
-            at[n..].copy_from_slice(&belief[half..half + n]);
+            values[..n].copy_from_slice(&belief[..n]);
+            tangents[..n].copy_from_slice(&belief[half..half + n]);
+            if let Some(levels) = &mut self.levels {
+                let found = levels.run(pass, [&[row.t], row.inputs], &[belief]);
+                let (own, along) = found.split_at(found.len() / 2);
+                values[n..].copy_from_slice(own);
+                tangents[n..].copy_from_slice(along);
+            }
         }
         for sensor in 0..self.sensors.len() {
             let reading = row.readings[sensor];
@@ -546,10 +558,13 @@ impl<const L: usize> Passes<L> {
             let known: [&[f64]; 2] = [&[row.t, reading], row.inputs];
             let found = code.run(pass, known, &[&self.at[pass], belief]);
             let (m, half) = (belief.len() / 2, found.len() / 2);
-            belief[..m].copy_from_slice(&found[..m]);
-            belief[m..].copy_from_slice(&found[half..half + m]);
             self.seen
                 .take(pass, [&found[m], &found[m + 1]], |k| found[half + m + k]);
+            if self.seen.is_certain() {
+                continue;
+            }
+            belief[..m].copy_from_slice(&found[..m]);
+            belief[m..].copy_from_slice(&found[half..half + m]);
         }
         score.count(&self.seen);
     }
@@ -571,7 +586,8 @@ impl<const L: usize> Passes<L> {
             let found = limited.view.run(pass, known, &parts);
             self.seen
                 .take(pass, [&found[0], &found[1]], |k| found[3 + k]);
-            let Some(weighed) = weighed(end, found) else {
+            let weighed = weighed(end, found).filter(|_| !self.seen.is_certain());
+            let Some(weighed) = weighed else {
                 continue;
             };
             let parts: [&[[f64; L]]; 3] = [&self.at[pass], belief, &weighed];
@@ -624,6 +640,14 @@ impl Tangents {
     }
 }
 
+impl Tangents {
+    /// Neither the estimate nor the sensor has any variance: as [`Root::update`](super::root::Root::update) there is no
+    /// correction then, and no density.
+    fn is_certain(&self) -> bool {
+        self.σ2 == 0.0
+    }
+}
+
 impl Score {
     fn none(parameters: usize) -> Self {
         Self {
@@ -632,10 +656,15 @@ impl Score {
             information: vec![0.0; parameters * parameters],
             readings: 0,
             confined: 0,
+            certain: 0,
         }
     }
 
     fn count(&mut self, seen: &Tangents) {
+        if seen.is_certain() {
+            self.certain += 1;
+            return;
+        }
         let Tangents { ν, σ2, dν, dσ2 } = seen;
         let weight = 1.0 / σ2;
         let share = ν * weight;
@@ -657,6 +686,10 @@ impl Score {
 
     /// −log Φ(−a) with a = ±ν/σ, whose slope is λ and whose curvature δ.
     fn count_end(&mut self, end: End, seen: &Tangents) {
+        if seen.is_certain() {
+            self.certain += 1;
+            return;
+        }
         let σ = seen.σ2.sqrt();
         let a = end.sign() * seen.ν / σ;
         let tail = Tail::beyond(a);

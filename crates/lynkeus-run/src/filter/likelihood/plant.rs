@@ -1,6 +1,6 @@
 //! A plant as a function of what is not known.
 
-use lynkeus_expr::{Graph, Node, jacobian};
+use lynkeus_expr::{Graph, Node};
 
 use crate::noise::Limits;
 use crate::{Error, Result};
@@ -51,45 +51,6 @@ impl ParametricPlant<'_> {
             return Err(Error::setting("states", expected, n));
         }
         Ok(())
-    }
-
-    /// The same with the states in the order in which noise reaches them: those that it acts on, those that these
-    /// drive, and so on. What noise makes of a state in a step of length h is of order h^(2d + 1) for one that is d
-    /// away, and Runge and Kutta's steps tell it up to h⁴. The factor of the noise's covariance W begins with the
-    /// first state: with one that is far away it would begin with what the steps left of nothing, and drop what
-    /// that has in common with the others.
-    pub(super) fn by_distance(&self) -> Self {
-        let order = self.order();
-        let ordered = |nodes: &[Node]| order.iter().map(|&i| nodes[i]).collect();
-        Self {
-            states: ordered(&self.states),
-            derivatives: ordered(&self.derivatives),
-            process_noise: ordered(&self.process_noise),
-            ranges: match self.ranges.is_empty() {
-                true => vec![],
-                false => order.iter().map(|&i| self.ranges[i]).collect(),
-            },
-            start: order.iter().map(|&i| self.start[i]).collect(),
-            ..self.clone()
-        }
-    }
-
-    /// The places of the states in that order.
-    pub(super) fn order(&self) -> Vec<usize> {
-        let n = self.states.len();
-        let is_noisy = |q: &Node| self.graph.constant_value(*q) != Some(0.0);
-        let mut away: Vec<usize> = (self.process_noise.iter())
-            .map(|q| if is_noisy(q) { 0 } else { n })
-            .collect();
-        let slopes = jacobian::forward(self.graph, &self.derivatives, &self.states).entries;
-        for _ in 0..n {
-            for &(row, column, _) in &slopes {
-                away[row] = away[row].min(away[column] + 1);
-            }
-        }
-        let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by_key(|&i| away[i]);
-        order
     }
 }
 

@@ -7,11 +7,11 @@ use lynkeus_expr::{Expr, Node, Tape};
 use lynkeus_native::Function;
 
 use super::code::Code;
-use super::plant::{ParametricLevel, ParametricPlant};
+use super::plant::{ParametricLevel, ParametricPlant, ParametricSensor};
 use super::stiff::Alone;
 use crate::Result;
-use crate::classical::{Term, sum};
-use crate::filter::expressions::{Corrected, Flow, corrected};
+use crate::classical::Term;
+use crate::filter::expressions::{Corrected, Flow, corrected, dot, projected};
 
 pub(super) type Compile<const L: usize> = fn(&Tape) -> Option<Function<L>>;
 
@@ -26,8 +26,11 @@ pub(super) struct Sample<'p, 'g> {
     views: Vec<(usize, usize, Node)>,
     h: Expr<'g>,
     reading: Expr<'g>,
-    /// symbols of the estimate at a row before its readings count
+    /// symbols of what is known at a row before its readings count: the estimate, then the variances of the noises
+    /// that are shares of an output
     at: Vec<Node>,
+    /// sensors with such noises
+    shares: Vec<usize>,
     /// entries of S that are not 0 whatever happens, and their symbols
     pattern: Vec<(usize, usize)>,
     root: Vec<Node>,
@@ -37,12 +40,16 @@ impl<'p, 'g> Sample<'p, 'g> {
     pub fn new(plant: &'p ParametricPlant<'g>) -> Self {
         let (g, n) = (plant.graph, plant.states.len());
         let outputs: Vec<Node> = plant.sensors.iter().map(|sensor| sensor.output).collect();
+        let is_share = |i: &usize| matches!(plant.sensors[*i].noise, ParametricLevel::Share(_));
+        let shares: Vec<usize> = (0..outputs.len()).filter(is_share).collect();
+        let at = (0..n + shares.len()).map(|i| g.fresh(format!("x{i}")).node());
         let mut sample = Self {
             plant,
             views: jacobian::forward(g, &outputs, &plant.states).entries,
             h: g.fresh("h"),
             reading: g.fresh("y"),
-            at: (0..n).map(|i| g.fresh(format!("x{i}")).node()).collect(),
+            at: at.collect(),
+            shares,
             pattern: vec![],
             root: vec![],
         };
@@ -252,13 +259,16 @@ impl<'p, 'g> Sample<'p, 'g> {
     fn corrected(&self, sensor: usize, weighed: Option<[Expr<'g>; 2]>) -> Corrected<'g> {
         let (g, n) = (self.plant.graph, self.plant.states.len());
         let output = self.plant.sensors[sensor].output;
-        let own = self.views.iter().filter(|view| view.0 == sensor);
-        let views: Vec<(usize, Node)> = own.map(|view| (view.1, view.2)).collect();
+        let views = self.views_of(sensor);
         // as they are at the estimate before the row's readings
-        let level = match self.plant.sensors[sensor].noise {
-            ParametricLevel::Variance(level) | ParametricLevel::Share(level) => level,
+        let noise = match self.plant.sensors[sensor].noise {
+            ParametricLevel::Variance(level) => level,
+            ParametricLevel::Share(_) => {
+                let before = self.shares.iter().take_while(|other| **other < sensor);
+                self.at[n + before.count()]
+            }
         };
-        let all: Vec<Node> = [output, level]
+        let all: Vec<Node> = [output, noise]
             .into_iter()
             .chain(views.iter().map(|v| v.1))
             .collect();
@@ -277,23 +287,53 @@ impl<'p, 'g> Sample<'p, 'g> {
         let off = slopes.iter().zip(&self.plant.states).zip(&self.at);
         let terms = off.filter_map(|((c, &x), &at)| c.map(|c| c * (g.expr(x) - g.expr(at))));
         let predicted = terms.fold(g.expr(all[0]), |sum, term| sum + term);
-        let (innovation, given) = match weighed {
-            Some([innovation, noise]) => (innovation, Some(noise)),
-            None => (self.reading - predicted, None),
-        };
-        let level = g.expr(all[1]);
-        let noise = |spread: Term<'g>| match (given, self.plant.sensors[sensor].noise) {
-            (Some(given), _) => given,
-            (None, ParametricLevel::Variance(_)) => level,
-            (None, ParametricLevel::Share(_)) => {
-                let square = sum(Some(predicted * predicted), spread);
-                level.powi(2) * square.unwrap_or(g.constant(0.0))
-            }
+        let [innovation, noise] = match weighed {
+            Some(weighed) => weighed,
+            None => [self.reading - predicted, g.expr(all[1])],
         };
         corrected((&x, &root), &slopes, innovation, noise)
     }
 
-    /// What the code of a sensor reads: t, y and u; x̂ at the row, x̂ and S.
+    /// The entries of the row of C of a sensor.
+    fn views_of(&self, sensor: usize) -> Vec<(usize, Node)> {
+        let own = self.views.iter().filter(|view| view.0 == sensor);
+        own.map(|view| (view.1, view.2)).collect()
+    }
+
+    /// Of t, u, x̂, S and θ: the variances of the noises that are shares of an output, p²E\[h²\], as the filter has
+    /// them before the first reading of the row counts; none where there are no such noises.
+    pub fn levels<const L: usize>(&self, compile: Compile<L>) -> Result<Option<Code<L>>> {
+        let (plant, g, n) = (self.plant, self.plant.graph, self.plant.states.len());
+        let (_, root) = self.belief();
+        let levels = self.shares.iter().map(|&sensor| {
+            let ParametricSensor { output, noise, .. } = &plant.sensors[sensor];
+            let mut slopes: Vec<Term<'g>> = vec![None; n];
+            for (column, slope) in self.views_of(sensor) {
+                slopes[column] = self.term(slope);
+            }
+            let projected = projected(&root, &slopes);
+            let spread = dot(&projected, &projected);
+            let square = g.expr(*output).powi(2);
+            let share = match noise {
+                ParametricLevel::Share(level) | ParametricLevel::Variance(level) => g.expr(*level),
+            };
+            share.powi(2) * spread.map_or(square, |spread| square + spread)
+        });
+        let levels: Vec<Node> = levels.map(Expr::node).collect();
+        if levels.is_empty() {
+            return Ok(None);
+        }
+        let known = [&[plant.time][..], &plant.inputs].concat();
+        self.code((&known, &self.numbered()), &levels, compile)
+            .map(Some)
+    }
+
+    /// Numbers of what is known at a row before its readings count.
+    pub fn known_before(&self) -> usize {
+        self.at.len()
+    }
+
+    /// What the code of a sensor reads: t, y and u; what was known before the row's readings, x̂ and S.
     fn read(&self) -> (Vec<Node>, Vec<Node>) {
         let plant = self.plant;
         let known = [&[plant.time, self.reading.node()][..], &plant.inputs].concat();

@@ -231,23 +231,19 @@ impl<'g> Unscented<'_, 'g> {
         compile: Compile<L>,
     ) -> Result<Points<L>> {
         let (plant, g, n) = (self.plant, self.plant.graph, self.states());
-        // the root of W begins at the noise; that of P, which draws the points, as the filter's does
-        let order = plant.order();
-        let ordered = |nodes: &[Node]| -> Vec<Node> { order.iter().map(|&i| nodes[i]).collect() };
-        let [states, derivatives] = [&plant.states[..], derivatives].map(ordered);
         let rest = plant.inputs.iter().chain(&plant.parameters);
-        let inputs = [plant.time].into_iter().chain(states.iter().copied());
+        let inputs = [plant.time].into_iter().chain(plant.states.iter().copied());
         let inputs: Vec<Node> = inputs.chain(rest.copied()).collect();
-        let f = jacobian::forward(g, &derivatives, &states).entries;
+        let f = jacobian::forward(g, derivatives, &plant.states).entries;
         let places: Vec<(usize, usize)> = f.iter().map(|s| (s.0, s.1)).collect();
         let slopes: Vec<Node> = f.iter().map(|s| s.2).collect();
-        let noise = ordered(&plant.process_noise).into_iter();
-        let noise: Vec<Term<'g>> = noise.map(|q| self.sample.term(q)).collect();
+        let noise = plant.process_noise.iter();
+        let noise: Vec<Term<'g>> = noise.map(|&q| self.sample.term(q)).collect();
         let is_noisy = noise.iter().any(Option::is_some);
         let flow = Flow {
             graph: g,
             inputs: &inputs,
-            derivatives: &derivatives,
+            derivatives,
             slopes: &slopes,
             places: &places,
             noise,
@@ -262,14 +258,9 @@ impl<'g> Unscented<'_, 'g> {
             .map(|_| (0..n).map(|_| g.fresh("p")).collect())
             .collect();
         let begin = |point: &[Expr<'g>], width: usize| {
-            let mut z: Vec<Term<'g>> = order.iter().map(|&i| Some(point[i])).collect();
+            let mut z: Vec<Term<'g>> = point.iter().copied().map(Some).collect();
             z.resize(n + n * width, None);
             z
-        };
-        let end = |next: &[Term<'g>]| {
-            let mut x = vec![None; n];
-            order.iter().zip(next).for_each(|(&i, next)| x[i] = *next);
-            x
         };
         // W is carried as its root, step by step: a factor of a W whose columns nearly agree is none
         let centre = |w: &[Term<'g>]| match is_noisy {
@@ -294,10 +285,10 @@ impl<'g> Unscented<'_, 'g> {
         };
         let places: Vec<usize> = (0..n * n).filter(|&at| w[at].is_some()).collect();
         let moved = points[1..].iter();
-        let moved = moved.flat_map(|point| end(&still.step(h, &begin(point, n))));
+        let moved = moved.flat_map(|point| still.step(h, &begin(point, n)).into_iter().take(n));
         let nothing = g.constant(0.0);
         let node = |term: Term<'g>| term.unwrap_or(nothing).node();
-        let stepped: Vec<Node> = (end(&next).into_iter().chain(moved))
+        let stepped: Vec<Node> = (next[..n].iter().copied().chain(moved))
             .chain(places.iter().map(|&at| root[at]))
             .map(node)
             .collect();
@@ -321,8 +312,7 @@ impl<'g> Unscented<'_, 'g> {
         let deviations: Vec<Vec<Term<'g>>> = deviations.collect();
         let mut extra = vec![None; if is_noisy { n * n } else { 0 }];
         for (place, entry) in extra.iter_mut().enumerate() {
-            let own = order.iter().position(|&i| i == place % n);
-            *entry = own.and_then(|own| w[own * n + place / n]);
+            *entry = w[place % n * n + place / n];
         }
         let root = self.spread(&deviations, extra, n);
         let gathered = self.nodes(mean.into_iter().map(Some).collect(), &root, n);

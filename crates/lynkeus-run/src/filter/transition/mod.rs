@@ -36,6 +36,10 @@ pub(crate) struct Propagation {
     pub end: Vec<f64>,
     /// of W
     factor: Factor,
+    /// the states as its factor goes, where they do not stand so
+    order: Option<Vec<usize>>,
+    /// W in that order
+    ordered: Vec<f64>,
     rows: Vec<f64>,
     sums: Vec<f64>,
 }
@@ -57,6 +61,9 @@ impl Propagation {
             true => Scheme::Joint(Box::new(Joint::new(flow, process_noise, method)?)),
             false => Scheme::Piecewise(Box::new(Piecewise::new(flow, process_noise, method)?)),
         };
+        // the others are as exact as is asked for
+        let has_steps = matches!((&scheme, method), (Scheme::Joint(_), Method::Rk4(_)));
+        let order = has_steps.then(|| flow.order_of(process_noise));
         Ok(Self {
             driven: flow.system().driven(run.between),
             scheme,
@@ -64,6 +71,8 @@ impl Propagation {
             is_behind: false,
             end: vec![],
             factor: Factor::default(),
+            order: order.flatten(),
+            ordered: vec![],
             rows: vec![],
             sums: vec![0.0; n],
         })
@@ -147,19 +156,27 @@ impl Propagation {
         self.transition.noise.is_some()
     }
 
-    /// Adds the rows of Lᵀ, W = LLᵀ.
+    /// Adds rows whose sum of squares is W.
     pub fn push_root(&mut self, rows: &mut Vec<f64>) {
         let Some(noise) = &self.transition.noise else {
             return;
         };
         let n = self.sums.len();
-        let lower = self.factor.of(noise.entries(), n);
+        let mut entries = noise.entries();
+        if let Some(order) = &self.order {
+            let pairs = order.iter().flat_map(|i| order.iter().map(move |j| (i, j)));
+            self.ordered.clear();
+            self.ordered.extend(pairs.map(|(i, j)| entries[i * n + j]));
+            entries = &self.ordered;
+        }
+        let lower = self.factor.of(entries, n);
         let first = rows.len();
         rows.resize(first + n * n, 0.0);
         let rows = &mut rows[first..];
         for (i, row) in lower.chunks_exact(n).enumerate() {
+            let place = self.order.as_ref().map_or(i, |order| order[i]);
             for (k, entry) in row[..=i].iter().enumerate() {
-                rows[k * n + i] = *entry;
+                rows[k * n + place] = *entry;
             }
         }
     }
@@ -235,4 +252,47 @@ fn carry(transition: &Profile, root: &mut Root, rows: &mut Vec<f64>, sums: &mut 
         column.zip(&*sums).for_each(|(into, sum)| *into = *sum);
     }
     root.of_rows(rows, sums);
+}
+
+#[cfg(test)]
+mod tests {
+    use lynkeus_expr::Graph;
+
+    use super::*;
+
+    /// x' = v, v' = a, a' = w over a step of length h. By hand W_aa = qh, W_va = qh²/2, W_vv = qh³/3, W_xa = qh³/6,
+    /// W_xv = qh⁴/8 and W_xx = qh⁵/20. A step of Runge and Kutta tells all of them but W_xx, of which it says 0; the
+    /// factor from a on has (1/36 + 1/48) qh⁵ there, which the others ask for.
+    #[test]
+    fn what_a_step_leaves_of_a_chain_is_of_order_five() {
+        let g = Graph::new();
+        let [time, x, v, a] = ["time", "x", "v", "a"].map(|name| g.symbol(name));
+        let zero = g.constant(0.0);
+        let states = [x, v, a].map(|x| (format!("{x:?}"), x.node(), 0.0));
+        let derivatives = [v, a, zero].map(|x| x.node());
+        let flow = Linearised::flow(&g, time.node(), &states, &[], &derivatives).unwrap();
+        let (h, q) = (0.15, 3.0);
+        let run = EstimatorSettings {
+            method: Method::Rk4(Step::Substeps(1)),
+            ..EstimatorSettings::default()
+        };
+        let mut propagation = Propagation::new(&flow, &[0.0, 0.0, q], run).unwrap();
+        let mut belief = Belief::new(&[0.0; 3], &[0.0; 3]);
+        propagation.driven.start(&[]);
+        propagation.predict(&mut belief, 0.0, h).unwrap();
+        let expected = [
+            7.0 / 144.0 * h.powi(5),
+            h.powi(4) / 8.0,
+            h.powi(3) / 6.0,
+            h.powi(3) / 3.0,
+            h.powi(2) / 2.0,
+            h,
+        ];
+        let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+        for ((i, j), expected) in pairs.into_iter().zip(expected) {
+            let found = dot(belief.root.row(i), belief.root.row(j));
+            let off = (found / (q * expected) - 1.0).abs();
+            assert!(off < 1e-13, "W{i}{j}: {found} beside {}", q * expected);
+        }
+    }
 }

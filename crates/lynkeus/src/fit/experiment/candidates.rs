@@ -10,9 +10,9 @@ use lynkeus_study::{self, Expression, Name};
 use super::extra::{Extra, usual};
 use crate::fit::logs::FittedLog;
 use crate::fit::plant::Source;
-use crate::prepare::{self, systems};
-use crate::words::{explain, number};
 use crate::{Error, Study, near};
+use lynkeus_experiment::prepare::{self, systems};
+use lynkeus_experiment::words::{explain, number};
 
 /// Most rows of an experiment.
 const ROWS: f64 = 1e6;
@@ -29,10 +29,10 @@ const LATE: f64 = 1e-6;
 
 /// An experiment that could be made.
 #[derive(Clone, Debug)]
-pub(super) struct Candidate {
+pub(crate) struct Candidate {
     /// what the study calls it, or what it is
     name: Title,
-    pub extras: Vec<Extra>,
+    pub(super) extras: Vec<Extra>,
     /// by the places of known inputs
     inputs: HashMap<usize, Course>,
     /// the usual time between two rows
@@ -75,6 +75,19 @@ impl Experiment {
             readings: &self.readings[k * outputs..(k + 1) * outputs],
             inputs: &self.inputs[k * inputs..(k + 1) * inputs],
         })
+    }
+
+    /// The inputs that leave their declared ranges.
+    pub fn beyond<'v>(&self, inputs: &'v [Variable]) -> impl Iterator<Item = &'v str> {
+        let [_, count] = self.widths;
+        let leaves = move |place: usize, input: &Variable| {
+            let mut rows = self.inputs.chunks_exact(count.max(1));
+            rows.any(|row| row[place] < input.min || row[place] > input.max)
+        };
+        let inputs = inputs.iter().enumerate();
+        inputs
+            .filter(move |(place, input)| leaves(*place, input))
+            .map(|(_, input)| input.name.as_str())
     }
 
     pub fn readings(&self) -> usize {
@@ -211,17 +224,20 @@ impl Candidate {
             );
             return Err(name.blame(Error::input(message).hint("choose a larger `every`")));
         }
-        Ok(Self {
+        let found = Self {
             name: Title::Named(name.text.clone()),
             extras,
             inputs,
             every,
             duration,
-        })
+        };
+        // an input without a value is told before the search
+        found.experiment(log, 0, &[])?;
+        Ok(found)
     }
 
     /// What it is called, with these sensors.
-    pub fn words(&self, extras: &[&Extra]) -> String {
+    pub(super) fn words(&self, extras: &[&Extra]) -> String {
         match &self.name {
             Title::Named(name) => name.clone(),
             Title::Sensors => {
@@ -236,7 +252,7 @@ impl Candidate {
     ///
     /// # Errors
     /// An input that has no value.
-    pub fn experiment(
+    pub(super) fn experiment(
         &self,
         log: &FittedLog,
         further: usize,
@@ -278,7 +294,7 @@ impl Candidate {
                 let start = found.inputs.len();
                 found
                     .inputs
-                    .extend_from_slice(held(&rows, offset % period, interval));
+                    .extend_from_slice(held(&rows, (offset + LATE * interval) % period));
                 for (place, tape, steps) in &mut tapes {
                     let value = match (tape, steps) {
                         (Some(tape), _) => tape.value(&[t]),
@@ -305,9 +321,9 @@ impl Candidate {
 }
 
 /// The inputs at a time after the first row, held since the row before.
-fn held<'r>(rows: &[lynkeus_run::filter::Row<'r>], after: f64, interval: f64) -> &'r [f64] {
+fn held<'r>(rows: &[Row<'r>], after: f64) -> &'r [f64] {
     let first = rows[0].t;
-    let past = rows.partition_point(|row| row.t - first <= after + LATE * interval);
+    let past = rows.partition_point(|row| row.t - first <= after);
     rows[past.saturating_sub(1)].inputs
 }
 

@@ -4,7 +4,7 @@ use lynkeus_expr::Node;
 use lynkeus_run::filter::Limits;
 use lynkeus_study::Noise;
 
-use crate::words::number;
+use lynkeus_experiment::words::number;
 
 /// The noise of a sensor of which nothing is said, as a share of its range.
 const LEVEL: f64 = 0.01;

@@ -11,7 +11,7 @@ use crate::fit::plant::{Further, Source};
 use crate::fit::problem::Problem;
 use crate::fit::search::Found;
 use crate::fit::unknown::{Kind, Unknown};
-use crate::words::explain;
+use lynkeus_experiment::words::explain;
 
 /// All of them, so that one likelihood serves every candidate: a sensor that does not report is none.
 pub(super) struct Extras {

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use lynkeus_model::{Plant, Variable};
 
-use crate::{Error, Study, prepare};
+use crate::{Error, Study};
+use lynkeus_experiment::prepare;
 
 /// How many parameters are looked for that cannot be symbols, before all are numbers.
 const MOST: usize = 8;

@@ -10,12 +10,12 @@ use lynkeus_run::{Method, System};
 
 use super::rate::rate;
 use super::{experiment, packed, quantity, time, units};
-use crate::course::fixed_steps::{size, typical, unset};
-use crate::prepare::headers::Headers;
-use crate::prepare::systems::{hat, starts};
 use crate::print::target::Artifact;
-use crate::words::explain;
 use crate::{Error, Study};
+use lynkeus_experiment::course::fixed_steps::{size, typical, unset};
+use lynkeus_experiment::prepare::headers::Headers;
+use lynkeus_experiment::prepare::systems::{hat, starts};
+use lynkeus_experiment::words::explain;
 use lynkeus_study::SimulateSettings;
 
 /// Equations over a graph, with what is known of their variables.

@@ -18,10 +18,10 @@ use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Updates};
 
 use crate::Study;
-use crate::course::fixed_steps::unset;
-use crate::prepare::Prepared;
-use crate::prepare::headers::Headers;
 use crate::print::target::Artifact;
+use lynkeus_experiment::course::fixed_steps::unset;
+use lynkeus_experiment::prepare::Prepared;
+use lynkeus_experiment::prepare::headers::Headers;
 use lynkeus_study::SimulateSettings;
 
 use library::Missing;

@@ -1,0 +1,155 @@
+//! What the search of `lynkeus fit` cannot see by itself, and what it is told of its logs.
+
+use crate::Folder;
+use crate::fit::{ALL, fitted, folder, holds, number};
+use crate::normal::Normal;
+
+const SINE: &str = r#"model Sine
+  parameter Real w(min = 0.2, max = 10) = 5.5;
+  parameter Real a(min = 0, max = 10) = 1;
+  Real z(start = 0, min = -20, max = 20);
+  output Real y = a*sin(w*time) + z;
+equation
+  der(z) = 0;
+end Sine;
+"#;
+
+/// From 5.5 the search ends at a hill's foot where nothing oscillates; the profile of w runs into the real one.
+#[test]
+fn the_search_goes_on_where_a_profile_falls() {
+    let folder = Folder::empty();
+    let mut normal = Normal(11);
+    let mut log = "t,y\n".to_owned();
+    for row in 0..40 {
+        let t = 0.1 * f64::from(row);
+        log += &format!("{t},{}\n", 1.5 * (2.3 * t).sin() + 0.3 * normal.next());
+    }
+    folder.write("plant.mo", SINE);
+    folder.write("log.csv", &log);
+    folder.write(
+        "study.toml",
+        "plant = \"plant.mo\"\nsensors = { noise = { y = 0.3 } }\nobserver = { initial_variance = { z = 0 } }\n[fit]\nparameters = [\"w\", \"a\"]\nnoise = true\nstarts = 1\n",
+    );
+    let alone = fitted(&folder, &[]);
+    assert!(number(&alone["parameters"]["w"]["value"]) > 4.0);
+    let answer = fitted(&folder, &["--profiles"]);
+    holds(&answer["parameters"]["w"], 2.3);
+    holds(&answer["parameters"]["a"], 1.5);
+    let optima = answer["optima"].as_array().unwrap();
+    assert_eq!(optima[0]["nll"], answer["nll"]);
+    let first = &optima[optima.len() - 1]["nll"];
+    assert!((number(first) - number(&alone["nll"])).abs() < 1e-3);
+    assert!(
+        answer["notes"]
+            .to_string()
+            .contains("a profile met a lower"),
+        "{}",
+        answer["notes"]
+    );
+}
+
+/// −log L has steps along the instant of a jump, and its derivative is 0 between them.
+#[test]
+fn a_parameter_that_only_moves_a_jump_is_refused() {
+    let folder = folder("parameters = [\"k\", \"late\"]");
+    folder.change(
+        "plant.mo",
+        "  input",
+        "  parameter Real late(min = 1, max = 30) = 5;\n  input",
+    );
+    folder.change(
+        "plant.mo",
+        "+ g*u",
+        "+ g*u + (if time > late then 0.5 else 0)",
+    );
+    let ended = folder.run(&["fit", "study.toml", "log.csv"]);
+    assert_eq!(ended.code, 1, "{}", ended.err);
+    assert!(
+        ended.err.contains("late moves where the model jumps"),
+        "{}",
+        ended.err
+    );
+    // where the branches meet, there is a slope
+    folder.change(
+        "plant.mo",
+        "(if time > late then 0.5 else 0)",
+        "(if time > late then 0.01*(time - late) else 0)",
+    );
+    let ended = folder.run(&["fit", "study.toml", "log.csv"]);
+    assert!(!ended.err.contains("jumps"), "{}", ended.err);
+}
+
+#[test]
+fn a_whole_number_is_not_searched() {
+    let folder = folder("parameters = [\"stages\"]");
+    folder.change(
+        "plant.mo",
+        "  input",
+        "  parameter Integer stages = 2;\n  input",
+    );
+    folder.change("plant.mo", "-k*x", "-k*x/stages");
+    let ended = folder.run(&["fit", "study.toml", "log.csv"]);
+    assert_eq!(ended.code, 2, "{}", ended.err);
+    assert!(
+        ended.err.contains("\"stages\" is an Integer"),
+        "{}",
+        ended.err
+    );
+}
+
+#[test]
+fn a_prior_beside_its_bounds_is_told() {
+    let folder = folder(&format!(
+        "{ALL}\npriors = {{ k = {{ mean = 7, sd = 10 }} }}"
+    ));
+    let warnings = fitted(&folder, &[])["warnings"].to_string();
+    assert!(
+        warnings.contains("the prior of k has its mean, 7, outside of the bounds [0.05, 5]"),
+        "{warnings}"
+    );
+}
+
+#[test]
+fn as_many_values_as_readings_leave_nothing_to_judge_by() {
+    let folder = folder("parameters = [\"k\", \"g\"]");
+    folder.write("log.csv", "t,y,u\n0,1.1,1\n4,1.9,1\n");
+    let ended = folder.run(&["fit", "study.toml", "log.csv"]);
+    assert!(
+        ended
+            .err
+            .contains("2 readings for 2 values: nothing is left"),
+        "{}",
+        ended.err
+    );
+}
+
+#[test]
+fn a_gap_that_parts_two_logs_is_told_as_such() {
+    let folder = folder(ALL);
+    let mut log = folder.read("log.csv");
+    log += "500000,1,1\n";
+    folder.write("log.csv", &log);
+    let ended = folder.run(&["fit", "study.toml", "log.csv"]);
+    assert_eq!(ended.code, 2, "{}", ended.err);
+    assert!(
+        ended
+            .err
+            .contains("log.csv: no row between 39.8 and 500000")
+            && ended.err.contains("as two logs"),
+        "{}",
+        ended.err
+    );
+}
+
+#[test]
+fn what_is_said_of_several_logs_names_them() {
+    let folder = folder(ALL);
+    let log = folder.read("log.csv");
+    folder.write("other.csv", &log.replacen("\n0.2,", "\n0.1,nan,1\n0.2,", 1));
+    let ended = folder.run(&["fit", "study.toml", "log.csv", "other.csv"]);
+    assert!(
+        ended.err.contains("note: other.csv: column \"y\""),
+        "{}",
+        ended.err
+    );
+}

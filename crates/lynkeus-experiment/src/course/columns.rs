@@ -1,0 +1,288 @@
+//! The columns of a log that a study reads.
+
+use std::borrow::Cow;
+use std::collections::HashSet;
+use std::path::Path;
+
+use lynkeus_structure::AugmentedPlant;
+
+use crate::course::{Samples, screen};
+use crate::prepare::Prepared;
+use crate::prepare::headers::{further_headers, header, log_time, refuse_seconds, time_of};
+use crate::{Error, Series, Study, Table, visible};
+use lynkeus_study::EstimateSettings;
+use lynkeus_table::{APART, Lost, Ordered, Request, is_parquet};
+
+/// The log of a study in a file (CSV, Parquet), read within the study's budget; of a Parquet file only what the
+/// study may ask for.
+///
+/// # Errors
+/// As [`Table::load_within`]; for a Parquet file those of [`prepare::plant`](crate::prepare::plant), too.
+pub fn log(study: &Study, path: impl AsRef<Path>) -> Result<Table, Error> {
+    let request = Request {
+        budget: study.budget.clone(),
+        columns: match is_parquet(path.as_ref()) {
+            true => Some(asked_for(study)?),
+            false => None,
+        },
+    };
+    Table::load_within(path, &request)
+}
+
+/// Headers of time and of all that the plant has names for: readings, inputs, and what may be compared with them.
+fn asked_for(study: &Study) -> Result<HashSet<String>, Error> {
+    let plant = crate::prepare::plant(study)?;
+    let settings = &study.estimate;
+    let variables = plant
+        .states
+        .iter()
+        .chain(&plant.inputs)
+        .chain(&plant.outputs);
+    let headers = variables.map(|v| header(settings, &v.name).to_owned());
+    let headers = headers.chain(further_headers(settings));
+    let headers = headers.chain([log_time(&plant, settings)]);
+    let spelled = |name: String| [visible::line(&name).into_owned(), name];
+    Ok(headers.flat_map(spelled).collect())
+}
+
+/// A log in the order of time, and what the observers of a study read of it.
+#[derive(Clone, Debug)]
+pub struct Log<'t> {
+    /// what was read
+    pub table: Cow<'t, Table>,
+    /// the header of time
+    pub time: String,
+    /// its rows as an observer reads them
+    pub samples: Samples,
+    /// what it lacks and what was done for its order
+    pub notes: Vec<String>,
+    /// what of it contradicts itself, or counts nowhere
+    pub warnings: Vec<String>,
+}
+
+impl<'t> Log<'t> {
+    /// A table as a study takes it: rows put in order unless the study is strict.
+    ///
+    /// # Errors
+    /// Columns that the study names or its observers read and the log does not have, or not as
+    /// numbers; times that are no order.
+    pub fn read(prepared: &Prepared<'_>, table: &'t Table) -> Result<Self, Error> {
+        Self::with(prepared, table, false)
+    }
+
+    /// One of several, in which a sensor may not have reported at all.
+    ///
+    /// # Errors
+    /// As [`Log::read`].
+    pub fn one_of(prepared: &Prepared<'_>, table: &'t Table) -> Result<Self, Error> {
+        Self::with(prepared, table, true)
+    }
+
+    fn with(prepared: &Prepared<'_>, table: &'t Table, may_lack: bool) -> Result<Self, Error> {
+        let (study, plant) = (prepared.study(), prepared.plant());
+        let settings = &study.estimate;
+        let augmented = prepared.augmented();
+        let time = time_of(table, plant, settings, read(augmented))?;
+        refuse_seconds(study, table, &time)?;
+        let ordered = match settings.strict {
+            true => None,
+            false => table.in_order(&time, settings.late)?,
+        };
+        let (table, mut notes, lost) = match ordered {
+            None => (Cow::Borrowed(table), vec![], vec![]),
+            Some(Ordered { table, notes, lost }) => (Cow::Owned(table), notes, lost),
+        };
+        let warnings = read(augmented).filter_map(|name| {
+            let own = header(settings, name);
+            lost.iter().find(|lost| lost.column == own)
+        });
+        let warnings = warnings.flat_map(|lost| told(lost, &time)).collect();
+        let mut samples = samples(&table, &time, settings, augmented, may_lack)?;
+        notes.extend(screened(prepared, &mut samples));
+        notes.extend(gaps(&table, settings, &time, augmented));
+        Ok(Self {
+            table,
+            time,
+            samples,
+            notes,
+            warnings,
+        })
+    }
+}
+
+/// What of a column that is read counts nowhere, in words.
+fn told(lost: &Lost, time: &str) -> Vec<String> {
+    let Lost { column, .. } = lost;
+    let conflict = lost.first.map(|first| {
+        let times = match lost.conflicts {
+            1 => "a time".to_owned(),
+            count => format!("{count} times"),
+        };
+        format!(
+            "column \"{column}\" says different things at {times}, first {} in line {} and {} in line {} at \"{time}\" = {}; the last one counts: {APART}",
+            first.lost, first.line, first.kept, first.kept_line, first.time
+        )
+    });
+    let timeless = (lost.timeless > 0).then(|| {
+        format!(
+            "column \"{column}\": values in rows without a time, which count nowhere: {}",
+            lost.timeless
+        )
+    });
+    conflict.into_iter().chain(timeless).collect()
+}
+
+/// Names of the measured outputs, then of the known inputs.
+fn read<'e>(augmented: &'e AugmentedPlant<'_>) -> impl Iterator<Item = &'e str> {
+    let outputs = augmented.outputs.iter().map(|o| o.variable.name.as_str());
+    outputs.chain(augmented.inputs.iter().map(|input| input.name.as_str()))
+}
+
+/// What a log knows to be true of an estimated quantity: what a simulation knew, else the column of that name,
+/// unless an observer reads it, for readings are no truth.
+pub(crate) fn truth<'t>(
+    prepared: &Prepared<'_>,
+    log: &'t Log<'_>,
+    name: &str,
+) -> Option<&'t Series> {
+    let settings = &prepared.study().estimate;
+    let own = header(settings, name);
+    let is_read = read(prepared.augmented()).any(|name| header(settings, name) == own);
+    let unread = || logged(&log.table, settings, &log.time, name).filter(|_| !is_read);
+    log.table.truth(name).or_else(unread)
+}
+
+/// The columns of a log that an observer reads: an input's last value stands where its cell is
+/// missing; a study that is strict has no cell missing.
+fn samples(
+    table: &Table,
+    time_header: &str,
+    settings: &EstimateSettings,
+    augmented: &AugmentedPlant<'_>,
+    may_lack: bool,
+) -> Result<Samples, Error> {
+    let is_empty = |name: &str| may_lack && table.missing(header(settings, name)) == table.rows();
+    let reading = |name: &str| match settings.strict {
+        true => table.column(header(settings, name)).cloned(),
+        false if is_empty(name) => table.cells(header(settings, name)).cloned(),
+        false => table.readings(header(settings, name)).cloned(),
+    };
+    let input = |name: &str| match is_made(table, settings, name) {
+        true => Ok(Series::default()),
+        false => held(table, settings, header(settings, name)),
+    };
+    let outputs = augmented.outputs.iter().map(|o| &o.variable.name);
+    let mut read: Vec<(&str, &str)> = vec![];
+    for name in outputs.chain(augmented.inputs.iter().map(|u| &u.name)) {
+        let own = header(settings, name);
+        if let Some((other, _)) = read.iter().find(|(_, known)| *known == own) {
+            let message = format!("{other} and {name} both read the column \"{own}\"");
+            return Err(Error::input(message)
+                .at(table.place())
+                .hint("give each a column of its own: `columns` of [estimate]"));
+        }
+        read.push((name, own));
+    }
+    let readings = augmented.outputs.iter().map(|o| reading(&o.variable.name));
+    let inputs = augmented.inputs.iter().map(|u| input(&u.name));
+    Ok(Samples {
+        time: table.time(time_header)?.clone(),
+        readings: readings.collect::<Result<_, _>>()?,
+        inputs: inputs.collect::<Result<_, _>>()?,
+    })
+}
+
+/// Leaves out of the readings what the study says are none, and tells how many.
+fn screened(prepared: &Prepared<'_>, samples: &mut Samples) -> Vec<String> {
+    let mut notes = vec![];
+    let outputs = prepared
+        .augmented()
+        .outputs
+        .iter()
+        .map(|o| &o.variable.name);
+    for (name, readings) in outputs.zip(&mut samples.readings) {
+        for screen in prepared.declared().screens.of(name).into_iter().flatten() {
+            let (left, count) = screen::screened(readings, *screen);
+            if count > 0 {
+                notes.push(format!(
+                    "{name}: {count} of {} cells {} and count as no readings",
+                    readings.len(),
+                    screen::words(*screen)
+                ));
+            }
+            *readings = left;
+        }
+    }
+    notes
+}
+
+/// A column as an input reads it.
+///
+/// # Errors
+/// The log has none, or not of numbers, or a strict study one with missing cells.
+pub(crate) fn held(
+    table: &Table,
+    settings: &EstimateSettings,
+    header: &str,
+) -> Result<Series, Error> {
+    match settings.strict {
+        true => table.column(header).cloned(),
+        false => table.held(header),
+    }
+}
+
+/// Whether the log leaves an input to its generator: its samples are then empty.
+fn is_made(table: &Table, settings: &EstimateSettings, name: &str) -> bool {
+    let mut made = settings.generator.iter();
+    let own = header(settings, name);
+    made.any(|(input, _)| input.text == name) && !table.names().any(|known| known == own)
+}
+
+/// What the log lacks in words, and where its times count from.
+fn gaps(
+    table: &Table,
+    settings: &EstimateSettings,
+    time: &str,
+    augmented: &AugmentedPlant<'_>,
+) -> Vec<String> {
+    let origin = table.origin(time);
+    let mut notes: Vec<String> = origin
+        .map(|origin| format!("times are seconds since {origin}"))
+        .into_iter()
+        .collect();
+    let outputs = augmented.outputs.iter().map(|o| &o.variable);
+    for signal in augmented.inputs.iter().chain(outputs) {
+        let header = header(settings, &signal.name);
+        let missing = table.missing(header);
+        if missing == 0 {
+            continue;
+        }
+        let places = table.faults(header).iter();
+        let places = places.map(|fault| format!("{fault} in line {}", fault.line));
+        let places: Vec<String> = places.collect();
+        let first = match places.is_empty() {
+            true => String::new(),
+            false => format!(", first {}", places.join(", ")),
+        };
+        let rows = table.rows();
+        notes.push(format!(
+            "column \"{header}\": {missing} of {rows} cells are missing{first}"
+        ));
+    }
+    notes
+}
+
+/// A column of the log, if it has one with numbers, and only one, that is not the one of time.
+pub(crate) fn logged<'t>(
+    table: &'t Table,
+    settings: &EstimateSettings,
+    time: &str,
+    name: &str,
+) -> Option<&'t Series> {
+    let header = header(settings, name);
+    let is_own = table.has_one(header) && header != time;
+    let values = table
+        .get(header)
+        .filter(|_| is_own && table.origin(header).is_none())?;
+    values.iter().any(|x| x.is_finite()).then_some(values)
+}
