@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::path::PathBuf;
 
-use lynkeus::table::{Cell, Gathered, Gathering, Instant, Request};
+use lynkeus::table::{Cell, Gathered, Gathering, Instant};
 use lynkeus::{Error, Study, Table};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -114,17 +114,19 @@ impl Log {
 
 #[pymethods]
 impl Log {
-    /// A CSV or Parquet file.
+    /// A CSV or Parquet file, all of its columns; `study` says how the file is written.
     #[staticmethod]
-    fn load(py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<Self> {
+    #[pyo3(signature = (path, study=None))]
+    fn load(
+        py: Python<'_>,
+        path: &Bound<'_, PyAny>,
+        study: Option<PyRef<'_, crate::study::Study>>,
+    ) -> PyResult<Self> {
         let file = path.extract::<PathBuf>();
         let path = file.map_err(|error| wrong("path", "a path", path, error))?;
+        let study = study.map_or_else(Study::default, |study| study.engine().clone());
         let table = away(py, &Terms::default(), |budget, _| {
-            let request = Request {
-                budget,
-                columns: None,
-            };
-            Table::load_within(&path, &request)
+            lynkeus::whole_log(&Study { budget, ..study }, &path)
         })?;
         Ok(Self { table })
     }

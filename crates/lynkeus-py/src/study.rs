@@ -46,6 +46,13 @@ pub fn schema() -> String {
     lynkeus::schema().to_string()
 }
 
+impl Study {
+    /// The study as the engine has it.
+    pub fn engine(&self) -> &lynkeus::Study {
+        &self.study
+    }
+}
+
 #[pymethods]
 impl Study {
     /// A study file, or a model for which it stands with every output measured; the plant's text

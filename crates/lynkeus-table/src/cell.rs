@@ -2,6 +2,7 @@
 
 use super::instant::{self, Instant};
 use super::number::POWERS;
+use super::{Decimal, Pattern};
 
 /// What a cell says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +40,47 @@ pub(super) enum Mark {
 /// Reads a trimmed cell.
 pub(super) fn read(text: &str) -> Cell {
     plain(text.as_bytes()).unwrap_or_else(|| other_than_plain(text))
+}
+
+/// Reads a trimmed cell whose decimal mark is known.
+pub(super) fn read_by(text: &str, decimal: Decimal) -> Cell {
+    let (mark, grouping) = match decimal {
+        Decimal::Point => ('.', ','),
+        Decimal::Comma => (',', '.'),
+    };
+    let (whole, fraction) = match text.split_once(mark) {
+        Some((whole, fraction)) => (whole, Some(fraction)),
+        None => (text, None),
+    };
+    let unsigned = whole.strip_prefix(['+', '-']).unwrap_or(whole);
+    let whole = match whole.contains(grouping) && are_groups(unsigned, grouping) {
+        true => whole.replace(grouping, ""),
+        false => whole.to_owned(),
+    };
+    let number = match fraction {
+        Some(fraction) => format!("{whole}.{fraction}"),
+        None => whole,
+    };
+    if !number.contains(grouping) || decimal == Decimal::Comma && !text.contains(grouping) {
+        match number.parse::<f64>() {
+            Ok(value) if value.is_finite() => return Cell::Number(value),
+            Ok(_) => return Cell::Missing,
+            Err(_) => {}
+        }
+    }
+    match read(text) {
+        Cell::Number(_) | Cell::Marked(..) => Cell::Garbled,
+        other => other,
+    }
+}
+
+/// Reads a trimmed cell that holds a time of this pattern.
+pub(super) fn of_pattern(text: &str, pattern: &Pattern) -> Cell {
+    match (pattern.instant(text), read(text)) {
+        (Some(instant), _) => Cell::Instant(instant),
+        (None, Cell::Missing) => Cell::Missing,
+        (None, _) => Cell::Garbled,
+    }
 }
 
 /// Digits of a cell that is read at once: as a whole number they are exact.
