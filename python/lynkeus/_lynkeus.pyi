@@ -37,7 +37,7 @@ class Answer:
         """Names of sensors and states, and by name the entries of what a filter's corrections are made of, row after
         row."""
 
-    def origin(self) -> tuple[int, bool] | None:
+    def origin(self) -> tuple[int, bool, float] | None:
         """What stands for zero where times are dates: nanoseconds since 1970, and whether that is UTC."""
 
     def refusal(self) -> LynkeusError | None: ...
@@ -50,13 +50,15 @@ class Log:
     """A table of named columns of equal length."""
 
     @staticmethod
-    def load(path: str | os.PathLike[str]) -> Log:
+    def load(path: str | os.PathLike[str], study: Study | None = None) -> Log:
         """A log in a file.
 
         Parameters
         ----------
         path : path
             CSV or Parquet.
+        study : Study, optional
+            Whose ``[log]`` says how the file is written.
 
         Returns
         -------
