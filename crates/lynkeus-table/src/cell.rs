@@ -57,11 +57,12 @@ pub(super) fn read_by(text: &str, decimal: Decimal) -> Cell {
         true => whole.replace(grouping, ""),
         false => whole.to_owned(),
     };
-    let number = match fraction {
-        Some(fraction) => format!("{whole}.{fraction}"),
-        None => whole,
-    };
-    if !number.contains(grouping) || decimal == Decimal::Comma && !text.contains(grouping) {
+    let is_plain = |part: &str| !part.contains([mark, grouping]);
+    if is_plain(&whole) && fraction.is_none_or(is_plain) {
+        let number = match fraction {
+            Some(fraction) => format!("{whole}.{fraction}"),
+            None => whole,
+        };
         match number.parse::<f64>() {
             Ok(value) if value.is_finite() => return Cell::Number(value),
             Ok(_) => return Cell::Missing,
@@ -236,6 +237,25 @@ mod tests {
         }
         assert_eq!(read("-1e3"), Cell::Number(-1000.0));
         assert_eq!(read("1700000000001"), Cell::Number(1_700_000_000_001.0));
+    }
+
+    #[test]
+    fn a_known_mark_leaves_nothing_open() {
+        for (text, by_point, by_comma) in [
+            ("1,234", Cell::Number(1234.0), Cell::Number(1.234)),
+            ("1.234", Cell::Number(1.234), Cell::Number(1234.0)),
+            ("-1,234.5", Cell::Number(-1234.5), Cell::Garbled),
+            ("1.234.567,5", Cell::Garbled, Cell::Number(1_234_567.5)),
+            ("2,5e-3", Cell::Garbled, Cell::Number(0.0025)),
+            ("2.5", Cell::Number(2.5), Cell::Garbled),
+            ("1,2,3", Cell::Garbled, Cell::Garbled),
+            ("17", Cell::Number(17.0), Cell::Number(17.0)),
+            ("NA", Cell::Missing, Cell::Missing),
+            ("", Cell::Missing, Cell::Missing),
+        ] {
+            assert_eq!(read_by(text, Decimal::Point), by_point, "{text}");
+            assert_eq!(read_by(text, Decimal::Comma), by_comma, "{text}");
+        }
     }
 
     #[test]

@@ -107,7 +107,7 @@ impl Pattern {
 /// A month by its name, or the first three letters of it.
 fn month(word: &str) -> Option<i64> {
     let is_meant = |name: &&str| *name == word || name.get(..3) == Some(word);
-    let place = MONTHS.iter().position(|name| is_meant(&name))?;
+    let place = MONTHS.iter().position(is_meant)?;
     i64::try_from(place + 1).ok()
 }
 
