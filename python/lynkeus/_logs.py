@@ -26,7 +26,8 @@ def log_of(data: Any, what: str = "the log", study: _lynkeus.Study | None = None
     if isinstance(data, _lynkeus.Log):
         return data
     if isinstance(data, (str, os.PathLike)):
-        return _lynkeus.Log.load(os.fspath(data), study)
+        path = os.fspath(data)
+        return _lynkeus.Log.load(path) if study is None else study.log(path)
     data = collected(data)
     if isinstance(data, Mapping):
         return _gathered(_items(data))

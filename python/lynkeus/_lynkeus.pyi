@@ -50,15 +50,13 @@ class Log:
     """A table of named columns of equal length."""
 
     @staticmethod
-    def load(path: str | os.PathLike[str], study: Study | None = None) -> Log:
+    def load(path: str | os.PathLike[str]) -> Log:
         """A log in a file.
 
         Parameters
         ----------
         path : path
             CSV or Parquet.
-        study : Study, optional
-            Whose ``[log]`` says how the file is written.
 
         Returns
         -------
@@ -204,6 +202,9 @@ class Study:
     @property
     def text(self) -> str: ...
     def html(self) -> str: ...
+    def log(self, path: str | os.PathLike[str]) -> Log:
+        """A log in a file that is written as the study says, all of its columns."""
+
     def sections(self) -> dict[str, Any]:
         """The text as dictionaries."""
 

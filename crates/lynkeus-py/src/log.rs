@@ -112,23 +112,25 @@ impl Log {
     }
 }
 
-#[pymethods]
 impl Log {
-    /// A CSV or Parquet file, all of its columns; `study` says how the file is written.
-    #[staticmethod]
-    #[pyo3(signature = (path, study=None))]
-    fn load(
-        py: Python<'_>,
-        path: &Bound<'_, PyAny>,
-        study: Option<PyRef<'_, crate::study::Study>>,
-    ) -> PyResult<Self> {
+    /// A file as a study says that it is written, all of its columns.
+    pub fn whole(py: Python<'_>, study: &Study, path: &Bound<'_, PyAny>) -> PyResult<Self> {
         let file = path.extract::<PathBuf>();
         let path = file.map_err(|error| wrong("path", "a path", path, error))?;
-        let study = study.map_or_else(Study::default, |study| study.engine().clone());
+        let study = study.clone();
         let table = away(py, &Terms::default(), |budget, _| {
             lynkeus::whole_log(&Study { budget, ..study }, &path)
         })?;
         Ok(Self { table })
+    }
+}
+
+#[pymethods]
+impl Log {
+    /// A CSV or Parquet file.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Self::whole(py, &Study::default(), path)
     }
 
     /// Columns in the forms that `_logs.py` gives them.
