@@ -1,141 +1,30 @@
-//! The analysis.
+//! The analysis of one branch.
 
 use lynkeus_expr::Node;
 use lynkeus_model::Plant;
 
-use crate::branches::{Branch, Choices, Reference};
+use crate::branches::Reference;
 use crate::expansion::{Affine, Columns, Start};
 use crate::hidden::{Hidden, beside, is_steady, joined, symmetries};
-use crate::model::{Model, check_names, expressions, measured};
+use crate::model::Model;
 use crate::search::Search;
 use crate::series::Stop;
-use crate::{Answer, Asked, Note, Partial, Quantity, Question, QuestionError, Verdict, hull, lie};
+use crate::{Answer, Asked, Note, Quantity, Question, Verdict, hull, lie};
 use lynkeus_expr::modular::Modular;
 
 /// Seed of the first point.
 const FIRST: u64 = 1;
 /// Seed of the second point, which confirms symmetries that the first suggests.
 const SECOND: u64 = 4711;
-/// Branches that are analysed beside the model's own.
-const BRANCHES: usize = 5;
 /// Products of coefficients, with a sensitivity each, that a search from a special start may
 /// cost; and the most orders it may have.
 const WORK: usize = 100_000_000;
 const ORDERS: usize = 1000;
 
-/// Decides what can be known.
-///
-/// # Errors
-/// [`QuestionError`].
-pub fn analyse(plant: &Plant, question: &Question) -> Result<Answer, QuestionError> {
-    let outputs = measured(plant, question)?;
-    let about = expressions(plant, question)?;
-    check_names(plant, question)?;
-    let choices = Choices::of(plant, &outputs);
-    let in_branch = |branch: Option<&Branch>, guards: &[Node]| {
-        let outputs = [&outputs[..], guards].concat();
-        let reference = branch.map(|branch| &branch.reference);
-        in_branch(plant, question, (&outputs, &about), reference)
-    };
-    let own = in_branch(None, &[]);
-    let branches = (!choices.is_empty()).then(|| choices.branches(plant));
-    Ok(match branches.flatten() {
-        Some(branches) => combined(plant, own, &choices, branches, &in_branch),
-        None => own,
-    })
-}
-
-/// The answers of all branches in one; `in_branch` gives that of one, with some guards measured beside the outputs.
-fn combined(
-    plant: &Plant,
-    own: Answer,
-    choices: &Choices,
-    mut branches: Vec<Branch>,
-    in_branch: &dyn Fn(Option<&Branch>, &[Node]) -> Answer,
-) -> Answer {
-    let left_out = branches.split_off(branches.len().min(BRANCHES + 1));
-    let verdicts = |answer: &Answer| answer.asked().map(|asked| asked.verdict).collect();
-    let mut verdicts_in: Vec<Vec<Verdict>> = vec![];
-    let mut guarded = vec![];
-    for (k, branch) in branches.iter().enumerate() {
-        // the first is the model's own
-        let other = Some(branch).filter(|_| k > 0);
-        let found: Vec<Verdict> = match other {
-            Some(_) => verdicts(&in_branch(other, &[])),
-            None => verdicts(&own),
-        };
-        // what is seen without the guards is seen with them
-        let is_hidden = found.contains(&Verdict::Unobservable);
-        guarded.push(is_hidden.then(|| in_branch(other, &choices.guards)));
-        verdicts_in.push(found);
-    }
-    let guarded_in: Option<Vec<Vec<Verdict>>> = guarded
-        .iter()
-        .map(|answer| Some(verdicts(answer.as_ref()?)))
-        .collect();
-    let mut found = own;
-    let (mut doubted, mut partial) = (vec![], vec![]);
-    for (place, own) in found.asked_mut().enumerate() {
-        let seen = verdicts_in
-            .iter()
-            .map(|all| all[place] == Verdict::Observable);
-        let seen: Vec<bool> = seen.collect();
-        let is_hidden = || {
-            let hides = |all: &Vec<Verdict>| all[place] == Verdict::Unobservable;
-            guarded_in.as_ref().is_some_and(|all| all.iter().all(hides))
-        };
-        let verdict = match seen.contains(&true) {
-            true => Verdict::Observable,
-            // in branches that were left out it may be seen, unless no path leads to it
-            false if is_hidden() && (left_out.is_empty() || !choices.feel(&own.name)) => {
-                Verdict::Unobservable
-            }
-            false => Verdict::Undecided,
-        };
-        if own.verdict == Verdict::Unobservable && verdict == Verdict::Undecided {
-            doubted.push(own.name.clone());
-        }
-        own.verdict = verdict;
-        if let Some(first) = seen.iter().position(|seen| !seen)
-            && verdict == Verdict::Observable
-        {
-            let hides = seen.iter().zip(&branches).filter(|(seen, _)| !**seen);
-            partial.push(Partial {
-                name: own.name.clone(),
-                share: hides.map(|(_, branch)| branch.share).sum(),
-                at: named(plant, choices, &branches[first].reference),
-            });
-        }
-    }
-    found.partial = partial;
-    // what is told of the model's own branch goes for all
-    let mut quantities = found.quantities.iter().zip(&verdicts_in[0]);
-    if quantities.any(|((asked, _), own)| asked.verdict != *own)
-        && let Some(answer) = guarded.into_iter().next()
-    {
-        found.symmetries = answer.map_or(vec![], |answer| answer.symmetries);
-    }
-    found.notes.retain(|note| *note != Note::OwnBranch);
-    let all = left_out.is_empty();
-    found.notes.push(Note::Branches(branches.len(), all));
-    if !doubted.is_empty() {
-        found.notes.push(Note::WithinBranches(doubted));
-    }
-    found
-}
-
-/// The values of what the choices read, by name.
-fn named(plant: &Plant, choices: &Choices, reference: &Reference) -> Vec<(String, f64)> {
-    let read = plant.graph.symbols_of(&choices.guards);
-    let variables = plant.states.iter().chain(&plant.inputs);
-    let read = variables.filter(|v| read.contains(&v.node));
-    read.map(|v| (v.name.clone(), reference[&v.node])).collect()
-}
-
 /// Decides what can be known in one branch.
 ///
 /// `reference` is a point in it, the model's own values where there is none.
-fn in_branch(
+pub(crate) fn in_branch(
     plant: &Plant,
     question: &Question,
     roots: (&[Node], &[Node]),

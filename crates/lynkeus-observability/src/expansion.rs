@@ -248,6 +248,19 @@ impl Start {
         Self { at_zero, ..self }
     }
 
+    /// The same numbers for another branch of the model, whose roots and logarithms are others.
+    pub fn elsewhere(&self) -> Self {
+        Self {
+            turned: BTreeSet::new(),
+            ..self.clone()
+        }
+    }
+
+    /// Whether it has the same numbers.
+    pub fn is_at(&self, other: &Self) -> bool {
+        (self.seed, &self.draws) == (other.seed, &other.draws)
+    }
+
     /// The known starts anywhere in a set.
     pub fn within(self, model: &Model, set: &Affine) -> Self {
         Self {

@@ -4,6 +4,7 @@
 use std::collections::BTreeSet;
 
 use crate::expansion::{Affine, Columns, Start};
+use crate::hull;
 use crate::model::Model;
 use crate::search::Search;
 use crate::series::Stop;
@@ -178,6 +179,61 @@ pub(crate) fn is_steady(
         before = Some(now);
     }
     Ok(false)
+}
+
+/// Seed of the point at which branches are compared.
+const COMPARED: u64 = 1;
+/// Rounds in which a point is looked for that suits all branches.
+const ROUNDS: usize = 8;
+
+/// Whether branches of a model, without known starts, leave the same directions of states and parameters unseen:
+/// then one branch carries on what another one hides. False may also mean: not known.
+pub(crate) fn hide_alike(mut models: Vec<Model>) -> bool {
+    let Some((first, others)) = models.split_first_mut() else {
+        return true;
+    };
+    for symbols in others.iter_mut().map(|model| &mut model.symbols) {
+        let pairs = symbols.iter_mut().zip(&first.symbols);
+        pairs.for_each(|(symbol, of_first)| symbol.negative = of_first.negative);
+    }
+    if first.known_starts().next().is_some() {
+        return false;
+    }
+    let Some(starts) = common(&models) else {
+        return false;
+    };
+    let spaces = models.iter().zip(&starts).map(|(model, start)| {
+        let mut search = Search::new(model, start, Columns::new(model, model.depth));
+        search.run_out().ok()?;
+        let lasting = model.named.len() - model.unknown_inputs;
+        let unseen = search.unseen();
+        let parts = unseen.iter().map(|(_, direction)| &direction[..lasting]);
+        Some(Echelon::of(lasting, parts))
+    });
+    let Some(spaces) = spaces.collect::<Option<Vec<Echelon>>>() else {
+        return false;
+    };
+    let is_same = |space: &Echelon| {
+        space.rank() == spaces[0].rank() && space.rows().all(|row| spaces[0].contains(row))
+    };
+    spaces.iter().all(is_same)
+}
+
+/// One point for all models, each with its own signs of roots.
+fn common(models: &[Model]) -> Option<Vec<Start>> {
+    let mut point = Start::new(models.first()?, COMPARED);
+    for _ in 0..ROUNDS {
+        let before = point.clone();
+        let mut starts = vec![];
+        for model in models {
+            point = hull::find(model, point.elsewhere()).ok()?;
+            starts.push(point.clone());
+        }
+        if starts.iter().all(|start| start.is_at(&before)) {
+            return Some(starts);
+        }
+    }
+    None
 }
 
 /// Weights of a scaling, and steps of a shift, are fractions with parts up to this.

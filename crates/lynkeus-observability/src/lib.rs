@@ -32,6 +32,7 @@
 
 mod analysis;
 mod branches;
+mod combined;
 mod expansion;
 mod hidden;
 mod hull;
@@ -41,8 +42,9 @@ pub mod precision;
 mod question;
 mod search;
 mod series;
+mod switched;
 
-pub use analysis::analyse;
+pub use combined::analyse;
 pub use question::{
     Answer, Asked, Kind, Note, Partial, Quantity, Question, QuestionError, Symmetry, Verdict,
 };

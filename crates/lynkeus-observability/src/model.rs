@@ -6,7 +6,7 @@ use lynkeus_model::{Plant, Variable, parse_expression};
 use crate::branches::Reference;
 use crate::series::Program;
 use crate::{Note, Quantity, Question, QuestionError, branches};
-use lynkeus_expr::modular::{Modular, Random};
+use lynkeus_expr::modular::Modular;
 
 /// What role a symbol plays in the series.
 #[derive(Clone, Copy, Debug)]
@@ -85,7 +85,7 @@ impl Model {
         let starts = model.add_symbols(plant, question);
         let roots = [&plant.derivatives[..], outputs, about].concat();
         let nodes: Vec<Node> = model.symbols.iter().map(|s| s.node).collect();
-        let own = || branches::reference(plant, &mut Random::new(1));
+        let own = || branches::own(plant, question);
         let reference = reference.cloned().unwrap_or_else(own);
         for symbol in &mut model.symbols {
             symbol.negative = reference.get(&symbol.node).is_some_and(|x| *x < 0.0);

@@ -109,9 +109,16 @@ pub enum Note {
     Generic(Vec<&'static str>),
     /// the model makes choices: in the branch at its own values
     OwnBranch,
-    /// the model makes choices: in so many branches, which are all that were found or not
-    Branches(usize, bool),
-    /// what is told in no branch may show when the branch changes
+    /// the model makes choices: branch by branch
+    Branches {
+        /// in how many
+        count: usize,
+        /// whether some of them were found at other times only
+        later: bool,
+        /// whether these are all that were found
+        all: bool,
+    },
+    /// what no branch tells of these may show when the branch changes, or from what several branches tell
     WithinBranches(Vec<String>),
     /// start values are given, and so many derivatives do not decide everything
     Derivatives(usize),
@@ -142,9 +149,9 @@ pub enum Note {
 pub struct Partial {
     /// its name
     pub name: String,
-    /// the share of the box in branches where they do not, estimated at points spread over it
+    /// the share of the box in branches where they do not, at the time told below, estimated at points spread over it
     pub share: f64,
-    /// one of these points: what the choices read, by name
+    /// one of these points: what the choices read, by name; `time` is one
     pub at: Vec<(String, f64)>,
 }
 

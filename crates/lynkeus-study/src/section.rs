@@ -278,6 +278,9 @@ impl<'a> Entry<'a> {
     }
 }
 
+/// Entries of a list that are told one by one.
+const FEW: usize = 4;
+
 /// A value as a message shows it.
 fn found(value: &DeValue<'_>) -> String {
     match value {
@@ -286,6 +289,10 @@ fn found(value: &DeValue<'_>) -> String {
         DeValue::Float(number) => number.to_string(),
         DeValue::Boolean(b) => b.to_string(),
         DeValue::Datetime(date) => format!("the date {date}"),
+        DeValue::Array(items) if items.len() <= FEW => {
+            let items = items.iter().map(|item| found(item.get_ref()));
+            format!("[{}]", items.collect::<Vec<_>>().join(", "))
+        }
         DeValue::Array(items) => format!("a list of {}", items.len()),
         DeValue::Table(_) => "a table".to_owned(),
     }

@@ -53,16 +53,17 @@ impl Words for Note {
             Note::OwnBranch => format!(
                 "{CHOICES}: the branch at its own values is analysed, and what another branch or the moment of the change would show is not"
             ),
-            Note::Branches(count, all) => {
+            Note::Branches { count, later, all } => {
                 let found = match count {
                     1 => "one branch was".to_owned(),
                     count => format!("{count} branches were"),
                 };
+                let times = if *later { " and at other times" } else { "" };
                 let reserve = if *all { "" } else { ", and further ones were not" };
-                format!("{CHOICES}: {found} found at points of the box, each analysed{reserve}")
+                format!("{CHOICES}: {found} found at points of the box{times}, each analysed{reserve}")
             }
             Note::WithinBranches(names) => format!(
-                "within each branch the outputs do not tell {}; the moments at which the branch changes may",
+                "within each branch the outputs do not tell {}; the moments at which the branch changes may, or what several branches tell together",
                 names.join(", ")
             ),
             Note::Derivatives(order) => format!(

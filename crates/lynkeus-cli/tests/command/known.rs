@@ -178,6 +178,56 @@ fn what_a_step_may_show_is_not_called_unobservable() {
     assert!(!text.contains("x can have any value"), "{text}");
 }
 
+/// Each branch tells one sum of a and b, and a run through both tells a and b: hidden in each branch is not hidden.
+#[test]
+fn what_two_branches_tell_together_is_not_called_unobservable() {
+    let (report, text) = check(
+        "Real x(start = 1, min = -2, max = 2); Real a(start = 1, min = 0, max = 2); Real b(start = 1, min = 0, max = 2); output Real y = x;
+         equation der(x) = -x + (if sin(time) < 0 then a + b else a - b); der(a) = 0; der(b) = 0;",
+        "",
+    );
+    for name in ["a", "b"] {
+        assert_eq!(report["observability"][name], "undecided", "{text}");
+        assert_eq!(known(&report, name)["known"], "undecided");
+    }
+    assert_eq!(report["symmetries"], serde_json::json!([]));
+    assert!(
+        text.contains("what several branches tell together"),
+        "{text}"
+    );
+}
+
+/// b' = −b + a: the error of b decays once a is known, and while a < 0 it is not: proved it is without a alone.
+#[test]
+fn decay_that_rests_on_a_branch_is_not_proved() {
+    let detectability = |b: &str| {
+        let model = format!(
+            "Real a(start = 1, min = -2, max = 2); Real b(start = 0, min = -4, max = 4); output Real y = max(a, 0);
+             equation der(a) = 0; der(b) = {b};"
+        );
+        let (report, _) = check(&model, "");
+        assert_eq!(known(&report, "a")["known"], "in part of the box");
+        known(&report, "b")["proved"].clone()
+    };
+    assert_eq!(detectability("-b + a"), false);
+    assert_eq!(detectability("-b"), true);
+}
+
+/// z acts from the tenth second on: it is known then, and the point where it is hidden has its time.
+#[test]
+fn what_a_later_branch_shows_is_known_in_part() {
+    let (report, text) = check(
+        "Real x(start = 1, min = -2, max = 2); Real z(start = 1, min = 0, max = 2); output Real y = x;
+         equation der(x) = -x + (if time > 10 then z else 0); der(z) = 0;",
+        "",
+    );
+    assert_eq!(report["observability"]["z"], "observable", "{text}");
+    let z = known(&report, "z");
+    assert_eq!(z["known"], "in part of the box", "{text}");
+    assert!(z["hidden_at"]["time"].as_f64().unwrap() < 10.0, "{z}");
+    assert!(text.contains("known at some times"), "{text}");
+}
+
 /// Beyond the limits of one sensor the other is all there is, and a disturbance acts on that.
 #[test]
 fn limits_and_disturbances_count_together() {

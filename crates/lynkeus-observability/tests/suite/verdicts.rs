@@ -1,5 +1,6 @@
 //! Verdicts judged against answers from elsewhere: by hand, planted, or from another method.
 
+mod branches;
 mod independent;
 mod limits;
 mod nonrational;

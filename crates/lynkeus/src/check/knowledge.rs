@@ -111,11 +111,22 @@ impl Knowledge {
             .iter()
             .map(|s| answer.verdict(&s.name))
             .collect();
-        let observability = verdicts.iter().map(|verdict| match verdict {
-            Some(Verdict::Observable) => Observability::Determined,
-            Some(Verdict::Unobservable) => Observability::Hidden,
-            Some(Verdict::Undecided) | None => Observability::Open,
-        });
+        // what is known in part may differ between two solutions for ever
+        let is_in_part = |i: usize| {
+            matches!(
+                found.seen(augmented, i, assumption, answer),
+                Known::InPart { .. }
+            )
+        };
+        let observability = verdicts
+            .iter()
+            .enumerate()
+            .map(|(i, verdict)| match verdict {
+                Some(Verdict::Observable) if is_in_part(i) => Observability::Open,
+                Some(Verdict::Observable) => Observability::Determined,
+                Some(Verdict::Unobservable) => Observability::Hidden,
+                Some(Verdict::Undecided) | None => Observability::Open,
+            });
         let hidden = Hidden {
             observability: observability.collect(),
             arbitrary: assumption == Assumption::Arbitrary,
@@ -293,14 +304,7 @@ impl Known {
             Known::AlmostEverywhere => {
                 "known at almost every state and input, locally (everywhere is not proved)".to_owned()
             }
-            Known::InPart { share, at } => {
-                let sides = at.iter().map(|(name, x)| format!("{name} = {}", number(*x)));
-                format!(
-                    "known on a part of the box only: the model makes choices, and in the branch at {}, as on about {} % of the box, the outputs do not show it",
-                    sides.collect::<Vec<_>>().join(", "),
-                    number((100.0 * share).round())
-                )
-            }
+            Known::InPart { share, at } => in_part(*share, at),
             Known::WhileExcited { input, value } => {
                 format!(
                     "known only while inputs excite it, and locally (hidden for {input} = {})",
@@ -354,6 +358,22 @@ impl Reserve {
             }
         }
     }
+}
+
+/// What is known in some branches, of which one that hides it holds at a point.
+pub(super) fn in_part(share: f64, at: &[(String, f64)]) -> String {
+    let (part, then) = match at.iter().any(|(name, _)| name == "time") {
+        true => ("at some times, or on a part of the box,", " at that time"),
+        false => ("on a part of the box", ""),
+    };
+    let sides = at
+        .iter()
+        .map(|(name, x)| format!("{name} = {}", number(*x)));
+    format!(
+        "known {part} only: the model makes choices, and in the branch at {}, as on about {} % of the box{then}, the outputs do not show it",
+        sides.collect::<Vec<_>>().join(", "),
+        number((100.0 * share).round())
+    )
 }
 
 fn told(detectability: Detectability, unit: &str) -> String {

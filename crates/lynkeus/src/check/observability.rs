@@ -7,6 +7,7 @@ use lynkeus_observability::{Answer, Quantity, Question, QuestionError, Verdict, 
 use lynkeus_structure::Sensors;
 use lynkeus_words::Words;
 
+use super::knowledge::in_part;
 use super::{CheckOptions, Report};
 use crate::{Error, Study};
 use lynkeus_experiment::words::explain;
@@ -89,6 +90,10 @@ pub(super) fn tell(document: &mut Document, report: &Report) {
     }
     for asked in &answer.about {
         document.line(format!("about {}: {}", asked.name, asked.verdict.word()));
+    }
+    if report.knowledge.is_empty() {
+        let partial = answer.partial.iter();
+        document.items(partial.map(|p| format!("{}: {}", p.name, in_part(p.share, &p.at))));
     }
     document.items(hint(answer));
     let is_open = |asked: &lynkeus_observability::Asked| asked.verdict == Verdict::Undecided;
