@@ -45,7 +45,7 @@ def _sampled(inputs: Mapping[Any, Any], time: str | None) -> dict[Any, Any]:
     """Columns, with the values of functions at their times."""
     if all(_is_column(value) for value in inputs.values()):
         return dict(inputs)
-    header = time or ("t" if "t" in inputs else "time")
+    header = time or ("time" if "time" in inputs and "t" not in inputs else "t")
     if header not in inputs:
         raise InputError(f"inputs: expected the times of the rows under {header!r} beside columns and functions")
     try:

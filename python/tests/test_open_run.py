@@ -73,8 +73,8 @@ def test_without_columns_it_is_what_simulate_says() -> None:
     ("call", "words"),
     [
         (lambda: STUDY.simulate(inputs=3), "inputs: expected a path, a mapping of columns"),
-        (lambda: STUDY.simulate(inputs={"inflow": T}), 'no column "t"'),
-        (lambda: STUDY.simulate(inputs={"inflow": lambda t: t, "y": T}), "inputs: expected the times of the rows under 'time'"),
+        (lambda: STUDY.simulate(inputs={"inflow": T}), 'no time column "t"'),
+        (lambda: STUDY.simulate(inputs={"inflow": lambda t: t, "y": T}), "inputs: expected the times of the rows under 't'"),
         (lambda: STUDY.simulate(inputs={"t": T, "inflow": "time"}), "inputs['inflow']: expected a column, a function"),
         (lambda: STUDY.simulate(inputs={"t": T, "inflow": lambda t: "x"}), "inputs['inflow'](0.0): expected a number, found 'x'"),
         (lambda: STUDY.simulate(inputs={"inflow": lambda t: None}), "inputs['inflow']: expected a function that gives a number"),

@@ -19,6 +19,7 @@ use lynkeus_words::short;
 use crate::course::columns::{Log, held, logged};
 use crate::course::ended::{is_answer, settle};
 use crate::course::fixed_steps::unlocated;
+use crate::course::inputs::refuse_strays;
 use crate::course::replay::{Watch, replay};
 use crate::course::run::{first_readings, told_start};
 use crate::course::{Course, Samples};
@@ -110,6 +111,7 @@ pub fn open_run(
 ) -> Result<OpenRun, Error> {
     let plant = prepare::plant(study)?;
     let prepared = &Prepared::new(study, &plant)?;
+    refuse_strays(prepared)?;
     let log = Log::of_inputs(prepared, table)?;
     let mut notes = log.notes.clone();
     let starts = started(prepared, &log.samples, &mut notes)?;
@@ -317,32 +319,7 @@ fn finished(
     let time_header = headers.time();
     let rows = course.estimates.first().map_or(0, Series::len);
     let columns = std::mem::take(&mut course.estimates);
-    let outputs = plant.states.len() + plant.inputs.len();
-    let mut variables: Vec<Simulated> = vec![];
-    for (place, (variable, values)) in told(plant).zip(columns).enumerate() {
-        let name = &variable.name;
-        let misfit = match place >= outputs {
-            true => readings(prepared, log, name)
-                .map(|readings| misfit(prepared, (name, &values), readings.shortened(rows)))
-                .map(|misfit| {
-                    misfit.under(
-                        headers.free(&format!("{name}_error"), &format!("the error of {name}")),
-                    )
-                }),
-            false => None,
-        };
-        // an output may be a state of the same name
-        match variables.iter_mut().find(|known| known.name == *name) {
-            Some(known) => known.misfit = misfit,
-            None => variables.push(Simulated {
-                name: name.clone(),
-                unit: variable.unit.clone(),
-                description: variable.description.clone(),
-                values,
-                misfit,
-            }),
-        }
-    }
+    let variables = compared(prepared, log, columns, &mut headers);
     let augmented = prepared.augmented();
     let measured = augmented.outputs.iter().zip(&log.samples.readings);
     for (output, _) in measured.filter(|(_, readings)| readings.is_empty()) {
@@ -372,6 +349,42 @@ fn finished(
         warnings: [course.warnings, log.warnings.clone()].concat(),
         notes,
     })
+}
+
+/// What there is of each variable, outputs beside what the log has of them.
+fn compared(
+    prepared: &Prepared<'_>,
+    log: &Log<'_>,
+    columns: Vec<Series>,
+    headers: &mut Headers,
+) -> Vec<Simulated> {
+    let plant = prepared.plant();
+    let outputs = plant.states.len() + plant.inputs.len();
+    let mut variables: Vec<Simulated> = vec![];
+    for (place, (variable, values)) in told(plant).zip(columns).enumerate() {
+        let name = &variable.name;
+        let readings = match place >= outputs {
+            true => readings(prepared, log, name),
+            false => None,
+        };
+        let misfit = readings.map(|readings| {
+            let header = headers.free(&format!("{name}_error"), &format!("the error of {name}"));
+            let readings = readings.shortened(values.len());
+            misfit(prepared, (name, &values), readings, header)
+        });
+        // an output may be a state of the same name
+        match variables.iter_mut().find(|known| known.name == *name) {
+            Some(known) => known.misfit = misfit,
+            None => variables.push(Simulated {
+                name: name.clone(),
+                unit: variable.unit.clone(),
+                description: variable.description.clone(),
+                values,
+                misfit,
+            }),
+        }
+    }
+    variables
 }
 
 /// Why a run is not whole.
@@ -407,7 +420,12 @@ fn readings(prepared: &Prepared<'_>, log: &Log<'_>, name: &str) -> Option<Series
 }
 
 /// The errors of an output.
-fn misfit(prepared: &Prepared<'_>, (name, output): (&str, &Series), readings: Series) -> Misfit {
+fn misfit(
+    prepared: &Prepared<'_>,
+    (name, output): (&str, &Series),
+    readings: Series,
+    error_header: String,
+) -> Misfit {
     let limits = prepared.declared().limits.of(name).copied();
     let is_at_end = |y: f64| limits.is_some_and(|limits| limits.ends(y));
     let missing = readings.iter().filter(|y| !y.is_finite()).count();
@@ -434,17 +452,8 @@ fn misfit(prepared: &Prepared<'_>, (name, output): (&str, &Series), readings: Se
         mean,
         rms: number((squares / count).sqrt()),
         fit: number(100.0 * (1.0 - (squares / spread).sqrt())).filter(|_| spread > 0.0),
-        error_header: String::new(),
+        error_header,
         readings,
         error,
-    }
-}
-
-impl Misfit {
-    fn under(self, error_header: String) -> Self {
-        Self {
-            error_header,
-            ..self
-        }
     }
 }
