@@ -195,8 +195,8 @@ def simulate(
 def simulate(
     study: _Study,
     *,
-    inputs: Any = None,
-    runs: Any = None,
+    inputs: LogLike | Courses | None = None,
+    runs: int | None = None,
     progress: Progress = False,
     time_limit: float | None = None,
     memory_limit: float = MEMORY,
@@ -235,7 +235,8 @@ def simulate(
     LimitError
         A limit ended it before its first row.
     """
-    found: Simulation | MonteCarlo | OpenRun = _study(study).simulate(
+    ask: Any = _study(study).simulate  # which of its kinds of answers it is depends on both
+    found: Simulation | MonteCarlo | OpenRun = ask(
         inputs=inputs, runs=runs, progress=progress, time_limit=time_limit, memory_limit=memory_limit
     )
     return found
