@@ -67,6 +67,11 @@ class SensorsSection(TypedDict, total=False):
     larger. Used by `simulate`, `tune`, the filters, `check --how-well` and `certify` (table: output =
     number, text `"5%"`, or `{ uniform = number }`; default: no noise)"""
 
+    bias: Mapping[str, Number] | None
+    """a constant offset of a sensor that is estimated along, y = h + b or f(u − b): a state `NAME_bias` that
+    starts at 0. The number is its standard deviation there, which the filters take; it wanders where
+    `[process_noise]` has a density for it (table: output or known input = number; default: none)"""
+
     plausible: Mapping[str, Numbers] | None
     """a cell of a log outside of this range is no reading; a note says how many there are (table: output =
     `[lowest, highest]`; default: none)"""

@@ -1,5 +1,6 @@
 //! From a study to its plant and its observer.
 
+mod bias;
 pub mod calibrate;
 pub mod choice;
 pub mod correction;
@@ -40,6 +41,7 @@ pub fn plant(study: &Study) -> Result<Plant, Error> {
         true => calibrate::as_states(study, load(study, Some(BTreeSet::new()))?, true)?,
         false => plant,
     };
+    let plant = bias::added(study, plant)?;
     refuse_strangers(study, &plant)?;
     Ok(plant)
 }
@@ -69,6 +71,7 @@ pub fn symbolic_plant(study: &Study, numbers: BTreeSet<String>) -> Result<Plant,
         true => calibrate::as_states(study, plant, false)?,
         false => plant,
     };
+    let plant = bias::added(study, plant)?;
     refuse_strangers(study, &plant)?;
     Ok(plant)
 }

@@ -119,7 +119,7 @@ pub(super) const SECTIONS: [KeySpec; 11] = [
 const LEVEL: Shape = Shape::Either(&[Shape::NotNegative, Shape::Text, Shape::Section(&[&NOISE])]);
 
 /// `[sensors]`
-pub(super) const SENSORS: [KeySpec; 8] = [
+pub(super) const SENSORS: [KeySpec; 9] = [
     KeySpec {
         name: "limits",
         shape: Shape::As(
@@ -155,6 +155,15 @@ pub(super) const SENSORS: [KeySpec; 8] = [
         ),
         default: "no noise",
         meaning: "white measurement noise: its standard deviation, in the output's unit or as a share of its present value; or uniform noise, every error up to ± the number (in the output's unit) equally likely and none larger. Used by `simulate`, `tune`, the [filters](ekf.md), [`check --how-well`](precision.md) and [`certify`](certificates.md)",
+    },
+    KeySpec {
+        name: "bias",
+        shape: Shape::As(
+            "table: output or known input = number",
+            &Shape::Table(&Shape::Positive),
+        ),
+        default: "none",
+        meaning: "a constant offset of a sensor that is estimated along, y = h + b or f(u − b): a state `NAME_bias` that starts at 0. The number is its standard deviation there, which the [filters](ekf.md) take; it wanders where `[process_noise]` has a density for it",
     },
     KeySpec {
         name: "plausible",

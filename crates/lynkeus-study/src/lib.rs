@@ -52,7 +52,7 @@ pub use fit::{Candidate, Chosen, FitSettings, Objective, Prior};
 pub use generator::Generator;
 pub use observer::ObserverSettings;
 pub use schema::schema;
-pub use sensors::{Noise, Screen, Sensors};
+pub use sensors::{Noise, Screen, Sensors, bias_of};
 pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
 pub use tune::{Scale, Swept, TuneSettings, Values};
@@ -215,6 +215,13 @@ impl Study {
         let mut top = Section::new(&source, "the study", table.into_inner(), &known)?;
         let simulate = top.optional("simulate", simulate::read)?;
         let (show, time_unit) = top.optional("plot", plot)?.unwrap_or_default();
+        let sensors = top.optional("sensors", sensors::read)?.unwrap_or_default();
+        let mut observer = top
+            .optional("observer", observer::read)?
+            .unwrap_or_default();
+        if observer.may_be_a_filter() {
+            sensors.doubt(&mut observer.tuning);
+        }
         Ok(Self {
             file: file.to_owned(),
             plant: top
@@ -226,11 +233,9 @@ impl Study {
                 .map(|name| name.text),
             parameters: top.optional("parameters", parameters)?.unwrap_or_default(),
             tables: top.optional("tables", tables)?.unwrap_or_default(),
-            sensors: top.optional("sensors", sensors::read)?.unwrap_or_default(),
+            sensors,
             process_noise: simulate::pairs(top.take("process_noise"), density)?,
-            observer: top
-                .optional("observer", observer::read)?
-                .unwrap_or_default(),
+            observer,
             narrower: top.optional("box", certify::read_box)?.unwrap_or_default(),
             certify: top.optional("certify", certify::read)?.unwrap_or_default(),
             simulate,

@@ -39,6 +39,11 @@ impl ObserverSettings {
             })
     }
 
+    /// Whether a filter is among them.
+    pub fn may_be_a_filter(&self) -> bool {
+        self.families().any(Family::is_filter)
+    }
+
     /// Whether a family takes all of the keys given.
     fn owns_all(&self, family: &dyn Family) -> bool {
         self.tuning.values.keys().all(|key| family.owns(key))

@@ -1,5 +1,8 @@
 //! `[sensors]`: what is measured, what is unknown, how noisy.
 
+use std::collections::BTreeMap;
+
+use lynkeus_observers::{Tuning, Value};
 use lynkeus_run::Level;
 
 use super::Name;
@@ -20,6 +23,8 @@ pub struct Sensors {
     pub noise: Vec<(Name, Noise)>,
     /// The range that a sensor can show: (output, lowest, highest reading).
     pub limits: Vec<(Name, f64, f64)>,
+    /// Offsets to estimate: outputs and known inputs, with how far off they may be at the start.
+    pub bias: Vec<(Name, f64)>,
     /// Which cells of a log are no readings, by output.
     pub screens: Vec<(Name, Screen)>,
 }
@@ -84,6 +89,7 @@ pub(super) fn read(entry: Entry<'_>) -> Result<Sensors, Error> {
             .into_iter()
             .map(|(name, (low, high))| (name, low, high))
             .collect(),
+        bias: super::simulate::pairs(section.take("bias"), bias)?,
         screens: screens(&mut section)?,
         noise: match section.take("noise") {
             None => Vec::new(),
@@ -94,6 +100,33 @@ pub(super) fn read(entry: Entry<'_>) -> Result<Sensors, Error> {
                 .collect::<Result<_, Error>>()?,
         },
     })
+}
+
+impl Sensors {
+    /// What the filters take the offsets for at the start, beside what the study says of them.
+    pub(super) fn doubt(&self, tuning: &mut Tuning) {
+        for (name, deviation) in &self.bias {
+            let all = tuning.values.entry("initial_variance".to_owned());
+            // something else than a table is refused where it is read
+            if let Value::Table(table) = all.or_insert(Value::Table(BTreeMap::new())) {
+                let own = table.entry(bias_of(&name.text));
+                own.or_insert(Value::Number(deviation * deviation));
+            }
+        }
+    }
+}
+
+/// What the offset of a signal is called as a state: `gyro_bias[2]` that of `gyro[2]`.
+pub fn bias_of(signal: &str) -> String {
+    match signal.split_once('[') {
+        Some((array, element)) => format!("{array}_bias[{element}"),
+        None => format!("{signal}_bias"),
+    }
+}
+
+fn bias(entry: Entry<'_>) -> Result<f64, Error> {
+    let refusal = entry.wrong("a standard deviation > 0, in the unit of the signal");
+    entry.number().ok().filter(|sd| *sd > 0.0).ok_or(refusal)
 }
 
 fn screens(section: &mut Section<'_>) -> Result<Vec<(Name, Screen)>, Error> {

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod backends;
+mod bias;
 mod certify;
 mod compare;
 mod credible;
