@@ -50,6 +50,7 @@ ANSWERS = {
     "CertificateReport": ("Study.certify`", "Certificate"),
     "RunReport": ("Study.simulate` and :meth:`lynkeus.Study.estimate`", "Simulation` or :class:`lynkeus.Estimation"),
     "MonteCarloReport": ("Study.simulate` with ``runs``", "MonteCarlo"),
+    "OpenRunReport": ("Study.simulate` with a log as ``inputs``", "OpenRun"),
     "SweepReport": ("Study.tune`", "Sweep"),
     "FitReport": ("Study.fit`", "Fit"),
     "ComparisonReport": ("Study.compare`", "Comparison"),

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Column = NDArray[np.float64]
 
 #: colours that the colour-blind tell apart (Okabe and Ito), those of the command's pictures
-TRUE, ESTIMATED, SMOOTHED, PLAIN = "#595959", "#0072B2", "#009E73", "#CC79A7"
+TRUE, ESTIMATED, SMOOTHED, PLAIN, MEASURED = "#595959", "#0072B2", "#009E73", "#CC79A7", "#E69F00"
 BAND = 0.18
 #: a panel is cut where its curves span more than so many times what is worth seeing
 TOO_TALL = 4.0
@@ -106,6 +106,25 @@ def _derived(run: Run, name: str, estimates: Mapping[str, str], kind: str) -> Co
         if header.startswith(f"{name}_{kind}"):
             return run[header]
     return None
+
+
+def of_open_run(
+    run: Run, names: Sequence[str] | None, truth: Mapping[str, Column]
+) -> tuple[list[Panel], str]:
+    """Variables of the plant alone, with the readings that count over them."""
+    told, time = captions(run)
+    errors = run.summary["errors"]
+    panels = []
+    for name in names if names is not None else [name for name in told if name in run.columns]:
+        panel = Panel(name, told.get(name, name))
+        if name in truth:
+            panel.curves.append(Curve("true", truth[name], {"color": TRUE, "linestyle": "--", "zorder": 3}))
+        if name in errors:
+            readings = run[name] + run[errors[name]["column"]]
+            panel.curves.append(Curve("measured", readings, {"color": MEASURED, "linestyle": "none", "marker": "."}))
+        panel.curves.append(Curve("plant alone", run[name], {"color": ESTIMATED}))
+        panels.append(panel)
+    return panels, time
 
 
 def of_many(run: Run, names: Sequence[str] | None) -> tuple[list[Panel], str]:

@@ -103,6 +103,14 @@ def expressions(roots: Sequence[Value | float], taken: Iterable[str]) -> tuple[l
     return texts, auxiliaries
 
 
+def whole(root: Value) -> str:
+    """An expression as one text, in which what it shares is repeated."""
+    pieces: dict[int, _Piece] = {}
+    for value in sorted(_uses([root]), key=lambda value: value.place):
+        pieces[value.place] = _printed(value, [pieces[a.place] for a in value.arguments])
+    return pieces[root.place].text
+
+
 def shown(value: Value) -> str:
     """An expression for messages: short."""
     texts, auxiliaries = expressions([value], ())

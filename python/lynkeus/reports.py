@@ -53,6 +53,7 @@ __all__ = [
     "InnovationCounts",
     "Knowledge",
     "Known",
+    "Misfit",
     "Monitor",
     "MonteCarloEntries",
     "MonteCarloReport",
@@ -60,6 +61,8 @@ __all__ = [
     "Next",
     "NextExperiment",
     "OneToOne",
+    "OpenRunEntries",
+    "OpenRunReport",
     "Outside",
     "OutsideBox",
     "Peak",
@@ -888,6 +891,56 @@ class MonteCarloEntries:
 class MonteCarloReport(MonteCarloEntries, Record):
     """The summary of a :class:`lynkeus.MonteCarlo`."""
 
+    notes: list[str]
+    """what you should know"""
+
+
+class Misfit(Record):
+    """An output of the plant alone beside what a log has of it."""
+
+    unit: str | None
+    """its unit"""
+    column: str
+    """header of the column with reading − output"""
+    readings: int
+    """rows that count"""
+    missing: int
+    """rows without a reading"""
+    at_ends: int
+    """readings at an end of their sensor's range, which do not count"""
+    rms: float | None
+    """root mean square error, in its unit"""
+    mean: float | None
+    """mean error, in its unit"""
+    fit_percent: float | None
+    """100 (1 − ‖y − ŷ‖/‖y − mean of y‖), in percent; 100 is perfect, 0 no better than the mean of the
+    readings"""
+
+
+class OpenRunEntries:
+    """What :meth:`lynkeus.Study.simulate` with a log as ``inputs`` answers."""
+
+    plant: str
+    """the name of the model"""
+    log: str
+    """the log whose inputs drive it"""
+    rows: int
+    """number of rows"""
+    start: Named[float]
+    """where each state starts"""
+    errors: Named[Misfit]
+    """errors of each output that the log has readings of"""
+    ended: Ended | None
+    """why it ended before its last row, where it did"""
+    warnings: list[str]
+    """what of the log contradicts itself, or counts nowhere"""
+
+
+class OpenRunReport(OpenRunEntries, Record):
+    """The summary of a :class:`lynkeus.OpenRun`."""
+
+    columns: list[str]
+    """headers of the columns"""
     notes: list[str]
     """what you should know"""
 

@@ -416,6 +416,19 @@ class Simulation(reports.RunEntries, Run):
         return dict(self._core.log())
 
 
+class OpenRun(reports.OpenRunEntries, Run):
+    """The plant alone under the inputs of a log: states, inputs and outputs, and what of the log's readings they
+    miss. ``run.errors["y"].fit_percent`` says how much of the readings of y the plant alone explains."""
+
+    @cached_property
+    def summary(self) -> reports.OpenRunReport:
+        """The answer for programs, as the command\'s ``--json`` prints it."""
+        return self._made(reports.OpenRunReport)
+
+    def _panels(self, names: Sequence[str] | None, truth: dict[str, Column]) -> tuple[list[_plot.Panel], str]:
+        return _plot.of_open_run(self, names, truth)
+
+
 class Estimation(reports.RunEntries, Run):
     """A log through the observer."""
 

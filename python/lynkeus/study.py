@@ -13,6 +13,7 @@ from ._arguments import real, takes, whole, word, words
 from ._base import FILE, Base, plant_of, spelled, spoken
 from ._batched import Batched
 from ._export import EXPORT, Export, write
+from ._inputs import Courses, driven
 from ._logs import given, given_each
 from ._lynkeus import MEMORY
 from ._progress import Progress, Terms, told
@@ -31,6 +32,7 @@ from .results import (
     Fit,
     HowWell,
     MonteCarlo,
+    OpenRun,
     Simulation,
     Sweep,
     judged,
@@ -399,6 +401,7 @@ class Study(Batched):
     def simulate(
         self,
         *,
+        inputs: Courses | None = ...,
         runs: None = ...,
         progress: Progress = ...,
         time_limit: float | None = ...,
@@ -408,24 +411,41 @@ class Study(Batched):
     def simulate(
         self,
         *,
+        inputs: Courses | None = ...,
         runs: int,
         progress: Progress = ...,
         time_limit: float | None = ...,
         memory_limit: float = ...,
     ) -> MonteCarlo: ...
+    @overload
+    def simulate(
+        self,
+        *,
+        inputs: LogLike,
+        runs: None = ...,
+        progress: Progress = ...,
+        time_limit: float | None = ...,
+        memory_limit: float = ...,
+    ) -> OpenRun: ...
     @takes(runs=optional(whole), progress=told_of, **LIMITS)
     def simulate(
         self,
         *,
+        inputs: LogLike | Courses | None = None,
         runs: int | None = None,
         progress: Progress = False,
         time_limit: float | None = None,
         memory_limit: float = MEMORY,
-    ) -> Simulation | MonteCarlo:
-        """The plant with its observer, once or many times.
+    ) -> Simulation | MonteCarlo | OpenRun:
+        """The plant with its observer, once or many times; or the plant alone on a log.
 
         Parameters
         ----------
+        inputs : log, or mapping of str to array, function, float or str, optional
+            What drives the plant. A log (a path, a mapping of columns, a data frame) drives the plant alone, row by row,
+            without observer and noise; in a mapping with times under ``"t"`` a column may be a function of time or a
+            number as well. Without columns, numbers, expressions of time in Modelica and functions of time that can be
+            traced (``lambda t: lynkeus.sin(t)``) stand for those of ``[simulate]``.
         runs : int, optional
             So many runs with other noise and starts, at least 1.
         progress : bool or function
@@ -437,13 +457,13 @@ class Study(Batched):
 
         Returns
         -------
-        Simulation or MonteCarlo
-            A run, with ``runs`` what they have in common.
+        Simulation, MonteCarlo or OpenRun
+            A run, with ``runs`` what they have in common, on a log the plant alone with its errors.
 
         Raises
         ------
         InputError
-            The study cannot be run.
+            The study cannot be run, or an input has no value.
         RefusedError
             A condition is refuted, or the estimate diverges.
         LimitError
@@ -451,10 +471,29 @@ class Study(Batched):
         """
         if runs is not None and runs < 1:
             raise InputError(f"runs: expected at least 1, found {runs}")
+        core = self._core
+        if inputs is not None:
+            sections = core.sections()
+            found = driven(
+                inputs, sections.get("log", {}).get("time") or sections.get("estimate", {}).get("time")
+            )
+            if not isinstance(found, dict):
+                return self._open_run(found, runs, progress, Terms(time_limit, memory_limit))
+            known = sections.get("simulate", {}).get("inputs", {})
+            core = self.replace(simulate={"inputs": {**known, **found}})._core
         with told(progress, "simulating") as tell:
             if runs is None:
-                return judged(Simulation(self._core.simulate(Terms(time_limit, memory_limit, tell))))
-            return judged(MonteCarlo(self._core.monte_carlo(runs, Terms(time_limit, memory_limit, tell))))
+                return judged(Simulation(core.simulate(Terms(time_limit, memory_limit, tell))))
+            return judged(MonteCarlo(core.monte_carlo(runs, Terms(time_limit, memory_limit, tell))))
+
+    def _open_run(
+        self, log: _lynkeus.Log | str, runs: int | None, progress: Progress, terms: Terms
+    ) -> OpenRun:
+        """The plant alone on a log."""
+        if runs is not None:
+            raise InputError("runs: the plant alone has no noise on a log, and all its runs are the same")
+        with told(progress, "simulating") as tell:
+            return judged(OpenRun(self._core.open_run(log, terms._replace(progress=tell))))
 
     @takes(record=flag, progress=told_of, **LIMITS)
     def estimate(

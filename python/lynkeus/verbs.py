@@ -6,13 +6,15 @@ What they take beside the study, what they give and what they raise is that of :
 from __future__ import annotations
 
 import os
-from typing import Literal, TypeAlias, overload
+from typing import Any, Literal, TypeAlias, overload
 
+from ._inputs import Courses
 from ._lynkeus import MEMORY
 from ._progress import Progress
 from ._types import ListOf, LogLike, Names
 from .errors import ArgumentError
-from .results import Certificate, Check, Comparison, Design, Estimation, Fit, HowWell, MonteCarlo, Simulation, Sweep
+from .results import Certificate, Check, Comparison, Design, Estimation, Fit, HowWell, MonteCarlo, OpenRun
+from .results import Simulation, Sweep
 from .study import Study
 
 _Study: TypeAlias = Study | str | os.PathLike[str]
@@ -164,6 +166,7 @@ def how_well(
 def simulate(
     study: _Study,
     *,
+    inputs: Courses | None = ...,
     runs: None = ...,
     progress: Progress = ...,
     time_limit: float | None = ...,
@@ -173,25 +176,42 @@ def simulate(
 def simulate(
     study: _Study,
     *,
+    inputs: Courses | None = ...,
     runs: int,
     progress: Progress = ...,
     time_limit: float | None = ...,
     memory_limit: float = ...,
 ) -> MonteCarlo: ...
+@overload
 def simulate(
     study: _Study,
     *,
+    inputs: LogLike,
+    runs: None = ...,
+    progress: Progress = ...,
+    time_limit: float | None = ...,
+    memory_limit: float = ...,
+) -> OpenRun: ...
+def simulate(
+    study: _Study,
+    *,
+    inputs: LogLike | Courses | None = None,
     runs: int | None = None,
     progress: Progress = False,
     time_limit: float | None = None,
     memory_limit: float = MEMORY,
-) -> Simulation | MonteCarlo:
-    """The plant with its observer, once or many times.
+) -> Simulation | MonteCarlo | OpenRun:
+    """The plant with its observer, once or many times; or the plant alone on a log.
 
     Parameters
     ----------
     study : Study or path
         The study, or its file.
+    inputs : log, or mapping of str to array, function, float or str, optional
+        What drives the plant. A log (a path, a mapping of columns, a data frame) drives the plant alone, row by row,
+        without observer and noise; in a mapping with times under ``"t"`` a column may be a function of time or a
+        number as well. Without columns, numbers, expressions of time in Modelica and functions of time that can be
+        traced (``lambda t: lynkeus.sin(t)``) stand for those of ``[simulate]``.
     runs : int, optional
         So many runs with other noise and starts, at least 1.
     progress : bool or function
@@ -203,22 +223,23 @@ def simulate(
 
     Returns
     -------
-    Simulation or MonteCarlo
-        A run, with ``runs`` what they have in common.
+    Simulation, MonteCarlo or OpenRun
+        A run, with ``runs`` what they have in common, on a log the plant alone with its errors.
 
     Raises
     ------
     InputError
-        The study cannot be run.
+        The study cannot be run, or an input has no value.
     RefusedError
         A condition is refuted, or the estimate diverges.
     LimitError
         A limit ended it before its first row.
     """
-    asked = _study(study)
-    if runs is None:
-        return asked.simulate(progress=progress, time_limit=time_limit, memory_limit=memory_limit)
-    return asked.simulate(runs=runs, progress=progress, time_limit=time_limit, memory_limit=memory_limit)
+    ask: Any = _study(study).simulate  # which of its kinds of answers it is depends on both
+    found: Simulation | MonteCarlo | OpenRun = ask(
+        inputs=inputs, runs=runs, progress=progress, time_limit=time_limit, memory_limit=memory_limit
+    )
+    return found
 
 
 def estimate(

@@ -60,7 +60,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Study.design": (STUDY.design, LIMITS),
     "Study.certify": (STUDY.certify, LIMITS),
     "Study.how_well": (STUDY.how_well, {"horizon": None, "sensors": None, **LIMITS}),
-    "Study.simulate": (STUDY.simulate, {"runs": None, "progress": False, **LIMITS}),
+    "Study.simulate": (STUDY.simulate, {"inputs": None, "runs": None, "progress": False, **LIMITS}),
     "Study.estimate": (STUDY.estimate, {"log": log(), "record": False, "progress": False, **LIMITS}),
     "Study.estimate_each": (STUDY.estimate_each, {"logs": [log()], "by": None, **BATCH}),
     "Study.sweep": (STUDY.sweep, {"changes": [{}], "log": None, **BATCH}),

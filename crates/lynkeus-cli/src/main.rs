@@ -72,6 +72,7 @@ Examples:
   lynkeus certify study.toml
   lynkeus simulate study.toml -o run.csv --plot run.svg
   lynkeus simulate study.toml --runs 1000 --plot spread.svg
+  lynkeus simulate study.toml --inputs log.csv --plot open.svg
   lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
   lynkeus fit study.toml log.csv --write
   lynkeus tune study.toml --plot tune.svg
@@ -136,7 +137,7 @@ enum Command {
         #[command(flatten)]
         limits: Limits,
     },
-    /// Run the plant and its observer together, with noise; many times with --runs
+    /// Run the plant and its observer together, with noise; many times with --runs; the plant alone on a log's inputs with --inputs
     Simulate {
         /// The study (TOML; "-": standard input)
         study: PathBuf,
@@ -148,6 +149,9 @@ enum Command {
         /// Also write what a logger would have seen (t, measured outputs, inputs), ready for `estimate`
         #[arg(long, value_name = "FILE.csv")]
         log: Option<PathBuf>,
+        /// The plant alone instead, without observer and noise: from row to row of this log under its inputs, with the errors of its outputs beside the log's readings
+        #[arg(long, value_name = "LOG", conflicts_with_all = ["log", "runs", "seed"])]
+        inputs: Option<PathBuf>,
         /// Run it N times with the seeds S, S+1, … (S: the study's, or --seed), on all processors: means, quantiles and the worst. Run k is what --seed S+k gives alone (fixed steps: but for the rounding of exp, sin and the like); `spread` of [simulate] moves starts and parameters
         #[arg(long, value_name = "N", conflicts_with = "log", value_parser = runs)]
         runs: Option<usize>,
@@ -293,6 +297,7 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             output,
             seed,
             log,
+            inputs,
             runs,
             limits,
         } => {
@@ -300,9 +305,10 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             if let (Some(seed), Some(settings)) = (seed, &mut source.study.simulate) {
                 settings.seed = seed;
             }
-            match runs {
-                Some(runs) => monte_carlo::monte_carlo(&source, &output, runs),
-                None => run::simulate(&source, &output, log.as_deref()),
+            match (runs, inputs) {
+                (Some(runs), _) => monte_carlo::monte_carlo(&source, &output, runs),
+                (None, Some(inputs)) => run::open_run(&source, &inputs, &output),
+                (None, None) => run::simulate(&source, &output, log.as_deref()),
             }
         }
         Command::Estimate {

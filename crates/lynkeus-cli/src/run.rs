@@ -82,6 +82,19 @@ pub(super) fn simulate(
     Ok(limits::code(&source.study, code))
 }
 
+pub(super) fn open_run(source: &Source, log: &Path, output: &Output) -> Result<ExitCode, Error> {
+    let files = source.files().reads("the log", Some(log));
+    files.asked(output).check()?;
+    let study = &source.study;
+    let table = inputs::log(study, log)?;
+    let mut progress = Progress::new("simulating", output.quiet);
+    let run = lynkeus::open_run(study, &table, &mut progress.watch())?;
+    progress.finish();
+    drop(table);
+    let code = Results::default().tell(&run, output)?;
+    Ok(limits::code(study, code))
+}
+
 pub(super) fn estimate(
     source: &Source,
     log: &Path,

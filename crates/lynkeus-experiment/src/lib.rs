@@ -48,6 +48,9 @@ pub mod figure;
 
 pub mod monte_carlo;
 
+// the plant alone, driven by a log
+mod open_run;
+
 // the same study again and again
 mod choose;
 
@@ -68,6 +71,7 @@ pub use judge::interval::{Intervals, Sampled};
 pub use judge::outcome::{Outcome, Watch};
 pub use judge::outside::{Excursion, Outside};
 pub use monte_carlo::monte_carlo;
+pub use open_run::{Misfit, OpenRun, Simulated, open_run};
 pub use prepare::choice::{Choice, Grounds, Proposal, Speed};
 pub use prepare::correction::{Correction, GainEntry, InjectionEntry};
 pub use prepare::declared::Account;
@@ -81,7 +85,7 @@ pub use words::explain;
 #[cfg(feature = "schema")]
 pub use {
     compare::ComparisonReport, judge::outcome::RunReport, monte_carlo::MonteCarloReport,
-    tune::SweepReport,
+    open_run::OpenRunReport, tune::SweepReport,
 };
 
 use lynkeus_answer::{Error, ErrorKind, near, visible};

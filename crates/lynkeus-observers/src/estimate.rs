@@ -21,7 +21,9 @@ use lynkeus_structure::{AugmentedPlant, Measurement, Region};
 
 use crate::conditions::Partial;
 use crate::tuning::is_or_has;
-use crate::{Estimate, KeySpec, Observer, Reason, Shape, Signal, Tunable, Tuning, TuningError};
+use crate::{
+    Estimate, Initial, KeySpec, Observer, Reason, Shape, Signal, Tunable, Tuning, TuningError,
+};
 
 impl Tuning {
     /// The same where the keys of every observer can be used.
@@ -88,28 +90,10 @@ impl<'e, 'p> PlantCopy<'e, 'p> {
         self.augmented.graph().substitute(expressions, &seen)
     }
 
-    /// x̂ with its starts: the named value, else the default, else the plant's
-    /// `start`, else the middle of its range, else 0.
+    /// x̂ with its starts.
     pub fn states(&self) -> Result<Vec<(Signal, f64)>, TuningError> {
-        let initial = &self.common.initial;
-        if let Some(name) = initial
-            .values
-            .keys()
-            .find(|n| !self.hats.iter().any(|hat| is_or_has(n, &hat.name)))
-        {
-            return Err(no_such_estimate(self.augmented, "initial", name));
-        }
-        let start = |variable: &Variable| {
-            initial
-                .of(&variable.name)
-                .or(initial.default)
-                .or(variable.start)
-                .unwrap_or_else(|| middle(variable))
-        };
-        let states = self.hats.iter().zip(&self.augmented.states);
-        Ok(states
-            .map(|(hat, variable)| (hat.clone(), start(variable)))
-            .collect())
+        let starts = starts(self.augmented, &self.common.initial)?;
+        Ok(self.hats.iter().cloned().zip(starts).collect())
     }
 
     /// The estimates where the observer's first states are x̂ itself.
@@ -122,6 +106,27 @@ impl<'e, 'p> PlantCopy<'e, 'p> {
         };
         pairs.map(estimate).collect()
     }
+}
+
+/// Where states and unknown inputs start: at the named value, else the default, else the plant's `start`, else the
+/// middle of the range, else 0.
+///
+/// # Errors
+/// A name that is none of theirs.
+pub fn starts(augmented: &AugmentedPlant<'_>, initial: &Initial) -> Result<Vec<f64>, TuningError> {
+    let states = &augmented.states;
+    let mut names = initial.values.keys();
+    if let Some(name) = names.find(|n| !states.iter().any(|state| is_or_has(n, &state.name))) {
+        return Err(no_such_estimate(augmented, "initial", name));
+    }
+    let start = |variable: &Variable| {
+        initial
+            .of(&variable.name)
+            .or(initial.default)
+            .or(variable.start)
+            .unwrap_or_else(|| middle(variable))
+    };
+    Ok(states.iter().map(start).collect())
 }
 
 /// The error that a key names what is not estimated.

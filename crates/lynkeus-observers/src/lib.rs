@@ -37,6 +37,7 @@ pub use certificate::{Assumptions, Bounds, Certificate, Constant, UltimateBound}
 pub use design::{
     ChainGain, Design, DesignError, Examination, Family, ParameterValue, Shown, fit_word,
 };
+pub use estimate::starts;
 pub use generator::{Generator, GeneratorError};
 pub use guarantee::{Claim, Correction, Inequality, Injection, certify, is_certified_gain};
 pub use lynkeus_gain::integrators::Pole;

@@ -172,6 +172,15 @@ impl Study {
         Ok(Answer::of(outcome))
     }
 
+    #[pyo3(signature = (log, terms=None))]
+    fn open_run(&self, py: Python<'_>, log: Given, terms: Option<Terms<'_>>) -> PyResult<Answer> {
+        let terms = terms.unwrap_or_default();
+        let run = self.ask(py, &terms, |study, watch| {
+            lynkeus::open_run(study, &*log.table(study)?, watch)
+        })?;
+        Ok(Answer::of(run))
+    }
+
     #[pyo3(signature = (runs, terms=None))]
     fn monte_carlo(
         &self,

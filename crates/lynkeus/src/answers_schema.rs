@@ -3,7 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use lynkeus_experiment::{ComparisonReport, MonteCarloReport, RunReport, SweepReport};
+use lynkeus_experiment::{
+    ComparisonReport, MonteCarloReport, OpenRunReport, RunReport, SweepReport,
+};
 use schemars::generate::SchemaSettings;
 use serde_json::json;
 
@@ -25,6 +27,7 @@ fn the_schema_of_answers_is_the_committed_one() {
         generator.subschema_for::<CertificateReport<'static>>(),
         generator.subschema_for::<RunReport<'static>>(),
         generator.subschema_for::<MonteCarloReport<'static>>(),
+        generator.subschema_for::<OpenRunReport<'static>>(),
         generator.subschema_for::<SweepReport<'static>>(),
         generator.subschema_for::<FitReport<'static>>(),
         generator.subschema_for::<ComparisonReport<'static>>(),

@@ -38,6 +38,7 @@ mod next_experiment;
 #[path = "../../../lynkeus/tests/normal/mod.rs"]
 mod normal;
 mod observability;
+mod open_run;
 mod outside;
 mod parquet_logs;
 mod random;

@@ -99,7 +99,7 @@ impl<'t> Log<'t> {
     /// Columns that the study names or its observers read and the log does not have, or not as
     /// numbers; times that are no order.
     pub fn read(prepared: &Prepared<'_>, table: &'t Table) -> Result<Self, Error> {
-        Self::with(prepared, table, false)
+        Self::with(prepared, table, Lack::Nothing)
     }
 
     /// One of several, in which a sensor may not have reported at all.
@@ -107,17 +107,25 @@ impl<'t> Log<'t> {
     /// # Errors
     /// As [`Log::read`].
     pub fn one_of(prepared: &Prepared<'_>, table: &'t Table) -> Result<Self, Error> {
-        Self::with(prepared, table, true)
+        Self::with(prepared, table, Lack::Readings)
     }
 
-    fn with(prepared: &Prepared<'_>, table: &'t Table, may_lack: bool) -> Result<Self, Error> {
+    /// One for the plant alone, which may have no column of a sensor: its samples are then empty.
+    ///
+    /// # Errors
+    /// As [`Log::read`].
+    pub(crate) fn of_inputs(prepared: &Prepared<'_>, table: &'t Table) -> Result<Self, Error> {
+        Self::with(prepared, table, Lack::Columns)
+    }
+
+    fn with(prepared: &Prepared<'_>, table: &'t Table, may_lack: Lack) -> Result<Self, Error> {
         let (study, plant) = (prepared.study(), prepared.plant());
         let settings = &study.estimate;
         let augmented = prepared.augmented();
         let mut absent = vec![];
         let is_needed = |name: &Name| {
             let is_made = settings.generator.iter().any(|(made, _)| made == name);
-            !is_made && read(augmented).any(|read| read == name.text)
+            may_lack != Lack::Columns && !is_made && read(augmented).any(|read| read == name.text)
         };
         let table = with_expressions(table, settings, is_needed, &mut absent)?;
         let time = time_of(&table, plant, settings, read(augmented))?;
@@ -153,6 +161,16 @@ impl<'t> Log<'t> {
             warnings,
         })
     }
+}
+
+/// What of its sensors a log may lack.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Lack {
+    Nothing,
+    /// all readings in a column
+    Readings,
+    /// the column
+    Columns,
 }
 
 /// What of a column that is read counts nowhere, in words.
@@ -204,10 +222,17 @@ fn samples(
     time_header: &str,
     settings: &EstimateSettings,
     augmented: &AugmentedPlant<'_>,
-    may_lack: bool,
+    may_lack: Lack,
 ) -> Result<Samples, Error> {
-    let is_empty = |name: &str| may_lack && table.missing(header(settings, name)) == table.rows();
+    let is_empty = |name: &str| {
+        may_lack != Lack::Nothing && table.missing(header(settings, name)) == table.rows()
+    };
+    let is_absent = |name: &str| {
+        let own = header(settings, name);
+        may_lack == Lack::Columns && !table.names().any(|known| known == own)
+    };
     let reading = |name: &str| match settings.strict {
+        _ if is_absent(name) => Ok(Series::default()),
         true => table.column(header(settings, name)).cloned(),
         false if is_empty(name) => table.cells(header(settings, name)).cloned(),
         false => table.readings(header(settings, name)).cloned(),

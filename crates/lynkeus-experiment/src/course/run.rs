@@ -55,22 +55,32 @@ pub fn at_readings(prepared: &Prepared<'_>) -> Vec<AtReading> {
 
 /// Lets them start at the first readings of a log.
 pub fn start_at_readings(prepared: &Prepared<'_>, samples: &Samples, design: &mut StudyDesign) {
-    for at in at_readings(prepared) {
-        let readings = samples.readings.get(at.sensor);
-        let Some(y) = readings.and_then(|r| r.iter().find(|y| y.is_finite())) else {
-            continue;
-        };
-        let start = (y - at.offset) / at.slope;
-        let own = design.observer.states.get_mut(at.state);
-        if let (true, Some(own)) = (start.is_finite(), own) {
+    for (state, start) in first_readings(prepared, samples) {
+        if let Some(own) = design.observer.states.get_mut(state) {
             own.1 = start;
-            design.notes.push(format!(
-                "{} starts at its first reading, {}: neither `initial` nor the model's `start` says where",
-                prepared.augmented().states[at.state].name,
-                lynkeus_words::short(start)
-            ));
+            design.notes.push(told_start(prepared, state, start));
         }
     }
+}
+
+/// The places of these states, each with where the first reading of a log puts it.
+pub(crate) fn first_readings(prepared: &Prepared<'_>, samples: &Samples) -> Vec<(usize, f64)> {
+    let of = |at: AtReading| {
+        let readings = samples.readings.get(at.sensor)?;
+        let y = readings.iter().find(|y| y.is_finite())?;
+        let start = (y - at.offset) / at.slope;
+        start.is_finite().then_some((at.state, start))
+    };
+    at_readings(prepared).into_iter().filter_map(of).collect()
+}
+
+/// What is to be said of it.
+pub(crate) fn told_start(prepared: &Prepared<'_>, state: usize, start: f64) -> String {
+    format!(
+        "{} starts at its first reading, {}: neither `initial` nor the model's `start` says where",
+        prepared.augmented().states[state].name,
+        lynkeus_words::short(start)
+    )
 }
 
 /// The observer's run over samples: a filter takes readings when they are there; an observer

@@ -551,7 +551,7 @@ fn alarms(watches: &[Watch]) -> Vec<String> {
 }
 
 /// That a limit ended a run, in words.
-fn not_whole(spent: Spent, error: &RunError) -> String {
+pub(crate) fn not_whole(spent: Spent, error: &RunError) -> String {
     match error {
         RunError::Cancelled { time } => format!("the run is not whole: {spent} at t = {time}"),
         _ => format!("the run is not whole: {spent}"),
