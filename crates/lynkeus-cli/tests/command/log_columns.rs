@@ -176,6 +176,7 @@ fn commands_agree_on_a_log_with_expressions() {
     for command in [
         &["tune", "study.toml", "--log", "log.csv", "--json"][..],
         &["compare", "study.toml", "log.csv", "--json"],
+        &["simulate", "study.toml", "--inputs", "log.csv", "--json"],
         &["fit", "study.toml", "log.csv", "--json"],
         &["report", "study.toml", "log.csv", "-o", "page.html"],
     ] {
@@ -202,7 +203,7 @@ fn commands_agree_on_a_log_with_expressions() {
         let expected = of("", long(plain(), 1.0));
         assert!(expected.code < 2, "{command:?}: {}", expected.err);
         assert_eq!(found.code, expected.code, "{command:?}: {}", found.err);
-        for (name, key) in [("tune", "rows"), ("fit", "nll")] {
+        for (name, key) in [("tune", "rows"), ("fit", "nll"), ("simulate", "errors")] {
             if command.contains(&name) {
                 let [found, expected] = [found.json(), expected.json()];
                 assert!(!expected[key].is_null(), "{expected}");
