@@ -55,7 +55,7 @@ class Signals:
 
 def _time(study: dict[str, Any], read: list[str]) -> str:
     """The header of the log's time column."""
-    named = study.get("estimate", {}).get("time")
+    named = study.get("log", {}).get("time") or study.get("estimate", {}).get("time")
     return str(named or ("time" if "t" in read else "t"))
 
 
@@ -63,7 +63,7 @@ class Replay:
     """An asset's rows through the observer."""
 
     def __init__(self, study: Study, signals: Signals) -> None:
-        self.study = study.replace(estimate={"time": signals.time})
+        self.study = study.replace(log={"time": signals.time}, estimate={"time": None})
         self.signals = signals
 
     def asset(self, table: Any) -> Any:

@@ -83,7 +83,7 @@ def sweep(study: _lynkeus.Study, changes: Iterable[Mapping[str, Any]], log: Any,
                 f"change {place}: expected a dictionary as of replace, {{\"observer\": {{\"theta\": 2.0}}}}, "
                 f"found {type(change).__name__}"
             )
-    recorded = None if log is None else log_of(log)
+    recorded = None if log is None else log_of(log, study=study)
     base = Base(study)
 
     def run(change: Mapping[str, Any], tell: Tell) -> Run:

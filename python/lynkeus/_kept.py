@@ -91,7 +91,7 @@ class Kept:
     def corrections(self) -> tuple[list[str], list[str], list[tuple[str, Column]]] | None:
         return self.corrected
 
-    def origin(self) -> tuple[int, bool] | None:
+    def origin(self) -> tuple[int, bool, float] | None:
         return self.zero
 
     def refusal(self) -> LynkeusError | None:

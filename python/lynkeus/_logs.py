@@ -18,14 +18,16 @@ from .errors import ArgumentError, InputError
 _Named = Iterable[tuple[Any, Any]]
 
 
-def log_of(data: Any, what: str = "the log") -> _lynkeus.Log:
+def log_of(data: Any, what: str = "the log", study: _lynkeus.Study | None = None) -> _lynkeus.Log:
     """The log in a file (CSV, Parquet), a mapping of columns, a data frame of pandas or polars, a
     table of Arrow or whatever else has ``__arrow_c_stream__``, a structured array, or the result of
-    a simulation; ``what`` is what messages call it. A column that cannot be read is refused where the study asks for it, not before."""
+    a simulation; ``what`` is what messages call it, ``study`` says how a file
+    is written. A column that cannot be read is refused where the study asks for it, not before."""
     if isinstance(data, _lynkeus.Log):
         return data
     if isinstance(data, (str, os.PathLike)):
-        return _lynkeus.Log.load(os.fspath(data))
+        path = os.fspath(data)
+        return _lynkeus.Log.load(path) if study is None else study.log(path)
     data = collected(data)
     if isinstance(data, Mapping):
         return _gathered(_items(data))
@@ -119,11 +121,15 @@ def frame(data: Any, what: str = "the log") -> Iterator[tuple[Any, Any]]:
 
 
 def _unnamed_times(data: Any) -> str | None:
-    """The header of an index of instants without a name, which is the time of the rows."""
+    """The header of an index of instants without a name, which is the time of the rows; so is one of numbers or
+    durations, where there is no other time. Whole numbers count rows."""
     kind = getattr(data.index, "inferred_type", "")
-    if data.index.nlevels > 1 or data.index.name is not None or not kind.startswith("datetime"):
+    if data.index.nlevels > 1 or data.index.name is not None:
         return None
-    return next((name for name in ("t", "time") if name not in data.columns), None)
+    free = [name for name in ("t", "time") if name not in data.columns]
+    if kind.startswith("datetime"):
+        return next(iter(free), None)
+    return "t" if kind in ("floating", "timedelta", "timedelta64") and len(free) == 2 else None
 
 
 def _names(data: Any) -> list[str] | None:

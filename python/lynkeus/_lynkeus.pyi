@@ -37,7 +37,7 @@ class Answer:
         """Names of sensors and states, and by name the entries of what a filter's corrections are made of, row after
         row."""
 
-    def origin(self) -> tuple[int, bool] | None:
+    def origin(self) -> tuple[int, bool, float] | None:
         """What stands for zero where times are dates: nanoseconds since 1970, and whether that is UTC."""
 
     def refusal(self) -> LynkeusError | None: ...
@@ -202,6 +202,9 @@ class Study:
     @property
     def text(self) -> str: ...
     def html(self) -> str: ...
+    def log(self, path: str | os.PathLike[str]) -> Log:
+        """A log in a file that is written as the study says, all of its columns."""
+
     def sections(self) -> dict[str, Any]:
         """The text as dictionaries."""
 

@@ -128,7 +128,7 @@ def sweep(
     data = needed("ray.data", "lynkeus.ray")
     asked = [section(f"changes[{place}]", change) for place, change in enumerate(changes)]
     items = [{"place": place, "change": pickle.dumps(dict(change))} for place, change in enumerate(asked)]
-    columns = None if log is None else columns_of(log_of(log))
+    columns = None if log is None else columns_of(log_of(log, study=study._core))
     work = _Work(study, "place", _changed, keep, errors, columns)
     return _mapped(data, items, work, blocks, options)
 

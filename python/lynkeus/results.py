@@ -321,7 +321,8 @@ class Run(Table):
     @cached_property
     def time(self) -> NDArray[np.datetime64] | None:
         """The times of the rows as dates, ``datetime64[us]`` of shape (rows,), in UTC where the log's had a zone;
-        ``None`` where the log's times are numbers. :attr:`t` counts seconds since the log's first date."""
+        ``None`` where the log's times are numbers. :attr:`t` counts from the log's first date, in seconds or in ``time_unit`` of
+        ``[log]``."""
         dates = self._instants()
         return None if dates is None else dates[0]
 
@@ -329,11 +330,11 @@ class Run(Table):
         origin = self._core.origin()
         if origin is None:
             return None
-        nanoseconds, zoned = origin
+        nanoseconds, zoned, unit = origin
         # a date that is exact to the microsecond comes back exactly: what is nearest to it in seconds is nearer to it
         # than to its neighbours
         whole, rest = divmod(nanoseconds, 1000)
-        since = np.rint(self.t * 1e6 + rest / 1000).astype(np.int64)
+        since = np.rint(self.t * unit * 1e6 + rest / 1000).astype(np.int64)
         found = (whole + since).astype("datetime64[us]")
         found.flags.writeable = False
         return found, zoned

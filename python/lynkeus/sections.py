@@ -358,6 +358,38 @@ class SimulateSection(TypedDict, total=False):
     """steps of `rk4` from one row to the next, where `step` is not given (whole number ≥ 1; default: 16)"""
 
 
+class LogSection(TypedDict, total=False):
+    """what the columns of a log are (table; default: none)"""
+
+    time: str | None
+    """the log's time column (text: a header, or an expression of headers; default: `"t"`; `"time"` where the
+    log has an output or an input called `t`)"""
+
+    columns: Mapping[str, str] | None
+    """where the log names a signal differently, or has it in another unit: `T = "(T_F - 32)/1.8"` (table:
+    name = header, or expression of headers; default: the plant's names)"""
+
+    time_unit: str | None
+    """the plant's unit of time, into which dates and durations are converted (a year has 365.25 days); it is
+    also that of `[plot]` (`"ns"`, `"us"`, `"ms"`, `"s"`, `"min"`, `"h"`, `"d"`, `"week"`, `"year"`;
+    default: seconds)"""
+
+    time_format: str | None
+    """what the times of a CSV file are written like: `"%d.%m.%Y %H:%M:%S"` (text in the directives of
+    `strftime`; default: dates as in RFC 3339)"""
+
+    decimal: Literal[".", ","] | None
+    """the decimal mark of a CSV file; the other one groups thousands (`"."`, `","`; default: found out, or
+    the column is refused)"""
+
+    delimiter: str | None
+    """what stands between the cells of a CSV file (text of one character; default: comma, semicolon or tab,
+    whichever the header has most of)"""
+
+    skip: Whole | None
+    """lines of a CSV file before its header (whole number ≥ 0; default: 0)"""
+
+
 class EstimateGeneratorPoles(TypedDict):
     """A value of ``generator.poles`` in ``[estimate]``."""
 
@@ -412,11 +444,10 @@ class EstimateSection(TypedDict, total=False):
     which looks ahead one sample (`"hold"`, `"predict"`, `"linear"`; default: `"hold"`)"""
 
     time: str | None
-    """header of the log's time column (text; default: `"t"`; `"time"` where the log has an output or an input
-    called `t`)"""
+    """`time` of `[log]` (text; default: that of [`log]`)"""
 
     columns: Mapping[str, str] | None
-    """where the log's header names a signal differently (table: name = text; default: the plant's names)"""
+    """`columns` of `[log]` (table: name = text; default: those of [`log]`)"""
 
     input_derivatives: Mapping[str, str | Names] | None
     """the log's columns of u', u'', … of a known input, for an observer that reads them (drift-observable,
@@ -599,7 +630,7 @@ class PlotSection(TypedDict, total=False):
     what is measured; six at most)"""
 
     time_unit: str | None
-    """the unit on the time axis (text; default: none)"""
+    """the unit on the time axis (text; default: that of [`log]`)"""
 
 
 class Sections(TypedDict, total=False):
@@ -653,6 +684,9 @@ class Sections(TypedDict, total=False):
 
     simulate: SimulateSection | None
     """how the plant and its observer are run together (table; default: none)"""
+
+    log: LogSection | None
+    """what the columns of a log are (table; default: none)"""
 
     estimate: EstimateSection | None
     """how a log is replayed (table; default: none)"""

@@ -46,6 +46,7 @@ from .sections import (
     EstimateSection,
     Family,
     FitSection,
+    LogSection,
     ObserverSection,
     ParametersSection,
     PlotSection,
@@ -82,7 +83,7 @@ class Study(Batched):
         The section ``[observer]``, or the name of a family.
     box : mapping of str to float or list of float, optional
         Ranges narrower than the model's, in its units.
-    certify, simulate, estimate, tune, fit, plot : dict, optional
+    certify, simulate, log, estimate, tune, fit, plot : dict, optional
         The sections of these names.
     compare : dict or list of str, optional
         The section ``[compare]``, or the names of families.
@@ -129,6 +130,7 @@ class Study(Batched):
         box: BoxSection | None = None,
         certify: CertifySection | None = None,
         simulate: SimulateSection | None = None,
+        log: LogSection | None = None,
         estimate: EstimateSection | None = None,
         tune: TuneSection | None = None,
         fit: FitSection | None = None,
@@ -145,6 +147,7 @@ class Study(Batched):
             "box": box,
             "certify": certify,
             "simulate": simulate,
+            "log": log,
             "estimate": estimate,
             "tune": tune,
             "fit": fit,

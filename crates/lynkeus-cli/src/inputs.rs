@@ -58,7 +58,7 @@ impl Source {
 /// The log of a study.
 pub(super) fn log(study: &Study, path: &Path) -> Result<Table, Error> {
     match is_standard(path) {
-        true => Table::read(Incoming::standard(&study.budget), STANDARD),
+        true => lynkeus::log_of(study, Incoming::standard(&study.budget), STANDARD),
         false => lynkeus::log(study, path),
     }
 }

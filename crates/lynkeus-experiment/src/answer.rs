@@ -10,6 +10,15 @@ use serde_json::Value;
 use crate::course::corrections::Corrections;
 use crate::{Error, Series};
 
+/// What stands for zero where times are dates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Origin {
+    /// the first of them
+    pub instant: Instant,
+    /// seconds of the unit in which the others count from it
+    pub unit: f64,
+}
+
 /// An answer of a command.
 pub trait Answer: Send {
     /// What is told, as the command prints it.
@@ -47,7 +56,7 @@ pub trait Answer: Send {
     }
 
     /// What stands for zero where its times are dates.
-    fn origin(&self) -> Option<Instant> {
+    fn origin(&self) -> Option<Origin> {
         None
     }
 

@@ -3,6 +3,7 @@
 
 pub(crate) mod checkpoint;
 pub mod columns;
+mod computed;
 pub(crate) mod corrections;
 pub(crate) mod doubt;
 pub(crate) mod ended;

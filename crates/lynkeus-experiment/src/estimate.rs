@@ -22,7 +22,7 @@ use crate::judge::interval;
 use crate::judge::outcome::{Raw, measurements};
 use crate::prepare::systems::{method, run_settings};
 use crate::prepare::{self, Prepared, StudyDesign};
-use crate::{Error, Outcome, Quantity, Series, Study, Table};
+use crate::{Error, Origin, Outcome, Quantity, Series, Study, Table};
 use lynkeus_study::{BetweenSamples, Method};
 
 /// Replays a log; `watch` is told the fraction done and may stop the replay.
@@ -237,7 +237,10 @@ impl<'t> Begun<'t> {
             intervals,
             frozen: hanging(prepared, &design.observer, samples),
             time: samples.time.shortened(rows),
-            origin: log.table.start(&log.time),
+            origin: log.table.start(&log.time).map(|instant| Origin {
+                instant,
+                unit: settings.log.seconds(),
+            }),
             quantities: estimated.into_iter().chain(known).collect(),
             measurements: measurements(&design, |signal| logged(&signal.name)),
             replayed: true,

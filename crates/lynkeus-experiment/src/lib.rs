@@ -54,11 +54,11 @@ mod open_run;
 // the same study again and again
 mod choose;
 
-pub use answer::Answer;
+pub use answer::{Answer, Origin};
 pub use choose::runner::{Runner, Runners};
 pub use compare::{Against, Compared, Comparison, Interval, Run, Settled, compare};
 pub use course::checkpoint::Checkpoint;
-pub use course::columns::log;
+pub use course::columns::{log, log_of, whole_log};
 pub use course::corrections::Corrections;
 pub use course::doubt::{Doubt, Kind as DoubtKind, Level as DoubtLevel};
 pub use course::quantity::Quantity;

@@ -8,12 +8,12 @@ mod report;
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 
+use crate::answer::Origin;
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::starts;
 use lynkeus_run::{Error as RunError, Estimator, System};
 use lynkeus_study::{Generator, Name};
-use lynkeus_table::Instant;
 use lynkeus_words::short;
 
 use crate::course::columns::{Log, held, logged};
@@ -44,7 +44,7 @@ pub struct OpenRun {
     /// times of the rows
     pub time: Series,
     time_header: String,
-    origin: Option<Instant>,
+    origin: Option<Origin>,
     /// the unit of time, where the study has one
     pub time_unit: Option<String>,
     /// the variables that its picture shows, where the study says so
@@ -337,7 +337,10 @@ fn finished(
         log: log.table.place(),
         time: log.samples.time.shortened(rows),
         time_header,
-        origin: log.table.start(&log.time),
+        origin: log.table.start(&log.time).map(|instant| Origin {
+            instant,
+            unit: prepared.study().estimate.log.seconds(),
+        }),
         time_unit: study.time_unit.clone(),
         show: study.show.clone(),
         variables,

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, OnceLock};
 
-use lynkeus::{Corrections, Error, Series};
+use lynkeus::{Corrections, Error, Origin, Series};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
@@ -169,10 +169,10 @@ impl Answer {
     }
 
     /// What stands for zero where times are dates: nanoseconds since 1970, and whether that is UTC.
-    fn origin(&self, py: Python<'_>) -> Option<(i64, bool)> {
-        let origin = self.ask(py, |found| found.origin())?;
-        let nanoseconds = i64::try_from(origin.nanoseconds()).ok()?;
-        Some((nanoseconds, origin.is_zoned()))
+    fn origin(&self, py: Python<'_>) -> Option<(i64, bool, f64)> {
+        let Origin { instant, unit } = self.ask(py, |found| found.origin())?;
+        let nanoseconds = i64::try_from(instant.nanoseconds()).ok()?;
+        Some((nanoseconds, instant.is_zoned(), unit))
     }
 
     fn svg(&self, py: Python<'_>) -> PyResult<Option<String>> {

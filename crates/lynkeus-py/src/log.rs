@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::path::PathBuf;
 
-use lynkeus::table::{Cell, Gathered, Gathering, Instant, Request};
+use lynkeus::table::{Cell, Gathered, Gathering, Instant};
 use lynkeus::{Error, Study, Table};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -112,21 +112,25 @@ impl Log {
     }
 }
 
+impl Log {
+    /// A file as a study says that it is written, all of its columns.
+    pub fn whole(py: Python<'_>, study: &Study, path: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let file = path.extract::<PathBuf>();
+        let path = file.map_err(|error| wrong("path", "a path", path, error))?;
+        let study = study.clone();
+        let table = away(py, &Terms::default(), |budget, _| {
+            lynkeus::whole_log(&Study { budget, ..study }, &path)
+        })?;
+        Ok(Self { table })
+    }
+}
+
 #[pymethods]
 impl Log {
     /// A CSV or Parquet file.
     #[staticmethod]
     fn load(py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let file = path.extract::<PathBuf>();
-        let path = file.map_err(|error| wrong("path", "a path", path, error))?;
-        let table = away(py, &Terms::default(), |budget, _| {
-            let request = Request {
-                budget,
-                columns: None,
-            };
-            Table::load_within(&path, &request)
-        })?;
-        Ok(Self { table })
+        Self::whole(py, &Study::default(), path)
     }
 
     /// Columns in the forms that `_logs.py` gives them.

@@ -20,7 +20,7 @@ use crate::errors::{exception, from_source};
 use crate::estimator::Estimator;
 use crate::functions::Functions;
 use crate::likelihood::Likelihood;
-use crate::log::Given;
+use crate::log::{Given, Log};
 use crate::sections;
 
 /// A study with the texts that it was made from.
@@ -48,6 +48,11 @@ pub fn schema() -> String {
 
 #[pymethods]
 impl Study {
+    /// A log in a file that is written as the study says, all of its columns.
+    fn log(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<Log> {
+        Log::whole(py, &self.study, path)
+    }
+
     /// A study file, or a model for which it stands with every output measured; the plant's text
     /// comes along.
     #[staticmethod]

@@ -3,7 +3,8 @@
 use super::Name;
 use super::generator::{self, Generator};
 use super::keys::{ESTIMATE, INTEGRATOR};
-use super::section::Entry;
+use super::log::LogSettings;
+use super::section::{Entry, Section};
 use super::simulate::{self, Method, pairs};
 use lynkeus_answer::Error;
 
@@ -14,11 +15,8 @@ pub struct EstimateSettings {
     pub between_samples: BetweenSamples,
     /// The integrator and its steps or tolerances.
     pub method: Method,
-    /// The header of the time column; `None` is `t`, or `time` where an output or an input of the
-    /// plant is called `t` in the log.
-    pub time: Option<String>,
-    /// Where the log names a signal differently: (the plant's name, the column's header).
-    pub columns: Vec<(Name, String)>,
+    /// What the log's columns are: `[log]`, and `time` and `columns` of `[estimate]`.
+    pub log: LogSettings,
     /// Columns of the log that hold u', u'', … of known inputs.
     pub input_derivatives: Vec<(Name, Vec<String>)>,
     /// What makes known inputs.
@@ -72,8 +70,22 @@ fn headers(entry: Entry<'_>) -> Result<Vec<String>, Error> {
     Ok(names.into_iter().map(|name| name.text).collect())
 }
 
-pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
-    let mut section = entry.section("[estimate]", &[&ESTIMATE[..], &INTEGRATOR].concat())?;
+/// Reads `[estimate]`, where the study has it, beside what `[log]` says.
+pub(super) fn read(entry: Option<Entry<'_>>, log: LogSettings) -> Result<EstimateSettings, Error> {
+    match entry {
+        Some(entry) => {
+            let section = entry.section("[estimate]", &[&ESTIMATE[..], &INTEGRATOR].concat())?;
+            read_section(section, log)
+        }
+        None => Ok(EstimateSettings {
+            log,
+            ..EstimateSettings::default()
+        }),
+    }
+}
+
+fn read_section(mut section: Section<'_>, mut log: LogSettings) -> Result<EstimateSettings, Error> {
+    log.join(&mut section)?;
     let smooth = section
         .optional("smooth", Entry::boolean)?
         .unwrap_or_default();
@@ -98,15 +110,7 @@ pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
         innovations: section
             .optional("innovations", Entry::boolean)?
             .unwrap_or_default(),
-        time: section.optional("time", Entry::name)?.map(|name| name.text),
-        columns: match section.take("columns") {
-            None => Vec::new(),
-            Some(table) => table
-                .pairs()?
-                .into_iter()
-                .map(|(name, header)| Ok((name, header.name()?.text)))
-                .collect::<Result<_, Error>>()?,
-        },
+        log,
         input_derivatives: section
             .optional("input_derivatives", |entry| {
                 let pairs = entry.pairs()?.into_iter();

@@ -40,7 +40,7 @@ pub(super) const KEYS: [KeySpec; 4] = [
 ];
 
 /// The sections.
-pub(super) const SECTIONS: [KeySpec; 11] = [
+pub(super) const SECTIONS: [KeySpec; 12] = [
     KeySpec {
         name: "sensors",
         shape: Shape::Section(&[&SENSORS]),
@@ -82,6 +82,12 @@ pub(super) const SECTIONS: [KeySpec; 11] = [
         shape: Shape::Section(&[&SIMULATE, &INTEGRATOR]),
         default: "none",
         meaning: "how the plant and its observer are run together",
+    },
+    KeySpec {
+        name: "log",
+        shape: Shape::Section(&[&LOG]),
+        default: "none",
+        meaning: "what the columns of a log are",
     },
     KeySpec {
         name: "estimate",
@@ -410,6 +416,58 @@ pub(super) const GENERATOR: [KeySpec; 3] = [
     },
 ];
 
+/// `[log]`
+pub(super) const LOG: [KeySpec; 7] = [
+    KeySpec {
+        name: "time",
+        shape: Shape::As("text: a header, or an expression of headers", &Shape::Text),
+        default: "`\"t\"`; `\"time\"` where the log has an output or an input called `t`",
+        meaning: "the log's time column",
+    },
+    KeySpec {
+        name: "columns",
+        shape: Shape::As(
+            "table: name = header, or expression of headers",
+            &Shape::Table(&Shape::Text),
+        ),
+        default: "the plant's names",
+        meaning: "where the log names a signal differently, or has it in another unit: `T = \"(T_F - 32)/1.8\"`",
+    },
+    KeySpec {
+        name: "time_unit",
+        shape: Shape::As(
+            "`\"ns\"`, `\"us\"`, `\"ms\"`, `\"s\"`, `\"min\"`, `\"h\"`, `\"d\"`, `\"week\"`, `\"year\"`",
+            &Shape::Text,
+        ),
+        default: "seconds",
+        meaning: "the plant's unit of time, into which dates and durations are converted (a year has 365.25 days); it is also that of `[plot]`",
+    },
+    KeySpec {
+        name: "time_format",
+        shape: Shape::As("text in the directives of `strftime`", &Shape::Text),
+        default: "dates as in RFC 3339",
+        meaning: "what the times of a CSV file are written like: `\"%d.%m.%Y %H:%M:%S\"`",
+    },
+    KeySpec {
+        name: "decimal",
+        shape: Shape::Word(&[".", ","]),
+        default: "found out, or the column is refused",
+        meaning: "the decimal mark of a CSV file; the other one groups thousands",
+    },
+    KeySpec {
+        name: "delimiter",
+        shape: Shape::As("text of one character", &Shape::Text),
+        default: "comma, semicolon or tab, whichever the header has most of",
+        meaning: "what stands between the cells of a CSV file",
+    },
+    KeySpec {
+        name: "skip",
+        shape: Shape::Whole(0),
+        default: "0",
+        meaning: "lines of a CSV file before its header",
+    },
+];
+
 /// `[estimate]` without the integrator.
 pub(super) const ESTIMATE: [KeySpec; 11] = [
     KeySpec {
@@ -451,14 +509,14 @@ pub(super) const ESTIMATE: [KeySpec; 11] = [
     KeySpec {
         name: "time",
         shape: Shape::Text,
-        default: "`\"t\"`; `\"time\"` where the log has an output or an input called `t`",
-        meaning: "header of the log's time column",
+        default: "that of [`[log]`](#log)",
+        meaning: "`time` of `[log]`",
     },
     KeySpec {
         name: "columns",
         shape: Shape::Table(&Shape::Text),
-        default: "the plant's names",
-        meaning: "where the log's header names a signal differently",
+        default: "those of [`[log]`](#log)",
+        meaning: "`columns` of `[log]`",
     },
     KeySpec {
         name: "input_derivatives",

@@ -30,6 +30,7 @@ mod estimate;
 mod fit;
 mod generator;
 mod keys;
+mod log;
 mod observer;
 mod schema;
 mod section;
@@ -50,6 +51,7 @@ pub use certify::{Box, CertifySettings};
 pub use estimate::{BetweenSamples, EstimateSettings, Smoothing};
 pub use fit::{Candidate, Chosen, FitSettings, Objective, Prior};
 pub use generator::Generator;
+pub use log::{LogSettings, seconds_in};
 pub use observer::ObserverSettings;
 pub use schema::schema;
 pub use sensors::{Noise, Screen, Sensors, bias_of};
@@ -104,7 +106,7 @@ pub struct Study {
     pub compare: Option<Vec<Name>>,
     /// The quantities to draw, one panel each; `None` lets the tool choose.
     pub show: Option<Vec<Name>>,
-    /// The unit on the time axis.
+    /// The plant's unit of time, of `[plot]` or of `[log]`: the one on the time axis.
     pub time_unit: Option<String>,
     /// What a replay keeps of a filter's corrections; no file has it.
     pub records: Records,
@@ -215,6 +217,8 @@ impl Study {
         let mut top = Section::new(&source, "the study", table.into_inner(), &known)?;
         let simulate = top.optional("simulate", simulate::read)?;
         let (show, time_unit) = top.optional("plot", plot)?.unwrap_or_default();
+        let log = top.optional("log", log::read)?.unwrap_or_default();
+        let time_unit = log.unit_beside(time_unit)?;
         let sensors = top.optional("sensors", sensors::read)?.unwrap_or_default();
         let mut observer = top
             .optional("observer", observer::read)?
@@ -239,9 +243,7 @@ impl Study {
             narrower: top.optional("box", certify::read_box)?.unwrap_or_default(),
             certify: top.optional("certify", certify::read)?.unwrap_or_default(),
             simulate,
-            estimate: top
-                .optional("estimate", estimate::read)?
-                .unwrap_or_default(),
+            estimate: estimate::read(top.take("estimate"), log)?,
             tune: top.optional("tune", tune::read)?.unwrap_or_default(),
             fit: top.optional("fit", fit::read)?.unwrap_or_default(),
             compare: top.optional("compare", compare)?.flatten(),
@@ -287,11 +289,11 @@ fn compare(entry: section::Entry<'_>) -> Result<Option<Vec<Name>>, Error> {
 }
 
 /// `show` and `time_unit` of `[plot]`.
-fn plot(entry: section::Entry<'_>) -> Result<(Option<Vec<Name>>, Option<String>), Error> {
+fn plot(entry: section::Entry<'_>) -> Result<(Option<Vec<Name>>, Option<Name>), Error> {
     let mut section = entry.section("[plot]", &keys::PLOT)?;
     let show = section.optional("show", |e| e.list_of(section::Entry::name))?;
     let unit = section.optional("time_unit", section::Entry::name)?;
-    Ok((show, unit.map(|name| name.text)))
+    Ok((show, unit))
 }
 
 #[cfg(test)]

@@ -59,7 +59,7 @@ fn every_key_arrives() {
     assert_eq!(simulate.seed, 7);
     assert_eq!(simulate.spread[0], ("alpha".into(), 0.02));
     assert_eq!(simulate.spread[1].1, 0.0);
-    assert_eq!(study.estimate.columns[0].1, "AI-101");
+    assert_eq!(study.estimate.log.columns[0].1.text, "AI-101");
     assert_eq!(study.show.unwrap()[0].text, "Zf");
 }
 

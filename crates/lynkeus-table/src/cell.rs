@@ -2,6 +2,7 @@
 
 use super::instant::{self, Instant};
 use super::number::POWERS;
+use super::{Decimal, Pattern};
 
 /// What a cell says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +40,48 @@ pub(super) enum Mark {
 /// Reads a trimmed cell.
 pub(super) fn read(text: &str) -> Cell {
     plain(text.as_bytes()).unwrap_or_else(|| other_than_plain(text))
+}
+
+/// Reads a trimmed cell whose decimal mark is known.
+pub(super) fn read_by(text: &str, decimal: Decimal) -> Cell {
+    let (mark, grouping) = match decimal {
+        Decimal::Point => ('.', ','),
+        Decimal::Comma => (',', '.'),
+    };
+    let (whole, fraction) = match text.split_once(mark) {
+        Some((whole, fraction)) => (whole, Some(fraction)),
+        None => (text, None),
+    };
+    let unsigned = whole.strip_prefix(['+', '-']).unwrap_or(whole);
+    let whole = match whole.contains(grouping) && are_groups(unsigned, grouping) {
+        true => whole.replace(grouping, ""),
+        false => whole.to_owned(),
+    };
+    let is_plain = |part: &str| !part.contains([mark, grouping]);
+    if is_plain(&whole) && fraction.is_none_or(is_plain) {
+        let number = match fraction {
+            Some(fraction) => format!("{whole}.{fraction}"),
+            None => whole,
+        };
+        match number.parse::<f64>() {
+            Ok(value) if value.is_finite() => return Cell::Number(value),
+            Ok(_) => return Cell::Missing,
+            Err(_) => {}
+        }
+    }
+    match read(text) {
+        Cell::Number(_) | Cell::Marked(..) => Cell::Garbled,
+        other => other,
+    }
+}
+
+/// Reads a trimmed cell that holds a time of this pattern.
+pub(super) fn of_pattern(text: &str, pattern: &Pattern) -> Cell {
+    match (pattern.instant(text), read(text)) {
+        (Some(instant), _) => Cell::Instant(instant),
+        (None, Cell::Missing) => Cell::Missing,
+        (None, _) => Cell::Garbled,
+    }
 }
 
 /// Digits of a cell that is read at once: as a whole number they are exact.
@@ -194,6 +237,25 @@ mod tests {
         }
         assert_eq!(read("-1e3"), Cell::Number(-1000.0));
         assert_eq!(read("1700000000001"), Cell::Number(1_700_000_000_001.0));
+    }
+
+    #[test]
+    fn a_known_mark_leaves_nothing_open() {
+        for (text, by_point, by_comma) in [
+            ("1,234", Cell::Number(1234.0), Cell::Number(1.234)),
+            ("1.234", Cell::Number(1.234), Cell::Number(1234.0)),
+            ("-1,234.5", Cell::Number(-1234.5), Cell::Garbled),
+            ("1.234.567,5", Cell::Garbled, Cell::Number(1_234_567.5)),
+            ("2,5e-3", Cell::Garbled, Cell::Number(0.0025)),
+            ("2.5", Cell::Number(2.5), Cell::Garbled),
+            ("1,2,3", Cell::Garbled, Cell::Garbled),
+            ("17", Cell::Number(17.0), Cell::Number(17.0)),
+            ("NA", Cell::Missing, Cell::Missing),
+            ("", Cell::Missing, Cell::Missing),
+        ] {
+            assert_eq!(read_by(text, Decimal::Point), by_point, "{text}");
+            assert_eq!(read_by(text, Decimal::Comma), by_comma, "{text}");
+        }
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::fmt;
 use super::cell::{self, Cell, Mark};
 use super::instant::Instant;
 use super::marks::{FileMarks, Marks, Refusal, ShortComma};
+use super::{Decimal, Pattern};
 use crate::series::{Series, Store};
 
 /// Missing cells that are kept with their line.
@@ -59,6 +60,10 @@ pub(super) struct Column {
     open: Rows,
     /// a plain number was seen
     has_number: bool,
+    /// its decimal mark, where that is known
+    pub(super) decimal: Option<Decimal>,
+    /// what its times are written like, where that is known
+    pub(super) pattern: Option<Pattern>,
 }
 
 impl Column {
@@ -132,7 +137,12 @@ impl Column {
 
     /// Takes the next row's cell.
     pub(super) fn push(&mut self, text: &str, line: u64) {
-        let value = match cell::read(text) {
+        let cell = match (&self.pattern, self.decimal) {
+            (Some(pattern), _) => cell::of_pattern(text, pattern),
+            (None, Some(decimal)) => cell::read_by(text, decimal),
+            (None, None) => cell::read(text),
+        };
+        let value = match cell {
             Cell::Number(value) => {
                 self.marks.see_plain(value);
                 self.number(value, line, text)
@@ -147,15 +157,26 @@ impl Column {
                 f64::NAN
             }
             Cell::Garbled => {
-                self.refuse(
-                    line,
-                    format!("expected a number, found \"{text}\""),
-                    "write numbers without units and blanks, and times as numbers or as 2026-11-22T01:02:03Z",
-                );
+                self.garbled(line, text);
                 f64::NAN
             }
         };
         self.values.push(value);
+    }
+
+    /// A cell that is nothing that its column holds.
+    fn garbled(&mut self, line: u64, text: &str) {
+        match &self.pattern {
+            Some(pattern) => {
+                let message = format!("expected a time like {}, found \"{text}\"", pattern.text());
+                self.refuse(line, message, "mend the cell, or `time_format` of [log]");
+            }
+            None => self.refuse(
+                line,
+                format!("expected a number, found \"{text}\""),
+                "write numbers without units and blanks, and times as numbers or as 2026-11-22T01:02:03Z",
+            ),
+        }
     }
 
     /// A number in its row; the value.

@@ -110,12 +110,102 @@ pub(super) fn read(text: &str) -> Option<Instant> {
     })
 }
 
+/// A point in time by calendar and clock.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Civil {
+    pub year: i64,
+    pub month: i64,
+    pub day: i64,
+    pub hour: i64,
+    pub minute: i64,
+    /// 60 is a leap second
+    pub second: i64,
+    pub nanoseconds: i128,
+    /// nanoseconds by which the clock is ahead of UTC, where that is said
+    pub offset: Option<i128>,
+}
+
+/// The beginning of 1970.
+impl Default for Civil {
+    fn default() -> Self {
+        Self {
+            year: 1970,
+            month: 1,
+            day: 1,
+            hour: 0,
+            minute: 0,
+            second: 0,
+            nanoseconds: 0,
+            offset: None,
+        }
+    }
+}
+
+impl Civil {
+    /// None where there is no such day or time of day.
+    pub(super) fn instant(self) -> Option<Instant> {
+        let is_there = (0..=9999).contains(&self.year)
+            && (1..=12).contains(&self.month)
+            && (1..=days(self.year, self.month)).contains(&self.day)
+            && (0..=23).contains(&self.hour)
+            && (0..=59).contains(&self.minute)
+            && (0..=60).contains(&self.second);
+        let day = is_there.then(|| days_since_1970(self.year, self.month, self.day))?;
+        let clock = (self.hour * 60 + self.minute) * 60 + self.second;
+        let seconds = i128::from(day) * 86_400 + i128::from(clock);
+        Some(Instant {
+            nanoseconds: seconds * SECOND + self.nanoseconds - self.offset.unwrap_or(0),
+            zoned: self.offset.is_some(),
+        })
+    }
+}
+
 /// What is left of a text.
-struct Scan<'a> {
+pub(super) struct Scan<'a> {
     bytes: &'a [u8],
 }
 
-impl Scan<'_> {
+impl<'a> Scan<'a> {
+    pub(super) fn new(text: &'a str) -> Self {
+        let bytes = text.as_bytes();
+        Self { bytes }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.bytes.is_empty()
+    }
+
+    /// Passes over blanks.
+    pub(super) fn blanks(&mut self) {
+        self.bytes = self.bytes.trim_ascii_start();
+    }
+
+    /// Passes over a character.
+    pub(super) fn same(&mut self, character: char) -> Option<()> {
+        let mut room = [0; 4];
+        let wanted = character.encode_utf8(&mut room).as_bytes();
+        self.bytes = self.bytes.strip_prefix(wanted)?;
+        Some(())
+    }
+
+    /// A number of at most so many digits.
+    pub(super) fn digits(&mut self, most: usize) -> Option<i64> {
+        let digits = self.bytes.iter().take(most);
+        let count = digits.take_while(|b| b.is_ascii_digit()).count();
+        if count == 0 {
+            return None;
+        }
+        self.number(count, 0..=i64::MAX)
+    }
+
+    /// Letters, in lower case.
+    pub(super) fn word(&mut self) -> String {
+        let letters = self.bytes.iter().take_while(|b| b.is_ascii_alphabetic());
+        let (word, rest) = self.bytes.split_at(letters.count());
+        self.bytes = rest;
+        String::from_utf8_lossy(word).to_lowercase()
+    }
+
     fn one_of(&mut self, set: &[u8]) -> Option<u8> {
         let (first, rest) = self.bytes.split_first()?;
         set.contains(first).then(|| self.bytes = rest)?;
@@ -149,7 +239,7 @@ impl Scan<'_> {
     }
 
     /// Digits after the second, as nanoseconds; what is finer is dropped.
-    fn fraction(&mut self) -> Option<i128> {
+    pub(super) fn fraction(&mut self) -> Option<i128> {
         let (mut value, mut unit, mut digits) = (0, SECOND, 0);
         while let Some(digit) = self.one_of(b"0123456789") {
             unit /= 10;
@@ -160,7 +250,7 @@ impl Scan<'_> {
     }
 
     /// Nanoseconds by which the clock is ahead of UTC; an inner none where that is not said.
-    fn offset(&mut self) -> Option<Option<i128>> {
+    pub(super) fn offset(&mut self) -> Option<Option<i128>> {
         if self.bytes.is_empty() {
             return Some(None);
         }

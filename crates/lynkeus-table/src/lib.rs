@@ -13,6 +13,7 @@
 
 mod cell;
 mod column;
+mod computed;
 pub mod files;
 mod gathering;
 pub mod incoming;
@@ -23,6 +24,7 @@ mod number;
 mod order;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod pattern;
 mod read;
 mod request;
 mod row;
@@ -44,7 +46,8 @@ pub use instant::Instant;
 pub use number::{exact, significant};
 pub use order::APART;
 pub use order::{Conflict, Lost, Ordered};
-pub use request::Request;
+pub use pattern::Pattern;
+pub use request::{Decimal, Format, Request};
 pub use series::Series;
 pub use write::write_csv;
 
@@ -124,6 +127,11 @@ impl Table {
             false => visible::line(name).trim().to_owned(),
         };
         self.columns.iter().filter(move |c| c.name == header)
+    }
+
+    /// Whether a column is called so.
+    pub fn has(&self, name: &str) -> bool {
+        self.called(name).next().is_some()
     }
 
     /// Whether one column is called so, and no other.
@@ -212,12 +220,17 @@ impl Table {
         let values = self.times(name)?;
         match self.origin(name) {
             None => Ok(values),
-            Some(date) => Err(Error::input(format!(
-                "column \"{name}\" must hold numbers, found dates such as {date}: only times may be dates"
-            ))
-            .at(self.place())
-            .hint("name another column under [estimate] columns, or convert this one")),
+            Some(date) => Err(self.dates(name, date)),
         }
+    }
+
+    /// The refusal of dates in a column of numbers.
+    fn dates(&self, name: &str, date: &str) -> Error {
+        Error::input(format!(
+            "column \"{name}\" must hold numbers, found dates such as {date}: only times may be dates"
+        ))
+        .at(self.place())
+        .hint("name another column under [estimate] columns, or convert this one")
     }
 
     fn without_number(&self, column: &Column) -> Error {

@@ -41,12 +41,23 @@ impl Table {
         let name = path.display().to_string();
         #[cfg(feature = "parquet")]
         if super::is_parquet(path) {
+            if request.format != super::Format::default() {
+                return Err(Error::input(
+                    "`decimal`, `delimiter`, `skip` and `time_format` of [log] say how a CSV file is written, found a Parquet file",
+                )
+                .at(&name)
+                .hint("leave them out for this log"));
+            }
             return match crate::files::is_stream(path) {
                 true => Err(super::parquet::no_file(&name)),
                 false => super::parquet::load(crate::files::open(path, "log")?, &name, request),
             };
         }
-        Self::read(Incoming::open(path, "log", &request.budget)?, &name)
+        Self::read_as(
+            Incoming::open(path, "log", &request.budget)?,
+            &name,
+            request,
+        )
     }
 
     /// Reads CSV text; `file` names it in messages.
@@ -62,6 +73,14 @@ impl Table {
     /// # Errors
     /// As [`Table::load`].
     pub fn read(input: impl BufRead, file: &str) -> Result<Self, Error> {
+        Self::read_as(input, file, &Request::default())
+    }
+
+    /// The same of a text that is written as somebody says.
+    ///
+    /// # Errors
+    /// As [`Table::load`].
+    pub fn read_as(input: impl BufRead, file: &str, request: &Request) -> Result<Self, Error> {
         let mut reading = Reading {
             rows: Rows::new(input),
             table: Table {
@@ -70,7 +89,9 @@ impl Table {
             },
             delimiter: b',',
         };
-        reading.header()?;
+        let skipped = reading.rows.skip(request.format.skip);
+        skipped.map_err(|broken| reading.broken(&broken))?;
+        reading.header(request)?;
         while reading.next()? {
             reading.row()?;
         }
@@ -90,9 +111,11 @@ impl<R: BufRead> Reading<R> {
         self.rows.next().map_err(|broken| self.broken(&broken))
     }
 
-    fn header(&mut self) -> Result<(), Error> {
+    fn header(&mut self, request: &Request) -> Result<(), Error> {
         let any = self.next()?;
-        self.delimiter = delimiter(self.rows.raw());
+        let format = &request.format;
+        let given = format.delimiter;
+        self.delimiter = given.unwrap_or_else(|| delimiter(self.rows.raw()));
         let count = self.rows.split(self.delimiter);
         if count > MOST_COLUMNS {
             return Err(self.error(format!(
@@ -101,7 +124,10 @@ impl<R: BufRead> Reading<R> {
         }
         let names = self.rows.texts();
         for name in names.map_err(|_| not_utf8(&self.table.file, self.rows.number()))? {
-            let column = Column::new(&name, &self.table.store);
+            let mut column = Column::new(&name, &self.table.store);
+            column.decimal = format.decimal;
+            let is_time = request.time.as_deref() == Some(&*name);
+            column.pattern = format.times.clone().filter(|_| is_time);
             self.table.columns.push(column);
         }
         if !any || self.table.names().all(str::is_empty) {

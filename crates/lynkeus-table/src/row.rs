@@ -50,6 +50,17 @@ impl<R: BufRead> Rows<R> {
         }
     }
 
+    /// Passes over lines, as far as there are so many.
+    pub(super) fn skip(&mut self, lines: u64) -> Result<(), Broken> {
+        for _ in 0..lines {
+            self.bytes.clear();
+            if !self.line()? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     /// Goes to the next row that is not blank; false at the end.
     pub(super) fn next(&mut self) -> Result<bool, Broken> {
         loop {

@@ -226,5 +226,7 @@ fn dates_beside_a_plant_in_minutes_are_refused() {
             ended.code > 0 && text.contains("says that the plant's are in min"),
             "{text}"
         );
+        let hint = "add time_unit = \"min\" under [log]";
+        assert!(text.contains(hint), "{text}");
     }
 }

@@ -28,6 +28,7 @@ mod how_well;
 mod known;
 mod limits;
 mod live;
+mod log_columns;
 mod logs;
 mod long;
 mod mentioned;

@@ -79,7 +79,7 @@ fn every_command_refuses_a_stranger_in_any_section() {
         (
             "[estimate]",
             "columns = { nope = \"a\" }",
-            "columns: the plant 'M' has no output or input named \"nope\"",
+            "columns: the plant 'M' has no output, input or state named \"nope\"",
         ),
         (
             "[compare]",

@@ -2,15 +2,17 @@
 
 use std::borrow::Cow;
 use std::collections::HashSet;
+use std::io::BufRead;
 use std::path::Path;
 
 use lynkeus_structure::AugmentedPlant;
 
+use crate::course::computed::{given, names, with_expressions};
 use crate::course::{Samples, screen};
 use crate::prepare::Prepared;
-use crate::prepare::headers::{further_headers, header, log_time, refuse_seconds, time_of};
+use crate::prepare::headers::{UNNAMED, further_headers, header, in_unit, log_time, time_of};
 use crate::{Error, Series, Study, Table, visible};
-use lynkeus_study::EstimateSettings;
+use lynkeus_study::{EstimateSettings, Name};
 use lynkeus_table::{APART, Lost, Ordered, Request, is_parquet};
 
 /// The log of a study in a file (CSV, Parquet), read within the study's budget; of a Parquet file only what the
@@ -19,14 +21,42 @@ use lynkeus_table::{APART, Lost, Ordered, Request, is_parquet};
 /// # Errors
 /// As [`Table::load_within`]; for a Parquet file those of [`prepare::plant`](crate::prepare::plant), too.
 pub fn log(study: &Study, path: impl AsRef<Path>) -> Result<Table, Error> {
-    let request = Request {
-        budget: study.budget.clone(),
-        columns: match is_parquet(path.as_ref()) {
-            true => Some(asked_for(study)?),
-            false => None,
-        },
-    };
+    let mut request = request(study)?;
+    if is_parquet(path.as_ref()) {
+        request.columns = Some(asked_for(study)?);
+    }
     Table::load_within(path, &request)
+}
+
+/// The same with all that the file has, for several studies.
+///
+/// # Errors
+/// As [`log`].
+pub fn whole_log(study: &Study, path: impl AsRef<Path>) -> Result<Table, Error> {
+    Table::load_within(path, &request(study)?)
+}
+
+/// The same of a text that comes: `file` names it in messages.
+///
+/// # Errors
+/// As [`Table::read_as`].
+pub fn log_of(study: &Study, input: impl BufRead, file: &str) -> Result<Table, Error> {
+    Table::read_as(input, file, &request(study)?)
+}
+
+/// How the study's log is read.
+fn request(study: &Study) -> Result<Request, Error> {
+    let format = study.estimate.log.format.clone();
+    let time = match format.times {
+        Some(_) => Some(log_time(&crate::prepare::plant(study)?, &study.estimate)),
+        None => None,
+    };
+    Ok(Request {
+        budget: study.budget.clone(),
+        columns: None,
+        format,
+        time,
+    })
 }
 
 /// Headers of time and of all that the plant has names for: readings, inputs, and what may be compared with them.
@@ -41,6 +71,8 @@ fn asked_for(study: &Study) -> Result<HashSet<String>, Error> {
     let headers = variables.map(|v| header(settings, &v.name).to_owned());
     let headers = headers.chain(further_headers(settings));
     let headers = headers.chain([log_time(&plant, settings)]);
+    let headers = headers.chain(UNNAMED.map(str::to_owned));
+    let headers = headers.chain(given(settings).flat_map(|given| names(&given.text)));
     let spelled = |name: String| [visible::line(&name).into_owned(), name];
     Ok(headers.flat_map(spelled).collect())
 }
@@ -90,14 +122,20 @@ impl<'t> Log<'t> {
         let (study, plant) = (prepared.study(), prepared.plant());
         let settings = &study.estimate;
         let augmented = prepared.augmented();
-        let time = time_of(table, plant, settings, read(augmented))?;
-        refuse_seconds(study, table, &time)?;
+        let mut absent = vec![];
+        let is_needed = |name: &Name| {
+            let is_made = settings.generator.iter().any(|(made, _)| made == name);
+            !is_made && read(augmented).any(|read| read == name.text)
+        };
+        let table = with_expressions(table, settings, is_needed, &mut absent)?;
+        let time = time_of(&table, plant, settings, read(augmented))?;
+        let table = in_unit(study, table, &time)?;
         let ordered = match settings.strict {
             true => None,
             false => table.in_order(&time, settings.late)?,
         };
         let (table, mut notes, lost) = match ordered {
-            None => (Cow::Borrowed(table), vec![], vec![]),
+            None => (table, vec![], vec![]),
             Some(Ordered { table, notes, lost }) => (Cow::Owned(table), notes, lost),
         };
         let warnings = read(augmented).filter_map(|name| {
@@ -106,6 +144,13 @@ impl<'t> Log<'t> {
         });
         let warnings = warnings.flat_map(|lost| told(lost, &time)).collect();
         let mut samples = samples(&table, &time, settings, augmented, may_lack)?;
+        if settings.log.time.is_none() && UNNAMED.contains(&time.as_str()) {
+            let which = "the times of the log are in its column without a name";
+            notes.push(format!(
+                "{which}: set `time` in [log] if they are in another"
+            ));
+        }
+        notes.append(&mut absent);
         notes.extend(screened(prepared, &mut samples));
         notes.extend(gaps(&table, settings, &time, augmented));
         Ok(Self {
@@ -272,7 +317,13 @@ fn gaps(
 ) -> Vec<String> {
     let origin = table.origin(time);
     let mut notes: Vec<String> = origin
-        .map(|origin| format!("times are seconds since {origin}"))
+        .map(|origin| {
+            let unit = settings.log.time_unit.as_ref();
+            match unit.filter(|_| settings.log.seconds() != 1.0) {
+                Some(unit) => format!("times are in {unit} since {origin}"),
+                None => format!("times are seconds since {origin}"),
+            }
+        })
         .into_iter()
         .collect();
     let outputs = augmented.outputs.iter().map(|o| &o.variable);

@@ -4,14 +4,13 @@ use lynkeus_answer::Document;
 use lynkeus_answer::document::{Cell, Line, Table};
 #[cfg(feature = "plot")]
 use lynkeus_plot::Figure;
-use lynkeus_table::Instant;
 use lynkeus_words::figures;
 use serde_json::Value;
 
 use crate::course::corrections::Corrections;
 use crate::judge::Innovations;
 use crate::words::{instant, number};
-use crate::{Accuracy, Answer, Error, Outcome, Quantity, Series, Settling};
+use crate::{Accuracy, Answer, Error, Origin, Outcome, Quantity, Series, Settling};
 
 /// Rows of a table that a text shows.
 const LISTED: usize = 12;
@@ -65,7 +64,7 @@ impl Answer for Outcome {
         self.corrections.as_ref()
     }
 
-    fn origin(&self) -> Option<Instant> {
+    fn origin(&self) -> Option<Origin> {
         self.origin
     }
 

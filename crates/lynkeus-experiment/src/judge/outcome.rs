@@ -8,6 +8,7 @@ use lynkeus_observers::{Design, Monitor, Signal};
 use lynkeus_run::Error as RunError;
 use serde::Serialize;
 
+use crate::answer::Origin;
 use crate::course::Course;
 use crate::course::corrections::Corrections;
 use crate::course::doubt::Doubt;
@@ -25,7 +26,6 @@ use crate::prepare::{Prepared, StudyDesign};
 use crate::words::in_words;
 use crate::{Error, Quantity, Series, judge::expected, judge::saturated, prepare::headers};
 use lynkeus_study::{EstimateSettings, Name};
-use lynkeus_table::Instant;
 
 #[cfg(feature = "schema")]
 pub use summary::RunReport;
@@ -111,7 +111,7 @@ pub struct Outcome {
     /// what the corrections of a filter are made of, where [`Study::records`](lynkeus_study::Study::records) asks for all of it
     pub corrections: Option<Corrections>,
     /// what the log writes for zero where its times are dates
-    pub origin: Option<Instant>,
+    pub origin: Option<Origin>,
     /// errors of the estimates whose true values are known
     pub accuracies: Vec<Accuracy>,
     /// sensors whose readings hang
@@ -214,7 +214,7 @@ pub(crate) struct Raw<'r> {
     /// times of the rows
     pub time: Series,
     /// what stands for zero where they are dates
-    pub origin: Option<Instant>,
+    pub origin: Option<Origin>,
     pub course: Course,
     pub quantities: Vec<Quantity>,
     pub measurements: Vec<(String, Series)>,

@@ -1,10 +1,10 @@
 //! An open run in words, as JSON and as columns.
 
+use crate::answer::Origin;
 use lynkeus_answer::Document;
 use lynkeus_answer::document::{Cell, Table};
 #[cfg(feature = "plot")]
 use lynkeus_plot::Figure;
-use lynkeus_table::Instant;
 use lynkeus_words::{counted, figures};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -175,7 +175,7 @@ impl Answer for OpenRun {
         self.figure().map(Some)
     }
 
-    fn origin(&self) -> Option<Instant> {
+    fn origin(&self) -> Option<Origin> {
         self.origin
     }
 

@@ -2,16 +2,20 @@
 //!
 //! The model's own names keep theirs; what the tool derives gives way (`docs/study.md`).
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 
 use lynkeus_model::{Plant, Variable};
 
 use crate::{Error, Study, Table};
-use lynkeus_study::{self, EstimateSettings, Name};
+use lynkeus_study::{self, EstimateSettings, Name, seconds_in};
 
 /// The header of time, and what it is where a column of data is called so.
 const TIME: &str = "t";
 const OTHER_TIME: &str = "time";
+
+/// What a first column without a name is called: in CSV, as pandas reads that, and as pandas writes it to Parquet.
+pub(crate) const UNNAMED: [&str; 3] = ["", "Unnamed: 0", "__index_level_0__"];
 
 /// Gives out headers, each once.
 #[derive(Clone, Debug)]
@@ -80,15 +84,15 @@ impl Headers {
 /// The header of a log's time column.
 pub(crate) fn log_time(plant: &Plant, settings: &EstimateSettings) -> String {
     let is_taken = || signals(plant).any(|v| header(settings, &v.name) == TIME);
-    match &settings.time {
-        Some(time) => time.clone(),
+    match &settings.log.time {
+        Some(time) => time.text.clone(),
         None if is_taken() => OTHER_TIME.to_owned(),
         None => TIME.to_owned(),
     }
 }
 
 /// What a log can hold.
-fn signals(plant: &Plant) -> impl Iterator<Item = &Variable> {
+fn signals(plant: &Plant) -> impl Iterator<Item = &Variable> + Clone {
     plant.outputs.iter().chain(&plant.inputs)
 }
 
@@ -112,7 +116,11 @@ pub(crate) fn time_of<'s>(
         .hint("say which columns they are: `time` and `columns` of [estimate]"));
     }
     let is_there = table.names().any(|name| name == time);
-    if !is_there && settings.time.is_none() && time == OTHER_TIME {
+    let is_said = settings.log.time.is_some() || table.has(&time);
+    if let Some(unnamed) = unnamed(table).filter(|_| !is_said) {
+        return Ok(unnamed.to_owned());
+    }
+    if !is_there && settings.log.time.is_none() && time == OTHER_TIME {
         return Err(Error::input(format!(
             "no time column \"{time}\" (the model has a variable called t); the columns found are: {}",
             crate::near::list(table.names())
@@ -123,42 +131,50 @@ pub(crate) fn time_of<'s>(
     Ok(time)
 }
 
-/// Refuses dates and durations where the study's time has another unit than the seconds that they become.
+/// The header of a first column that has no name; pandas writes its index as the last one to Parquet.
+fn unnamed(table: &Table) -> Option<&'static str> {
+    let [csv @ .., parquet] = UNNAMED;
+    let first = table.names().next();
+    let mut known = csv.into_iter().filter(|name| first == Some(*name));
+    known
+        .next()
+        .or_else(|| table.has_one(parquet).then_some(parquet))
+}
+
+/// The log with dates and durations of its times in the unit that `[log]` says; numbers stay.
 ///
 /// # Errors
-/// The unit, and what to do.
-pub(crate) fn refuse_seconds(study: &Study, table: &Table, time: &str) -> Result<(), Error> {
-    let unit = study.time_unit.as_deref().filter(|unit| is_no_second(unit));
+/// They are seconds, and `[plot]` alone says another unit.
+pub(crate) fn in_unit<'t>(
+    study: &Study,
+    table: Cow<'t, Table>,
+    time: &str,
+) -> Result<Cow<'t, Table>, Error> {
     let dates = table
         .origin(time)
         .map(|date| format!("dates such as {date}"));
     let durations = || table.has_durations(time).then(|| "durations".to_owned());
-    match (unit, dates.or_else(durations)) {
-        (Some(unit), Some(found)) => Err(Error::input(format!(
+    let Some(found) = dates.or_else(durations) else {
+        return Ok(table);
+    };
+    let is_other = |unit: &&str| seconds_in(unit).is_some_and(|seconds| seconds != 1.0);
+    let log = &study.estimate.log;
+    match study.time_unit.as_deref().filter(is_other) {
+        None => Ok(table),
+        Some(_) if log.time_unit.is_some() => table.with_unit(time, log.seconds()).map(Cow::Owned),
+        Some(unit) => Err(Error::input(format!(
             "the times of the log are {found}, which count in seconds, but `time_unit` of [plot] says that the plant's are in {unit}"
         ))
         .at(table.place())
-        .hint(format!("write them as numbers in {unit}, or the model in seconds"))),
-        _ => Ok(()),
+        .hint(format!("add time_unit = \"{unit}\" under [log], and they are converted"))),
     }
-}
-
-/// Whether it is the name of another unit of time.
-fn is_no_second(unit: &str) -> bool {
-    const OTHERS: [&str; 19] = [
-        "ns", "us", "µs", "ms", "min", "mins", "minute", "minutes", "h", "hr", "hour", "hours",
-        "d", "day", "days", "week", "weeks", "year", "years",
-    ];
-    OTHERS.contains(&unit.trim().to_lowercase().as_str())
 }
 
 /// The header under which the log has a signal of the plant.
 pub fn header<'a>(settings: &'a EstimateSettings, name: &'a str) -> &'a str {
-    let given = settings
-        .columns
-        .iter()
-        .find(|(plant, _)| plant.text == name);
-    given.map_or(name, |(_, header)| header)
+    let mut given = settings.log.columns.iter();
+    let given = given.find(|(plant, _)| plant.text == name);
+    given.map_or(name, |(_, header)| header.text.as_str())
 }
 
 /// Refuses headers under which the study looks for what the plant does not have.
@@ -167,13 +183,11 @@ pub(crate) fn refuse_stray_columns(
     settings: &EstimateSettings,
 ) -> Result<(), Error> {
     let names = || {
-        plant
-            .outputs
-            .iter()
-            .chain(&plant.inputs)
-            .map(|v| v.name.as_str())
+        let all = signals(plant).chain(&plant.states);
+        all.map(|v| v.name.as_str())
     };
     match settings
+        .log
         .columns
         .iter()
         .find(|(name, _)| !names().any(|n| n == name.text))
@@ -181,7 +195,7 @@ pub(crate) fn refuse_stray_columns(
         None => Ok(()),
         Some((name, _)) => Err(name.blame(
             Error::input(format!(
-                "columns: the plant '{}' has no output or input named \"{name}\"",
+                "columns: the plant '{}' has no output, input or state named \"{name}\"",
                 plant.name
             ))
             .hint(crate::near::suggest(&name.text, names())),

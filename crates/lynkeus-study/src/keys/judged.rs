@@ -240,7 +240,7 @@ pub(crate) const PLOT: [KeySpec; 2] = [
     KeySpec {
         name: "time_unit",
         shape: Shape::Text,
-        default: "none",
+        default: "that of [`[log]`](#log)",
         meaning: "the unit on the time axis",
     },
 ];

@@ -335,7 +335,7 @@ end M;",
         ("[observer]\nfamily = \"ukf\"\nkappa = -9", "sigma points"),
         (
             "[estimate]\ncolumns = { z = \"c\" }",
-            "no output or input named",
+            "no output, input or state named",
         ),
     ] {
         let (check, estimate) = both(rest);
