@@ -339,7 +339,7 @@ fn finished(
         time_header,
         origin: log.table.start(&log.time).map(|instant| Origin {
             instant,
-            unit: study.estimate.log.seconds(),
+            unit: prepared.study().estimate.log.seconds(),
         }),
         time_unit: study.time_unit.clone(),
         show: study.show.clone(),

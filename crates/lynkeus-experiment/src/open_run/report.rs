@@ -1,5 +1,6 @@
 //! An open run in words, as JSON and as columns.
 
+use crate::answer::Origin;
 use lynkeus_answer::Document;
 use lynkeus_answer::document::{Cell, Table};
 #[cfg(feature = "plot")]
@@ -174,7 +175,7 @@ impl Answer for OpenRun {
         self.figure().map(Some)
     }
 
-    fn origin(&self) -> Option<crate::Origin> {
+    fn origin(&self) -> Option<Origin> {
         self.origin
     }
 

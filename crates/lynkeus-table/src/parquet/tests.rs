@@ -254,7 +254,14 @@ fn what_nobody_asks_for_is_left_and_limits_hold_while_the_rest_is_read() {
     write_parquet(&mut file.reopen().unwrap(), &columns).unwrap();
     let load = |columns: &[&str], budget: Budget| {
         let columns = Some(columns.iter().map(ToString::to_string).collect());
-        Table::load_within(file.path(), &Request { budget, columns })
+        Table::load_within(
+            file.path(),
+            &Request {
+                budget,
+                columns,
+                ..Request::default()
+            },
+        )
     };
     let table = load(&["t"], Budget::default()).unwrap();
     assert_eq!((table.names().count(), table.rows()), (2, 3_000_000));
