@@ -72,7 +72,6 @@ impl FittedLog {
                 time.partition_point(|t| *t <= until)
             }
         };
-        refuse_gaps(&log.table.place(), &time)?;
         let fitted_readings = &readings[..fitted * widths[0]];
         if !fitted_readings.iter().any(|y| y.is_finite()) {
             return Err(
@@ -121,37 +120,31 @@ impl FittedLog {
 
     /// The usual time between two rows.
     pub fn interval(&self) -> f64 {
-        usual_interval(&self.time)
+        let mut steps: Vec<f64> = self.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.retain(|step| *step > 0.0);
+        let middle = steps.len() / 2;
+        match steps.is_empty() {
+            true => 1.0,
+            false => *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
+        }
     }
-}
 
-fn usual_interval(time: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    steps.retain(|step| *step > 0.0);
-    let middle = steps.len() / 2;
-    match steps.is_empty() {
-        true => 1.0,
-        false => *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
+    /// What is to be said of steps that are too many, where two rows are as far apart as if they were of two logs.
+    pub fn gap(&self) -> Option<Error> {
+        let interval = self.interval();
+        let mut pairs = self.time.windows(2);
+        let gap = pairs.find(|pair| pair[1] - pair[0] > FARTHEST * interval)?;
+        let message = format!(
+            "no row between {} and {}, {:.1e} times the usual {}",
+            number(gap[0]),
+            number(gap[1]),
+            (gap[1] - gap[0]) / interval,
+            number(interval)
+        );
+        let hint = "give what is before and after as two logs: each starts anew";
+        Some(Error::input(message).at(&self.place).hint(hint))
     }
 }
 
 /// Usual intervals between two rows beyond which they are of two logs.
 const FARTHEST: f64 = 1e6;
-
-fn refuse_gaps(place: &str, time: &[f64]) -> Result<(), Error> {
-    let interval = usual_interval(time);
-    let mut pairs = time.windows(2);
-    let Some(gap) = pairs.find(|pair| pair[1] - pair[0] > FARTHEST * interval) else {
-        return Ok(());
-    };
-    let message = format!(
-        "no row between {} and {}, {:.1e} times the usual {}",
-        number(gap[0]),
-        number(gap[1]),
-        (gap[1] - gap[0]) / interval,
-        number(interval)
-    );
-    Err(Error::input(message)
-        .at(place)
-        .hint("give what is before and after as two logs: each starts anew"))
-}

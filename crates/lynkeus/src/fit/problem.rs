@@ -1,8 +1,8 @@
 //! What is made least: −log L over all logs, and what was known before.
 
 use lynkeus_expr::Budget;
-use lynkeus_run::Step;
 use lynkeus_run::filter::{Likelihood, Score, Seen};
+use lynkeus_run::{Error as RunError, Step};
 use nalgebra::{DMatrix, DVector};
 
 use super::logs::FittedLog;
@@ -174,7 +174,11 @@ impl Problem<'_> {
         let rows = log.rows(count).enumerate();
         let rows = rows.take_while(|(k, _)| is_going(*k)).map(|(_, row)| row);
         let score = term.likelihood.watched(&own, rows, self.steps.length, see);
-        score.map_err(|error| explain(error).at(&log.place))
+        score.map_err(|error| match &error {
+            // steps that grow reach any distance, equal ones do not
+            RunError::Setting { .. } => log.gap().unwrap_or_else(|| explain(error).at(&log.place)),
+            _ => explain(error).at(&log.place),
+        })
     }
 
     fn add_priors(&self, values: &[f64], point: &mut Point) {
