@@ -26,7 +26,7 @@ class Kept:
     picture: str | LynkeusError | None
     drawn: tuple[str, list[tuple[str, str]]] | LynkeusError | None
     corrected: tuple[list[str], list[str], list[tuple[str, Column]]] | None
-    zero: tuple[int, bool] | None
+    zero: tuple[int, bool, float] | None
     refused: LynkeusError | None
     warned: tuple[str, ...]
     seen: tuple[tuple[str, Column], ...] | LynkeusError
