@@ -207,6 +207,13 @@ impl<'t> Begun<'t> {
             let values = columns::logged(&log.table, settings, &log.time, name)?;
             Some(values.shortened(rows))
         };
+        // cells that are no readings show nothing
+        let screened = |name: &str| {
+            prepared.declared().screens.of(name)?;
+            let mut outputs = prepared.augmented().outputs.iter();
+            let place = outputs.position(|output| output.variable.name == name)?;
+            Some(samples.readings.get(place)?.shortened(rows))
+        };
         let estimated = design.observer.estimates.iter().enumerate();
         let estimated = estimated.map(|(i, e)| {
             let mut quantity = Quantity {
@@ -242,7 +249,9 @@ impl<'t> Begun<'t> {
                 unit: settings.log.seconds(),
             }),
             quantities: estimated.into_iter().chain(known).collect(),
-            measurements: measurements(&design, |signal| logged(&signal.name)),
+            measurements: measurements(&design, |signal| {
+                screened(&signal.name).or_else(|| logged(&signal.name))
+            }),
             replayed: true,
             notes,
             course,

@@ -59,6 +59,7 @@ fn cells_that_are_no_readings_are_as_missing_ones() {
     ] {
         let (with, err) = estimate(key, &given);
         assert!(err.contains(told), "{key}: {err}");
+        assert!(!err.contains("declared box"), "{key}: {err}");
         assert_eq!(with, estimate("", &left).0, "{key}");
     }
 }
