@@ -81,7 +81,10 @@ pub(crate) struct Problem<'a> {
 }
 
 /// Rows after which the clock is looked at.
-const LOOK: usize = 16;
+const LOOK: usize = 64;
+
+/// A noise that is a smaller share of its start is as good as none.
+const NOTHING: f64 = 1e-4;
 
 /// Rows of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -226,6 +229,11 @@ impl Unknown {
             true => z.exp(),
             false => z,
         }
+    }
+
+    /// Whether it is a noise that stands for 0 there.
+    pub fn is_nothing(&self, z: f64) -> bool {
+        self.reaches_zero() && self.value(z) <= NOTHING * self.start
     }
 
     /// Its derivative by what is searched.

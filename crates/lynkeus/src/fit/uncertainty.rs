@@ -305,12 +305,32 @@ impl Edge<'_, '_> {
         Ok(Some(outside.map_or(limit, |_| inside.0)))
     }
 
+    /// The same with noises that are at nothing where the study has them; none where there are none. A density is
+    /// searched as a logarithm, and near nothing −log L has no slope along that: what ended there once stays there.
+    fn lifted(&self, z: &DVector<f64>) -> Option<DVector<f64>> {
+        let mut lifted = z.clone();
+        for (i, unknown) in self.problem.unknowns.iter().enumerate() {
+            let is_nothing = i != self.held && unknown.is_nothing(z[i]);
+            if is_nothing {
+                lifted[i] = unknown.searched(unknown.start);
+            }
+        }
+        (lifted != *z).then_some(lifted)
+    }
+
     fn rise_at(&mut self, z: f64) -> Result<Option<f64>, Error> {
         let mut start = self.from.clone();
         start[self.held] = z;
         let mut held = vec![false; start.len()];
         held[self.held] = true;
-        let (point, is_done) = least(self.problem, start, &held)?;
+        let (mut point, mut is_done) = least(self.problem, start, &held)?;
+        if let Some(lifted) = self.lifted(&point.z) {
+            let (other, is_other_done) = least(self.problem, lifted, &held)?;
+            is_done &= is_other_done;
+            if other.value < point.value {
+                point = other;
+            }
+        }
         let rise = point.value - self.least;
         if rise < -BETTER {
             self.way.better = Some(point);
