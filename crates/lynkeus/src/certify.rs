@@ -258,8 +258,10 @@ fn account(declared: &Declared, in_mean_square: bool) -> Account {
         slew,
         input_derivatives,
         screens,
+        manifold,
     } = declared;
     Account::default()
+        .leaves(manifold, "no theorem is about angles and rotations")
         .leaves(screens, "a proof is for readings that come")
         .counts(ranges)
         .counts(noise)

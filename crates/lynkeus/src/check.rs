@@ -169,9 +169,11 @@ fn account(declared: &Declared) -> Account {
         slew,
         input_derivatives,
         screens,
+        manifold,
     } = declared;
     let elsewhere = "`certify` counts it, and `check --how-well`";
     Account::default()
+        .counts(manifold)
         .leaves(screens, "they are of logs")
         .counts(ranges)
         .counts(input_derivatives)

@@ -139,8 +139,10 @@ fn account(declared: &Declared, counts_process_noise: bool) -> Account {
         slew,
         input_derivatives,
         screens,
+        manifold,
     } = declared;
     Account::default()
+        .counts(manifold)
         .leaves(screens, "they are of logs: every simulated reading counts")
         .counts(ranges)
         .counts(noise)

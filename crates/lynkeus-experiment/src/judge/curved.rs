@@ -1,0 +1,150 @@
+//! Angles and rotations of a run as they are shown and compared.
+
+use lynkeus_model::{Home, Plant, Variable};
+use lynkeus_run::manifold::{angle_between, wrapped};
+
+use crate::course::quantity::Rotation;
+use crate::prepare::headers::Headers;
+use crate::prepare::manifold::firsts;
+use crate::{Quantity, Series};
+
+/// Tells quantities where they live: angles go to their declared turn, and a quaternion's first number has
+/// what is known of its rotation. Readings of angles go to the turn of their output.
+pub(crate) fn place(
+    plant: &Plant,
+    replayed: bool,
+    quantities: &mut [Quantity],
+    measurements: &mut [(String, Series)],
+) {
+    let homes = plant.states.iter().chain(&plant.outputs);
+    let curved: Vec<&Variable> = homes.filter(|v| v.home != Home::Line).collect();
+    if curved.is_empty() {
+        return;
+    }
+    for quantity in quantities.iter_mut() {
+        let own = plant.states.iter().find(|s| s.name == quantity.name);
+        quantity.home = own.map_or(Home::Line, |state| state.home);
+        match quantity.home {
+            Home::Circle { from: Some(from) } => {
+                let columns = [
+                    &mut quantity.truth,
+                    &mut quantity.estimate,
+                    &mut quantity.smoothed,
+                ];
+                columns
+                    .into_iter()
+                    .flatten()
+                    .for_each(|x| *x = in_turn(x, from));
+            }
+            // a log's truth is of any turn
+            Home::Circle { from: None } if replayed => {
+                quantity.truth = beside(&quantity.truth, &quantity.estimate);
+            }
+            _ => {}
+        }
+    }
+    for (name, readings) in measurements {
+        let output = plant.outputs.iter().find(|o| o.name == *name);
+        let Some(Home::Circle { from }) = output.map(|o| o.home) else {
+            continue;
+        };
+        let state = plant
+            .states
+            .iter()
+            .find(|s| Some(s.node) == output.map(|o| o.node));
+        let shown = state.and_then(|s| quantities.iter().find(|q| q.name == s.name));
+        let estimate = shown.map_or(&None, |q| &q.estimate);
+        *readings = match (from, beside(&Some(readings.clone()), estimate)) {
+            (Some(from), _) => in_turn(readings, from),
+            (None, Some(lifted)) => lifted,
+            (None, None) => readings.clone(),
+        };
+    }
+    for (_, name) in firsts(&plant.states) {
+        place_rotation(&name, quantities);
+    }
+}
+
+/// Angles in the turn that begins at an angle.
+fn in_turn(angles: &Series, from: f64) -> Series {
+    const TURN: f64 = std::f64::consts::TAU;
+    let shown = angles
+        .iter()
+        .map(|x| x - TURN * ((x - from) / TURN).floor());
+    Series::gathered(angles.store(), shown)
+}
+
+/// Angles in the turns of others.
+fn beside(angles: &Option<Series>, others: &Option<Series>) -> Option<Series> {
+    let (angles, others) = (angles.as_ref()?, others.as_ref()?);
+    let pairs = angles.iter().zip(others);
+    let lifted = pairs.map(|(angle, other)| match other.is_finite() {
+        true => other + wrapped(angle - other),
+        false => angle,
+    });
+    Some(Series::gathered(angles.store(), lifted))
+}
+
+fn place_rotation(name: &str, quantities: &mut [Quantity]) {
+    let is_own = |q: &Quantity| {
+        let element = q.name.strip_prefix(name);
+        element.is_some_and(|rest| rest.starts_with('[')) && q.home != Home::Line
+    };
+    let Some(first) = quantities.iter().position(is_own) else {
+        return;
+    };
+    let Some(own) = quantities.get(first..first + 4) else {
+        return;
+    };
+    let estimate = together(own, |q| &q.estimate);
+    let truth = together(own, |q| &q.truth);
+    let rotation = Rotation {
+        name: name.to_owned(),
+        error: estimate.zip(truth).map(|(estimate, truth)| {
+            let angles = rows(&estimate).zip(rows(&truth));
+            let angles = angles.map(|(one, other)| angle_between(one, other));
+            Series::gathered(estimate[0].store(), angles)
+        }),
+        deviation: together(own, |q| &q.deviation).map(|sd| of_angle(&sd)),
+        smoothed_deviation: together(own, |q| &q.smoothed_deviation).map(|sd| of_angle(&sd)),
+        ..Rotation::default()
+    };
+    quantities[first].rotation = Some(Box::new(rotation));
+}
+
+/// Columns of the four numbers.
+fn together(own: &[Quantity], of: fn(&Quantity) -> &Option<Series>) -> Option<[&Series; 4]> {
+    let columns: Option<Vec<&Series>> = own.iter().map(|q| of(q).as_ref()).collect();
+    columns?.try_into().ok()
+}
+
+fn rows<'s>(columns: &[&'s Series; 4]) -> impl Iterator<Item = [f64; 4]> + use<'s> {
+    let mut columns = columns.map(Series::iter);
+    std::iter::from_fn(move || {
+        let row = columns.each_mut().map(Iterator::next);
+        row.iter()
+            .all(Option::is_some)
+            .then(|| row.map(Option::unwrap_or_default))
+    })
+}
+
+/// The deviation of the rotation's angle by those of the four numbers: |θ| = 2|δq|.
+fn of_angle(deviations: &[&Series; 4]) -> Series {
+    let angle = |sd: [f64; 4]| 2.0 * sd.iter().map(|x| x * x).sum::<f64>().sqrt();
+    Series::gathered(deviations[0].store(), rows(deviations).map(angle))
+}
+
+impl Rotation {
+    /// Gives its columns headers.
+    pub(crate) fn give_headers(&mut self, headers: &mut Headers) {
+        let what = format!("the deviation of the rotation {}", self.name);
+        if self.deviation.is_some() {
+            self.deviation_header = headers.free(&format!("{}_sd", self.name), &what);
+        }
+        if self.smoothed_deviation.is_some() {
+            let wanted = format!("{}_smooth_sd", self.name);
+            let what = format!("{what} given later rows");
+            self.smoothed_deviation_header = headers.free(&wanted, &what);
+        }
+    }
+}
