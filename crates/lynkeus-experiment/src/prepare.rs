@@ -194,6 +194,7 @@ impl<'a> Prepared<'a> {
     pub fn new(study: &'a Study, plant: &'a Plant) -> Result<Self, Error> {
         let mut augmented = seen_by(study, plant, &sensors(study, plant))?;
         let declared = Declared::new(study, plant)?;
+        manifold::refuse_ends(study, &declared, &augmented)?;
         let bounds = |input: &Variable| declared.input_derivatives.of(&input.name);
         augmented.input_derivatives = augmented
             .inputs

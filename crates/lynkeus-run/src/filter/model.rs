@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use lynkeus_expr::{Graph, Node};
 
+use super::belief::Belief;
 use crate::manifold::Manifold;
 use crate::noise::{Level, Limits, check_size};
 use crate::snapshot::Digest;
@@ -120,6 +121,14 @@ impl NoisyModel {
     pub fn on(mut self, manifold: Manifold) -> Self {
         self.manifold = manifold;
         self
+    }
+
+    /// Where a filter starts: its estimate, and the lower root of its covariance row by row.
+    #[must_use]
+    pub fn start(&self) -> (Vec<f64>, Vec<f64>) {
+        let start = self.flow.system().start();
+        let Belief { x, root } = Belief::on(&self.manifold, start, &self.initial_variance);
+        (x, root.entries)
     }
 
     /// The same with the numbers of a plant whose expressions are those of this one: where it starts, variances,

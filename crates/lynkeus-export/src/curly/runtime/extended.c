@@ -9,11 +9,11 @@ static truth believe(STATE *s, int i, const real *c, const real *before, real pr
     }
     project(s->root, c, i, projected);
 //? !limits
-    const real rest = s->readings[i] - predicted - moved;
+    const real rest = READING_HERE - predicted - moved;
     const real variance = noise;
 //?
 //? limits
-    real rest = shown_of(i, s->readings[i]) - predicted - moved;
+    real rest = shown_of(i, READING_HERE) - predicted - moved;
     real variance = noise;
     const real end = end_of(i, s->readings[i]);
     truth is_told = 1;
