@@ -6,7 +6,6 @@
 
 pub(crate) mod accuracy;
 pub(crate) mod assertions;
-pub(crate) mod curved;
 pub(crate) mod expected;
 pub(crate) mod frozen;
 pub mod interval;

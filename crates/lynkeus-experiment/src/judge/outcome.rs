@@ -9,13 +9,12 @@ use lynkeus_run::Error as RunError;
 use serde::Serialize;
 
 use crate::answer::Origin;
-use crate::course::Course;
 use crate::course::corrections::Corrections;
 use crate::course::doubt::Doubt;
 use crate::course::trace::Trace;
+use crate::course::{Course, curved};
 use crate::judge::accuracy::{self, Accuracy};
 use crate::judge::assertions;
-use crate::judge::curved;
 use crate::judge::frozen::Frozen;
 use crate::judge::interval::Intervals;
 use crate::judge::outside::{self, Outside, outside};
@@ -280,6 +279,7 @@ impl Raw<'_> {
         let watches = watches(&design, &mut course.monitors, &time, &mut headers);
         show_measurements(plant, &measurements, &mut quantities);
         expected::give(prepared.augmented(), &time, &mut quantities);
+        curved::place_expected(&mut quantities);
         let sides = outside::sides(prepared.augmented());
         let accuracies = accuracy::accuracies(&time, &quantities, &sides);
         notes.extend(accuracy::told(&accuracies));
@@ -599,6 +599,7 @@ fn show_measurements(
                 unit: output.unit.clone(),
                 description: output.description.clone(),
                 measured: Some(values.clone()),
+                home: output.home,
                 ..Quantity::default()
             }),
         }

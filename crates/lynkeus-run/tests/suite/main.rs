@@ -8,6 +8,7 @@ mod fleet;
 mod integration;
 mod likelihood;
 mod linear_plants;
+mod manifold;
 mod replay;
 mod second_opinion;
 mod simulation;

@@ -1,9 +1,13 @@
 //! Angles and rotations of a run as they are shown and compared.
 
 use lynkeus_model::{Home, Plant, Variable};
+use lynkeus_observers::{Estimate, Observer};
+use lynkeus_run::Role;
 use lynkeus_run::manifold::{angle_between, wrapped};
 
+use crate::course::Course;
 use crate::course::quantity::Rotation;
+use crate::course::recorded::Recorded;
 use crate::prepare::headers::Headers;
 use crate::prepare::manifold::firsts;
 use crate::{Quantity, Series};
@@ -65,6 +69,91 @@ pub(crate) fn place(
     }
 }
 
+/// Gives what is expected of measured angles that are no states their turn.
+pub(crate) fn place_expected(quantities: &mut [Quantity]) {
+    for quantity in quantities {
+        let Some(expected) = &quantity.expected else {
+            continue;
+        };
+        quantity.expected = match quantity.home {
+            Home::Circle { from: Some(from) } => Some(in_turn(expected, from)),
+            Home::Circle { from: None } => match &quantity.measured {
+                Some(readings) => Some(lifted(expected, readings)),
+                None => continue,
+            },
+            _ => continue,
+        };
+    }
+}
+
+/// Estimates as those of the same angles and rotations that are nearest to the true ones.
+pub(crate) fn beside_truth(
+    plant: &Plant,
+    observer: &Observer,
+    ran: &Recorded,
+    course: &mut Course,
+) {
+    let estimates = observer.estimates.iter().enumerate();
+    let truth = |e: &Estimate| {
+        let place = plant
+            .states
+            .iter()
+            .position(|s| s.node == e.variable.node)?;
+        ran.column(Role::State.at(place))
+    };
+    for (i, estimate) in estimates {
+        let home = estimate.variable.home;
+        let Some(own) = truth(estimate).filter(|_| home != Home::Line) else {
+            continue;
+        };
+        let smoothed = course.smoothed.iter_mut();
+        for columns in std::iter::once(&mut course.estimates).chain(smoothed) {
+            match home {
+                Home::Circle { .. } => columns[i] = lifted(&columns[i], own),
+                Home::Rotation { element: 0 } => {
+                    let all = observer.estimates.get(i..i + 4).unwrap_or_default();
+                    let known: Vec<&Series> = all.iter().filter_map(truth).collect();
+                    if let Ok(known) = <[&Series; 4]>::try_from(known) {
+                        take_sign(&mut columns[i..i + 4], &known);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Of a quaternion and its negative the one that is nearer to what is known.
+fn take_sign(columns: &mut [Series], known: &[&Series; 4]) {
+    let found: Vec<&Series> = columns.iter().collect();
+    let Ok(found) = <[&Series; 4]>::try_from(found) else {
+        return;
+    };
+    let along = |(one, other): ([f64; 4], [f64; 4])| -> f64 {
+        one.iter().zip(other).map(|(a, b)| a * b).sum()
+    };
+    let signs = || {
+        let pairs = rows(&found).zip(rows(known));
+        pairs
+            .map(along)
+            .map(|along| if along < 0.0 { -1.0 } else { 1.0 })
+    };
+    let turned = found.map(|own| {
+        let values = own.iter().zip(signs()).map(|(x, sign)| sign * x);
+        Series::gathered(own.store(), values)
+    });
+    for (column, turned) in columns.iter_mut().zip(turned) {
+        *column = turned;
+    }
+}
+
+/// The angle, in rad, between the rotations that columns of quaternions say.
+pub(crate) fn angles(one: &[&Series; 4], other: &[&Series; 4]) -> Series {
+    let angles = rows(one).zip(rows(other));
+    let angles = angles.map(|(one, other)| angle_between(one, other));
+    Series::gathered(one[0].store(), angles)
+}
+
 /// Angles in the turn that begins at an angle.
 fn in_turn(angles: &Series, from: f64) -> Series {
     const TURN: f64 = std::f64::consts::TAU;
@@ -76,13 +165,17 @@ fn in_turn(angles: &Series, from: f64) -> Series {
 
 /// Angles in the turns of others.
 fn beside(angles: &Option<Series>, others: &Option<Series>) -> Option<Series> {
-    let (angles, others) = (angles.as_ref()?, others.as_ref()?);
+    Some(lifted(angles.as_ref()?, others.as_ref()?))
+}
+
+/// The same of columns that are there.
+pub(crate) fn lifted(angles: &Series, others: &Series) -> Series {
     let pairs = angles.iter().zip(others);
     let lifted = pairs.map(|(angle, other)| match other.is_finite() {
         true => other + wrapped(angle - other),
         false => angle,
     });
-    Some(Series::gathered(angles.store(), lifted))
+    Series::gathered(angles.store(), lifted)
 }
 
 fn place_rotation(name: &str, quantities: &mut [Quantity]) {
@@ -100,11 +193,7 @@ fn place_rotation(name: &str, quantities: &mut [Quantity]) {
     let truth = together(own, |q| &q.truth);
     let rotation = Rotation {
         name: name.to_owned(),
-        error: estimate.zip(truth).map(|(estimate, truth)| {
-            let angles = rows(&estimate).zip(rows(&truth));
-            let angles = angles.map(|(one, other)| angle_between(one, other));
-            Series::gathered(estimate[0].store(), angles)
-        }),
+        error: estimate.zip(truth).map(|(one, other)| angles(&one, &other)),
         deviation: together(own, |q| &q.deviation).map(|sd| of_angle(&sd)),
         smoothed_deviation: together(own, |q| &q.smoothed_deviation).map(|sd| of_angle(&sd)),
         ..Rotation::default()
