@@ -113,6 +113,11 @@ pub enum Home {
         /// the values are shown in the turn that begins here; none where they are shown as they come
         from: Option<f64>,
     },
+    /// it changes its sign with a quaternion, which says the same as its negative
+    Signed {
+        /// place among the states of the first of the four numbers
+        of: usize,
+    },
     /// it is one of the four numbers of a unit quaternion, which says the same as its negative
     Rotation {
         /// its place among them; 0 is the scalar
@@ -125,7 +130,7 @@ impl Variable {
     #[must_use]
     pub fn width(&self) -> f64 {
         match self.home {
-            Home::Line => self.max - self.min,
+            Home::Line | Home::Signed { .. } => self.max - self.min,
             Home::Circle { .. } | Home::Rotation { .. } => std::f64::consts::TAU,
         }
     }

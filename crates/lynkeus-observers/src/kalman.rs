@@ -210,7 +210,7 @@ const VARIANCE: KeySpec = KeySpec {
         "table: name = number ≥ 0, and `default`",
         &Shape::Table(&Shape::NotNegative),
     ),
-    default: "the square of a quarter of the declared range (without a range: of the start value, or 1)",
+    default: "the square of a quarter of the declared range (without a range: of the start value, or 1; of an angle or a rotation: of a turn)",
     meaning: "how uncertain the first estimate is: the variance of each state and unknown input; `default` holds for everything not listed",
 };
 

@@ -7,6 +7,7 @@
 //! multiplication with q⁺⊗q̄, which keeps θ. So filters are those of multiplicative errors (F. L. Markley, *Journal of
 //! Guidance, Control, and Dynamics* 26 (2003) 311–317), and all that works on roots works on them.
 
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 /// Where the states of a plant and the readings of its sensors live; by default among the real numbers.
@@ -18,6 +19,8 @@ pub struct Manifold {
     pub rotations: Vec<usize>,
     /// the places of sensors that show an angle
     pub dials: Vec<usize>,
+    /// by quaternion the places of sensors that change their sign with it
+    pub mirrors: Vec<Vec<usize>>,
 }
 
 /// An angle in (−π, π], up to full turns.
@@ -65,6 +68,20 @@ impl Manifold {
             true => predicted + wrapped(reading - predicted),
             false => reading,
         }
+    }
+
+    /// Readings with the signs of what is expected, where a quaternion and its negative say the same.
+    pub(crate) fn signed<'r>(&self, readings: &'r [f64], expected: &[f64]) -> Cow<'r, [f64]> {
+        let mut signed = Cow::Borrowed(readings);
+        for mirror in &self.mirrors {
+            let read = mirror.iter().filter(|i| readings[**i].is_finite());
+            let along: f64 = read.map(|&i| readings[i] * expected[i]).sum();
+            if along < 0.0 {
+                let own = signed.to_mut();
+                mirror.iter().for_each(|&i| own[i] = -own[i]);
+            }
+        }
+        signed
     }
 
     /// Quaternions of length 1 in the place of those that came off the sphere.

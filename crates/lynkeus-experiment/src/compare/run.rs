@@ -174,14 +174,22 @@ fn judged(prepared: &Prepared<'_>, outcome: Outcome, seconds: f64) -> Run {
         let found = crate::course::filter::noise::scatter(&outcome.time, estimate, half)?;
         Some(found / width(q))
     });
+    // of a quaternion the angle of its rotation
+    let settled = |q: &Quantity| match (q.home, &q.rotation) {
+        (Home::Rotation { .. }, None) => None,
+        (_, Some(rotation)) => Some(Settled {
+            quantity: rotation.name.clone(),
+            rms: q.told_error().map(|(_, rms)| rms),
+            width: PI,
+        }),
+        (_, None) => Some(Settled {
+            quantity: q.name.clone(),
+            rms: q.settled_error(),
+            width: width(q),
+        }),
+    };
     Run {
-        settled: estimated()
-            .map(|q| Settled {
-                quantity: q.name.clone(),
-                rms: q.settled_error(),
-                width: width(q),
-            })
-            .collect(),
+        settled: estimated().filter_map(settled).collect(),
         peak: errors.peak().map(|peak| peak.2).filter(|_| is_known),
         settling: outcome
             .time

@@ -47,7 +47,7 @@ pub(crate) fn place(
             _ => {}
         }
     }
-    for (name, readings) in measurements {
+    for (name, readings) in measurements.iter_mut() {
         let output = plant.outputs.iter().find(|o| o.name == *name);
         let Some(Home::Circle { from }) = output.map(|o| o.home) else {
             continue;
@@ -64,8 +64,46 @@ pub(crate) fn place(
             (None, None) => readings.clone(),
         };
     }
-    for (_, name) in firsts(&plant.states) {
+    for (place, name) in firsts(&plant.states) {
+        turn_readings(plant, place, quantities, measurements);
         place_rotation(&name, quantities);
+    }
+}
+
+/// Readings that change their sign with a quaternion as those of its estimate, where they are its numbers.
+fn turn_readings(
+    plant: &Plant,
+    of: usize,
+    quantities: &[Quantity],
+    measurements: &mut [(String, Series)],
+) {
+    let output = |name: &str| plant.outputs.iter().find(|o| o.name == name);
+    let own: Vec<usize> = (0..measurements.len())
+        .filter(|&i| output(&measurements[i].0).is_some_and(|o| o.home == Home::Signed { of }))
+        .collect();
+    let estimate = |i: usize| {
+        let node = output(&measurements[i].0)?.node;
+        let state = plant.states.iter().find(|s| s.node == node)?;
+        let shown = quantities.iter().find(|q| q.name == state.name)?;
+        Some((measurements[i].1.iter(), shown.estimate.as_ref()?.iter()))
+    };
+    let mut pairs: Vec<_> = own.iter().filter_map(|&i| estimate(i)).collect();
+    if pairs.is_empty() {
+        return;
+    }
+    let rows = own.iter().map(|&i| measurements[i].1.len()).max();
+    let signs: Vec<f64> = (0..rows.unwrap_or(0))
+        .map(|_| {
+            let products = pairs.iter_mut();
+            let products = products.filter_map(|(y, x)| Some(y.next()? * x.next()?));
+            let along: f64 = products.filter(|p| p.is_finite()).sum();
+            if along < 0.0 { -1.0 } else { 1.0 }
+        })
+        .collect();
+    for i in own {
+        let readings = &mut measurements[i].1;
+        let signed = readings.iter().zip(&signs).map(|(y, sign)| sign * y);
+        *readings = Series::gathered(readings.store(), signed);
     }
 }
 

@@ -90,7 +90,7 @@ impl Quantity {
     pub fn errors(&self) -> Option<impl Iterator<Item = f64> + '_> {
         let (truth, estimate) = (self.truth.as_ref()?, self.estimate.as_ref()?);
         let difference = match self.home {
-            Home::Line => |off: f64| off,
+            Home::Line | Home::Signed { .. } => |off: f64| off,
             Home::Circle { .. } => wrapped,
             Home::Rotation { .. } => return None,
         };

@@ -180,9 +180,9 @@ impl<'s> Turns<'s> {
     fn place(&self, plant: &mut Plant) -> Result<(), Error> {
         for state in 0..plant.states.len() {
             match plant.states[state].home {
-                Home::Line => {}
+                Home::Line | Home::Signed { .. } => {}
                 Home::Circle { from } => self.place_circle(plant, state, from)?,
-                Home::Rotation { element: 0 } => self.check_rotation(plant, state)?,
+                Home::Rotation { element: 0 } => self.place_rotation(plant, state)?,
                 Home::Rotation { .. } => {}
             }
         }
@@ -249,10 +249,12 @@ impl<'s> Turns<'s> {
         Error::input(message).at(&self.study.file).hint(hint)
     }
 
-    fn check_rotation(&self, plant: &Plant, first: usize) -> Result<(), Error> {
+    fn place_rotation(&self, plant: &mut Plant, first: usize) -> Result<(), Error> {
         let name = array(&plant.states[first].name);
         let count = plant.derivatives.len();
         let own = first..first + 4;
+        // whether outputs are the same at -q, and whether they change their sign alone
+        let mut parities = vec![[true; 2]; plant.outputs.len()];
         let negate = |x: &mut [f64]| x[own.clone()].iter_mut().for_each(|q| *q = -*q);
         for place in &self.places {
             let Some([here, there]) = self.pair(place, negate) else {
@@ -273,8 +275,17 @@ impl<'s> Turns<'s> {
                 return Err(Error::input(message).at(&self.study.file).hint(hint));
             }
             for (i, (here, there)) in here.iter().zip(&there).enumerate() {
-                let expected = if own.contains(&i) { -there } else { *there };
-                if (here - expected).abs() > ROUNDING * (1.0 + here.abs()) {
+                let is_nothing = |off: f64| off.abs() <= ROUNDING * (1.0 + here.abs());
+                let parity = [is_nothing(here - there), is_nothing(here + there)];
+                let is_sound = match i.checked_sub(count) {
+                    None => parity[usize::from(own.contains(&i))],
+                    Some(output) => {
+                        let known = &mut parities[output];
+                        *known = [known[0] && parity[0], known[1] && parity[1]];
+                        known[0] || known[1]
+                    }
+                };
+                if !is_sound {
                     let what = match i.checked_sub(count) {
                         None => format!("der({})", plant.states[i].name),
                         Some(output) => plant.outputs[output].name.clone(),
@@ -289,6 +300,11 @@ impl<'s> Turns<'s> {
                     );
                     return Err(Error::input(message).at(&self.study.file).hint(hint));
                 }
+            }
+        }
+        for (output, [is_same, _]) in plant.outputs.iter_mut().zip(parities) {
+            if !is_same {
+                output.home = Home::Signed { of: first };
             }
         }
         Ok(())
@@ -348,10 +364,18 @@ fn array(element: &str) -> String {
 /// Where states and readings of a plant live.
 pub(crate) fn of(augmented: &AugmentedPlant<'_>) -> Manifold {
     let outputs = augmented.outputs.iter().enumerate();
-    let dials = outputs.filter(|(_, output)| is_circle(&output.variable));
+    let dials = outputs.clone();
+    let dials = dials.filter(|(_, output)| is_circle(&output.variable));
+    let own = of_states(&augmented.states);
+    let mirrors = own.rotations.iter().map(|of| {
+        let own = outputs.clone();
+        let own = own.filter(|(_, o)| o.variable.home == Home::Signed { of: *of });
+        own.map(|(place, _)| place).collect::<Vec<usize>>()
+    });
     Manifold {
         dials: dials.map(|(place, _)| place).collect(),
-        ..of_states(&augmented.states)
+        mirrors: mirrors.filter(|own| !own.is_empty()).collect(),
+        ..own
     }
 }
 

@@ -256,6 +256,7 @@ impl Machine {
             (confined.is_some(), "confined"),
             (has_rotations, "rotations"),
             (has_dials, "dials"),
+            (!model.manifold.mirrors.is_empty(), "mirrors"),
             (has_rotations && confined.is_some(), "curved_inside"),
             (!device.turns.is_empty(), "turns"),
             (device.deviations && !has_rotations, "each"),
@@ -338,12 +339,15 @@ impl Machine {
     /// Which states and sensors are angles or rotations.
     fn curved(&mut self, device: &Device<'_>, model: &NoisyModel) {
         let Manifold {
-            rotations, dials, ..
+            rotations,
+            dials,
+            mirrors,
+            ..
         } = &model.manifold;
         let (n, m) = (model.process_noise.len(), model.sensors.len());
         if !rotations.is_empty() {
             self.size("ROTATIONS", rotations.len());
-            self.tables += &places("rotations", rotations.iter().copied());
+            self.tables += &places("rotation_places", rotations.iter().copied());
             if device.deviations {
                 let element = |i: usize| {
                     let own = rotations.iter().find(|r| (**r..**r + 4).contains(&i));
@@ -355,6 +359,14 @@ impl Machine {
         if !dials.is_empty() {
             let is_dial = |i: usize| usize::from(dials.contains(&i));
             self.tables += &places("dials", (0..m).map(is_dial));
+        }
+        if !mirrors.is_empty() {
+            self.size("MIRRORS", mirrors.len());
+            let mirror = |i: usize| {
+                let own = mirrors.iter().position(|mirror| mirror.contains(&i));
+                own.unwrap_or(mirrors.len())
+            };
+            self.tables += &places("mirror_of", (0..m).map(mirror));
         }
         if !device.turns.is_empty() {
             self.size("TURNS", device.turns.len());
@@ -466,6 +478,7 @@ impl Machine {
             (has_limits, "limits"),
             (about.contains(&"rotations"), "rotations"),
             (about.contains(&"dials"), "dials"),
+            (about.contains(&"mirrors"), "mirrors"),
         ];
         let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
         let [parameter, argument] = match about.contains(&"rotations") {

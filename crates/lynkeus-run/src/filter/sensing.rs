@@ -89,7 +89,11 @@ impl Sensing {
         self.output_map
             .linearise(sample.t, &belief.x, sample.inputs)?;
         taken.clear();
-        for (i, reading) in sample.readings.iter().enumerate() {
+        let readings = self
+            .manifold
+            .signed(sample.readings, self.output_map.outputs())
+            .into_owned();
+        for (i, reading) in readings.iter().enumerate() {
             let spread = self.project(i, belief);
             let predicted = self.output_map.outputs()[i];
             taken.extend(self.judge(i, *reading, predicted, spread));

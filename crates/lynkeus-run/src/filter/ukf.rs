@@ -284,7 +284,8 @@ impl Ukf {
         self.show(sensing, &before, belief, sample)?;
         let m = sample.readings.len();
         let (mut inside, mut at_ends) = (vec![], vec![]);
-        for (i, reading) in sample.readings.iter().enumerate() {
+        let readings = self.manifold.signed(sample.readings, &self.expected);
+        for (i, reading) in readings.iter().enumerate() {
             let spread = self.weights.moment(&self.shown, m, i, i);
             let believed = sensing.judge(i, *reading, self.expected[i], spread);
             if let Some(believed) = believed.filter(|b| spread + b.variance > 0.0) {

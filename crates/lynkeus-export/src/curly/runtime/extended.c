@@ -65,6 +65,9 @@ static truth correct(STATE *s, double t)
     for (int i = 0; i < STATES; i++) {
         before[i] = s->x[i];
     }
+//? mirrors
+    take_signs(s, h);
+//?
     for (int i = 0; i < SENSORS; i++) {
         project(s->root, c, i, projected);
         const real spread = dot(projected, 0, projected, 0, STATES);

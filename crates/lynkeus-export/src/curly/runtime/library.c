@@ -504,7 +504,7 @@ static void restore(real *root)
 static void settle(real *x, real *root)
 {
     for (int r = 0; r < ROTATIONS; r++) {
-        const int q = rotations[r];
+        const int q = rotation_places[r];
         normalise(x, q);
         for (int k = 0; k < STATES; k++) {
             real along = R(0.0);
@@ -524,7 +524,7 @@ static void settle(real *x, real *root)
 static void retract(const real *before, real *x)
 {
     for (int r = 0; r < ROTATIONS; r++) {
-        const int q = rotations[r];
+        const int q = rotation_places[r];
         real squares = R(0.0);
         for (int i = 0; i < 4; i++) {
             squares += (x[q + i] - before[q + i]) * (x[q + i] - before[q + i]);
@@ -547,7 +547,7 @@ static void land(const real *before, real *x, real *root)
     real column[4];
     retract(before, x);
     for (int r = 0; r < ROTATIONS; r++) {
-        const int q = rotations[r];
+        const int q = rotation_places[r];
         for (int i = 0; i < 4; i++) {
             column[i] = before[q + i];
         }
@@ -573,7 +573,7 @@ static void land(const real *before, real *x, real *root)
 static void flatten(const real *about, real *x)
 {
     for (int r = 0; r < ROTATIONS; r++) {
-        const int q = rotations[r];
+        const int q = rotation_places[r];
         real along = R(0.0);
         for (int i = 0; i < 4; i++) {
             along += about[q + i] * x[q + i];
@@ -588,6 +588,25 @@ static void flatten(const real *about, real *x)
         const real share = sine > R(0.0) ? atan2(sine, side * along) / sine : R(1.0);
         for (int i = 0; i < 4; i++) {
             x[q + i] = about[q + i] + share * x[q + i];
+        }
+    }
+}
+
+//= take_signs
+/* Readings with the signs of what is expected, where a quaternion and its negative say the same. */
+static void take_signs(STATE *s, const real *expected)
+{
+    for (int r = 0; r < MIRRORS; r++) {
+        real along = R(0.0);
+        for (int i = 0; i < SENSORS; i++) {
+            if (mirror_of[i] == r && isfinite(s->readings[i])) {
+                along += s->readings[i] * expected[i];
+            }
+        }
+        for (int i = 0; i < SENSORS; i++) {
+            if (mirror_of[i] == r && along < R(0.0)) {
+                s->readings[i] = -s->readings[i];
+            }
         }
     }
 }

@@ -81,7 +81,7 @@ static void gather(real *points, real *x)
             point[i] = points[k * STATES + i];
         }
         for (int r = 0; r < ROTATIONS; r++) {
-            normalise(point, rotations[r]);
+            normalise(point, rotation_places[r]);
         }
         for (int i = 0; i < STATES; i++) {
             images[k * STATES + i] = point[i];
@@ -107,7 +107,7 @@ static void gather(real *points, real *x)
         moved = R(0.0);
         for (int r = 0; r < ROTATIONS; r++) {
             for (int i = 0; i < 4; i++) {
-                const real off = fabs(x[rotations[r] + i] - about[rotations[r] + i]);
+                const real off = fabs(x[rotation_places[r] + i] - about[rotation_places[r] + i]);
                 moved = off > moved ? off : moved;
             }
         }
@@ -255,6 +255,9 @@ static truth correct(STATE *s, double t)
     if (!show(s, t, BEFORE_ARGUMENTpoints, shown, h)) {
         return 0;
     }
+//? mirrors
+    take_signs(s, h);
+//?
     for (int i = 0; i < SENSORS; i++) {
         const real spread = shown_together(shown, i, i);
         believed[i] = judge(s, i, s->readings[i], h[i], spread, noises);
