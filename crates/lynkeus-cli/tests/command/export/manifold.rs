@@ -12,7 +12,7 @@ fn angles_and_rotations_are_those_of_estimate() {
         return skipped("gcc is not there");
     }
     let mut looked = vec![];
-    let mut seeds = [0, 1, 2, 3].into_iter().cycle();
+    let mut seeds = 0..;
     for (family, more) in [("ekf", "gate = 6"), ("ukf", "")] {
         for folder in [rotor(family, more), attitude(family, more), tracked(family)] {
             let log = folder.run(&["simulate", "s.toml", "--log", "log.csv", "-q"]);
@@ -28,7 +28,7 @@ fn angles_and_rotations_are_those_of_estimate() {
         "m.mo",
         &ROTOR.replace("min = -3.14159, max = 3.14159, ", ""),
     );
-    looked.push(look(2, folder).unwrap());
+    looked.push(look(7, folder).unwrap());
     let code = looked[1].folder.read("c/body.h");
     assert!(code.contains("q_sd") && !code.contains("q[1]_sd"), "{code}");
     rust::check(&looked);
