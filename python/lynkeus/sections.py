@@ -292,7 +292,11 @@ class ObserverSection(TypedDict, total=False):
 
     gate: Number | None
     """ekf, ukf, mhe: a reading whose innovation exceeds so many of its standard deviations is rejected and
-    counted; after ten in a row the next is believed (number > 0; default: none)"""
+    counted (number > 0; default: none)"""
+
+    gate_patience: Whole | None
+    """ekf, ukf, mhe: after so many rejections of a sensor in a row, at least half of which moved, its next
+    reading is believed (whole number ≥ 1; default: 10)"""
 
     bounds: Literal["project"] | None
     """ekf, ukf: "project": the estimate is kept in the declared ranges `[min, max]`: after each prediction
