@@ -5,6 +5,7 @@ pub mod calibrate;
 pub mod choice;
 pub mod correction;
 pub mod declared;
+mod dials;
 pub mod headers;
 pub(crate) mod manifold;
 pub(crate) mod mentioned;
@@ -194,7 +195,7 @@ impl<'a> Prepared<'a> {
     pub fn new(study: &'a Study, plant: &'a Plant) -> Result<Self, Error> {
         let mut augmented = seen_by(study, plant, &sensors(study, plant))?;
         let declared = Declared::new(study, plant)?;
-        manifold::refuse_ends(study, &declared, &augmented)?;
+        dials::refuse_ends(study, &declared, &augmented)?;
         let bounds = |input: &Variable| declared.input_derivatives.of(&input.name);
         augmented.input_derivatives = augmented
             .inputs

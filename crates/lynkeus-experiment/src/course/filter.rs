@@ -303,10 +303,10 @@ fn model(
         },
     };
     let mut densities = noise::densities(prepared, span, notes);
-    manifold::quartered(prepared, "[process_noise]", &mut densities)?;
+    quartered(prepared, "[process_noise]", &mut densities)?;
     let mut variances = tuning.initial_variance.clone();
     let key = "`initial_variance` of [observer]";
-    manifold::quartered(prepared, key, &mut variances)?;
+    quartered(prepared, key, &mut variances)?;
     let plant = NoisyPlant {
         graph: augmented.graph(),
         time: observer.time,
@@ -328,6 +328,25 @@ fn model(
     };
     let model = compiled(&plant).map_err(explain)?;
     Ok(model.on(manifold::of(augmented)))
+}
+
+/// One number for the four of each quaternion, as a quarter of what it is for the vector of a small rotation.
+///
+/// # Errors
+/// Numbers that differ.
+fn quartered(prepared: &Prepared<'_>, what: &str, values: &mut [f64]) -> Result<(), Error> {
+    for (place, name) in manifold::firsts(&prepared.augmented().states) {
+        let own = &mut values[place..place + 4];
+        if own.iter().any(|value| *value != own[0]) {
+            let message = format!(
+                "{what}: expected one number for the quaternion {name}, that of the vector of a small rotation, found different ones for its elements"
+            );
+            let hint = format!("write {name} = …");
+            return Err(Error::input(message).at(&prepared.study().file).hint(hint));
+        }
+        own.iter_mut().for_each(|value| *value *= 0.25);
+    }
+    Ok(())
 }
 
 /// The filter of a plant that is kept for many logs: compiled once, it has the numbers of each. The plant's graph has

@@ -8,11 +8,9 @@ use lynkeus_run::Manifold;
 use lynkeus_run::manifold::{unit, wrapped};
 use lynkeus_structure::AugmentedPlant;
 
-use crate::prepare::Prepared;
-use crate::prepare::declared::Declared;
 use crate::words::number;
 use crate::{Error, Study, near};
-use lynkeus_study::{Name, Noise};
+use lynkeus_study::Name;
 
 /// A declared range is a turn up to so much, in radians: its ends are written with a few digits.
 const SLACK: f64 = 5e-3;
@@ -390,7 +388,7 @@ pub(crate) fn of_states(states: &[Variable]) -> Manifold {
     }
 }
 
-fn is_circle(variable: &Variable) -> bool {
+pub(super) fn is_circle(variable: &Variable) -> bool {
     matches!(variable.home, Home::Circle { .. })
 }
 
@@ -413,61 +411,6 @@ pub(crate) fn started(states: &[Variable], starts: &mut [f64], whose: &str) -> R
             return Err(Error::input(message).hint(hint));
         };
         own.copy_from_slice(&q);
-    }
-    Ok(())
-}
-
-/// Refuses what is said of the readings of angles as if they were real numbers.
-///
-/// # Errors
-/// Ends of a range, a share of the value.
-pub(super) fn refuse_ends(
-    study: &Study,
-    declared: &Declared,
-    augmented: &AugmentedPlant<'_>,
-) -> Result<(), Error> {
-    let dials = augmented.outputs.iter().map(|o| &o.variable);
-    for dial in dials.filter(|variable| is_circle(variable)) {
-        let name = &dial.name;
-        let (key, why) = match (declared.limits.of(name), declared.noise.of(name)) {
-            (Some(_), _) => (
-                "limits",
-                "a full turn changes nothing there, so that it has no ends",
-            ),
-            (_, Some(Noise::Relative(_))) => {
-                ("noise", "a share of it says another noise after each turn")
-            }
-            _ => continue,
-        };
-        let message = format!("`{key}` of [sensors]: {name} is an angle by [manifold]: {why}");
-        let hint = match key {
-            "limits" => "leave it out, or take the angle out of `circle`".to_owned(),
-            _ => format!("give its standard deviation in rad: noise = {{ {name} = 0.01 }}"),
-        };
-        return Err(Error::input(message).at(&study.file).hint(hint));
-    }
-    Ok(())
-}
-
-/// One number for the four of each quaternion, as a quarter of what it is for the vector of a small rotation.
-///
-/// # Errors
-/// Numbers that differ.
-pub(crate) fn quartered(
-    prepared: &Prepared<'_>,
-    what: &str,
-    values: &mut [f64],
-) -> Result<(), Error> {
-    for (place, name) in firsts(&prepared.augmented().states) {
-        let own = &mut values[place..place + 4];
-        if own.iter().any(|value| *value != own[0]) {
-            let message = format!(
-                "{what}: expected one number for the quaternion {name}, that of the vector of a small rotation, found different ones for its elements"
-            );
-            let hint = format!("write {name} = …");
-            return Err(Error::input(message).at(&prepared.study().file).hint(hint));
-        }
-        own.iter_mut().for_each(|value| *value *= 0.25);
     }
     Ok(())
 }
