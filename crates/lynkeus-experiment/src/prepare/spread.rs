@@ -1,6 +1,6 @@
 //! Starts and parameters that differ from run to run: `spread` of `[simulate]`.
 
-use lynkeus_model::{Home, Plant};
+use lynkeus_model::{Home, Plant, Variable};
 use lynkeus_run::manifold::turned;
 use lynkeus_run::{System, deviate};
 
@@ -53,6 +53,14 @@ impl Spread {
                 })
             });
             let parameters: Vec<_> = parameters.collect();
+            let is_element =
+                |s: &Variable| matches!(s.home, Home::Rotation { .. }) && s.name == name.text;
+            if states().any(is_element) {
+                let message = format!(
+                    "`spread` of [simulate]: {name} is a number of a quaternion; write the array's name, for the vector of a small rotation"
+                );
+                return Err(name.blame(Error::input(message)));
+            }
             if states().next().is_none() && parameters.is_empty() {
                 return Err(unknown(plant, name));
             }
