@@ -128,16 +128,13 @@ fn a_rotor_that_turns_is_credible_and_exact() {
         let column = |name: &str| header.iter().position(|h| h == name).unwrap();
         for name in ["theta", "theta_hat", "theta_smooth"] {
             let values = rows.iter().map(|row| row[column(name)]);
-            assert!(
-                values.clone().all(|x| (-3.1416..3.1416).contains(&x)),
-                "{name}"
-            );
+            assert!(values.clone().all(|x| (-3.15..3.15).contains(&x)), "{name}");
             let turns = rows.windows(2);
             let turns = turns.filter(|w| (w[1][column(name)] - w[0][column(name)]).abs() > 3.0);
             assert!(turns.count() > 15, "{family}: {name}");
         }
         let (_, log) = csv(&folder.read("log.csv"));
-        assert!(log.iter().all(|row| row[1].abs() < 3.1416));
+        assert!(log.iter().all(|row| row[1].abs() < 3.15));
         let run = folder.run(&["estimate", "s.toml", "log.csv", "-o", "out.csv"]);
         assert_eq!(run.code, 0, "{family}: {}", run.err);
         // without [manifold] the same log is not credible
@@ -247,6 +244,9 @@ fn refused(folder: &Folder, command: &[&str], parts: &[&str]) {
     }
 }
 
+/// A file with a text and what stands in its place, the command, and parts of the message.
+type Refused<'t> = (&'t str, &'t str, &'t str, &'t [&'t str], &'t [&'t str]);
+
 /// What cannot be is refused at its place, with what to do.
 #[test]
 fn what_is_no_angle_and_no_rotation_is_refused() {
@@ -256,7 +256,7 @@ fn what_is_no_angle_and_no_rotation_is_refused() {
         folder
     };
     let simulate = &["simulate", "s.toml"][..];
-    let rotors: [(&str, &str, &str, &[&str], &[&str]); 8] = [
+    let rotors: [Refused<'_>; 8] = [
         (
             "s.toml",
             "[\"theta\"]",
@@ -326,7 +326,7 @@ fn what_is_no_angle_and_no_rotation_is_refused() {
     for (file, from, to, command, parts) in rotors {
         refused(&with(rotor("ekf", ""), file, from, to), command, parts);
     }
-    let bodies: [(&str, &str, &str, &[&str], &[&str]); 7] = [
+    let bodies: [Refused<'_>; 7] = [
         (
             "m.mo",
             "(start = {2, 0, 0, 0})",
