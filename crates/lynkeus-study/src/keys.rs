@@ -125,7 +125,7 @@ pub(super) const SECTIONS: [KeySpec; 12] = [
 const LEVEL: Shape = Shape::Either(&[Shape::NotNegative, Shape::Text, Shape::Section(&[&NOISE])]);
 
 /// `[sensors]`
-pub(super) const SENSORS: [KeySpec; 9] = [
+pub(super) const SENSORS: [KeySpec; 11] = [
     KeySpec {
         name: "limits",
         shape: Shape::As(
@@ -197,6 +197,18 @@ pub(super) const SENSORS: [KeySpec; 9] = [
         ),
         default: "none",
         meaning: "more equal cells of a log in a row than this are no readings from there on, until they change: the sensor is stuck",
+    },
+    KeySpec {
+        name: "delay",
+        shape: Shape::As("table: output = number", &Shape::Table(&Shape::NotNegative)),
+        default: "none",
+        meaning: "how much later than its sample is taken a reading comes, in the plant's unit of time: the reading in a row at t is of t less this ([late readings](#late-readings))",
+    },
+    KeySpec {
+        name: "taken_at",
+        shape: Shape::As("table: output = column", &Shape::Table(&Shape::Text)),
+        default: "none",
+        meaning: "the column of a log, or an expression of columns, that has the time at which the sample was taken whose result is the reading in that row: an assay that comes hours later ([late readings](#late-readings))",
     },
 ];
 

@@ -54,7 +54,7 @@ pub use generator::Generator;
 pub use log::{LogSettings, seconds_in};
 pub use observer::ObserverSettings;
 pub use schema::schema;
-pub use sensors::{Noise, Screen, Sensors, bias_of};
+pub use sensors::{Late, Noise, Screen, Sensors, bias_of};
 pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
 pub use tune::{Scale, Swept, TuneSettings, Values};

@@ -26,6 +26,7 @@ mod generated;
 mod hostile;
 mod how_well;
 mod known;
+mod late;
 mod limits;
 mod live;
 mod log_columns;

@@ -24,6 +24,7 @@ pub(crate) fn printed<T>(
     about: &[String],
     print: impl FnOnce(&Device<'_>, Vec<String>) -> Result<T, Refusal>,
 ) -> Result<T, Error> {
+    refuse_late(prepared)?;
     let told = Told::of(prepared, design, made);
     let first: Vec<FirstReading> = at_readings(prepared)
         .iter()
@@ -54,6 +55,21 @@ pub(crate) fn printed<T>(
     };
     print(&device, told.notes)
         .map_err(|refusal| Error::refused(refusal.to_string()).at(&study.file))
+}
+
+/// A device has no past to put a late reading in.
+fn refuse_late(prepared: &Prepared<'_>) -> Result<(), Error> {
+    let mut late = prepared.declared().late.iter();
+    let Some((name, late)) = late.next() else {
+        return Ok(());
+    };
+    let message = format!(
+        "`{}` of [sensors]: the readings of {name} come later than their samples are taken, and exported code takes each at the time of its row",
+        late.key()
+    );
+    Err(Error::refused(message).at(&prepared.study().file).hint(
+        "leave the key out and give the device each reading with the time of its sample before later rows; or run the estimator of the library, which goes back to it",
+    ))
 }
 
 /// The study without what looks ahead, which a device cannot.
