@@ -798,8 +798,14 @@ class Study(Batched):
         )
         return write(Path(folder), files, notes, force=force)
 
-    def estimator(self) -> _lynkeus.Estimator:
+    def estimator(self, *, wait: float = 0.0) -> _lynkeus.Estimator:
         """An estimator for samples that come one by one.
+
+        Parameters
+        ----------
+        wait : float
+            How much later than another a sample may come, in the model's unit of time: it is put in its place. The
+            readings of a sensor with a ``delay`` are put in theirs whatever this says.
 
         Returns
         -------
@@ -813,14 +819,14 @@ class Study(Batched):
         RefusedError
             No family fits, or a condition of the one that is asked for is refuted.
         """
-        return self._core.estimator(self)
+        return self._core.estimator(self, wait)
 
 
 def _restored(text: str, file: str, plant: tuple[str, str | None] | None, model: str | None) -> Study:
     return Study._of(_lynkeus.Study.parse(text, file, plant, model))
 
 
-def _resumed(study: Study, snapshot: bytes) -> _lynkeus.Estimator:
-    estimator = study.estimator()
+def _resumed(study: Study, snapshot: bytes, wait: float = 0.0) -> _lynkeus.Estimator:
+    estimator = study.estimator(wait=wait)
     estimator.restore(snapshot)
     return estimator

@@ -11,13 +11,11 @@ use crate::prepare::Prepared;
 use crate::prepare::headers::header;
 use crate::words::number;
 use crate::{Error, Series, Table};
+use lynkeus_run::is_of_row;
 use lynkeus_study::{BetweenSamples, Late, Name};
 
 /// Why a simulation does not count delays.
 pub(crate) const AT_ONCE: &str = "in a simulation every reading has come: it counts at the time of its sample, and only the simulated log has it late";
-
-/// Times that differ by less than so many roundings are one: t − delay does not meet the row that is meant to the bit.
-const ROUNDINGS: f64 = 4.0;
 
 /// Where the rows of a log are among those that an estimator goes through.
 #[derive(Clone, Debug)]
@@ -40,14 +38,8 @@ struct Taken {
 }
 
 impl Taken {
-    /// How far from `t` is as good as at `t`.
-    fn roundings(&self, t: f64) -> f64 {
-        let largest = self.at.abs().max(self.came.abs()).max(t.abs());
-        ROUNDINGS * f64::EPSILON * largest
-    }
-
     fn is_at(&self, t: f64) -> bool {
-        (self.at - t).abs() <= self.roundings(t)
+        is_of_row(self.at, t, self.came)
     }
 }
 
