@@ -75,6 +75,7 @@ __all__ = [
     "Range",
     "Rank",
     "Record",
+    "Revised",
     "RunEntries",
     "RunReport",
     "SamplingLimits",

@@ -12,7 +12,7 @@ pub(super) use judged::{CANDIDATE, COMPARE, FIT, PLOT, PRIOR, RANGE, TUNE};
 const EXPRESSION: Shape = Shape::Either(&[Shape::Number, Shape::Text]);
 
 /// The keys of the top level.
-pub(super) const KEYS: [KeySpec; 4] = [
+pub(super) const KEYS: [KeySpec; 5] = [
     KeySpec {
         name: "plant",
         shape: Shape::Text,
@@ -36,6 +36,12 @@ pub(super) const KEYS: [KeySpec; 4] = [
         shape: Shape::Word(&["linear", "monotone"]),
         default: "`\"linear\"`",
         meaning: "what the plant's [tables](modelica.md#tables) are between their points: straight lines, or monotone cubics, whose slopes do not jump",
+    },
+    KeySpec {
+        name: "delay_states",
+        shape: Shape::Whole(1),
+        default: "6",
+        meaning: "states that hold the last of what the plant [delays](modelica.md#delays), for each `delay`: at most 10",
     },
 ];
 

@@ -194,7 +194,7 @@ fn every_command_moves_late_readings() {
     let folder = Folder::empty();
     folder.write("plant.mo", PLANT);
     let (late, sorted) = logs(7);
-    let fit = "[fit]\nnoise = [\"a\"]\n[tune]\nprocess_noise = { q = [0.005, 0.02] }\n";
+    let fit = "[fit]\nnoise = [\"a\"]\n";
     folder.write("late.csv", &late);
     folder.write("sorted.csv", &sorted);
     folder.write(
