@@ -6,6 +6,7 @@ mod bias;
 mod certify;
 mod compare;
 mod credible;
+mod delays;
 mod export;
 mod families;
 mod faulty;
