@@ -18,7 +18,7 @@ from ._logs import given, given_each
 from ._lynkeus import MEMORY
 from ._progress import Progress, Terms, told
 from ._toml import document, valid
-from ._types import ListOf, LogLike, Names, Number, Numbers
+from ._types import ListOf, LogLike, Names, Number, Numbers, Whole
 from .errors import InputError, LimitError
 from .likelihood import Likelihood, likelihood
 from .systems import Functions, Observer
@@ -89,6 +89,8 @@ class Study(Batched):
         The section ``[compare]``, or the names of families.
     tables : str, optional
         ``"linear"`` or ``"monotone"``: what the model's tables are between their points.
+    delay_states : int, optional
+        States that hold each delay of the model, at most 10.
 
     Raises
     ------
@@ -137,9 +139,11 @@ class Study(Batched):
         compare: CompareSection | Names | None = None,
         plot: PlotSection | None = None,
         tables: Literal["linear", "monotone"] | None = None,
+        delay_states: Whole | None = None,
     ) -> None:
         given = {
             "tables": tables,
+            "delay_states": delay_states,
             "sensors": sensors,
             "process_noise": process_noise,
             "parameters": parameters,

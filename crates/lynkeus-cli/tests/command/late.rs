@@ -188,6 +188,65 @@ fn a_delay_is_undone() {
     );
 }
 
+/// A vehicle whose accelerometer is read at once and whose GPS 0.6 s late: at 2.3 m/s the delay is 1.4 m.
+#[test]
+fn a_late_gps_no_longer_shifts_a_vehicle() {
+    let folder = Folder::empty();
+    folder.write(
+        "plant.mo",
+        "model Vehicle
+  input Real a;
+  Real s(start = 0);
+  Real v(start = 0);
+  output Real gps = s;
+equation
+  der(s) = v;
+  der(v) = a;
+end Vehicle;
+",
+    );
+    let study = |sensors: &str| {
+        format!(
+            "plant = \"plant.mo\"\nprocess_noise = {{ v = 1e-3 }}\n[sensors]\nnoise = {{ gps = 0.3 }}\n{sensors}\n[observer]\nfamily = \"ekf\"\n"
+        )
+    };
+    let mut random = Normal(3);
+    let (mut s, mut v) = (vec![], 0.0);
+    let mut text = "t,gps,a\n".to_owned();
+    let mut at = 0.0;
+    for k in 0..600 {
+        let t = f64::from(k) / 10.0;
+        let a = if t < 2.3 { 1.0 } else { 0.0 };
+        s.push(at);
+        // a fix a second, of 0.6 s ago
+        let fix = match k >= 6 && k % 10 == 0 {
+            true => format!("{}", s[k as usize - 6] + 0.3 * random.next()),
+            false => String::new(),
+        };
+        text += &format!("{t},{fix},{a}\n");
+        at += 0.1 * v + 0.005 * a;
+        v += 0.1 * a;
+    }
+    folder.write("log.csv", &text);
+    let shift = |sensors: &str| -> f64 {
+        folder.write("study.toml", &study(sensors));
+        let ended = folder.run(&["estimate", "study.toml", "log.csv"]);
+        assert!(ended.code < 2, "{}", ended.err);
+        let (header, rows) = crate::csv(&ended.out);
+        let place = header.iter().position(|name| name == "s_hat").unwrap();
+        let late = rows.iter().zip(&s).skip(200);
+        late.map(|(row, s)| row[place] - s).sum::<f64>() / 400.0
+    };
+    let as_it_came = shift("");
+    let undone = shift("delay = { gps = 0.6 }");
+    // what is left is the noise of 40 fixes
+    assert!(undone.abs() < 0.2, "{undone}");
+    assert!(
+        (undone - as_it_came - 1.38).abs() < 0.1,
+        "{as_it_came} {undone}"
+    );
+}
+
 /// The tables of every command are over the rows of the log, with the readings at their own times.
 #[test]
 fn every_command_moves_late_readings() {

@@ -30,7 +30,7 @@ fn study(family: &str, delays: &str) -> String {
 
 /// Rows at any times, of which some readings are missing, and inputs but in the first rows, too.
 fn log(random: &mut Normal) -> Vec<String> {
-    let mut t = 0.0;
+    let mut t: f64 = 0.0;
     let rows = (0..120).map(|k| {
         let mut maybe = |share: f64, value: f64| match random.uniform() < share {
             true => format!("{value:?}"),

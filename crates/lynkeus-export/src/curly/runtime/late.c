@@ -140,6 +140,9 @@ static int take_late(@NAME@_state *s, double t, const @REAL@ *signals, @REAL@ *e
         && !(s->count > 0 && is_of_row(arrived[0].t, s->rows[0].t, t))) {
         return @CAPITALS@_ROOM;
     }
+    for (int i = 0; i < @CAPITALS@_SIGNALS; i++) {
+        were[i] = (@REAL@)NAN;
+    }
     from = s->count;
     for (int a = 0; a < count; a++) {
         arrival *own = &arrived[a];
@@ -169,6 +172,7 @@ static int take_late(@NAME@_state *s, double t, const @REAL@ *signals, @REAL@ *e
     begin_with_inputs(s);
     code = again(s, from, estimates);
     if (code != 0) {
+        /* out again, the last that came first */
         @REAL@ told[@CAPITALS@_ESTIMATES];
         for (int i = 0; i < @CAPITALS@_SIGNALS; i++) {
             s->rows[arrived[count - 1].place].signals[i] = were[i];
