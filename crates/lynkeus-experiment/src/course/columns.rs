@@ -111,6 +111,23 @@ pub struct Log<'t> {
 }
 
 impl Log<'_> {
+    /// Whether readings are late, so that its samples have rows between its own.
+    #[must_use]
+    pub fn is_late(&self) -> bool {
+        self.interleaved.is_some()
+    }
+
+    /// Its samples, in its own rows alone.
+    #[must_use]
+    pub fn own_samples(&self) -> Samples {
+        let own = |columns: &[Series]| columns.iter().map(|column| self.own(column)).collect();
+        Samples {
+            time: self.own(&self.samples.time),
+            readings: own(&self.samples.readings),
+            inputs: own(&self.samples.inputs),
+        }
+    }
+
     /// A column of the log over the rows of its samples, NaN in those between its own.
     pub(crate) fn spread(&self, column: &Series) -> Series {
         match &self.interleaved {
