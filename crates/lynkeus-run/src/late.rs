@@ -287,10 +287,10 @@ impl Late {
     fn begin(&self, rows: &mut [Row]) {
         let inputs = self.estimator.sensors()..self.estimator.signals().len();
         for input in inputs {
-            let known = rows
+            let mut known = rows
                 .iter()
                 .filter_map(|row| row.signals.get(input).copied());
-            let known = known.filter(|u| u.is_finite()).next();
+            let known = known.find(|u| u.is_finite());
             if let (Some(first), Some(known)) = (rows.first_mut(), known)
                 && let Some(own) = first.signals.get_mut(input)
                 && !own.is_finite()
