@@ -226,25 +226,34 @@ impl<'t> Begun<'t> {
         let Self { design, log } = self;
         let (study, samples) = (prepared.study(), &log.samples);
         let settings = &study.estimate;
-        let rows = course.estimates.first().map_or(0, Series::len);
+        let done = |course: &Course| course.estimates.first().map_or(0, Series::len);
+        let all = done(&course);
         settle(
             &mut course,
-            rows,
+            all,
             study,
             &log.table.place(),
             is_observers_answer,
         )?;
         let intervals = interval::intervals(prepared, &design, samples, &course);
+        if let Some(among) = &log.interleaved {
+            among.thin(&mut course);
+        }
+        let rows = done(&course);
         let logged = |name: &str| {
             let values = columns::logged(&log.table, settings, &log.time, name)?;
             Some(values.shortened(rows))
         };
-        // cells that are no readings show nothing
-        let screened = |name: &str| {
-            prepared.declared().screens.of(name)?;
+        // cells that are no readings show nothing, and late ones stand where their samples were taken
+        let counted = |name: &str| {
+            let declared = prepared.declared();
+            let is_screened = declared.screens.of(name).is_some();
+            if !is_screened && declared.late.of(name).is_none() {
+                return None;
+            }
             let mut outputs = prepared.augmented().outputs.iter();
             let place = outputs.position(|output| output.variable.name == name)?;
-            Some(samples.readings.get(place)?.shortened(rows))
+            Some(log.own(samples.readings.get(place)?).shortened(rows))
         };
         let estimated = design.observer.estimates.iter().enumerate();
         let estimated = estimated.map(|(i, e)| {
@@ -275,14 +284,14 @@ impl<'t> Begun<'t> {
         let raw = Raw {
             intervals,
             frozen: hanging(prepared, &design.observer, samples),
-            time: samples.time.shortened(rows),
+            time: log.own(&samples.time).shortened(rows),
             origin: log.table.start(&log.time).map(|instant| Origin {
                 instant,
                 unit: settings.log.seconds(),
             }),
             quantities: estimated.into_iter().chain(known).collect(),
             measurements: measurements(&design, |signal| {
-                screened(&signal.name).or_else(|| logged(&signal.name))
+                counted(&signal.name).or_else(|| logged(&signal.name))
             }),
             replayed: true,
             notes,

@@ -88,6 +88,7 @@ fn load(study: &Study, symbols_but: Option<BTreeSet<String>>) -> Result<Plant, E
         symbolic_parameters: symbols_but.is_some(),
         numbers: symbols_but.unwrap_or_default(),
         tables: study.tables,
+        delay_states: study.delay_states,
         budget: study.budget.clone(),
     };
     let plant = match &study.plant_text {

@@ -33,6 +33,8 @@ pub struct Plant {
     /// what the points of tables are made of that is no number, such as parameters that stay symbolic:
     /// that the points increase is not known
     pub table_points: BTreeSet<Node>,
+    /// what is delayed, of which the last of it is held by a few states
+    pub delays: Vec<Delay>,
     /// what must hold along every run, in order of the text
     pub assertions: Vec<Assertion>,
     /// what the text says that has no effect here, or that looks wrong
@@ -53,10 +55,22 @@ impl Plant {
             algebraics: vec![],
             parameters: vec![],
             table_points: BTreeSet::new(),
+            delays: vec![],
             assertions: vec![],
             warnings: vec![],
         }
     }
+}
+
+/// A `delay` of the model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Delay {
+    /// as it stands in the text
+    pub text: String,
+    /// the names of its states begin so
+    pub states: String,
+    /// how many there are
+    pub count: usize,
 }
 
 /// An `assert` of the model.
@@ -153,6 +167,9 @@ pub struct LoadOptions {
     pub numbers: BTreeSet<String>,
     /// what tables are between their points
     pub tables: Tables,
+    /// states of each delay, from 1 to [`MAX_DELAY_STATES`](crate::MAX_DELAY_STATES); without it
+    /// [`DELAY_STATES`](crate::DELAY_STATES)
+    pub delay_states: Option<usize>,
     /// when to stop; the graph of the plant keeps it
     pub budget: Budget,
 }

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use lynkeus_expr::{Graph, MissingInput, Node, jacobian};
 use lynkeus_model::{Plant, Variable};
 
+use crate::Reason;
 use crate::{Dimension, Finding, Region, regularity, steps};
 
 /// Who measures what.
@@ -231,11 +232,18 @@ impl<'p> AugmentedPlant<'p> {
     }
 
     /// Whether f and h have values on the whole of a box and jump nowhere as the states
-    /// move: what every condition and every proof on that box takes for granted.
+    /// move: what every condition and every proof on that box takes for granted. Of a plant with a delay
+    /// nothing is proved: the states that hold it are not all of it.
     ///
     /// # Errors
     /// [`MissingInput`] where the plant has parameters without value.
     pub fn regularity(&self, region: &Region) -> Result<Finding, MissingInput> {
+        if let Some(delay) = self.plant.delays.first() {
+            return Ok(Finding::undecided(Reason::Delayed {
+                delay: delay.text.clone(),
+                states: delay.count,
+            }));
+        }
         let all = [self.derivatives.clone(), self.output_nodes()].concat();
         regularity(self.graph(), &all, &self.symbols(), region)
     }

@@ -21,7 +21,7 @@ const INTERPOLATE: &str = "Modelica.Math.Vectors.interpolate";
 type Function = for<'e, 'a> fn(&'e mut Evaluator<'a>, &'a Call) -> Result<Value>;
 
 /// By name: what an evaluator `e` makes of a call `c`.
-const FUNCTIONS: [(&str, Function); 47] = [
+const FUNCTIONS: [(&str, Function); 48] = [
     ("sqrt", |e, c| e.each(c, |x| x.sqrt())),
     ("exp", |e, c| e.each(c, |x| x.exp())),
     ("log", |e, c| e.each(c, |x| x.ln())),
@@ -47,6 +47,7 @@ const FUNCTIONS: [(&str, Function); 47] = [
     ("min", |e, c| e.extreme(c, i64::min, |a, b| a.min(b))),
     ("max", |e, c| e.extreme(c, i64::max, |a, b| a.max(b))),
     ("der", |e, c| e.der(c)),
+    ("delay", |e, c| e.delay(c)),
     ("noEvent", |e, c| e.only_argument(c)),
     ("smooth", |e, c| Ok(e.two_arguments(c)?.1)),
     ("homotopy", |e, c| Ok(e.two_arguments(c)?.0)),
@@ -74,7 +75,7 @@ const FUNCTIONS: [(&str, Function); 47] = [
 const NO_EVENTS: &str = "models with events are not supported: use `if` expressions";
 
 /// Functions that an observer's model cannot have, and what to do instead.
-const REFUSED: [(&str, &str); 10] = [
+const REFUSED: [(&str, &str); 9] = [
     ("pre", NO_EVENTS),
     ("edge", NO_EVENTS),
     ("change", NO_EVENTS),
@@ -83,10 +84,9 @@ const REFUSED: [(&str, &str); 10] = [
     ("terminal", "models with events are not supported"),
     ("reinit", "models with events are not supported"),
     (
-        "delay",
-        "a delay has infinitely many states: use a chain of lags",
+        "spatialDistribution",
+        "use `delay` where the flow is constant, or a chain of lags",
     ),
-    ("spatialDistribution", "use a chain of lags"),
     ("assert", "it is an equation or a statement of its own"),
 ];
 

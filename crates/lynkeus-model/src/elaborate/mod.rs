@@ -6,6 +6,7 @@ mod arrays;
 mod assemble;
 mod calls;
 mod declare;
+mod delay;
 mod evaluate;
 mod execute;
 mod flatten;
@@ -28,6 +29,7 @@ use crate::{LoadOptions, Plant};
 use scope::Mode;
 use symbols::{Names, Symbols};
 
+pub use delay::{DELAY_STATES, MAX_DELAY_STATES};
 pub(crate) use evaluate::Evaluator;
 
 /// The plant of a Modelica text, with what looks wrong in it.

@@ -6,6 +6,7 @@ mod common;
 mod coverage;
 mod fleet;
 mod integration;
+mod late;
 mod likelihood;
 mod linear_plants;
 mod replay;

@@ -139,9 +139,14 @@ fn account(declared: &Declared, counts_process_noise: bool) -> Account {
         slew,
         input_derivatives,
         screens,
+        late,
     } = declared;
     Account::default()
         .leaves(screens, "they are of logs: every simulated reading counts")
+        .leaves(
+            late,
+            "what is known counts each reading at the time of its sample, and is known once it has come",
+        )
         .counts(ranges)
         .counts(noise)
         .counts(limits)
