@@ -38,6 +38,7 @@ struct Filter {
     called: &'static str,
     keys: &'static [&'static [KeySpec]],
     smooths: bool,
+    follows_jumps: bool,
     kind: fn(&Tuning) -> Result<FilterKind, TuningError>,
 }
 
@@ -48,6 +49,7 @@ pub const EKF: &dyn Family = &Filter {
     called: "extended Kalman filter",
     keys: &[&KEYS, &BOUNDS],
     smooths: true,
+    follows_jumps: true,
     kind: |_| Ok(FilterKind::Extended),
 };
 
@@ -58,6 +60,7 @@ pub const UKF: &dyn Family = &Filter {
     called: "unscented Kalman filter",
     keys: &[&KEYS, &BOUNDS, &POINTS],
     smooths: false,
+    follows_jumps: false,
     kind: |tuning| {
         let SigmaPoints { alpha, beta, kappa } = SigmaPoints::default();
         let [own_alpha, own_beta, own_kappa] = &POINTS;
@@ -76,6 +79,7 @@ pub const MHE: &dyn Family = &Filter {
     called: "moving-horizon estimator",
     keys: &[&KEYS, &WINDOW],
     smooths: false,
+    follows_jumps: false,
     kind: |tuning| {
         let [horizon] = &WINDOW;
         let length = match number(tuning, horizon)? {
@@ -127,6 +131,7 @@ impl Filter {
             gate: tuning.positive(GATE.name)?,
             projects: projects(tuning)?,
             outputs: copy.at_estimate(&outputs),
+            whens: copy.whens(),
             confined,
             initial_variance: variance.clone(),
         });
@@ -169,6 +174,10 @@ impl Family for Filter {
 
     fn smooths(&self) -> bool {
         self.smooths
+    }
+
+    fn follows_jumps(&self) -> bool {
+        self.follows_jumps
     }
 
     fn verify(&self, augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<(), TuningError> {

@@ -125,7 +125,7 @@ pub use dynamics::{Dynamics, Events, Function};
 pub(crate) use error::Result;
 pub use error::{Error, Interrupted, Margin};
 pub use estimator::Estimator;
-pub use events::{Guards, first_jump};
+pub use events::{Cause, Clauses, Guards, Memory, Seen, first_jump};
 pub use fleet::{Apart, Fleet};
 pub use integrator::{Integrator, Rk4, StepAdvice};
 pub use jacobian::{Fastest, spectral_radius};

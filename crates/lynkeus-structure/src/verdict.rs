@@ -109,6 +109,11 @@ pub enum Reason {
         /// the part
         place: Place,
     },
+    /// the state jumps at events
+    StateJumps {
+        /// line of the first `when`
+        line: usize,
+    },
     /// the values of an expression lie in a range
     Lies {
         /// as a person would write it

@@ -294,7 +294,8 @@ fn model(
         process_noise: noise::densities(prepared, span, notes),
         initial_variance: tuning.initial_variance.clone(),
         ranges: augmented.states.iter().map(range).collect(),
-        confined: Some(tuning.confined.clone()),
+        confined: tuning.whens.is_empty().then(|| tuning.confined.clone()),
+        whens: tuning.whens.clone(),
     };
     compiled(&plant).map_err(explain)
 }
@@ -335,6 +336,10 @@ fn compiled(plant: &NoisyPlant<'_>) -> Result<NoisyModel, lynkeus_run::Error> {
     nodes.push(vec![plant.time]);
     nodes.push(plant.derivatives.clone());
     nodes.extend(plant.confined.clone());
+    for clause in &plant.whens.clauses {
+        let (changed, values) = clause.changes.iter().copied().unzip();
+        nodes.extend([clause.conditions.clone(), changed, values]);
+    }
     let asked = Asked { nodes, names };
     let mut known = known.0.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((own, model)) = &*known

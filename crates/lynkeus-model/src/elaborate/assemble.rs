@@ -6,6 +6,7 @@ use std::collections::{HashMap, HashSet};
 use lynkeus_expr::{Binary, Graph, Interval, Node, Tape, Unary, jacobian};
 
 use super::evaluate::Evaluator;
+use super::events;
 use super::flatten::Flat;
 use super::scope::Mode;
 use super::symbols::{Component, Symbols, is_outer_input};
@@ -40,6 +41,14 @@ pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec
             parameters(graph, declaration, component, elements, &mut plant);
         }
     }
+    let held = events::held(&flat.clauses);
+    for state in plant.states.iter_mut().filter(|s| held.contains(&s.node)) {
+        state.discrete = true;
+        state.fixed = true;
+        state.start = state.start.or(Some(0.0));
+    }
+    let states: Vec<Node> = plant.states.iter().map(|state| state.node).collect();
+    plant.whens = events::whens(symbols, &flat.clauses, &solution, &states)?;
     let mut warnings = fix_starts(symbols, &flat, &solution, &mut plant.states);
     let found = assertions(graph, flat.claims, &solution);
     warnings.extend(failing_at_start(symbols, &found, &plant));

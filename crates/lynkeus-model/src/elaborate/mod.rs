@@ -7,6 +7,7 @@ mod assemble;
 mod calls;
 mod declare;
 mod evaluate;
+mod events;
 mod execute;
 mod flatten;
 mod functions;

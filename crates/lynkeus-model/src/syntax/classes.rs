@@ -265,14 +265,10 @@ impl Parser<'_> {
     }
 
     fn refuse_unsupported_element(&self) -> Result<()> {
-        const TAKEN: &str = ". final parameter constant input output flow stream enumeration";
+        const TAKEN: &str = ". final parameter constant discrete input output flow stream enumeration";
         Err(match self.token {
             Token::Identifier => return Ok(()),
             Token::Fixed(word) if TAKEN.split(' ').any(|taken| taken == word) => return Ok(()),
-            Token::Fixed("discrete") => {
-                let hint = "only continuous variables are supported";
-                self.refuse("a `discrete` variable", hint)
-            }
             Token::Fixed("inner" | "outer") => self.refuse("`inner`/`outer`", HOW_TO_FLATTEN),
             Token::Fixed("redeclare" | "replaceable") => {
                 self.refuse("a replaceable element", HOW_TO_FLATTEN)
@@ -291,6 +287,7 @@ impl Parser<'_> {
             match word {
                 "parameter" => declaration.variability = Variability::Parameter,
                 "constant" => declaration.variability = Variability::Constant,
+                "discrete" => declaration.is_discrete = true,
                 "input" => declaration.causality = Causality::Input,
                 "output" => declaration.causality = Causality::Output,
                 "flow" | "stream" => declaration.of_connector = Some(self.span),

@@ -8,6 +8,7 @@ mod extract;
 mod filippov;
 mod guards;
 mod time;
+mod when;
 
 pub use extract::first_jump;
 pub(crate) use extract::{bends, state_events, time_events};
@@ -15,3 +16,5 @@ pub(crate) use filippov::{Filippov, Jump, Sides, Span};
 pub use guards::Guards;
 pub(crate) use guards::{Ahead, COEFFICIENTS, Poly, Surface};
 pub(crate) use time::TimeEvents;
+pub use when::{Cause, Clauses, Memory, Seen};
+pub(crate) use when::{JumpSlopes, WhenRoots, occur, rates, saltation};
