@@ -265,7 +265,7 @@ impl<'a> Prepared<'a> {
         if !self.plant().whens.is_empty() {
             families.retain(|family| family.follows_jumps());
             if families.is_empty() {
-                return Err(whens::refused(self.study, self.plant(), whens::Part::Family));
+                return Err(whens::no_family(self.study, self.plant()));
             }
         }
         let mut found = vec![];

@@ -282,6 +282,10 @@ fn projects(tuning: &Tuning) -> Result<bool, TuningError> {
 /// The square of a quarter of the range: two standard deviations reach its ends. Without a range, that of
 /// the start value, or 1.
 pub fn prior_variance(state: &Variable, start: f64) -> f64 {
+    // what changes at events alone is known until then
+    if state.discrete {
+        return 0.0;
+    }
     let width = state.max - state.min;
     match width.is_finite() && width > 0.0 {
         true => (width / 4.0).powi(2),

@@ -4,38 +4,33 @@ use lynkeus_model::Plant;
 
 use crate::{Error, Study};
 
-/// A part of the tool that takes plants whose state never jumps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// a family of observers
-    Family,
-    /// what this command, or this part of one, makes of the plant
-    Command(&'static str),
-}
-
-/// That a plant's state never jumps.
+/// That a plant's state never jumps; `what` takes no other.
 ///
 /// # Errors
 /// The line of the first `when`.
-pub fn refuse(study: &Study, plant: &Plant, part: Part) -> Result<(), Error> {
-    match plant.whens.is_empty() {
-        true => Ok(()),
-        false => Err(refused(study, plant, part)),
+pub fn refuse(study: &Study, plant: &Plant, what: &str) -> Result<(), Error> {
+    match plant.whens.clauses.first() {
+        None => Ok(()),
+        Some(clause) => Err(refused(study, plant, clause.line, what)),
     }
 }
 
-pub(super) fn refused(study: &Study, plant: &Plant, part: Part) -> Error {
-    let lines = plant.whens.lines();
-    let line = lines.first().copied().unwrap_or_default();
-    let subject = match (part, &study.observer.family) {
-        (Part::Command(what), _) => what.to_owned(),
-        (Part::Family, Some(name)) => format!("family = \"{}\"", name.text),
-        (Part::Family, None) => "this observer".to_owned(),
-    };
+/// None of the families that the study allows goes along.
+pub(super) fn no_family(study: &Study, plant: &Plant) -> Error {
+    let line = plant.whens.clauses.first().map_or(0, |clause| clause.line);
+    let named = study.observer.family.as_ref();
+    let what = named.map_or_else(
+        || "this observer".to_owned(),
+        |name| format!("family = \"{}\"", name.text),
+    );
+    refused(study, plant, line, &what)
+}
+
+fn refused(study: &Study, plant: &Plant, line: usize, what: &str) -> Error {
     let model = &plant.name;
     let message = format!(
-        "{subject}: the state of '{model}' jumps at events (`when` of line {line}), which this does not follow"
+        "{what}: the state of '{model}' jumps at events (`when` of line {line}), which this does not follow"
     );
-    let hint = "family = \"ekf\" follows them, with its smoother; `simulate` does without an observer";
+    let hint = "`simulate` and `estimate` with family = \"ekf\" follow them, its smoother too";
     Error::refused(message).at(&study.file).hint(hint)
 }

@@ -341,12 +341,15 @@ fn fix_starts(
     let graph = symbols.graph;
     let mut at_start = solution.clone();
     at_start.insert(symbols.time(), graph.constant(0.0).node());
+    let now = symbols.now();
     let values = symbols.parameter_values();
     let places: HashMap<Node, usize> = states.iter().map(|state| state.node).zip(0..).collect();
     let unread = flat.initial_unread.iter();
     let mut warnings: Vec<Problem> = unread.map(|&span| without_effect(span, UNREAD)).collect();
     for equation in &flat.initial {
-        let sides = graph.substitute(&[equation.left, equation.right], &at_start);
+        // before the start is at the start
+        let sides = graph.substitute(&[equation.left, equation.right], &now);
+        let sides = graph.substitute(&sides, &at_start);
         match start_fixed(graph, &values, &places, [sides[0], sides[1]]) {
             Some((place, start, value)) => {
                 let state = &mut states[place];

@@ -3,7 +3,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use lynkeus_expr::{Binary, Node, Unary};
+use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
 
 use super::evaluate::Evaluator;
 use super::scope::{Frame, Local, Named};
@@ -75,6 +75,14 @@ impl Symbols<'_> {
             is_initial,
         });
         symbol
+    }
+}
+
+impl Symbols<'_> {
+    /// The variables by the symbols of their values before an event.
+    pub(super) fn now(&self) -> HashMap<Node, Node> {
+        let events = self.events.borrow();
+        events.before.iter().map(|(now, (before, _))| (*before, *now)).collect()
     }
 }
 
@@ -524,6 +532,12 @@ pub(super) fn whens(
         .collect();
     let mut found = vec![];
     for clause in clauses {
+        let conditions = graph.substitute(&clause.conditions, solution);
+        if conditions.iter().any(|&condition| !is_told(graph, condition, &flowing)) {
+            let message = "the condition of this `when` changes where no relation does";
+            return Err(Problem::new(clause.span, message)
+                .hint("write it with `<`, `<=`, `>` or `>=`: `x >= n` for `integer(x) == n`"));
+        }
         let mut known: HashMap<Node, Node> = HashMap::new();
         let solved = |change: &Change| (change.0, graph.substitute(&[change.1], solution)[0], change.2);
         let mut open: Vec<Change> = clause.assigned.iter().map(solved).collect();
@@ -560,7 +574,7 @@ pub(super) fn whens(
         };
         found.push(Clause {
             group: clause.group,
-            conditions: graph.substitute(&clause.conditions, solution),
+            conditions,
             changes: changes.iter().map(fixed).collect(),
             line: clause.span.line(symbols.source),
         });
@@ -572,4 +586,24 @@ pub(super) fn whens(
         before: states.iter().filter_map(before).collect(),
         timers: events.timers.clone(),
     })
+}
+
+/// Whether a condition changes only where a relation in it does, as a flow moves these states.
+fn is_told(graph: &Graph, condition: Node, flowing: &HashMap<Node, Node>) -> bool {
+    let mut open = vec![condition];
+    while let Some(node) = open.pop() {
+        match graph.op(node) {
+            Op::Binary(Binary::Less | Binary::LessEq, ..) => {}
+            Op::Binary(Binary::And | Binary::Or | Binary::Equal, ..)
+            | Op::Unary(Unary::Not, _)
+            | Op::Select(..) => open.extend(graph.arguments(node)),
+            _ => {
+                let read = graph.symbols_of(&[node]);
+                if read.iter().any(|symbol| flowing.contains_key(symbol)) {
+                    return false;
+                }
+            }
+        }
+    }
+    true
 }

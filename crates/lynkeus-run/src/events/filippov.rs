@@ -25,7 +25,7 @@ use crate::{Dynamics, Error, Result, Slopes};
 const REACHED: f64 = 1e-10;
 
 /// What a clause watches has passed its surface so far beyond it.
-const ROUNDED: f64 = 1e-13;
+const ROUNDED: f64 = 1e-16;
 
 /// A surface passed so often in a run is named where the steps run out.
 const OFTEN: usize = 1000;

@@ -33,9 +33,9 @@ const ROUNDS: usize = 100;
 /// Most instants of one timer in an interval.
 const INSTANTS: usize = 1_000_000;
 
-/// Events in a row that come sooner and sooner, down to so small a share of the interval.
+/// Events in a row that come sooner and sooner, down to so small a share of the time since the first of them.
 const HURRIED: usize = 5;
-const SOON: f64 = 1e-6;
+const SOON: f64 = 1e-4;
 
 /// Events in a row between which time hardly goes on.
 const AT_ONCE: usize = 200;
@@ -368,13 +368,35 @@ pub struct Memory {
     timers: Vec<usize>,
     /// the state at the end of the last interval
     last: Vec<f64>,
-    /// of each clause: when it took effect last, how long after the time before, and how often in a row
-    /// sooner than before
-    hurry: Vec<(f64, f64, usize)>,
+    /// of each clause
+    hurry: Vec<Hurry>,
     /// events in a row between which time hardly went on
     at_once: usize,
     /// a clause that takes effect ever sooner, and its relation
     suspect: Option<(usize, usize)>,
+}
+
+/// When a clause took effect.
+#[derive(Clone, Copy, Debug)]
+struct Hurry {
+    /// last
+    at: f64,
+    /// so long after the time before
+    apart: f64,
+    /// how often in a row sooner than before, and since when
+    streak: usize,
+    since: f64,
+}
+
+impl Default for Hurry {
+    fn default() -> Self {
+        Self {
+            at: f64::NEG_INFINITY,
+            apart: f64::INFINITY,
+            streak: 0,
+            since: 0.0,
+        }
+    }
 }
 
 impl Persist for Memory {
@@ -391,11 +413,12 @@ impl Persist for Memory {
         self.last.resize(count, 0.0);
         walk.numbers(&mut self.last)?;
         count = walk.length(self.hurry.len())?;
-        self.hurry.resize(count, (0.0, 0.0, 0));
-        for (at, apart, streak) in &mut self.hurry {
-            walk.number(at)?;
-            walk.number(apart)?;
-            walk.count(streak)?;
+        self.hurry.resize(count, Hurry::default());
+        for hurry in &mut self.hurry {
+            walk.number(&mut hurry.at)?;
+            walk.number(&mut hurry.apart)?;
+            walk.count(&mut hurry.streak)?;
+            walk.number(&mut hurry.since)?;
         }
         walk.count(&mut self.at_once)?;
         walk.optional(&mut self.suspect, |walk, suspect| {
@@ -657,7 +680,7 @@ impl Memory {
             false => first_after(timer, t),
         };
         self.timers = clauses.shape.timers.iter().map(first).collect();
-        self.hurry = vec![(f64::NEG_INFINITY, f64::INFINITY, 0); clauses.shape.clauses.len()];
+        self.hurry = vec![Hurry::default(); clauses.shape.clauses.len()];
     }
 
     /// An interval is over.
@@ -666,11 +689,11 @@ impl Memory {
         self.last.extend_from_slice(x);
     }
 
-    /// A condition came to hold at `t`, in an interval of some length: whether clauses come ever sooner.
+    /// A condition came to hold at `t`: whether clauses come ever sooner.
     fn hurried(
         &mut self,
         clauses: &Clauses,
-        (t, length): (f64, f64),
+        t: f64,
         condition: usize,
         relation: Option<usize>,
     ) -> Result<()> {
@@ -678,11 +701,14 @@ impl Memory {
             return Ok(());
         }
         let k = clauses.clause_of(condition);
-        let (at, apart, streak) = self.hurry[k];
-        let now = t - at;
-        let streak = if now < apart { streak + 1 } else { 0 };
-        self.hurry[k] = (t, now, streak);
-        let is_suspect = streak >= HURRIED && now <= SOON * length;
+        let hurry = &mut self.hurry[k];
+        let now = t - hurry.at;
+        (hurry.streak, hurry.since) = match now < hurry.apart && hurry.at.is_finite() {
+            true => (hurry.streak + 1, hurry.since),
+            false => (0, t),
+        };
+        (hurry.at, hurry.apart) = (t, now);
+        let is_suspect = hurry.streak >= HURRIED && now <= SOON * (t - hurry.since);
         self.suspect = relation.filter(|_| is_suspect).map(|relation| (k, relation));
         self.at_once = match now <= SAME * t.abs() {
             true => self.at_once + 1,
@@ -787,7 +813,7 @@ pub(crate) fn occur<D: Dynamics>(
     let needs = clauses.shape.needs.get(condition);
     let mut own = causes.iter().filter(|r| needs.is_none_or(|needs| needs.contains(r)));
     let relation = own.next().copied();
-    memory.hurried(&clauses, (t, length), condition, relation)?;
+    memory.hurried(&clauses, t, condition, relation)?;
     let cause = relation.map(|relation| Cause {
         relation,
         rate: rates(f, (t, length), &old, &before)[relation],

@@ -78,6 +78,7 @@ pub struct Report {
 pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     let settings = systems::settings(study)?;
     let plant = prepare::plant(study)?;
+    prepare::whens::refuse(study, &plant, "precision")?;
     let prepared = Prepared::new(study, &plant)?;
     let setup = Setup::new(&prepared, settings, options)?;
     let found = setup
