@@ -79,7 +79,5 @@ mod units;
 pub use builder::{Model, ModelError};
 pub use diagnostic::{Diagnostic, LoadError, Span};
 pub use load::{model_names, parse_expression};
-pub use plant::{
-    Assertion, Clause, LoadOptions, Parameter, Plant, Tables, Timer, Variable, Whens,
-};
+pub use plant::{Assertion, Clause, LoadOptions, Parameter, Plant, Tables, Timer, Variable, Whens};
 pub use units::BaseUnit;

@@ -93,7 +93,10 @@ impl Whens {
     pub fn substituted(&self, graph: &Graph, by: &HashMap<Node, Node>) -> Self {
         let mut changed = self.clone();
         let image = |state: &mut Node| *state = by.get(state).copied().unwrap_or(*state);
-        changed.before.iter_mut().for_each(|pair| image(&mut pair.0));
+        changed
+            .before
+            .iter_mut()
+            .for_each(|pair| image(&mut pair.0));
         for clause in &mut changed.clauses {
             clause.conditions = graph.substitute(&clause.conditions, by);
             let values: Vec<Node> = clause.changes.iter().map(|change| change.1).collect();

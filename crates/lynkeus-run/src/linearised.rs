@@ -60,7 +60,14 @@ impl Linearised {
     ) -> Result<Self> {
         let none = Whens::default();
         Self::jumping(
-            graph, time, states, signals, derivatives, outputs, jacobians, &none,
+            graph,
+            time,
+            states,
+            signals,
+            derivatives,
+            outputs,
+            jacobians,
+            &none,
         )
     }
 
@@ -105,7 +112,14 @@ impl Linearised {
             ..Jacobians::default()
         };
         Self::jumping(
-            graph, time, states, signals, derivatives, &[], &jacobians, whens,
+            graph,
+            time,
+            states,
+            signals,
+            derivatives,
+            &[],
+            &jacobians,
+            whens,
         )
     }
 

@@ -12,9 +12,7 @@ use super::value::{Scalar, Value, element_name};
 use crate::balance::FlatEquation;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::plant::{Clause, Timer, Whens};
-use crate::syntax::ast::{
-    Call, Declaration, Equation, ExprId, Statement, StatementKind, TypeName,
-};
+use crate::syntax::ast::{Call, Declaration, Equation, ExprId, Statement, StatementKind, TypeName};
 
 /// What has a symbol of its own because of events.
 #[derive(Debug, Default)]
@@ -40,7 +38,8 @@ pub(crate) struct FlatClause {
     span: Span,
 }
 
-const HOW_PRE: &str = "`pre` takes Boolean, Integer and `discrete` variables; that of a state stands in a `when`";
+const HOW_PRE: &str =
+    "`pre` takes Boolean, Integer and `discrete` variables; that of a state stands in a `when`";
 
 impl Symbols<'_> {
     /// The symbol of the value before an event.
@@ -57,9 +56,8 @@ impl Symbols<'_> {
     fn timer(&self, start: f64, interval: f64, is_initial: bool) -> Node {
         let mut events = self.events.borrow_mut();
         let mut timers = events.timers.iter();
-        let same = |t: &&Timer| {
-            t.is_initial == is_initial && t.start == start && t.interval == interval
-        };
+        let same =
+            |t: &&Timer| t.is_initial == is_initial && t.start == start && t.interval == interval;
         if let Some(known) = timers.find(same) {
             return known.symbol;
         }
@@ -82,7 +80,11 @@ impl Symbols<'_> {
     /// The variables by the symbols of their values before an event.
     pub(super) fn now(&self) -> HashMap<Node, Node> {
         let events = self.events.borrow();
-        events.before.iter().map(|(now, (before, _))| (*before, *now)).collect()
+        events
+            .before
+            .iter()
+            .map(|(now, (before, _))| (*before, *now))
+            .collect()
     }
 }
 
@@ -135,7 +137,9 @@ impl<'a> Evaluator<'a> {
                 Scalar::Boolean(node) => node,
                 other => self.real(other)?,
             };
-            let same = self.graph.binary(Binary::Equal, node, self.node_before(node)?);
+            let same = self
+                .graph
+                .binary(Binary::Equal, node, self.node_before(node)?);
             Ok(Scalar::Boolean(self.graph.unary(Unary::Not, same)))
         })
     }
@@ -185,9 +189,9 @@ impl<'a> Evaluator<'a> {
         let (group, span) = (self.clauses.len(), self.at);
         for (condition, body) in clauses {
             self.is_in_when = true;
-            let done = self.conditions_of(*condition).and_then(|conditions| {
-                Ok((conditions, self.apart(body)?))
-            });
+            let done = self
+                .conditions_of(*condition)
+                .and_then(|conditions| Ok((conditions, self.apart(body)?)));
             self.is_in_when = false;
             let (conditions, equations) = done?;
             let assigned = equations.into_iter().map(|e| (e.left, e.right, e.span));
@@ -235,7 +239,11 @@ impl<'a> Evaluator<'a> {
             let (state, mut value) = (self.real(*state)?, self.real(*value)?);
             let otherwise = self.symbols.before(state, at);
             for &(condition, holds) in &self.conditions {
-                let [yes, no] = if holds { [value, otherwise] } else { [otherwise, value] };
+                let [yes, no] = if holds {
+                    [value, otherwise]
+                } else {
+                    [otherwise, value]
+                };
                 value = self.graph.select(condition, yes, no);
             }
             self.resets.push((state, value, at));
@@ -254,7 +262,9 @@ impl<'a> Evaluator<'a> {
             };
             let group = self.clauses.len();
             for (condition, body) in clauses {
-                self.standing(statement.span, |e| e.when_statement(group, *condition, body))?;
+                self.standing(statement.span, |e| {
+                    e.when_statement(group, *condition, body)
+                })?;
             }
         }
         Ok(())
@@ -356,7 +366,11 @@ pub(super) fn discrete(
         }
     }
     let found = always(symbols, &declared, equations, &owner)?;
-    owner.extend(found.iter().map(|clause| (clause.assigned[0].0, usize::MAX)));
+    owner.extend(
+        found
+            .iter()
+            .map(|clause| (clause.assigned[0].0, usize::MAX)),
+    );
     clauses.splice(0..0, found);
     check_before(symbols, &declared, equations, &owner)?;
     for clause in clauses {
@@ -400,7 +414,8 @@ fn check_target(
         let message = format!("the input `{label}` is assigned in a `when`");
         (message, "inputs come from outside")
     } else if declaration.binding.is_some() {
-        let message = format!("`{label}` has an equation where it is declared, and one in a `when`");
+        let message =
+            format!("`{label}` has an equation where it is declared, and one in a `when`");
         (message, "give its first value with `start = …`")
     } else {
         return Ok(());
@@ -483,7 +498,8 @@ fn check_before(
     for equation in equations {
         let read = symbols.graph.symbols_of(&[equation.left, equation.right]);
         if read.iter().any(|symbol| before.contains(symbol)) {
-            let message = "`pre`, `edge` or `change` in an equation of something that is not discrete";
+            let message =
+                "`pre`, `edge` or `change` in an equation of something that is not discrete";
             return Err(Problem::new(equation.span, message)
                 .hint("between two events nothing was before: write it in a `when`"));
         }
@@ -533,13 +549,22 @@ pub(super) fn whens(
     let mut found = vec![];
     for clause in clauses {
         let conditions = graph.substitute(&clause.conditions, solution);
-        if conditions.iter().any(|&condition| !is_told(graph, condition, &flowing)) {
+        if conditions
+            .iter()
+            .any(|&condition| !is_told(graph, condition, &flowing))
+        {
             let message = "the condition of this `when` changes where no relation does";
             return Err(Problem::new(clause.span, message)
                 .hint("write it with `<`, `<=`, `>` or `>=`: `x >= n` for `integer(x) == n`"));
         }
         let mut known: HashMap<Node, Node> = HashMap::new();
-        let solved = |change: &Change| (change.0, graph.substitute(&[change.1], solution)[0], change.2);
+        let solved = |change: &Change| {
+            (
+                change.0,
+                graph.substitute(&[change.1], solution)[0],
+                change.2,
+            )
+        };
         let mut open: Vec<Change> = clause.assigned.iter().map(solved).collect();
         while !open.is_empty() {
             let targets: HashSet<Node> = open.iter().map(|change| change.0).collect();
@@ -551,9 +576,8 @@ pub(super) fn whens(
                 let (target, _, span) = open[0];
                 let name = graph.symbol_name(target).unwrap_or_default();
                 let message = format!("the new value of `{name}` needs itself");
-                return Err(Problem::new(span, message).hint(format!(
-                    "what it was before the event is `pre({name})`"
-                )));
+                return Err(Problem::new(span, message)
+                    .hint(format!("what it was before the event is `pre({name})`")));
             };
             let (target, value, _) = open.remove(place);
             let value = graph.substitute(&[value], &known)[0];
@@ -564,7 +588,10 @@ pub(super) fn whens(
         }
         let resets = clause.resets.iter().map(solved);
         let resets = resets.map(|(state, value, _)| (state, graph.substitute(&[value], &known)[0]));
-        let assigned = clause.assigned.iter().map(|change| (change.0, known[&change.0]));
+        let assigned = clause
+            .assigned
+            .iter()
+            .map(|change| (change.0, known[&change.0]));
         let changes: Vec<(Node, Node)> = assigned.chain(resets).collect();
         // what is always so reads the states as they are now
         let is_always = clause.conditions.is_empty();

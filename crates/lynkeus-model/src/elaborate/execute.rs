@@ -84,7 +84,9 @@ impl<'a> Evaluator<'a> {
     pub(super) fn claim(&mut self, assert: &Assert) -> Result<()> {
         if self.is_in_when {
             let message = "an `assert` within a `when` is not supported";
-            return Err(self.problem(message).hint("write it outside, where it always holds"));
+            return Err(self
+                .problem(message)
+                .hint("write it outside, where it always holds"));
         }
         let mut condition = self.condition(assert.condition)?;
         self.charge(self.conditions.len() as u64)?;

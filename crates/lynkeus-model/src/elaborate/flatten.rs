@@ -13,7 +13,9 @@ use super::value::{
 use crate::Assertion;
 use crate::balance::FlatEquation;
 use crate::diagnostic::{Result, Span};
-use crate::syntax::ast::{Equation, EquationKind, ExprId, Kind, Statement, StatementKind, Variability};
+use crate::syntax::ast::{
+    Equation, EquationKind, ExprId, Kind, Statement, StatementKind, Variability,
+};
 use crate::syntax::plain;
 
 /// A model written out.
@@ -84,7 +86,10 @@ impl<'a> Evaluator<'a> {
 
     /// The variables that an algorithm assigns, each with an equation of its own.
     fn algorithm(&mut self, statements: &'a [Statement]) -> Result<()> {
-        if statements.iter().any(|s| matches!(s.kind, StatementKind::When(_))) {
+        if statements
+            .iter()
+            .any(|s| matches!(s.kind, StatementKind::When(_)))
+        {
             return self.when_statements(statements);
         }
         let mut names = vec![];

@@ -265,7 +265,8 @@ impl Parser<'_> {
     }
 
     fn refuse_unsupported_element(&self) -> Result<()> {
-        const TAKEN: &str = ". final parameter constant discrete input output flow stream enumeration";
+        const TAKEN: &str =
+            ". final parameter constant discrete input output flow stream enumeration";
         Err(match self.token {
             Token::Identifier => return Ok(()),
             Token::Fixed(word) if TAKEN.split(' ').any(|taken| taken == word) => return Ok(()),

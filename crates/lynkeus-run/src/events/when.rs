@@ -37,8 +37,9 @@ const INSTANTS: usize = 1_000_000;
 const HURRIED: usize = 5;
 const SOON: f64 = 1e-4;
 
-/// Events in a row between which time hardly goes on.
+/// Events in a row between which time hardly goes on, against the time that it is.
 const AT_ONCE: usize = 200;
+const HARDLY: f64 = 1e-12;
 
 /// A quantity that goes so far beyond where it was at the last of them, against its largest value, is
 /// not held back any more.
@@ -147,7 +148,11 @@ impl WhenRoots {
             (graph.constant_value(*rate) == Some(0.0)).then_some(*state)
         };
         let at_rest: HashSet<Node> = own.iter().zip(rates).filter_map(at_rest).collect();
-        let flows: HashSet<Node> = moving.iter().copied().filter(|s| !at_rest.contains(s)).collect();
+        let flows: HashSet<Node> = moving
+            .iter()
+            .copied()
+            .filter(|s| !at_rest.contains(s))
+            .collect();
         let relations = relations(graph, &conditions, &always, &flows);
         let (relations, needs) = relations;
         let nothing = graph.constant(0.0).node();
@@ -290,7 +295,10 @@ impl Clauses {
             seen: Tape::new(graph, inputs, &[relations, quantities].concat())?,
             gradient: slopes(quantities, own, inputs)?,
             values: values.collect::<Result<_, _>>()?,
-            slopes: parts.iter().map(|of| slopes(of, &by, &all)).collect::<Result<_, _>>()?,
+            slopes: parts
+                .iter()
+                .map(|of| slopes(of, &by, &all))
+                .collect::<Result<_, _>>()?,
         })
     }
 
@@ -370,7 +378,8 @@ pub struct Memory {
     last: Vec<f64>,
     /// of each clause
     hurry: Vec<Hurry>,
-    /// events in a row between which time hardly went on
+    /// when any clause took effect last, and events in a row between which time hardly went on
+    newest: f64,
     at_once: usize,
     /// a clause that takes effect ever sooner, and its relation
     suspect: Option<(usize, usize)>,
@@ -420,6 +429,7 @@ impl Persist for Memory {
             walk.count(&mut hurry.streak)?;
             walk.number(&mut hurry.since)?;
         }
+        walk.number(&mut self.newest)?;
         walk.count(&mut self.at_once)?;
         walk.optional(&mut self.suspect, |walk, suspect| {
             walk.count(&mut suspect.0)?;
@@ -703,14 +713,20 @@ impl Memory {
         let k = clauses.clause_of(condition);
         let hurry = &mut self.hurry[k];
         let now = t - hurry.at;
-        (hurry.streak, hurry.since) = match now < hurry.apart && hurry.at.is_finite() {
+        let hardly = now <= HARDLY * t.abs();
+        // rounding decides which of such times is the shorter one
+        let is_sooner = now < hurry.apart || hardly;
+        (hurry.streak, hurry.since) = match is_sooner && hurry.at.is_finite() {
             true => (hurry.streak + 1, hurry.since),
             false => (0, t),
         };
         (hurry.at, hurry.apart) = (t, now);
         let is_suspect = hurry.streak >= HURRIED && now <= SOON * (t - hurry.since);
-        self.suspect = relation.filter(|_| is_suspect).map(|relation| (k, relation));
-        self.at_once = match now <= SAME * t.abs() {
+        self.suspect = relation
+            .filter(|_| is_suspect)
+            .map(|relation| (k, relation));
+        let apart = t - std::mem::replace(&mut self.newest, t);
+        self.at_once = match apart <= HARDLY * t.abs() {
             true => self.at_once + 1,
             false => 0,
         };
@@ -746,7 +762,8 @@ impl Memory {
             return Err(Error::EndlessEvents {
                 time: t,
                 line: clauses.shape.clauses[k].line,
-                how: "its events come sooner and sooner, and end at this time (Zeno's paradox)".to_owned(),
+                how: "its events come sooner and sooner, and end at this time (Zeno's paradox)"
+                    .to_owned(),
             });
         }
         Ok(())
@@ -799,7 +816,11 @@ pub(crate) fn occur<D: Dynamics>(
             false => *rate > 0.0,
         });
         let outward: Vec<bool> = outward.collect();
-        for (r, rate) in rates.iter().enumerate().filter(|(r, _)| flips[*r] && !outward[*r]) {
+        for (r, rate) in rates
+            .iter()
+            .enumerate()
+            .filter(|(r, _)| flips[*r] && !outward[*r])
+        {
             late[r] = (now[r].value / rate).clamp(0.0, length);
             causes.push(r);
         }
@@ -811,7 +832,9 @@ pub(crate) fn occur<D: Dynamics>(
         return Ok(false);
     };
     let needs = clauses.shape.needs.get(condition);
-    let mut own = causes.iter().filter(|r| needs.is_none_or(|needs| needs.contains(r)));
+    let mut own = causes
+        .iter()
+        .filter(|r| needs.is_none_or(|needs| needs.contains(r)));
     let relation = own.next().copied();
     memory.hurried(&clauses, t, condition, relation)?;
     let cause = relation.map(|relation| Cause {
@@ -823,7 +846,11 @@ pub(crate) fn occur<D: Dynamics>(
     let mut after = vec![0.0; x.len()];
     f.derivatives(t, x, &mut after);
     let line = match condition {
-        usize::MAX => clauses.shape.clauses.first().map_or(0, |clause| clause.line),
+        usize::MAX => clauses
+            .shape
+            .clauses
+            .first()
+            .map_or(0, |clause| clause.line),
         condition => clauses.line_of(condition),
     };
     f.settle((t, &old), x, [&before, &after], cause, line)?;
@@ -856,7 +883,12 @@ impl Clauses {
 }
 
 /// How fast the quantities change as the state moves with dx: central differences.
-pub(crate) fn rates<D: Dynamics>(f: &mut D, (t, length): (f64, f64), x: &[f64], dx: &[f64]) -> Vec<f64> {
+pub(crate) fn rates<D: Dynamics>(
+    f: &mut D,
+    (t, length): (f64, f64),
+    x: &[f64],
+    dx: &[f64],
+) -> Vec<f64> {
     let size = |values: &[f64]| values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let stays = (1e-5 * size(x).max(1e-3)) / size(dx).max(f64::MIN_POSITIVE);
     let step = (1e-5 * length).min(stays);
@@ -898,7 +930,11 @@ pub(crate) fn saltation(
     if off.iter().all(|off| *off == 0.0) {
         return Ok((matrix, moved));
     }
-    let made: f64 = gradient.iter().zip(before).map(|(c, f)| (c * f).abs()).sum();
+    let made: f64 = gradient
+        .iter()
+        .zip(before)
+        .map(|(c, f)| (c * f).abs())
+        .sum();
     if cause.rate.abs() <= GRAZING * made || cause.rate == 0.0 {
         let touches = gradient.iter().any(|c| *c != 0.0);
         if touches {

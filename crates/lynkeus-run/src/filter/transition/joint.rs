@@ -313,8 +313,13 @@ impl Dynamics for Variational<'_> {
         let rows = jumped[n..].to_vec();
         for (i, into) in jumped[n..].chunks_exact_mut(width).enumerate() {
             into.fill(0.0);
-            for (entry, row) in matrix[i * n..(i + 1) * n].iter().zip(rows.chunks_exact(width)) {
-                into.iter_mut().zip(row).for_each(|(into, x)| *into += entry * x);
+            for (entry, row) in matrix[i * n..(i + 1) * n]
+                .iter()
+                .zip(rows.chunks_exact(width))
+            {
+                into.iter_mut()
+                    .zip(row)
+                    .for_each(|(into, x)| *into += entry * x);
             }
         }
         if width > n {
@@ -432,7 +437,15 @@ mod tests {
         let derivatives = dx.map(|dx| dx.node());
         let states = x.map(|x| ("x".to_owned(), x.node(), 0.0));
         let signals = [("w".to_owned(), w.node())];
-        let flow = Linearised::flow(&g, time.node(), &states, &signals, &derivatives, &Whens::default()).unwrap();
+        let flow = Linearised::flow(
+            &g,
+            time.node(),
+            &states,
+            &signals,
+            &derivatives,
+            &Whens::default(),
+        )
+        .unwrap();
         let mut driven = flow.system().driven(BetweenSamples::Hold);
         driven.start(&[0.7]);
         for noise in [vec![], vec![0.3, 1.0, 0.5]] {

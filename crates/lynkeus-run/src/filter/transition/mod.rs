@@ -278,7 +278,15 @@ mod tests {
         let zero = g.constant(0.0);
         let states = [x, v, a].map(|x| (format!("{x:?}"), x.node(), 0.0));
         let derivatives = [v, a, zero].map(|x| x.node());
-        let flow = Linearised::flow(&g, time.node(), &states, &[], &derivatives, &Whens::default()).unwrap();
+        let flow = Linearised::flow(
+            &g,
+            time.node(),
+            &states,
+            &[],
+            &derivatives,
+            &Whens::default(),
+        )
+        .unwrap();
         let (h, q) = (0.15, 3.0);
         let run = EstimatorSettings {
             method: Method::Rk4(Step::Substeps(1)),
