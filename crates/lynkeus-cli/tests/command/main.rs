@@ -6,6 +6,7 @@ mod bias;
 mod certify;
 mod compare;
 mod credible;
+mod events;
 mod export;
 mod families;
 mod faulty;

@@ -356,6 +356,10 @@ fn fix_starts(
                 state.start = value;
                 state.start_node = (!graph.symbols_of(&[start]).is_empty()).then_some(start);
                 state.fixed = true;
+                if !flat.clauses.is_empty() {
+                    // what counts at events begins one value after the other
+                    at_start.insert(state.node, start);
+                }
             }
             None => warnings.push(without_effect(equation.span, FIXES_NONE)),
         }

@@ -156,6 +156,7 @@ impl Parser<'_> {
                 _ => match (section, class.algorithms.last_mut()) {
                     ("equation", _) => class.equations.push(self.equation()?),
                     ("initial", _) => class.initial.push(self.equation()?),
+                    ("initial algorithm", _) => class.initial.push(self.first_value()?),
                     ("algorithm", Some(last)) => last.push(self.statement()?),
                     _ => self.element(class)?,
                 },
@@ -165,20 +166,16 @@ impl Parser<'_> {
 
     /// `equation`, `algorithm`, or `initial` before one of them: the first of these words.
     fn section(&mut self) -> Result<&'static str> {
-        let initial = self.span;
         let is_initial = self.accept("initial")?;
         if self.accept("equation")? {
             return Ok(if is_initial { "initial" } else { "equation" });
         }
-        if is_initial && self.at("algorithm") {
-            let problem = Problem::new(initial, "an `initial algorithm` is not supported");
-            return Err(problem.hint(
-                "give the starting values with `start = …` in the declarations, or in an \
-                 `initial equation`",
-            ));
-        }
         self.expect("algorithm")?;
-        Ok("algorithm")
+        Ok(if is_initial {
+            "initial algorithm"
+        } else {
+            "algorithm"
+        })
     }
 
     fn element(&mut self, class: &mut Class) -> Result<()> {

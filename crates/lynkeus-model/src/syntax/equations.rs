@@ -266,6 +266,26 @@ impl Parser<'_> {
         })
     }
 
+    /// `x := e;` of an `initial algorithm`, which says what an initial equation does.
+    pub(super) fn first_value(&mut self) -> Result<Equation> {
+        let Placed { kind, span } = self.statement()?;
+        match kind {
+            StatementKind::Assign(targets, value) if let [Some(target)] = targets[..] => {
+                Ok(Placed {
+                    kind: EquationKind::Equality(target, value),
+                    span,
+                })
+            }
+            _ => {
+                let message = "an `initial algorithm` that does more than assign values";
+                Err(Problem::new(span, message).hint(
+                    "give the start values in the declarations with `start = …`, or write an \
+                     `initial equation`",
+                ))
+            }
+        }
+    }
+
     fn assignment(&mut self) -> Result<StatementKind> {
         if let Some(assert) = self.assert_call()? {
             return Ok(StatementKind::Assert(assert));

@@ -54,7 +54,7 @@ fn constructs_outside_the_subset() {
         if z > 0 then |  | equations follow after the word `equation`
          | Real late; | declarations come before the word `equation`
          | parameter Real late; | declarations come before the word `equation`
-         | initial algorithm z := 1; | an `initial algorithm` is not supported (give the start
+         | initial algorithm if z > 0 then z := 1; end if; | an `initial algorithm` that does more than assign values (give the start
         "#,
     );
     assert!(

@@ -443,7 +443,7 @@ mod tests {
             &states,
             &signals,
             &derivatives,
-            &Whens::default(),
+            &Default::default(),
         )
         .unwrap();
         let mut driven = flow.system().driven(BetweenSamples::Hold);

@@ -284,7 +284,7 @@ mod tests {
             &states,
             &[],
             &derivatives,
-            &Whens::default(),
+            &Default::default(),
         )
         .unwrap();
         let (h, q) = (0.15, 3.0);

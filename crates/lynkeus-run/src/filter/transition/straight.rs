@@ -301,7 +301,7 @@ mod tests {
             &states,
             &signals,
             &derivatives,
-            &Whens::default(),
+            &Default::default(),
         )
         .unwrap()
     }
