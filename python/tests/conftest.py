@@ -10,6 +10,9 @@ from tank_study import SIMULATE, tank
 
 import lynkeus
 
+ALL = bool(os.environ.get("LYNKEUS_ALL_TESTS"))
+"""Whether tests run that are left out for the time that they take: ``cargo xtask test --all`` says so."""
+
 ROOT = Path(__file__).resolve().parents[2]
 
 

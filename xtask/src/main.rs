@@ -55,8 +55,8 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let task = arguments.first().map_or("", String::as_str);
     let outcome = match (task, arguments.len()) {
-        ("test", 1) => test(),
-        ("test", 2) if arguments[1] == "--all" => test().and_then(|()| long_tests()),
+        ("test", 1) => test(false),
+        ("test", 2) if arguments[1] == "--all" => test(true).and_then(|()| long_tests()),
         ("ci", 1) => ci(),
         // with the features of the whole, so that nothing is compiled twice
         ("chores", 1) => run(&mut cargo(&["test", "--workspace", "--bin", "chores"])),
@@ -90,8 +90,9 @@ fn compiled() -> Result<(), String> {
         .args(["--lib", "--bins", "--tests"]))
 }
 
-/// Runs every test, those of the Python package beside those in Rust.
-fn test() -> Result<(), String> {
+/// Runs every test, those of the Python package beside those in Rust; of what several of those in Python do alike,
+/// all or a sample.
+fn test(is_all: bool) -> Result<(), String> {
     begins("the tests, compiled, beside the Python environments");
     let ((checks, package), compiled) = std::thread::scope(|scope| {
         // packages are waited for while the processors compile
@@ -111,7 +112,7 @@ fn test() -> Result<(), String> {
         tests.env("RUST_TEST_THREADS", (processors + 1).to_string());
     }
     match found(package, "the tests of the Python package")? {
-        Some(python) => package::test_beside(&python, &tests),
+        Some(python) => package::test_beside(&python, &tests, is_all),
         None => run(&mut tests),
     }
 }
@@ -145,7 +146,7 @@ fn ci() -> Result<(), String> {
         "warnings",
     ]))?;
     run(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))?;
-    test()
+    test(false)
 }
 
 /// True on machines that promise to have everything: there, a skip is a failure.

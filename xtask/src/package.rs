@@ -15,6 +15,9 @@ const REQUIREMENTS: &str = include_str!("../../python/requirements.txt");
 /// The tests compare with the command that this names.
 const COMMAND: &str = "LYNKEUS_COMMAND";
 
+/// Where it is set, they are no sample.
+const ALL: &str = "LYNKEUS_ALL_TESTS";
+
 /// Builds the wheel, installs it, and tries it as users have it; all tests run beside those in Rust.
 ///
 /// # Errors
@@ -39,13 +42,13 @@ pub fn wheel(python: &Path) -> Result<(), String> {
 ///
 /// # Errors
 /// What is missing, or what failed, of either.
-pub fn test_beside(python: &Path, rust: &Command) -> Result<(), String> {
+pub fn test_beside(python: &Path, rust: &Command, is_all: bool) -> Result<(), String> {
     begins("the tests in Rust, beside the tests of the Python package and its types");
     let path = target().join("package.log");
     let cannot = |error: std::io::Error| format!("cannot write {}: {error}", path.display());
     let log = File::create(&path).map_err(cannot)?;
     let (package, rust) = std::thread::scope(|scope| {
-        let package = scope.spawn(|| steps(python, &log));
+        let package = scope.spawn(|| steps(python, &log, is_all));
         let rust = run(&mut behind(rust));
         begins("what the tests of the Python package say, which ran beside");
         (joined(package), rust)
@@ -56,12 +59,16 @@ pub fn test_beside(python: &Path, rust: &Command) -> Result<(), String> {
 
 /// Its tests, from a folder with the library that the workspace has built, and its types; what they print
 /// goes to the log.
-fn steps(python: &Path, log: &File) -> Result<(), String> {
+fn steps(python: &Path, log: &File, is_all: bool) -> Result<(), String> {
     let told = |command: &mut Command| {
         let copy = || log.try_clone().map_err(|e| format!("the log: {e}"));
         run(command.stdout(copy()?).stderr(copy()?))
     };
-    told(tests(python).env("PYTHONPATH", folder()?))?;
+    let mut tests = tests(python);
+    if is_all {
+        tests.env(ALL, "1");
+    }
+    told(tests.env("PYTHONPATH", folder()?))?;
     told(&mut types(python))
 }
 

@@ -14,7 +14,7 @@
 //! Nothing is required of the plant, and nothing is proved of the error.
 
 use lynkeus_model::Variable;
-use lynkeus_run::filter::{FilterKind, SigmaPoints};
+use lynkeus_run::filter::{FilterKind, PATIENCE, SigmaPoints};
 use lynkeus_structure::AugmentedPlant;
 
 use crate::estimate::{PlantCopy, Speed, limited, no_such_estimate};
@@ -81,13 +81,8 @@ pub const MHE: &dyn Family = &Filter {
     smooths: false,
     follows_jumps: false,
     kind: |tuning| {
-        let [horizon] = &WINDOW;
-        let length = match number(tuning, horizon)? {
-            None => HORIZON,
-            Some(x) if x >= 1.0 && x.fract() == 0.0 && x <= 1e4 => x as usize,
-            Some(x) => return Err(horizon.wrong(x)),
-        };
-        Ok(FilterKind::MovingHorizon(length))
+        let length = whole(tuning, &WINDOW[0])?;
+        Ok(FilterKind::MovingHorizon(length.unwrap_or(HORIZON)))
     },
 };
 
@@ -96,6 +91,7 @@ impl Filter {
         (self.kind)(tuning)?;
         tuning.checked()?;
         tuning.positive(GATE.name)?;
+        patience(tuning)?;
         projects(tuning)?;
         variances(augmented, tuning).map(drop)
     }
@@ -129,6 +125,7 @@ impl Filter {
         observer.filter = Some(FilterTuning {
             kind: (self.kind)(tuning)?,
             gate: tuning.positive(GATE.name)?,
+            patience: patience(tuning)?,
             projects: projects(tuning)?,
             outputs: copy.at_estimate(&outputs),
             whens: copy.whens(),
@@ -227,11 +224,18 @@ const GATE: KeySpec = KeySpec {
     name: "gate",
     shape: Shape::Positive,
     default: "none",
-    meaning: "a reading whose innovation exceeds so many of its standard deviations is rejected and counted; after ten in a row the next is believed",
+    meaning: "a reading whose innovation exceeds so many of its standard deviations is rejected and counted",
+};
+
+const GATE_PATIENCE: KeySpec = KeySpec {
+    name: "gate_patience",
+    shape: Shape::Whole(1),
+    default: "10",
+    meaning: "after so many rejections of a sensor in a row, at least half of which moved, its next reading is believed",
 };
 
 /// Those of every filter.
-const KEYS: [KeySpec; 2] = [VARIANCE, GATE];
+const KEYS: [KeySpec; 3] = [VARIANCE, GATE, GATE_PATIENCE];
 
 /// That of the filters that may go anywhere.
 const BOUNDS: [KeySpec; 1] = [KeySpec {
@@ -273,6 +277,20 @@ const WINDOW: [KeySpec; 1] = [KeySpec {
     default: "10",
     meaning: "samples over which the states are estimated anew at each sample, within `[min, max]`",
 }];
+
+/// A number of samples or readings.
+fn whole(tuning: &Tuning, key: &KeySpec) -> Result<Option<usize>, TuningError> {
+    match number(tuning, key)? {
+        None => Ok(None),
+        Some(x) if x >= 1.0 && x.fract() == 0.0 && x <= 1e4 => Ok(Some(x as usize)),
+        Some(x) => Err(key.wrong(x)),
+    }
+}
+
+/// The patience of the gate.
+fn patience(tuning: &Tuning) -> Result<usize, TuningError> {
+    Ok(whole(tuning, &GATE_PATIENCE)?.unwrap_or(PATIENCE))
+}
 
 /// Whether the estimate is kept in the declared ranges.
 fn projects(tuning: &Tuning) -> Result<bool, TuningError> {

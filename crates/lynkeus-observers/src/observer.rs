@@ -100,6 +100,8 @@ pub struct FilterTuning {
     pub kind: FilterKind,
     /// a reading further from what is expected, in standard deviations, is rejected
     pub gate: Option<f64>,
+    /// rejections in a row after which the next reading is believed
+    pub patience: usize,
     /// the estimate is kept in the declared ranges
     pub projects: bool,
     /// h(t, x̂, u), one per measured output

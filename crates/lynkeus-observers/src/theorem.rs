@@ -212,6 +212,9 @@ fn bounds(augmented: &AugmentedPlant<'_>, found: Ultimate) -> Option<Bounds> {
 /// Cells examined per end of the range of an entry.
 const CELLS: usize = 600;
 
+/// How many times as large as a value that was met a bound may be before the expression's parts are bounded, too.
+const LOOSE: f64 = 2.0;
+
 /// A box with what was found to be unbounded on it.
 pub(crate) struct Enclosure<'g> {
     graph: &'g Graph,
@@ -283,7 +286,11 @@ impl<'g> Enclosure<'g> {
 
     /// Largest absolute value.
     pub fn magnitude(&self, node: Node) -> Result<f64, MissingInput> {
-        let size = self.magnitude_of(node)?;
+        let whole = magnitude_within(self.graph, node, &self.region, CELLS)?;
+        let size = match whole.bound <= LOOSE * whole.attained {
+            true => whole.bound,
+            false => whole.bound.min(self.of_parts(node)?),
+        };
         if !size.is_finite() {
             self.note(node);
         }
@@ -319,7 +326,7 @@ impl<'g> Enclosure<'g> {
                 // it is such an entry itself
                 Some(entry) if entry != node => {
                     let inverse = magnitude_within(self.graph, entry, &self.region, CELLS)?;
-                    times(inverse, self.magnitude_of(b)?)
+                    times(inverse.bound, self.magnitude_of(b)?)
                 }
                 _ => f64::INFINITY,
             };
@@ -334,8 +341,8 @@ impl<'g> Enclosure<'g> {
             return Ok(*known);
         }
         let whole = magnitude_within(self.graph, node, &self.region, CELLS)?;
-        let size = match whole.is_finite() {
-            true => whole,
+        let size = match whole.bound.is_finite() {
+            true => whole.bound,
             false => self.of_parts(node)?,
         };
         self.sizes.borrow_mut().insert(node, size);

@@ -37,7 +37,7 @@ pub use layers::Layers;
 pub use matrix::Matrix;
 pub use misfit::Misfit;
 pub use one_to_one::OneToOne;
-pub use range::{Range, enclosure_within, magnitude_within, range, range_within};
+pub use range::{Magnitude, Range, enclosure_within, magnitude_within, range, range_within};
 pub use region::{Coordinate, Dimension, Place, Point, Region};
 pub use regularity::{has_value_at, regularity, steps};
 pub use slopes::{Innovation, Slopes};

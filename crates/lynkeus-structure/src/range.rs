@@ -1,12 +1,13 @@
 //! The range of an expression over a box, by interval branch and bound.
 
 use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use std::collections::{BinaryHeap, HashMap};
 
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape};
 
 use crate::region::{Cell, Question, highest_corner, lowest_corner};
+use crate::regularity::decisive;
 use crate::{Place, Point, Region, regularity};
 
 /// Cells examined per end of the range.
@@ -72,8 +73,17 @@ pub fn enclosure_within(
     Ok(found.map_or(Interval::UNKNOWN, |range| range.enclosure))
 }
 
+/// What is known of the largest absolute value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Magnitude {
+    /// none is larger; infinite where the expression may lack a value
+    pub bound: f64,
+    /// one is at least this
+    pub attained: f64,
+}
+
 /// The magnitude of the [`enclosure_within`], at up to half its cost: the end of the range that
-/// is nearer to zero is not sought. Infinite where the expression may lack a value.
+/// is nearer to zero is not sought.
 ///
 /// # Errors
 /// [`MissingInput`] where the node depends on a symbol outside the region.
@@ -82,11 +92,26 @@ pub fn magnitude_within(
     node: Node,
     region: &Region,
     budget: usize,
-) -> Result<f64, MissingInput> {
+) -> Result<Magnitude, MissingInput> {
     let question = asked(graph, node, region, budget);
-    let told = |range: &Range| range.enclosure.magnitude();
-    let found = answered(graph, question, told, |s| s.magnitude())?;
-    Ok(found.unwrap_or(f64::INFINITY))
+    let told = |range: &Range| Magnitude {
+        bound: range.enclosure.magnitude(),
+        attained: furthest(&range.lowest).max(furthest(&range.highest)),
+    };
+    let found = answered(graph, question, told, |search| {
+        let bound = search.magnitude();
+        let attained = furthest(&search.lowest).max(furthest(&search.highest));
+        Magnitude { bound, attained }
+    })?;
+    Ok(found.unwrap_or(Magnitude {
+        bound: f64::INFINITY,
+        attained: 0.0,
+    }))
+}
+
+/// The absolute value at a point, 0 at none.
+fn furthest(point: &Option<Point>) -> f64 {
+    point.as_ref().map_or(0.0, |point| point.value.abs())
 }
 
 /// Whether an expression has a value everywhere on the region, and none is zero. What
@@ -151,6 +176,8 @@ fn both_ends(search: &mut Search<'_>, valued: bool) -> Range {
 const FACES: usize = 3;
 /// Refinement stops when the outer bound is this close to a value attained.
 const TOLERANCE: f64 = 1e-3;
+/// A side that is narrower than this share of the region's is not halved for want of bounds alone.
+const FINEST: f64 = 1e-4;
 /// Cells between two looks at the clock.
 const OFTEN: usize = 16;
 
@@ -230,6 +257,8 @@ struct Search<'a> {
     graph: &'a Graph,
     bounds: Evaluator<Intervals>,
     evaluator: Evaluator,
+    /// made once a cell has no bounds
+    parts: Option<Parts>,
     asked: &'a Question,
     tree: Vec<Branch>,
     /// the smallest and the largest value attained
@@ -248,6 +277,7 @@ impl<'a> Search<'a> {
             graph,
             evaluator: tape.evaluator(),
             bounds: tape.evaluator_in(Intervals),
+            parts: None,
             asked,
             tree: vec![],
             lowest: None,
@@ -377,8 +407,11 @@ impl<'a> Search<'a> {
         if let Some(first) = self.tree[place].halves {
             return Some(first);
         }
+        let guilty = self.guilty(place);
         let whole = &self.tree[place].cell;
-        let [one, other] = self.asked.region.split(whole)?;
+        let among = |sides: &[Node]| self.asked.region.split_among(whole, sides, FINEST);
+        let found = among(&guilty).or_else(|| self.asked.region.split(whole));
+        let [one, other] = found?;
         let side = (0..whole.len()).find(|&i| one[i] != whole[i])?;
         let half = |end| {
             let of = place;
@@ -389,6 +422,19 @@ impl<'a> Search<'a> {
         self.add(other, half(End::Upper));
         self.tree[place].halves = Some(first);
         Some(first)
+    }
+
+    /// The symbols to which it lies that a cell has no bounds: halving the others finds none.
+    fn guilty(&mut self, place: usize) -> Vec<Node> {
+        let branch = &self.tree[place];
+        if branch.values.is_bounded() {
+            return vec![];
+        }
+        if self.parts.is_none() {
+            self.parts = Parts::new(self.graph, self.asked).ok();
+        }
+        let parts = self.parts.as_mut();
+        parts.map_or_else(Vec::new, |parts| parts.guilty(&branch.cell))
     }
 
     fn is_close(&self, bound: f64, end: End) -> bool {
@@ -469,6 +515,62 @@ impl<'a> Search<'a> {
     }
 }
 
+/// Everything that an expression is made of, to be bounded on a cell.
+struct Parts {
+    values: Evaluator<Intervals>,
+    /// in the order of evaluation; of an operation its arguments' places and the symbols it reads
+    steps: Vec<Part>,
+}
+
+struct Part {
+    arguments: Vec<usize>,
+    /// those to which it lies where it has no bounds and its arguments have
+    symbols: Vec<Node>,
+    /// none of its own: a system of equations, of which entries have values
+    is_valued: bool,
+}
+
+impl Parts {
+    fn new(graph: &Graph, asked: &Question) -> Result<Self, MissingInput> {
+        let nodes = graph.reachable(&[asked.node]);
+        let place: HashMap<Node, usize> = nodes.iter().enumerate().map(|(i, &n)| (n, i)).collect();
+        let part = |&node: &Node| Part {
+            arguments: graph.arguments(node).iter().map(|a| place[a]).collect(),
+            symbols: graph.symbols_of(&decisive(graph, node)),
+            is_valued: !graph.op(node).is_system(),
+        };
+        let steps: Vec<Part> = nodes.iter().map(part).collect();
+        let valued = nodes.iter().zip(&steps).filter(|(_, step)| step.is_valued);
+        let valued: Vec<Node> = valued.map(|(&node, _)| node).collect();
+        let tape = Tape::new(graph, &asked.region.symbols(), &valued)?;
+        Ok(Self {
+            values: tape.evaluator_in(Intervals),
+            steps,
+        })
+    }
+
+    /// The symbols of the first operation that has no bounds where its arguments have; none where a side
+    /// has no end.
+    fn guilty(&mut self, cell: &[Interval]) -> Vec<Node> {
+        let mut values = vec![Interval::ENTIRE; self.values.tape().outputs()];
+        self.values.eval(cell, &mut values);
+        let mut values = values.into_iter();
+        let mut bounded: Vec<bool> = Vec::with_capacity(self.steps.len());
+        for step in &self.steps {
+            let given = step.arguments.iter().all(|&a| bounded[a]);
+            let own = match step.is_valued {
+                true => values.next().is_some_and(|values| values.is_bounded()),
+                false => given,
+            };
+            if given && !own && !step.arguments.is_empty() {
+                return step.symbols.clone();
+            }
+            bounded.push(own);
+        }
+        vec![]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -496,7 +598,7 @@ mod tests {
                 range_within(&g, node, &region, 600).unwrap().enclosure,
             )
         };
-        let size = |node: Node| magnitude_within(&g, node, &region, 600).unwrap();
+        let size = |node: Node| magnitude_within(&g, node, &region, 600).unwrap().bound;
         let root = (x * (x - 1.0) + 0.3).sqrt();
         for node in [
             x * (1.0 - x),
@@ -515,6 +617,27 @@ mod tests {
         let (quick, searched) = both((1.0 / (x - 0.5)).node());
         assert!(!quick.is_defined() && !searched.is_defined());
         assert_eq!(quick.magnitude(), f64::INFINITY);
+    }
+
+    /// Of eight sides only that of y decides whether there are bounds: others are not halved to find them.
+    #[test]
+    fn a_quotient_among_many_sides_has_bounds() {
+        let g = Graph::new();
+        let names = ["y", "a", "b", "c", "d", "e", "f", "h"];
+        let x = names.map(|name| g.symbol(name));
+        let dimensions = names.iter().zip(&x);
+        let region = Region {
+            dimensions: dimensions
+                .map(|(name, x)| Dimension::new(*name, x.node(), -3.0, 3.0))
+                .collect(),
+        };
+        // at least 1/2, but not to intervals on the whole of the side
+        let below = x[0].powi(2) + (1.0 - x[0]).powi(2);
+        let others = x[1..].iter().fold(g.constant(1.0), |sum, x| sum + x.sin());
+        let node = (others / (below - 0.1)).node();
+        let found = magnitude_within(&g, node, &region, 60).unwrap();
+        assert!(found.bound.is_finite() && found.bound > 2.0);
+        assert!(found.attained <= found.bound);
     }
 
     /// The second end costs fewer cells than it does alone, and is the same.

@@ -120,11 +120,14 @@ fn search(
             }
             asked.push(culprit);
         }
-        let used = graph.symbols_of(&[culprit]);
+        let among = |nodes: &[Node]| {
+            let used = graph.symbols_of(nodes);
+            region.split_among(&cell, &used, FINEST)
+        };
         let lasts = seen < BUDGET && graph.spent().is_none();
         let decidable = lasts && !known.values.is_empty();
         let halves = decidable
-            .then(|| region.split_among(&cell, &used, FINEST))
+            .then(|| among(&decisive(graph, culprit)).or_else(|| among(&[culprit])))
             .flatten();
         match halves {
             Some([first, second]) => open.extend([second, first]),
@@ -132,6 +135,21 @@ fn search(
         }
     }
     Ok(None)
+}
+
+/// What decides whether an operation has a value and bounds where its arguments have: of a quotient the divisor, of
+/// linear equations the matrix.
+pub(crate) fn decisive(graph: &Graph, node: Node) -> Vec<Node> {
+    let matrix = |system: Node| {
+        let call = graph.system(system)?;
+        call.linear().map(|(A, _)| A.to_vec())
+    };
+    let found = match graph.op(node) {
+        Op::Binary(Binary::Div, _, divisor) => Some(vec![divisor]),
+        Op::Entry(system, _) => matrix(system),
+        _ => None,
+    };
+    found.unwrap_or_else(|| vec![node])
 }
 
 /// [`search`] of a part, which the graph remembers.

@@ -472,7 +472,7 @@ pub fn uncertain(
         for (k, slope) in slopes.row(row).filter(|(k, _)| *k != j) {
             let size = sizes[k].unwrap_or(f64::INFINITY);
             if size > 0.0 {
-                sum += size * magnitude_within(graph, slope, &region, SLOPE_CELLS)?;
+                sum += size * magnitude_within(graph, slope, &region, SLOPE_CELLS)?.bound;
             }
         }
         sizes[j] = Some(sum / least).filter(|size| size.is_finite());

@@ -159,6 +159,7 @@ fn filter(random: &mut Normal, folder: &Folder) {
     study += &format!("[observer]\nfamily = \"{family}\"\n");
     if random.uniform() < 0.5 {
         study += &format!("gate = {}\n", pick(random, &[2, 3, 5]));
+        study += &format!("gate_patience = {}\n", pick(random, &[1, 4, 10]));
     }
     if family == "ukf" && random.uniform() < 0.5 {
         study += *pick(

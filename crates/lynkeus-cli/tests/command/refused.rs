@@ -64,6 +64,12 @@ fn noises_that_cannot_be() {
         ("", ", gate = -1", "", ["study.toml:3:", "found -1"]),
         (
             "",
+            ", gate_patience = 0",
+            "",
+            ["study.toml:3:", "whole number"],
+        ),
+        (
+            "",
             "",
             "process_noise = { x = -1 }",
             ["study.toml:5:", "found -1"],

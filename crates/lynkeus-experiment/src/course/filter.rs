@@ -179,6 +179,7 @@ pub(crate) fn blueprint(
     let model = model(prepared, design, tuning, samples, notes)?;
     let kept = FilterSettings {
         gate: tuning.gate,
+        patience: tuning.patience,
         projects: tuning.projects,
         keep_history: study.estimate.smoothing.is_some(),
         ..FilterSettings::of(tuning.kind.clone())

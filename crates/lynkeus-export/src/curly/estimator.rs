@@ -385,6 +385,8 @@ impl Machine {
             false => ["reading", "reading - predicted"],
         };
         let text = chosen(JUDGE, holds).replace("GATE", &gate);
+        let text = text.replace("LOCKED_OUT", &settings.patience.to_string());
+        let text = text.replace("MOVED_OF_THEM", &settings.patience.div_ceil(2).to_string());
         let text = text.replace("SHOWN_READING", shown);
         self.add(&text.replace("SURPRISE", surprise));
     }

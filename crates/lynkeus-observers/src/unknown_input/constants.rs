@@ -65,27 +65,41 @@ pub(super) fn norms<'p>(
     let each = |matrices: &[Matrix<'_>]| -> Result<Vec<f64>, MissingInput> {
         matrices.iter().map(|A| box_.norm(A)).collect()
     };
-    let (Ψ, Z, P_inverse) = match tall && !form.bends() {
-        // ζ_k = P_k η_k where P does not read X²: ∂ζ_k/∂x^k = P_k alone
+    let straight = tall && !form.bends();
+    let P_inverse: Vec<f64> = match straight {
         true => {
-            let inverse: Vec<Matrix<'_>> = P.iter().map(|P| P.left_divide(&one(P.rows))).collect();
-            let own = |k: usize, j: usize| (j == k).then(|| P[k].clone());
-            let ψ = |k: usize, j: usize| Some(signals.straight_remainder(&P[k], k, j));
-            (signals.lower(ψ)?, signals.lower(own)?, each(&inverse)?)
+            let inverse = P.iter().map(|P| P.left_divide(&one(P.rows)));
+            each(&inverse.collect::<Vec<_>>())?
         }
         false => {
+            let inverse = P.iter().map(|P| box_.inverse_norm(P));
+            inverse.collect::<Result<_, _>>()?
+        }
+    };
+    // where they are unbounded, so is every constant that has Ψ, ∂Z/∂x or Y in it
+    let bounded = P_inverse.iter().all(|inverse| inverse.is_finite());
+    let (Ψ, Z) = match (bounded, straight) {
+        (false, _) => (unbounded(q), unbounded(q)),
+        // ζ_k = P_k η_k where P does not read X²: ∂ζ_k/∂x^k = P_k alone
+        (true, true) => {
+            let own = |k: usize, j: usize| (j == k).then(|| P[k].clone());
+            let ψ = |k: usize, j: usize| Some(signals.straight_remainder(&P[k], k, j));
+            (signals.lower(ψ)?, signals.lower(own)?)
+        }
+        (true, false) => {
             let Z = signals.coordinates(&P);
             let ψ = signals.remainders(&P, &Z, &γ);
-            let inverse = P.iter().map(|P| box_.inverse_norm(P));
             let slopes = |A: &[Matrix<'p>], k: usize, j: usize| signals.slopes_in(&A[k], j + 1);
             (
                 signals.lower(|k, j| Some(slopes(&ψ, k, j)))?,
                 signals.lower(|k, j| Some(slopes(&Z, k, j)))?,
-                inverse.collect::<Result<_, _>>()?,
             )
         }
     };
-    let Y: Vec<Matrix<'_>> = (1..=q).map(|k| signals.Y(k, &γ)).collect();
+    let Y = match bounded {
+        true => each(&(1..=q).map(|k| signals.Y(k, &γ)).collect::<Vec<_>>())?,
+        false => vec![f64::INFINITY; q],
+    };
     let turning = along(&form.G11(), &signals.slopes).times(&left);
     Ok(Norms {
         N0: box_.norm(&N0)?,
@@ -97,7 +111,7 @@ pub(super) fn norms<'p>(
         W: inverse_triangle(&Z, &P_inverse),
         Z,
         Ψ,
-        Y: each(&Y)?,
+        Y,
         P_inverse,
         tall,
         checks: [
@@ -107,6 +121,11 @@ pub(super) fn norms<'p>(
         ],
         open: box_.open(),
     })
+}
+
+/// Norms of matrices k, j of which none is bounded.
+fn unbounded(q: usize) -> Vec<Vec<f64>> {
+    vec![vec![f64::INFINITY; q]; q]
 }
 
 impl<'e, 'p> Signals<'e, 'p> {

@@ -68,7 +68,7 @@ pub(crate) use model::check_counts;
 pub use model::{NoisyModel, NoisyPlant, Sensor};
 pub(crate) use order::by_distance;
 pub use record::Record;
-pub use settings::{FilterKind, FilterSettings, SigmaPoints, Weights};
+pub use settings::{FilterKind, FilterSettings, PATIENCE, SigmaPoints, Weights};
 pub use smoother::Smoothed;
 
 use crate::divergence::{Bound, check_deviations};

@@ -14,13 +14,6 @@ use crate::noise::Limits;
 use crate::runner::Sample;
 use crate::snapshot::{Damaged, Persist, Walk};
 
-/// After so many rejections in a row the next reading is believed: a gate must not lock the
-/// filter out for ever.
-const LOCKED_OUT: usize = 10;
-/// Of them so many have to differ from the reading before: a sensor that hangs, or shows an end
-/// of its range, is no reason to doubt the estimate.
-const MOVED: usize = 5;
-
 /// A reading so many deviations from what is expected contradicts the prediction: then it has a say in
 /// how large a noise that grows with the value is. A nearer one has none: readings that come out high
 /// would count less than those that come out low.
@@ -31,6 +24,8 @@ pub(crate) struct Sensing {
     pub output_map: OutputMap,
     sensors: Vec<Sensor>,
     gate: Option<f64>,
+    /// rejections in a row that end its say
+    patience: usize,
     /// of readings that only stand for others ([`FilterSettings::foresees`])
     foresees: bool,
     /// of the readings of each sensor that were rejected in a row, those that differ from the one before
@@ -58,6 +53,7 @@ impl Sensing {
             output_map: OutputMap::new(&model.output_map),
             sensors: model.sensors.clone(),
             gate: settings.gate,
+            patience: settings.patience,
             foresees: settings.foresees,
             moved: vec![0; count],
             last: vec![0.0; count],
@@ -177,7 +173,8 @@ impl Sensing {
 
     fn is_outlier(&self, i: usize, innovation: f64, deviation: f64) -> bool {
         let Some(gate) = self.gate else { return false };
-        let relieved = self.health.sensors[i].locked_out >= LOCKED_OUT && self.moved[i] >= MOVED;
+        let moved = self.moved[i] >= self.patience.div_ceil(2);
+        let relieved = moved && self.health.sensors[i].locked_out >= self.patience;
         !relieved && innovation.abs() > gate * deviation
     }
 

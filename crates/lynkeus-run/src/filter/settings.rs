@@ -14,6 +14,9 @@ pub enum FilterKind {
     MovingHorizon(usize),
 }
 
+/// The patience of a gate, where nothing else is said.
+pub const PATIENCE: usize = 10;
+
 /// How a filter works.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilterSettings {
@@ -21,6 +24,9 @@ pub struct FilterSettings {
     pub kind: FilterKind,
     /// a reading whose innovation exceeds so many of its standard deviations is rejected
     pub gate: Option<f64>,
+    /// after so many rejections in a row, half of which differ from the reading before, the next is believed:
+    /// a gate must not lock the filter out for ever, but a sensor that hangs is no reason to doubt the estimate
+    pub patience: usize,
     /// keep what a smoother needs
     pub keep_history: bool,
     /// the estimate is kept in the model's ranges: after each prediction and correction it is put to the
@@ -39,6 +45,7 @@ impl FilterSettings {
         Self {
             kind,
             gate: None,
+            patience: PATIENCE,
             keep_history: false,
             projects: false,
             foresees: false,

@@ -24,7 +24,7 @@ static truth judge(STATE *s, int i, real reading, real predicted, real spread, r
     }
 //? gate
     /* a gate must not lock the filter out for ever: a sensor that moves is believed in the end */
-    const truth is_heard = s->rejected[i] >= 10 && s->moved[i] >= 5;
+    const truth is_heard = s->rejected[i] >= LOCKED_OUT && s->moved[i] >= MOVED_OF_THEM;
     if (s->became[i] == TAKEN && !is_heard && fabs(SHOWN_READING - predicted) > GATE * deviation) {
         s->became[i] = REJECTED;
     }
