@@ -101,6 +101,7 @@ mod estimator;
 mod events;
 pub mod filter;
 mod fleet;
+mod grid;
 mod integrator;
 mod jacobian;
 mod lanes;

@@ -16,7 +16,9 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::guards::{Ahead, Guard, Guards, Poly, SHORTEST};
-use super::when::{Cause, Clauses, Memory, Seen, occur};
+use super::memory::Memory;
+use super::occur::occur;
+use super::when::{Cause, Clauses, Seen};
 use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Result, Slopes};
