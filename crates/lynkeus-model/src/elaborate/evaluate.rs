@@ -2,7 +2,7 @@
 
 use lynkeus_expr::{Graph, Node, Unary};
 
-use super::events::{Change, FlatClause};
+use super::clauses::{Change, FlatClause};
 use super::scope::{Frame, Local, Mode, Named};
 use super::symbols::Symbols;
 use super::value::{Scalar, Value, describe_dims, expected_number};

@@ -5,6 +5,7 @@ use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
 
+use super::clauses::{Change, FlatClause};
 use super::evaluate::Evaluator;
 use super::scope::{Frame, Local, Named};
 use super::symbols::{Symbols, is_outer_input};
@@ -13,30 +14,6 @@ use crate::balance::FlatEquation;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::plant::{Clause, Timer, Whens};
 use crate::syntax::ast::{Call, Declaration, Equation, ExprId, Statement, StatementKind, TypeName};
-
-/// What has a symbol of its own because of events.
-#[derive(Debug, Default)]
-pub(crate) struct EventSymbols {
-    /// variables with the symbols of their values before an event, and where these are first asked for
-    before: HashMap<Node, (Node, Span)>,
-    timers: Vec<Timer>,
-}
-
-/// A variable that gets a value at an event, the value, and where that stands.
-pub(crate) type Change = (Node, Node, Span);
-
-/// A `when` or an `elsewhen`, written out; without conditions, an equation that holds at every event.
-#[derive(Debug)]
-pub(crate) struct FlatClause {
-    /// the same number for all of one `when`
-    group: usize,
-    conditions: Vec<Node>,
-    /// of discrete variables
-    assigned: Vec<Change>,
-    /// of states
-    resets: Vec<Change>,
-    span: Span,
-}
 
 const HOW_PRE: &str =
     "`pre` takes Boolean, Integer and `discrete` variables; that of a state stands in a `when`";

@@ -2,8 +2,9 @@
 
 use lynkeus_expr::{Binary, Node};
 
+use super::clauses::FlatClause;
 use super::evaluate::Evaluator;
-use super::events::{FlatClause, discrete};
+use super::events::discrete;
 use super::execute::{Ended, targets};
 use super::scope::{Frame, Local, Mode, Named};
 use super::symbols::Symbols;

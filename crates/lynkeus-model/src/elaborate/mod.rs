@@ -5,6 +5,7 @@ mod arithmetic;
 mod arrays;
 mod assemble;
 mod calls;
+mod clauses;
 mod declare;
 mod evaluate;
 mod events;
