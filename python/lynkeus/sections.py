@@ -84,6 +84,15 @@ class SensorsSection(TypedDict, total=False):
     """more equal cells of a log in a row than this are no readings from there on, until they change: the
     sensor is stuck (table: output = whole number; default: none)"""
 
+    delay: Mapping[str, Number] | None
+    """how much later than its sample is taken a reading comes, in the plant's unit of time: the reading in a
+    row at t is of t less this (late readings) (table: output = number; default: none)"""
+
+    taken_at: Mapping[str, str] | None
+    """the column of a log, or an expression of columns, that has the time at which the sample was taken whose
+    result is the reading in that row: an assay that comes hours later (late readings) (table: output =
+    column; default: none)"""
+
 
 #: spectral density (variance per unit of time) of white noise on a state's derivative; for an unknown input,
 #: how fast it wanders. Read by the filters, `sd` and `--how-well`; `simulate` moves the plant's states by it,
@@ -730,6 +739,10 @@ class Sections(TypedDict, total=False):
     tables: Literal["linear", "monotone"] | None
     """what the plant's tables are between their points: straight lines, or monotone cubics, whose slopes do
     not jump (`"linear"`, `"monotone"`; default: `"linear"`)"""
+
+    delay_states: Whole | None
+    """states that hold the last of what the plant delays, for each `delay`: at most 10 (whole number ≥ 1;
+    default: 6)"""
 
 
 class Changes(Sections, total=False):

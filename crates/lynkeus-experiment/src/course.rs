@@ -21,6 +21,7 @@ pub mod run;
 pub(crate) mod sampled;
 pub mod sampling;
 mod screen;
+pub(crate) mod taken;
 pub(crate) mod trace;
 
 use lynkeus_expr::Spent;

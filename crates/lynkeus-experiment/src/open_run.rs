@@ -22,6 +22,7 @@ use crate::course::fixed_steps::unlocated;
 use crate::course::inputs::refuse_strays;
 use crate::course::replay::{Watch, replay};
 use crate::course::run::{first_readings, told_start};
+use crate::course::taken::Interleaved;
 use crate::course::{Course, Samples, curved};
 use crate::crew::within;
 use crate::judge::outcome::{Ended, not_whole};
@@ -233,13 +234,14 @@ impl Driven {
         let names = self::told(plant).map(|variable| variable.name.clone());
         let outputs: Vec<(String, Node)> = names.zip(told).collect();
         let derivatives = put(&plant.derivatives);
-        System::new(
+        System::jumping(
             &plant.graph,
             plant.time,
             &states,
             &self.signals,
             &derivatives,
             &outputs,
+            &plant.whens.substituted(&plant.graph, &self.made),
         )
         .map_err(explain)
     }
@@ -262,7 +264,10 @@ fn of_the_log(
 ) -> Result<Option<Series>, Error> {
     let settings = &prepared.study().estimate;
     match logged(&log.table, settings, &log.time, &input.name) {
-        Some(_) => held(&log.table, settings, header(settings, &input.name)).map(Some),
+        Some(_) => {
+            let column = held(&log.table, settings, header(settings, &input.name))?;
+            Ok(Some(log.held(&column)))
+        }
         None => Ok(None),
     }
 }
@@ -335,7 +340,7 @@ fn finished(
     Ok(OpenRun {
         plant: plant.name.clone(),
         log: log.table.place(),
-        time: log.samples.time.shortened(rows),
+        time: log.own(&log.samples.time.shortened(rows)),
         time_header,
         origin: log.table.start(&log.time).map(|instant| Origin {
             instant,
@@ -376,8 +381,14 @@ fn compared(
             if let Home::Circle { .. } = variable.home {
                 readings = curved::lifted(&readings, &values);
             }
-            misfit(prepared, (name, &values), readings, header)
+            let inserted = log.interleaved.as_ref().map_or(0, Interleaved::inserted);
+            let mut misfit = misfit(prepared, (name, &values), readings, header);
+            misfit.missing = misfit.missing.saturating_sub(inserted);
+            misfit.readings = log.own(&misfit.readings);
+            misfit.error = log.own(&misfit.error);
+            misfit
         });
+        let values = log.own(&values);
         // an output may be a state of the same name
         match variables.iter_mut().find(|known| known.name == *name) {
             Some(known) => known.misfit = misfit,
@@ -419,10 +430,10 @@ fn readings(prepared: &Prepared<'_>, log: &Log<'_>, name: &str) -> Option<Series
     let settings = &prepared.study().estimate;
     let measured = &prepared.augmented().outputs;
     let found = match measured.iter().position(|o| o.variable.name == name) {
-        Some(sensor) => log.samples.readings.get(sensor),
-        None => logged(&log.table, settings, &log.time, name),
+        Some(sensor) => log.samples.readings.get(sensor).cloned(),
+        None => logged(&log.table, settings, &log.time, name).map(|column| log.spread(column)),
     };
-    found.filter(|readings| !readings.is_empty()).cloned()
+    found.filter(|readings| !readings.is_empty())
 }
 
 /// The errors of an output.

@@ -12,7 +12,7 @@ pub(super) use judged::{CANDIDATE, COMPARE, FIT, PLOT, PRIOR, RANGE, TUNE};
 const EXPRESSION: Shape = Shape::Either(&[Shape::Number, Shape::Text]);
 
 /// The keys of the top level.
-pub(super) const KEYS: [KeySpec; 4] = [
+pub(super) const KEYS: [KeySpec; 5] = [
     KeySpec {
         name: "plant",
         shape: Shape::Text,
@@ -36,6 +36,12 @@ pub(super) const KEYS: [KeySpec; 4] = [
         shape: Shape::Word(&["linear", "monotone"]),
         default: "`\"linear\"`",
         meaning: "what the plant's [tables](modelica.md#tables) are between their points: straight lines, or monotone cubics, whose slopes do not jump",
+    },
+    KeySpec {
+        name: "delay_states",
+        shape: Shape::Whole(1),
+        default: "6",
+        meaning: "states that hold the last of what the plant [delays](modelica.md#delays), for each `delay`: at most 10",
     },
 ];
 
@@ -131,7 +137,7 @@ pub(super) const SECTIONS: [KeySpec; 13] = [
 const LEVEL: Shape = Shape::Either(&[Shape::NotNegative, Shape::Text, Shape::Section(&[&NOISE])]);
 
 /// `[sensors]`
-pub(super) const SENSORS: [KeySpec; 9] = [
+pub(super) const SENSORS: [KeySpec; 11] = [
     KeySpec {
         name: "limits",
         shape: Shape::As(
@@ -203,6 +209,18 @@ pub(super) const SENSORS: [KeySpec; 9] = [
         ),
         default: "none",
         meaning: "more equal cells of a log in a row than this are no readings from there on, until they change: the sensor is stuck",
+    },
+    KeySpec {
+        name: "delay",
+        shape: Shape::As("table: output = number", &Shape::Table(&Shape::NotNegative)),
+        default: "none",
+        meaning: "how much later than its sample is taken a reading comes, in the plant's unit of time: the reading in a row at t is of t less this ([late readings](#late-readings))",
+    },
+    KeySpec {
+        name: "taken_at",
+        shape: Shape::As("table: output = column", &Shape::Table(&Shape::Text)),
+        default: "none",
+        meaning: "the column of a log, or an expression of columns, that has the time at which the sample was taken whose result is the reading in that row: an assay that comes hours later ([late readings](#late-readings))",
     },
 ];
 

@@ -5,6 +5,7 @@ mod credible;
 mod glitch;
 mod hidden;
 pub(super) mod javascript;
+mod late;
 mod manifold;
 mod names;
 mod rust;

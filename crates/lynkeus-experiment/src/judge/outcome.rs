@@ -11,6 +11,7 @@ use serde::Serialize;
 use crate::answer::Origin;
 use crate::course::corrections::Corrections;
 use crate::course::doubt::Doubt;
+use crate::course::taken::{AT_ONCE, delayed};
 use crate::course::trace::Trace;
 use crate::course::{Course, curved};
 use crate::judge::accuracy::{self, Accuracy};
@@ -19,13 +20,13 @@ use crate::judge::frozen::Frozen;
 use crate::judge::interval::Intervals;
 use crate::judge::outside::{self, Outside, outside};
 use crate::judge::{self, By, Evidence, Innovations, Judged, innovations};
-use crate::prepare::declared::{Account, Declared};
+use crate::prepare::declared::{Account, Declared, Kind};
 use crate::prepare::headers::{Headers, log_time};
 use crate::prepare::systems::hat;
 use crate::prepare::{Prepared, StudyDesign};
 use crate::words::in_words;
 use crate::{Error, Quantity, Series, judge::expected, judge::saturated, prepare::headers};
-use lynkeus_study::{EstimateSettings, Name};
+use lynkeus_study::{EstimateSettings, Late, Name};
 
 #[cfg(feature = "schema")]
 pub use summary::RunReport;
@@ -83,6 +84,8 @@ pub struct Outcome {
     log_time: String,
     /// how the study names the columns of one
     settings: EstimateSettings,
+    /// whose readings it has late
+    late: Kind<Late>,
     /// the study, for messages
     file: String,
     /// the unit of time, where the study has one
@@ -163,8 +166,17 @@ impl Outcome {
         let inputs = inputs.filter_map(|q| Some((&q.name, q.truth.as_ref()?)));
         let measured = self.measurements.iter().map(|(n, values)| (n, values));
         let mut columns = vec![(self.log_time.clone(), self.time.clone())];
+        let mut stamps: Vec<&str> = vec![];
         for (name, values) in measured.chain(inputs) {
             let header = headers::header(&self.settings, name).to_owned();
+            let values = &match self.late.of(name) {
+                Some(Late::By(delay)) => self.delayed(name, values, *delay)?,
+                Some(Late::TakenAt(column)) => {
+                    stamps.push(&column.text);
+                    values.clone()
+                }
+                None => values.clone(),
+            };
             if columns.iter().any(|(known, _)| *known == header) {
                 return Err(Error::input(format!(
                     "the log would have two columns \"{header}\", and \"{name}\" is one of them"
@@ -174,7 +186,24 @@ impl Outcome {
             }
             columns.push((header, values.clone()));
         }
+        // what is simulated is told at once
+        for column in stamps {
+            if columns.iter().all(|(known, _)| known != column) {
+                columns.push((column.to_owned(), self.time.clone()));
+            }
+        }
         Ok(columns)
+    }
+
+    /// What a sensor shows that is late.
+    fn delayed(&self, name: &str, values: &Series, delay: f64) -> Result<Series, Error> {
+        delayed(&self.time, values, delay).ok_or_else(|| {
+            Error::input(format!(
+                "the simulated log has no row {delay} after another, and {name} is as late: expected a delay of some whole rows"
+            ))
+            .hint("set `sample_step` (of a filter) or `output_step` of [simulate] to a part of the delay")
+            .at(&self.file)
+        })
     }
 
     /// The answer "no" where an estimate is not credible, by its [doubts](Self::doubts), or the run
@@ -332,7 +361,7 @@ impl Raw<'_> {
         time.check()?;
         let is_weighed =
             design.observer.filter.is_some() || quantities.iter().any(|q| q.deviation.is_some());
-        let declared = account(prepared.declared(), &design, is_weighed);
+        let declared = account(prepared.declared(), &design, is_weighed, replayed);
         // of a gain that is chosen without the noises nobody takes them for counted
         let is_claimed = is_weighed || prepared.declared().disturbances.is_declared();
         notes.extend(declared.told().filter(|_| is_claimed));
@@ -343,6 +372,7 @@ impl Raw<'_> {
             declared,
             log_time: log_time(plant, &study.estimate),
             settings: study.estimate.clone(),
+            late: prepared.declared().late.clone(),
             time_unit: study.time_unit.clone(),
             show: study.show.clone(),
             is_simulated: !replayed,
@@ -393,7 +423,7 @@ fn followed(design: &Design, innovations: &[Innovations]) -> Vec<String> {
 }
 
 /// What estimates count: a filter by its gain, a family with a theorem by its deviations if they are asked for.
-fn account(declared: &Declared, design: &Design, is_weighed: bool) -> Account {
+fn account(declared: &Declared, design: &Design, is_weighed: bool, replayed: bool) -> Account {
     let Declared {
         ranges,
         noise,
@@ -404,6 +434,7 @@ fn account(declared: &Declared, design: &Design, is_weighed: bool) -> Account {
         slew,
         input_derivatives,
         screens,
+        late,
         manifold,
     } = declared;
     let is_filter = design.observer.filter.is_some();
@@ -411,6 +442,7 @@ fn account(declared: &Declared, design: &Design, is_weighed: bool) -> Account {
     let promised = "a promise of what the inputs do: `certify` counts it";
     Account::default()
         .counts(screens)
+        .counts_if(replayed, late, AT_ONCE)
         .counts(manifold)
         .counts(ranges)
         .counts(samples)

@@ -39,6 +39,7 @@ pub use report::shortened;
 pub use row::{Peak, Row};
 
 use crate::course::plant::sample_step;
+use crate::course::taken::AT_ONCE;
 use crate::crew::within;
 use crate::prepare::Prepared;
 use crate::prepare::declared::{Account, Declared};
@@ -240,6 +241,7 @@ fn account(declared: &Declared, is_simulated: bool, is_filters: bool) -> Account
         slew,
         input_derivatives,
         screens,
+        late,
         manifold,
     } = declared;
     let measured = "the log's own is in its readings";
@@ -251,6 +253,7 @@ fn account(declared: &Declared, is_simulated: bool, is_filters: bool) -> Account
             screens,
             "they are of logs: every simulated reading counts",
         )
+        .counts_if(!is_simulated, late, AT_ONCE)
         .counts(ranges)
         .counts(limits)
         .counts_if(is_simulated || is_filters, noise, measured)

@@ -30,6 +30,8 @@ pub struct Device<'a> {
     pub noises: &'a [Option<Level>],
     /// units and meanings of the model's names, where there are any
     pub words: &'a [Entry],
+    /// how much later than its sample is taken a reading comes, by sensor; none where no sensor is late
+    pub delays: &'a [f64],
     /// lines for people: the study, the design, the certificate
     pub about: &'a [String],
 }

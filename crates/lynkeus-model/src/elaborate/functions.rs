@@ -21,7 +21,7 @@ const INTERPOLATE: &str = "Modelica.Math.Vectors.interpolate";
 type Function = for<'e, 'a> fn(&'e mut Evaluator<'a>, &'a Call) -> Result<Value>;
 
 /// By name: what an evaluator `e` makes of a call `c`.
-const FUNCTIONS: [(&str, Function); 47] = [
+const FUNCTIONS: [(&str, Function); 53] = [
     ("sqrt", |e, c| e.each(c, |x| x.sqrt())),
     ("exp", |e, c| e.each(c, |x| x.exp())),
     ("log", |e, c| e.each(c, |x| x.ln())),
@@ -47,9 +47,15 @@ const FUNCTIONS: [(&str, Function); 47] = [
     ("min", |e, c| e.extreme(c, i64::min, |a, b| a.min(b))),
     ("max", |e, c| e.extreme(c, i64::max, |a, b| a.max(b))),
     ("der", |e, c| e.der(c)),
+    ("delay", |e, c| e.delay(c)),
     ("noEvent", |e, c| e.only_argument(c)),
     ("smooth", |e, c| Ok(e.two_arguments(c)?.1)),
     ("homotopy", |e, c| Ok(e.two_arguments(c)?.0)),
+    ("pre", |e, c| e.before(c)),
+    ("edge", |e, c| e.edge(c)),
+    ("change", |e, c| e.change(c)),
+    ("sample", |e, c| e.sample(c)),
+    ("initial", |e, c| e.initial(c)),
     ("semiLinear", |e, c| e.semi_linear(c)),
     ("cross", |e, c| e.cross(c)),
     (INTERPOLATE, |e, c| e.interpolate(c)),
@@ -71,22 +77,14 @@ const FUNCTIONS: [(&str, Function); 47] = [
     ("matrix", |e, c| e.reshaped(c, matrix_dims)),
 ];
 
-const NO_EVENTS: &str = "models with events are not supported: use `if` expressions";
-
 /// Functions that an observer's model cannot have, and what to do instead.
-const REFUSED: [(&str, &str); 10] = [
-    ("pre", NO_EVENTS),
-    ("edge", NO_EVENTS),
-    ("change", NO_EVENTS),
-    ("sample", "sampling is set in the study, not in the model"),
-    ("initial", "give the starting values with `start = …`"),
-    ("terminal", "models with events are not supported"),
-    ("reinit", "models with events are not supported"),
+const REFUSED: [(&str, &str); 4] = [
+    ("terminal", "the study says until when a run goes"),
+    ("reinit", "it is an equation of its own, in a `when`"),
     (
-        "delay",
-        "a delay has infinitely many states: use a chain of lags",
+        "spatialDistribution",
+        "use `delay` where the flow is constant, or a chain of lags",
     ),
-    ("spatialDistribution", "use a chain of lags"),
     ("assert", "it is an equation or a statement of its own"),
 ];
 

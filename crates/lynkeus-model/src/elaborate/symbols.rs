@@ -5,6 +5,8 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use lynkeus_expr::{Graph, Node};
 
+use super::clauses::EventSymbols;
+use super::delay::Delayed;
 use super::scope::{Mode, Named};
 use super::value::Scalar;
 use crate::LoadOptions;
@@ -42,6 +44,8 @@ pub(crate) struct Symbols<'a> {
     pub(super) texts: Budget,
     /// of which the points of tables are made, found on the way
     pub table_points: RefCell<BTreeSet<Node>>,
+    /// the delays that equations have
+    pub(super) delays: RefCell<Vec<Delayed>>,
     pub(super) by_name: HashMap<&'a str, usize>,
     pub(super) components: Vec<Option<Component>>,
     /// arrays whose elements are declared by themselves: `x` of `x[1]` and `x[2]`
@@ -50,6 +54,8 @@ pub(crate) struct Symbols<'a> {
     pub(super) parameters: HashSet<Node>,
     /// symbols that may stand in `der`, with the symbols of their derivatives once they do
     pub(super) derivatives: RefCell<HashMap<Node, Option<Node>>>,
+    /// what the text says of events, found on the way
+    pub(super) events: RefCell<EventSymbols>,
     /// of each declaration: true where the value of a parameter is made from other parameters
     pub dependent: Vec<bool>,
 }
@@ -79,11 +85,13 @@ impl<'a> Symbols<'a> {
             scalars: Budget::new(MAX_SCALARS, "scalar variables and parameters"),
             texts: Budget::new(MAX_TEXT, "bytes of names, units and descriptions"),
             table_points: RefCell::default(),
+            delays: RefCell::default(),
             by_name: HashMap::new(),
             components: vec![],
             gathered: HashMap::new(),
             parameters: HashSet::new(),
             derivatives: RefCell::default(),
+            events: RefCell::default(),
             dependent: vec![],
         }
     }

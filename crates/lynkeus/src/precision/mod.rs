@@ -79,6 +79,7 @@ pub struct Report {
 pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     let settings = systems::settings(study)?;
     let plant = prepare::plant(study)?;
+    prepare::whens::refuse(study, &plant, "precision")?;
     let prepared = Prepared::new(study, &plant)?;
     let mut states = plant.states.iter();
     if let Some(state) = states.find(|s| matches!(s.home, Home::Rotation { .. })) {
@@ -149,11 +150,16 @@ fn account(declared: &Declared, counts_process_noise: bool) -> Account {
         slew,
         input_derivatives,
         screens,
+        late,
         manifold,
     } = declared;
     Account::default()
         .counts(manifold)
         .leaves(screens, "they are of logs: every simulated reading counts")
+        .leaves(
+            late,
+            "what is known counts each reading at the time of its sample, and is known once it has come",
+        )
         .counts(ranges)
         .counts(noise)
         .counts(limits)
