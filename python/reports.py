@@ -32,7 +32,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal, TypeAlias
 
-from ._health import Health, Innovation, SensorHealth
+from ._health import Health, Innovation, Revised, SensorHealth
 from ._records import Named, Record
 
 '''
@@ -40,7 +40,7 @@ RANGE = """#: a range, ``[smallest, largest]``; an end that is not declared is `
 Range: TypeAlias = list[float | None]
 """
 #: what is imported
-OTHERS = ("Health", "Innovation", "Named", "Range", "Record", "SensorHealth")
+OTHERS = ("Health", "Innovation", "Named", "Range", "Record", "Revised", "SensorHealth")
 
 #: what answers each report, and the class that has it as its summary
 ANSWERS = {

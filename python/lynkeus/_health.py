@@ -44,3 +44,16 @@ class Health(TypedDict):
     """samples at which the estimate was put back to where the plant has values"""
     unsolved: int
     """samples at which a moving horizon did not come to its minimum"""
+    too_late: int
+    """samples that came later than is waited for, which are not used"""
+
+
+class Revised(TypedDict):
+    """A row that an estimator went over again, because a reading came late."""
+
+    t: float
+    """its time"""
+    estimate: dict[str, float]
+    """what is estimated there now, by name"""
+    sd: dict[str, float] | None
+    """standard deviations by name, where the observer has them"""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ._columns import Given as _Given
 from ._progress import Terms as _Terms
 from .errors import LynkeusError
-from .reports import Health as _Health, Innovation as _Innovation
+from .reports import Health as _Health, Innovation as _Innovation, Revised as _Revised
 from .study import Study as _Study
 
 _Column = NDArray[np.float64]
@@ -251,7 +251,7 @@ class Study:
     def compare(self, log: Log | str | None, terms: _Terms | None = None) -> Answer: ...
     def functions(self) -> Functions: ...
     def observer(self, terms: _Terms | None = None) -> Functions: ...
-    def estimator(self, study: _Study) -> Estimator: ...
+    def estimator(self, study: _Study, wait: float) -> Estimator: ...
 
 class Functions:
     """A system's functions, in the engine."""
@@ -331,7 +331,7 @@ class Estimator:
         Parameters
         ----------
         t : float
-            The time, in the model's unit, not before the last one.
+            The time, in the model's unit, not before the last one by more than :attr:`wait`.
         readings : mapping of str to float
             By signal, in its unit. A sensor that is left out, ``None`` or NaN did not report; of a known
             input the last value holds.
@@ -349,7 +349,7 @@ class Estimator:
         Parameters
         ----------
         t : float
-            The time, in the model's unit, not before the last one.
+            The time, in the model's unit, not before the last one by more than :attr:`wait`.
         signals : list of float
             One for each of :attr:`signals`, shape (m,); NaN did not report.
 
@@ -375,6 +375,15 @@ class Estimator:
     @property
     def time(self) -> float | None:
         """The time of the last sample or prediction."""
+
+    @property
+    def wait(self) -> float:
+        """How long what comes late is waited for; at least the largest ``delay`` of the study."""
+
+    @property
+    def revised(self) -> list[_Revised]:
+        """The rows before the newest that the last call went over, because of a reading that came late: their
+        estimates now."""
 
     @property
     def estimate(self) -> dict[str, float]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal, TypeAlias
 
-from ._health import Health, Innovation, SensorHealth
+from ._health import Health, Innovation, Revised, SensorHealth
 from ._records import Named, Record
 
 __all__ = [
@@ -75,6 +75,7 @@ __all__ = [
     "Range",
     "Rank",
     "Record",
+    "Revised",
     "RunEntries",
     "RunReport",
     "SamplingLimits",

@@ -84,6 +84,15 @@ class SensorsSection(TypedDict, total=False):
     """more equal cells of a log in a row than this are no readings from there on, until they change: the
     sensor is stuck (table: output = whole number; default: none)"""
 
+    delay: Mapping[str, Number] | None
+    """how much later than its sample is taken a reading comes, in the plant's unit of time: the reading in a
+    row at t is of t less this (late readings) (table: output = number; default: none)"""
+
+    taken_at: Mapping[str, str] | None
+    """the column of a log, or an expression of columns, that has the time at which the sample was taken whose
+    result is the reading in that row: an assay that comes hours later (late readings) (table: output =
+    column; default: none)"""
+
 
 #: spectral density (variance per unit of time) of white noise on a state's derivative; for an unknown input,
 #: how fast it wanders. Read by the filters, `sd` and `--how-well`; `simulate` moves the plant's states by it,
@@ -94,6 +103,22 @@ ProcessNoiseSection: TypeAlias = Mapping[str, Number | None]
 
 #: values that replace those of the plant (table: name = number; default: none)
 ParametersSection: TypeAlias = Mapping[str, Number | None]
+
+
+class ManifoldSection(TypedDict, total=False):
+    """which states and outputs are angles or rotations; the filters take them as such (table; default: none)"""
+
+    circle: Names | None
+    """angles in radians, of which a full turn changes nothing: θ and θ + 2π are one. Innovations and errors
+    are wrapped, the box has no ends there, and estimates are shown in the declared range (`min` and `max`,
+    or `[box]`) where that is one turn, else unwrapped. An output that turns with such a state is one as
+    well (list of states and outputs; default: none)"""
+
+    quaternion: Names | None
+    """attitudes: arrays `Real q[4]` of states, a unit quaternion with the scalar first, whose equation is q'
+    = ½ q⊗(0, ω). `initial_variance`, `[process_noise]`, `spread` and `NAME_sd` are those of the vector of
+    a small rotation about the body's axes, in rad: one number for the array, and one column (list of
+    states; default: none)"""
 
 
 class ObserverS(TypedDict):
@@ -271,11 +296,16 @@ class ObserverSection(TypedDict, total=False):
     initial_variance: Mapping[str, Number] | None
     """ekf, ukf, mhe: how uncertain the first estimate is: the variance of each state and unknown input;
     `default` holds for everything not listed (table: name = number ≥ 0, and `default`; default: the square
-    of a quarter of the declared range (without a range: of the start value, or 1))"""
+    of a quarter of the declared range (without a range: of the start value, or 1; of an angle or a
+    rotation: of a turn))"""
 
     gate: Number | None
     """ekf, ukf, mhe: a reading whose innovation exceeds so many of its standard deviations is rejected and
-    counted; after ten in a row the next is believed (number > 0; default: none)"""
+    counted (number > 0; default: none)"""
+
+    gate_patience: Whole | None
+    """ekf, ukf, mhe: after so many rejections of a sensor in a row, at least half of which moved, its next
+    reading is believed (whole number ≥ 1; default: 10)"""
 
     bounds: Literal["project"] | None
     """ekf, ukf: "project": the estimate is kept in the declared ranges `[min, max]`: after each prediction
@@ -672,6 +702,9 @@ class Sections(TypedDict, total=False):
     parameters: ParametersSection | None
     """values that replace those of the plant (table: name = number; default: none)"""
 
+    manifold: ManifoldSection | None
+    """which states and outputs are angles or rotations; the filters take them as such (table; default: none)"""
+
     observer: ObserverSection | Family | None
     """the observer family and its tuning"""
 
@@ -706,6 +739,10 @@ class Sections(TypedDict, total=False):
     tables: Literal["linear", "monotone"] | None
     """what the plant's tables are between their points: straight lines, or monotone cubics, whose slopes do
     not jump (`"linear"`, `"monotone"`; default: `"linear"`)"""
+
+    delay_states: Whole | None
+    """states that hold the last of what the plant delays, for each `delay`: at most 10 (whole number ≥ 1;
+    default: 6)"""
 
 
 class Changes(Sections, total=False):

@@ -18,7 +18,7 @@ from ._logs import given, given_each
 from ._lynkeus import MEMORY
 from ._progress import Progress, Terms, told
 from ._toml import document, valid
-from ._types import ListOf, LogLike, Names, Number, Numbers
+from ._types import ListOf, LogLike, Names, Number, Numbers, Whole
 from .errors import InputError, LimitError
 from .likelihood import Likelihood, likelihood
 from .systems import Functions, Observer
@@ -89,6 +89,8 @@ class Study(Batched):
         The section ``[compare]``, or the names of families.
     tables : str, optional
         ``"linear"`` or ``"monotone"``: what the model's tables are between their points.
+    delay_states : int, optional
+        States that hold each delay of the model, at most 10.
 
     Raises
     ------
@@ -137,9 +139,11 @@ class Study(Batched):
         compare: CompareSection | Names | None = None,
         plot: PlotSection | None = None,
         tables: Literal["linear", "monotone"] | None = None,
+        delay_states: Whole | None = None,
     ) -> None:
         given = {
             "tables": tables,
+            "delay_states": delay_states,
             "sensors": sensors,
             "process_noise": process_noise,
             "parameters": parameters,
@@ -798,8 +802,14 @@ class Study(Batched):
         )
         return write(Path(folder), files, notes, force=force)
 
-    def estimator(self) -> _lynkeus.Estimator:
+    def estimator(self, *, wait: float = 0.0) -> _lynkeus.Estimator:
         """An estimator for samples that come one by one.
+
+        Parameters
+        ----------
+        wait : float
+            How much later than another a sample may come, in the model's unit of time: it is put in its place. The
+            readings of a sensor with a ``delay`` are put in theirs whatever this says.
 
         Returns
         -------
@@ -813,14 +823,14 @@ class Study(Batched):
         RefusedError
             No family fits, or a condition of the one that is asked for is refuted.
         """
-        return self._core.estimator(self)
+        return self._core.estimator(self, wait)
 
 
 def _restored(text: str, file: str, plant: tuple[str, str | None] | None, model: str | None) -> Study:
     return Study._of(_lynkeus.Study.parse(text, file, plant, model))
 
 
-def _resumed(study: Study, snapshot: bytes) -> _lynkeus.Estimator:
-    estimator = study.estimator()
+def _resumed(study: Study, snapshot: bytes, wait: float = 0.0) -> _lynkeus.Estimator:
+    estimator = study.estimator(wait=wait)
     estimator.restore(snapshot)
     return estimator

@@ -5,6 +5,7 @@ pub(crate) mod checkpoint;
 pub mod columns;
 mod computed;
 pub(crate) mod corrections;
+pub(crate) mod curved;
 pub(crate) mod doubt;
 pub(crate) mod ended;
 pub mod filter;
@@ -20,6 +21,7 @@ pub mod run;
 pub(crate) mod sampled;
 pub mod sampling;
 mod screen;
+pub(crate) mod taken;
 pub(crate) mod trace;
 
 use lynkeus_expr::Spent;

@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 
 use crate::answer::Origin;
 use lynkeus_expr::Node;
-use lynkeus_model::{Plant, Variable};
+use lynkeus_model::{Home, Plant, Variable};
 use lynkeus_observers::starts;
 use lynkeus_run::{Error as RunError, Estimator, System};
 use lynkeus_study::{Generator, Name};
@@ -22,7 +22,8 @@ use crate::course::fixed_steps::unlocated;
 use crate::course::inputs::refuse_strays;
 use crate::course::replay::{Watch, replay};
 use crate::course::run::{first_readings, told_start};
-use crate::course::{Course, Samples};
+use crate::course::taken::Interleaved;
+use crate::course::{Course, Samples, curved};
 use crate::crew::within;
 use crate::judge::outcome::{Ended, not_whole};
 use crate::prepare::headers::{Headers, header};
@@ -263,7 +264,10 @@ fn of_the_log(
 ) -> Result<Option<Series>, Error> {
     let settings = &prepared.study().estimate;
     match logged(&log.table, settings, &log.time, &input.name) {
-        Some(_) => held(&log.table, settings, header(settings, &input.name)).map(Some),
+        Some(_) => {
+            let column = held(&log.table, settings, header(settings, &input.name))?;
+            Ok(Some(log.held(&column)))
+        }
         None => Ok(None),
     }
 }
@@ -336,7 +340,7 @@ fn finished(
     Ok(OpenRun {
         plant: plant.name.clone(),
         log: log.table.place(),
-        time: log.samples.time.shortened(rows),
+        time: log.own(&log.samples.time.shortened(rows)),
         time_header,
         origin: log.table.start(&log.time).map(|instant| Origin {
             instant,
@@ -373,9 +377,18 @@ fn compared(
         };
         let misfit = readings.map(|readings| {
             let header = headers.free(&format!("{name}_error"), &format!("the error of {name}"));
-            let readings = readings.shortened(values.len());
-            misfit(prepared, (name, &values), readings, header)
+            let mut readings = readings.shortened(values.len());
+            if let Home::Circle { .. } = variable.home {
+                readings = curved::lifted(&readings, &values);
+            }
+            let inserted = log.interleaved.as_ref().map_or(0, Interleaved::inserted);
+            let mut misfit = misfit(prepared, (name, &values), readings, header);
+            misfit.missing = misfit.missing.saturating_sub(inserted);
+            misfit.readings = log.own(&misfit.readings);
+            misfit.error = log.own(&misfit.error);
+            misfit
         });
+        let values = log.own(&values);
         // an output may be a state of the same name
         match variables.iter_mut().find(|known| known.name == *name) {
             Some(known) => known.misfit = misfit,
@@ -417,10 +430,10 @@ fn readings(prepared: &Prepared<'_>, log: &Log<'_>, name: &str) -> Option<Series
     let settings = &prepared.study().estimate;
     let measured = &prepared.augmented().outputs;
     let found = match measured.iter().position(|o| o.variable.name == name) {
-        Some(sensor) => log.samples.readings.get(sensor),
-        None => logged(&log.table, settings, &log.time, name),
+        Some(sensor) => log.samples.readings.get(sensor).cloned(),
+        None => logged(&log.table, settings, &log.time, name).map(|column| log.spread(column)),
     };
-    found.filter(|readings| !readings.is_empty()).cloned()
+    found.filter(|readings| !readings.is_empty())
 }
 
 /// The errors of an output.

@@ -78,6 +78,9 @@ mod units;
 
 pub use builder::{Model, ModelError};
 pub use diagnostic::{Diagnostic, LoadError, Span};
+pub use elaborate::{DELAY_STATES, MAX_DELAY_STATES};
 pub use load::{model_names, parse_expression};
-pub use plant::{Assertion, Clause, LoadOptions, Parameter, Plant, Tables, Timer, Variable, Whens};
+pub use plant::{
+    Assertion, Clause, Delay, Home, LoadOptions, Parameter, Plant, Tables, Timer, Variable, Whens,
+};
 pub use units::BaseUnit;

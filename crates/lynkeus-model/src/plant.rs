@@ -33,6 +33,8 @@ pub struct Plant {
     /// what the points of tables are made of that is no number, such as parameters that stay symbolic:
     /// that the points increase is not known
     pub table_points: BTreeSet<Node>,
+    /// what is delayed, of which the last of it is held by a few states
+    pub delays: Vec<Delay>,
     /// what must hold along every run, in order of the text
     pub assertions: Vec<Assertion>,
     /// what happens at events, in order of the text
@@ -55,11 +57,23 @@ impl Plant {
             algebraics: vec![],
             parameters: vec![],
             table_points: BTreeSet::new(),
+            delays: vec![],
             assertions: vec![],
             whens: Whens::default(),
             warnings: vec![],
         }
     }
+}
+
+/// A `delay` of the model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Delay {
+    /// as it stands in the text
+    pub text: String,
+    /// the names of its states begin so
+    pub states: String,
+    /// how many there are
+    pub count: usize,
 }
 
 /// The `when` clauses of a model. A variable that they assign is a state at rest, which jumps.
@@ -179,9 +193,43 @@ pub struct Variable {
     pub discrete: bool,
     /// declared with `fixed = true`: the value at the start is known, 0 where `start` is absent
     pub fixed: bool,
+    /// where its values live
+    pub home: Home,
+}
+
+/// Where the values of a variable live.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Home {
+    /// among the real numbers
+    #[default]
+    Line,
+    /// on a circle, in radians: a full turn changes nothing
+    Circle {
+        /// the values are shown in the turn that begins here; none where they are shown as they come
+        from: Option<f64>,
+    },
+    /// it changes its sign with a quaternion, which says the same as its negative
+    Signed {
+        /// place among the states of the first of the four numbers
+        of: usize,
+    },
+    /// it is one of the four numbers of a unit quaternion, which says the same as its negative
+    Rotation {
+        /// its place among them; 0 is the scalar
+        element: usize,
+    },
 }
 
 impl Variable {
+    /// How wide its range is: a full turn of an angle; infinite where an end is missing.
+    #[must_use]
+    pub fn width(&self) -> f64 {
+        match self.home {
+            Home::Line | Home::Signed { .. } => self.max - self.min,
+            Home::Circle { .. } | Home::Rotation { .. } => std::f64::consts::TAU,
+        }
+    }
+
     /// A variable of which nothing is declared.
     pub(crate) fn new(name: String, node: Node) -> Self {
         Self {
@@ -197,6 +245,7 @@ impl Variable {
             integer: false,
             discrete: false,
             fixed: false,
+            home: Home::Line,
         }
     }
 }
@@ -235,6 +284,9 @@ pub struct LoadOptions {
     pub numbers: BTreeSet<String>,
     /// what tables are between their points
     pub tables: Tables,
+    /// states of each delay, from 1 to [`MAX_DELAY_STATES`](crate::MAX_DELAY_STATES); without it
+    /// [`DELAY_STATES`](crate::DELAY_STATES)
+    pub delay_states: Option<usize>,
     /// when to stop; the graph of the plant keeps it
     pub budget: Budget,
 }

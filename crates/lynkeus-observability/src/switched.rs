@@ -11,7 +11,7 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
-use lynkeus_model::{Plant, Variable};
+use lynkeus_model::{Home, Plant, Variable};
 
 use crate::branches::{Choices, Reference, value};
 
@@ -61,6 +61,7 @@ fn input(graph: &Graph, node: Node) -> Variable {
         integer: false,
         discrete: false,
         fixed: false,
+        home: Home::Line,
     }
 }
 

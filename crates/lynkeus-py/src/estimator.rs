@@ -14,7 +14,7 @@ use crate::errors::{exception, from_source, number, wrong};
 #[pyclass(frozen, module = "lynkeus._lynkeus")]
 pub struct Estimator {
     /// threads take turns; nothing of Python is called while it is locked
-    estimator: Mutex<run::Estimator>,
+    estimator: Mutex<run::Late>,
     /// the Python study that it is of
     study: Py<PyAny>,
     /// names of the signals, interned
@@ -37,7 +37,7 @@ const PATIENCE: usize = 5;
 const FEW: usize = 32;
 
 impl Estimator {
-    pub fn of(py: Python<'_>, estimator: run::Estimator, study: Py<PyAny>) -> Self {
+    pub fn of(py: Python<'_>, estimator: run::Late, study: Py<PyAny>) -> Self {
         let interned = |names: &[String]| {
             let names = names.iter();
             names
@@ -55,7 +55,7 @@ impl Estimator {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, run::Estimator> {
+    fn lock(&self) -> MutexGuard<'_, run::Late> {
         self.estimator
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -212,6 +212,27 @@ impl Estimator {
         deviations.map(|sd| self.by_name(py, &sd)).transpose()
     }
 
+    /// How long what comes late is waited for.
+    #[getter]
+    fn wait(&self) -> f64 {
+        self.lock().wait()
+    }
+
+    /// The rows that the last call went over again.
+    #[getter]
+    fn revised<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let revised = self.lock().revised().to_vec();
+        let rows = revised.into_iter().map(|row| {
+            let found = PyDict::new(py);
+            found.set_item("t", row.t)?;
+            found.set_item("estimate", self.by_name(py, &row.estimate)?)?;
+            let sd = row.deviations.map(|sd| self.by_name(py, &sd)).transpose()?;
+            found.set_item("sd", sd)?;
+            Ok(found)
+        });
+        rows.collect()
+    }
+
     /// What is estimated, in the order of `names`.
     fn to_numpy<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let estimate = self.lock().estimate().to_vec();
@@ -253,6 +274,7 @@ impl Estimator {
         found.set_item("inputs_held", health.inputs_held)?;
         found.set_item("confined", health.confined)?;
         found.set_item("unsolved", health.unsolved)?;
+        found.set_item("too_late", self.lock().too_late())?;
         Ok(found)
     }
 
@@ -269,7 +291,7 @@ impl Estimator {
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let again = py.import("lynkeus.study")?.getattr("_resumed")?;
-        let parts = (self.study.clone_ref(py), self.snapshot(py));
+        let parts = (self.study.clone_ref(py), self.snapshot(py), self.wait());
         (again, parts).into_pyobject(py)
     }
 }

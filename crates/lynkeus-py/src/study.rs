@@ -392,8 +392,10 @@ impl Study {
     }
 
     /// `study` is what a copy or an unpickled estimator is made of again.
-    fn estimator(&self, py: Python<'_>, study: Py<PyAny>) -> PyResult<Estimator> {
-        let made = self.ask(py, &Terms::default(), |study, _| lynkeus::estimator(study));
+    fn estimator(&self, py: Python<'_>, study: Py<PyAny>, wait: f64) -> PyResult<Estimator> {
+        let made = self.ask(py, &Terms::default(), |study, _| {
+            lynkeus::late_estimator(study, wait)
+        });
         Ok(Estimator::of(py, made?, study))
     }
 }

@@ -204,6 +204,17 @@ pub enum Error {
         time: f64,
     },
 
+    /// A row that comes later than is waited for.
+    #[error(
+        "the time {time} is before {oldest}: expected a row that is no later than is waited for; it is not used"
+    )]
+    TooLate {
+        /// time of the row, or of a sample in it
+        time: f64,
+        /// the earliest that still finds its place
+        oldest: f64,
+    },
+
     /// A time of a sample, or an input of the first one, that is no finite number.
     #[error("{signal}: expected a finite number, found {value}")]
     NoNumber {

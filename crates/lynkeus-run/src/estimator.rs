@@ -294,6 +294,25 @@ impl Estimator {
         self.image = image;
     }
 
+    /// The state, to [go back](Self::go_back) to; what a smoother keeps is not in it.
+    pub(crate) fn image(&mut self) -> Vec<u64> {
+        let mut image = vec![];
+        // a state that is there can be walked over
+        let _ = self.walk(&mut Walk::Save(&mut image), false);
+        image
+    }
+
+    /// To a state from before.
+    pub(crate) fn go_back(&mut self, image: &[u64]) {
+        // the same walk over what it made
+        let _ = snapshot::load(image, |walk| self.walk(walk, false));
+    }
+
+    /// Over all that the future depends on.
+    pub(crate) fn walk_state(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.walk(walk, false)
+    }
+
     /// The observer to the sample that was taken in; back to what was saved where that fails.
     fn settle(&mut self, before: Option<f64>, has_signals: bool) -> Result<&[f64]> {
         if let Err(error) = self.go(before, has_signals) {

@@ -235,11 +235,18 @@ impl<'p> AugmentedPlant<'p> {
     }
 
     /// Whether f and h have values on the whole of a box and jump nowhere as the states
-    /// move: what every condition and every proof on that box takes for granted.
+    /// move: what every condition and every proof on that box takes for granted. Of a plant with a delay
+    /// nothing is proved: the states that hold it are not all of it.
     ///
     /// # Errors
     /// [`MissingInput`] where the plant has parameters without value.
     pub fn regularity(&self, region: &Region) -> Result<Finding, MissingInput> {
+        if let Some(delay) = self.plant.delays.first() {
+            return Ok(Finding::undecided(Reason::Delayed {
+                delay: delay.text.clone(),
+                states: delay.count,
+            }));
+        }
         if let Some(clause) = self.whens.clauses.first() {
             let reason = Reason::StateJumps { line: clause.line };
             return Ok(Finding::undecided(reason));

@@ -109,6 +109,13 @@ pub enum Reason {
         /// the part
         place: Place,
     },
+    /// a delay of the plant is held by a few states, which is not all of it
+    Delayed {
+        /// as it stands in the model
+        delay: String,
+        /// how many states
+        states: usize,
+    },
     /// the state jumps at events
     StateJumps {
         /// line of the first `when`

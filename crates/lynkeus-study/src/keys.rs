@@ -12,7 +12,7 @@ pub(super) use judged::{CANDIDATE, COMPARE, FIT, PLOT, PRIOR, RANGE, TUNE};
 const EXPRESSION: Shape = Shape::Either(&[Shape::Number, Shape::Text]);
 
 /// The keys of the top level.
-pub(super) const KEYS: [KeySpec; 4] = [
+pub(super) const KEYS: [KeySpec; 5] = [
     KeySpec {
         name: "plant",
         shape: Shape::Text,
@@ -37,10 +37,16 @@ pub(super) const KEYS: [KeySpec; 4] = [
         default: "`\"linear\"`",
         meaning: "what the plant's [tables](modelica.md#tables) are between their points: straight lines, or monotone cubics, whose slopes do not jump",
     },
+    KeySpec {
+        name: "delay_states",
+        shape: Shape::Whole(1),
+        default: "6",
+        meaning: "states that hold the last of what the plant [delays](modelica.md#delays), for each `delay`: at most 10",
+    },
 ];
 
 /// The sections.
-pub(super) const SECTIONS: [KeySpec; 12] = [
+pub(super) const SECTIONS: [KeySpec; 13] = [
     KeySpec {
         name: "sensors",
         shape: Shape::Section(&[&SENSORS]),
@@ -52,6 +58,12 @@ pub(super) const SECTIONS: [KeySpec; 12] = [
         shape: Shape::Table(&Shape::NotNegative),
         default: "0; for an unknown input, from its range and the log's length",
         meaning: "spectral density (variance per unit of time) of white noise on a state's derivative; for an unknown input, how fast it wanders. Read by the [filters](ekf.md), `sd` and `--how-well`; `simulate` moves the plant's states by it, and [`certify`](certificates.md) then bounds the error in mean square",
+    },
+    KeySpec {
+        name: "manifold",
+        shape: Shape::Section(&[&MANIFOLD]),
+        default: "none",
+        meaning: "which states and outputs are angles or rotations; the [filters](ekf.md) take them as such",
     },
     KeySpec {
         name: "observer",
@@ -125,7 +137,7 @@ pub(super) const SECTIONS: [KeySpec; 12] = [
 const LEVEL: Shape = Shape::Either(&[Shape::NotNegative, Shape::Text, Shape::Section(&[&NOISE])]);
 
 /// `[sensors]`
-pub(super) const SENSORS: [KeySpec; 9] = [
+pub(super) const SENSORS: [KeySpec; 11] = [
     KeySpec {
         name: "limits",
         shape: Shape::As(
@@ -198,6 +210,18 @@ pub(super) const SENSORS: [KeySpec; 9] = [
         default: "none",
         meaning: "more equal cells of a log in a row than this are no readings from there on, until they change: the sensor is stuck",
     },
+    KeySpec {
+        name: "delay",
+        shape: Shape::As("table: output = number", &Shape::Table(&Shape::NotNegative)),
+        default: "none",
+        meaning: "how much later than its sample is taken a reading comes, in the plant's unit of time: the reading in a row at t is of t less this ([late readings](#late-readings))",
+    },
+    KeySpec {
+        name: "taken_at",
+        shape: Shape::As("table: output = column", &Shape::Table(&Shape::Text)),
+        default: "none",
+        meaning: "the column of a log, or an expression of columns, that has the time at which the sample was taken whose result is the reading in that row: an assay that comes hours later ([late readings](#late-readings))",
+    },
 ];
 
 /// `{ uniform = … }` of `noise` in `[sensors]`
@@ -207,6 +231,22 @@ pub(super) const NOISE: [KeySpec; 1] = [KeySpec {
     default: REQUIRED,
     meaning: "every error up to ± this, in the output's unit, is equally likely and none is larger",
 }];
+
+/// `[manifold]`
+pub(super) const MANIFOLD: [KeySpec; 2] = [
+    KeySpec {
+        name: "circle",
+        shape: Shape::As("list of states and outputs", &Shape::NAMES),
+        default: "none",
+        meaning: "angles in radians, of which a full turn changes nothing: θ and θ + 2π are one. Innovations and errors are wrapped, the box has no ends there, and estimates are shown in the declared range (`min` and `max`, or `[box]`) where that is one turn, else unwrapped. An output that turns with such a state is one as well",
+    },
+    KeySpec {
+        name: "quaternion",
+        shape: Shape::As("list of states", &Shape::NAMES),
+        default: "none",
+        meaning: "attitudes: arrays `Real q[4]` of states, a unit quaternion with the scalar first, whose equation is q' = ½ q⊗(0, ω). `initial_variance`, `[process_noise]`, `spread` and `NAME_sd` are those of the vector of a small rotation about the body's axes, in rad: one number for the array, and one column",
+    },
+];
 
 /// `[observer]`, for every family.
 pub(super) const OBSERVER: [KeySpec; 3] = [

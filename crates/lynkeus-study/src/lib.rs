@@ -31,6 +31,7 @@ mod fit;
 mod generator;
 mod keys;
 mod log;
+mod manifold;
 mod observer;
 mod schema;
 mod section;
@@ -52,16 +53,17 @@ pub use estimate::{BetweenSamples, EstimateSettings, Smoothing};
 pub use fit::{Candidate, Chosen, FitSettings, Objective, Prior};
 pub use generator::Generator;
 pub use log::{LogSettings, seconds_in};
+pub use manifold::ManifoldSettings;
 pub use observer::ObserverSettings;
 pub use schema::schema;
-pub use sensors::{Noise, Screen, Sensors, bias_of};
+pub use sensors::{Late, Noise, Screen, Sensors, bias_of};
 pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
 pub use tune::{Scale, Swept, TuneSettings, Values};
 pub use whole::Whole;
 
 use lynkeus_expr::Budget;
-use lynkeus_model::Tables;
+use lynkeus_model::{MAX_DELAY_STATES, Tables};
 
 use lynkeus_answer::Error;
 use section::Section;
@@ -83,11 +85,15 @@ pub struct Study {
     pub parameters: BTreeMap<String, f64>,
     /// What the plant's tables are between their points.
     pub tables: Tables,
+    /// States of each delay of the plant.
+    pub delay_states: Option<usize>,
     /// What is measured and what is not.
     pub sensors: Sensors,
     /// White noise on states' derivatives: (name, spectral density), in the square of the state's
     /// unit per unit of time; for an unknown input, how fast it wanders.
     pub process_noise: Vec<(Name, f64)>,
+    /// What is an angle or a rotation.
+    pub manifold: ManifoldSettings,
     /// The observer family and its tuning.
     pub observer: ObserverSettings,
     /// Ranges narrower than the model's.
@@ -223,6 +229,10 @@ impl Study {
         let mut observer = top
             .optional("observer", observer::read)?
             .unwrap_or_default();
+        let manifold = top
+            .optional("manifold", manifold::read)?
+            .unwrap_or_default();
+        observer.live_on(&manifold)?;
         if observer.may_be_a_filter() {
             sensors.doubt(&mut observer.tuning);
         }
@@ -237,7 +247,9 @@ impl Study {
                 .map(|name| name.text),
             parameters: top.optional("parameters", parameters)?.unwrap_or_default(),
             tables: top.optional("tables", tables)?.unwrap_or_default(),
+            delay_states: top.optional("delay_states", delay_states)?,
             sensors,
+            manifold,
             process_noise: simulate::pairs(top.take("process_noise"), density)?,
             observer,
             narrower: top.optional("box", certify::read_box)?.unwrap_or_default(),
@@ -280,6 +292,18 @@ fn parameters(entry: section::Entry<'_>) -> Result<BTreeMap<String, f64>, Error>
 
 fn tables(entry: section::Entry<'_>) -> Result<Tables, Error> {
     entry.choice(&[("linear", Tables::Linear), ("monotone", Tables::Monotone)])
+}
+
+/// States of a delay.
+fn delay_states(entry: section::Entry<'_>) -> Result<usize, Error> {
+    let refusal = entry.wrong(&format!("a whole number from 1 to {MAX_DELAY_STATES}"));
+    let count = entry
+        .whole(1)
+        .ok()
+        .and_then(|count| usize::try_from(count).ok());
+    count
+        .filter(|count| *count <= MAX_DELAY_STATES)
+        .ok_or(refusal)
 }
 
 /// `families` of `[compare]`.

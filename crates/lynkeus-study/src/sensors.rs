@@ -27,6 +27,28 @@ pub struct Sensors {
     pub bias: Vec<(Name, f64)>,
     /// Which cells of a log are no readings, by output.
     pub screens: Vec<(Name, Screen)>,
+    /// Whose readings come later than their samples are taken, by output.
+    pub late: Vec<(Name, Late)>,
+}
+
+/// How much later than its sample is taken a reading comes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Late {
+    /// By as much time, every one.
+    By(f64),
+    /// What this column of the log says: its header, or an expression of headers.
+    TakenAt(Name),
+}
+
+impl Late {
+    /// The key that says so.
+    #[must_use]
+    pub fn key(&self) -> &'static str {
+        match self {
+            Late::By(_) => "delay",
+            Late::TakenAt(_) => "taken_at",
+        }
+    }
 }
 
 /// Why a cell of a log is no reading.
@@ -91,6 +113,7 @@ pub(super) fn read(entry: Entry<'_>) -> Result<Sensors, Error> {
             .collect(),
         bias: super::simulate::pairs(section.take("bias"), bias)?,
         screens: screens(&mut section)?,
+        late: late(&mut section)?,
         noise: match section.take("noise") {
             None => Vec::new(),
             Some(table) => table
@@ -137,6 +160,26 @@ fn screens(section: &mut Section<'_>) -> Result<Vec<(Name, Screen)>, Error> {
     let mut all = super::simulate::pairs(section.take("plausible"), plausible)?;
     all.extend(super::simulate::pairs(section.take("repeats"), repeats)?);
     all.extend(super::simulate::pairs(section.take("frozen"), frozen)?);
+    Ok(all)
+}
+
+fn late(section: &mut Section<'_>) -> Result<Vec<(Name, Late)>, Error> {
+    let delay = |entry: Entry<'_>| {
+        let refusal = entry.wrong("a time >= 0, in the unit of the plant's time");
+        let delay = entry.number().ok().filter(|delay| *delay >= 0.0);
+        delay.map(Late::By).ok_or(refusal)
+    };
+    let taken = |entry: Entry<'_>| entry.name().map(Late::TakenAt);
+    let mut all = super::simulate::pairs(section.take("delay"), delay)?;
+    for (name, taken) in super::simulate::pairs(section.take("taken_at"), taken)? {
+        if all.iter().any(|(other, _)| *other == name) {
+            let message = format!(
+                "`delay` and `taken_at` of [sensors] both say when the samples of {name} are taken"
+            );
+            return Err(name.blame(Error::input(message).hint("keep one of them")));
+        }
+        all.push((name, taken));
+    }
     Ok(all)
 }
 

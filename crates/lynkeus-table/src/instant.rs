@@ -31,6 +31,16 @@ impl Instant {
         self.zoned
     }
 
+    /// So many seconds after this one, to the nanosecond.
+    pub(super) fn later(self, seconds: f64) -> Self {
+        let whole = seconds.floor();
+        let part = ((seconds - whole) * SECOND as f64).round();
+        Self {
+            nanoseconds: self.nanoseconds + whole as i128 * SECOND + part as i128,
+            ..self
+        }
+    }
+
     /// From `origin` to here, rounded once where that is less than 104 days.
     pub(super) fn seconds_since(self, origin: Self) -> f64 {
         seconds(self.nanoseconds - origin.nanoseconds)

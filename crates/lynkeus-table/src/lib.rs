@@ -86,6 +86,11 @@ impl Table {
         named.next().map(|(_, values)| values)
     }
 
+    /// Whether anything is known to be true: the table is of a simulation.
+    pub fn has_truth(&self) -> bool {
+        !self.truth.is_empty()
+    }
+
     /// The number of rows.
     pub fn rows(&self) -> usize {
         self.lines.rows()
@@ -116,6 +121,11 @@ impl Table {
             (line, true) => format!("row {line} of the table"),
             (line, false) => format!("{}:{line}", self.file),
         }
+    }
+
+    /// A row of it in messages, from 0.
+    pub fn place_of_row(&self, row: usize) -> String {
+        self.place_of(self.lines.of(row))
     }
 
     /// The columns of a name: under it, else as tables that are [written](visible) spell it.
@@ -174,6 +184,38 @@ impl Table {
     pub fn start(&self, name: &str) -> Option<Instant> {
         let column = self.called(name).next()?;
         column.origin.as_ref().map(|origin| origin.instant)
+    }
+
+    /// A column of times, counted as those of the column `like` are: dates from its first date, in seconds; missing
+    /// ones are NaN.
+    ///
+    /// # Errors
+    /// As [`Table::times`], or one column holds dates and the other does not, or dates with a zone and dates without.
+    pub fn times_like(&self, name: &str, like: &str) -> Result<Series, Error> {
+        let times = self.cells(name)?;
+        let (own, other) = (self.start(name), self.start(like));
+        let is_empty = self.missing(name) == times.len();
+        match (own, other) {
+            _ if is_empty => Ok(times.clone()),
+            (None, None) => Ok(times.clone()),
+            (Some(own), Some(other)) if own.is_zoned() == other.is_zoned() => {
+                let counted = times.iter().map(|t| own.later(t).seconds_since(other));
+                Ok(Series::gathered(&self.store, counted))
+            }
+            _ => {
+                let kind = |header: &str| match self.origin(header) {
+                    Some(date) => format!("dates such as {date}"),
+                    None => "numbers".to_owned(),
+                };
+                let (found, expected) = (kind(name), kind(like));
+                let message = format!(
+                    "column \"{name}\": expected {expected} as in \"{like}\", found {found}"
+                );
+                Err(Error::input(message)
+                    .at(self.place())
+                    .hint("write the times of both columns in the same way"))
+            }
+        }
     }
 
     /// Whether a column holds lengths of time, which are counted in seconds.

@@ -126,7 +126,7 @@ impl<R: BufRead> Reading<R> {
         for name in names.map_err(|_| not_utf8(&self.table.file, self.rows.number()))? {
             let mut column = Column::new(&name, &self.table.store);
             column.decimal = format.decimal;
-            let is_time = request.time.as_deref() == Some(&*name);
+            let is_time = request.times.iter().any(|time| *time == *name);
             column.pattern = format.times.clone().filter(|_| is_time);
             self.table.columns.push(column);
         }

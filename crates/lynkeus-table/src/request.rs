@@ -15,8 +15,8 @@ pub struct Request {
     pub columns: Option<HashSet<String>>,
     /// how a CSV file is written, as far as that is said
     pub format: Format,
-    /// the header of the column whose times are written by a pattern
-    pub time: Option<String>,
+    /// the headers of the columns whose times are written by a pattern
+    pub times: Vec<String>,
 }
 
 /// How a CSV file is written; what is not said is found out.

@@ -76,6 +76,13 @@ impl Words for Reason {
         match self {
             Self::Misfit(misfit) => misfit.words(),
             Self::Regular => "every operation examined".into(),
+            Self::Delayed { delay, states } => {
+                let states = match states {
+                    1 => "1 state".to_owned(),
+                    count => format!("{count} states"),
+                };
+                format!("{delay} is held by {states}, which is not all of the delay: nothing is proved")
+            }
             Self::NoValue {
                 operation,
                 place,

@@ -258,9 +258,16 @@ fn account(declared: &Declared, in_mean_square: bool) -> Account {
         slew,
         input_derivatives,
         screens,
+        late,
+        manifold,
     } = declared;
     Account::default()
+        .leaves(manifold, "no theorem is about angles and rotations")
         .leaves(screens, "a proof is for readings that come")
+        .leaves(
+            late,
+            "a proof is for the estimate once the readings have come: until then the model alone leads there",
+        )
         .counts(ranges)
         .counts(noise)
         .counts(limits)

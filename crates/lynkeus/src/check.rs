@@ -169,10 +169,17 @@ fn account(declared: &Declared) -> Account {
         slew,
         input_derivatives,
         screens,
+        late,
+        manifold,
     } = declared;
     let elsewhere = "`certify` counts it, and `check --how-well`";
     Account::default()
+        .counts(manifold)
         .leaves(screens, "they are of logs")
+        .leaves(
+            late,
+            "what can be known does not depend on when it is told: a late reading counts at the time of its sample",
+        )
         .counts(ranges)
         .counts(input_derivatives)
         .leaves(noise, elsewhere)

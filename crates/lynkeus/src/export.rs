@@ -10,7 +10,7 @@ use lynkeus_experiment::prepare::{self, Prepared};
 use lynkeus_export::Refusal;
 use lynkeus_export::curly::c::{self, Precision};
 
-use crate::print::device::{causal, printed};
+use crate::print::device::{causal, printed, refuse_late};
 use crate::print::head::{about, beyond_float};
 use crate::print::target::{Artifact, Declared, Export, ExportOptions, Subject, Writes};
 
@@ -69,6 +69,7 @@ fn written(
     let plant = prepare::plant(study)?;
     prepare::whens::refuse(study, &plant, "export")?;
     let prepared = Prepared::new(study, &plant)?;
+    refuse_late(&prepared, options.to, options.tunable)?;
     let mut design = match is_tunable {
         true => tunable::design(&prepared)?,
         false => prepared.design()?,

@@ -98,8 +98,8 @@ pub use lynkeus_experiment::{
     Correction, Corrections, Coverage, Doubt, DoubtKind, DoubtLevel, Excursion, Frozen, GainEntry,
     Grounds, InjectionEntry, Interval, Intervals, Misfit, OpenRun, Origin, Outcome, Outside,
     Proposal, Quantity, Resolution, Run, Runner, Runners, Sampled, Settled, Settling, Simulated,
-    Speed, Watch, compare, estimate, estimate_resumed, estimator, explain, interrupt, log, log_of,
-    observer_system, open_run, side_by_side, simulate, whole_log,
+    Speed, Watch, compare, estimate, estimate_resumed, estimator, explain, interrupt,
+    late_estimator, log, log_of, observer_system, open_run, side_by_side, simulate, whole_log,
 };
 
 /// From a study to its plant, its choice of an observer and the design.

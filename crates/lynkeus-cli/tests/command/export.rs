@@ -5,6 +5,8 @@ mod credible;
 mod glitch;
 mod hidden;
 pub(super) mod javascript;
+mod late;
+mod manifold;
 mod names;
 mod rust;
 mod slopes;

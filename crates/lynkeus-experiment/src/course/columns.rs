@@ -8,11 +8,12 @@ use std::path::Path;
 use lynkeus_structure::AugmentedPlant;
 
 use crate::course::computed::{given, names, with_expressions};
+use crate::course::taken::{Interleaved, Unordered};
 use crate::course::{Samples, screen};
 use crate::prepare::Prepared;
 use crate::prepare::headers::{UNNAMED, further_headers, header, in_unit, log_time, time_of};
 use crate::{Error, Series, Study, Table, visible};
-use lynkeus_study::{EstimateSettings, Name};
+use lynkeus_study::{EstimateSettings, Late, Name};
 use lynkeus_table::{APART, Lost, Ordered, Request, is_parquet};
 
 /// The log of a study in a file (CSV, Parquet), read within the study's budget; of a Parquet file only what the
@@ -47,15 +48,28 @@ pub fn log_of(study: &Study, input: impl BufRead, file: &str) -> Result<Table, E
 /// How the study's log is read.
 fn request(study: &Study) -> Result<Request, Error> {
     let format = study.estimate.log.format.clone();
-    let time = match format.times {
-        Some(_) => Some(log_time(&crate::prepare::plant(study)?, &study.estimate)),
-        None => None,
+    let times = match format.times {
+        Some(_) => {
+            let own = log_time(&crate::prepare::plant(study)?, &study.estimate);
+            let taken = taken_at(study).map(|column| column.text.clone());
+            std::iter::once(own).chain(taken).collect()
+        }
+        None => vec![],
     };
     Ok(Request {
         budget: study.budget.clone(),
         columns: None,
         format,
-        time,
+        times,
+    })
+}
+
+/// The columns with the times at which samples were taken.
+fn taken_at(study: &Study) -> impl Iterator<Item = &Name> {
+    let late = study.sensors.late.iter();
+    late.filter_map(|(_, late)| match late {
+        Late::TakenAt(column) => Some(column),
+        Late::By(_) => None,
     })
 }
 
@@ -72,7 +86,9 @@ fn asked_for(study: &Study) -> Result<HashSet<String>, Error> {
     let headers = headers.chain(further_headers(settings));
     let headers = headers.chain([log_time(&plant, settings)]);
     let headers = headers.chain(UNNAMED.map(str::to_owned));
-    let headers = headers.chain(given(settings).flat_map(|given| names(&given.text)));
+    let given = given(settings).chain(taken_at(study));
+    let headers = headers
+        .chain(given.flat_map(|given| [names(&given.text), vec![given.text.clone()]].concat()));
     let spelled = |name: String| [visible::line(&name).into_owned(), name];
     Ok(headers.flat_map(spelled).collect())
 }
@@ -84,12 +100,57 @@ pub struct Log<'t> {
     pub table: Cow<'t, Table>,
     /// the header of time
     pub time: String,
-    /// its rows as an observer reads them
+    /// its rows as an observer reads them, and rows between them where samples were taken whose readings are late
     pub samples: Samples,
+    /// which of these are the log's, where there are others
+    pub(crate) interleaved: Option<Interleaved>,
     /// what it lacks and what was done for its order
     pub notes: Vec<String>,
     /// what of it contradicts itself, or counts nowhere
     pub warnings: Vec<String>,
+}
+
+impl Log<'_> {
+    /// Whether readings are late, so that its samples have rows between its own.
+    #[must_use]
+    pub fn is_late(&self) -> bool {
+        self.interleaved.is_some()
+    }
+
+    /// Its samples, in its own rows alone.
+    #[must_use]
+    pub fn own_samples(&self) -> Samples {
+        let own = |columns: &[Series]| columns.iter().map(|column| self.own(column)).collect();
+        Samples {
+            time: self.own(&self.samples.time),
+            readings: own(&self.samples.readings),
+            inputs: own(&self.samples.inputs),
+        }
+    }
+
+    /// A column of the log over the rows of its samples, NaN in those between its own.
+    pub(crate) fn spread(&self, column: &Series) -> Series {
+        match &self.interleaved {
+            None => column.clone(),
+            Some(among) => among.spread(column),
+        }
+    }
+
+    /// A known input over the rows of the samples.
+    pub(crate) fn held(&self, input: &Series) -> Series {
+        match &self.interleaved {
+            None => input.clone(),
+            Some(among) => among.held(input),
+        }
+    }
+
+    /// The rows of the log of a column over those of the samples.
+    pub(crate) fn own(&self, column: &Series) -> Series {
+        match &self.interleaved {
+            None => column.clone(),
+            Some(among) => among.own(column),
+        }
+    }
 }
 
 impl<'t> Log<'t> {
@@ -127,9 +188,11 @@ impl<'t> Log<'t> {
             let is_made = settings.generator.iter().any(|(made, _)| made == name);
             may_lack != Lack::Columns && !is_made && read(augmented).any(|read| read == name.text)
         };
-        let table = with_expressions(table, settings, is_needed, &mut absent)?;
+        let table = with_expressions(table, (settings, taken_at(study)), is_needed, &mut absent)?;
         let time = time_of(&table, plant, settings, read(augmented))?;
         let table = in_unit(study, table, &time)?;
+        // of rows of one time one is left, but each sample has a time of its own
+        let raw = taken_at(study).next().map(|_| table.clone());
         let ordered = match settings.strict {
             true => None,
             false => table.in_order(&time, settings.late)?,
@@ -138,12 +201,30 @@ impl<'t> Log<'t> {
             None => (table, vec![], vec![]),
             Some(Ordered { table, notes, lost }) => (Cow::Owned(table), notes, lost),
         };
+        let late = &prepared.declared().late;
         let warnings = read(augmented).filter_map(|name| {
             let own = header(settings, name);
-            lost.iter().find(|lost| lost.column == own)
+            let mut lost = lost.iter().filter(|lost| lost.column == own).cloned();
+            lost.next().map(|lost| match late.of(name) {
+                Some(Late::TakenAt(_)) => Lost {
+                    first: None,
+                    ..lost
+                },
+                _ => lost,
+            })
         });
-        let warnings = warnings.flat_map(|lost| told(lost, &time)).collect();
+        let mut warnings = warnings.flat_map(|lost| told(&lost, &time)).collect();
         let mut samples = samples(&table, &time, settings, augmented, may_lack)?;
+        let unordered = Unordered {
+            raw: raw.as_deref(),
+            time: &time,
+        };
+        let told_late = (&mut notes, &mut warnings);
+        let interleaved = match table.has_truth() {
+            false => unordered.interleave(prepared, &mut samples, told_late)?,
+            // of a simulation every reading has come
+            true => None,
+        };
         if settings.log.time.is_none() && UNNAMED.contains(&time.as_str()) {
             let which = "the times of the log are in its column without a name";
             notes.push(format!(
@@ -157,6 +238,7 @@ impl<'t> Log<'t> {
             table,
             time,
             samples,
+            interleaved,
             notes,
             warnings,
         })

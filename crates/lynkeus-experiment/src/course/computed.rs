@@ -63,20 +63,21 @@ impl Parsed {
 }
 
 /// The log with the columns that the study gives as expressions, under their texts: a text that is a header is that
-/// column. What nobody has to read may be absent, and is told in the notes.
+/// column. `always` are columns beside them that have to be there. What nobody has to read may be absent, and is told in the notes.
 ///
 /// # Errors
 /// The time, or a name that `is_read`, is an expression of what the log does not have, or not as numbers.
-pub(super) fn with_expressions<'t>(
+pub(super) fn with_expressions<'t, 's>(
     table: &'t Table,
-    settings: &EstimateSettings,
+    (settings, always): (&'s EstimateSettings, impl Iterator<Item = &'s Name>),
     is_read: impl Fn(&Name) -> bool,
     notes: &mut Vec<String>,
 ) -> Result<Cow<'t, Table>, Error> {
     let mut whole = Cow::Borrowed(table);
     let columns = settings.log.columns.iter();
     let columns = columns.map(|(name, given)| (Some(name), given));
-    for (name, given) in columns.chain(settings.log.time.iter().map(|time| (None, time))) {
+    let always = settings.log.time.iter().chain(always);
+    for (name, given) in columns.chain(always.map(|given| (None, given))) {
         if whole.has(&given.text) {
             continue;
         }

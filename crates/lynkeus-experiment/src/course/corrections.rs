@@ -45,6 +45,19 @@ impl Corrections {
         })
     }
 
+    /// Does something to each column.
+    pub(crate) fn each(&mut self, change: impl Fn(&mut Series)) {
+        let columns = [
+            &mut self.predicted,
+            &mut self.innovation,
+            &mut self.innovation_covariance,
+            &mut self.gain,
+            &mut self.covariance,
+        ];
+        let columns = columns.into_iter().flatten();
+        columns.chain([&mut self.log_likelihood]).for_each(change);
+    }
+
     /// Takes the next row.
     pub(crate) fn add(&mut self, record: &Record) {
         let add = |columns: &mut [Series], row: &[f64]| {

@@ -170,7 +170,8 @@ impl Log<'_> {
                 Source::Input(place) => header(settings, &known[*place].name),
                 Source::Column(header) => header,
             };
-            held(&self.table, settings, header)
+            let column = held(&self.table, settings, header)?;
+            Ok(self.held(&column))
         });
         own.collect()
     }

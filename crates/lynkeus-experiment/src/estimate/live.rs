@@ -1,7 +1,7 @@
 //! A study's estimator for samples that come one by one.
 
 use lynkeus_observers::Design;
-use lynkeus_run::{Blueprint, Estimator};
+use lynkeus_run::{Blueprint, Estimator, Late};
 
 use crate::course::Samples;
 use crate::course::inputs::{on_device, refuse_derivatives};
@@ -44,13 +44,45 @@ use lynkeus_study::{BetweenSamples, EstimateSettings};
 /// # Errors
 /// A study that does not fit its plant, no family that fits, and what only a log could tell: the
 /// noise of a sensor or of an unknown input that the study does not declare, lines between
-/// samples, smoothing.
+/// samples, smoothing, a sensor whose readings come late ([`late_estimator`]).
 pub fn estimator(study: &Study) -> Result<Estimator, Error> {
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
+    if let Some((name, late)) = prepared.declared().late.iter().next() {
+        let message = format!(
+            "`{}` of [sensors]: the readings of {name} come later than their samples are taken, and this estimator takes each at the time of its row",
+            late.key()
+        );
+        let hint = "take `late_estimator`, which goes back to where they belong";
+        return Err(Error::input(message).at(&study.file).hint(hint));
+    }
+    live(&prepared)
+}
+
+/// The same where readings come late: those of sensors with a `delay` are put where their samples were taken, and so is
+/// a row that comes up to `wait` later than another. A sensor with `taken_at` has its readings in rows of their own, at
+/// the times of the samples.
+///
+/// # Errors
+/// As [`estimator`], and a time to wait that is negative or no number.
+pub fn late_estimator(study: &Study, wait: f64) -> Result<Late, Error> {
+    let plant = prepare::plant(study)?;
+    let prepared = Prepared::new(study, &plant)?;
+    let estimator = live(&prepared)?;
+    let declared = &prepared.declared().late;
+    let outputs = prepared.augmented().outputs.iter();
+    let delays = outputs.map(|output| match declared.of(&output.variable.name) {
+        Some(lynkeus_study::Late::By(delay)) => *delay,
+        _ => 0.0,
+    });
+    let delays: Vec<f64> = delays.collect();
+    Late::new(estimator, &delays, wait).map_err(explain)
+}
+
+fn live(prepared: &Prepared<'_>) -> Result<Estimator, Error> {
     let mut design = prepared.design()?;
-    on_device(&prepared, &mut design)?;
-    let blueprint = blueprint(&prepared, &design)?;
+    on_device(prepared, &mut design)?;
+    let blueprint = blueprint(prepared, &design)?;
     blueprint.estimator().map_err(explain)
 }
 

@@ -3,29 +3,30 @@
 mod summary;
 
 use lynkeus_expr::Spent;
-use lynkeus_model::Plant;
+use lynkeus_model::{Home, Plant};
 use lynkeus_observers::{Design, Monitor, Signal};
 use lynkeus_run::Error as RunError;
 use serde::Serialize;
 
 use crate::answer::Origin;
-use crate::course::Course;
 use crate::course::corrections::Corrections;
 use crate::course::doubt::Doubt;
+use crate::course::taken::{AT_ONCE, delayed};
 use crate::course::trace::Trace;
+use crate::course::{Course, curved};
 use crate::judge::accuracy::{self, Accuracy};
 use crate::judge::assertions;
 use crate::judge::frozen::Frozen;
 use crate::judge::interval::Intervals;
 use crate::judge::outside::{self, Outside, outside};
 use crate::judge::{self, By, Evidence, Innovations, Judged, innovations};
-use crate::prepare::declared::{Account, Declared};
+use crate::prepare::declared::{Account, Declared, Kind};
 use crate::prepare::headers::{Headers, log_time};
 use crate::prepare::systems::hat;
 use crate::prepare::{Prepared, StudyDesign};
 use crate::words::in_words;
 use crate::{Error, Quantity, Series, judge::expected, judge::saturated, prepare::headers};
-use lynkeus_study::{EstimateSettings, Name};
+use lynkeus_study::{EstimateSettings, Late, Name};
 
 #[cfg(feature = "schema")]
 pub use summary::RunReport;
@@ -83,6 +84,8 @@ pub struct Outcome {
     log_time: String,
     /// how the study names the columns of one
     settings: EstimateSettings,
+    /// whose readings it has late
+    late: Kind<Late>,
     /// the study, for messages
     file: String,
     /// the unit of time, where the study has one
@@ -133,17 +136,16 @@ impl Outcome {
     /// simulated; `<name>_hat` for everything estimated; monitors. No two have the same
     /// header: what the model calls so itself keeps its name, and the others give way.
     pub fn columns(&self) -> Vec<(String, Series)> {
-        type Of = fn(&Quantity) -> (&String, &Option<Series>);
-        let truth: Of = |q| (&q.name, &q.truth);
+        type Of = fn(&Quantity) -> Option<(&String, &Series)>;
+        let truth: Of = |q| Some((&q.name, q.truth.as_ref()?));
         let others: [Of; 4] = [
-            |q| (&q.estimate_header, &q.estimate),
-            |q| (&q.deviation_header, &q.deviation),
-            |q| (&q.smoothed_header, &q.smoothed),
-            |q| (&q.smoothed_deviation_header, &q.smoothed_deviation),
+            |q| Some((&q.estimate_header, q.estimate.as_ref()?)),
+            Quantity::deviation_column,
+            |q| Some((&q.smoothed_header, q.smoothed.as_ref()?)),
+            Quantity::smoothed_deviation_column,
         ];
         let told = self.is_simulated.then_some(truth).into_iter().chain(others);
-        let named = told.flat_map(|of| self.quantities.iter().map(of));
-        let named = named.filter_map(|(header, values)| Some((header, values.as_ref()?)));
+        let named = told.flat_map(|of| self.quantities.iter().filter_map(of));
         let innovations = self.innovation_columns.iter();
         let watches = self.watches.iter().map(|w| (&w.header, &w.values));
         std::iter::once((&self.time_header, &self.time))
@@ -164,8 +166,17 @@ impl Outcome {
         let inputs = inputs.filter_map(|q| Some((&q.name, q.truth.as_ref()?)));
         let measured = self.measurements.iter().map(|(n, values)| (n, values));
         let mut columns = vec![(self.log_time.clone(), self.time.clone())];
+        let mut stamps: Vec<&str> = vec![];
         for (name, values) in measured.chain(inputs) {
             let header = headers::header(&self.settings, name).to_owned();
+            let values = &match self.late.of(name) {
+                Some(Late::By(delay)) => self.delayed(name, values, *delay)?,
+                Some(Late::TakenAt(column)) => {
+                    stamps.push(&column.text);
+                    values.clone()
+                }
+                None => values.clone(),
+            };
             if columns.iter().any(|(known, _)| *known == header) {
                 return Err(Error::input(format!(
                     "the log would have two columns \"{header}\", and \"{name}\" is one of them"
@@ -175,7 +186,24 @@ impl Outcome {
             }
             columns.push((header, values.clone()));
         }
+        // what is simulated is told at once
+        for column in stamps {
+            if columns.iter().all(|(known, _)| known != column) {
+                columns.push((column.to_owned(), self.time.clone()));
+            }
+        }
         Ok(columns)
+    }
+
+    /// What a sensor shows that is late.
+    fn delayed(&self, name: &str, values: &Series, delay: f64) -> Result<Series, Error> {
+        delayed(&self.time, values, delay).ok_or_else(|| {
+            Error::input(format!(
+                "the simulated log has no row {delay} after another, and {name} is as late: expected a delay of some whole rows"
+            ))
+            .hint("set `sample_step` (of a filter) or `output_step` of [simulate] to a part of the delay")
+            .at(&self.file)
+        })
     }
 
     /// The answer "no" where an estimate is not credible, by its [doubts](Self::doubts), or the run
@@ -238,24 +266,29 @@ impl Raw<'_> {
             origin,
             mut course,
             mut quantities,
-            measurements,
+            mut measurements,
             replayed,
             frozen,
             intervals,
             mut notes,
         } = self;
+        let plant = prepared.plant();
+        curved::place(plant, replayed, &mut quantities, &mut measurements);
         notes.append(&mut course.notes);
         notes.extend(frozen.iter().map(Frozen::words));
         notes.extend(intervals.as_ref().and_then(Intervals::words));
         notes.extend(saturated::told(prepared, &design, &measurements));
         let innovations = innovations(&design, &course, &mut notes);
-        let plant = prepared.plant();
         let mut headers = Headers::beside(plant);
         let time_header = headers.time();
         for quantity in quantities.iter_mut().filter(|q| q.estimate.is_some()) {
             let what = format!("the estimate of {}", quantity.name);
             quantity.estimate_header = headers.free(&hat(&quantity.name), &what);
-            if quantity.deviation.is_some() {
+            if let Some(rotation) = &mut quantity.rotation {
+                rotation.give_headers(&mut headers);
+            }
+            let is_own = !matches!(quantity.home, Home::Rotation { .. });
+            if is_own && quantity.deviation.is_some() {
                 let wanted = format!("{}_sd", quantity.name);
                 quantity.deviation_header =
                     headers.free(&wanted, &format!("the deviation of {what}"));
@@ -265,7 +298,7 @@ impl Raw<'_> {
                 quantity.smoothed_header =
                     headers.free(&wanted, &format!("{what} given later rows"));
             }
-            if quantity.smoothed_deviation.is_some() {
+            if is_own && quantity.smoothed_deviation.is_some() {
                 let wanted = format!("{}_smooth_sd", quantity.name);
                 let what = format!("the deviation of {what} given later rows");
                 quantity.smoothed_deviation_header = headers.free(&wanted, &what);
@@ -275,6 +308,7 @@ impl Raw<'_> {
         let watches = watches(&design, &mut course.monitors, &time, &mut headers);
         show_measurements(plant, &measurements, &mut quantities);
         expected::give(prepared.augmented(), &time, &mut quantities);
+        curved::place_expected(&mut quantities);
         let sides = outside::sides(prepared.augmented());
         let accuracies = accuracy::accuracies(&time, &quantities, &sides);
         notes.extend(accuracy::told(&accuracies));
@@ -327,7 +361,7 @@ impl Raw<'_> {
         time.check()?;
         let is_weighed =
             design.observer.filter.is_some() || quantities.iter().any(|q| q.deviation.is_some());
-        let declared = account(prepared.declared(), &design, is_weighed);
+        let declared = account(prepared.declared(), &design, is_weighed, replayed);
         // of a gain that is chosen without the noises nobody takes them for counted
         let is_claimed = is_weighed || prepared.declared().disturbances.is_declared();
         notes.extend(declared.told().filter(|_| is_claimed));
@@ -338,6 +372,7 @@ impl Raw<'_> {
             declared,
             log_time: log_time(plant, &study.estimate),
             settings: study.estimate.clone(),
+            late: prepared.declared().late.clone(),
             time_unit: study.time_unit.clone(),
             show: study.show.clone(),
             is_simulated: !replayed,
@@ -388,7 +423,7 @@ fn followed(design: &Design, innovations: &[Innovations]) -> Vec<String> {
 }
 
 /// What estimates count: a filter by its gain, a family with a theorem by its deviations if they are asked for.
-fn account(declared: &Declared, design: &Design, is_weighed: bool) -> Account {
+fn account(declared: &Declared, design: &Design, is_weighed: bool, replayed: bool) -> Account {
     let Declared {
         ranges,
         noise,
@@ -399,12 +434,16 @@ fn account(declared: &Declared, design: &Design, is_weighed: bool) -> Account {
         slew,
         input_derivatives,
         screens,
+        late,
+        manifold,
     } = declared;
     let is_filter = design.observer.filter.is_some();
     let unweighed = "the gain is chosen without it: `sd` of [estimate] counts it, and `certify`";
     let promised = "a promise of what the inputs do: `certify` counts it";
     Account::default()
         .counts(screens)
+        .counts_if(replayed, late, AT_ONCE)
+        .counts(manifold)
         .counts(ranges)
         .counts(samples)
         .counts_if(is_weighed, noise, unweighed)
@@ -592,6 +631,7 @@ fn show_measurements(
                 unit: output.unit.clone(),
                 description: output.description.clone(),
                 measured: Some(values.clone()),
+                home: output.home,
                 ..Quantity::default()
             }),
         }

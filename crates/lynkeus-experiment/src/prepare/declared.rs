@@ -8,14 +8,14 @@ mod account;
 
 use std::collections::BTreeMap;
 
-use lynkeus_model::{Plant, Variable};
+use lynkeus_model::{Home, Plant, Variable};
 use lynkeus_run::filter::Limits;
 use lynkeus_structure::{AugmentedPlant, range};
 
 use crate::words::explain;
 use crate::{Error, Study, near, prepare::calibrate, prepare::systems};
 pub use account::Account;
-use lynkeus_study::{Name, Noise, Screen};
+use lynkeus_study::{Late, Name, Noise, Screen};
 
 /// One kind of declaration: what is said of single quantities, by their names.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,6 +48,10 @@ pub struct Declared {
     pub input_derivatives: Kind<Vec<f64>>,
     /// which cells of a log are no readings, by output
     pub screens: Kind<Vec<Screen>>,
+    /// readings that come later than their samples are taken, by output
+    pub late: Kind<Late>,
+    /// states and outputs that are angles or rotations
+    pub manifold: Kind<()>,
 }
 
 impl Declared {
@@ -135,8 +139,17 @@ impl Declared {
                 &known,
             )?,
             screens: screens(&sensors.screens, &outputs)?,
+            late: late(&sensors.late, &outputs)?,
+            manifold: curved(plant),
         })
     }
+}
+
+/// The states and outputs that are no real numbers.
+fn curved(plant: &Plant) -> Kind<()> {
+    let variables = plant.states.iter().chain(&plant.outputs);
+    let curved = variables.filter(|v| v.home != Home::Line);
+    Kind::new("angles and rotations", curved.map(|v| (v.name.clone(), ())))
 }
 
 /// All that is said of an output; of one kind what its own name says comes before what an array's does.
@@ -161,6 +174,27 @@ fn screens(given: &[(Name, Screen)], outputs: &[String]) -> Result<Kind<Vec<Scre
         }
     }
     Ok(Kind::new("cells that are no readings", said))
+}
+
+/// Whose readings are late; a delay of 0 is none.
+fn late(given: &[(Name, Late)], outputs: &[String]) -> Result<Kind<Late>, Error> {
+    for key in ["delay", "taken_at"] {
+        let own = given.iter().filter(|(_, late)| late.key() == key);
+        let own: Vec<(Name, Late)> = own.cloned().collect();
+        Kind::read(
+            "delays",
+            &format!("`{key}` of [sensors]"),
+            "output",
+            &own,
+            outputs,
+        )?;
+    }
+    let all = Kind::read("delays", "[sensors]", "output", given, outputs)?;
+    let all = all.said.into_iter();
+    Ok(Kind::new(
+        "delays",
+        all.filter(|(_, late)| *late != Late::By(0.0)),
+    ))
 }
 
 /// The states and inputs of which the model or `[box]` declares an end.

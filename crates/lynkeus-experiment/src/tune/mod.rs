@@ -39,6 +39,7 @@ pub use report::shortened;
 pub use row::{Peak, Row};
 
 use crate::course::plant::sample_step;
+use crate::course::taken::AT_ONCE;
 use crate::crew::within;
 use crate::prepare::Prepared;
 use crate::prepare::declared::{Account, Declared};
@@ -240,15 +241,19 @@ fn account(declared: &Declared, is_simulated: bool, is_filters: bool) -> Account
         slew,
         input_derivatives,
         screens,
+        late,
+        manifold,
     } = declared;
     let measured = "the log's own is in its readings";
     let promised = "a promise of what the inputs do: `certify` counts it";
     Account::default()
+        .counts(manifold)
         .counts_if(
             !is_simulated,
             screens,
             "they are of logs: every simulated reading counts",
         )
+        .counts_if(!is_simulated, late, AT_ONCE)
         .counts(ranges)
         .counts(limits)
         .counts_if(is_simulated || is_filters, noise, measured)

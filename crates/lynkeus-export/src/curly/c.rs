@@ -13,6 +13,7 @@ use super::template::{chosen, exchanged, outside_comments};
 use crate::Refusal;
 
 const REPLAY: &str = include_str!("runtime/replay.c");
+const LATE: &str = include_str!("runtime/late.c");
 const CMAKE: &str = include_str!("runtime/CMakeLists.txt");
 
 /// The type of numbers.
@@ -169,6 +170,57 @@ impl Frame<'_> {
         }
     }
 
+    /// The state that the equations have: all of it, but where late readings find their place.
+    fn core(&self) -> String {
+        match self.is_late() {
+            true => format!("{}_core", self.prefix),
+            false => format!("{}_state", self.prefix),
+        }
+    }
+
+    fn is_late(&self) -> bool {
+        !self.device.delays.is_empty()
+    }
+
+    /// Rows with the state before each, in the header.
+    fn rows(&self) -> String {
+        if !self.is_late() {
+            return String::new();
+        }
+        let (name, capitals, real) = (&self.prefix, self.capitals(), self.real());
+        let sensors = self.device.sensors();
+        let room = format!("the rows that are kept end after a late sample: raise {capitals}_ROWS");
+        format!(
+            "#define {capitals}_ROOM 7 /* {room} */\n\n\
+             /* Rows that are kept, so that a late reading finds its place: at least those of the longest delay, and one\n\
+             \x20  more for each late reading in it. */\n\
+             #ifndef {capitals}_ROWS\n#define {capitals}_ROWS 64\n#endif\n\
+             typedef char {name}_rows_suffice[{capitals}_ROWS > {sensors} + 2 ? 1 : -1];\n\n\
+             /* What was read at a time (NaN: nothing), and the estimator before it. */\n\
+             typedef struct {{\n    double t;\n    {real} signals[{capitals}_SIGNALS];\n    {name}_core before;\n}} {name}_row;\n\n\
+             /* All there is to an estimator under way: a copy is a snapshot. */\n\
+             typedef struct {{\n    {name}_core now; /* at the newest row */\n    int count; /* rows that are kept, in the order of their times */\n    int is_whole; /* whether the first row is among them */\n    int refused; /* samples in a row for which the equations had no value or an estimate ran away */\n    {name}_row rows[{capitals}_ROWS];\n}} {name}_state;\n\n"
+        )
+    }
+
+    /// How late readings find their place, in the source.
+    fn late(&self) -> String {
+        let delays: Vec<String> = self
+            .device
+            .delays
+            .iter()
+            .map(|d| format!("{d:?}"))
+            .collect();
+        let longest = self.device.delays.iter().copied().fold(0.0, f64::max);
+        LATE.replace("@NAME@", &self.prefix)
+            .replace("@CAPITALS@", &self.capitals())
+            .replace("@REAL@", self.real())
+            .replace("@SENSORS@", &self.device.sensors().to_string())
+            .replace("@DELAYS@", &delays.join(", "))
+            .replace("@LONGEST@", &format!("{longest:?}"))
+            .replace("@PATIENCE@", &PATIENCE.to_string())
+    }
+
     fn header(&self) -> String {
         let (name, capitals, real) = (&self.prefix, self.capitals(), self.real());
         let Device {
@@ -214,8 +266,8 @@ impl Frame<'_> {
              {tunables}/* Why a sample was refused; nothing has changed then but `refused` of the state. When the\n\
              \x20  equations had no value, or an estimate ran away, {PATIENCE} times in a row, an absurd reading is behind it\n\
              \x20  that was taken before: the state is then what {name}_init makes it, and the next sample the first. */\n{codes}\n{readings}\
-             /* All there is to an estimator under way: a copy is a snapshot. */\n\
-             typedef struct {{\n{fields}}} {name}_state;\n\n\
+             /* {all} */\n\
+             typedef struct {{\n{fields}}} {core};\n\n{rows}\
              /* Before the first sample. */\n\
              void {name}_init({name}_state *s);\n\n\
              /* Goes to time t and takes the signals there; 0, or one of the codes above, and then the\n\
@@ -225,6 +277,12 @@ impl Frame<'_> {
             title = title(&format!("{name}.h"), self.device.about),
             signal_list = listed(signals),
             signal_count = signals.len(),
+            core = self.core(),
+            rows = self.rows(),
+            all = match self.is_late() {
+                true => "The estimator at a time.",
+                false => "All there is to an estimator under way: a copy is a snapshot.",
+            },
             tunables = self.tunables(),
             verdict = self.verdict_declared(),
             estimate_list = listed(estimates),
@@ -249,7 +307,8 @@ impl Frame<'_> {
         let name = &self.prefix;
         match self.machine.is_judged() {
             true => format!(
-                "\nint {name}_credible(const {name}_state *s)\n{{\n    return is_credible(s);\n}}\n"
+                "\nint {name}_credible(const {name}_state *s)\n{{\n    return is_credible({now});\n}}\n",
+                now = if self.is_late() { "&s->now" } else { "s" }
             ),
             false => String::new(),
         }
@@ -306,7 +365,7 @@ impl Frame<'_> {
         let draft = machine.text() + &self.init();
         let draft = exchanged(&draft, |word| {
             if word == "STATE" {
-                return Some(format!("{name}_state"));
+                return Some(self.core());
             }
             number_of(word).map(|_| format!("{capitals}_{word}"))
         });
@@ -326,25 +385,17 @@ impl Frame<'_> {
                 )
             }
         };
-        let real = self.real();
         format!(
             "{title}#include \"{name}.h\"\n\n#include <math.h>\n\n\
              const char *const {name}_signal_names[{capitals}_SIGNALS] = {{\n{signals}}};\n\n\
              const char *const {name}_estimate_names[{capitals}_ESTIMATES] = {{\n{estimates}}};\n\n\
              {tunables}{body}\n\
-             int {name}_push({name}_state *s, double t, const {real} *signals, {real} *estimates)\n{{\n\
-             \x20   const {name}_state before = *s;\n\
-             \x20   const int code = take(s, t, signals, estimates);\n\
-             \x20   if (code != 0) {{\n        *s = before;\n    }}\n\
-             \x20   if (code == {capitals}_DIVERGED || code == {capitals}_NOT_FINITE) {{\n        s->refused++;\n\
-             \x20       if (s->refused >= {PATIENCE}) {{\n            {name}_init(s);\n{keeps}        }}\n    }}\n    return code;\n}}\n{verdict}",
-            verdict = self.verdict(),
-            keeps = match self.device.tunables {
-                [] => String::new(),
-                _ => format!(
-                    "            for (int i = 0; i < {capitals}_TUNABLES; i++) {{\n                s->tuning[i] = before.tuning[i];\n            }}\n"
-                ),
+             {push}{verdict}",
+            push = match self.is_late() {
+                true => self.push_row() + &self.late(),
+                false => self.push(),
             },
+            verdict = self.verdict(),
             title = title(&format!("{name}.c"), self.device.about),
             signals = names(self.device.signals),
             estimates = names(self.device.estimates),
@@ -352,11 +403,44 @@ impl Frame<'_> {
         )
     }
 
+    /// A sample; what is refused changes nothing.
+    fn push(&self) -> String {
+        let (name, capitals, real) = (&self.prefix, self.capitals(), self.real());
+        let keeps = match self.device.tunables {
+            [] => String::new(),
+            _ => format!(
+                "            for (int i = 0; i < {capitals}_TUNABLES; i++) {{\n                s->tuning[i] = before.tuning[i];\n            }}\n"
+            ),
+        };
+        format!(
+            "int {name}_push({name}_state *s, double t, const {real} *signals, {real} *estimates)\n{{\n\
+             \x20   const {name}_state before = *s;\n\
+             \x20   const int code = take(s, t, signals, estimates);\n\
+             \x20   if (code != 0) {{\n        *s = before;\n    }}\n\
+             \x20   if (code == {capitals}_DIVERGED || code == {capitals}_NOT_FINITE) {{\n        s->refused++;\n\
+             \x20       if (s->refused >= {PATIENCE}) {{\n            {name}_init(s);\n{keeps}        }}\n    }}\n    return code;\n}}\n"
+        )
+    }
+
+    /// The same of a row among others.
+    fn push_row(&self) -> String {
+        let (name, real) = (&self.prefix, self.real());
+        format!(
+            "static int push_row({name}_core *s, double t, const {real} *signals, {real} *estimates)\n{{\n\
+             \x20   const {name}_core before = *s;\n\
+             \x20   const int code = take(s, t, signals, estimates);\n\
+             \x20   if (code != 0) {{\n        *s = before;\n    }}\n    return code;\n}}\n"
+        )
+    }
+
     /// The start, in the draft.
     fn init(&self) -> String {
-        let name = &self.prefix;
+        let (name, core) = (&self.prefix, self.core());
         let lines: String = self.machine.fields.iter().map(start).collect();
-        format!("void {name}_init({name}_state *s)\n{{\n{lines}}}\n")
+        match self.is_late() {
+            true => format!("static void init_core({core} *s)\n{{\n{lines}}}\n"),
+            false => format!("void {name}_init({core} *s)\n{{\n{lines}}}\n"),
+        }
     }
 }
 

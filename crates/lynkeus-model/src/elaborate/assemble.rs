@@ -5,6 +5,7 @@ use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::{Binary, Graph, Interval, Node, Tape, Unary, jacobian};
 
+use super::delay::Delayed;
 use super::evaluate::Evaluator;
 use super::events;
 use super::flatten::Flat;
@@ -20,8 +21,13 @@ use crate::{Assertion, Parameter, Plant, Variable, balance};
 /// The plant, with what looks wrong in it. Its graph is still the caller's: this one is empty.
 pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec<Problem>)> {
     let (graph, model) = (symbols.graph, symbols.model);
-    let (unknowns, inputs) = unknowns(symbols, &flat.equations)?;
-    let equations = std::mem::take(&mut flat.equations);
+    let (mut unknowns, inputs) = unknowns(symbols, &flat.equations)?;
+    let mut equations = std::mem::take(&mut flat.equations);
+    let delays = symbols.delays.take();
+    for delayed in &delays {
+        unknowns.extend(delayed.unknowns());
+        equations.extend(delayed.equations(graph));
+    }
     let time = symbols.time();
     let system = System::new(graph, symbols.source, equations, unknowns, &inputs, time);
     let solution = balance::solve(system, model.name)?;
@@ -41,6 +47,10 @@ pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec
             parameters(graph, declaration, component, elements, &mut plant);
         }
     }
+    let mut warnings: Vec<Problem> = delays.iter().map(Delayed::told).collect();
+    for delayed in delays {
+        delayed.join(symbols, &solution, &mut plant);
+    }
     let held = events::held(&flat.clauses);
     for state in plant.states.iter_mut().filter(|s| held.contains(&s.node)) {
         state.discrete = true;
@@ -49,7 +59,7 @@ pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec
     }
     let states: Vec<Node> = plant.states.iter().map(|state| state.node).collect();
     plant.whens = events::whens(symbols, &flat.clauses, &solution, &states)?;
-    let mut warnings = fix_starts(symbols, &flat, &solution, &mut plant.states);
+    warnings.extend(fix_starts(symbols, &flat, &solution, &mut plant.states));
     let found = assertions(graph, flat.claims, &solution);
     warnings.extend(failing_at_start(symbols, &found, &plant));
     plant.table_points = symbols.table_points.take();
@@ -423,7 +433,11 @@ fn root(graph: &Graph, residual: Node, symbol: Node) -> Option<Node> {
 }
 
 /// The number that an expression is for values of its symbols; none where one has no value.
-fn computed(graph: &Graph, node: Node, value: impl Fn(Node) -> Option<f64>) -> Option<f64> {
+pub(super) fn computed(
+    graph: &Graph,
+    node: Node,
+    value: impl Fn(Node) -> Option<f64>,
+) -> Option<f64> {
     let symbols = graph.symbols_of(&[node]);
     let values: Option<Vec<f64>> = symbols.iter().map(|&symbol| value(symbol)).collect();
     let tape = Tape::new(graph, &symbols, &[node]).ok()?;

@@ -21,7 +21,7 @@ const INTERPOLATE: &str = "Modelica.Math.Vectors.interpolate";
 type Function = for<'e, 'a> fn(&'e mut Evaluator<'a>, &'a Call) -> Result<Value>;
 
 /// By name: what an evaluator `e` makes of a call `c`.
-const FUNCTIONS: [(&str, Function); 52] = [
+const FUNCTIONS: [(&str, Function); 53] = [
     ("sqrt", |e, c| e.each(c, |x| x.sqrt())),
     ("exp", |e, c| e.each(c, |x| x.exp())),
     ("log", |e, c| e.each(c, |x| x.ln())),
@@ -47,6 +47,7 @@ const FUNCTIONS: [(&str, Function); 52] = [
     ("min", |e, c| e.extreme(c, i64::min, |a, b| a.min(b))),
     ("max", |e, c| e.extreme(c, i64::max, |a, b| a.max(b))),
     ("der", |e, c| e.der(c)),
+    ("delay", |e, c| e.delay(c)),
     ("noEvent", |e, c| e.only_argument(c)),
     ("smooth", |e, c| Ok(e.two_arguments(c)?.1)),
     ("homotopy", |e, c| Ok(e.two_arguments(c)?.0)),
@@ -77,14 +78,13 @@ const FUNCTIONS: [(&str, Function); 52] = [
 ];
 
 /// Functions that an observer's model cannot have, and what to do instead.
-const REFUSED: [(&str, &str); 5] = [
+const REFUSED: [(&str, &str); 4] = [
     ("terminal", "the study says until when a run goes"),
     ("reinit", "it is an equation of its own, in a `when`"),
     (
-        "delay",
-        "a delay has infinitely many states: use a chain of lags",
+        "spatialDistribution",
+        "use `delay` where the flow is constant, or a chain of lags",
     ),
-    ("spatialDistribution", "use a chain of lags"),
     ("assert", "it is an equation or a statement of its own"),
 ];
 

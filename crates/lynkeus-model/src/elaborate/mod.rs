@@ -7,6 +7,7 @@ mod assemble;
 mod calls;
 mod clauses;
 mod declare;
+mod delay;
 mod evaluate;
 mod events;
 mod execute;
@@ -30,6 +31,7 @@ use crate::{LoadOptions, Plant};
 use scope::Mode;
 use symbols::{Names, Symbols};
 
+pub use delay::{DELAY_STATES, MAX_DELAY_STATES};
 pub(crate) use evaluate::Evaluator;
 
 /// The plant of a Modelica text, with what looks wrong in it.

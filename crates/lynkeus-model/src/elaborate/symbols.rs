@@ -6,6 +6,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use lynkeus_expr::{Graph, Node};
 
 use super::clauses::EventSymbols;
+use super::delay::Delayed;
 use super::scope::{Mode, Named};
 use super::value::Scalar;
 use crate::LoadOptions;
@@ -43,6 +44,8 @@ pub(crate) struct Symbols<'a> {
     pub(super) texts: Budget,
     /// of which the points of tables are made, found on the way
     pub table_points: RefCell<BTreeSet<Node>>,
+    /// the delays that equations have
+    pub(super) delays: RefCell<Vec<Delayed>>,
     pub(super) by_name: HashMap<&'a str, usize>,
     pub(super) components: Vec<Option<Component>>,
     /// arrays whose elements are declared by themselves: `x` of `x[1]` and `x[2]`
@@ -82,6 +85,7 @@ impl<'a> Symbols<'a> {
             scalars: Budget::new(MAX_SCALARS, "scalar variables and parameters"),
             texts: Budget::new(MAX_TEXT, "bytes of names, units and descriptions"),
             table_points: RefCell::default(),
+            delays: RefCell::default(),
             by_name: HashMap::new(),
             components: vec![],
             gathered: HashMap::new(),

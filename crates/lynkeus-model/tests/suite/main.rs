@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod balance;
+mod delays;
 mod examples;
 mod flat_files;
 mod hostile;

@@ -28,7 +28,9 @@ fn constructs_outside_the_subset() {
     check(
         r#"
          | connect(a, b); | :5:3: the model is not flat: it has `connect` (flatten it first: `omc -f
-         | z = delay(z, 1); | :5:7: `delay` is not supported (a delay has
+         | x[1] = delay(u, z); | :5:10: the time of `delay` changes: expected a number or a parameter (where a flow
+         | x[1] = delay(u, -1); | :5:10: a delay of -1: expected a time >= 0
+         | x[1] = delay(u); | `delay` takes 2 arguments, found 1
          | z = spatialDistribution(z, z); | `spatialDistribution` is not supported
          | assert(z > 0, "negative"; | expected `)` after the message of the `assert`
          | assert(1 > 2, "never"); | :5:3: this assertion does not hold: never

@@ -2,16 +2,17 @@
 
 use lynkeus_export::Refusal;
 use lynkeus_export::curly::{Device, Entry, FirstReading, Tunable};
-use lynkeus_model::Variable;
+use lynkeus_model::{Home, Variable};
 use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Level, Updates};
 
+use crate::print::target::Target;
 use crate::{Error, Study, print::tunable};
 use lynkeus_experiment::course::run::at_readings;
 use lynkeus_experiment::prepare::Prepared;
 use lynkeus_experiment::prepare::headers::Headers;
 use lynkeus_experiment::prepare::systems::hat;
-use lynkeus_study::BetweenSamples;
+use lynkeus_study::{BetweenSamples, Late};
 
 /// What `print` makes of an estimator, with `about` at its head, and of notes on names.
 ///
@@ -24,6 +25,7 @@ pub(crate) fn printed<T>(
     about: &[String],
     print: impl FnOnce(&Device<'_>, Vec<String>) -> Result<T, Refusal>,
 ) -> Result<T, Error> {
+    let delays = delays(prepared);
     let told = Told::of(prepared, design, made);
     let first: Vec<FirstReading> = at_readings(prepared)
         .iter()
@@ -47,13 +49,58 @@ pub(crate) fn printed<T>(
         estimates: &told.estimates,
         monitors: told.monitors,
         deviations: study.estimate.deviations,
+        turns: &told.turns,
         tunables: &told.tunables,
         noises: &noises,
         words: &told.words,
+        delays: &delays,
         about,
     };
     print(&device, told.notes)
         .map_err(|refusal| Error::refused(refusal.to_string()).at(&study.file))
+}
+
+/// How much later than its sample is taken a reading comes, by sensor; none where no sensor is late.
+fn delays(prepared: &Prepared<'_>) -> Vec<f64> {
+    let declared = &prepared.declared().late;
+    if !declared.is_declared() {
+        return vec![];
+    }
+    let outputs = prepared.augmented().outputs.iter();
+    let delays = outputs.map(|output| match declared.of(&output.variable.name) {
+        Some(Late::By(delay)) => *delay,
+        _ => 0.0,
+    });
+    delays.collect()
+}
+
+/// Only in C late readings find their place, and only those of a delay that does not change.
+///
+/// # Errors
+/// A sensor is late, and the code could not help it.
+pub(crate) fn refuse_late(
+    prepared: &Prepared<'_>,
+    to: Target,
+    is_tunable: bool,
+) -> Result<(), Error> {
+    let mut late = prepared.declared().late.iter();
+    let finds_place = to == Target::C && !is_tunable;
+    let Some((name, late)) = late.find(|(_, late)| !finds_place || !matches!(late, Late::By(_)))
+    else {
+        return Ok(());
+    };
+    let where_to = match late {
+        Late::TakenAt(_) => "no exported code has a column for that".to_owned(),
+        Late::By(_) if to == Target::C => "what is tunable does not go back to them".to_owned(),
+        Late::By(_) => format!("only C goes back to them, and not {}", to.word()),
+    };
+    let message = format!(
+        "`{}` of [sensors]: the readings of {name} come later than their samples are taken, and {where_to}",
+        late.key()
+    );
+    Err(Error::refused(message).at(&prepared.study().file).hint(
+        "export C with a `delay`, or leave the key out and give the device each reading with the time of its sample, before later rows; the library's estimator goes back to late readings, too",
+    ))
 }
 
 /// The study without what looks ahead, which a device cannot.
@@ -78,6 +125,8 @@ struct Told {
     signals: Vec<Entry>,
     estimates: Vec<Entry>,
     monitors: usize,
+    /// states that are told in one turn, and where it begins
+    turns: Vec<(usize, f64)>,
     tunables: Vec<Tunable>,
     words: Vec<Entry>,
     notes: Vec<String>,
@@ -113,10 +162,16 @@ impl Told {
                 name: header,
                 about,
             });
+            // of a rotation there is one
+            let own = match estimate.variable.home {
+                Home::Rotation { element: 0 } => name.split('[').next().unwrap_or(name),
+                Home::Rotation { .. } => continue,
+                _ => name,
+            };
             if has_deviations {
-                let about = format!("standard deviation of {name}");
+                let about = format!("standard deviation of {own}");
                 deviations.push(Entry {
-                    name: headers.free(&format!("{name}_sd"), &format!("the {about}")),
+                    name: headers.free(&format!("{own}_sd"), &format!("the {about}")),
                     about,
                 });
             }
@@ -132,9 +187,15 @@ impl Told {
                 })
                 .collect(),
         };
+        let turns = observer.estimates.iter().enumerate();
+        let turns = turns.filter_map(|(i, e)| match e.variable.home {
+            Home::Circle { from } => Some((i, from?)),
+            _ => None,
+        });
         Self {
             signals: read.map(|signal| known(&signal.name)).collect(),
             monitors: monitors.len(),
+            turns: turns.collect(),
             estimates: estimates
                 .into_iter()
                 .chain(deviations)

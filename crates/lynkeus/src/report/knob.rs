@@ -5,7 +5,8 @@ use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Method, Step};
 
 use super::positions::{Position, Positions};
-use crate::print::device::printed;
+use crate::print::device::{printed, refuse_late};
+use crate::print::target::Target;
 use crate::{Error, Study};
 use lynkeus_experiment::blueprint;
 use lynkeus_experiment::course::fixed_steps::{stepped, steps};
@@ -57,6 +58,7 @@ impl Fixed {
         step: Option<f64>,
         shorter: f64,
     ) -> Result<Self, Error> {
+        refuse_late(prepared, Target::JavaScript, true)?;
         let is_filter = design.observer.filter.is_some();
         let mut study = prepared.study().clone();
         // a filter has them anyway

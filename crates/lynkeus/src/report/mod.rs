@@ -104,7 +104,7 @@ pub fn report(
         None => None,
     };
     let fitted = log.and_then(|log| Fitted::new(study, log, watch));
-    let samples = Log::read(&prepared, table)?.samples;
+    let samples = Log::read(&prepared, table)?.own_samples();
     notes.extend_from_slice(&outcome.warnings);
     notes.extend_from_slice(&outcome.notes);
     // a page goes to others: no folder of this machine

@@ -214,7 +214,8 @@ impl Tradeoff {
 /// The first rows of a log that has more than are judged, as far as the study reads them.
 fn first(prepared: &Prepared<'_>, table: &Table) -> Result<Option<Table>, Error> {
     let log = Log::read(prepared, table)?;
-    if log.samples.time.len() <= ROWS {
+    // late readings would be moved twice
+    if log.samples.time.len() <= ROWS || log.is_late() {
         return Ok(None);
     }
     let settings = &prepared.study().estimate;
