@@ -40,7 +40,7 @@ impl Clauses {
         memory: &mut Memory,
         slopes: Option<&mut JumpSlopes>,
     ) -> Result<Option<usize>> {
-        let (t, n) = (inputs[0], self.states);
+        let t = inputs[0];
         let mut inputs = inputs.to_vec();
         inputs.extend_from_slice(x);
         inputs.resize(inputs.len() + self.shape.timers.len(), 0.0);
@@ -57,16 +57,19 @@ impl Clauses {
             memory.begin(self, t);
             // what holds from the start on, equations of discrete variables included, is no event
             rounds.always(t, &rounds.kept())?;
-            rounds.remember(n);
+            let now = rounds.x.to_vec();
+            rounds.remember(&now);
             memory.truths = rounds.truths();
         }
         let mut first = None;
         let mut line = self.shape.clauses.first().map_or(0, |clause| clause.line);
+        // what a round has changed is a change to the next one, too, which so sees an edge of it
+        let (mut old, mut kept) = (rounds.x.to_vec(), rounds.kept());
         for round in 0..ROUNDS {
             let before = rounds.x.to_vec();
             let is_due = round == 0 && rounds.set_timers(memory, t, is_first);
-            rounds.remember(n);
-            let kept = rounds.kept();
+            rounds.remember(&old);
+            let slopes = rounds.kept();
             rounds.always(t, &kept)?;
             let truths = rounds.truths();
             let rises = |c: usize| truths[c] && !memory.truths[c];
@@ -86,11 +89,12 @@ impl Clauses {
                 line = clause.line;
                 first.get_or_insert(risen);
             }
-            if done.is_empty() && !is_due && before == *rounds.x {
+            if done.is_empty() && !is_due && before == *rounds.x && old == before {
                 let has_moved = start != *rounds.x;
                 return Ok(first.or(has_moved.then_some(NONE)));
             }
             rounds.clear_timers();
+            (old, kept) = (before, slopes);
         }
         Err(Error::EndlessEvents {
             time: t,
@@ -115,10 +119,10 @@ impl Rounds<'_> {
         self.inputs.len() - self.x.len() - self.clauses.shape.timers.len()
     }
 
-    /// The states as they are now are those before.
-    fn remember(&mut self, n: usize) {
+    /// The states before.
+    fn remember(&mut self, before: &[f64]) {
         let aside = self.aside();
-        self.inputs[aside..aside + n].copy_from_slice(self.x);
+        self.inputs[aside..aside + before.len()].copy_from_slice(before);
     }
 
     fn set_timers(&mut self, memory: &mut Memory, t: f64, is_first: bool) -> bool {
@@ -251,7 +255,8 @@ impl Clauses {
             slopes: None,
         };
         rounds.always(t, &JumpSlopes::default())?;
-        rounds.remember(self.states);
+        let now = rounds.x.to_vec();
+        rounds.remember(&now);
         Ok(rounds.truths())
     }
 }

@@ -50,6 +50,7 @@ fn filter(kind: FilterKind) -> Estimator {
             2
         ],
         confined: None,
+        whens: Default::default(),
     };
     let model = NoisyModel::new(&plant).unwrap();
     let blueprint = Blueprint::filter(

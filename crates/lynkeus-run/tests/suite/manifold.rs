@@ -59,6 +59,7 @@ fn rotor(manifold: Manifold) -> NoisyModel {
         initial_variance: vec![1.0, 9.0],
         ranges: vec![open; 2],
         confined: None,
+        whens: Default::default(),
     });
     model.unwrap().on(manifold)
 }
@@ -187,6 +188,7 @@ fn body(start: [f64; 4], variances: [f64; 2]) -> NoisyModel {
         initial_variance: [vec![0.25 * variances[0]; 4], vec![variances[1]; 3]].concat(),
         ranges: vec![],
         confined: None,
+        whens: Default::default(),
     });
     model.unwrap().on(Manifold {
         rotations: vec![0],
