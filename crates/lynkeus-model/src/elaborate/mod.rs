@@ -7,6 +7,7 @@ mod assemble;
 mod calls;
 mod declare;
 mod delay;
+mod delayed;
 mod evaluate;
 mod execute;
 mod flatten;
@@ -29,7 +30,7 @@ use crate::{LoadOptions, Plant};
 use scope::Mode;
 use symbols::{Names, Symbols};
 
-pub use delay::{DELAY_STATES, MAX_DELAY_STATES};
+pub use delayed::{DELAY_STATES, MAX_DELAY_STATES};
 pub(crate) use evaluate::Evaluator;
 
 /// The plant of a Modelica text, with what looks wrong in it.

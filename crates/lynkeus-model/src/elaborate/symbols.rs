@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use lynkeus_expr::{Graph, Node};
 
-use super::delay::Delayed;
+use super::delayed::Delayed;
 use super::scope::{Mode, Named};
 use super::value::Scalar;
 use crate::LoadOptions;
