@@ -42,8 +42,8 @@ from .model import Model
 
 #: in which order `Study` takes its sections, and what stands for itself beside them
 SENSORS = ("measured", "unknown", "disturbances", "noise", "limits")
-SECTIONS = ("sensors", "process_noise", "parameters", "observer", "box", "certify", "simulate", "log", "estimate")
-SECTIONS += ("tune", "fit", "compare", "plot", "tables", "delay_states")
+SECTIONS = ("sensors", "process_noise", "parameters", "manifold", "observer", "box", "certify", "simulate")
+SECTIONS += ("log", "estimate", "tune", "fit", "compare", "plot", "tables", "delay_states")
 #: what may be said briefly
 BRIEFLY = {"observer": "Family", "compare": "Names"}
 PLANT = {

@@ -105,6 +105,22 @@ ProcessNoiseSection: TypeAlias = Mapping[str, Number | None]
 ParametersSection: TypeAlias = Mapping[str, Number | None]
 
 
+class ManifoldSection(TypedDict, total=False):
+    """which states and outputs are angles or rotations; the filters take them as such (table; default: none)"""
+
+    circle: Names | None
+    """angles in radians, of which a full turn changes nothing: θ and θ + 2π are one. Innovations and errors
+    are wrapped, the box has no ends there, and estimates are shown in the declared range (`min` and `max`,
+    or `[box]`) where that is one turn, else unwrapped. An output that turns with such a state is one as
+    well (list of states and outputs; default: none)"""
+
+    quaternion: Names | None
+    """attitudes: arrays `Real q[4]` of states, a unit quaternion with the scalar first, whose equation is q'
+    = ½ q⊗(0, ω). `initial_variance`, `[process_noise]`, `spread` and `NAME_sd` are those of the vector of
+    a small rotation about the body's axes, in rad: one number for the array, and one column (list of
+    states; default: none)"""
+
+
 class ObserverS(TypedDict):
     """A value of ``S`` in ``[observer]``."""
 
@@ -280,11 +296,16 @@ class ObserverSection(TypedDict, total=False):
     initial_variance: Mapping[str, Number] | None
     """ekf, ukf, mhe: how uncertain the first estimate is: the variance of each state and unknown input;
     `default` holds for everything not listed (table: name = number ≥ 0, and `default`; default: the square
-    of a quarter of the declared range (without a range: of the start value, or 1))"""
+    of a quarter of the declared range (without a range: of the start value, or 1; of an angle or a
+    rotation: of a turn))"""
 
     gate: Number | None
     """ekf, ukf, mhe: a reading whose innovation exceeds so many of its standard deviations is rejected and
-    counted; after ten in a row the next is believed (number > 0; default: none)"""
+    counted (number > 0; default: none)"""
+
+    gate_patience: Whole | None
+    """ekf, ukf, mhe: after so many rejections of a sensor in a row, at least half of which moved, its next
+    reading is believed (whole number ≥ 1; default: 10)"""
 
     bounds: Literal["project"] | None
     """ekf, ukf: "project": the estimate is kept in the declared ranges `[min, max]`: after each prediction
@@ -680,6 +701,9 @@ class Sections(TypedDict, total=False):
 
     parameters: ParametersSection | None
     """values that replace those of the plant (table: name = number; default: none)"""
+
+    manifold: ManifoldSection | None
+    """which states and outputs are angles or rotations; the filters take them as such (table; default: none)"""
 
     observer: ObserverSection | Family | None
     """the observer family and its tuning"""

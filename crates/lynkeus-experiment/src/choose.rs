@@ -251,6 +251,10 @@ fn left_out(prepared: &Prepared<'_>) -> Vec<String> {
     let keys: Vec<&str> = observer.tuning.values.keys().map(String::as_str).collect();
     match names.is_empty() {
         true => vec![],
+        false if observer.is_curved => vec![format!(
+            "not examined, as their theorems are about errors that are differences of real numbers, and [manifold] has others: {}",
+            names.join(", ")
+        )],
         false => vec![format!(
             "not examined, as they do not take {}: {}",
             keys.join(" and "),

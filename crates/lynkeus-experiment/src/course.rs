@@ -5,6 +5,7 @@ pub(crate) mod checkpoint;
 pub mod columns;
 mod computed;
 pub(crate) mod corrections;
+pub(crate) mod curved;
 pub(crate) mod doubt;
 pub(crate) mod ended;
 pub mod filter;

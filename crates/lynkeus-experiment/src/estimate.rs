@@ -1,12 +1,13 @@
 //! A log through the study's observer.
 
 pub(crate) mod live;
+mod suspected;
 mod told;
 
 use std::ops::ControlFlow;
 
 use lynkeus_observers::{Design, Observer, Signal};
-use lynkeus_run::Fleet;
+use lynkeus_run::{EstimatorSettings, Fleet};
 
 use crate::course::checkpoint::Checkpoint;
 use crate::course::columns::{self, Log};
@@ -17,6 +18,7 @@ use crate::course::replay::{Watch, refuse_smoothing};
 use crate::course::run::{course_of, refuse_settings, start_at_readings};
 use crate::course::{Course, Samples, filter, sampled};
 use crate::crew::within;
+use crate::estimate::suspected::suspected;
 use crate::judge::frozen::{Channel, Frozen, frozen};
 use crate::judge::interval;
 use crate::judge::outcome::{Raw, measurements};
@@ -37,7 +39,8 @@ pub fn estimate(
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Outcome, Error> {
     let plant = prepare::plant(study)?;
-    estimated(&Prepared::new(study, &plant)?, table, watch)
+    let prepared = Prepared::new(study, &plant)?;
+    looked_at(&prepared, prepared.design()?, table, Watch::only(watch))
 }
 
 /// The same with a checkpoint: where this file holds the beginning of the same replay, it goes on
@@ -59,7 +62,7 @@ pub fn estimate_resumed(
         checkpoint: Some(checkpoint),
     };
     let prepared = Prepared::new(study, &plant)?;
-    watched(&prepared, prepared.design()?, table, watch)
+    looked_at(&prepared, prepared.design()?, table, watch)
 }
 
 /// The replay of a study that is prepared.
@@ -87,10 +90,34 @@ fn watched(
     table: &Table,
     watch: Watch<'_>,
 ) -> Result<Outcome, Error> {
-    let study = prepared.study();
     let begun = Begun::new(prepared, design, table)?;
-    let (design, samples) = (&begun.design, &begun.log.samples);
-    let run = run_settings(&study.estimate);
+    let course = begun.course(prepared, watch)?;
+    begun.finish(prepared, course)
+}
+
+/// The same for somebody who looks at the result: a column that seems to be another quantity is named.
+pub(crate) fn looked_at(
+    prepared: &Prepared<'_>,
+    design: StudyDesign,
+    table: &Table,
+    watch: Watch<'_>,
+) -> Result<Outcome, Error> {
+    let begun = Begun::new(prepared, design, table)?;
+    let mut course = begun.course(prepared, watch)?;
+    let suspicion = suspected(prepared, &begun.design, &begun.log.samples, &course);
+    course.doubts.extend(suspicion);
+    begun.finish(prepared, course)
+}
+
+/// An observer over samples, with what judges it.
+fn followed(
+    prepared: &Prepared<'_>,
+    design: &StudyDesign,
+    samples: &Samples,
+    run: EstimatorSettings,
+    watch: Watch<'_>,
+) -> Result<Course, Error> {
+    let study = prepared.study();
     let is_judged_beside = is_judged_beside(study, design);
     let share = if is_judged_beside { 0.5 } else { 1.0 };
     let mut told = within(&study.budget, watch.watch);
@@ -107,7 +134,7 @@ fn watched(
         };
         sampled::judge(prepared, design, samples, run, beside, &mut course)?;
     }
-    begun.finish(prepared, course)
+    Ok(course)
 }
 
 /// How many logs of a study are best estimated [together](crate::Runner::estimate_together).
@@ -187,6 +214,11 @@ impl<'t> Begun<'t> {
         }
         start_at_readings(prepared, &log.samples, &mut design);
         Ok(Self { design, log })
+    }
+
+    fn course(&self, prepared: &Prepared<'_>, watch: Watch<'_>) -> Result<Course, Error> {
+        let run = run_settings(&prepared.study().estimate);
+        followed(prepared, &self.design, &self.log.samples, run, watch)
     }
 
     /// What the course of its observer comes to.

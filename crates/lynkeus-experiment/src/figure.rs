@@ -1,5 +1,7 @@
 //! The picture of an outcome.
 
+use lynkeus_model::Home;
+
 use crate::prepare::mentioned::not_drawn;
 use crate::tune::Foretold;
 use crate::{Error, Outcome, Quantity, Series};
@@ -144,7 +146,7 @@ fn panel(outcome: &Outcome, quantity: &Quantity) -> Panel {
     ];
     let curves = series
         .into_iter()
-        .filter_map(|(kind, values)| Some(curve(outcome, kind, values.as_ref()?)))
+        .filter_map(|(kind, values)| Some(curve_of(outcome, quantity, kind, values.as_ref()?)))
         .collect();
     Panel {
         name: quantity.name.clone(),
@@ -166,21 +168,59 @@ fn bands(outcome: &Outcome, quantity: &Quantity) -> Vec<Band> {
         (&quantity.smoothed, &quantity.smoothed_deviation),
     ];
     let pairs = pairs.into_iter();
-    let found = pairs.filter_map(|(x, sd)| Some(band(outcome, x.as_ref()?, sd.as_ref()?)));
+    let is_wrapped = is_wrapped(quantity);
+    let found =
+        pairs.filter_map(|(x, sd)| Some(band(outcome, x.as_ref()?, sd.as_ref()?, is_wrapped)));
     found.collect()
 }
 
-fn band(outcome: &Outcome, estimate: &Series, deviation: &Series) -> Band {
+fn band(outcome: &Outcome, estimate: &Series, deviation: &Series, is_wrapped: bool) -> Band {
     let edge = |side: f64| {
         let pairs = estimate.iter().zip(deviation);
         let edge = pairs.map(|(x, sd)| x + side * DEVIATIONS * sd);
         Series::gathered(estimate.store(), edge)
     };
+    let (low, high) = (edge(-1.0), edge(1.0));
+    let (time, low, high) = match is_wrapped {
+        false => (outcome.time.clone(), low, high),
+        true => {
+            let (time, low) = lifted(&outcome.time, &low, estimate);
+            (time, low, lifted(&outcome.time, &high, estimate).1)
+        }
+    };
     Band {
         extent: Extent::TwoDeviations,
-        time: outcome.time.clone(),
-        low: edge(-1.0),
-        high: edge(1.0),
+        time,
+        low,
+        high,
+    }
+}
+
+/// Whether a quantity is shown in one turn.
+fn is_wrapped(quantity: &Quantity) -> bool {
+    matches!(quantity.home, Home::Circle { from: Some(_) })
+}
+
+/// Time and values, with the pen lifted where angles go on in the next turn.
+fn lifted(time: &Series, values: &Series, angles: &Series) -> (Series, Series) {
+    let rows = || time.iter().zip(values).zip(angles);
+    let before = std::iter::once(f64::NAN).chain(angles);
+    let points = rows().zip(before).flat_map(|(((t, x), angle), before)| {
+        let is_new = (angle - before).abs() > std::f64::consts::PI;
+        let lift = is_new.then_some((t, f64::INFINITY));
+        lift.into_iter().chain([(t, x)])
+    });
+    let (time, values): (Vec<f64>, Vec<f64>) = points.unzip();
+    (time.into(), values.into())
+}
+
+fn curve_of(outcome: &Outcome, quantity: &Quantity, kind: Kind, values: &Series) -> Curve {
+    match is_wrapped(quantity) {
+        false => curve(outcome, kind, values),
+        true => {
+            let (time, values) = lifted(&outcome.time, values, values);
+            Curve::new(kind, time, values)
+        }
     }
 }
 

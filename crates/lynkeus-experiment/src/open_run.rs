@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 
 use crate::answer::Origin;
 use lynkeus_expr::Node;
-use lynkeus_model::{Plant, Variable};
+use lynkeus_model::{Home, Plant, Variable};
 use lynkeus_observers::starts;
 use lynkeus_run::{Error as RunError, Estimator, System};
 use lynkeus_study::{Generator, Name};
@@ -23,7 +23,7 @@ use crate::course::inputs::refuse_strays;
 use crate::course::replay::{Watch, replay};
 use crate::course::run::{first_readings, told_start};
 use crate::course::taken::Interleaved;
-use crate::course::{Course, Samples};
+use crate::course::{Course, Samples, curved};
 use crate::crew::within;
 use crate::judge::outcome::{Ended, not_whole};
 use crate::prepare::headers::{Headers, header};
@@ -376,7 +376,10 @@ fn compared(
         };
         let misfit = readings.map(|readings| {
             let header = headers.free(&format!("{name}_error"), &format!("the error of {name}"));
-            let readings = readings.shortened(values.len());
+            let mut readings = readings.shortened(values.len());
+            if let Home::Circle { .. } = variable.home {
+                readings = curved::lifted(&readings, &values);
+            }
             let inserted = log.interleaved.as_ref().map_or(0, Interleaved::inserted);
             let mut misfit = misfit(prepared, (name, &values), readings, header);
             misfit.missing = misfit.missing.saturating_sub(inserted);

@@ -5,7 +5,9 @@ pub mod calibrate;
 pub mod choice;
 pub mod correction;
 pub mod declared;
+mod dials;
 pub mod headers;
+pub(crate) mod manifold;
 pub(crate) mod mentioned;
 pub mod modes;
 pub(crate) mod spread;
@@ -17,7 +19,7 @@ use std::ops::{Deref, DerefMut};
 use std::time::Duration;
 
 use lynkeus_expr::{Budget, Spent};
-use lynkeus_model::{LoadError, LoadOptions, Plant, Variable};
+use lynkeus_model::{Home, LoadError, LoadOptions, Plant, Variable};
 pub use lynkeus_observers::is_certified_gain;
 use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning};
 use lynkeus_structure::{AugmentedPlant, Dimension, Region, Sensors, SensorsError, range};
@@ -42,6 +44,7 @@ pub fn plant(study: &Study) -> Result<Plant, Error> {
         false => plant,
     };
     let plant = bias::added(study, plant)?;
+    let plant = manifold::placed(study, plant)?;
     refuse_strangers(study, &plant)?;
     Ok(plant)
 }
@@ -72,6 +75,7 @@ pub fn symbolic_plant(study: &Study, numbers: BTreeSet<String>) -> Result<Plant,
         false => plant,
     };
     let plant = bias::added(study, plant)?;
+    let plant = manifold::placed(study, plant)?;
     refuse_strangers(study, &plant)?;
     Ok(plant)
 }
@@ -130,7 +134,14 @@ pub fn seen_by<'a>(
     sensors: &Sensors,
 ) -> Result<AugmentedPlant<'a>, Error> {
     let mut augmented = AugmentedPlant::new(plant, sensors).map_err(|error| blame(study, error))?;
-    for (name, low, high) in &study.narrower {
+    // the turn in which an angle is shown
+    let is_turn = |name: &Name| {
+        let mut states = plant.states.iter();
+        let is_circle = |s: &Variable| matches!(s.home, Home::Circle { .. });
+        states.any(|state| name.text == state.name && is_circle(state))
+    };
+    let narrower = study.narrower.iter();
+    for (name, low, high) in narrower.filter(|(name, ..)| !is_turn(name)) {
         augmented
             .narrow(&name.text, *low, *high)
             .map_err(|error| name.blame(explain(error)))?;
@@ -185,6 +196,7 @@ impl<'a> Prepared<'a> {
     pub fn new(study: &'a Study, plant: &'a Plant) -> Result<Self, Error> {
         let mut augmented = seen_by(study, plant, &sensors(study, plant))?;
         let declared = Declared::new(study, plant)?;
+        dials::refuse_ends(study, &declared, &augmented)?;
         let bounds = |input: &Variable| declared.input_derivatives.of(&input.name);
         augmented.input_derivatives = augmented
             .inputs

@@ -112,9 +112,43 @@ pub struct Variable {
     pub integer: bool,
     /// declared with `fixed = true`: the value at the start is known, 0 where `start` is absent
     pub fixed: bool,
+    /// where its values live
+    pub home: Home,
+}
+
+/// Where the values of a variable live.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Home {
+    /// among the real numbers
+    #[default]
+    Line,
+    /// on a circle, in radians: a full turn changes nothing
+    Circle {
+        /// the values are shown in the turn that begins here; none where they are shown as they come
+        from: Option<f64>,
+    },
+    /// it changes its sign with a quaternion, which says the same as its negative
+    Signed {
+        /// place among the states of the first of the four numbers
+        of: usize,
+    },
+    /// it is one of the four numbers of a unit quaternion, which says the same as its negative
+    Rotation {
+        /// its place among them; 0 is the scalar
+        element: usize,
+    },
 }
 
 impl Variable {
+    /// How wide its range is: a full turn of an angle; infinite where an end is missing.
+    #[must_use]
+    pub fn width(&self) -> f64 {
+        match self.home {
+            Home::Line | Home::Signed { .. } => self.max - self.min,
+            Home::Circle { .. } | Home::Rotation { .. } => std::f64::consts::TAU,
+        }
+    }
+
     /// A variable of which nothing is declared.
     pub(crate) fn new(name: String, node: Node) -> Self {
         Self {
@@ -129,6 +163,7 @@ impl Variable {
             nominal: None,
             integer: false,
             fixed: false,
+            home: Home::Line,
         }
     }
 }

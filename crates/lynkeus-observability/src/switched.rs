@@ -11,7 +11,7 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
-use lynkeus_model::{Plant, Variable};
+use lynkeus_model::{Home, Plant, Variable};
 
 use crate::branches::{Choices, Reference, value};
 
@@ -60,6 +60,7 @@ fn input(graph: &Graph, node: Node) -> Variable {
         nominal: None,
         integer: false,
         fixed: false,
+        home: Home::Line,
     }
 }
 

@@ -207,7 +207,7 @@ const VARIANCE: KeySpec = KeySpec {
         "table: name = number ≥ 0, and `default`",
         &Shape::Table(&Shape::NotNegative),
     ),
-    default: "the square of a quarter of the declared range (without a range: of the start value, or 1)",
+    default: "the square of a quarter of the declared range (without a range: of the start value, or 1; of an angle or a rotation: of a turn)",
     meaning: "how uncertain the first estimate is: the variance of each state and unknown input; `default` holds for everything not listed",
 };
 
@@ -288,10 +288,10 @@ fn projects(tuning: &Tuning) -> Result<bool, TuningError> {
     Ok(tuning.meant(&BOUNDS[0], [true])?.is_some())
 }
 
-/// The square of a quarter of the range: two standard deviations reach its ends. Without a range, that of
+/// The square of a quarter of the range, of an angle and a rotation of a turn: two standard deviations reach its ends. Without a range, that of
 /// the start value, or 1.
 pub fn prior_variance(state: &Variable, start: f64) -> f64 {
-    let width = state.max - state.min;
+    let width = state.width();
     match width.is_finite() && width > 0.0 {
         true => (width / 4.0).powi(2),
         false => start.powi(2).max(1.0),

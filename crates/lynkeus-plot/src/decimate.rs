@@ -9,7 +9,7 @@ type Point = (f64, f64);
 /// lowest, the highest and the last, in their order. A curve with few points stays as it is.
 /// A value that is not finite breaks the line: one is kept for each column without values, and
 /// between columns where a gap reaches from one to the next. A gap within a column is too narrow
-/// to be seen.
+/// to be seen, but for an infinite value, which lifts the pen wherever it stands: an angle that begins a new turn.
 pub(super) fn decimated(time: &Series, values: &Series, columns: usize) -> Vec<Point> {
     let points = time.iter().zip(values);
     let count = time.len().min(values.len());
@@ -24,7 +24,15 @@ pub(super) fn decimated(time: &Series, values: &Series, columns: usize) -> Vec<P
     let column = |p: Point| ((p.0 - first) / width).floor();
     let (mut kept, mut near): (Vec<Point>, Vec<Point>) = (vec![], vec![]);
     let mut is_after_gap = false;
+    let lifts = values.iter().filter(|y| *y == f64::INFINITY).count();
     for point in points {
+        if point.1 == f64::INFINITY && lifts <= columns {
+            keep(&mut kept, &near, is_after_gap);
+            near.clear();
+            kept.push((point.0, f64::NAN));
+            is_after_gap = false;
+            continue;
+        }
         if near
             .last()
             .is_some_and(|last| column(*last) != column(point))

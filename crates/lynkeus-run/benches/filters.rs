@@ -164,6 +164,7 @@ fn likelihood(count: usize) -> Result<Likelihood, Error> {
             output: x[CELLS - 1].node(),
             noise: ParametricLevel::Variance(value(CELLS).powi(2).node()),
             limits: None,
+            is_dial: false,
         }],
         process_noise: (0..CELLS).map(|i| value(CELLS + 1 + i).node()).collect(),
         ranges: vec![range; CELLS],

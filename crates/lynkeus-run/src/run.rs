@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use crate::closed_loop::Loop;
 use crate::divergence::Bound;
 use crate::{
-    Error, Events, Integrator, Interrupted, Result, Role, Simulation, System, Trajectory,
+    Error, Events, Integrator, Interrupted, Manifold, Result, Role, Simulation, System, Trajectory,
     process_draws,
 };
 
@@ -79,6 +79,7 @@ struct Run {
     x: Vec<f64>,
     row: Vec<f64>,
     bound: Bound,
+    manifold: Manifold,
 }
 
 impl Run {
@@ -91,6 +92,7 @@ impl Run {
             integrator: Integrator::new(simulation.method, x.len())?,
             row: vec![],
             bound: Bound::new(&x),
+            manifold: simulation.manifold.clone(),
             system,
             x,
         })
@@ -111,6 +113,7 @@ impl Run {
                     let done = self.integrator.advance(system, from, to, x);
                     let scale = self.bound.scale;
                     done.map_err(|error| self.system.explained(error, &self.x, scale))?;
+                    self.manifold.normalise(&mut self.x);
                 }
                 Stop::Row(time) => {
                     take(time, self.record(time)?);

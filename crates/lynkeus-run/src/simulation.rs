@@ -1,6 +1,6 @@
 //! What is simulated: a plant, its inputs and its observer.
 
-use crate::{Method, Noise, System};
+use crate::{Manifold, Method, Noise, System};
 
 /// A plant under known inputs and, if wished, an observer of its measured
 /// outputs.
@@ -30,6 +30,8 @@ pub struct Simulation {
     pub noise: Noise,
     /// also record the plant's outputs, exact and as measured
     pub record_outputs: bool,
+    /// where the plant's states live
+    pub manifold: Manifold,
 }
 
 impl Simulation {
@@ -45,6 +47,7 @@ impl Simulation {
             method: Method::default(),
             noise: Noise::default(),
             record_outputs: false,
+            manifold: Manifold::default(),
         }
     }
 }

@@ -46,7 +46,7 @@ pub(super) const KEYS: [KeySpec; 5] = [
 ];
 
 /// The sections.
-pub(super) const SECTIONS: [KeySpec; 12] = [
+pub(super) const SECTIONS: [KeySpec; 13] = [
     KeySpec {
         name: "sensors",
         shape: Shape::Section(&[&SENSORS]),
@@ -58,6 +58,12 @@ pub(super) const SECTIONS: [KeySpec; 12] = [
         shape: Shape::Table(&Shape::NotNegative),
         default: "0; for an unknown input, from its range and the log's length",
         meaning: "spectral density (variance per unit of time) of white noise on a state's derivative; for an unknown input, how fast it wanders. Read by the [filters](ekf.md), `sd` and `--how-well`; `simulate` moves the plant's states by it, and [`certify`](certificates.md) then bounds the error in mean square",
+    },
+    KeySpec {
+        name: "manifold",
+        shape: Shape::Section(&[&MANIFOLD]),
+        default: "none",
+        meaning: "which states and outputs are angles or rotations; the [filters](ekf.md) take them as such",
     },
     KeySpec {
         name: "observer",
@@ -225,6 +231,22 @@ pub(super) const NOISE: [KeySpec; 1] = [KeySpec {
     default: REQUIRED,
     meaning: "every error up to ± this, in the output's unit, is equally likely and none is larger",
 }];
+
+/// `[manifold]`
+pub(super) const MANIFOLD: [KeySpec; 2] = [
+    KeySpec {
+        name: "circle",
+        shape: Shape::As("list of states and outputs", &Shape::NAMES),
+        default: "none",
+        meaning: "angles in radians, of which a full turn changes nothing: θ and θ + 2π are one. Innovations and errors are wrapped, the box has no ends there, and estimates are shown in the declared range (`min` and `max`, or `[box]`) where that is one turn, else unwrapped. An output that turns with such a state is one as well",
+    },
+    KeySpec {
+        name: "quaternion",
+        shape: Shape::As("list of states", &Shape::NAMES),
+        default: "none",
+        meaning: "attitudes: arrays `Real q[4]` of states, a unit quaternion with the scalar first, whose equation is q' = ½ q⊗(0, ω). `initial_variance`, `[process_noise]`, `spread` and `NAME_sd` are those of the vector of a small rotation about the body's axes, in rad: one number for the array, and one column",
+    },
+];
 
 /// `[observer]`, for every family.
 pub(super) const OBSERVER: [KeySpec; 3] = [

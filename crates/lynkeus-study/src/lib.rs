@@ -31,6 +31,7 @@ mod fit;
 mod generator;
 mod keys;
 mod log;
+mod manifold;
 mod observer;
 mod schema;
 mod section;
@@ -52,6 +53,7 @@ pub use estimate::{BetweenSamples, EstimateSettings, Smoothing};
 pub use fit::{Candidate, Chosen, FitSettings, Objective, Prior};
 pub use generator::Generator;
 pub use log::{LogSettings, seconds_in};
+pub use manifold::ManifoldSettings;
 pub use observer::ObserverSettings;
 pub use schema::schema;
 pub use sensors::{Late, Noise, Screen, Sensors, bias_of};
@@ -90,6 +92,8 @@ pub struct Study {
     /// White noise on states' derivatives: (name, spectral density), in the square of the state's
     /// unit per unit of time; for an unknown input, how fast it wanders.
     pub process_noise: Vec<(Name, f64)>,
+    /// What is an angle or a rotation.
+    pub manifold: ManifoldSettings,
     /// The observer family and its tuning.
     pub observer: ObserverSettings,
     /// Ranges narrower than the model's.
@@ -225,6 +229,10 @@ impl Study {
         let mut observer = top
             .optional("observer", observer::read)?
             .unwrap_or_default();
+        let manifold = top
+            .optional("manifold", manifold::read)?
+            .unwrap_or_default();
+        observer.live_on(&manifold)?;
         if observer.may_be_a_filter() {
             sensors.doubt(&mut observer.tuning);
         }
@@ -241,6 +249,7 @@ impl Study {
             tables: top.optional("tables", tables)?.unwrap_or_default(),
             delay_states: top.optional("delay_states", delay_states)?,
             sensors,
+            manifold,
             process_noise: simulate::pairs(top.take("process_noise"), density)?,
             observer,
             narrower: top.optional("box", certify::read_box)?.unwrap_or_default(),

@@ -12,7 +12,7 @@ use lynkeus_words::Words;
 
 use super::keys::OBSERVER;
 use super::section::{Entry, Section};
-use super::{Name, Place};
+use super::{ManifoldSettings, Name, Place};
 use lynkeus_answer::Error;
 
 /// The observer's family and tuning.
@@ -22,6 +22,8 @@ pub struct ObserverSettings {
     pub family: Option<Name>,
     /// Its tuning.
     pub tuning: Tuning,
+    /// Whether a state or an output is an angle or a rotation: no family with a theorem takes it then.
+    pub is_curved: bool,
     /// Where the keys stand, for messages.
     places: BTreeMap<String, Place>,
 }
@@ -37,6 +39,28 @@ impl ObserverSettings {
                 Some(name) => family.name() == name.text,
                 None => family.is_filter() || self.owns_all(*family),
             })
+            .filter(|family| family.is_filter() || !self.is_curved)
+    }
+
+    /// Of a plant with such states and outputs.
+    ///
+    /// # Errors
+    /// A family with a theorem is asked for.
+    pub(super) fn live_on(&mut self, manifold: &ManifoldSettings) -> Result<(), Error> {
+        self.is_curved = !manifold.is_empty();
+        let Some(name) = self.family.as_ref().filter(|_| self.is_curved) else {
+            return Ok(());
+        };
+        match self.families().next() {
+            Some(_) => Ok(()),
+            None => {
+                let refusal = Error::input(format!(
+                    "{name} takes no [manifold]: its theorem is about errors that are differences of real numbers, and those of angles and rotations are none"
+                ));
+                let hint = "take \"ekf\" or \"ukf\"; an angle that the log unwraps is a real number, without [manifold]";
+                Err(name.blame(refusal.hint(hint)))
+            }
+        }
     }
 
     /// Whether a filter is among them.
@@ -94,6 +118,7 @@ pub(super) fn read(entry: Entry<'_>) -> Result<ObserverSettings, Error> {
                 .unwrap_or_default(),
             ..Tuning::default()
         },
+        is_curved: false,
         places: BTreeMap::new(),
         family,
     };

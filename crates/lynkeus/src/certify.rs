@@ -259,8 +259,10 @@ fn account(declared: &Declared, in_mean_square: bool) -> Account {
         input_derivatives,
         screens,
         late,
+        manifold,
     } = declared;
     Account::default()
+        .leaves(manifold, "no theorem is about angles and rotations")
         .leaves(screens, "a proof is for readings that come")
         .leaves(
             late,

@@ -170,9 +170,11 @@ fn account(declared: &Declared) -> Account {
         input_derivatives,
         screens,
         late,
+        manifold,
     } = declared;
     let elsewhere = "`certify` counts it, and `check --how-well`";
     Account::default()
+        .counts(manifold)
         .leaves(screens, "they are of logs")
         .leaves(
             late,

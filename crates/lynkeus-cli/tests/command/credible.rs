@@ -292,3 +292,30 @@ fn a_gap_beyond_the_declared_range_is_no_doubt() {
         (0, Some(true))
     );
 }
+
+/// Two wells at ±1, read in other units: the change that makes the log agree is named. Where several do, none is: ten
+/// times too large is as well a thousand times, of a plant that rests at 0; nor where the plant is another one.
+#[test]
+fn a_column_in_another_unit_is_named() {
+    let study = "[process_noise]\nx = 1e-4\n[observer]\nfamily = \"ekf\"\ninitial_variance = { x = 0.04 }\n";
+    let named = |unit: fn(f64) -> f64| {
+        let y = (0..200).map(|k| unit(1.0 + noise(k)));
+        let (_, ended) = estimated(WELLS, study, y);
+        assert_eq!(ended.code, 1, "{}", ended.err);
+        let json = ended.json();
+        let doubts = json["doubts"].as_array().unwrap();
+        let texts = doubts.iter().filter_map(|doubt| doubt["text"].as_str());
+        let text = texts.filter(|text| text.contains("looks as if"));
+        text.map(str::to_owned).collect::<Vec<_>>().join("; ")
+    };
+    for (unit, expression) in [
+        ((|y| 1.8 * y + 32.0) as fn(f64) -> f64, "(y - 32) / 1.8"),
+        (|y| 273.15 + y, "y - 273.15"),
+    ] {
+        let text = named(unit);
+        let column = format!("`columns = {{ y = \"{expression}\" }}`");
+        assert!(text.contains(&column), "{text}");
+    }
+    assert_eq!(named(|y| 10.0 * y), "");
+    assert_eq!(named(|y| 1.5 + 4.0 * (y - 1.0)), "");
+}

@@ -6,6 +6,7 @@ mod glitch;
 mod hidden;
 pub(super) mod javascript;
 mod late;
+mod manifold;
 mod names;
 mod rust;
 mod slopes;

@@ -33,6 +33,7 @@ mod live;
 mod log_columns;
 mod logs;
 mod long;
+mod manifold;
 mod mentioned;
 mod messages;
 mod names;

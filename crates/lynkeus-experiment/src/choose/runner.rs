@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use lynkeus_model::Plant;
 
 use crate::course::filter::keep_compiled;
+use crate::course::replay::Watch;
 use crate::course::rig::Rig;
 use crate::prepare::{Prepared, StudyDesign, is_certified_gain};
 use crate::simulate;
@@ -94,7 +95,12 @@ impl Runner {
         watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
     ) -> Result<Outcome, Error> {
         let (plant, design) = self.replay(study)?;
-        estimate::with_design(&Prepared::new(study, &plant)?, design, table, watch)
+        estimate::looked_at(
+            &Prepared::new(study, &plant)?,
+            design,
+            table,
+            Watch::only(watch),
+        )
     }
 
     /// The same for several logs: where a filter allows it, side by side. How many pay off together says

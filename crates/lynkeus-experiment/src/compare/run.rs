@@ -1,9 +1,10 @@
 //! Families on the same samples.
 
+use std::f64::consts::{PI, TAU};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use lynkeus_model::Plant;
+use lynkeus_model::{Home, Plant};
 use lynkeus_observers::Family;
 
 use crate::crew::within;
@@ -143,7 +144,10 @@ fn judged(prepared: &Prepared<'_>, outcome: Outcome, seconds: f64) -> Run {
     let width = |quantity: &Quantity| {
         let states = prepared.augmented().states.iter();
         let mut own = states.filter(|s| s.name == quantity.name);
-        let width = own.next().map_or(f64::INFINITY, |s| s.max - s.min);
+        let width = own.next().map_or(f64::INFINITY, |s| match s.home {
+            Home::Circle { .. } => TAU,
+            _ => s.max - s.min,
+        });
         if width.is_finite() && width > 0.0 {
             width
         } else {
@@ -152,15 +156,12 @@ fn judged(prepared: &Prepared<'_>, outcome: Outcome, seconds: f64) -> Run {
     };
     let estimated = || outcome.quantities.iter().filter(|q| q.estimate.is_some());
     let scaled = estimated().filter_map(|q| {
-        let (truth, estimate) = (q.truth.as_ref()?, q.estimate.as_ref()?);
+        if let Some(rotation) = &q.rotation {
+            let angles = rotation.error.as_ref()?;
+            return Some(angles.iter().map(|angle| angle / PI).collect());
+        }
         let width = width(q);
-        Some(
-            truth
-                .iter()
-                .zip(estimate)
-                .map(|(x, hat)| (hat - x) / width)
-                .collect(),
-        )
+        Some(q.errors()?.map(|error| error / width).collect())
     });
     let errors = Errors {
         time: outcome.time.to_vec(),
@@ -173,14 +174,22 @@ fn judged(prepared: &Prepared<'_>, outcome: Outcome, seconds: f64) -> Run {
         let found = crate::course::filter::noise::scatter(&outcome.time, estimate, half)?;
         Some(found / width(q))
     });
+    // of a quaternion the angle of its rotation
+    let settled = |q: &Quantity| match (q.home, &q.rotation) {
+        (Home::Rotation { .. }, None) => None,
+        (_, Some(rotation)) => Some(Settled {
+            quantity: rotation.name.clone(),
+            rms: q.told_error().map(|(_, rms)| rms),
+            width: PI,
+        }),
+        (_, None) => Some(Settled {
+            quantity: q.name.clone(),
+            rms: q.settled_error(),
+            width: width(q),
+        }),
+    };
     Run {
-        settled: estimated()
-            .map(|q| Settled {
-                quantity: q.name.clone(),
-                rms: q.settled_error(),
-                width: width(q),
-            })
-            .collect(),
+        settled: estimated().filter_map(settled).collect(),
         peak: errors.peak().map(|peak| peak.2).filter(|_| is_known),
         settling: outcome
             .time

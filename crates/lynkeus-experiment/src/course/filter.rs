@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use lynkeus_expr::{Graph, Node};
-use lynkeus_model::Variable;
+use lynkeus_model::{Home, Variable};
 use lynkeus_observers::{Design, FilterTuning, Signal};
 use lynkeus_run::filter::{
     FilterKind, FilterSettings, Health, Limits, NoisyModel, NoisyPlant, Sensor, Smoothed,
@@ -15,8 +15,8 @@ use lynkeus_words::short;
 
 use crate::course::replay::{Watch, replay, replay_together};
 use crate::course::{Course, Samples};
-use crate::prepare::Prepared;
 use crate::prepare::systems::run_settings;
+use crate::prepare::{Prepared, manifold};
 use crate::words::explain;
 use crate::{Error, Series, Study};
 use lynkeus_study::{Records, Smoothing};
@@ -176,6 +176,7 @@ pub(crate) fn blueprint(
     };
     refuse_longer_lag(study, &tuning.kind)?;
     refuse_smoothed_bounds(study, tuning)?;
+    refuse_rotations(prepared, &tuning.kind)?;
     let model = model(prepared, design, tuning, samples, notes)?;
     let kept = FilterSettings {
         gate: tuning.gate,
@@ -226,6 +227,21 @@ fn refuse_smoothed_bounds(study: &Study, tuning: &FilterTuning) -> Result<(), Er
     ))
 }
 
+/// The steps of a window are sums.
+fn refuse_rotations(prepared: &Prepared<'_>, kind: &FilterKind) -> Result<(), Error> {
+    let states = &prepared.augmented().states;
+    let (Some((_, name)), FilterKind::MovingHorizon(_)) = (manifold::firsts(states).next(), kind)
+    else {
+        return Ok(());
+    };
+    let message = format!(
+        "family = \"mhe\" does not take the quaternion {name}: its steps are sums, and those of rotations are none"
+    );
+    Err(Error::input(message)
+        .at(&prepared.study().file)
+        .hint("take family = \"ekf\" or \"ukf\""))
+}
+
 /// A window has no row older than its horizon.
 pub(crate) fn refuse_longer_lag(study: &Study, kind: &FilterKind) -> Result<(), Error> {
     let (Some(Smoothing::Lag(lag)), FilterKind::MovingHorizon(horizon)) =
@@ -266,18 +282,31 @@ fn model(
 ) -> Result<NoisyModel, Error> {
     let (augmented, observer) = (prepared.augmented(), &design.observer);
     let declared = prepared.declared();
-    let states = observer
-        .states
-        .iter()
-        .map(|(s, start)| (s.name.clone(), s.symbol, *start));
+    let states = observer.states.iter();
+    let mut starts: Vec<f64> = states.map(|(_, start)| *start).collect();
+    let started = manifold::started(&augmented.states, &mut starts, "estimate");
+    started.map_err(|error| error.at(&prepared.study().file))?;
+    let states = observer.states.iter().zip(starts);
+    let states = states.map(|((s, _), start)| (s.name.clone(), s.symbol, start));
     let named = |s: &Signal| (s.name.clone(), s.symbol);
     let span = samples.span();
     let levels = noise::levels(declared, augmented, samples, notes);
     let sensors = observer.measured.iter().zip(&tuning.outputs).zip(levels);
-    let range = |state: &Variable| Limits {
-        low: state.min,
-        high: state.max,
+    let range = |state: &Variable| match state.home {
+        Home::Rotation { .. } => Limits {
+            low: f64::NEG_INFINITY,
+            high: f64::INFINITY,
+        },
+        _ => Limits {
+            low: state.min,
+            high: state.max,
+        },
     };
+    let mut densities = noise::densities(prepared, span, notes);
+    quartered(prepared, "[process_noise]", &mut densities)?;
+    let mut variances = tuning.initial_variance.clone();
+    let key = "`initial_variance` of [observer]";
+    quartered(prepared, key, &mut variances)?;
     let plant = NoisyPlant {
         graph: augmented.graph(),
         time: observer.time,
@@ -292,12 +321,32 @@ fn model(
                 limits: declared.limits.of(&signal.name).copied(),
             })
             .collect(),
-        process_noise: noise::densities(prepared, span, notes),
-        initial_variance: tuning.initial_variance.clone(),
+        process_noise: densities,
+        initial_variance: variances,
         ranges: augmented.states.iter().map(range).collect(),
         confined: Some(tuning.confined.clone()),
     };
-    compiled(&plant).map_err(explain)
+    let model = compiled(&plant).map_err(explain)?;
+    Ok(model.on(manifold::of(augmented)))
+}
+
+/// One number for the four of each quaternion, as a quarter of what it is for the vector of a small rotation.
+///
+/// # Errors
+/// Numbers that differ.
+fn quartered(prepared: &Prepared<'_>, what: &str, values: &mut [f64]) -> Result<(), Error> {
+    for (place, name) in manifold::firsts(&prepared.augmented().states) {
+        let own = &mut values[place..place + 4];
+        if own.iter().any(|value| *value != own[0]) {
+            let message = format!(
+                "{what}: expected one number for the quaternion {name}, that of the vector of a small rotation, found different ones for its elements"
+            );
+            let hint = format!("write {name} = …");
+            return Err(Error::input(message).at(&prepared.study().file).hint(hint));
+        }
+        own.iter_mut().for_each(|value| *value *= 0.25);
+    }
+    Ok(())
 }
 
 /// The filter of a plant that is kept for many logs: compiled once, it has the numbers of each. The plant's graph has

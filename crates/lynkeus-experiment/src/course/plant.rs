@@ -13,6 +13,7 @@ use crate::course::recorded::Recorded;
 use crate::course::{Course, Samples};
 use crate::crew::{Watch, within};
 use crate::prepare::headers::{header, log_time};
+use crate::prepare::manifold;
 use crate::prepare::systems::{self, method, settings};
 use crate::{Error, Series, Study, Table};
 use lynkeus_study::SimulateSettings;
@@ -171,5 +172,6 @@ pub fn open_loop(
         method: method(&settings.method),
         noise: noise(study, settings, plant)?,
         record_outputs: true,
+        manifold: manifold::of_states(&plant.states),
     })
 }

@@ -6,6 +6,7 @@ use lynkeus_model::Plant;
 use lynkeus_observers::Design;
 use lynkeus_run::{Simulation, System};
 
+use crate::course::curved;
 use crate::course::ended::{is_answer, settle};
 use crate::course::plant::{
     Ran, Shown, closed_loop, noise, open_loop, sample_step, shown, stirred,
@@ -162,5 +163,6 @@ fn sampled(
     let rows = course.estimates.first().map_or(0, Series::len);
     settle(&mut course, rows, study, &study.file, is_answer)?;
     run.truncate(rows);
+    curved::beside_truth(prepared.plant(), &design.observer, &run, &mut course);
     Ok(Ran { run, course })
 }

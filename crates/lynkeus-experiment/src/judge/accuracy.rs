@@ -1,9 +1,13 @@
 //! How far estimates are from what is known to be true.
 
+use std::f64::consts::{PI, TAU};
+
+use lynkeus_model::Home;
 use lynkeus_structure::Dimension;
 use lynkeus_words::figures;
 use serde::{Serialize, Serializer};
 
+use crate::course::quantity::mean_square;
 use crate::entries::finite;
 use crate::words::instant;
 use crate::{Quantity, Series};
@@ -129,40 +133,59 @@ pub(crate) fn accuracies(
 }
 
 fn accuracy(time: &Series, quantity: &Quantity, side: Option<&Dimension>) -> Option<Accuracy> {
-    let (truth, estimate) = (quantity.truth.as_ref()?, quantity.estimate.as_ref()?);
-    let errors = || {
-        let pairs = truth.iter().zip(estimate);
-        let errors = pairs.map(|(x, hat)| (hat - x).abs());
-        time.iter().zip(errors).filter(|(_, e)| e.is_finite())
+    if let Some(rotation) = &quantity.rotation {
+        let error = rotation.error.as_ref()?;
+        let deviation = rotation.deviation.as_ref();
+        let errors = || error.iter();
+        return told_by(time, &rotation.name, errors, deviation, Some(PI));
+    }
+    quantity.errors().is_some().then_some(())?;
+    let errors = || quantity.errors().into_iter().flatten();
+    let width = match quantity.home {
+        Home::Circle { .. } => Some(TAU),
+        _ => side.map(|s| s.max - s.min),
     };
-    let after_start = errors().skip(usize::from(errors().nth(1).is_some()));
+    let width = width.filter(|w| w.is_finite() && *w > 0.0);
+    let deviation = quantity.deviation.as_ref();
+    told_by(time, &quantity.name, errors, deviation, width)
+}
+
+/// By errors row by row and their deviations; `width` is that of the range.
+fn told_by<E: Iterator<Item = f64>>(
+    time: &Series,
+    name: &str,
+    errors: impl Fn() -> E,
+    deviation: Option<&Series>,
+    width: Option<f64>,
+) -> Option<Accuracy> {
+    let sizes = || {
+        let sizes = time.iter().zip(errors().map(f64::abs));
+        sizes.filter(|(_, e)| e.is_finite())
+    };
+    let after_start = sizes().skip(usize::from(sizes().nth(1).is_some()));
     let (peak_at, peak) = after_start.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let width = side
-        .map(|s| s.max - s.min)
-        .filter(|w| w.is_finite() && *w > 0.0);
+    let rows = errors().count();
     Some(Accuracy {
-        quantity: quantity.name.clone(),
-        rms: quantity.settled_error(),
+        quantity: name.to_owned(),
+        rms: mean_square(errors().skip(rows / 2).map(|e| e.powi(2))),
         peak,
         peak_at,
-        settling: match width.map(|width| settled_from(errors(), SETTLED * width)) {
+        settling: match width.map(|width| settled_from(sizes(), SETTLED * width)) {
             Some(Some(time)) => Settling::From(time),
             Some(None) => Settling::Never,
             None => Settling::NoRange,
         },
-        coverage: coverage(quantity),
+        coverage: deviation.and_then(|deviation| coverage(errors().zip(deviation), rows)),
     })
 }
 
-fn coverage(quantity: &Quantity) -> Option<Coverage> {
-    let truth = quantity.truth.as_ref()?;
-    let estimates = quantity.estimate.as_ref()?.iter();
-    let told = estimates.zip(quantity.deviation.as_ref()?);
-    let shares = truth.iter().zip(told).skip(truth.len() / 2);
+/// Of errors beside their deviations, over the last half of so many rows.
+fn coverage(pairs: impl Iterator<Item = (f64, f64)>, all: usize) -> Option<Coverage> {
     // 0/0, an exact value that is known for exact, is within
-    let shares = shares.map(|(x, (hat, deviation))| match hat == x {
+    let shares = pairs.skip(all / 2);
+    let shares = shares.map(|(error, deviation)| match error == 0.0 {
         true => 0.0 * deviation,
-        false => (hat - x) / deviation,
+        false => error / deviation,
     });
     let (mut rows, mut within, mut squares) = (0, 0, 0.0);
     for share in shares.filter(|share| !share.is_nan()) {
@@ -276,7 +299,11 @@ mod tests {
             deviation: Some(vec![1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0].into()),
             ..Quantity::default()
         };
-        let found = coverage(&of(1.0)).unwrap();
+        let counted = |quantity: &Quantity| {
+            let errors = quantity.errors()?.zip(quantity.deviation.as_ref()?);
+            coverage(errors, quantity.truth.as_ref()?.len())
+        };
+        let found = counted(&of(1.0)).unwrap();
         assert_eq!((found.within, found.rows), (0.75, 4));
         assert!((found.ratio - (9.25_f64 / 4.0).sqrt()).abs() < 1e-15);
         let long = |error: f64| Quantity {
@@ -291,7 +318,7 @@ mod tests {
         assert!(told(0.5).contains("0 % of the last half within 2 sd"));
         assert!(told(0.5).contains("the truth contradicts the standard deviation of x"));
         assert!(!told(0.3).contains("contradicts") && !told(0.15).contains(" 0 %"));
-        assert_eq!(coverage(&Quantity::default()), None);
+        assert_eq!(counted(&Quantity::default()), None);
     }
 
     /// A laboratory's value now and then: the last half is that of the rows, as everywhere.

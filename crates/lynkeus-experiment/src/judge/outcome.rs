@@ -3,17 +3,17 @@
 mod summary;
 
 use lynkeus_expr::Spent;
-use lynkeus_model::Plant;
+use lynkeus_model::{Home, Plant};
 use lynkeus_observers::{Design, Monitor, Signal};
 use lynkeus_run::Error as RunError;
 use serde::Serialize;
 
 use crate::answer::Origin;
-use crate::course::Course;
 use crate::course::corrections::Corrections;
 use crate::course::doubt::Doubt;
 use crate::course::taken::{AT_ONCE, delayed};
 use crate::course::trace::Trace;
+use crate::course::{Course, curved};
 use crate::judge::accuracy::{self, Accuracy};
 use crate::judge::assertions;
 use crate::judge::frozen::Frozen;
@@ -136,17 +136,16 @@ impl Outcome {
     /// simulated; `<name>_hat` for everything estimated; monitors. No two have the same
     /// header: what the model calls so itself keeps its name, and the others give way.
     pub fn columns(&self) -> Vec<(String, Series)> {
-        type Of = fn(&Quantity) -> (&String, &Option<Series>);
-        let truth: Of = |q| (&q.name, &q.truth);
+        type Of = fn(&Quantity) -> Option<(&String, &Series)>;
+        let truth: Of = |q| Some((&q.name, q.truth.as_ref()?));
         let others: [Of; 4] = [
-            |q| (&q.estimate_header, &q.estimate),
-            |q| (&q.deviation_header, &q.deviation),
-            |q| (&q.smoothed_header, &q.smoothed),
-            |q| (&q.smoothed_deviation_header, &q.smoothed_deviation),
+            |q| Some((&q.estimate_header, q.estimate.as_ref()?)),
+            Quantity::deviation_column,
+            |q| Some((&q.smoothed_header, q.smoothed.as_ref()?)),
+            Quantity::smoothed_deviation_column,
         ];
         let told = self.is_simulated.then_some(truth).into_iter().chain(others);
-        let named = told.flat_map(|of| self.quantities.iter().map(of));
-        let named = named.filter_map(|(header, values)| Some((header, values.as_ref()?)));
+        let named = told.flat_map(|of| self.quantities.iter().filter_map(of));
         let innovations = self.innovation_columns.iter();
         let watches = self.watches.iter().map(|w| (&w.header, &w.values));
         std::iter::once((&self.time_header, &self.time))
@@ -267,24 +266,29 @@ impl Raw<'_> {
             origin,
             mut course,
             mut quantities,
-            measurements,
+            mut measurements,
             replayed,
             frozen,
             intervals,
             mut notes,
         } = self;
+        let plant = prepared.plant();
+        curved::place(plant, replayed, &mut quantities, &mut measurements);
         notes.append(&mut course.notes);
         notes.extend(frozen.iter().map(Frozen::words));
         notes.extend(intervals.as_ref().and_then(Intervals::words));
         notes.extend(saturated::told(prepared, &design, &measurements));
         let innovations = innovations(&design, &course, &mut notes);
-        let plant = prepared.plant();
         let mut headers = Headers::beside(plant);
         let time_header = headers.time();
         for quantity in quantities.iter_mut().filter(|q| q.estimate.is_some()) {
             let what = format!("the estimate of {}", quantity.name);
             quantity.estimate_header = headers.free(&hat(&quantity.name), &what);
-            if quantity.deviation.is_some() {
+            if let Some(rotation) = &mut quantity.rotation {
+                rotation.give_headers(&mut headers);
+            }
+            let is_own = !matches!(quantity.home, Home::Rotation { .. });
+            if is_own && quantity.deviation.is_some() {
                 let wanted = format!("{}_sd", quantity.name);
                 quantity.deviation_header =
                     headers.free(&wanted, &format!("the deviation of {what}"));
@@ -294,7 +298,7 @@ impl Raw<'_> {
                 quantity.smoothed_header =
                     headers.free(&wanted, &format!("{what} given later rows"));
             }
-            if quantity.smoothed_deviation.is_some() {
+            if is_own && quantity.smoothed_deviation.is_some() {
                 let wanted = format!("{}_smooth_sd", quantity.name);
                 let what = format!("the deviation of {what} given later rows");
                 quantity.smoothed_deviation_header = headers.free(&wanted, &what);
@@ -304,6 +308,7 @@ impl Raw<'_> {
         let watches = watches(&design, &mut course.monitors, &time, &mut headers);
         show_measurements(plant, &measurements, &mut quantities);
         expected::give(prepared.augmented(), &time, &mut quantities);
+        curved::place_expected(&mut quantities);
         let sides = outside::sides(prepared.augmented());
         let accuracies = accuracy::accuracies(&time, &quantities, &sides);
         notes.extend(accuracy::told(&accuracies));
@@ -430,6 +435,7 @@ fn account(declared: &Declared, design: &Design, is_weighed: bool, replayed: boo
         input_derivatives,
         screens,
         late,
+        manifold,
     } = declared;
     let is_filter = design.observer.filter.is_some();
     let unweighed = "the gain is chosen without it: `sd` of [estimate] counts it, and `certify`";
@@ -437,6 +443,7 @@ fn account(declared: &Declared, design: &Design, is_weighed: bool, replayed: boo
     Account::default()
         .counts(screens)
         .counts_if(replayed, late, AT_ONCE)
+        .counts(manifold)
         .counts(ranges)
         .counts(samples)
         .counts_if(is_weighed, noise, unweighed)
@@ -624,6 +631,7 @@ fn show_measurements(
                 unit: output.unit.clone(),
                 description: output.description.clone(),
                 measured: Some(values.clone()),
+                home: output.home,
                 ..Quantity::default()
             }),
         }

@@ -4,17 +4,20 @@ use std::sync::OnceLock;
 
 use lynkeus_expr::Spent;
 use lynkeus_model::Plant;
+use lynkeus_run::Column;
 
 use super::ends::{Clipped, Sensor};
 use super::runs::{Again, Failure, Followed, Track, Whole};
 use super::statistics::of_runs;
 use super::together::{Figures, Screened};
+use crate::course::curved;
+use crate::course::plant::Ran;
 use crate::course::rig::Rig;
 use crate::crew::{self, Watch};
 use crate::prepare::Prepared;
 use crate::simulate;
 use crate::words::in_words;
-use crate::{Error, Study};
+use crate::{Error, Series, Study};
 
 /// What one run gave.
 #[derive(Debug)]
@@ -93,10 +96,21 @@ impl Job<'_> {
             return Ok(None);
         }
         self.time.get_or_init(|| ran.run.time.to_vec());
-        let tracks = self.followed.iter().map(|f| Track {
-            truth: ran.run.column(f.truth).map_or(vec![], |x| x.to_vec()),
-            estimate: ran.course.estimates[f.estimate].to_vec(),
-            coverage: None,
+        let tracks = self.followed.iter().map(|f| match &f.rotation {
+            None => Track {
+                truth: ran.run.column(f.truth).map_or(vec![], |x| x.to_vec()),
+                estimate: ran.course.estimates[f.estimate].to_vec(),
+                coverage: None,
+            },
+            // a rotation is known by how far it is off
+            Some((_, columns)) => {
+                let angles = off(&ran, f.estimate, columns);
+                Track {
+                    truth: vec![0.0; angles.len()],
+                    estimate: angles,
+                    coverage: None,
+                }
+            }
         });
         let mut tracks: Vec<Track> = tracks.collect();
         let at_ends = self.sensors.iter().map(|s| s.count(&ran.run)).collect();
@@ -104,7 +118,9 @@ impl Job<'_> {
         let alone = simulate::outcome(&own, rig.design.clone(), &ran.run, ran.course)?;
         let estimates = &alone.design.observer.estimates;
         for (track, followed) in tracks.iter_mut().zip(self.followed) {
-            let name = &estimates[followed.estimate].variable.name;
+            let own = &estimates[followed.estimate].variable.name;
+            let whole = followed.rotation.as_ref().map(|(name, _)| name);
+            let name = whole.unwrap_or(own);
             let mut own = alone.accuracies.iter();
             let own = own.find(|a| a.quantity == *name);
             track.coverage = own.and_then(|a| a.coverage);
@@ -172,6 +188,17 @@ impl Job<'_> {
             time: self.time.into_inner().unwrap_or_default(),
             again,
         })
+    }
+}
+
+/// The angles between true and estimated rotations.
+fn off(ran: &Ran, first: usize, columns: &[Column; 4]) -> Vec<f64> {
+    let estimates = ran.course.estimates.get(first..first + 4);
+    let truth: Vec<&Series> = columns.iter().filter_map(|c| ran.run.column(*c)).collect();
+    let estimates: Vec<&Series> = estimates.unwrap_or_default().iter().collect();
+    match (estimates.try_into(), truth.try_into()) {
+        (Ok(estimates), Ok(truth)) => curved::angles(&estimates, &truth).to_vec(),
+        _ => vec![],
     }
 }
 

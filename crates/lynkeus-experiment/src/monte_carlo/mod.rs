@@ -18,10 +18,12 @@ use std::ops::{ControlFlow, RangeInclusive};
 use std::sync::OnceLock;
 
 use lynkeus_model::{Plant, Variable};
+use lynkeus_run::Role;
 
 use crate::course::rig::Rig;
 use crate::prepare::Prepared;
 use crate::prepare::headers::Headers;
+use crate::prepare::manifold::firsts;
 use crate::prepare::systems::column_of;
 use crate::{Error, Study, prepare, prepare::systems};
 use apart::{Job, room};
@@ -115,9 +117,27 @@ fn followed(plant: &Plant, rig: &Rig) -> Vec<Followed> {
     let estimates = rig.design.observer.estimates.iter().enumerate();
     let known = estimates.filter_map(|(estimate, e)| {
         let truth = column_of(plant, &e.variable)?;
-        Some(Followed { estimate, truth })
+        Some(Followed {
+            estimate,
+            truth,
+            rotation: None,
+        })
     });
-    known.collect()
+    let mut known: Vec<Followed> = known.collect();
+    for (place, name) in firsts(&plant.states) {
+        let node = plant.states[place].node;
+        let mut estimates = rig.design.observer.estimates.iter();
+        let Some(estimate) = estimates.position(|e| e.variable.node == node) else {
+            continue;
+        };
+        let columns = std::array::from_fn(|i| Role::State.at(place + i));
+        known.push(Followed {
+            estimate,
+            truth: columns[0],
+            rotation: Some((name, columns)),
+        });
+    }
+    known
 }
 
 impl Figures {
@@ -150,7 +170,13 @@ fn reported(
     let estimates = &rig.design.observer.estimates;
     let quantities = followed.iter().zip(found).map(|(f, found)| {
         let estimate = &estimates[f.estimate];
-        let variable = &estimate.variable;
+        let whole = f.rotation.as_ref().map(|(name, _)| Variable {
+            name: name.clone(),
+            unit: Some("rad".to_owned()),
+            description: Some("angle of the rotation between truth and estimate".to_owned()),
+            ..estimate.variable.clone()
+        });
+        let variable = whole.as_ref().unwrap_or(&estimate.variable);
         Scattered {
             unknown_input: estimate.unknown_input,
             is_measured: is_measured(prepared, variable),

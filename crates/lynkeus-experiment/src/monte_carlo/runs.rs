@@ -107,6 +107,8 @@ pub struct Bands {
 pub(super) struct Followed {
     pub estimate: usize,
     pub truth: Column,
+    /// of a quaternion as a whole: its name, and the columns of its true numbers, which begin there
+    pub rotation: Option<(String, [Column; 4])>,
 }
 
 /// True course and estimate of one quantity in one run.

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::Node;
-use lynkeus_model::{Plant, Variable};
+use lynkeus_model::{Home, Plant, Variable};
 use lynkeus_study::{Name, bias_of};
 
 use crate::{Error, Study, near};
@@ -88,6 +88,7 @@ fn offset(plant: &Plant, signal: &Variable) -> Variable {
         nominal: None,
         integer: false,
         fixed: false,
+        home: Home::Line,
         name,
     }
 }

@@ -8,7 +8,7 @@ mod account;
 
 use std::collections::BTreeMap;
 
-use lynkeus_model::{Plant, Variable};
+use lynkeus_model::{Home, Plant, Variable};
 use lynkeus_run::filter::Limits;
 use lynkeus_structure::{AugmentedPlant, range};
 
@@ -50,6 +50,8 @@ pub struct Declared {
     pub screens: Kind<Vec<Screen>>,
     /// readings that come later than their samples are taken, by output
     pub late: Kind<Late>,
+    /// states and outputs that are angles or rotations
+    pub manifold: Kind<()>,
 }
 
 impl Declared {
@@ -138,8 +140,16 @@ impl Declared {
             )?,
             screens: screens(&sensors.screens, &outputs)?,
             late: late(&sensors.late, &outputs)?,
+            manifold: curved(plant),
         })
     }
+}
+
+/// The states and outputs that are no real numbers.
+fn curved(plant: &Plant) -> Kind<()> {
+    let variables = plant.states.iter().chain(&plant.outputs);
+    let curved = variables.filter(|v| v.home != Home::Line);
+    Kind::new("angles and rotations", curved.map(|v| (v.name.clone(), ())))
 }
 
 /// All that is said of an output; of one kind what its own name says comes before what an array's does.

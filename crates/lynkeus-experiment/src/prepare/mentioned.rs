@@ -122,11 +122,17 @@ pub(crate) fn not_drawn(name: &Name, nothing: &str, names: &[&str]) -> Error {
 pub(crate) fn asked(study: &Study) -> Result<Option<Vec<&'static dyn Family>>, Error> {
     let find = |name: &Name| {
         let found = lynkeus_observers::find(&name.text);
-        found.ok_or_else(|| {
+        let found = found.ok_or_else(|| {
             let names = FAMILIES.iter().map(|f| f.name());
             let message = format!("families of [compare]: no family is called \"{name}\"");
             name.blame(Error::input(message).hint(crate::near::suggest(&name.text, names)))
-        })
+        })?;
+        match found.is_filter() || !study.observer.is_curved {
+            true => Ok(found),
+            false => Err(name.blame(Error::input(format!(
+                "families of [compare]: {name} takes no [manifold]: its theorem is about errors that are differences of real numbers"
+            )))),
+        }
     };
     let names = study.compare.as_ref();
     names

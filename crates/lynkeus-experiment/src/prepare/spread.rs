@@ -1,7 +1,10 @@
 //! Starts and parameters that differ from run to run: `spread` of `[simulate]`.
 
-use lynkeus_model::Plant;
+use lynkeus_model::{Home, Plant};
+use lynkeus_run::manifold::turned;
 use lynkeus_run::{System, deviate};
+
+use crate::prepare::manifold::firsts;
 
 use crate::{Error, Study};
 use lynkeus_study::{Name, SimulateSettings};
@@ -11,6 +14,8 @@ use lynkeus_study::{Name, SimulateSettings};
 pub(crate) struct Spread {
     /// starts of states by name, with their standard deviations
     starts: Vec<(String, f64)>,
+    /// attitudes by the names of their four numbers, with the standard deviation of the rotation about each axis
+    attitudes: Vec<([String; 4], f64)>,
     parameters: Vec<Uncertain>,
 }
 
@@ -30,8 +35,15 @@ impl Spread {
     pub fn new(plant: &Plant, settings: &SimulateSettings) -> Result<Self, Error> {
         let mut found = Self::default();
         for (name, deviation) in &settings.spread {
-            let states = plant.states.iter().filter(|s| name.is_or_has(&s.name));
-            let starts: Vec<_> = states.map(|s| (s.name.clone(), *deviation)).collect();
+            let states = || plant.states.iter().filter(|s| name.is_or_has(&s.name));
+            let starts = states().filter(|s| !matches!(s.home, Home::Rotation { .. }));
+            let starts: Vec<_> = starts.map(|s| (s.name.clone(), *deviation)).collect();
+            let attitudes = firsts(&plant.states).filter(|(_, array)| name.text == *array);
+            let attitudes = attitudes.map(|(place, _)| {
+                let name = |i: usize| plant.states[place + i].name.clone();
+                (std::array::from_fn(name), *deviation)
+            });
+            found.attitudes.extend(attitudes);
             let parameters = plant.parameters.iter().filter_map(|p| {
                 let own = name.is_or_has(&p.variable.name);
                 own.then_some(Uncertain {
@@ -41,7 +53,7 @@ impl Spread {
                 })
             });
             let parameters: Vec<_> = parameters.collect();
-            if starts.is_empty() && parameters.is_empty() {
+            if states().next().is_none() && parameters.is_empty() {
                 return Err(unknown(plant, name));
             }
             found.starts.extend(starts);
@@ -53,7 +65,9 @@ impl Spread {
     /// Whether anything is drawn that is not zero.
     pub fn is_random(&self) -> bool {
         let parameters = self.parameters.iter().map(|p| p.deviation);
-        let mut all = self.starts.iter().map(|s| s.1).chain(parameters);
+        let attitudes = self.attitudes.iter().map(|a| a.1);
+        let starts = self.starts.iter().map(|s| s.1);
+        let mut all = starts.chain(attitudes).chain(parameters);
         all.any(|deviation| deviation > 0.0)
     }
 
@@ -65,6 +79,16 @@ impl Spread {
             if let Some(x) = place.and_then(|i| start.get_mut(i)) {
                 *x += deviation * deviate(seed, name);
             }
+        }
+        for (names, deviation) in &self.attitudes {
+            let place = plant.states().iter().position(|state| *state == names[0]);
+            let Some(own) = place.and_then(|i| start.get_mut(i..i + 4)) else {
+                continue;
+            };
+            let q = std::array::from_fn(|i| own[i]);
+            let [_, x, y, z] = names.each_ref();
+            let vector = [x, y, z].map(|name| deviation * deviate(seed, name));
+            own.copy_from_slice(&turned(q, vector));
         }
         start
     }

@@ -5,6 +5,7 @@ use lynkeus_model::{Plant, Variable, parse_expression};
 use lynkeus_observers::{Monitor, Observer, Signal};
 use lynkeus_run::{Column, EstimatorSettings, Margin, Method, Role, Step, System, Tolerances};
 
+use crate::prepare::manifold;
 use crate::words::explain;
 use crate::{Error, Study};
 use lynkeus_study::{
@@ -153,7 +154,9 @@ pub fn starts(plant: &Plant, given: &[(Name, f64)]) -> Result<Vec<f64>, Error> {
         // Modelica's own default
         given.copied().or(variable.start).unwrap_or(0.0)
     };
-    Ok(plant.states.iter().map(start).collect())
+    let mut starts: Vec<f64> = plant.states.iter().map(start).collect();
+    manifold::started(&plant.states, &mut starts, "simulation")?;
+    Ok(starts)
 }
 
 /// Variables with the nodes that stand for them.

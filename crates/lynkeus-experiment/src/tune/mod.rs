@@ -242,10 +242,12 @@ fn account(declared: &Declared, is_simulated: bool, is_filters: bool) -> Account
         input_derivatives,
         screens,
         late,
+        manifold,
     } = declared;
     let measured = "the log's own is in its readings";
     let promised = "a promise of what the inputs do: `certify` counts it";
     Account::default()
+        .counts(manifold)
         .counts_if(
             !is_simulated,
             screens,

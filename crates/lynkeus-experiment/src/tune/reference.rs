@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 use lynkeus_expr::Node;
-use lynkeus_model::{Plant, Variable};
+use lynkeus_model::{Home, Plant, Variable};
 use lynkeus_run::{Column, Events, Level, Noise, Role};
 
 use crate::course::plant::{alone, open_loop};
@@ -93,7 +93,10 @@ impl Reference {
 /// state takes that state's.
 fn scales(plant: &Plant, truth: &Recorded) -> Scales {
     let scale = |variable: &Variable, column: Column| {
-        let range = variable.max - variable.min;
+        let range = match variable.home {
+            Home::Circle { .. } => std::f64::consts::TAU,
+            _ => variable.max - variable.min,
+        };
         if range.is_finite() && range > 0.0 {
             return range;
         }

@@ -1,5 +1,6 @@
 //! One value on a log: how well held-out samples are predicted, and how white the innovation is.
 
+use lynkeus_model::Home;
 use lynkeus_run::filter::SensorHealth;
 
 use super::Row;
@@ -9,9 +10,9 @@ use super::holdout::{predicted, switchable};
 use super::record::{Record, Replayed, course, span};
 use super::speed::longest_step;
 use super::whiteness::{Whiteness, whiteness};
-use crate::course::Course;
 use crate::course::inputs::supplied;
 use crate::course::run::start_at_readings;
+use crate::course::{Course, curved};
 use crate::crew::{Watch, part};
 use crate::prepare::{Prepared, StudyDesign};
 use crate::{Error, Series, prepare::systems};
@@ -134,7 +135,18 @@ impl Replay<'_> {
     ) -> Result<Result<Course, String>, Error> {
         let (samples, between) = (&replayed.samples, replayed.between);
         let place = self.record.log.table.place();
-        course(self.prepared, &self.design, samples, between, &place, watch)
+        let course = course(self.prepared, &self.design, samples, between, &place, watch)?;
+        Ok(course.map(|mut course| {
+            // of an angle the turn in which it is read
+            let outputs = self.prepared.augmented().outputs.iter();
+            let columns = course.predicted.iter_mut().zip(self.record.readings());
+            for ((predicted, readings), output) in columns.zip(outputs) {
+                if let Home::Circle { .. } = output.variable.home {
+                    *predicted = curved::lifted(predicted, readings);
+                }
+            }
+            course
+        }))
     }
 
     /// The innovation of a replay that looks at no later sample, past the first block, in the

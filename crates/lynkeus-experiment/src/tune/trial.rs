@@ -9,6 +9,7 @@ use super::disturbed::disturbed;
 use super::record::{course, told};
 use super::reference::Reference;
 use super::speed::{longest_step, transparent};
+use crate::course::curved;
 use crate::course::plant::{self, Ran, Shown, closed_loop, open_loop};
 use crate::crew::Watch;
 use crate::prepare::Prepared;
@@ -193,7 +194,10 @@ impl<'a> Trial<'a> {
                 let place = &study.file;
                 let course = course(self.prepared, &self.design, samples, between, place, watch)?;
                 let run = shown.run.clone();
-                return Ok(course.map(|course| Ran { run, course }));
+                return Ok(course.map(|mut course| {
+                    curved::beside_truth(self.prepared.plant(), observer, &run, &mut course);
+                    Ran { run, course }
+                }));
             }
         };
         let simulation = match under {

@@ -19,6 +19,8 @@ pub struct Device<'a> {
     pub monitors: usize,
     /// whether a filter's standard deviations are reported
     pub deviations: bool,
+    /// states that are told in one turn: their places, and where it begins
+    pub turns: &'a [(usize, f64)],
     /// numbers that may be changed while it runs: those of a sampled observer's
     /// [`tuned`](lynkeus_run::Updates::Jumps), in its order; of a filter none, or a factor on
     /// its process noise

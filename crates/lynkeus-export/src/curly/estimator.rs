@@ -2,10 +2,10 @@
 
 use lynkeus_run::credible::{By, CHANCE, CLIP, ENOUGH, FEW};
 use lynkeus_run::filter::{FilterKind, FilterSettings, Limits, NoisyModel, Sensor, SigmaPoints};
-use lynkeus_run::{BetweenSamples, Jacobians, Level, Tuned, Updates};
+use lynkeus_run::{BetweenSamples, Jacobians, Level, Manifold, Tuned, Updates};
 
 use super::device::{Device, Entry, FirstReading};
-use super::draft::{Arguments, Target, draft, number, table};
+use super::draft::{Arguments, Target, draft, number, places, table};
 use super::machine::{FIELD, INTEGRATE, Linear, Machine, Which, code, refuse_jumps};
 use super::syntax::Type;
 use super::template::{chosen, exchanged};
@@ -239,9 +239,10 @@ impl Machine {
         let room = inputs.len() + device.tunables.len();
         let room = vec![0.0; room.max(1)];
         self.size("STATES", states.len());
-        self.field("x", Type::Real, &states.join(", "), flow.start().to_vec());
+        let (start, root) = model.start();
+        self.field("x", Type::Real, &states.join(", "), start);
         self.field("inputs", Type::Real, &inputs.join(", "), room);
-        self.root(&model.initial_variance);
+        self.lower_root(root);
         // also a polynomial has no value once it has run away
         let mut ranges = model.ranges.iter();
         let is_bounded = ranges.any(|b| b.low.is_finite() || b.high.is_finite());
@@ -249,9 +250,17 @@ impl Machine {
         let has_limits = model.sensors.iter().any(|sensor| sensor.limits.is_some());
         let is_share = |sensor: &Sensor| matches!(sensor.noise, Level::Relative(_));
         let is_relative = model.sensors.iter().any(is_share);
+        let has_rotations = !model.manifold.rotations.is_empty();
+        let has_dials = !model.manifold.dials.is_empty();
         let facts = [
             (confined.is_some(), "confined"),
-            (device.deviations, "deviations"),
+            (has_rotations, "rotations"),
+            (has_dials, "dials"),
+            (!model.manifold.mirrors.is_empty(), "mirrors"),
+            (has_rotations && confined.is_some(), "curved_inside"),
+            (!device.turns.is_empty(), "turns"),
+            (device.deviations && !has_rotations, "each"),
+            (device.deviations && has_rotations, "one"),
             (settings.gate.is_some(), "gate"),
             (has_limits, "limits"),
             (is_relative, "relative"),
@@ -261,6 +270,7 @@ impl Machine {
             ),
         ];
         let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
+        self.curved(device, model);
         self.measure(model, &arguments, &settings.kind)?;
         let sensors = model.sensors.len();
         self.credible(sensors, By::Filter, settings.gate.is_some());
@@ -312,13 +322,57 @@ impl Machine {
                 self.size("LARGER", n);
                 self.linear(Which::Free, free, arguments)?;
                 self.carried(Which::Free, free);
-                self.add(&chosen(EXTENDED, holds));
+                let reading = match holds.contains(&"dials") {
+                    true => "lifted(i, s->readings[i], predicted)",
+                    false => "s->readings[i]",
+                };
+                self.add(&chosen(EXTENDED, holds).replace("READING_HERE", reading));
                 Ok("linearised")
             }
             FilterKind::Unscented(points) => {
                 self.unscented(points, free, arguments, holds)?;
                 Ok("flow")
             }
+        }
+    }
+
+    /// Which states and sensors are angles or rotations.
+    fn curved(&mut self, device: &Device<'_>, model: &NoisyModel) {
+        let Manifold {
+            rotations,
+            dials,
+            mirrors,
+            ..
+        } = &model.manifold;
+        let (n, m) = (model.process_noise.len(), model.sensors.len());
+        if !rotations.is_empty() {
+            self.size("ROTATIONS", rotations.len());
+            self.tables += &places("rotation_places", rotations.iter().copied());
+            if device.deviations {
+                let element = |i: usize| {
+                    let own = rotations.iter().find(|r| (**r..**r + 4).contains(&i));
+                    own.map_or(4, |first| i - first)
+                };
+                self.tables += &places("elements", (0..n).map(element));
+            }
+        }
+        if !dials.is_empty() {
+            let is_dial = |i: usize| usize::from(dials.contains(&i));
+            self.tables += &places("dials", (0..m).map(is_dial));
+        }
+        if !mirrors.is_empty() {
+            self.size("MIRRORS", mirrors.len());
+            let mirror = |i: usize| {
+                let own = mirrors.iter().position(|mirror| mirror.contains(&i));
+                own.unwrap_or(mirrors.len())
+            };
+            self.tables += &places("mirror_of", (0..m).map(mirror));
+        }
+        if !device.turns.is_empty() {
+            self.size("TURNS", device.turns.len());
+            self.tables += &places("turn_states", device.turns.iter().map(|turn| turn.0));
+            let from: Vec<f64> = device.turns.iter().map(|turn| turn.1).collect();
+            self.tables += &table("turns_from", &from);
         }
     }
 
@@ -377,18 +431,22 @@ impl Machine {
             self.tables += &table("highest", &ends(f64::INFINITY, |l| l.high));
         }
         let gate = number(settings.gate.unwrap_or_default());
+        let reading = match holds.contains(&"dials") {
+            true => "lifted(i, reading, predicted)",
+            false => "reading",
+        };
         let [shown, surprise] = match holds.contains(&"limits") {
             true => [
-                "shown_of(i, reading)",
-                "end == R(0.0) ? reading - predicted : R(0.0)",
+                format!("shown_of(i, {reading})"),
+                format!("end == R(0.0) ? {reading} - predicted : R(0.0)"),
             ],
-            false => ["reading", "reading - predicted"],
+            false => [reading.to_owned(), format!("{reading} - predicted")],
         };
         let text = chosen(JUDGE, holds).replace("GATE", &gate);
         let text = text.replace("LOCKED_OUT", &settings.patience.to_string());
         let text = text.replace("MOVED_OF_THEM", &settings.patience.div_ceil(2).to_string());
-        let text = text.replace("SHOWN_READING", shown);
-        self.add(&text.replace("SURPRISE", surprise));
+        let text = text.replace("SHOWN_READING", &shown);
+        self.add(&text.replace("SURPRISE", &surprise));
     }
 
     fn unscented(
@@ -420,11 +478,26 @@ impl Machine {
             (weights.centre >= 0.0, "definite"),
             (free.is_noisy(), "noisy"),
             (has_limits, "limits"),
+            (about.contains(&"rotations"), "rotations"),
+            (about.contains(&"dials"), "dials"),
+            (about.contains(&"mirrors"), "mirrors"),
         ];
         let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
+        let [parameter, argument] = match about.contains(&"rotations") {
+            true => ["const real *before, ", "before, "],
+            false => ["", ""],
+        };
+        let reading = match about.contains(&"dials") {
+            true => "lifted(i, s->readings[i], h[i])",
+            false => "s->readings[i]",
+        };
+        let text = chosen(UNSCENTED, &holds)
+            .replace("BEFORE_PARAMETER", parameter)
+            .replace("BEFORE_ARGUMENT", argument)
+            .replace("READING_SHOWN", reading);
         let first = u8::from(free.is_noisy());
         let rounds = if has_limits { "SENSORS + 1" } else { "1" };
-        let text = exchanged(&chosen(UNSCENTED, &holds), |word| {
+        let text = exchanged(&text, |word| {
             Some(number(match word {
                 "FIRST" => return Some(first.to_string()),
                 "ROUNDS" => return Some(rounds.to_owned()),

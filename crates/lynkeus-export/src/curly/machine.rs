@@ -249,6 +249,11 @@ impl Machine {
         for (i, variance) in variances.iter().enumerate() {
             start[i * n + i] = variance.sqrt();
         }
+        self.lower_root(start);
+    }
+
+    /// The lower root of a covariance.
+    pub fn lower_root(&mut self, start: Vec<f64>) {
         self.field(
             "root",
             Type::Real,

@@ -1,6 +1,7 @@
 //! What is believed of the state, and the ranges in which it is kept.
 
 use super::root::{Factor, Root, dot, substitute};
+use crate::manifold::Manifold;
 use crate::noise::Limits;
 use crate::snapshot::{Damaged, Persist, Walk};
 
@@ -18,6 +19,18 @@ impl Belief {
             x: x.to_vec(),
             root: Root::diagonal(variances),
         }
+    }
+
+    /// The same of states that live elsewhere: quaternions of length 1, of whose numbers those variances count that
+    /// are along the sphere.
+    pub fn on(manifold: &Manifold, x: &[f64], variances: &[f64]) -> Self {
+        let mut own = Self::new(x, variances);
+        if !manifold.rotations.is_empty() {
+            manifold.normalise(&mut own.x);
+            manifold.project(&own.x, &mut own.root.entries, x.len());
+            own.root.restore();
+        }
+        own
     }
 
     /// x̂, then the lower triangle of S, row by row.

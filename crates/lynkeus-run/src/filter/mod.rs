@@ -71,6 +71,7 @@ pub use settings::{FilterKind, FilterSettings, PATIENCE, SigmaPoints, Weights};
 pub use smoother::Smoothed;
 
 use crate::divergence::{Bound, check_deviations};
+use crate::manifold::Manifold;
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings, Result};
@@ -126,6 +127,7 @@ pub(crate) struct Filter {
     /// estimate is
     spare: Option<Propagation>,
     ranges: Vec<Limits>,
+    manifold: Manifold,
     belief: Belief,
     projection: Option<Projection>,
     sensing: Sensing,
@@ -146,13 +148,17 @@ impl Filter {
         let flow = model.flow.system();
         let n = flow.states().len();
         settings.check(n, model.ranges.len())?;
+        let manifold = model.manifold.clone();
+        if settings.is_window() && !manifold.is_straight() {
+            return Err(Error::setting("states", "no quaternion in a window", "one"));
+        }
         let propagation = |flow| Propagation::new(flow, &model.process_noise, run);
         Ok(Self {
             propagation: propagation(&model.flow)?,
             engine: match settings.kind {
                 FilterKind::Extended => Engine::Extended(Ekf::default()),
                 FilterKind::Unscented(points) => {
-                    Engine::Unscented(Box::new(Ukf::new(n, points, run.method)?))
+                    Engine::Unscented(Box::new(Ukf::new(n, points, run.method, &manifold)?))
                 }
                 FilterKind::MovingHorizon(length) => {
                     let horizon = Mhe::new(model, length, settings.keep_history)?;
@@ -162,11 +168,15 @@ impl Filter {
             spare: model.confined.as_ref().map(propagation).transpose()?,
             ranges: model.ranges.clone(),
             deviations: model.initial_variance.iter().map(|v| v.sqrt()).collect(),
-            belief: Belief::new(flow.start(), &model.initial_variance),
+            belief: Belief::on(&manifold, flow.start(), &model.initial_variance),
             projection: (settings.projects).then(|| Projection::new(model.ranges.clone())),
             sensing: Sensing::new(model, settings),
             bound: Bound::new(flow.start()),
-            history: settings.keep_history.then(History::default),
+            history: settings.keep_history.then(|| History {
+                manifold: manifold.clone(),
+                ..History::default()
+            }),
+            manifold,
             pending: None,
         })
     }
@@ -231,9 +241,51 @@ impl Filter {
 
     /// The estimate into the bounds where it is to be kept there.
     fn keep_inside(&mut self) {
+        let before = self.before();
         if let Some(projection) = &mut self.projection {
             let Belief { x, root } = &mut self.belief;
             self.sensing.health.projected += usize::from(projection.project(x, root));
+            self.land(before);
+        }
+    }
+
+    /// Where it is, in case that a sum is none of its states.
+    fn before(&self) -> Option<Vec<f64>> {
+        (!self.manifold.is_straight()).then(|| self.belief.x.clone())
+    }
+
+    /// What was added to the states since then as their own way, with all that is known about it.
+    fn land(&mut self, before: Option<Vec<f64>>) {
+        let (Some(before), Belief { x, root }) = (before, &mut self.belief) else {
+            return;
+        };
+        let n = x.len();
+        self.manifold.retract(&before, x);
+        self.manifold.transport(&before, x, &mut root.entries, n);
+        root.restore();
+        let Some(corrections) = &mut self.sensing.corrections else {
+            return;
+        };
+        for correction in corrections {
+            correction.transport(&self.manifold, &before, x);
+        }
+        let pending = self.pending.get_or_insert_with(|| Profile::identity(n));
+        self.manifold
+            .transport(&before, x, pending.entries_mut(), n);
+    }
+
+    /// The way of quaternions, which steps leave as long as they are.
+    fn settle(&mut self, transition: &mut Option<Profile>) {
+        if self.manifold.is_straight() {
+            return;
+        }
+        let Belief { x, root } = &mut self.belief;
+        let n = x.len();
+        self.manifold.normalise(x);
+        self.manifold.project(x, &mut root.entries, n);
+        root.restore();
+        if let Some(transition) = transition {
+            self.manifold.project(x, transition.entries_mut(), n);
         }
     }
 
@@ -272,15 +324,16 @@ impl Filter {
 impl Runner for Filter {
     fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<()> {
         self.bound.see(self.propagation.driven.signals());
-        let transition = self.predict(from, sample)?;
+        let mut transition = self.predict(from, sample)?;
         self.propagation.driven.arrive();
-        self.keep_inside();
+        self.settle(&mut transition);
         if let Some(transition) = transition {
             self.pending = Some(match self.pending.take() {
                 None => transition,
                 Some(earlier) => transition.after(&earlier),
             });
         }
+        self.keep_inside();
         Ok(())
     }
 
@@ -289,7 +342,9 @@ impl Runner for Filter {
         // those of an update that failed
         self.sensing.take_corrections();
         self.propagation.driven.start(sample.inputs);
+        let before = self.before();
         self.correct(sample)?;
+        self.land(before);
         self.keep_inside();
         if let Some(record) = &mut self.sensing.record {
             record.end(&self.belief);

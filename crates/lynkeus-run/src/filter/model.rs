@@ -5,6 +5,8 @@ use std::fmt::Write;
 
 use lynkeus_expr::{Graph, Node};
 
+use super::belief::Belief;
+use crate::manifold::Manifold;
 use crate::noise::{Level, Limits, check_size};
 use crate::snapshot::Digest;
 use crate::{Error, Linearised, Result};
@@ -65,6 +67,8 @@ pub struct NoisyModel {
     pub ranges: Vec<Limits>,
     /// the flow inside the ranges
     pub confined: Option<Linearised>,
+    /// where the states and the readings live
+    pub manifold: Manifold,
     /// of an observer: the place of the state that stands for what held measurements lag behind
     pub(crate) lag: Option<usize>,
     /// how many functions of the states are estimated; the flow has their slopes where they are not the
@@ -104,9 +108,27 @@ impl NoisyModel {
             initial_variance: plant.initial_variance.clone(),
             ranges: plant.ranges.clone(),
             confined,
+            manifold: Manifold::default(),
             lag: None,
             estimates: plant.states.len(),
         })
+    }
+
+    /// The same with states and readings that live elsewhere than among the real numbers: quaternions start with
+    /// length 1, the density of the noise on each of their numbers is a quarter of that on the vector of the rotation,
+    /// and so is the variance.
+    #[must_use]
+    pub fn on(mut self, manifold: Manifold) -> Self {
+        self.manifold = manifold;
+        self
+    }
+
+    /// Where a filter starts: its estimate, and the lower root of its covariance row by row.
+    #[must_use]
+    pub fn start(&self) -> (Vec<f64>, Vec<f64>) {
+        let start = self.flow.system().start();
+        let Belief { x, root } = Belief::on(&self.manifold, start, &self.initial_variance);
+        (x, root.entries)
     }
 
     /// The same with the numbers of a plant whose expressions are those of this one: where it starts, variances,
@@ -137,6 +159,9 @@ impl NoisyModel {
         let (q, p) = (&self.process_noise, &self.initial_variance);
         // a digest takes any text
         let _ = write!(digest, "{sensors:?} {q:?} {p:?} {:?}", self.ranges);
+        if !self.manifold.is_flat() {
+            let _ = write!(digest, "{:?}", self.manifold);
+        }
     }
 }
 

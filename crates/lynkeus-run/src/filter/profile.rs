@@ -42,6 +42,12 @@ impl Profile {
         }
     }
 
+    /// All entries, to be changed.
+    pub fn entries_mut(&mut self) -> &mut [f64] {
+        self.spans.fill(0..self.n);
+        &mut self.entries
+    }
+
     /// Other entries, all of them, row by row.
     pub fn fill(&mut self, entries: impl Iterator<Item = f64>) {
         let n = self.n;

@@ -47,13 +47,23 @@ impl Root {
             .collect()
     }
 
-    /// φ with φS = b; components along which P has no variance are 0.
-    pub fn against(&self, b: &[f64]) -> Vec<f64> {
+    /// The lower root of the same covariance, after rows of S were changed.
+    pub fn restore(&mut self) {
+        let n = self.n;
+        let mut rows = vec![0.0; n * n];
+        for (i, row) in self.entries.chunks_exact(n.max(1)).enumerate() {
+            (0..n).for_each(|k| rows[k * n + i] = row[k]);
+        }
+        self.of_rows(&mut rows, &mut vec![0.0; n]);
+    }
+
+    /// φ with φS = b; components along which P has no variance but this share of what the state has are 0.
+    pub fn against(&self, b: &[f64], share: f64) -> Vec<f64> {
         let mut result = vec![0.0; self.n];
         let mut rest = b.to_vec();
         for k in (0..self.n).rev() {
             let row = &self.row(k)[..=k];
-            if row[k] > 0.0 {
+            if row[k] > 0.0 && (share == 0.0 || row[k] > share * self.deviation(k)) {
                 result[k] = rest[k] / row[k];
             }
             for (rest, s) in rest.iter_mut().zip(row) {
@@ -322,8 +332,8 @@ mod tests {
         let mut root = Root::diagonal(&[4.0, 9.0]);
         root.entries[2] = 1.0;
         // (5, 7) [[2, 0], [1, 3]] = (17, 21)
-        close(&root.against(&[17.0, 21.0]), &[5.0, 7.0], 1e-15);
-        assert_eq!(Root::diagonal(&[0.0]).against(&[0.0]), [0.0]);
+        close(&root.against(&[17.0, 21.0], 0.0), &[5.0, 7.0], 1e-15);
+        assert_eq!(Root::diagonal(&[0.0]).against(&[0.0], 0.0), [0.0]);
     }
 
     #[test]

@@ -10,6 +10,7 @@ use super::settings::FilterSettings;
 use super::smoother::Correction;
 use crate::Result;
 use crate::linearised::OutputMap;
+use crate::manifold::Manifold;
 use crate::noise::Limits;
 use crate::runner::Sample;
 use crate::snapshot::{Damaged, Persist, Walk};
@@ -22,6 +23,7 @@ pub(crate) const SURPRISE: f64 = 3.0;
 #[derive(Clone, Debug)]
 pub(crate) struct Sensing {
     pub output_map: OutputMap,
+    pub manifold: Manifold,
     sensors: Vec<Sensor>,
     gate: Option<f64>,
     /// rejections in a row that end its say
@@ -51,6 +53,7 @@ impl Sensing {
         let keeps_corrections = settings.keep_history && !settings.is_window();
         Self {
             output_map: OutputMap::new(&model.output_map),
+            manifold: model.manifold.clone(),
             sensors: model.sensors.clone(),
             gate: settings.gate,
             patience: settings.patience,
@@ -82,7 +85,11 @@ impl Sensing {
         self.output_map
             .linearise(sample.t, &belief.x, sample.inputs)?;
         taken.clear();
-        for (i, reading) in sample.readings.iter().enumerate() {
+        let readings = self
+            .manifold
+            .signed(sample.readings, self.output_map.outputs())
+            .into_owned();
+        for (i, reading) in readings.iter().enumerate() {
             let spread = self.project(i, belief);
             let predicted = self.output_map.outputs()[i];
             taken.extend(self.judge(i, *reading, predicted, spread));
@@ -134,7 +141,7 @@ impl Sensing {
         let mut off = f64::NAN;
         if reading.is_finite() {
             innovation.reading = Reading::Taken;
-            let (mut shown, mut end) = (reading, None);
+            let (mut shown, mut end) = (self.manifold.lifted(i, reading, predicted), None);
             if let Some(limits) = limits {
                 (shown, end) = (limits.shown(reading), End::of(limits, reading));
             }
@@ -150,7 +157,7 @@ impl Sensing {
             }
             if innovation.reading != Reading::Rejected {
                 if end.is_none() && plain.abs() > SURPRISE * deviation {
-                    variance = noise.variance_after(reading, predicted, spread);
+                    variance = noise.variance_after(shown, predicted, spread);
                 }
                 believed = Some(Believed {
                     sensor: i,

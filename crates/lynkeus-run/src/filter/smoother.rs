@@ -3,6 +3,7 @@
 use super::belief::Belief;
 use super::profile::Profile;
 use super::root::dot;
+use crate::manifold::Manifold;
 use crate::snapshot::{Damaged, Persist, Walk};
 
 /// What readings did that were taken together.
@@ -41,6 +42,13 @@ pub(crate) struct Step {
 }
 
 impl Correction {
+    /// The same in what it was carried over to.
+    pub fn transport(&mut self, manifold: &Manifold, from: &[f64], to: &[f64]) {
+        for column in self.slopes.iter_mut().chain(&mut self.gains) {
+            manifold.transport(from, to, column, 1);
+        }
+    }
+
     /// Of n states.
     fn walk(&mut self, walk: &mut Walk<'_>, n: usize) -> Result<(), Damaged> {
         let count = walk.length(self.gains.len())?;
@@ -71,11 +79,12 @@ impl Step {
     }
 
     /// Given what later samples say.
-    fn given(&self, adjoint: &Adjoint) -> Smoothed {
+    fn given(&self, adjoint: &Adjoint, manifold: &Manifold) -> Smoothed {
         let Belief { x, root } = &self.belief;
         let n = x.len();
         let shift = root.covariance_times(&adjoint.vector);
-        let estimate = x.iter().zip(&shift).map(|(x, s)| x - s).collect();
+        let mut estimate: Vec<f64> = x.iter().zip(&shift).map(|(x, s)| x - s).collect();
+        manifold.retract(x, &mut estimate);
         // without Λ there is nothing to tell
         let told = if adjoint.matrix.is_empty() { 0 } else { n };
         let deviations = (0..told).map(|i| {
@@ -129,6 +138,7 @@ pub(crate) struct History {
     pub steps: Vec<Step>,
     /// of a moving horizon: the states of the window at each sample, row after row
     pub windows: Vec<Vec<f64>>,
+    pub manifold: Manifold,
 }
 
 /// What later samples say: x̂ˢ = x̂⁺ − P⁺λ, Pˢ = P⁺ − P⁺ΛP⁺.
@@ -172,7 +182,7 @@ impl History {
             None => {
                 let mut adjoint = Adjoint::nothing(n, deviations);
                 for step in steps.iter().rev() {
-                    result.push(step.given(&adjoint));
+                    result.push(step.given(&adjoint, &self.manifold));
                     step.back(&mut adjoint);
                 }
                 result.reverse();
@@ -184,7 +194,7 @@ impl History {
                     for later in steps[k + 1..=last].iter().rev() {
                         later.back(&mut adjoint);
                     }
-                    result.push(step.given(&adjoint));
+                    result.push(step.given(&adjoint, &self.manifold));
                 }
             }
         }

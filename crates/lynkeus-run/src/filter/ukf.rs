@@ -8,11 +8,19 @@ use super::sensing::Sensing;
 use super::settings::{SigmaPoints, Weights};
 use super::smoother::Correction;
 use super::transition::Propagation;
+use crate::manifold::Manifold;
 use crate::runner::Sample;
 use crate::{Integrator, Method, Result};
 
 /// Images of two points that differ by no more than this share of their size do not differ.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// A covariance of quaternions has directions without variance: what stands there is below this share of a state's.
+const NOTHING: f64 = 1e-9;
+
+/// Most steps to the mean of points that are no vectors, and the last of them.
+const MEANS: usize = 30;
+const LAST: f64 = 1e-13;
 
 /// Sigma points under way.
 #[derive(Clone, Debug)]
@@ -28,12 +36,14 @@ pub(crate) struct Ukf {
     extra: Vec<f64>,
     sums: Vec<f64>,
     factor: Factor,
+    manifold: Manifold,
 }
 
 impl Ukf {
     /// Of n states.
-    pub fn new(n: usize, points: SigmaPoints, method: Method) -> Result<Self> {
+    pub fn new(n: usize, points: SigmaPoints, method: Method, manifold: &Manifold) -> Result<Self> {
         Ok(Self {
+            manifold: manifold.clone(),
             integrator: Integrator::new(method, n)?,
             weights: points.weights(n)?,
             points: vec![],
@@ -47,17 +57,39 @@ impl Ukf {
         })
     }
 
-    /// Points of the belief beside their mean, and what the sensors show of them.
-    fn show(&mut self, sensing: &mut Sensing, belief: &Belief, sample: &Sample<'_>) -> Result<()> {
+    /// Points of the belief beside their mean, and what the sensors show of them. Where it was before the sample's
+    /// readings says in which plane the belief of a quaternion lies.
+    fn show(
+        &mut self,
+        sensing: &mut Sensing,
+        before: &[f64],
+        belief: &Belief,
+        sample: &Sample<'_>,
+    ) -> Result<()> {
         let weights = self.weights;
         let n = belief.x.len();
         draw(belief, weights.spread, &mut self.points);
         self.shown.clear();
         let mut m = 0;
+        let mut place = vec![];
         for point in self.points.chunks_exact(n) {
-            let shown = sensing.output_map.predict(sample.t, point, sample.inputs)?;
+            let at = match self.manifold.is_straight() {
+                true => point,
+                false => {
+                    point.clone_into(&mut place);
+                    self.manifold.retract(before, &mut place);
+                    &place
+                }
+            };
+            let shown = sensing.output_map.predict(sample.t, at, sample.inputs)?;
             m = shown.len();
             self.shown.extend_from_slice(shown);
+        }
+        for dial in &self.manifold.dials {
+            let first = self.shown[*dial];
+            for shown in self.shown.iter_mut().skip(*dial).step_by(m) {
+                *shown = self.manifold.lifted(*dial, *shown, first);
+            }
         }
         weights.centre(&mut self.points, n, &mut self.mean);
         weights.centre(&mut self.shown, m, &mut self.expected);
@@ -67,7 +99,7 @@ impl Ukf {
     /// Corrects by readings of `m` sensors, together.
     fn take(&mut self, sensing: &mut Sensing, belief: &mut Belief, m: usize, taken: &[Believed]) {
         let weights = self.weights;
-        let (n, count) = (belief.x.len(), taken.len());
+        let (n, count, share) = (belief.x.len(), taken.len(), self.share());
         let mut variance = vec![0.0; count * count];
         for (a, one) in taken.iter().enumerate() {
             for (b, other) in taken.iter().enumerate() {
@@ -90,7 +122,7 @@ impl Ukf {
         let unit = |a: usize| (0..count).map(|b| f64::from(u8::from(a == b))).collect();
         let units = (0..count).map(unit);
         if let Some(corrections) = &mut sensing.corrections {
-            let row = |b: &Believed| weights.row(&belief.root, &self.shown, m, b.sensor);
+            let row = |b: &Believed| weights.row(&belief.root, &self.shown, m, b.sensor, share);
             corrections.push(Correction {
                 slopes: taken.iter().map(row).collect(),
                 gains: (0..count).map(column).collect(),
@@ -169,6 +201,9 @@ impl Ukf {
         let weights = self.weights;
         let n = belief.x.len();
         draw(belief, weights.spread, &mut self.points);
+        for point in self.points.chunks_exact_mut(n) {
+            self.manifold.retract(&belief.x, point);
+        }
         let mut points = self.points.chunks_exact_mut(n);
         if propagation.is_noisy()
             && let Some(centre) = points.next()
@@ -180,15 +215,58 @@ impl Ukf {
             self.integrator
                 .advance(&mut propagation.driven, from, to, point)?;
         }
+        let straight = self.manifold.is_straight();
+        if !straight {
+            let mut points = std::mem::take(&mut self.points);
+            self.gather(&mut points, n, &mut belief.x);
+            self.points = points;
+        }
+        let share = self.share();
         let transition = keep.then(|| {
-            let rows = (0..n).flat_map(|i| weights.row(&belief.root, &self.points, n, i));
-            Profile::dense(n, rows.collect())
+            let row = |i| weights.row(&belief.root, &self.points, n, i, share);
+            Profile::dense(n, (0..n).flat_map(row).collect())
         });
-        weights.centre(&mut self.points, n, &mut belief.x);
+        if straight {
+            weights.centre(&mut self.points, n, &mut belief.x);
+        }
         self.extra.clear();
         propagation.push_root(&mut self.extra);
         self.spread(&mut belief.root);
         Ok(transition)
+    }
+
+    /// The mean of points of which some numbers are those of quaternions, and the points beside it, in the plane that
+    /// touches there.
+    fn gather(&self, points: &mut [f64], n: usize, mean: &mut Vec<f64>) {
+        for point in points.chunks_exact_mut(n) {
+            self.manifold.normalise(point);
+        }
+        let images = points.to_vec();
+        let mut about = images[..n].to_vec();
+        for _ in 0..MEANS {
+            points.copy_from_slice(&images);
+            for point in points.chunks_exact_mut(n) {
+                self.manifold.flatten(&about, point);
+            }
+            self.weights.centre(points, n, mean);
+            let moved = mean.iter().zip(&about).map(|(m, x)| (m - x).abs());
+            let quaternions = self.manifold.rotations.iter().flat_map(|r| *r..r + 4);
+            let moved: Vec<f64> = moved.collect();
+            let moved = quaternions.map(|i| moved[i]).fold(0.0, f64::max);
+            self.manifold.retract(&about, mean);
+            about.clone_from(mean);
+            if moved < LAST {
+                break;
+            }
+        }
+    }
+
+    /// What counts as no variance.
+    fn share(&self) -> f64 {
+        match self.manifold.is_straight() {
+            true => 0.0,
+            false => NOTHING,
+        }
     }
 
     /// The points drawn again from x̂⁻, P⁻; K = P_xz P_zz⁻¹ over the readings that are believed. For
@@ -199,10 +277,15 @@ impl Ukf {
         belief: &mut Belief,
         sample: &Sample<'_>,
     ) -> Result<()> {
-        self.show(sensing, belief, sample)?;
+        let before = match self.manifold.is_straight() {
+            true => vec![],
+            false => belief.x.clone(),
+        };
+        self.show(sensing, &before, belief, sample)?;
         let m = sample.readings.len();
         let (mut inside, mut at_ends) = (vec![], vec![]);
-        for (i, reading) in sample.readings.iter().enumerate() {
+        let readings = self.manifold.signed(sample.readings, &self.expected);
+        for (i, reading) in readings.iter().enumerate() {
             let spread = self.weights.moment(&self.shown, m, i, i);
             let believed = sensing.judge(i, *reading, self.expected[i], spread);
             if let Some(believed) = believed.filter(|b| spread + b.variance > 0.0) {
@@ -221,14 +304,14 @@ impl Ukf {
             self.take(sensing, belief, m, &inside);
             is_moved = true;
         }
-        for (mut believed, before) in at_ends {
-            if is_moved && self.show(sensing, belief, sample).is_err() {
+        for (mut believed, expected) in at_ends {
+            if is_moved && self.show(sensing, &before, belief, sample).is_err() {
                 // the sensors' model has no value about the estimate as it is now: the others count
                 break;
             }
             let i = believed.sensor;
             let spread = self.weights.moment(&self.shown, m, i, i);
-            let moved = self.expected[i] - before;
+            let moved = self.expected[i] - expected;
             if let Some(record) = &mut sensing.record {
                 record.count_at_end(&believed, moved, spread);
             }
@@ -296,8 +379,8 @@ impl Weights {
     }
 
     /// The linear map that takes the points drawn from `root` best to component i of their images
-    /// of `size` numbers.
-    fn row(&self, root: &Root, images: &[f64], size: usize, i: usize) -> Vec<f64> {
+    /// of `size` numbers; `share` is that of a state's variance which counts as none.
+    fn row(&self, root: &Root, images: &[f64], size: usize, i: usize, share: f64) -> Vec<f64> {
         let n = root.n;
         let of = |k: usize| images[k * size + i];
         let apart = (0..n).map(|k| {
@@ -308,7 +391,7 @@ impl Weights {
             if apart.abs() > rounding { apart } else { 0.0 }
         });
         let halves: Vec<f64> = apart.map(|d| 0.5 * d / self.spread).collect();
-        root.against(&halves)
+        root.against(&halves, share)
     }
 }
 

@@ -23,6 +23,8 @@ pub enum Apart {
     Line,
     /// a smoother needs the way of each
     History,
+    /// states or readings are angles or rotations
+    Manifold,
     /// only covariances are asked for
     Foreseen,
     /// the plant or a sensor jumps with time
@@ -48,6 +50,7 @@ impl fmt::Display for Apart {
             Self::Step => f.write_str("the steps follow from the system"),
             Self::Line => f.write_str("inputs are on a line between samples"),
             Self::History => f.write_str("a smoother needs the way of each"),
+            Self::Manifold => f.write_str("states or readings are angles or rotations"),
             Self::Foreseen => f.write_str("only covariances are asked for"),
             Self::Instants => f.write_str("the plant or a sensor jumps with time"),
             Self::Noiseless(name) => write!(f, "sensor {name} has no noise"),

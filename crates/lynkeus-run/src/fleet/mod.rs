@@ -171,6 +171,9 @@ fn refuse(filter: &Blueprint) -> Result<(), Apart> {
     if filter.run.between != BetweenSamples::Hold {
         return Err(Apart::Line);
     }
+    if !model.manifold.is_flat() {
+        return Err(Apart::Manifold);
+    }
     if settings.keep_history {
         return Err(Apart::History);
     }

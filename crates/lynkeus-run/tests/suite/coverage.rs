@@ -155,7 +155,7 @@ impl Case {
 }
 
 /// Standard normal numbers by Box and Muller, of a counter's hash.
-struct Normal(u64);
+pub struct Normal(pub u64);
 
 impl Normal {
     fn uniform(&mut self) -> f64 {
@@ -166,7 +166,7 @@ impl Normal {
         (((z ^ (z >> 31)) >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
     }
 
-    fn next(&mut self) -> f64 {
+    pub fn next(&mut self) -> f64 {
         let radius = (-2.0 * self.uniform().ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform()).cos()
     }

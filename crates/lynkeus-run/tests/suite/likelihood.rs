@@ -156,6 +156,7 @@ impl Case {
                     output,
                     noise: self.noise(r),
                     limits: self.limits(),
+                    is_dial: false,
                 })
                 .collect(),
             process_noise: (0..self.n)
@@ -368,6 +369,7 @@ fn the_information_is_fisher_s() {
             output: x.node(),
             noise: ParametricLevel::Variance((r * r).node()),
             limits: None,
+            is_dial: false,
         }],
         process_noise: vec![zero],
         ranges: vec![],
@@ -439,6 +441,7 @@ fn a_plant_without_parameters_has_a_value() {
             output: x,
             noise: ParametricLevel::Variance(number(4.0)),
             limits: None,
+            is_dial: false,
         }],
         process_noise: vec![number(0.0)],
         ranges: vec![],
@@ -482,6 +485,7 @@ fn an_estimate_without_a_value_is_put_into_its_range() {
             output: x.node(),
             noise: ParametricLevel::Variance(number(0.04)),
             limits: None,
+            is_dial: false,
         }],
         process_noise: vec![number(0.1)],
         ranges: vec![range],
@@ -568,6 +572,7 @@ fn what_has_decayed_leaves_the_derivatives() {
                 output: z.node(),
                 noise: ParametricLevel::Variance(number(0.01)),
                 limits: None,
+                is_dial: false,
             }],
             process_noise: states
                 .iter()
@@ -628,6 +633,7 @@ fn the_order_of_the_states_does_not_matter() {
                 output: x[0].node(),
                 noise: ParametricLevel::Variance(g.constant(0.01).node()),
                 limits: None,
+                is_dial: false,
             }],
             process_noise: ordered(&density),
             ranges: vec![],
@@ -662,6 +668,7 @@ fn driven(rate: f64, steps: usize, is_implicit: bool) -> lynkeus_run::filter::Sc
         output: output.node(),
         noise: ParametricLevel::Variance(number(1.0)),
         limits: None,
+        is_dial: false,
     };
     let mut likelihood = Likelihood::new(&ParametricPlant {
         graph: &g,
@@ -743,6 +750,7 @@ fn a_noise_may_depend_on_the_state() {
             output: x.node(),
             noise: ParametricLevel::Variance((0.1 + θ * x).powi(2).node()),
             limits: None,
+            is_dial: false,
         }],
         process_noise: vec![number(0.0)],
         ranges: vec![],
@@ -787,6 +795,7 @@ fn a_reading_of_which_all_is_certain_does_not_count() {
                 output: x.node(),
                 noise: ParametricLevel::Share(number(share)),
                 limits: None,
+                is_dial: false,
             }],
             process_noise: vec![number(0.0)],
             ranges: vec![],

@@ -9,6 +9,7 @@ mod integration;
 mod late;
 mod likelihood;
 mod linear_plants;
+mod manifold;
 mod replay;
 mod second_opinion;
 mod simulation;

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::*;
 use crate::keys::{
-    CERTIFY, COMPARE, ESTIMATE, FIT, GENERATOR, INTEGRATOR, KEYS, LOG, PLOT, SENSORS, SIMULATE,
-    TUNE,
+    CERTIFY, COMPARE, ESTIMATE, FIT, GENERATOR, INTEGRATOR, KEYS, LOG, MANIFOLD, PLOT, SENSORS,
+    SIMULATE, TUNE,
 };
 
 const HEADER: &str = "| key | type | default | meaning |\n|---|---|---|---|\n";
@@ -61,9 +61,10 @@ fn the_schema_is_the_committed_one() {
 fn the_page_of_studies_shows_the_keys() {
     let path = document("study.md");
     let mut page = fs::read_to_string(&path).unwrap();
-    let tables: [(&str, &[KeySpec]); 13] = [
+    let tables: [(&str, &[KeySpec]); 14] = [
         ("\n## Top level\n", &KEYS),
         ("\n## `[sensors]`\n", &SENSORS),
+        ("\n## `[manifold]`\n", &MANIFOLD),
         ("\n## `[observer]`\n", &OBSERVER),
         ("\n## `[certify]`\n", &CERTIFY),
         ("\n## `[simulate]`\n", &SIMULATE),

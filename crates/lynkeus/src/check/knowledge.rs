@@ -2,6 +2,7 @@
 //! observable, but its error decays by itself; not known. For each assumption on the unknown inputs.
 
 use lynkeus_answer::Document;
+use lynkeus_model::Home;
 use lynkeus_observability::{Answer, Verdict};
 use lynkeus_structure::detectability::{Detectability, Hidden, HiddenErrors, Observability};
 use lynkeus_structure::{self as structure, AugmentedPlant, Coordinate, Uniformity};
@@ -89,6 +90,8 @@ pub struct Knowledge {
     pub quantities: Vec<(String, Known)>,
     /// where it was linearised; empty where it was not
     pub point: Vec<Coordinate>,
+    /// what the states that are no real numbers are known up to, in words
+    pub turns: Vec<String>,
 }
 
 /// What the examination of the box has found.
@@ -158,6 +161,7 @@ impl Knowledge {
                 .map(|i| (augmented.states[i].name.clone(), known(i)))
                 .collect(),
             point: hidden_errors.point,
+            turns: turns(augmented),
         })
     }
 
@@ -449,9 +453,26 @@ pub(super) fn tell(document: &mut Document, all: &[Knowledge], unit: &str) {
 /// Coordinates of a point that are told.
 const COORDINATES: usize = 8;
 
+/// What angles and rotations are known up to.
+fn turns(augmented: &AugmentedPlant<'_>) -> Vec<String> {
+    let states = augmented.states.iter();
+    let angles = states
+        .clone()
+        .filter(|s| matches!(s.home, Home::Circle { .. }));
+    let angles: Vec<&str> = angles.map(|s| s.name.as_str()).collect();
+    let rotations = states.filter(|s| s.home == Home::Rotation { element: 0 });
+    let rotations = rotations.map(|s| {
+        let name = s.name.split('[').next().unwrap_or(&s.name);
+        format!("({name} is a unit quaternion: that its length is 1 counts as known, and {name} and -{name} are one rotation)")
+    });
+    let angles =
+        (!angles.is_empty()).then(|| format!("({}: known up to a full turn)", listed(&angles)));
+    angles.into_iter().chain(rotations).collect()
+}
+
 /// What the lines rest on.
 fn caveats(knowledge: &Knowledge) -> Vec<String> {
-    let mut told = vec![];
+    let mut told = knowledge.turns.clone();
     if !knowledge.point.is_empty() {
         let point = knowledge.point.iter().take(COORDINATES);
         let sides = point.map(|c| format!("{} = {}", c.name, number(c.value)));

@@ -2,7 +2,7 @@
 
 use lynkeus_answer::Document;
 use lynkeus_expr::Budget;
-use lynkeus_model::Plant;
+use lynkeus_model::{Home, Plant, Variable};
 use lynkeus_observability::{Answer, Quantity, Question, QuestionError, Verdict, analyse};
 use lynkeus_structure::Sensors;
 use lynkeus_words::Words;
@@ -23,8 +23,14 @@ pub(super) fn answer(
     sensors: &Sensors,
     budget: Budget,
 ) -> Result<Answer, Error> {
+    let own = with_lengths(plant);
+    let mut measured = sensors.measured.clone();
+    if let (Some(own), false) = (&own, measured.is_empty()) {
+        let known = own.outputs[plant.outputs.len()..].iter();
+        measured.extend(known.map(|output| output.name.clone()));
+    }
     let question = Question {
-        measured: sensors.measured.clone(),
+        measured,
         unknown: sensors.unknown.clone(),
         disturbances: sensors.disturbances.clone(),
         parameters: options.parameters,
@@ -32,7 +38,31 @@ pub(super) fn answer(
         budget,
         ..Question::default()
     };
+    let plant = own.as_ref().unwrap_or(plant);
     analyse(plant, &question).map_err(|error| blame(study, error))
+}
+
+/// The plant with what is known of its quaternions as outputs: their length is 1. None where it has none.
+fn with_lengths(plant: &Plant) -> Option<Plant> {
+    let states = plant.states.iter().enumerate();
+    let firsts = states.filter(|(_, s)| s.home == Home::Rotation { element: 0 });
+    let lengths = firsts.map(|(first, state)| {
+        let own = plant.states[first..first + 4].iter();
+        let squares = own.map(|q| plant.graph.expr(q.node).powi(2));
+        let length = squares.reduce(|sum, square| sum + square);
+        Variable {
+            // no name of the plant's has this form
+            name: format!(" length of {}", state.name),
+            node: length.map_or(state.node, |length| length.node()),
+            ..state.clone()
+        }
+    });
+    let lengths: Vec<Variable> = lengths.collect();
+    (!lengths.is_empty()).then(|| {
+        let mut own = plant.clone();
+        own.outputs.extend(lengths);
+        own
+    })
 }
 
 /// The place in the study of a name that does not fit.

@@ -156,6 +156,7 @@ impl View<'_> {
             unknown: vec![],
             quantities: names.zip(hidden_errors.of.into_iter().map(of)).collect(),
             point: hidden_errors.point,
+            turns: vec![],
         })
     }
 

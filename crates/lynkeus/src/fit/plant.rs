@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 
 use lynkeus_expr::{Expr, Node};
-use lynkeus_model::Plant;
+use lynkeus_model::{Home, Plant};
 use lynkeus_observers::FilterTuning;
 use lynkeus_run::Level;
 use lynkeus_run::filter::{
@@ -68,6 +68,7 @@ impl Source<'_> {
             is_alone,
             further,
         } = *self;
+        refuse_curved(prepared.study(), symbolic, tuning, is_alone)?;
         let graph = symbolic.graph();
         let number = |value: f64| graph.constant(value).node();
         let symbols: Vec<Node> = (unknowns.iter())
@@ -129,6 +130,7 @@ impl Source<'_> {
                 output: output.variable.node,
                 noise: noise(level.filter(|_| named.is_none()), size),
                 limits: declared.limits.of(name).copied(),
+                is_dial: matches!(output.variable.home, Home::Circle { .. }),
             })
         });
         let further = further.iter().map(|sensor| {
@@ -136,6 +138,7 @@ impl Source<'_> {
                 output: sensor.output,
                 noise: noise(Some(sensor.level), graph.constant(sensor.level.size())),
                 limits: sensor.limits,
+                is_dial: false,
             })
         });
         let plant = ParametricPlant {
@@ -163,6 +166,36 @@ impl Source<'_> {
         };
         likelihood.map_err(explain)
     }
+}
+
+/// Likelihoods are of sums, and along sigma points of readings that are no angles.
+fn refuse_curved(
+    study: &Study,
+    plant: &AugmentedPlant<'_>,
+    tuning: &FilterTuning,
+    is_alone: bool,
+) -> Result<(), Error> {
+    let mut states = plant.states.iter();
+    if let Some(state) = states.find(|s| matches!(s.home, Home::Rotation { .. })) {
+        let message = format!(
+            "a likelihood takes no quaternion, and [manifold] has one ({})",
+            state.name
+        );
+        let hint = "fit in a study of which [manifold] names none: near the truth its filter is the same to first order, with der(q) + k*(1 - q*q)*q to keep the length";
+        return Err(Error::input(message).at(&study.file).hint(hint));
+    }
+    let mut outputs = plant.outputs.iter().map(|o| &o.variable);
+    let dial = outputs.find(|o| matches!(o.home, Home::Circle { .. }));
+    let is_unscented = matches!(tuning.kind, FilterKind::Unscented(_)) && !is_alone;
+    let Some(dial) = dial.filter(|_| is_unscented) else {
+        return Ok(());
+    };
+    let message = format!(
+        "the likelihood along an unscented filter takes no angle, and {} is one by [manifold]",
+        dial.name
+    );
+    let hint = "fit with family = \"ekf\"; the unscented filter takes what it finds";
+    Err(Error::input(message).at(&study.file).hint(hint))
 }
 
 /// A noise of this size, of the kind that it is.

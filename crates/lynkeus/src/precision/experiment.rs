@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use lynkeus_expr::Node;
-use lynkeus_model::{Plant, Variable};
+use lynkeus_model::{Home, Plant, Variable};
 use lynkeus_observability::precision::{Deviation, Experiment, Quantity, Sensor, Window};
 use lynkeus_run::{Method, Tolerances};
 use lynkeus_structure::AugmentedPlant;
@@ -202,7 +202,10 @@ impl Reach<'_> {
 
     /// The declared range, else the greatest magnitude, else 1.
     fn scale(&self, variable: &Variable) -> f64 {
-        let range = variable.max - variable.min;
+        let range = match variable.home {
+            Home::Circle { .. } => std::f64::consts::TAU,
+            _ => variable.max - variable.min,
+        };
         if range.is_finite() && range > 0.0 {
             return range;
         }

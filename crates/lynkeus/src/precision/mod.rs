@@ -12,6 +12,7 @@ mod report;
 mod tests;
 mod words;
 
+use lynkeus_model::Home;
 use lynkeus_observability::precision::{Advice, Deviations, SensorSet};
 
 use crate::{Error, Study};
@@ -79,6 +80,15 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     let settings = systems::settings(study)?;
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
+    let mut states = plant.states.iter();
+    if let Some(state) = states.find(|s| matches!(s.home, Home::Rotation { .. })) {
+        let message = format!(
+            "what is foretold here is how well real numbers can be known, and [manifold] has a quaternion ({})",
+            state.name
+        );
+        let hint = "`lynkeus simulate STUDY --runs 100` says how well a filter knows it";
+        return Err(Error::input(message).at(&study.file).hint(hint));
+    }
     let setup = Setup::new(&prepared, settings, options)?;
     let found = setup
         .experiment
@@ -140,8 +150,10 @@ fn account(declared: &Declared, counts_process_noise: bool) -> Account {
         input_derivatives,
         screens,
         late,
+        manifold,
     } = declared;
     Account::default()
+        .counts(manifold)
         .leaves(screens, "they are of logs: every simulated reading counts")
         .leaves(
             late,

@@ -2,7 +2,7 @@
 
 use lynkeus_export::Refusal;
 use lynkeus_export::curly::{Device, Entry, FirstReading, Tunable};
-use lynkeus_model::Variable;
+use lynkeus_model::{Home, Variable};
 use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Level, Updates};
 
@@ -49,6 +49,7 @@ pub(crate) fn printed<T>(
         estimates: &told.estimates,
         monitors: told.monitors,
         deviations: study.estimate.deviations,
+        turns: &told.turns,
         tunables: &told.tunables,
         noises: &noises,
         words: &told.words,
@@ -124,6 +125,8 @@ struct Told {
     signals: Vec<Entry>,
     estimates: Vec<Entry>,
     monitors: usize,
+    /// states that are told in one turn, and where it begins
+    turns: Vec<(usize, f64)>,
     tunables: Vec<Tunable>,
     words: Vec<Entry>,
     notes: Vec<String>,
@@ -159,10 +162,16 @@ impl Told {
                 name: header,
                 about,
             });
+            // of a rotation there is one
+            let own = match estimate.variable.home {
+                Home::Rotation { element: 0 } => name.split('[').next().unwrap_or(name),
+                Home::Rotation { .. } => continue,
+                _ => name,
+            };
             if has_deviations {
-                let about = format!("standard deviation of {name}");
+                let about = format!("standard deviation of {own}");
                 deviations.push(Entry {
-                    name: headers.free(&format!("{name}_sd"), &format!("the {about}")),
+                    name: headers.free(&format!("{own}_sd"), &format!("the {about}")),
                     about,
                 });
             }
@@ -178,9 +187,15 @@ impl Told {
                 })
                 .collect(),
         };
+        let turns = observer.estimates.iter().enumerate();
+        let turns = turns.filter_map(|(i, e)| match e.variable.home {
+            Home::Circle { from } => Some((i, from?)),
+            _ => None,
+        });
         Self {
             signals: read.map(|signal| known(&signal.name)).collect(),
             monitors: monitors.len(),
+            turns: turns.collect(),
             estimates: estimates
                 .into_iter()
                 .chain(deviations)

@@ -113,7 +113,7 @@ pub(crate) fn densities(prepared: &Prepared<'_>, span: f64, notes: &mut Vec<Stri
             None if i >= augmented.plant_states() => wander(state, span, notes),
             None if is_declared || is_constant(state) => 0.0,
             None => {
-                let width = state.max - state.min;
+                let width = state.width();
                 is_awake |= width.is_finite();
                 if width.is_finite() {
                     10.0 * (DOUBT * width).powi(2) / span
@@ -148,7 +148,7 @@ pub(crate) fn of_families(prepared: &Prepared<'_>, span: f64, notes: &mut Vec<St
 /// A density to begin a search with: a wander over a twentieth of the range, or of the start value, in a tenth
 /// of the log.
 pub fn guessed(state: &Variable, span: f64) -> f64 {
-    let width = state.max - state.min;
+    let width = state.width();
     let size = match width.is_finite() && width > 0.0 {
         true => width,
         false => state.start.unwrap_or(0.0).abs().max(1.0),
@@ -160,7 +160,7 @@ pub fn guessed(state: &Variable, span: f64) -> f64 {
 const DOUBT: f64 = 0.0025;
 
 fn wander(state: &Variable, span: f64, notes: &mut Vec<String>) -> f64 {
-    let width = state.max - state.min;
+    let width = state.width();
     let (reach, from) = match width.is_finite() && width > 0.0 {
         true => (width / 4.0, "a quarter of its range"),
         false => (

@@ -1,6 +1,6 @@
 //! What a simulation draws, and what its sensors can show of it.
 
-use lynkeus_model::Plant;
+use lynkeus_model::{Home, Plant, Variable};
 use lynkeus_run::{Level, Simulation, process_draws};
 use lynkeus_words::figures;
 
@@ -21,7 +21,15 @@ pub(crate) fn noise(
     let declared = Declared::new(study, plant)?;
     let levels = declared.noise.iter();
     let limits = declared.limits.iter();
-    let density = |name: &String| Some((name.clone(), *declared.process_noise.of(name)?));
+    let density = |state: &Variable| {
+        let density = *declared.process_noise.of(&state.name)?;
+        // what is drawn off the sphere is taken away again
+        let share = match state.home {
+            Home::Rotation { .. } => 0.25,
+            _ => 1.0,
+        };
+        Some((state.name.clone(), share * density))
+    };
     let states = plant.states.iter();
     Ok(lynkeus_run::Noise {
         seed: settings.seed,
@@ -29,7 +37,7 @@ pub(crate) fn noise(
         levels: levels
             .map(|(name, noise)| (name.clone(), Level::from(*noise)))
             .collect(),
-        process: states.filter_map(|state| density(&state.name)).collect(),
+        process: states.filter_map(density).collect(),
         limits: limits
             .map(|(name, limits)| (name.clone(), *limits))
             .collect(),

@@ -82,9 +82,7 @@ impl Outcome {
             last: estimated()
                 .map(|(q, estimate)| (q.name.clone(), estimate.last()))
                 .collect(),
-            rms_error_last_half: estimated()
-                .filter_map(|(q, _)| Some((q.name.clone(), q.settled_error()?)))
-                .collect(),
+            rms_error_last_half: estimated().filter_map(|(q, _)| q.told_error()).collect(),
             errors: self
                 .accuracies
                 .iter()

@@ -9,11 +9,11 @@ static truth believe(STATE *s, int i, const real *c, const real *before, real pr
     }
     project(s->root, c, i, projected);
 //? !limits
-    const real rest = s->readings[i] - predicted - moved;
+    const real rest = READING_HERE - predicted - moved;
     const real variance = noise;
 //?
 //? limits
-    real rest = shown_of(i, s->readings[i]) - predicted - moved;
+    real rest = shown_of(i, READING_HERE) - predicted - moved;
     real variance = noise;
     const real end = end_of(i, s->readings[i]);
     truth is_told = 1;
@@ -65,6 +65,9 @@ static truth correct(STATE *s, double t)
     for (int i = 0; i < STATES; i++) {
         before[i] = s->x[i];
     }
+//? mirrors
+    take_signs(s, h);
+//?
     for (int i = 0; i < SENSORS; i++) {
         project(s->root, c, i, projected);
         const real spread = dot(projected, 0, projected, 0, STATES);

@@ -24,12 +24,20 @@ static int advance(STATE *s, double t)
         return INTERVAL;
     }
     if (predict(FIELD, s->time, t, steps, s->inputs, s->x, s->root)) {
+//? rotations
+        settle(s->x, s->root);
+//?
         return 0;
     }
 //? confined
     /* the model has no value on the way: once more, inside the declared ranges */
     confine(s->x);
     if (predict_inside(FIELD_INSIDE, s->time, t, steps, s->inputs, s->x, s->root)) {
+//?
+//? curved_inside
+        settle(s->x, s->root);
+//?
+//? confined
         return 0;
     }
 //?
@@ -39,6 +47,12 @@ static int advance(STATE *s, double t)
 /* Takes the readings and inputs of a sample. */
 static int update(STATE *s, double t, const real *signals)
 {
+//? rotations
+    real before[STATES];
+    for (int i = 0; i < STATES; i++) {
+        before[i] = s->x[i];
+    }
+//?
     for (int i = 0; i < SENSORS; i++) {
         s->readings[i] = signals[i];
     }
@@ -48,11 +62,19 @@ static int update(STATE *s, double t, const real *signals)
         }
     }
     if (correct(s, t)) {
+//? rotations
+        land(before, s->x, s->root);
+//?
         return 0;
     }
 //? confined
     confine(s->x);
     if (correct(s, t)) {
+//?
+//? curved_inside
+        land(before, s->x, s->root);
+//?
+//? confined
         return 0;
     }
 //?
@@ -76,9 +98,33 @@ static int report(STATE *s, double t, const real *signals, real *estimates)
     }
     for (int i = 0; i < STATES; i++) {
         estimates[i] = s->x[i];
-//? deviations
+//? each
         estimates[STATES + i] = deviations[i];
 //?
     }
+//? turns
+    for (int i = 0; i < TURNS; i++) {
+        estimates[turn_states[i]] = in_turn(s->x[turn_states[i]], turns_from[i]);
+    }
+//?
+//? one
+    /* of a rotation the deviation of its angle, in one place */
+    int place = STATES;
+    for (int i = 0; i < STATES; i++) {
+        if (elements[i] == 0) {
+            real squares = R(0.0);
+            for (int k = 0; k < 4; k++) {
+                squares += deviations[i + k] * deviations[i + k];
+            }
+            estimates[place] = R(2.0) * sqrt(squares);
+            place++;
+        } else if (elements[i] == 4) {
+            estimates[place] = deviations[i];
+            place++;
+        } else {
+            /* told with the first of the four */
+        }
+    }
+//?
     return 0;
 }

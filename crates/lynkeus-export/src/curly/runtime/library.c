@@ -454,3 +454,159 @@ static void widen(STATE *s, real value)
         s->scale = size;
     }
 }
+
+//= lifted
+/* A reading of an angle as the nearest one to what is predicted, up to full turns. */
+static real lifted(int i, real reading, real predicted)
+{
+    if (dials[i] == 0) {
+        return reading;
+    }
+    const real off = reading - predicted;
+    return predicted + (off + R(6.283185307179586) * floor(R(0.5) - off / R(6.283185307179586)));
+}
+
+//= in_turn
+/* An angle in the turn that begins at another. */
+static real in_turn(real angle, real from)
+{
+    return angle - R(6.283185307179586) * floor((angle - from) / R(6.283185307179586));
+}
+
+//= normalise
+/* The quaternion that begins at a place as one of length 1. */
+static void normalise(real *x, int q)
+{
+    const real squares = x[q] * x[q] + x[q + 1] * x[q + 1];
+    const real length = sqrt(squares + x[q + 2] * x[q + 2] + x[q + 3] * x[q + 3]);
+    if (length > R(0.0) && isfinite(length)) {
+        for (int i = 0; i < 4; i++) {
+            x[q + i] /= length;
+        }
+    }
+}
+
+//= restore
+/* The lower root of the same covariance, after its rows were changed. */
+static void restore(real *root)
+{
+    real rows[STATES * STATES];
+    for (int i = 0; i < STATES; i++) {
+        for (int k = 0; k < STATES; k++) {
+            rows[k * STATES + i] = root[i * STATES + k];
+        }
+    }
+    root_of_rows(rows, STATES, root);
+}
+
+//= settle
+/* Quaternions back to length 1, and what is not known of them along the sphere. */
+static void settle(real *x, real *root)
+{
+    for (int r = 0; r < ROTATIONS; r++) {
+        const int q = rotation_places[r];
+        normalise(x, q);
+        for (int k = 0; k < STATES; k++) {
+            real along = R(0.0);
+            for (int i = 0; i < 4; i++) {
+                along += x[q + i] * root[(q + i) * STATES + k];
+            }
+            for (int i = 0; i < 4; i++) {
+                root[(q + i) * STATES + k] -= along * x[q + i];
+            }
+        }
+    }
+    restore(root);
+}
+
+//= retract
+/* What was added to quaternions since before as a way along the sphere. */
+static void retract(const real *before, real *x)
+{
+    for (int r = 0; r < ROTATIONS; r++) {
+        const int q = rotation_places[r];
+        real squares = R(0.0);
+        for (int i = 0; i < 4; i++) {
+            squares += (x[q + i] - before[q + i]) * (x[q + i] - before[q + i]);
+        }
+        const real size = sqrt(squares);
+        const real cosine = size > R(0.0) ? cos(size) : R(1.0);
+        const real share = size > R(0.0) ? sin(size) / size : R(1.0);
+        for (int i = 0; i < 4; i++) {
+            x[q + i] = cosine * before[q + i] + share * (x[q + i] - before[q + i]);
+        }
+        normalise(x, q);
+    }
+}
+
+//= land
+/* The same, with what is known of them carried over. */
+static void land(const real *before, real *x, real *root)
+{
+    real way[4];
+    real column[4];
+    retract(before, x);
+    for (int r = 0; r < ROTATIONS; r++) {
+        const int q = rotation_places[r];
+        for (int i = 0; i < 4; i++) {
+            column[i] = before[q + i];
+        }
+        way[0] = x[q] * column[0] + x[q + 1] * column[1] + x[q + 2] * column[2] + x[q + 3] * column[3];
+        way[1] = x[q + 1] * column[0] - x[q] * column[1] - x[q + 2] * column[3] + x[q + 3] * column[2];
+        way[2] = x[q + 2] * column[0] - x[q] * column[2] + x[q + 1] * column[3] - x[q + 3] * column[1];
+        way[3] = x[q + 3] * column[0] - x[q] * column[3] - x[q + 1] * column[2] + x[q + 2] * column[1];
+        for (int k = 0; k < STATES; k++) {
+            for (int i = 0; i < 4; i++) {
+                column[i] = root[(q + i) * STATES + k];
+            }
+            root[q * STATES + k] = way[0] * column[0] - way[1] * column[1] - way[2] * column[2] - way[3] * column[3];
+            root[(q + 1) * STATES + k] = way[0] * column[1] + way[1] * column[0] + way[2] * column[3] - way[3] * column[2];
+            root[(q + 2) * STATES + k] = way[0] * column[2] - way[1] * column[3] + way[2] * column[0] + way[3] * column[1];
+            root[(q + 3) * STATES + k] = way[0] * column[3] + way[1] * column[2] - way[2] * column[1] + way[3] * column[0];
+        }
+    }
+    restore(root);
+}
+
+//= flatten
+/* Quaternions of a point in the plane that touches the sphere at another. */
+static void flatten(const real *about, real *x)
+{
+    for (int r = 0; r < ROTATIONS; r++) {
+        const int q = rotation_places[r];
+        real along = R(0.0);
+        for (int i = 0; i < 4; i++) {
+            along += about[q + i] * x[q + i];
+        }
+        const real side = along < R(0.0) ? R(-1.0) : R(1.0);
+        real squares = R(0.0);
+        for (int i = 0; i < 4; i++) {
+            x[q + i] = side * x[q + i] - side * along * about[q + i];
+            squares += x[q + i] * x[q + i];
+        }
+        const real sine = sqrt(squares);
+        const real share = sine > R(0.0) ? atan2(sine, side * along) / sine : R(1.0);
+        for (int i = 0; i < 4; i++) {
+            x[q + i] = about[q + i] + share * x[q + i];
+        }
+    }
+}
+
+//= take_signs
+/* Readings with the signs of what is expected, where a quaternion and its negative say the same. */
+static void take_signs(STATE *s, const real *expected)
+{
+    for (int r = 0; r < MIRRORS; r++) {
+        real along = R(0.0);
+        for (int i = 0; i < SENSORS; i++) {
+            if (mirror_of[i] == r && isfinite(s->readings[i])) {
+                along += s->readings[i] * expected[i];
+            }
+        }
+        for (int i = 0; i < SENSORS; i++) {
+            if (mirror_of[i] == r && along < R(0.0)) {
+                s->readings[i] = -s->readings[i];
+            }
+        }
+    }
+}

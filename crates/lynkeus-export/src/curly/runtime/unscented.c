@@ -69,6 +69,56 @@ static void root_of_points(const real *points, const real *extra, int count, rea
 //?
 }
 
+//? rotations
+/* The mean of points with quaternions, and the points beside it, in the plane that touches there. */
+static void gather(real *points, real *x)
+{
+    real images[POINTS * STATES];
+    real point[STATES];
+    real about[STATES];
+    for (int k = 0; k < POINTS; k++) {
+        for (int i = 0; i < STATES; i++) {
+            point[i] = points[k * STATES + i];
+        }
+        for (int r = 0; r < ROTATIONS; r++) {
+            normalise(point, rotation_places[r]);
+        }
+        for (int i = 0; i < STATES; i++) {
+            images[k * STATES + i] = point[i];
+        }
+    }
+    for (int i = 0; i < STATES; i++) {
+        about[i] = images[i];
+    }
+    real moved = R(1.0);
+    int step = 0;
+    while (step < 30 && moved >= R(1e-13)) {
+        step++;
+        for (int k = 0; k < POINTS; k++) {
+            for (int i = 0; i < STATES; i++) {
+                point[i] = images[k * STATES + i];
+            }
+            flatten(about, point);
+            for (int i = 0; i < STATES; i++) {
+                points[k * STATES + i] = point[i];
+            }
+        }
+        centre(points, STATES, x);
+        moved = R(0.0);
+        for (int r = 0; r < ROTATIONS; r++) {
+            for (int i = 0; i < 4; i++) {
+                const real off = fabs(x[rotation_places[r] + i] - about[rotation_places[r] + i]);
+                moved = off > moved ? off : moved;
+            }
+        }
+        retract(about, x);
+        for (int i = 0; i < STATES; i++) {
+            about[i] = x[i];
+        }
+    }
+}
+
+//?
 /* Each point through the flow; P is their spread and W. 0, and nothing changed, where the flow has no value. */
 static truth predict(field f, double from, double to, int steps, const real *w, real *x, real *root)
 {
@@ -79,6 +129,17 @@ static truth predict(field f, double from, double to, int steps, const real *w, 
         extra[i] = R(0.0);
     }
     draw(x, root, points);
+//? rotations
+    for (int k = 0; k < POINTS; k++) {
+        for (int i = 0; i < STATES; i++) {
+            point[i] = points[k * STATES + i];
+        }
+        retract(x, point);
+        for (int i = 0; i < STATES; i++) {
+            points[k * STATES + i] = point[i];
+        }
+    }
+//?
 //? noisy
     /* the estimate with what the process noise comes to along it */
     real z[DIMENSION];
@@ -101,7 +162,12 @@ static truth predict(field f, double from, double to, int steps, const real *w, 
             points[k * STATES + i] = point[i];
         }
     }
+//? !rotations
     centre(points, STATES, x);
+//?
+//? rotations
+    gather(points, x);
+//?
     root_of_points(points, extra, STATES, root);
     return 1;
 }
@@ -124,7 +190,7 @@ static void substitute(const real *lower, int n, real *b)
 
 /* Points drawn again beside their mean, and what the sensors show of them beside theirs, h. 0 where
    the sensors' model has no value. */
-static truth show(STATE *s, double t, real *points, real *shown, real *h)
+static truth show(STATE *s, double t, BEFORE_PARAMETERreal *points, real *shown, real *h)
 {
     real point[STATES];
     real mean[STATES];
@@ -133,12 +199,20 @@ static truth show(STATE *s, double t, real *points, real *shown, real *h)
         for (int i = 0; i < STATES; i++) {
             point[i] = points[k * STATES + i];
         }
+//? rotations
+        retract(before, point);
+//?
         measure((real)t, point, s->inputs, h);
         for (int i = 0; i < SENSORS; i++) {
             if (!isfinite(h[i])) {
                 return 0;
             }
+//? !dials
             shown[k * SENSORS + i] = h[i];
+//?
+//? dials
+            shown[k * SENSORS + i] = k == 0 ? h[i] : lifted(i, h[i], shown[i]);
+//?
         }
     }
     centre(points, STATES, mean);
@@ -172,9 +246,18 @@ static truth correct(STATE *s, double t)
     real row[SENSORS];
     real gain[STATES * SENSORS];
     real extra[SENSORS * STATES];
-    if (!show(s, t, points, shown, h)) {
+//? rotations
+    real before[STATES];
+    for (int i = 0; i < STATES; i++) {
+        before[i] = s->x[i];
+    }
+//?
+    if (!show(s, t, BEFORE_ARGUMENTpoints, shown, h)) {
         return 0;
     }
+//? mirrors
+    take_signs(s, h);
+//?
     for (int i = 0; i < SENSORS; i++) {
         const real spread = shown_together(shown, i, i);
         believed[i] = judge(s, i, s->readings[i], h[i], spread, noises);
@@ -197,7 +280,7 @@ static truth correct(STATE *s, double t)
             if (believed[i] != 0 && end != R(0.0)) {
                 real weighed[2];
                 if (is_moved) {
-                    if (!show(s, t, points, shown, h)) {
+                    if (!show(s, t, BEFORE_ARGUMENTpoints, shown, h)) {
                         return 1;
                     }
                 }
@@ -214,7 +297,7 @@ static truth correct(STATE *s, double t)
 //?
             if (believed[i] != 0 && round == 0) {
                 taken[count] = i;
-                innovations[count] = s->readings[i] - h[i];
+                innovations[count] = READING_SHOWN - h[i];
                 count++;
             }
         }

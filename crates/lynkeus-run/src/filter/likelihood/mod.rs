@@ -77,6 +77,7 @@ pub struct Score {
 ///         output: x.node(),
 ///         noise: ParametricLevel::Variance(number(1.0)),
 ///         limits: None,
+///         is_dial: false,
 ///     }],
 ///     process_noise: vec![number(0.0)],
 ///     ranges: vec![],

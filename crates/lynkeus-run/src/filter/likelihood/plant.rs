@@ -63,6 +63,8 @@ pub struct ParametricSensor {
     pub noise: ParametricLevel,
     /// the range that it can show; a reading at an end says that y is there or beyond
     pub limits: Option<Limits>,
+    /// it shows an angle: a full turn changes nothing
+    pub is_dial: bool,
 }
 
 /// The noise of a sensor.

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use std::f64::consts::TAU;
+
 use lynkeus_expr::jacobian;
 use lynkeus_expr::{Expr, Node, Tape};
 use lynkeus_native::Function;
@@ -289,7 +291,14 @@ impl<'p, 'g> Sample<'p, 'g> {
         let predicted = terms.fold(g.expr(all[0]), |sum, term| sum + term);
         let [innovation, noise] = match weighed {
             Some(weighed) => weighed,
-            None => [self.reading - predicted, g.expr(all[1])],
+            None => {
+                let off = self.reading - predicted;
+                let innovation = match self.plant.sensors[sensor].is_dial {
+                    true => off + (0.5 - off / TAU).floor() * TAU,
+                    false => off,
+                };
+                [innovation, g.expr(all[1])]
+            }
         };
         corrected((&x, &root), &slopes, innovation, noise)
     }
