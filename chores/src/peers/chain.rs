@@ -85,6 +85,7 @@ fn filter(n: usize) -> Result<Blueprint, Error> {
         initial_variance: vec![1e-4; n],
         ranges: vec![range; n],
         confined: None,
+        whens: Default::default(),
     })?;
     let run = EstimatorSettings {
         method: Method::Rk4(Step::Substeps(1)),

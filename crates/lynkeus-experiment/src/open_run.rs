@@ -234,13 +234,14 @@ impl Driven {
         let names = self::told(plant).map(|variable| variable.name.clone());
         let outputs: Vec<(String, Node)> = names.zip(told).collect();
         let derivatives = put(&plant.derivatives);
-        System::new(
+        System::jumping(
             &plant.graph,
             plant.time,
             &states,
             &self.signals,
             &derivatives,
             &outputs,
+            &plant.whens.substituted(&plant.graph, &self.made),
         )
         .map_err(explain)
     }

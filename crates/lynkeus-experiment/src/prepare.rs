@@ -12,6 +12,7 @@ pub(crate) mod mentioned;
 pub mod modes;
 pub(crate) mod spread;
 pub mod systems;
+pub mod whens;
 
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
@@ -273,7 +274,13 @@ impl<'a> Prepared<'a> {
         if let Some(known) = self.examinations.get() {
             return Ok(known);
         }
-        let families: Vec<_> = self.study.observer.families().collect();
+        let mut families: Vec<_> = self.study.observer.families().collect();
+        if !self.plant().whens.is_empty() {
+            families.retain(|family| family.follows_jumps());
+            if families.is_empty() {
+                return Err(whens::no_family(self.study, self.plant()));
+            }
+        }
         let mut found = vec![];
         for (done, family) in families.iter().enumerate() {
             found.push(self.examined(*family, families.len() - done)?);

@@ -80,5 +80,7 @@ pub use builder::{Model, ModelError};
 pub use diagnostic::{Diagnostic, LoadError, Span};
 pub use elaborate::{DELAY_STATES, MAX_DELAY_STATES};
 pub use load::{model_names, parse_expression};
-pub use plant::{Assertion, Delay, Home, LoadOptions, Parameter, Plant, Tables, Variable};
+pub use plant::{
+    Assertion, Clause, Delay, Home, LoadOptions, Parameter, Plant, Tables, Timer, Variable, Whens,
+};
 pub use units::BaseUnit;

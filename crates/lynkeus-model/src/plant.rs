@@ -1,6 +1,6 @@
 //! What a model means: states, derivatives, inputs and outputs over one expression graph.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use lynkeus_expr::{Budget, Graph, Node};
 
@@ -37,6 +37,8 @@ pub struct Plant {
     pub delays: Vec<Delay>,
     /// what must hold along every run, in order of the text
     pub assertions: Vec<Assertion>,
+    /// what happens at events, in order of the text
+    pub whens: Whens,
     /// what the text says that has no effect here, or that looks wrong
     pub warnings: Vec<Diagnostic>,
 }
@@ -57,6 +59,7 @@ impl Plant {
             table_points: BTreeSet::new(),
             delays: vec![],
             assertions: vec![],
+            whens: Whens::default(),
             warnings: vec![],
         }
     }
@@ -71,6 +74,82 @@ pub struct Delay {
     pub states: String,
     /// how many there are
     pub count: usize,
+}
+
+/// The `when` clauses of a model. A variable that they assign is a state at rest, which jumps.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Whens {
+    /// in order of the text
+    pub clauses: Vec<Clause>,
+    /// states with the symbols of their values before an event, where clauses read these
+    pub before: Vec<(Node, Node)>,
+    /// what is told by time alone
+    pub timers: Vec<Timer>,
+}
+
+impl Whens {
+    /// True of a model without events.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.clauses.is_empty()
+    }
+
+    /// The lines of the text where clauses stand.
+    #[must_use]
+    pub fn lines(&self) -> Vec<usize> {
+        let mut lines: Vec<usize> = self.clauses.iter().map(|clause| clause.line).collect();
+        lines.dedup();
+        lines
+    }
+
+    /// The same with other expressions in the place of symbols; of states, other symbols.
+    #[must_use]
+    pub fn substituted(&self, graph: &Graph, by: &HashMap<Node, Node>) -> Self {
+        let mut changed = self.clone();
+        let image = |state: &mut Node| *state = by.get(state).copied().unwrap_or(*state);
+        changed
+            .before
+            .iter_mut()
+            .for_each(|pair| image(&mut pair.0));
+        for clause in &mut changed.clauses {
+            clause.conditions = graph.substitute(&clause.conditions, by);
+            let values: Vec<Node> = clause.changes.iter().map(|change| change.1).collect();
+            let values = graph.substitute(&values, by);
+            let changes = clause.changes.iter_mut().zip(values);
+            changes.for_each(|(change, value)| {
+                image(&mut change.0);
+                change.1 = value;
+            });
+        }
+        changed
+    }
+}
+
+/// A `when` or an `elsewhen`; without conditions, an equation that holds at every event.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Clause {
+    /// of clauses with one number the first that is due takes effect
+    pub group: usize,
+    /// it takes effect where one of them comes to hold
+    pub conditions: Vec<Node>,
+    /// states with their new values, over `time`, inputs, discrete states as they are now, and the
+    /// states as they were before
+    pub changes: Vec<(Node, Node)>,
+    /// line of the text, from 1
+    pub line: usize,
+}
+
+/// A symbol that is 1 at the instants start + k·interval, and else 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Timer {
+    /// the symbol
+    pub symbol: Node,
+    /// the first instant
+    pub start: f64,
+    /// the time between two of them
+    pub interval: f64,
+    /// the start of a run alone, wherever that is
+    pub is_initial: bool,
 }
 
 /// An `assert` of the model.
@@ -110,6 +189,8 @@ pub struct Variable {
     pub nominal: Option<f64>,
     /// declared as `Integer`
     pub integer: bool,
+    /// it changes at events alone
+    pub discrete: bool,
     /// declared with `fixed = true`: the value at the start is known, 0 where `start` is absent
     pub fixed: bool,
     /// where its values live
@@ -162,6 +243,7 @@ impl Variable {
             max: f64::INFINITY,
             nominal: None,
             integer: false,
+            discrete: false,
             fixed: false,
             home: Home::Line,
         }

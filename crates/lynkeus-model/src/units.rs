@@ -287,6 +287,16 @@ impl Walk<'_> {
                     self.compare(a, b, equation.span, "the other side");
                 }
                 EquationKind::For(_, body) => self.equations(body),
+                EquationKind::When(clauses) => {
+                    for (condition, body) in clauses {
+                        self.unit(*condition);
+                        self.equations(body);
+                    }
+                }
+                EquationKind::Reinit(state, value) => {
+                    let (a, b) = (self.unit(*state), self.unit(*value));
+                    self.compare(a, b, equation.span, "the other side");
+                }
                 EquationKind::If(branches, otherwise) => {
                     for (condition, body) in branches {
                         self.unit(*condition);

@@ -15,6 +15,30 @@ use crate::{Answer, Note, Partial, Question, QuestionError, Verdict};
 /// # Errors
 /// [`QuestionError`].
 pub fn analyse(plant: &Plant, question: &Question) -> Result<Answer, QuestionError> {
+    let between = between_events(plant, question)?;
+    Ok(match plant.whens.is_empty() {
+        true => between,
+        false => beyond_events(between),
+    })
+}
+
+/// What is seen before the first event is seen; what is hidden until then, an event may show.
+fn beyond_events(mut answer: Answer) -> Answer {
+    let mut doubted = vec![];
+    for asked in answer.asked_mut() {
+        if asked.verdict == Verdict::Unobservable {
+            asked.verdict = Verdict::Undecided;
+            doubted.push(asked.name.clone());
+        }
+    }
+    answer.symmetries.clear();
+    if !doubted.is_empty() {
+        answer.notes.push(Note::BetweenEvents(doubted));
+    }
+    answer
+}
+
+fn between_events(plant: &Plant, question: &Question) -> Result<Answer, QuestionError> {
     let outputs = measured(plant, question)?;
     let about = expressions(plant, question)?;
     check_names(plant, question)?;

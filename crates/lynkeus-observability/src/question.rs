@@ -120,6 +120,8 @@ pub enum Note {
     },
     /// what no branch tells of these may show when the branch changes, or from what several branches tell
     WithinBranches(Vec<String>),
+    /// what the flow hides of these may show when an event comes
+    BetweenEvents(Vec<String>),
     /// start values are given, and so many derivatives do not decide everything
     Derivatives(usize),
     /// the limit of that name struck after so many derivatives

@@ -59,6 +59,7 @@ fn input(graph: &Graph, node: Node) -> Variable {
         max: f64::INFINITY,
         nominal: None,
         integer: false,
+        discrete: false,
         fixed: false,
         home: Home::Line,
     }

@@ -37,6 +37,10 @@ pub trait Family: Sync {
     fn smooths(&self) -> bool {
         false
     }
+    /// Whether it goes along where the plant's state jumps at events.
+    fn follows_jumps(&self) -> bool {
+        false
+    }
     /// Whether every key has a value that can be used; a required one may be absent.
     ///
     /// # Errors

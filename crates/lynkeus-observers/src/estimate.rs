@@ -16,7 +16,7 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{Expr, Graph, Node};
-use lynkeus_model::Variable;
+use lynkeus_model::{Variable, Whens};
 use lynkeus_structure::{AugmentedPlant, Measurement, Region};
 
 use crate::conditions::Partial;
@@ -79,6 +79,14 @@ impl<'e, 'p> PlantCopy<'e, 'p> {
     /// Expressions of the plant at the estimate: f(x̂, u) from f(x, u).
     pub fn at_estimate(&self, expressions: &[Node]) -> Vec<Node> {
         self.augmented.graph().substitute(expressions, &self.seen)
+    }
+
+    /// The clauses by which the estimate jumps as the plant does.
+    pub fn whens(&self) -> Whens {
+        let augmented = self.augmented;
+        let pairs = augmented.states.iter().zip(&self.hats);
+        let hats = pairs.map(|(state, hat)| (state.node, hat.symbol)).collect();
+        augmented.whens.substituted(augmented.graph(), &hats)
     }
 
     /// The same where some states, by their places, have another estimate.

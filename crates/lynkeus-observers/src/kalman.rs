@@ -38,6 +38,7 @@ struct Filter {
     called: &'static str,
     keys: &'static [&'static [KeySpec]],
     smooths: bool,
+    follows_jumps: bool,
     kind: fn(&Tuning) -> Result<FilterKind, TuningError>,
 }
 
@@ -48,6 +49,7 @@ pub const EKF: &dyn Family = &Filter {
     called: "extended Kalman filter",
     keys: &[&KEYS, &BOUNDS],
     smooths: true,
+    follows_jumps: true,
     kind: |_| Ok(FilterKind::Extended),
 };
 
@@ -58,6 +60,7 @@ pub const UKF: &dyn Family = &Filter {
     called: "unscented Kalman filter",
     keys: &[&KEYS, &BOUNDS, &POINTS],
     smooths: false,
+    follows_jumps: false,
     kind: |tuning| {
         let SigmaPoints { alpha, beta, kappa } = SigmaPoints::default();
         let [own_alpha, own_beta, own_kappa] = &POINTS;
@@ -76,6 +79,7 @@ pub const MHE: &dyn Family = &Filter {
     called: "moving-horizon estimator",
     keys: &[&KEYS, &WINDOW],
     smooths: false,
+    follows_jumps: false,
     kind: |tuning| {
         let length = whole(tuning, &WINDOW[0])?;
         Ok(FilterKind::MovingHorizon(length.unwrap_or(HORIZON)))
@@ -124,6 +128,7 @@ impl Filter {
             patience: patience(tuning)?,
             projects: projects(tuning)?,
             outputs: copy.at_estimate(&outputs),
+            whens: copy.whens(),
             confined,
             initial_variance: variance.clone(),
         });
@@ -166,6 +171,10 @@ impl Family for Filter {
 
     fn smooths(&self) -> bool {
         self.smooths
+    }
+
+    fn follows_jumps(&self) -> bool {
+        self.follows_jumps
     }
 
     fn verify(&self, augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<(), TuningError> {
@@ -291,6 +300,10 @@ fn projects(tuning: &Tuning) -> Result<bool, TuningError> {
 /// The square of a quarter of the range, of an angle and a rotation of a turn: two standard deviations reach its ends. Without a range, that of
 /// the start value, or 1.
 pub fn prior_variance(state: &Variable, start: f64) -> f64 {
+    // what changes at events alone is known until then
+    if state.discrete {
+        return 0.0;
+    }
     let width = state.width();
     match width.is_finite() && width > 0.0 {
         true => (width / 4.0).powi(2),

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use lynkeus_expr::flow::Flow;
 use lynkeus_expr::{Graph, MissingInput, Node, flow};
-use lynkeus_model::Variable;
+use lynkeus_model::{Variable, Whens};
 use lynkeus_run::filter::FilterKind;
 use lynkeus_structure::AugmentedPlant;
 
@@ -111,6 +111,8 @@ pub struct FilterTuning {
     /// the derivatives with the estimate limited to its declared range, for where the model has
     /// no value outside of it
     pub confined: Vec<Node>,
+    /// by which the estimate jumps
+    pub whens: Whens,
 }
 
 impl Observer {

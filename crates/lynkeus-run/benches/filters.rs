@@ -44,6 +44,7 @@ fn chain(n: usize) -> Result<NoisyModel, Error> {
             n
         ],
         confined: None,
+        whens: Default::default(),
     })
 }
 

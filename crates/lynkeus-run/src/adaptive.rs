@@ -188,6 +188,9 @@ impl Adaptive {
                 false => step = self.up_to_event(method, leg, step)?,
             }
             leg.pass(step);
+            if leg.f.has_event() && leg.f.event(leg.t, leg.x)? {
+                method.restart(true);
+            }
             if leg.at_the_end() {
                 return Ok(true);
             }

@@ -1,10 +1,11 @@
 //! Inputs, plant, sensors and observer as one system.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use lynkeus_expr::{Graph, Node, Nodes, Reals};
 
 use crate::equations::{Both, Equations, Roots};
+use crate::events::{Clauses, Memory, Seen};
 use crate::method::are_finite;
 use crate::noise::Sensors;
 use crate::{Dynamics, Error, Evaluation, Events, Result, Simulation, Slopes, System};
@@ -163,6 +164,7 @@ impl Wiring {
             let made = over(observer, own_observer, &self.observed(&u, &shown));
             roots.surfaces.extend(made.surfaces);
             roots.bends.extend(made.bends);
+            roots.whens = roots.whens.or(made.whens);
             derivatives.extend(made.held.derivatives);
             row.extend(match observer.outputs().is_empty() {
                 true => &own_observer[0],
@@ -314,6 +316,22 @@ impl Dynamics for Loop {
 
     fn events(&mut self) -> Option<&mut dyn Events> {
         self.joined.events()
+    }
+
+    fn clauses(&self) -> Option<Arc<Clauses>> {
+        self.joined.clauses()
+    }
+
+    fn watch(&mut self, t: f64, x: &[f64], seen: &mut Vec<Seen>) {
+        self.joined.watch(t, x, seen);
+    }
+
+    fn truths(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>> {
+        self.joined.truths(t, x)
+    }
+
+    fn happen(&mut self, t: f64, x: &mut [f64], memory: &mut Memory) -> Result<Option<usize>> {
+        self.joined.happen(t, x, memory)
     }
 
     fn names(&self) -> Vec<String> {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::error::state_text;
-use crate::events::Guards;
+use crate::events::{Cause, Clauses, Guards, Memory, Seen};
 use crate::{Error, Result, Slopes};
 
 /// A right-hand side x' = f(t, x), with its [`Events`].
@@ -32,6 +32,48 @@ pub trait Dynamics {
     /// The instants and surfaces at which f is not smooth; none where it is smooth everywhere.
     fn events(&mut self) -> Option<&mut dyn Events> {
         None
+    }
+
+    /// The clauses by which the state jumps; none where it never does. Where there are some, the
+    /// methods below belong to them. States that a wrapper adds may follow those of the clauses.
+    fn clauses(&self) -> Option<Arc<Clauses>> {
+        None
+    }
+
+    /// Writes what the relations of the clauses are at (t, x).
+    fn watch(&mut self, _t: f64, _x: &[f64], _seen: &mut Vec<Seen>) {}
+
+    /// Which conditions of the clauses hold at (t, x).
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`].
+    fn truths(&mut self, _t: f64, _x: &[f64]) -> Result<Vec<bool>> {
+        Ok(vec![])
+    }
+
+    /// Lets the clauses that are due take effect at (t, x): the condition that came to hold first, where
+    /// one did; a number that is none's, where only discrete variables have changed.
+    ///
+    /// # Errors
+    /// [`Error::EndlessEvents`], [`Error::NotFinite`].
+    fn happen(&mut self, _t: f64, _x: &mut [f64], _memory: &mut Memory) -> Result<Option<usize>> {
+        Ok(None)
+    }
+
+    /// After an event at (t, x), the state is now `jumped`, the derivatives were and are `rates`: what
+    /// follows deviations of the state takes them along.
+    ///
+    /// # Errors
+    /// [`Error::Grazing`].
+    fn settle(
+        &mut self,
+        _at: (f64, &[f64]),
+        _jumped: &mut [f64],
+        _rates: [&[f64]; 2],
+        _cause: Option<Cause>,
+        _line: usize,
+    ) -> Result<()> {
+        Ok(())
     }
 
     /// Asked at every step: true ends the run with [`Error::Cancelled`].

@@ -4,8 +4,9 @@ use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard};
 
 use lynkeus_expr::{Graph, MissingInput, Node};
+use lynkeus_model::Whens;
 
-use crate::events::{Jump, Surface, TimeEvents, bends, state_events, time_events};
+use crate::events::{Jump, Surface, TimeEvents, WhenRoots, bends, state_events, time_events};
 
 /// x' = f(t, x, w) and y = h(t, x, w), with all that jumps taken out, in a graph of their own.
 #[derive(Debug)]
@@ -41,6 +42,8 @@ pub(crate) struct Roots {
     pub surfaces: Vec<Surface>,
     /// what vanishes where x' bends with the state
     pub bends: Vec<Node>,
+    /// the clauses by which the state jumps
+    pub whens: Option<WhenRoots>,
 }
 
 impl Equations {
@@ -51,20 +54,30 @@ impl Equations {
         symbols: &[Node],
         derivatives: &[Node],
         outputs: &[Node],
+        whens: &Whens,
     ) -> Result<Self, MissingInput> {
         let own = Graph::new();
-        let roots = [derivatives, outputs].concat();
-        let image = own.copied(graph, &[symbols, &roots].concat());
+        let read = WhenRoots::read(whens);
+        let clauses = &read[..WhenRoots::count(whens)];
+        let roots = [derivatives, outputs, clauses].concat();
+        let image = own.copied(graph, &[symbols, &roots, &read].concat());
         let moving: Vec<Node> = symbols.iter().map(|s| image[s]).collect();
         let mut roots: Vec<Node> = roots.iter().map(|r| image[r]).collect();
         let count = derivatives.len();
+        let all = roots.len() - clauses.len();
         let both = |roots: &[Node]| Both {
             derivatives: roots[..count].to_vec(),
             outputs: roots[count..].to_vec(),
         };
         let (modes, switches) = time_events(&own, moving[0], &mut roots)?;
+        let clauses = roots.split_off(all);
+        let whens = (!whens.is_empty()).then(|| {
+            let (states, rates) = (&symbols[1..=count], &roots[..count]);
+            WhenRoots::new(&own, whens, states, &moving, rates, &clauses, &image)
+        });
         let free = both(&roots);
-        let (held_modes, jumps, surfaces) = state_events(&own, &moving, &mut roots, count);
+        let (held_modes, jumps, mut surfaces) = state_events(&own, &moving, &mut roots, count);
+        surfaces.extend(whens.iter().flat_map(|whens| whens.surfaces(&own)));
         Ok(Self {
             states: vec![],
             signals: vec![],
@@ -74,6 +87,7 @@ impl Equations {
                 held: both(&roots),
                 surfaces,
                 bends: bends(&own, &moving[1..], &roots[..count]),
+                whens,
             },
             inputs: [moving, modes, held_modes].concat(),
             switches: vec![switches],
@@ -102,9 +116,16 @@ impl Equations {
     pub fn over(&self, to: &Graph, arguments: &[Node]) -> Roots {
         let own = self.graph();
         let mut roots = self.roots.clone();
+        let aside = roots.whens.iter_mut().flat_map(|whens| &mut whens.aside);
+        let mut beside: HashMap<Node, Node> = HashMap::new();
+        for symbol in aside {
+            let image = to.fresh("before").node();
+            beside.insert(std::mem::replace(symbol, image), image);
+        }
         let mut places: Vec<&mut Node> = roots.nodes().collect();
         let places_of = self.inputs.iter().copied();
         let mut images: HashMap<Node, Node> = places_of.zip(arguments.iter().copied()).collect();
+        images.extend(beside);
         for node in own.reachable(&places.iter().map(|node| **node).collect::<Vec<_>>()) {
             if !images.contains_key(&node)
                 && let Some(image) = to.rebuilt(&own, node, |argument| images[&argument])
@@ -124,6 +145,8 @@ impl Roots {
         let surfaces = self.surfaces.iter_mut().map(|surface| &mut surface.node);
         let both = [&mut self.free, &mut self.held].into_iter();
         let lists = both.flat_map(|both| [&mut both.derivatives, &mut both.outputs]);
-        lists.chain([&mut self.bends]).flatten().chain(surfaces)
+        let clauses = self.whens.iter_mut().flat_map(|whens| &mut whens.nodes);
+        let lists = lists.chain([&mut self.bends]).flatten();
+        lists.chain(surfaces).chain(clauses)
     }
 }

@@ -169,6 +169,30 @@ pub enum Error {
         time: f64,
     },
 
+    /// Events of a clause that never end.
+    #[error(
+        "the `when` of line {line} does not come to an end at t = {time}: {how}; give it a state of rest (a variable that says that it is over), or a hysteresis"
+    )]
+    EndlessEvents {
+        /// when
+        time: f64,
+        /// line of the text
+        line: usize,
+        /// in which way
+        how: String,
+    },
+
+    /// An event that a deviation moves by any time.
+    #[error(
+        "the estimate only touches the threshold of the `when` of line {line} at t = {time}: whether and when that event is cannot be told from the state, and no covariance goes through it"
+    )]
+    Grazing {
+        /// when
+        time: f64,
+        /// line of the text
+        line: usize,
+    },
+
     /// A sample from before where an estimator is.
     #[error(
         "the time {time} is before {reached}, where the estimator is: expected samples in the order of their times"

@@ -3,7 +3,7 @@
 
 use crate::adaptive::Adaptive;
 use crate::divergence::{diverged, largest};
-use crate::events::{Filippov, Sides};
+use crate::events::{Filippov, Memory, Seen, Sides, occur, rates};
 use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Method, Result, Step, spectral_radius};
@@ -152,12 +152,25 @@ impl Integrator {
                 Stepper::Adaptive(adaptive) => {
                     let at = (start, &*x);
                     let mut system = Filippov::new(f, &mut self.sides, at, end - start);
+                    system.begin(start, x)?;
                     adaptive.advance(&mut system, start, end, x)?;
                 }
-                Stepper::Fixed(fixed) => fixed.advance(f, start, end, whole, x)?,
+                Stepper::Fixed(fixed) => {
+                    let memory = &mut self.sides.memory;
+                    occur(f, memory, (start, end - start), x, &[], |_, _| ())?;
+                    fixed.advance(f, memory, (start, end), whole, x)?;
+                }
             }
         }
+        if let Some(clauses) = f.clauses() {
+            self.sides.memory.leave(&x[..clauses.states()]);
+        }
         Ok(())
+    }
+
+    /// What is remembered of clauses.
+    pub(crate) fn memory(&mut self) -> &mut Memory {
+        &mut self.sides.memory
     }
 
     /// For [`Method::Rk4`]: the step in use beside the step that the Jacobian asks
@@ -205,20 +218,20 @@ impl Fixed {
     fn advance(
         &mut self,
         f: &mut impl Dynamics,
-        from: f64,
-        to: f64,
+        memory: &mut Memory,
+        (from, to): (f64, f64),
         whole: f64,
         x: &mut [f64],
     ) -> Result<()> {
         let Some(used) = self.step.length(whole) else {
-            return self.auto(f, from, to, x);
+            return self.auto(f, memory, (from, to), x);
         };
         if self.advice.is_none() {
             self.advice = Some(advice(f, from, x, used));
         }
         let steps = fixed_steps(from, to, used)?;
         self.begin.copy_from_slice(x);
-        let result = self.rk4.advance(f, from, to, steps, x);
+        let result = self.steps(f, memory, (from, to), steps, x);
         if let Err(Error::NotFinite { .. }) = result {
             self.advice = Some(advice(f, from, &self.begin, used));
         }
@@ -227,7 +240,13 @@ impl Fixed {
 
     /// With a step from the spectral radius; a failed interval is tried again
     /// with smaller steps, since the Jacobian may have grown meanwhile.
-    fn auto(&mut self, f: &mut impl Dynamics, from: f64, to: f64, x: &mut [f64]) -> Result<()> {
+    fn auto(
+        &mut self,
+        f: &mut impl Dynamics,
+        memory: &mut Memory,
+        (from, to): (f64, f64),
+        x: &mut [f64],
+    ) -> Result<()> {
         let known = self.advice.filter(|_| self.since_look > 0);
         let mut seen = known.unwrap_or_else(|| advice(f, from, x, to - from));
         let needed = seen.needed;
@@ -241,15 +260,43 @@ impl Fixed {
             limit: MOST_STEPS,
         })?;
         self.begin.copy_from_slice(x);
+        let remembered = memory.clone();
         for _ in 0..RETRIES {
-            if self.rk4.advance(f, from, to, steps, x).is_ok() {
-                return Ok(());
+            match self.steps(f, memory, (from, to), steps, x) {
+                Ok(()) => return Ok(()),
+                Err(error @ (Error::EndlessEvents { .. } | Error::Grazing { .. })) => {
+                    return Err(error);
+                }
+                Err(_) => {}
             }
             x.copy_from_slice(&self.begin);
+            memory.clone_from(&remembered);
             steps = steps.saturating_mul(4).min(MOST_STEPS);
             self.since_look = 0;
         }
-        self.rk4.advance(f, from, to, steps, x)
+        self.steps(f, memory, (from, to), steps, x)
+    }
+
+    /// So many equal steps, with events where there are clauses.
+    fn steps(
+        &mut self,
+        f: &mut impl Dynamics,
+        memory: &mut Memory,
+        (from, to): (f64, f64),
+        steps: usize,
+        x: &mut [f64],
+    ) -> Result<()> {
+        if f.clauses().is_none() {
+            return self.rk4.advance(f, from, to, steps, x);
+        }
+        for i in 0..steps {
+            let [t, next] = [i, i + 1].map(|i| instant(from, to, steps, i));
+            if f.is_over() {
+                return Err(Error::Cancelled { time: t });
+            }
+            self.rk4.step_with_events(f, memory, (t, next), x)?;
+        }
+        Ok(())
     }
 }
 
@@ -344,6 +391,9 @@ pub(crate) fn instant(from: f64, to: f64, steps: usize, i: usize) -> f64 {
     from + (to - from) * (i as f64 / steps as f64)
 }
 
+/// How often a step is halved on the way to an event.
+const HALVINGS: usize = 50;
+
 /// (time of the stage as a fraction of the step, factor of the stage before)
 const STAGES: [(f64, f64); 4] = [(0.0, 0.0), (0.5, 0.5), (0.5, 0.5), (1.0, 1.0)];
 
@@ -404,6 +454,119 @@ impl Rk4 {
             }
             self.step(f, t, next - t, x)?;
             t = next;
+        }
+        Ok(())
+    }
+
+    /// One step with events in it. Where a relation of a clause is another one at the end of it, steps of
+    /// the same method from the same start, their lengths halved [`HALVINGS`] times, find the first
+    /// that ends beyond the change; the clauses take effect there, and another step leads to the end. A
+    /// state that a jump has sent back is followed by shorter steps until it has left.
+    fn step_with_events(
+        &mut self,
+        f: &mut impl Dynamics,
+        memory: &mut Memory,
+        (from, to): (f64, f64),
+        x: &mut [f64],
+    ) -> Result<()> {
+        let (mut t, mut was, mut now) = (from, vec![], vec![]);
+        let mut sent_back: Option<usize> = None;
+        let mut start = x.to_vec();
+        while to - t > resolution(to) {
+            let whole = to - t;
+            start.copy_from_slice(x);
+            f.watch(t, x, &mut was);
+            let mut h = whole;
+            self.step(f, t, h, x)?;
+            f.watch(t + h, x, &mut now);
+            // there and back within one step
+            if let Some(relation) = sent_back.take() {
+                for _ in 0..HALVINGS {
+                    if now[relation].holds != was[relation].holds {
+                        break;
+                    }
+                    h *= 0.5;
+                    x.copy_from_slice(&start);
+                    self.step(f, t, h, x)?;
+                    f.watch(t + h, x, &mut now);
+                }
+                if now[relation].holds == was[relation].holds {
+                    h = whole;
+                    x.copy_from_slice(&start);
+                    self.step(f, t, h, x)?;
+                    f.watch(t + h, x, &mut now);
+                }
+            }
+            let changes = |a: &[Seen], b: &[Seen]| a.iter().zip(b).any(|(a, b)| a.holds != b.holds);
+            if !changes(&was, &now) {
+                t = if h == whole { to } else { t + h };
+                self.check(f, memory, t, x, &now)?;
+                continue;
+            }
+            let (mut low, mut high) = (0.0, h);
+            let mut end = x.to_vec();
+            let mut there = vec![];
+            for _ in 0..HALVINGS {
+                let middle = low + 0.5 * (high - low);
+                if high - low <= resolution(t + high) {
+                    break;
+                }
+                x.copy_from_slice(&start);
+                self.step(f, t, middle, x)?;
+                f.watch(t + middle, x, &mut there);
+                match changes(&was, &there) {
+                    true => {
+                        high = middle;
+                        end.copy_from_slice(x);
+                        now.clone_from(&there);
+                    }
+                    false => low = middle,
+                }
+            }
+            x.copy_from_slice(&end);
+            t = if high == whole { to } else { t + high };
+            let pairs = was.iter().zip(&now).enumerate();
+            let flipped = pairs.filter(|(_, (a, b))| a.holds != b.holds);
+            let flipped: Vec<usize> = flipped.map(|(relation, _)| relation).collect();
+            if occur(f, memory, (t, to - from), x, &flipped, |_, _| ())? {
+                sent_back = self.sent_back(f, (t, to - from), x, &flipped);
+            }
+        }
+        Ok(())
+    }
+
+    /// The relation that still holds behind an event and is left from there.
+    fn sent_back(
+        &mut self,
+        f: &mut impl Dynamics,
+        (t, length): (f64, f64),
+        x: &[f64],
+        flipped: &[usize],
+    ) -> Option<usize> {
+        let mut slope = vec![0.0; x.len()];
+        f.derivatives(t, x, &mut slope);
+        let rates = rates(f, (t, length), x, &slope);
+        let mut seen = vec![];
+        f.watch(t, x, &mut seen);
+        let leaves = |relation: &&usize| match seen[**relation].holds {
+            true => rates[**relation] < 0.0,
+            false => rates[**relation] > 0.0,
+        };
+        flipped.iter().find(leaves).copied()
+    }
+
+    /// That clauses which came ever sooner still hold.
+    fn check(
+        &mut self,
+        f: &mut impl Dynamics,
+        memory: &mut Memory,
+        t: f64,
+        x: &[f64],
+        seen: &[Seen],
+    ) -> Result<()> {
+        if let (true, Some(clauses)) = (memory.suspects(), f.clauses()) {
+            let size = x.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            memory.check(&clauses, t, seen, |_| size)?;
         }
         Ok(())
     }

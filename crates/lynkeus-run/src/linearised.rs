@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use lynkeus_expr::{Graph, Node, jacobian};
+use lynkeus_model::Whens;
 
 use crate::filter::by_distance;
 use crate::method::are_finite;
@@ -57,6 +58,30 @@ impl Linearised {
         outputs: &[(String, Node)],
         jacobians: &Jacobians<Entries>,
     ) -> Result<Self> {
+        let none = Whens::default();
+        Self::jumping(
+            graph,
+            time,
+            states,
+            signals,
+            derivatives,
+            outputs,
+            jacobians,
+            &none,
+        )
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "what a system is made of")]
+    fn jumping(
+        graph: &Graph,
+        time: Node,
+        states: &[(String, Node, f64)],
+        signals: &[(String, Node)],
+        derivatives: &[Node],
+        outputs: &[(String, Node)],
+        jacobians: &Jacobians<Entries>,
+        whens: &Whens,
+    ) -> Result<Self> {
         let mut all = vec![];
         let state = Jacobian::among(&mut all, &jacobians.state);
         all.extend_from_slice(outputs);
@@ -65,7 +90,7 @@ impl Linearised {
             estimate: Jacobian::among(&mut all, &jacobians.estimate),
             output: Jacobian::among(&mut all, &jacobians.output),
         };
-        let system = System::new(graph, time, states, signals, derivatives, &all)?;
+        let system = System::jumping(graph, time, states, signals, derivatives, &all, whens)?;
         Ok(Self { system, jacobians })
     }
 
@@ -79,13 +104,23 @@ impl Linearised {
         states: &[(String, Node, f64)],
         signals: &[(String, Node)],
         derivatives: &[Node],
+        whens: &Whens,
     ) -> Result<Self> {
         let symbols: Vec<Node> = states.iter().map(|s| s.1).collect();
         let jacobians = Jacobians {
             state: jacobian::forward(graph, derivatives, &symbols).entries,
             ..Jacobians::default()
         };
-        Self::new(graph, time, states, signals, derivatives, &[], &jacobians)
+        Self::jumping(
+            graph,
+            time,
+            states,
+            signals,
+            derivatives,
+            &[],
+            &jacobians,
+            whens,
+        )
     }
 
     /// Outputs h with C by x: a system without states, whose signals are x and w.

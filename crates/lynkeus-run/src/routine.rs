@@ -268,7 +268,8 @@ mod tests {
                 .map(|i| (x[i] * read + i as f64).exp().node())
                 .collect();
             let symbols: Vec<Node> = [t].into_iter().chain(x.iter().map(|x| x.node())).collect();
-            let equations = Arc::new(Equations::new(&g, &symbols, &dx, &[]).unwrap());
+            let equations =
+                Arc::new(Equations::new(&g, &symbols, &dx, &[], &Default::default()).unwrap());
             let dx = equations.roots.free.derivatives.clone();
             let routine = Routine::new(&equations, symbols.len(), dx, vec![]).unwrap();
             routine.slopes(n).map(|known| known.places.len())

@@ -190,6 +190,9 @@ impl Persist for Sampled {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.driven.walk(walk)?;
         self.integrator.walk(walk)?;
+        if self.driven.system().has_clauses() {
+            self.integrator.memory().walk(walk)?;
+        }
         walk.numbers(&mut self.x)?;
         walk.numbers(&mut self.outputs)?;
         walk.number(&mut self.bound.scale)?;

@@ -5,11 +5,12 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use lynkeus_expr::{Evaluator, Graph, MissingInput, Node, Tape};
+use lynkeus_model::Whens;
 
 use crate::divergence::explained;
 use crate::equations::{Both, Equations};
 use crate::error::state_text;
-use crate::events::{Guards, TimeEvents};
+use crate::events::{Clauses, Guards, JumpSlopes, Memory, Seen, TimeEvents};
 use crate::routine::{Routine, Runner};
 use crate::snapshot::{Damaged, Digest, Persist, Walk};
 use crate::{BetweenSamples, Dynamics, Error, Events, Margin, Result, Slopes};
@@ -50,6 +51,8 @@ struct Code {
     indicators: Tape,
     /// where it jumps and bends with the state, over all inputs
     guards: Option<Arc<Guards>>,
+    /// by which its state jumps
+    clauses: Option<Arc<Clauses>>,
 }
 
 impl System {
@@ -71,6 +74,24 @@ impl System {
         derivatives: &[Node],
         outputs: &[(String, Node)],
     ) -> Result<Self> {
+        let none = Whens::default();
+        Self::jumping(graph, time, states, signals, derivatives, outputs, &none)
+    }
+
+    /// The same of a system whose state jumps by clauses, whose symbols are those of the states, time
+    /// and signals.
+    ///
+    /// # Errors
+    /// As [`System::new`].
+    pub fn jumping(
+        graph: &Graph,
+        time: Node,
+        states: &[(String, Node, f64)],
+        signals: &[(String, Node)],
+        derivatives: &[Node],
+        outputs: &[(String, Node)],
+        whens: &Whens,
+    ) -> Result<Self> {
         if states.len() != derivatives.len() {
             let (expected, found) = (per_state(states.len()), derivatives.len());
             return Err(Error::setting("number of derivatives", expected, found));
@@ -83,7 +104,7 @@ impl System {
             states: states.iter().map(|(name, ..)| name.clone()).collect(),
             signals: signals.iter().map(|(name, _)| name.clone()).collect(),
             outputs: outputs.iter().map(|(name, _)| name.clone()).collect(),
-            ..Equations::new(graph, &symbols, derivatives, &roots)?
+            ..Equations::new(graph, &symbols, derivatives, &roots, whens)?
         };
         let start = states.iter().map(|(.., value)| *value).collect();
         Self::compiled(equations, start)
@@ -109,7 +130,11 @@ impl System {
         let graph = equations.graph();
         let surfaces: Vec<Node> = roots.surfaces.iter().map(|surface| surface.node).collect();
         let states = equations.states.len();
+        let smooth = &inputs[..equations.smooth_inputs()];
+        let clauses = roots.whens.as_ref();
+        let clauses = clauses.map(|whens| Clauses::new(&graph, smooth, states, whens));
         let code = Code {
+            clauses: clauses.transpose()?.map(Arc::new),
             free,
             held,
             indicators: Tape::new(&graph, inputs, &surfaces)?,
@@ -199,6 +224,9 @@ impl System {
             let _ = write!(digest, "{tapes:?}");
         }
         let _ = write!(digest, "{:?}", code.indicators);
+        if let Some(clauses) = &code.clauses {
+            let _ = write!(digest, "{clauses:?}");
+        }
         digest.numbers(&self.start);
     }
 
@@ -236,10 +264,18 @@ impl System {
     }
 
     /// Whether it jumps or bends (as max does) with time alone, at instants that are found and at
-    /// which an integration stops.
+    /// which an integration stops; or whether its state jumps by clauses.
     pub fn has_instants(&self) -> bool {
+        if self.has_clauses() {
+            return true;
+        }
         let mut switches = self.code.equations.switches.iter();
         switches.any(|switches| !switches.is_empty())
+    }
+
+    /// Whether its state jumps by clauses.
+    pub fn has_clauses(&self) -> bool {
+        self.code.clauses.is_some()
     }
 
     /// An evaluator with its own working memory, signals at zero.
@@ -412,6 +448,37 @@ impl Evaluation {
         stays.then(|| self.at(t, x).1)
     }
 
+    /// What clauses read at (t, x); states that a wrapper adds do not count.
+    fn smooth_at(&mut self, t: f64, x: &[f64]) -> &[f64] {
+        let states = self.system.states().len();
+        let smooth = self.system.code.equations.smooth_inputs();
+        &self.at(t, &x[..states]).1[..smooth]
+    }
+
+    /// Lets clauses take effect, as [`Dynamics::happen`], with the slopes of the jump.
+    pub(crate) fn jump(
+        &mut self,
+        t: f64,
+        x: &mut [f64],
+        memory: &mut Memory,
+        slopes: Option<&mut JumpSlopes>,
+    ) -> Result<Option<usize>> {
+        let Some(clauses) = self.system.code.clauses.clone() else {
+            return Ok(None);
+        };
+        let inputs = self.smooth_at(t, x).to_vec();
+        let states = self.system.states().len();
+        clauses.happen(&inputs, &mut x[..states], memory, slopes)
+    }
+
+    /// The slopes of the quantity of a relation by the states at (t, x).
+    pub(crate) fn gradient(&mut self, t: f64, x: &[f64], relation: usize) -> Vec<f64> {
+        match self.system.code.clauses.clone() {
+            Some(clauses) => clauses.gradient(self.smooth_at(t, x), relation),
+            None => vec![],
+        }
+    }
+
     /// Goes to (t, x): the code that is in force there, and what it reads.
     fn at(&mut self, t: f64, x: &[f64]) -> (&mut Both<Runner>, &mut Vec<f64>) {
         self.inputs[0] = t;
@@ -468,6 +535,27 @@ impl Dynamics for Evaluation {
         Some(self)
     }
 
+    fn clauses(&self) -> Option<Arc<Clauses>> {
+        self.system.code.clauses.clone()
+    }
+
+    fn watch(&mut self, t: f64, x: &[f64], seen: &mut Vec<Seen>) {
+        if let Some(clauses) = self.system.code.clauses.clone() {
+            clauses.see(self.smooth_at(t, x), seen);
+        }
+    }
+
+    fn truths(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>> {
+        match self.system.code.clauses.clone() {
+            Some(clauses) => clauses.truths(self.smooth_at(t, x)),
+            None => Ok(vec![]),
+        }
+    }
+
+    fn happen(&mut self, t: f64, x: &mut [f64], memory: &mut Memory) -> Result<Option<usize>> {
+        self.jump(t, x, memory, None)
+    }
+
     fn names(&self) -> Vec<String> {
         self.system.states().to_vec()
     }
@@ -491,7 +579,11 @@ impl Dynamics for Evaluation {
 impl Events for Evaluation {
     fn instants(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<()> {
         let mut switches = self.switches.iter_mut();
-        switches.try_for_each(|switches| switches.instants(from, to, times))
+        switches.try_for_each(|switches| switches.instants(from, to, times))?;
+        match &self.system.code.clauses {
+            Some(clauses) => clauses.instants(from, to, times),
+            None => Ok(()),
+        }
     }
 
     fn enter(&mut self, t: f64) {
@@ -510,7 +602,7 @@ impl Events for Evaluation {
 
     fn indicators(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
         self.at(t, &x[..self.dimension()]);
-        if self.is_held {
+        if self.is_held || self.held.is_none() {
             self.indicators.eval(&self.inputs, values);
         }
     }

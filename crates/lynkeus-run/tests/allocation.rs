@@ -78,6 +78,7 @@ fn filter() -> Estimator {
         initial_variance: vec![1.0; 2],
         ranges: vec![],
         confined: None,
+        whens: Default::default(),
     };
     let model = NoisyModel::new(&plant).unwrap();
     let kind = FilterSettings::of(FilterKind::Extended);

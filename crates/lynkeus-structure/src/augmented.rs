@@ -3,10 +3,9 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{Graph, MissingInput, Node, jacobian};
-use lynkeus_model::{Plant, Variable};
+use lynkeus_model::{Plant, Variable, Whens};
 
-use crate::Reason;
-use crate::{Dimension, Finding, Region, regularity, steps};
+use crate::{Dimension, Finding, Reason, Region, regularity, steps};
 
 /// Who measures what.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -115,6 +114,8 @@ pub struct AugmentedPlant<'p> {
     pub input_derivatives: Vec<Vec<f64>>,
     /// measured outputs, in the order of the study
     pub outputs: Vec<Measurement>,
+    /// by which the states jump
+    pub whens: Whens,
     /// row by row which augmented states the derivative depends on
     pub pattern: Vec<Vec<usize>>,
     /// the side of time in the box; the whole line unless narrowed
@@ -136,6 +137,7 @@ impl<'p> AugmentedPlant<'p> {
         let silenced: HashMap<Node, Node> = disturbances.iter().map(|d| (d.node, zero)).collect();
         let mut derivatives = graph.substitute(&plant.derivatives, &silenced);
         derivatives.extend(unknown.iter().map(|_| zero));
+        let whens = plant.whens.substituted(graph, &silenced);
         let known =
             |v: &&Variable| !sensors.unknown.contains(&v.name) && !silenced.contains_key(&v.node);
         let inputs: Vec<Variable> = plant.inputs.iter().filter(known).cloned().collect();
@@ -157,6 +159,7 @@ impl<'p> AugmentedPlant<'p> {
             input_derivatives: vec![vec![]; inputs.len()],
             inputs,
             outputs,
+            whens,
             pattern,
             time: Dimension::new("time", plant.time, f64::NEG_INFINITY, f64::INFINITY),
         })
@@ -243,6 +246,10 @@ impl<'p> AugmentedPlant<'p> {
                 delay: delay.text.clone(),
                 states: delay.count,
             }));
+        }
+        if let Some(clause) = self.whens.clauses.first() {
+            let reason = Reason::StateJumps { line: clause.line };
+            return Ok(Finding::undecided(reason));
         }
         let all = [self.derivatives.clone(), self.output_nodes()].concat();
         regularity(self.graph(), &all, &self.symbols(), region)

@@ -116,6 +116,11 @@ pub enum Reason {
         /// how many states
         states: usize,
     },
+    /// the state jumps at events
+    StateJumps {
+        /// line of the first `when`
+        line: usize,
+    },
     /// the values of an expression lie in a range
     Lies {
         /// as a person would write it

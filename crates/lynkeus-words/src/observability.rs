@@ -66,6 +66,10 @@ impl Words for Note {
                 "within each branch the outputs do not tell {}; the moments at which the branch changes may, or what several branches tell together",
                 names.join(", ")
             ),
+            Note::BetweenEvents(names) => format!(
+                "between events (`when`) the outputs do not tell {}; what happens at one may",
+                names.join(", ")
+            ),
             Note::Derivatives(order) => format!(
                 "start values are given: {order} derivatives of the outputs were taken, and what is undecided may show in a later one, or never"
             ),

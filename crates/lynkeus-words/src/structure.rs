@@ -91,6 +91,9 @@ impl Words for Reason {
                 let word = if *certain { "has" } else { "may have" };
                 format!("{operation} {word} no value{}", at(place))
             }
+            Self::StateJumps { line } => {
+                format!("the state jumps at events (`when` of line {line})")
+            }
             Self::Jumps { operation, place } => format!("{operation} jumps{}", at(place)),
             Self::Lies {
                 expression,

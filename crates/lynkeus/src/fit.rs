@@ -113,6 +113,7 @@ pub fn fit(
 ) -> Result<Fit, Error> {
     let (study, notes) = posed::with_filter(study)?;
     let plant = prepare::plant(&study)?;
+    prepare::whens::refuse(&study, &plant, "fit")?;
     let prepared = Prepared::new(&study, &plant)?;
     let design = prepared.design()?;
     let logs = posed::logs(&prepared, &design, tables)?;

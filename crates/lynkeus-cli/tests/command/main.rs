@@ -7,6 +7,7 @@ mod certify;
 mod compare;
 mod credible;
 mod delays;
+mod events;
 mod export;
 mod families;
 mod faulty;

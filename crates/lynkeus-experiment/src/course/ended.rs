@@ -42,6 +42,7 @@ pub(crate) fn is_answer(error: &RunError) -> bool {
             | RunError::NotFinite { .. }
             | RunError::StepUnderflow { .. }
             | RunError::Singular { .. }
+            | RunError::Grazing { .. }
     )
 }
 
@@ -57,7 +58,10 @@ pub(crate) fn is_observers_answer(error: &RunError) -> bool {
 
 /// A run on a log that ended early; what is wrong with a setting is the study's fault, not the log's.
 pub(crate) fn interrupted_on(error: RunError, log: &str, study: &str) -> Error {
-    let is_setting = matches!(error, RunError::Setting { .. } | RunError::TooStiff { .. });
+    let is_setting = matches!(
+        error,
+        RunError::Setting { .. } | RunError::TooStiff { .. } | RunError::EndlessEvents { .. }
+    );
     interrupted(error, if is_setting { study } else { log })
 }
 

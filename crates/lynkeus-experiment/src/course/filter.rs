@@ -324,7 +324,8 @@ fn model(
         process_noise: densities,
         initial_variance: variances,
         ranges: augmented.states.iter().map(range).collect(),
-        confined: Some(tuning.confined.clone()),
+        confined: tuning.whens.is_empty().then(|| tuning.confined.clone()),
+        whens: tuning.whens.clone(),
     };
     let model = compiled(&plant).map_err(explain)?;
     Ok(model.on(manifold::of(augmented)))
@@ -385,6 +386,10 @@ fn compiled(plant: &NoisyPlant<'_>) -> Result<NoisyModel, lynkeus_run::Error> {
     nodes.push(vec![plant.time]);
     nodes.push(plant.derivatives.clone());
     nodes.extend(plant.confined.clone());
+    for clause in &plant.whens.clauses {
+        let (changed, values) = clause.changes.iter().copied().unzip();
+        nodes.extend([clause.conditions.clone(), changed, values]);
+    }
     let asked = Asked { nodes, names };
     let mut known = known.0.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((own, model)) = &*known

@@ -206,6 +206,7 @@ pub(crate) fn observer(
                 initial_variance,
                 ranges: vec![],
                 confined: None,
+                whens: Default::default(),
             };
             let errors = NoisyModel::of_observer(&observer, &estimates, lag);
             Some(Box::new(errors.map_err(explain)?))

@@ -87,6 +87,7 @@ fn offset(plant: &Plant, signal: &Variable) -> Variable {
         max: f64::INFINITY,
         nominal: None,
         integer: false,
+        discrete: false,
         fixed: false,
         home: Home::Line,
         name,
@@ -105,6 +106,7 @@ fn take_from(plant: &mut Plant, input: Node, offset: Node) {
     let felt = (graph.expr(input) - graph.expr(offset)).node();
     let felt = HashMap::from([(input, felt)]);
     plant.derivatives = graph.substitute(&plant.derivatives, &felt);
+    plant.whens = plant.whens.substituted(graph, &felt);
     for variable in plant.outputs.iter_mut().chain(&mut plant.algebraics) {
         variable.node = graph.substitute(&[variable.node], &felt)[0];
     }

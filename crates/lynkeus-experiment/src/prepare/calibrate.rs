@@ -59,6 +59,7 @@ pub(crate) fn as_states(study: &Study, mut plant: Plant, valued: bool) -> Result
             values.insert(parameter.variable.node, plant.graph.constant(value).node());
         }
         plant.derivatives = plant.graph.substitute(&plant.derivatives, &values);
+        plant.whens = plant.whens.substituted(&plant.graph, &values);
         for variable in plant.outputs.iter_mut().chain(&mut plant.algebraics) {
             variable.node = plant.graph.substitute(&[variable.node], &values)[0];
         }

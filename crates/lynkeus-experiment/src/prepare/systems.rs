@@ -128,13 +128,14 @@ pub(crate) fn plant_reading(
         .zip(starts)
         .map(|(s, start)| (s.name.clone(), s.node, start))
         .collect();
-    System::new(
+    System::jumping(
         &plant.graph,
         plant.time,
         &states,
         signals,
         &plant.derivatives,
         &named(&plant.outputs),
+        &plant.whens,
     )
     .map_err(explain)
 }

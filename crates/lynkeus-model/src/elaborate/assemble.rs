@@ -7,6 +7,7 @@ use lynkeus_expr::{Binary, Graph, Interval, Node, Tape, Unary, jacobian};
 
 use super::delayed::Delayed;
 use super::evaluate::Evaluator;
+use super::events;
 use super::flatten::Flat;
 use super::scope::Mode;
 use super::symbols::{Component, Symbols, is_outer_input};
@@ -57,6 +58,14 @@ pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec
         };
         delayed.join(graph, &solution, start, &mut plant);
     }
+    let held = events::held(&flat.clauses);
+    for state in plant.states.iter_mut().filter(|s| held.contains(&s.node)) {
+        state.discrete = true;
+        state.fixed = true;
+        state.start = state.start.or(Some(0.0));
+    }
+    let states: Vec<Node> = plant.states.iter().map(|state| state.node).collect();
+    plant.whens = events::whens(symbols, &flat.clauses, &solution, &states)?;
     warnings.extend(fix_starts(symbols, &flat, &solution, &mut plant.states));
     let found = assertions(graph, flat.claims, &solution);
     warnings.extend(failing_at_start(symbols, &found, &plant));
@@ -349,18 +358,25 @@ fn fix_starts(
     let graph = symbols.graph;
     let mut at_start = solution.clone();
     at_start.insert(symbols.time(), graph.constant(0.0).node());
+    let now = symbols.now();
     let values = symbols.parameter_values();
     let places: HashMap<Node, usize> = states.iter().map(|state| state.node).zip(0..).collect();
     let unread = flat.initial_unread.iter();
     let mut warnings: Vec<Problem> = unread.map(|&span| without_effect(span, UNREAD)).collect();
     for equation in &flat.initial {
-        let sides = graph.substitute(&[equation.left, equation.right], &at_start);
+        // before the start is at the start
+        let sides = graph.substitute(&[equation.left, equation.right], &now);
+        let sides = graph.substitute(&sides, &at_start);
         match start_fixed(graph, &values, &places, [sides[0], sides[1]]) {
             Some((place, start, value)) => {
                 let state = &mut states[place];
                 state.start = value;
                 state.start_node = (!graph.symbols_of(&[start]).is_empty()).then_some(start);
                 state.fixed = true;
+                if !flat.clauses.is_empty() {
+                    // what counts at events begins one value after the other
+                    at_start.insert(state.node, start);
+                }
             }
             None => warnings.push(without_effect(equation.span, FIXES_NONE)),
         }

@@ -2,6 +2,7 @@
 
 use lynkeus_expr::{Graph, Node, Unary};
 
+use super::clauses::{Change, FlatClause};
 use super::scope::{Frame, Local, Mode, Named};
 use super::symbols::Symbols;
 use super::value::{Scalar, Value, describe_dims, expected_number};
@@ -48,6 +49,11 @@ pub(crate) struct Evaluator<'a> {
     /// what is to hold along a run
     pub(super) claims: Vec<(Assertion, Span)>,
     pub(super) equations: Vec<FlatEquation>,
+    /// what is read now stands in a `when`
+    pub(super) is_in_when: bool,
+    pub(super) clauses: Vec<FlatClause>,
+    /// of the `when` that is read now
+    pub(super) resets: Vec<Change>,
 }
 
 impl<'a> Evaluator<'a> {
@@ -71,6 +77,9 @@ impl<'a> Evaluator<'a> {
             conditions: vec![],
             claims: vec![],
             equations: vec![],
+            is_in_when: false,
+            clauses: vec![],
+            resets: vec![],
         }
     }
 

@@ -35,6 +35,11 @@ pub(super) fn targets(source: &str, ast: &Ast, statements: &[Statement], into: &
                 }
                 self::targets(source, ast, otherwise, into);
             }
+            StatementKind::When(clauses) => {
+                for (_, body) in clauses {
+                    self::targets(source, ast, body, into);
+                }
+            }
             _ => {}
         }
     }
@@ -62,6 +67,12 @@ impl<'a> Evaluator<'a> {
             StatementKind::If(branches, otherwise) => {
                 return self.branched(branches, otherwise);
             }
+            StatementKind::When(_) => {
+                let message = "a `when` within another statement";
+                return Err(self
+                    .problem(message)
+                    .hint("it stands by itself in a section `algorithm` of the model"));
+            }
             StatementKind::Assert(assert) => self.claim(assert)?,
             StatementKind::Break => return Ok(Ended::ByBreak),
             StatementKind::Return => return Ok(Ended::ByReturn),
@@ -71,6 +82,12 @@ impl<'a> Evaluator<'a> {
 
     /// Notes an `assert`; one that is known to fail is refused.
     pub(super) fn claim(&mut self, assert: &Assert) -> Result<()> {
+        if self.is_in_when {
+            let message = "an `assert` within a `when` is not supported";
+            return Err(self
+                .problem(message)
+                .hint("write it outside, where it always holds"));
+        }
         let mut condition = self.condition(assert.condition)?;
         self.charge(self.conditions.len() as u64)?;
         for &(on_path, holds) in &self.conditions {

@@ -2,7 +2,9 @@
 
 use lynkeus_expr::{Binary, Node};
 
+use super::clauses::FlatClause;
 use super::evaluate::Evaluator;
+use super::events::discrete;
 use super::execute::{Ended, targets};
 use super::scope::{Frame, Local, Mode, Named};
 use super::symbols::Symbols;
@@ -12,7 +14,9 @@ use super::value::{
 use crate::Assertion;
 use crate::balance::FlatEquation;
 use crate::diagnostic::{Result, Span};
-use crate::syntax::ast::{Equation, EquationKind, ExprId, Kind, Statement, Variability};
+use crate::syntax::ast::{
+    Equation, EquationKind, ExprId, Kind, Statement, StatementKind, Variability,
+};
 use crate::syntax::plain;
 
 /// A model written out.
@@ -23,6 +27,7 @@ pub(super) struct Flat {
     pub initial_unread: Vec<Span>,
     /// what is to hold along a run, and where that stands
     pub claims: Vec<(Assertion, Span)>,
+    pub clauses: Vec<FlatClause>,
 }
 
 /// All scalar equations of a model, declaration equations first.
@@ -48,7 +53,9 @@ pub(super) fn flatten(symbols: &Symbols<'_>) -> Result<Flat> {
     for algorithm in &model.algorithms {
         evaluator.algorithm(algorithm)?;
     }
-    let equations = std::mem::take(&mut evaluator.equations);
+    let mut equations = std::mem::take(&mut evaluator.equations);
+    let mut clauses = std::mem::take(&mut evaluator.clauses);
+    discrete(symbols, &mut equations, &mut clauses)?;
     let claims = std::mem::take(&mut evaluator.claims);
     let mut initial_unread = vec![];
     for equation in &model.initial {
@@ -62,6 +69,7 @@ pub(super) fn flatten(symbols: &Symbols<'_>) -> Result<Flat> {
         initial: evaluator.equations,
         initial_unread,
         claims,
+        clauses,
     })
 }
 
@@ -79,6 +87,12 @@ impl<'a> Evaluator<'a> {
 
     /// The variables that an algorithm assigns, each with an equation of its own.
     fn algorithm(&mut self, statements: &'a [Statement]) -> Result<()> {
+        if statements
+            .iter()
+            .any(|s| matches!(s.kind, StatementKind::When(_)))
+        {
+            return self.when_statements(statements);
+        }
         let mut names = vec![];
         targets(self.source, self.ast, statements, &mut names);
         names.sort_unstable();
@@ -146,6 +160,8 @@ impl<'a> Evaluator<'a> {
                 ended.map(|_| ())
             }
             EquationKind::If(branches, otherwise) => self.choose(branches, otherwise),
+            EquationKind::When(clauses) => self.when(clauses),
+            EquationKind::Reinit(state, value) => self.reinit(*state, *value),
         }
     }
 
@@ -236,7 +252,7 @@ impl<'a> Evaluator<'a> {
     }
 
     /// The equations of a branch by themselves.
-    fn apart(&mut self, body: &'a [Equation]) -> Result<Vec<FlatEquation>> {
+    pub(super) fn apart(&mut self, body: &'a [Equation]) -> Result<Vec<FlatEquation>> {
         let outside = std::mem::take(&mut self.equations);
         let done = self.write_out(body);
         let inside = std::mem::replace(&mut self.equations, outside);

@@ -21,7 +21,7 @@ const INTERPOLATE: &str = "Modelica.Math.Vectors.interpolate";
 type Function = for<'e, 'a> fn(&'e mut Evaluator<'a>, &'a Call) -> Result<Value>;
 
 /// By name: what an evaluator `e` makes of a call `c`.
-const FUNCTIONS: [(&str, Function); 48] = [
+const FUNCTIONS: [(&str, Function); 53] = [
     ("sqrt", |e, c| e.each(c, |x| x.sqrt())),
     ("exp", |e, c| e.each(c, |x| x.exp())),
     ("log", |e, c| e.each(c, |x| x.ln())),
@@ -51,6 +51,11 @@ const FUNCTIONS: [(&str, Function); 48] = [
     ("noEvent", |e, c| e.only_argument(c)),
     ("smooth", |e, c| Ok(e.two_arguments(c)?.1)),
     ("homotopy", |e, c| Ok(e.two_arguments(c)?.0)),
+    ("pre", |e, c| e.before(c)),
+    ("edge", |e, c| e.edge(c)),
+    ("change", |e, c| e.change(c)),
+    ("sample", |e, c| e.sample(c)),
+    ("initial", |e, c| e.initial(c)),
     ("semiLinear", |e, c| e.semi_linear(c)),
     ("cross", |e, c| e.cross(c)),
     (INTERPOLATE, |e, c| e.interpolate(c)),
@@ -72,17 +77,10 @@ const FUNCTIONS: [(&str, Function); 48] = [
     ("matrix", |e, c| e.reshaped(c, matrix_dims)),
 ];
 
-const NO_EVENTS: &str = "models with events are not supported: use `if` expressions";
-
 /// Functions that an observer's model cannot have, and what to do instead.
-const REFUSED: [(&str, &str); 9] = [
-    ("pre", NO_EVENTS),
-    ("edge", NO_EVENTS),
-    ("change", NO_EVENTS),
-    ("sample", "sampling is set in the study, not in the model"),
-    ("initial", "give the starting values with `start = …`"),
-    ("terminal", "models with events are not supported"),
-    ("reinit", "models with events are not supported"),
+const REFUSED: [(&str, &str); 4] = [
+    ("terminal", "the study says until when a run goes"),
+    ("reinit", "it is an equation of its own, in a `when`"),
     (
         "spatialDistribution",
         "use `delay` where the flow is constant, or a chain of lags",

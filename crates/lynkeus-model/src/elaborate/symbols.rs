@@ -5,6 +5,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use lynkeus_expr::{Graph, Node};
 
+use super::clauses::EventSymbols;
 use super::delayed::Delayed;
 use super::scope::{Mode, Named};
 use super::value::Scalar;
@@ -53,6 +54,8 @@ pub(crate) struct Symbols<'a> {
     pub(super) parameters: HashSet<Node>,
     /// symbols that may stand in `der`, with the symbols of their derivatives once they do
     pub(super) derivatives: RefCell<HashMap<Node, Option<Node>>>,
+    /// what the text says of events, found on the way
+    pub(super) events: RefCell<EventSymbols>,
     /// of each declaration: true where the value of a parameter is made from other parameters
     pub dependent: Vec<bool>,
 }
@@ -88,6 +91,7 @@ impl<'a> Symbols<'a> {
             gathered: HashMap::new(),
             parameters: HashSet::new(),
             derivatives: RefCell::default(),
+            events: RefCell::default(),
             dependent: vec![],
         }
     }

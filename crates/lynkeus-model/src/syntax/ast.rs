@@ -203,6 +203,8 @@ pub(crate) struct Declaration {
     pub is_final: bool,
     pub variability: Variability,
     pub causality: Causality,
+    /// `discrete` is written
+    pub is_discrete: bool,
     /// `flow` or `stream`, where it is written
     pub of_connector: Option<Span>,
     pub type_name: TypeName,
@@ -262,6 +264,10 @@ pub(crate) enum EquationKind {
     For(Vec<ForIndex>, Vec<Equation>),
     /// conditions with equations, and those of `else`
     If(Vec<(ExprId, Vec<Equation>)>, Vec<Equation>),
+    /// conditions with what happens when they come to hold, `elsewhen` behind `when`
+    When(Vec<(ExprId, Vec<Equation>)>),
+    /// `reinit(x, e)`
+    Reinit(ExprId, ExprId),
     Assert(Assert),
 }
 
@@ -281,6 +287,7 @@ pub(crate) enum StatementKind {
     For(Vec<ForIndex>, Vec<Statement>),
     While(ExprId, Vec<Statement>),
     If(Vec<(ExprId, Vec<Statement>)>, Vec<Statement>),
+    When(Vec<(ExprId, Vec<Statement>)>),
     Assert(Assert),
     Break,
     Return,

@@ -156,6 +156,7 @@ impl Parser<'_> {
                 _ => match (section, class.algorithms.last_mut()) {
                     ("equation", _) => class.equations.push(self.equation()?),
                     ("initial", _) => class.initial.push(self.equation()?),
+                    ("initial algorithm", _) => class.initial.push(self.first_value()?),
                     ("algorithm", Some(last)) => last.push(self.statement()?),
                     _ => self.element(class)?,
                 },
@@ -165,20 +166,16 @@ impl Parser<'_> {
 
     /// `equation`, `algorithm`, or `initial` before one of them: the first of these words.
     fn section(&mut self) -> Result<&'static str> {
-        let initial = self.span;
         let is_initial = self.accept("initial")?;
         if self.accept("equation")? {
             return Ok(if is_initial { "initial" } else { "equation" });
         }
-        if is_initial && self.at("algorithm") {
-            let problem = Problem::new(initial, "an `initial algorithm` is not supported");
-            return Err(problem.hint(
-                "give the starting values with `start = …` in the declarations, or in an \
-                 `initial equation`",
-            ));
-        }
         self.expect("algorithm")?;
-        Ok("algorithm")
+        Ok(if is_initial {
+            "initial algorithm"
+        } else {
+            "algorithm"
+        })
     }
 
     fn element(&mut self, class: &mut Class) -> Result<()> {
@@ -265,14 +262,11 @@ impl Parser<'_> {
     }
 
     fn refuse_unsupported_element(&self) -> Result<()> {
-        const TAKEN: &str = ". final parameter constant input output flow stream enumeration";
+        const TAKEN: &str =
+            ". final parameter constant discrete input output flow stream enumeration";
         Err(match self.token {
             Token::Identifier => return Ok(()),
             Token::Fixed(word) if TAKEN.split(' ').any(|taken| taken == word) => return Ok(()),
-            Token::Fixed("discrete") => {
-                let hint = "only continuous variables are supported";
-                self.refuse("a `discrete` variable", hint)
-            }
             Token::Fixed("inner" | "outer") => self.refuse("`inner`/`outer`", HOW_TO_FLATTEN),
             Token::Fixed("redeclare" | "replaceable") => {
                 self.refuse("a replaceable element", HOW_TO_FLATTEN)
@@ -291,6 +285,7 @@ impl Parser<'_> {
             match word {
                 "parameter" => declaration.variability = Variability::Parameter,
                 "constant" => declaration.variability = Variability::Constant,
+                "discrete" => declaration.is_discrete = true,
                 "input" => declaration.causality = Causality::Input,
                 "output" => declaration.causality = Causality::Output,
                 "flow" | "stream" => declaration.of_connector = Some(self.span),

@@ -13,7 +13,6 @@ use crate::limits::MAX_ITERATORS;
 /// Conditions with what holds under them.
 type Cases<T> = Vec<(ExprId, Vec<T>)>;
 
-const NO_EVENTS: &str = "an observer needs continuous equations: use `if` expressions";
 const WHERE_DECLARATIONS_STAND: &str =
     "declarations come before the word `equation`, or after `public`";
 
@@ -24,6 +23,7 @@ impl Parser<'_> {
             match parser.token {
                 Token::Fixed("for") => parser.repeated(Self::equation, EquationKind::For),
                 Token::Fixed("if") => parser.branches(Self::equation, EquationKind::If),
+                Token::Fixed("when") => parser.whens(Self::equation, EquationKind::When),
                 _ => parser.equality(),
             }
         })
@@ -43,7 +43,7 @@ impl Parser<'_> {
 
     fn refuse_unsupported_equation(&self) -> Result<()> {
         Err(match self.token {
-            Token::Fixed("when" | "elsewhen") => self.refuse("a `when` equation", NO_EVENTS),
+            Token::Fixed("elsewhen") => self.unexpected("`when` before it"),
             Token::Fixed("while") => self.refuse("`while`", "use a `for` loop"),
             Token::Fixed("connect") => {
                 let message = "the model is not flat: it has `connect`";
@@ -67,6 +67,9 @@ impl Parser<'_> {
             self.expect("=")?;
             return Ok(EquationKind::Several(targets, self.expression()?));
         }
+        if let Some(reinit) = self.reinit_call()? {
+            return Ok(reinit);
+        }
         let left = self.expression()?;
         if self.accept("=")? {
             return Ok(EquationKind::Equality(left, self.expression()?));
@@ -76,9 +79,9 @@ impl Parser<'_> {
             let problem = Problem::new(start, "a declaration among the equations");
             return Err(problem.hint(WHERE_DECLARATIONS_STAND));
         }
-        if matches!(text, "terminate" | "reinit") {
-            return Err(Problem::new(start, format!("`{text}` is not supported"))
-                .hint("models with events are not supported: use `if` expressions"));
+        if text == "terminate" {
+            return Err(Problem::new(start, "`terminate` is not supported")
+                .hint("the study says until when: `until` of [simulate], the end of the log"));
         }
         let hint = match self.token {
             Token::Fixed(":=") => Some("`:=` assigns in algorithms; write `=`"),
@@ -86,6 +89,40 @@ impl Parser<'_> {
             _ => None,
         };
         Err(self.unexpected("`=`").maybe_hint(hint))
+    }
+
+    /// `reinit(x, e)`, where one stands here.
+    fn reinit_call(&mut self) -> Result<Option<EquationKind>> {
+        if self.token != Token::Identifier || self.span.text(self.source) != "reinit" {
+            return Ok(None);
+        }
+        self.advance()?;
+        self.expect("(")?;
+        let state = self.expression()?;
+        self.expect(",")?;
+        let value = self.expression()?;
+        self.expect(")")?;
+        Ok(Some(EquationKind::Reinit(state, value)))
+    }
+
+    /// What stands behind `when`, and behind each `elsewhen`.
+    fn whens<T, K>(
+        &mut self,
+        one: fn(&mut Self) -> Result<T>,
+        kind: fn(Cases<T>) -> K,
+    ) -> Result<K> {
+        let mut clauses = vec![];
+        loop {
+            self.advance()?;
+            let condition = self.expression()?;
+            self.expect("then")?;
+            clauses.push((condition, self.until_end(one)?));
+            if !self.at("elsewhen") {
+                break;
+            }
+        }
+        self.end_of("when")?;
+        Ok(kind(clauses))
     }
 
     /// `assert(condition, "message", level)`, where one stands here.
@@ -163,7 +200,7 @@ impl Parser<'_> {
         let mut found = vec![];
         while !matches!(
             self.token,
-            Token::Fixed("end" | "else" | "elseif") | Token::End
+            Token::Fixed("end" | "else" | "elseif" | "elsewhen") | Token::End
         ) {
             found.push(one(self)?);
         }
@@ -224,9 +261,29 @@ impl Parser<'_> {
             Token::Fixed("if") => parser.branches(Self::statement, StatementKind::If),
             Token::Fixed("break") => parser.advance().map(|_| StatementKind::Break),
             Token::Fixed("return") => parser.advance().map(|_| StatementKind::Return),
-            Token::Fixed("when") => Err(parser.refuse("a `when` statement", NO_EVENTS)),
+            Token::Fixed("when") => parser.whens(Self::statement, StatementKind::When),
             _ => parser.assignment(),
         })
+    }
+
+    /// `x := e;` of an `initial algorithm`, which says what an initial equation does.
+    pub(super) fn first_value(&mut self) -> Result<Equation> {
+        let Placed { kind, span } = self.statement()?;
+        match kind {
+            StatementKind::Assign(targets, value) if let [Some(target)] = targets[..] => {
+                Ok(Placed {
+                    kind: EquationKind::Equality(target, value),
+                    span,
+                })
+            }
+            _ => {
+                let message = "an `initial algorithm` that does more than assign values";
+                Err(Problem::new(span, message).hint(
+                    "give the start values in the declarations with `start = …`, or write an \
+                     `initial equation`",
+                ))
+            }
+        }
     }
 
     fn assignment(&mut self) -> Result<StatementKind> {

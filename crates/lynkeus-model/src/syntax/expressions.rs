@@ -97,10 +97,7 @@ impl Parser<'_> {
             Token::Fixed("(") => return self.parenthesised(),
             Token::Fixed("{") => return self.braces(),
             Token::Fixed("[") => return self.matrix(),
-            Token::Identifier | Token::Fixed("." | "der") => return self.reference(),
-            Token::Fixed("initial") => {
-                return Err(self.refuse("`initial()`", "use `time` or a parameter"));
-            }
+            Token::Identifier | Token::Fixed("." | "der" | "initial") => return self.reference(),
             _ => return Err(self.unexpected("an operand")),
         };
         self.advance()?;
@@ -226,7 +223,7 @@ impl Parser<'_> {
 
     pub(super) fn dotted_name(&mut self) -> Result<Span> {
         let start = self.span;
-        if self.accept("der")? {
+        if self.accept("der")? || self.accept("initial")? {
             return Ok(start);
         }
         self.accept(".")?;

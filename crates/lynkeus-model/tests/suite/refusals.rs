@@ -27,16 +27,13 @@ fn check(cases: &str) {
 fn constructs_outside_the_subset() {
     check(
         r#"
-         | when time > 1 then z = 1; end when; | :5:3: a `when` equation is not supported (an
          | connect(a, b); | :5:3: the model is not flat: it has `connect` (flatten it first: `omc -f
-         | z = pre(z); | :5:7: `pre` is not supported (models with events
          | x[1] = delay(u, z); | :5:10: the time of `delay` changes: expected a number or a parameter (where a flow
          | x[1] = delay(u, -1); | :5:10: a delay of -1: expected a time >= 0
          | x[1] = delay(u); | `delay` takes 2 arguments, found 1
          | z = spatialDistribution(z, z); | `spatialDistribution` is not supported
          | assert(z > 0, "negative"; | expected `)` after the message of the `assert`
          | assert(1 > 2, "never"); | :5:3: this assertion does not hold: never
-         | reinit(z, 0); | `reinit` is not supported
          | z := 1; | :5:5: expected `=`, found `:=` (`:=` assigns in algorithms
          | z == 1; | expected `=`, found `;`
          | (z, u) = f(x); | the text has no function `f` with several outputs
@@ -51,7 +48,6 @@ fn constructs_outside_the_subset() {
         extends Base; |  | :3:11: the model is not flat: `extends Base` of another file (flatten it
         import Modelica.Constants.{pi, e}; |  | an import of several names is not supported
         model Tank end Tank; Tank tank; |  | the model is not flat: `tank` is a component of class
-        discrete Real d; |  | a `discrete` variable is not supported
         flow Real q; |  | the model is not flat: it has a connector variable
         replaceable Real q; |  | a replaceable element is not supported
         Real q if u > 0; |  | a conditional component is not supported
@@ -60,8 +56,7 @@ fn constructs_outside_the_subset() {
         if z > 0 then |  | equations follow after the word `equation`
          | Real late; | declarations come before the word `equation`
          | parameter Real late; | declarations come before the word `equation`
-         | initial algorithm z := 1; | an `initial algorithm` is not supported (give the start
-         | algorithm when z > 0 then z := 1; end when; | a `when` statement is not supported
+         | initial algorithm if z > 0 then z := 1; end if; | an `initial algorithm` that does more than assign values (give the start
         "#,
     );
     assert!(
@@ -289,4 +284,33 @@ fn files() {
         .set_len(1 << 30)
         .unwrap();
     assert!(matches!(load().unwrap_err(), LoadError::TooLarge { .. }));
+}
+
+#[test]
+fn events_that_say_nothing_clear() {
+    check(
+        r#"
+         | when time > 1 then z = 1; end when; | :5:22: `z` is a state: its value is no equation of a `when` (write `reinit(x, …)`)
+        Real y; Boolean b; | y = z; when z > 1 then reinit(y, 0); b = true; end when; | :5:26: `reinit` of `y`, which is no state
+         | reinit(z, 0); | :5:3: a `reinit` outside of a `when`
+        Boolean b; | when z > 1 then when z > 2 then b = true; end when; end when; | :5:19: a `when` within a `when`
+        Boolean b; | if z > 0 then when z > 2 then b = true; end when; else b = false; end if; | a `when` under a condition that varies
+        Boolean b; | when z > 1 then b = true; end when; when z > 2 then b = false; end when; | :5:55: `b` is assigned in two `when`s (join them with `elsewhen`
+        Real y; discrete Real d; | y = 2*z; when z > 1 then d = pre(y); end when; | `pre(y)`: `y` is not discrete
+        Real y; Boolean b; | y = if edge(b) then 1 else 0; when z > 1 then b = true; end when; | `pre`, `edge` or `change` in an equation of something that is not discrete
+        Boolean b; | when z > 1 then b = not pre(z > 1); end when; | `pre` takes a variable, not an expression
+        Integer d; | when z > 1 then d = d + 1; end when; | the new value of `d` needs itself (what it was before the event is `pre(d)`)
+        Integer d; | when sample(0, 0) then d = 1; end when; | `sample` every 0: expected a time above 0
+        Integer d; | when sample(0, z) then d = 1; end when; | `z` is a variable, but a known value is needed here
+        Integer d; | d = if sample(0, 1) then 1 else 0; | `sample` outside of a `when`
+        Integer d; | when integer(z) == n then d = 1; end when; | changes where no relation does
+        Integer d; | when z > 1 then d = 1; | expected `when`, found `M`
+        Integer d = 3; | when z > 1 then d = 1; end when; | an equation where it is declared, and one in a `when`
+         | when u > 1 then u = 0; end when; | the input `u` is assigned in a `when`
+        Boolean b; | when z > 1 then assert(z < 2, "no"); b = true; end when; | an `assert` within a `when` is not supported
+         | when z then reinit(z, 0); end when; | expected a condition, found a number
+         | terminate("done"); | `terminate` is not supported
+        discrete Real d; |  | lacks an equation
+        "#,
+    );
 }

@@ -55,6 +55,10 @@ impl Batch {
         members: &[Member],
         columns: &[Column],
     ) -> Result<Option<Self>> {
+        // each run has its own events, and steps that end there
+        if simulation.plant.has_clauses() {
+            return Ok(None);
+        }
         let made = match lynkeus_native::widest() {
             8 if members.len() > 4 => Blocks::<8>::work(simulation, members)?,
             _ => Blocks::<4>::work(simulation, members)?,

@@ -228,6 +228,7 @@ fn place_of(
         node,
         name: format!("{} = {level}", graph.render(node, SHOWN_OF_STATE)),
         counts,
+        is_watched: false,
     };
     let place = surfaces.len();
     surfaces.resize(place + if counts { 2 } else { 1 }, surface);

@@ -16,12 +16,18 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::guards::{Ahead, Guard, Guards, Poly, SHORTEST};
+use super::memory::Memory;
+use super::occur::occur;
+use super::when::{Cause, Clauses, Seen};
 use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Slopes};
+use crate::{Dynamics, Error, Result, Slopes};
 
 /// A surface counts as reached this close to it, against the largest value of its function.
 const REACHED: f64 = 1e-10;
+
+/// What a clause watches has passed its surface so far beyond it.
+const ROUNDED: f64 = 1e-16;
 
 /// A surface passed so often in a run is named where the steps run out.
 const OFTEN: usize = 1000;
@@ -81,6 +87,8 @@ pub(crate) struct Sides {
     largest: Vec<f64>,
     /// how often they were reached
     passes: Vec<usize>,
+    /// of clauses
+    pub memory: Memory,
     /// what is read beside time and states, each with its speed: room for it
     beside: Vec<[f64; 2]>,
     /// what the guards read over a step, the middle and how far it may be from there: room for it
@@ -136,6 +144,11 @@ pub(crate) struct Filippov<'a, D: Dynamics> {
     pairs: Vec<usize>,
     /// what is watched over a step
     guards: Option<Arc<Guards>>,
+    /// how many surfaces f jumps on; those that clauses watch follow
+    plain: usize,
+    /// relations of clauses that the last step has changed
+    flipped: Vec<usize>,
+    seen: Vec<Seen>,
 }
 
 impl<'a, D: Dynamics> Filippov<'a, D> {
@@ -144,9 +157,13 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         let guards = inner.events().and_then(|events| events.guards());
         let surfaces = guards.iter().flat_map(|guards| &guards.surfaces);
         let counting = surfaces.clone().enumerate().filter(|(_, s)| s.counts);
+        let plain = surfaces.clone().filter(|s| !s.is_watched).count();
         let count = surfaces.count();
         at.fit(count);
         let mut system = Self {
+            plain,
+            flipped: vec![],
+            seen: vec![],
             pairs: counting.map(|(i, _)| i).step_by(2).collect(),
             guards,
             inner,
@@ -274,7 +291,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         self.encounter(t, x);
         self.align(t, x, &[]);
         let reached = self.reached(t, x);
-        let at_hand: Vec<usize> = (0..reached.len()).filter(|&i| reached[i]).collect();
+        let at_hand: Vec<usize> = (0..self.plain).filter(|&i| reached[i]).collect();
         for &i in &at_hand {
             self.decide(i, t, x);
         }
@@ -292,7 +309,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
                 let is_held = self.at.sides[*i] != 0.0 && !self.at.sliding[*i];
                 is_held && self.values[*i] == 0.0 && !done.contains(i)
             };
-            let Some(i) = (0..self.values.len()).find(is_new) else {
+            let Some(i) = (0..self.plain).find(is_new) else {
                 break;
             };
             self.decide(i, t, x);
@@ -301,6 +318,66 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         }
         self.carry();
         self.hold();
+        self.see(t, x);
+    }
+
+    /// Reads which relations of clauses hold: the values themselves tell.
+    fn see(&mut self, t: f64, x: &[f64]) {
+        if self.plain == self.values.len() {
+            return;
+        }
+        self.inner.watch(t, x, &mut self.seen);
+        let sides = self.at.sides[self.plain..].iter_mut();
+        for (relation, (side, seen)) in sides.zip(&self.seen).enumerate() {
+            let now = if seen.holds { 1.0 } else { -1.0 };
+            if *side != now {
+                self.flipped.push(relation);
+            }
+            *side = now;
+        }
+    }
+
+    /// Lets clauses take effect that are due at the start of an interval.
+    pub fn begin(&mut self, t: f64, x: &mut [f64]) -> Result<()> {
+        self.flipped.clear();
+        if self.inner.clauses().is_some() {
+            self.event(t, x)?;
+        }
+        Ok(())
+    }
+
+    /// Whether relations of clauses have changed, or something has to be looked after.
+    pub fn has_event(&self) -> bool {
+        !self.flipped.is_empty() || self.at.memory.suspects()
+    }
+
+    /// Lets clauses take effect whose relations have changed: whether the state has jumped.
+    pub fn event(&mut self, t: f64, x: &mut [f64]) -> Result<bool> {
+        let flipped = std::mem::take(&mut self.flipped);
+        let mut memory = std::mem::take(&mut self.at.memory);
+        let done = self.event_with(&mut memory, t, x, &flipped);
+        self.at.memory = memory;
+        self.flipped.clear();
+        done
+    }
+
+    fn event_with(
+        &mut self,
+        memory: &mut Memory,
+        t: f64,
+        x: &mut [f64],
+        flipped: &[usize],
+    ) -> Result<bool> {
+        let length = self.length;
+        let jumped = occur(self, memory, (t, length), x, flipped, |own, x| {
+            own.start(t, x);
+        })?;
+        if let (false, true, Some(clauses)) = (jumped, memory.suspects(), self.inner.clauses()) {
+            self.inner.watch(t, x, &mut self.seen);
+            let largest = |relation: usize| self.at.largest[self.plain + relation];
+            memory.check(&clauses, t, &self.seen, largest)?;
+        }
+        Ok(jumped)
     }
 
     /// Puts the surfaces of each `floor` around where the state is: one may be within another.
@@ -319,7 +396,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
 
     /// Goes on where margins have become negative: across, along, or off the surface.
     pub fn pass(&mut self, t: f64, x: &[f64], margins: &[f64]) {
-        let at_hand: Vec<usize> = (0..margins.len()).filter(|&i| margins[i] < 0.0).collect();
+        let at_hand: Vec<usize> = (0..self.plain).filter(|&i| margins[i] < 0.0).collect();
         self.look(t, x);
         for &i in &at_hand {
             self.at.passes[i] += 1;
@@ -341,7 +418,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     /// reached. A function may jump with the sides of other surfaces: again, then.
     fn align(&mut self, t: f64, x: &[f64], at_hand: &[usize]) {
         self.hold();
-        let count = self.values.len();
+        let count = self.plain;
         if at_hand.len() == count {
             return;
         }
@@ -475,7 +552,10 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
                 continue;
             }
             let side = (self.at.sides[i], self.at.levels[i]);
-            let band = REACHED * self.at.largest[i];
+            let band = match i < self.plain {
+                true => REACHED * self.at.largest[i],
+                false => ROUNDED * self.at.largest[i] + f64::MIN_POSITIVE,
+            };
             match guard.passage(&path, side, band, shortest, first.at()) {
                 Ahead::Nothing => {}
                 found => first = found,
@@ -491,7 +571,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
 
     /// Whether the ends of a step have to be looked at, too.
     pub fn has_bound(&self) -> bool {
-        (0..self.values.len()).any(|i| self.is_bound(i))
+        (0..self.plain).any(|i| self.is_bound(i))
     }
 
     /// Whether a surface is not left by passing it: the state slides along it, or stays there.
@@ -608,6 +688,33 @@ impl<D: Dynamics> Dynamics for Filippov<'_, D> {
     /// How the parts of both sides change along a surface is not known.
     fn slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
         !self.at.sliding.contains(&true) && self.inner.slopes(t, x, slopes)
+    }
+
+    fn clauses(&self) -> Option<Arc<Clauses>> {
+        self.inner.clauses()
+    }
+
+    fn watch(&mut self, t: f64, x: &[f64], seen: &mut Vec<Seen>) {
+        self.inner.watch(t, x, seen);
+    }
+
+    fn truths(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>> {
+        self.inner.truths(t, x)
+    }
+
+    fn happen(&mut self, t: f64, x: &mut [f64], memory: &mut Memory) -> Result<Option<usize>> {
+        self.inner.happen(t, x, memory)
+    }
+
+    fn settle(
+        &mut self,
+        at: (f64, &[f64]),
+        jumped: &mut [f64],
+        rates: [&[f64]; 2],
+        cause: Option<Cause>,
+        line: usize,
+    ) -> Result<()> {
+        self.inner.settle(at, jumped, rates, cause, line)
     }
 
     fn is_over(&mut self) -> bool {

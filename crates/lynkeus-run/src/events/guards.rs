@@ -34,6 +34,8 @@ pub(crate) struct Surface {
     pub name: String,
     /// whether it is one of two on which a `floor` jumps: at even integers and, next, at odd ones
     pub counts: bool,
+    /// it is a relation of a clause that is decided there, and f does not jump
+    pub is_watched: bool,
 }
 
 /// Everything that is watched of a system, over the inputs of its code: time, states, and what

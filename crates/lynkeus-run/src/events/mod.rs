@@ -7,11 +7,20 @@
 mod extract;
 mod filippov;
 mod guards;
+mod memory;
+mod occur;
+mod rounds;
 mod time;
+mod when;
 
 pub use extract::first_jump;
 pub(crate) use extract::{bends, state_events, time_events};
 pub(crate) use filippov::{Filippov, Jump, Sides, Span};
 pub use guards::Guards;
 pub(crate) use guards::{Ahead, COEFFICIENTS, Poly, Surface};
+pub use memory::Memory;
+pub(crate) use occur::{occur, rates, saltation};
+pub(crate) use rounds::JumpSlopes;
 pub(crate) use time::TimeEvents;
+pub(crate) use when::WhenRoots;
+pub use when::{Cause, Clauses, Seen};

@@ -24,6 +24,7 @@
 //!     initial_variance: vec![1.0],
 //!     ranges: vec![],
 //!     confined: None,
+//!     whens: Default::default(),
 //! })?;
 //! let settings = FilterSettings::of(FilterKind::Extended);
 //! let filter = Blueprint::filter(model, settings, EstimatorSettings::default());
@@ -151,6 +152,10 @@ impl Filter {
         let manifold = model.manifold.clone();
         if settings.is_window() && !manifold.is_straight() {
             return Err(Error::setting("states", "no quaternion in a window", "one"));
+        }
+        if flow.has_clauses() && settings.kind != FilterKind::Extended {
+            let expected = "the extended filter for a plant whose state jumps (`when`)";
+            return Err(Error::setting("filter", expected, "another one"));
         }
         let propagation = |flow| Propagation::new(flow, &model.process_noise, run);
         Ok(Self {

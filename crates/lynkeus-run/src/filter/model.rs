@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 use std::fmt::Write;
 
 use lynkeus_expr::{Graph, Node};
+use lynkeus_model::Whens;
 
 use super::belief::Belief;
 use crate::manifold::Manifold;
@@ -35,6 +36,8 @@ pub struct NoisyPlant<'g> {
     pub ranges: Vec<Limits>,
     /// f of the states limited to their ranges, for where f has no value outside
     pub confined: Option<Vec<Node>>,
+    /// by which the states jump; none where they never do
+    pub whens: Whens,
 }
 
 /// A measured output.
@@ -85,7 +88,8 @@ impl NoisyModel {
     pub fn new(plant: &NoisyPlant<'_>) -> Result<Self> {
         check(plant)?;
         let flow = |f: &Vec<Node>| {
-            Linearised::flow(plant.graph, plant.time, &plant.states, &plant.inputs, f)
+            let (graph, time, states) = (plant.graph, plant.time, &plant.states);
+            Linearised::flow(graph, time, states, &plant.inputs, f, &plant.whens)
         };
         let confined = plant.confined.as_ref().map(flow);
         Self::of(plant, flow(&plant.derivatives)?, confined.transpose()?)

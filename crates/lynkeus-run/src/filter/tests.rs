@@ -27,6 +27,7 @@ pub(super) fn scalar(a: f64, q: f64, r: f64) -> NoisyModel {
             high: 1e301,
         }],
         confined: None,
+        whens: Default::default(),
     })
     .unwrap()
 }
@@ -194,6 +195,7 @@ fn a_reading_that_sigma_points_cannot_weigh_is_not_taken() {
         initial_variance: vec![2.0],
         ranges: vec![],
         confined: None,
+        whens: Default::default(),
     });
     let points = SigmaPoints {
         kappa: -0.9,
@@ -236,6 +238,7 @@ fn what_cannot_be_is_refused() {
         initial_variance: vec![],
         ranges: vec![],
         confined: None,
+        whens: Default::default(),
     });
     assert!(nothing.unwrap_err().to_string().contains("states"));
     let mut filter = new(FilterSettings::of(FilterKind::Extended)).unwrap();
@@ -282,6 +285,7 @@ fn an_estimate_without_a_value_of_the_plant_is_put_back() {
             high: 2.0,
         }],
         confined,
+        whens: Default::default(),
     };
     let inside = vec![(-x.max(g.constant(0.01)).sqrt()).node()];
     let run = |confined| {

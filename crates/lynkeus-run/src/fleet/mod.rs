@@ -39,6 +39,7 @@ use side::{Asset, Lanes, Side};
 ///     initial_variance: vec![1.0],
 ///     ranges: vec![],
 ///     confined: None,
+///     whens: Default::default(),
 /// })?;
 /// let run = EstimatorSettings { method: Method::Rk4(Step::Substeps(1)), ..EstimatorSettings::default() };
 /// let filter = Blueprint::filter(model, FilterSettings::of(FilterKind::Extended), run);
@@ -216,6 +217,7 @@ mod tests {
             initial_variance: vec![1.0; 2],
             ranges: vec![],
             confined: None,
+            whens: Default::default(),
         });
         let settings = FilterSettings {
             gate: Some(5.0),

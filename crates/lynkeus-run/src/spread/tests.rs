@@ -75,6 +75,7 @@ impl Plant {
             initial_variance: vec![self.p[0], self.p[1], 1.0, 0.0],
             ranges: vec![],
             confined: None,
+            whens: Default::default(),
         };
         let lag = Lag {
             state: 2,

@@ -88,6 +88,7 @@ impl Case {
                 2
             ],
             confined: None,
+            whens: Default::default(),
         });
         let settings = FilterSettings {
             keep_history: true,

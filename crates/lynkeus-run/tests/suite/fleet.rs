@@ -137,6 +137,7 @@ fn filter(random: &mut Random, kind: Kind, step: Step) -> Blueprint {
         initial_variance,
         ranges: vec![range; n],
         confined,
+        whens: Default::default(),
     });
     let settings = FilterSettings {
         gate: kind.gate.then_some(2.0),
@@ -185,6 +186,7 @@ fn another(random: &mut Random, filter: &Blueprint) -> Blueprint {
             initial_variance,
             ranges: model.ranges.clone(),
             confined: None,
+            whens: Default::default(),
         })
         .unwrap();
     other

@@ -205,6 +205,7 @@ impl Case {
             initial_variance: vec![0.2 * 0.2; self.n],
             ranges: vec![],
             confined: None,
+            whens: Default::default(),
         })
         .unwrap();
         let run = EstimatorSettings {
@@ -520,6 +521,7 @@ fn an_estimate_without_a_value_is_put_into_its_range() {
         initial_variance: vec![0.09],
         ranges: vec![range],
         confined: Some(vec![derivative(fixed, inside)]),
+        whens: Default::default(),
     })
     .unwrap();
     let run = EstimatorSettings {
@@ -846,6 +848,7 @@ fn a_reading_of_which_all_is_certain_does_not_count() {
                 initial_variance: vec![0.0],
                 ranges: vec![],
                 confined: None,
+                whens: Default::default(),
             });
             let run = EstimatorSettings {
                 method: Method::Rk4(Step::Substeps(1)),

@@ -132,6 +132,7 @@ impl Linear {
                 n
             ],
             confined: None,
+            whens: Default::default(),
         });
         let settings = FilterSettings {
             keep_history: true,

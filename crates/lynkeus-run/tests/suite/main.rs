@@ -16,3 +16,4 @@ mod simulation;
 mod snapshots;
 mod state_events;
 mod time_events;
+mod whens;

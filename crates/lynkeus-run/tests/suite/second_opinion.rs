@@ -123,6 +123,7 @@ impl Plant {
                 2
             ],
             confined: None,
+            whens: Default::default(),
         });
         let settings = FilterSettings {
             keep_history: true,

@@ -78,6 +78,7 @@ fn chain(n: usize, kind: FilterKind, method: Method) -> Estimator {
             n
         ],
         confined: None,
+        whens: Default::default(),
     };
     let of_filter = FilterSettings {
         keep_history: true,

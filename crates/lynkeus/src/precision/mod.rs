@@ -79,6 +79,7 @@ pub struct Report {
 pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     let settings = systems::settings(study)?;
     let plant = prepare::plant(study)?;
+    prepare::whens::refuse(study, &plant, "precision")?;
     let prepared = Prepared::new(study, &plant)?;
     let mut states = plant.states.iter();
     if let Some(state) = states.find(|s| matches!(s.home, Home::Rotation { .. })) {

@@ -24,6 +24,7 @@ use settable::{Settled, settled};
 pub(crate) fn plant(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let version = version(study, options)?;
     let valued = prepare::plant(study)?;
+    prepare::whens::refuse(study, &valued, "export")?;
     let drawn = |plant: &Plant| plant_as(study, plant, version, options);
     if valued.parameters.is_empty() {
         return Ok(drawn(&valued)?.exported());
@@ -65,6 +66,7 @@ fn plant_as(
 pub(crate) fn observer(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let version = version(study, options)?;
     let plant = prepare::plant(study)?;
+    prepare::whens::refuse(study, &plant, "export")?;
     let design = Prepared::new(study, &plant)?.design()?;
     if design.observer.filter.is_some() {
         return Err(filter(study, design.examination.family.name()));

@@ -66,6 +66,7 @@ fn bounded_cart(ranges: [(f64, f64); 2]) -> Estimator {
         initial_variance: vec![1.0, 0.5],
         ranges: ranges.map(|(low, high)| Limits { low, high }).to_vec(),
         confined: None,
+        whens: Default::default(),
     });
     let settings = FilterSettings::of(FilterKind::MovingHorizon(20));
     Blueprint::filter(model.unwrap(), settings, exact())

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::series::Transition;
 use super::straight::Straight;
 use crate::Evaluation;
+use crate::events::{Cause, Clauses, JumpSlopes, Memory, Seen, saltation};
 use crate::filter::belief::Belief;
 use crate::filter::profile::Profile;
 use crate::filter::root::Root;
@@ -39,10 +40,14 @@ impl Joint {
         };
         let noisy = || process_noise.iter().map(|q| *q > 0.0).collect();
         let equation = Equation::new(flow, noise);
+        // a step with an event in it is none as one function
+        let has_clauses = flow.system().has_clauses();
         Ok(Self {
             integrator: Integrator::new(method, equation.dimension())?,
             equation,
-            straight: step.map(|_| Straight::new(flow, noisy())),
+            straight: step
+                .filter(|_| !has_clauses)
+                .map(|_| Straight::new(flow, noisy())),
             step,
             scale,
             z: vec![],
@@ -182,6 +187,8 @@ struct Equation {
     slopes: Vec<f64>,
     /// diagonal of Q/q, empty where Q = 0
     noise: Vec<f64>,
+    /// of the last jump
+    jump: JumpSlopes,
     /// ∂F/∂x: its rows are the entries of F
     second: Slopes,
     /// where the entries of ∂F/∂x were when the terms were made
@@ -268,6 +275,65 @@ impl Dynamics for Variational<'_> {
         self.driven.events()
     }
 
+    fn clauses(&self) -> Option<Arc<Clauses>> {
+        self.driven.clauses()
+    }
+
+    fn watch(&mut self, t: f64, z: &[f64], seen: &mut Vec<Seen>) {
+        self.driven.watch(t, z, seen);
+    }
+
+    fn truths(&mut self, t: f64, z: &[f64]) -> Result<Vec<bool>> {
+        self.driven.truths(t, z)
+    }
+
+    fn happen(&mut self, t: f64, z: &mut [f64], memory: &mut Memory) -> Result<Option<usize>> {
+        let jump = &mut self.equation.jump;
+        self.driven.jump(t, z, memory, Some(jump))
+    }
+
+    /// Φ⁺ = ΞΦ and W⁺ = ΞWΞᵀ.
+    fn settle(
+        &mut self,
+        (t, z): (f64, &[f64]),
+        jumped: &mut [f64],
+        [before, after]: [&[f64]; 2],
+        cause: Option<Cause>,
+        line: usize,
+    ) -> Result<()> {
+        let (n, width) = (self.equation.n, self.equation.width);
+        let gradient = cause.map(|cause| self.driven.gradient(t, z, cause.relation));
+        let gradient = gradient.unwrap_or_default();
+        let rates = [&before[..n], &after[..n]];
+        let jump = &self.equation.jump;
+        let (matrix, moved) = saltation(jump, &gradient, rates, cause, (t, line))?;
+        for (x, moved) in jumped.iter_mut().zip(moved) {
+            *x += moved;
+        }
+        let rows = jumped[n..].to_vec();
+        for (i, into) in jumped[n..].chunks_exact_mut(width).enumerate() {
+            into.fill(0.0);
+            for (entry, row) in matrix[i * n..(i + 1) * n]
+                .iter()
+                .zip(rows.chunks_exact(width))
+            {
+                into.iter_mut()
+                    .zip(row)
+                    .for_each(|(into, x)| *into += entry * x);
+            }
+        }
+        if width > n {
+            for row in jumped[n..].chunks_exact_mut(width) {
+                let half = row[n..].to_vec();
+                for (j, into) in row[n..].iter_mut().enumerate() {
+                    let xi = &matrix[j * n..(j + 1) * n];
+                    *into = half.iter().zip(xi).map(|(w, xi)| w * xi).sum();
+                }
+            }
+        }
+        Ok(())
+    }
+
     fn names(&self) -> Vec<String> {
         self.driven.names()
     }
@@ -287,6 +353,7 @@ impl Equation {
             entries: flow.jacobians().state.places().to_vec(),
             slopes: vec![0.0; flow.system().outputs().len()],
             noise,
+            jump: JumpSlopes::default(),
             second: Slopes::default(),
             known: None,
             places: Arc::default(),
@@ -370,7 +437,15 @@ mod tests {
         let derivatives = dx.map(|dx| dx.node());
         let states = x.map(|x| ("x".to_owned(), x.node(), 0.0));
         let signals = [("w".to_owned(), w.node())];
-        let flow = Linearised::flow(&g, time.node(), &states, &signals, &derivatives).unwrap();
+        let flow = Linearised::flow(
+            &g,
+            time.node(),
+            &states,
+            &signals,
+            &derivatives,
+            &Default::default(),
+        )
+        .unwrap();
         let mut driven = flow.system().driven(BetweenSamples::Hold);
         driven.start(&[0.7]);
         for noise in [vec![], vec![0.3, 1.0, 0.5]] {

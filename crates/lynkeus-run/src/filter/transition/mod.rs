@@ -57,7 +57,9 @@ impl Propagation {
         let method = run.method;
         let n = flow.system().states().len();
         let is_given = matches!(method, Method::Rk4(Step::AtMost(_) | Step::Substeps(_)));
-        let scheme = match n <= FEW || is_given {
+        // Φ jumps with the state
+        let has_clauses = flow.system().has_clauses();
+        let scheme = match n <= FEW || is_given || has_clauses {
             true => Scheme::Joint(Box::new(Joint::new(flow, process_noise, method)?)),
             false => Scheme::Piecewise(Box::new(Piecewise::new(flow, process_noise, method)?)),
         };
@@ -186,7 +188,13 @@ impl Persist for Propagation {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.driven.walk(walk)?;
         match &mut self.scheme {
-            Scheme::Joint(joint) => joint.integrator.walk(walk),
+            Scheme::Joint(joint) => {
+                joint.integrator.walk(walk)?;
+                match self.driven.system().has_clauses() {
+                    true => joint.integrator.memory().walk(walk),
+                    false => Ok(()),
+                }
+            }
             Scheme::Piecewise(variation) => variation.walk(walk),
         }
     }
@@ -270,7 +278,15 @@ mod tests {
         let zero = g.constant(0.0);
         let states = [x, v, a].map(|x| (format!("{x:?}"), x.node(), 0.0));
         let derivatives = [v, a, zero].map(|x| x.node());
-        let flow = Linearised::flow(&g, time.node(), &states, &[], &derivatives).unwrap();
+        let flow = Linearised::flow(
+            &g,
+            time.node(),
+            &states,
+            &[],
+            &derivatives,
+            &Default::default(),
+        )
+        .unwrap();
         let (h, q) = (0.15, 3.0);
         let run = EstimatorSettings {
             method: Method::Rk4(Step::Substeps(1)),

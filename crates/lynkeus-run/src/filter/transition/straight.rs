@@ -295,7 +295,15 @@ mod tests {
             .map(|(i, x)| (format!("x{i}"), x.node(), 0.3))
             .collect();
         let signals = [("u".to_owned(), u.node())];
-        Linearised::flow(&g, time.node(), &states, &signals, &derivatives).unwrap()
+        Linearised::flow(
+            &g,
+            time.node(),
+            &states,
+            &signals,
+            &derivatives,
+            &Default::default(),
+        )
+        .unwrap()
     }
 
     /// The same bits with machine code and without, over plants of every structure, with noise on some states or

@@ -144,6 +144,7 @@ impl Case {
             initial_variance: self.variances.clone(),
             ranges: self.bounds.clone(),
             confined: None,
+            whens: Default::default(),
         });
         let kind = FilterKind::MovingHorizon(20);
         Blueprint::filter(model.unwrap(), FilterSettings::of(kind), exact())

@@ -23,7 +23,7 @@ fn chain(n: usize, law: Law) -> Linearised {
         .map(|i| (format!("x{i}"), x[i].node(), 0.3 + 0.1 * (i % 5) as f64))
         .collect();
     let signals = [("u".to_string(), u.node())];
-    Linearised::flow(&g, time.node(), &states, &signals, &dx).unwrap()
+    Linearised::flow(&g, time.node(), &states, &signals, &dx, &Default::default()).unwrap()
 }
 
 fn tight(relative: f64) -> Tolerances {
