@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::{Binary, Graph, Interval, Node, Tape, Unary, jacobian};
 
-use super::delay::Delayed;
+use super::delayed::Delayed;
 use super::evaluate::Evaluator;
 use super::events;
 use super::flatten::Flat;
@@ -49,7 +49,14 @@ pub(super) fn plant(symbols: &Symbols<'_>, mut flat: Flat) -> Result<(Plant, Vec
     }
     let mut warnings: Vec<Problem> = delays.iter().map(Delayed::told).collect();
     for delayed in delays {
-        delayed.join(symbols, &solution, &mut plant);
+        let start = |node: Node, plant: &Plant| {
+            let mut known = symbols.parameter_values();
+            known.insert(symbols.time(), Some(0.0));
+            let starts = plant.states.iter().chain(&plant.inputs);
+            known.extend(starts.map(|variable| (variable.node, variable.start)));
+            computed(graph, node, |symbol| known.get(&symbol).copied()?)
+        };
+        delayed.join(graph, &solution, start, &mut plant);
     }
     let held = events::held(&flat.clauses);
     for state in plant.states.iter_mut().filter(|s| held.contains(&s.node)) {
@@ -433,11 +440,7 @@ fn root(graph: &Graph, residual: Node, symbol: Node) -> Option<Node> {
 }
 
 /// The number that an expression is for values of its symbols; none where one has no value.
-pub(super) fn computed(
-    graph: &Graph,
-    node: Node,
-    value: impl Fn(Node) -> Option<f64>,
-) -> Option<f64> {
+fn computed(graph: &Graph, node: Node, value: impl Fn(Node) -> Option<f64>) -> Option<f64> {
     let symbols = graph.symbols_of(&[node]);
     let values: Option<Vec<f64>> = symbols.iter().map(|&symbol| value(symbol)).collect();
     let tape = Tape::new(graph, &symbols, &[node]).ok()?;

@@ -8,6 +8,7 @@ mod calls;
 mod clauses;
 mod declare;
 mod delay;
+mod delayed;
 mod evaluate;
 mod events;
 mod execute;
@@ -31,7 +32,7 @@ use crate::{LoadOptions, Plant};
 use scope::Mode;
 use symbols::{Names, Symbols};
 
-pub use delay::{DELAY_STATES, MAX_DELAY_STATES};
+pub use delayed::{DELAY_STATES, MAX_DELAY_STATES};
 pub(crate) use evaluate::Evaluator;
 
 /// The plant of a Modelica text, with what looks wrong in it.

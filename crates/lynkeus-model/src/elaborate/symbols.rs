@@ -6,7 +6,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use lynkeus_expr::{Graph, Node};
 
 use super::clauses::EventSymbols;
-use super::delay::Delayed;
+use super::delayed::Delayed;
 use super::scope::{Mode, Named};
 use super::value::Scalar;
 use crate::LoadOptions;
