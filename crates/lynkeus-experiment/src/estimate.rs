@@ -1,5 +1,6 @@
 //! A log through the study's observer.
 
+mod followed;
 pub(crate) mod live;
 mod suspected;
 mod told;
@@ -7,7 +8,7 @@ mod told;
 use std::ops::ControlFlow;
 
 use lynkeus_observers::{Design, Observer, Signal};
-use lynkeus_run::{EstimatorSettings, Fleet};
+use lynkeus_run::Fleet;
 
 use crate::course::checkpoint::Checkpoint;
 use crate::course::columns::{self, Log};
@@ -15,9 +16,10 @@ use crate::course::ended::{is_observers_answer, settle};
 use crate::course::fixed_steps::unlocated;
 use crate::course::inputs::{are_logged, supplied};
 use crate::course::replay::{Watch, refuse_smoothing};
-use crate::course::run::{course_of, refuse_settings, start_at_readings};
-use crate::course::{Course, Samples, filter, sampled};
+use crate::course::run::{refuse_settings, start_at_readings};
+use crate::course::{Course, Samples, filter};
 use crate::crew::within;
+use crate::estimate::followed::followed;
 use crate::estimate::suspected::suspected;
 use crate::judge::frozen::{Channel, Frozen, frozen};
 use crate::judge::interval;
@@ -107,34 +109,6 @@ pub(crate) fn looked_at(
     let suspicion = suspected(prepared, &begun.design, &begun.log.samples, &course);
     course.doubts.extend(suspicion);
     begun.finish(prepared, course)
-}
-
-/// An observer over samples, with what judges it.
-fn followed(
-    prepared: &Prepared<'_>,
-    design: &StudyDesign,
-    samples: &Samples,
-    run: EstimatorSettings,
-    watch: Watch<'_>,
-) -> Result<Course, Error> {
-    let study = prepared.study();
-    let is_judged_beside = is_judged_beside(study, design);
-    let share = if is_judged_beside { 0.5 } else { 1.0 };
-    let mut told = within(&study.budget, watch.watch);
-    let mut checkpoint = watch.checkpoint;
-    let own = &mut Watch {
-        watch: &mut |done| told(share * done),
-        checkpoint: checkpoint.as_deref_mut(),
-    };
-    let mut course = course_of(prepared, design, samples, run, own)?;
-    if is_judged_beside && course.ended.is_none() {
-        let beside = &mut Watch {
-            watch: &mut |done| told(share * (1.0 + done)),
-            checkpoint: checkpoint.map(Checkpoint::beside),
-        };
-        sampled::judge(prepared, design, samples, run, beside, &mut course)?;
-    }
-    Ok(course)
 }
 
 /// How many logs of a study are best estimated [together](crate::Runner::estimate_together).
@@ -301,12 +275,6 @@ impl<'t> Begun<'t> {
         };
         raw.finish()
     }
-}
-
-/// Whether readings have noises to be judged by, and the run itself follows no error.
-fn is_judged_beside(study: &Study, design: &Design) -> bool {
-    let is_followed = design.observer.filter.is_some() || study.estimate.follows_errors();
-    !is_followed && !study.sensors.noise.is_empty()
 }
 
 /// Where the sensors that an observer reads hang.

@@ -9,12 +9,12 @@ use std::time::Instant;
 
 use lynkeus_run::filter::SensorHealth;
 
-use super::followed;
 use crate::Series;
 use crate::course::doubt::{Doubt, Kind, Level};
 use crate::course::replay::Watch;
 use crate::course::run::start_at_readings;
 use crate::course::{Course, Samples};
+use crate::estimate::followed::followed;
 use crate::prepare::headers::header;
 use crate::prepare::systems::run_settings;
 use crate::prepare::{Prepared, StudyDesign};
