@@ -236,10 +236,16 @@ impl Accuracy {
     fn contradiction(&self) -> Option<String> {
         let Coverage { ratio, rows, .. } = self.coverage?;
         (rows >= TELLING && ratio > CONTRADICTED).then(|| {
+            let how = match ratio.is_finite() {
+                true => format!(
+                    "errors are {} times as large as it says (root mean square)",
+                    figures(ratio, 2)
+                ),
+                false => "there are errors where it is 0".to_owned(),
+            };
             format!(
-                "the truth contradicts the standard deviation of {}: in the last half errors are {} times as large as it says (root mean square)",
-                self.quantity,
-                figures(ratio, 2)
+                "the truth contradicts the standard deviation of {}: in the last half {how}",
+                self.quantity
             )
         })
     }

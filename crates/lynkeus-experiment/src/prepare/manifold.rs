@@ -15,6 +15,9 @@ use lynkeus_study::Name;
 /// A declared range is a turn up to so much, in radians: its ends are written with a few digits.
 const SLACK: f64 = 5e-3;
 
+/// No element of a unit quaternion is larger, rounding counted.
+const UNIT: f64 = 1.0 + 1e-9;
+
 /// What rounding leaves of a difference that vanishes, as a share of the values.
 const ROUNDING: f64 = 1e-7;
 
@@ -123,6 +126,7 @@ fn place_rotation(study: &Study, plant: &mut Plant, name: &Name) -> Result<(), E
             return refuse(format!("\"{name}\" stands there twice"));
         }
         state.home = Home::Rotation { element };
+        (state.min, state.max) = (state.min.max(-UNIT), state.max.min(UNIT));
     }
     Ok(())
 }
