@@ -47,6 +47,7 @@ from .sections import (
     Family,
     FitSection,
     LogSection,
+    ManifoldSection,
     ObserverSection,
     ParametersSection,
     PlotSection,
@@ -79,6 +80,8 @@ class Study(Batched):
         Spectral densities by state and unknown input: variance per unit of time.
     parameters : mapping of str to float, optional
         Values that replace those of the model, in its units.
+    manifold : dict, optional
+        Which states are angles (``circle``) and unit quaternions (``quaternion``), each a list of names.
     observer : dict or str, optional
         The section ``[observer]``, or the name of a family.
     box : mapping of str to float or list of float, optional
@@ -128,6 +131,7 @@ class Study(Batched):
         sensors: SensorsSection | None = None,
         process_noise: ProcessNoiseSection | None = None,
         parameters: ParametersSection | None = None,
+        manifold: ManifoldSection | None = None,
         observer: ObserverSection | Family | None = None,
         box: BoxSection | None = None,
         certify: CertifySection | None = None,
@@ -147,6 +151,7 @@ class Study(Batched):
             "sensors": sensors,
             "process_noise": process_noise,
             "parameters": parameters,
+            "manifold": manifold,
             "observer": {"family": observer} if isinstance(observer, str) else observer,
             "box": box,
             "certify": certify,
@@ -802,6 +807,7 @@ class Study(Batched):
         )
         return write(Path(folder), files, notes, force=force)
 
+    @takes(wait=real())
     def estimator(self, *, wait: float = 0.0) -> _lynkeus.Estimator:
         """An estimator for samples that come one by one.
 

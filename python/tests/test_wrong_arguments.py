@@ -70,7 +70,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Study.compare": (STUDY.compare, {"log": None, "progress": False, **LIMITS}),
     "Study.plant": (STUDY.plant, {}),
     "Study.observer": (STUDY.observer, LIMITS),
-    "Study.estimator": (STUDY.estimator, {}),
+    "Study.estimator": (STUDY.estimator, {"wait": 0.0}),
     "Study.export": (
         STUDY.export,
         {

@@ -98,7 +98,8 @@ fn families(study: &Study, plant: &Plant) -> Result<Vec<&'static dyn Family>, Er
         return Ok(asked);
     }
     let mut found = vec![];
-    for &family in FAMILIES {
+    let is_able = |family: &&&'static dyn Family| plant.whens.is_empty() || family.follows_jumps();
+    for &family in FAMILIES.iter().filter(is_able) {
         let own = of_family(study, family);
         let prepared = Prepared::new(&own, plant)?;
         let examined = prepared.examinations()?;

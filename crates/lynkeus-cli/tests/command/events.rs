@@ -202,6 +202,15 @@ fn what_does_not_follow_events_says_so_with_the_line() {
         refused(&folder, &["estimate", "study.toml", "log.csv"], &told);
         folder.change("study.toml", &format!("\"{family}\""), "\"ekf\"");
     }
+    let ended = folder.run(&["compare", "study.toml", "log.csv", "--json"]);
+    let rows = &ended.json()["families"];
+    let families: Vec<&str> = rows
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(|r| r["family"].as_str())
+        .collect();
+    assert_eq!(families, ["ekf"], "{}", ended.err);
     let ended = folder.run(&["certify", "study.toml"]);
     assert!(
         ended

@@ -1,8 +1,8 @@
 //! Columns of a log that may be another quantity than the model's: a wrong unit, a factor of ten, two that changed places.
 //!
 //! Where readings contradict the estimate, the beginning of the log is replayed once more with each of some usual changes
-//! of a column. A change under which every sensor agrees with the model is named; where several do, readings that shrink
-//! agree with anything, and nothing is said.
+//! of a column. A change under which every sensor agrees with the model is named; where several do, or readings agree
+//! however small they are, nothing is said.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -29,6 +29,9 @@ const SENSORS: usize = 3;
 const CONTRADICTS: f64 = 3.0;
 /// Between these a sensor agrees with the model over the last half of all rows, and before at most the other way round.
 const AGREES: [f64; 2] = [0.3, 1.5];
+
+/// Where readings that are still smaller agree as well, a change shows nothing: a plant may rest at 0.
+const SMALLER: [f64; 2] = [0.2, 0.02];
 
 /// A usual change of a reading y: factor·y + offset.
 struct Change {
@@ -104,9 +107,13 @@ pub(super) fn suspected(
     let mut found = vec![];
     for &(sensor, _) in suspects.iter().take(SENSORS) {
         for change in &CHANGES {
-            let changed =
-                |readings: &mut Vec<Series>| readings[sensor] = change.of(&readings[sensor]);
-            if trial.agrees(changed) {
+            let agrees = |change: &Change| {
+                trial.agrees(|readings| readings[sensor] = change.of(&readings[sensor]))
+            };
+            let is_scale = change.offset == 0.0 && change.factor > 0.0;
+            let shows_nothing =
+                || is_scale && SMALLER.iter().any(|&by| agrees(&change.smaller(by)));
+            if agrees(change) && !shows_nothing() {
                 found.push(trial.scaled(sensor, change));
             }
         }
@@ -122,6 +129,15 @@ pub(super) fn suspected(
 }
 
 impl Change {
+    fn smaller(&self, by: f64) -> Self {
+        change(
+            by * self.factor,
+            by * self.offset,
+            self.expression,
+            self.cause,
+        )
+    }
+
     fn of(&self, readings: &Series) -> Series {
         let values = readings.iter().map(|y| self.factor * y + self.offset);
         values.collect::<Vec<_>>().into()
