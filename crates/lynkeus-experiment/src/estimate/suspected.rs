@@ -27,8 +27,9 @@ const LONGEST: f64 = 1.0;
 const SENSORS: usize = 3;
 /// Innovations so many times as large as expected are a contradiction.
 const CONTRADICTS: f64 = 3.0;
-/// Between these a sensor agrees with the model over the last half of all rows, and before at most the other way round.
-const AGREES: [f64; 2] = [0.3, 1.5];
+/// From so many times on to [`MOST`] a sensor agrees with the model.
+const LEAST: f64 = 0.3;
+const MOST: f64 = 1.5;
 
 /// Where readings that are still smaller agree as well, a change shows nothing: a plant may rest at 0.
 const SMALLER: [f64; 2] = [0.2, 0.02];
@@ -107,20 +108,22 @@ pub(super) fn suspected(
     let mut found = vec![];
     for &(sensor, _) in suspects.iter().take(SENSORS) {
         for change in &CHANGES {
-            let agrees = |change: &Change| {
-                trial.agrees(|readings| readings[sensor] = change.of(&readings[sensor]))
+            let agrees = |change: &Change, least: f64| {
+                trial.agrees(least, |readings| {
+                    readings[sensor] = change.of(&readings[sensor])
+                })
             };
             let is_scale = change.offset == 0.0 && change.factor > 0.0;
             let shows_nothing =
-                || is_scale && SMALLER.iter().any(|&by| agrees(&change.smaller(by)));
-            if agrees(change) && !shows_nothing() {
+                || is_scale && SMALLER.iter().any(|&by| agrees(&change.smaller(by), 0.0));
+            if agrees(change, LEAST) && !shows_nothing() {
                 found.push(trial.scaled(sensor, change));
             }
         }
         for other in (0..samples.readings.len()).filter(|&other| other != sensor) {
             let changed = |readings: &mut Vec<Series>| readings.swap(sensor, other);
             let is_seen = suspects.iter().any(|s| s.0 == other) && other < sensor;
-            if !is_seen && trial.agrees(changed) {
+            if !is_seen && trial.agrees(LEAST, changed) {
                 found.push(trial.swapped(sensor, other));
             }
         }
@@ -129,6 +132,7 @@ pub(super) fn suspected(
 }
 
 impl Change {
+    /// Another unit that makes smaller numbers still.
     fn smaller(&self, by: f64) -> Self {
         change(
             by * self.factor,
@@ -173,14 +177,14 @@ struct Trial<'t, 'p> {
 }
 
 impl Trial<'_, '_> {
-    /// Whether every sensor agrees with the model once the readings are changed.
-    fn agrees(&self, change: impl Fn(&mut Vec<Series>)) -> bool {
-        let [least, most] = AGREES;
+    /// Whether the innovations of every sensor are as large as expected once the readings are changed: `least` to
+    /// [`MOST`] times over the last half.
+    fn agrees(&self, least: f64, change: impl Fn(&mut Vec<Series>)) -> bool {
         let last = self.samples.time.len().min(ROWS[ROWS.len() - 1]);
         ROWS.iter().all(|&rows| {
             let mut samples = beginning(self.samples, rows);
             change(&mut samples.readings);
-            let most = if rows < last { 1.0 / least } else { most };
+            let most = if rows < last { CONTRADICTS } else { MOST };
             let is_good = |ratio| ratio <= most && (rows < last || ratio >= least);
             self.course(&samples)
                 .is_some_and(|course| !course.late.is_empty() && ratios(&course.late).all(is_good))
