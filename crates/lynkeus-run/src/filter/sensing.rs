@@ -87,8 +87,7 @@ impl Sensing {
         taken.clear();
         let readings = self
             .manifold
-            .signed(sample.readings, self.output_map.outputs())
-            .into_owned();
+            .signed(sample.readings, self.output_map.outputs());
         for (i, reading) in readings.iter().enumerate() {
             let spread = self.project(i, belief);
             let predicted = self.output_map.outputs()[i];
