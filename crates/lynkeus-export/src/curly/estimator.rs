@@ -318,6 +318,7 @@ impl Machine {
         let n = free.flow.system().states().len();
         match kind {
             FilterKind::MovingHorizon(..) => Err(Refusal::Window),
+            FilterKind::Particles(..) => Err(Refusal::Particles),
             FilterKind::Extended => {
                 self.size("LARGER", n);
                 self.linear(Which::Free, free, arguments)?;
