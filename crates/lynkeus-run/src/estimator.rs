@@ -230,9 +230,9 @@ impl Estimator {
         self.runner.effective()
     }
 
-    /// The particles, one after the other, with weights in units of their sum; none of what has no particles.
+    /// The particles, one after the other, and their weights, which sum to 1; none of what has no particles.
     #[must_use]
-    pub fn particles(&self) -> Option<(&[f64], Vec<f64>)> {
+    pub fn particles(&self) -> Option<(&[f64], &[f64])> {
         self.runner.particles()
     }
 

@@ -57,7 +57,7 @@ pub(crate) trait Runner: Persist + Debug + Send + Sync {
     }
 
     /// The particles, and their weights, which sum to 1.
-    fn particles(&self) -> Option<(&[f64], Vec<f64>)> {
+    fn particles(&self) -> Option<(&[f64], &[f64])> {
         None
     }
 

@@ -299,11 +299,10 @@ fn beside_grid(well: &Well, readings: &[f64], kind: FilterKind) -> [f64; 2] {
         own.push(INTERVAL * k as f64, &[*y]).unwrap();
         chance += own.record().unwrap().log_likelihood - expected;
         let (x, weights) = own.particles().unwrap();
-        let whole: f64 = weights.iter().sum();
         for place in (0..grid.places.len() - 1).step_by(4) {
             let end = grid.places[place] + 0.5 * CELL;
-            let inside = x.iter().zip(&weights).filter(|(x, _)| **x <= end);
-            let share = inside.map(|(_, w)| w).sum::<f64>() / whole;
+            let inside = x.iter().zip(weights).filter(|(x, _)| **x <= end);
+            let share = inside.map(|(_, w)| w).sum::<f64>();
             largest = largest.max((share - grid.below(place)).abs());
         }
     }

@@ -24,6 +24,7 @@ use super::sensing::Sensing;
 use super::settings::{FilterSettings, Particles};
 use crate::divergence::{Bound, check_deviations};
 use crate::manifold::Manifold;
+use crate::method::are_finite;
 use crate::noise::Level;
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
@@ -31,7 +32,7 @@ use crate::{Error, EstimatorSettings, Result};
 use code::BLOCK;
 use likelihood::Likelihood;
 use moments::Moments;
-use way::{Cloud, Interval, Way, stream};
+use way::{Cloud, Interval, Way, shares, stream};
 
 /// The logarithm of the likelihood of readings that no particle explains: the least that a number has.
 const NO_CHANCE: f64 = -708.0;
@@ -89,11 +90,11 @@ impl ParticleFilter {
             manifold: model.manifold.clone(),
             cloud: Cloud {
                 x: vec![0.0; particles.count * n],
-                weights: vec![0.0; particles.count],
                 memories: match flow.has_clauses() {
                     true => vec![Default::default(); particles.count],
                     false => vec![],
                 },
+                ..Cloud::even(particles.count)
             },
             earlier: None,
             round: 0,
@@ -131,7 +132,7 @@ impl ParticleFilter {
             .show(&self.cloud, sample.t, sample.inputs, &mut self.shown);
         let m = sample.readings.len();
         self.moments
-            .show(&self.cloud.weights, &mut self.shown, m, &self.manifold);
+            .show(&self.cloud.share, &mut self.shown, m, &self.manifold);
         let expected = &self.moments.expected;
         if let Some(i) = expected.iter().position(|y| !y.is_finite()) {
             // what the sensors say of it at the estimate, where that has a name
@@ -186,14 +187,12 @@ impl ParticleFilter {
             return log_likelihood;
         }
         let own = self.likelihoods(taken, &self.shown);
-        let pairs = self.cloud.weights.iter().zip(&own);
-        let joint: Vec<f64> = pairs.map(|(w, l)| w + l).collect();
-        let log_likelihood = log_sum(&joint) - log_sum(&self.cloud.weights);
+        let joint = sums(&self.cloud.log, &own);
+        let log_likelihood = self.cloud.give(joint);
         if !log_likelihood.is_finite() {
             self.told().starved += 1;
             return NO_CHANCE;
         }
-        self.cloud.weights = joint;
         log_likelihood
     }
 
@@ -210,35 +209,37 @@ impl ParticleFilter {
         let mut places = before.clone();
         let seed = self.settings.seed;
         self.way.advance(&mut places, interval, seed, None).ok()?;
-        let mut shown = vec![];
-        self.way.show(&places, sample.t, sample.inputs, &mut shown);
-        self.lift(&mut shown);
-        let first = self.likelihoods(taken, &shown);
-        let pairs = before.weights.iter().zip(&first);
-        let joint: Vec<f64> = pairs.map(|(w, l)| w + l).collect();
-        let chance = log_sum(&joint) - log_sum(&before.weights);
-        if !chance.is_finite() {
-            return None;
-        }
-        let ancestors = self.ancestors(&joint);
+        let first = self.likelihoods_of(&places, taken, sample);
+        let (chance, share) = shares(&sums(&before.log, &first))?;
+        let ancestors = self.ancestors(&share);
         let mut cloud = before.of(&ancestors, n);
         let round = Some(&mut self.round);
         let put_back = self.way.advance(&mut cloud, interval, seed, round).ok()?;
-        self.way.show(&cloud, sample.t, sample.inputs, &mut shown);
-        self.lift(&mut shown);
-        let second = self.likelihoods(taken, &shown);
+        self.normalise(&mut cloud);
+        let second = self.likelihoods_of(&cloud, taken, sample);
         let pairs = second.iter().zip(&ancestors);
-        cloud.weights = pairs.map(|(l, a)| l - first[*a]).collect();
-        let rest = log_sum(&cloud.weights) - (ancestors.len() as f64).ln();
+        let rest = cloud.give(pairs.map(|(l, a)| l - first[*a]).collect());
         if !rest.is_finite() {
             return None;
         }
-        self.normalise(&mut cloud);
         self.cloud = cloud;
         let told = self.told();
         told.put_back += put_back;
         told.resampled += 1;
-        Some(chance + rest)
+        Some(chance + rest - (ancestors.len() as f64).ln())
+    }
+
+    /// The same of another cloud.
+    fn likelihoods_of(
+        &mut self,
+        cloud: &Cloud,
+        taken: &[Believed],
+        sample: &Sample<'_>,
+    ) -> Vec<f64> {
+        let mut shown = vec![];
+        self.way.show(cloud, sample.t, sample.inputs, &mut shown);
+        self.lift(&mut shown);
+        self.likelihoods(taken, &shown)
     }
 
     /// Angles as the nearest ones to what was expected.
@@ -256,8 +257,8 @@ impl ParticleFilter {
     fn ancestors(&mut self, weights: &[f64]) -> Vec<usize> {
         self.round += 1;
         let mut random = stream(self.settings.seed, self.round, 0);
-        let share: f64 = StandardUniform.sample(&mut random);
-        systematic(weights, share)
+        let first: f64 = StandardUniform.sample(&mut random);
+        systematic(weights, first)
     }
 
     /// Particles in the place of those with little weight, where few count.
@@ -266,7 +267,7 @@ impl ParticleFilter {
         if self.effective >= few {
             return;
         }
-        let weights = std::mem::take(&mut self.cloud.weights);
+        let weights = std::mem::take(&mut self.cloud.share);
         let ancestors = self.ancestors(&weights);
         self.cloud = self.cloud.of(&ancestors, self.estimate.len());
         self.told().resampled += 1;
@@ -274,8 +275,8 @@ impl ParticleFilter {
 
     /// Estimate and deviations of the cloud.
     fn condense(&mut self) {
-        let (Cloud { x, weights, .. }, moments) = (&self.cloud, &mut self.moments);
-        moments.condense(x, weights, &self.manifold, self.estimate.len());
+        let (Cloud { x, share, .. }, moments) = (&self.cloud, &mut self.moments);
+        moments.condense(x, share, &self.manifold, self.estimate.len());
         self.estimate.copy_from_slice(&moments.mean);
         self.deviations.copy_from_slice(&moments.deviations);
         self.is_stale = false;
@@ -288,7 +289,8 @@ impl ParticleFilter {
     }
 
     fn count_effective(&mut self) {
-        let effective = effective(&self.cloud.weights);
+        let squares: f64 = self.cloud.share.iter().map(|w| w * w).sum();
+        let effective = squares.recip();
         self.effective = effective;
         self.told().see(effective, ALONE);
     }
@@ -312,14 +314,15 @@ impl Runner for ParticleFilter {
         self.told().put_back += done?;
         let n = self.estimate.len();
         // a particle without a value is none from here on
-        let cloud = &mut self.cloud;
-        for (x, weight) in cloud.x.chunks_exact(n).zip(&mut cloud.weights) {
-            if !x.iter().all(|x| x.is_finite()) {
-                *weight = f64::NEG_INFINITY;
-            }
-        }
-        if !log_sum(&cloud.weights).is_finite() {
-            let memory = cloud.memories.first();
+        let particles = self.cloud.x.chunks_exact(n).zip(&self.cloud.log);
+        let alive = |(x, log): (&[f64], &f64)| match are_finite(x) {
+            true => *log,
+            false => f64::NEG_INFINITY,
+        };
+        if !are_finite(&self.cloud.x)
+            && !self.cloud.give(particles.map(alive).collect()).is_finite()
+        {
+            let memory = self.cloud.memories.first();
             return Err(self.way.why(&self.estimate, memory, &interval));
         }
         self.inputs.copy_from_slice(sample.inputs);
@@ -388,10 +391,8 @@ impl Runner for ParticleFilter {
         Some(self.effective)
     }
 
-    fn particles(&self) -> Option<(&[f64], Vec<f64>)> {
-        let most = log_sum(&self.cloud.weights);
-        let weights = self.cloud.weights.iter().map(|w| (w - most).exp());
-        Some((&self.cloud.x, weights.collect()))
+    fn particles(&self) -> Option<(&[f64], &[f64])> {
+        Some((&self.cloud.x, &self.cloud.share))
     }
 
     fn copied(&self) -> Box<dyn Runner> {
@@ -408,7 +409,8 @@ impl Persist for ParticleFilter {
         let has_memory = !self.cloud.memories.is_empty();
         walk.optional(&mut self.earlier, |walk, (cloud, interval)| {
             cloud.x.resize(states * count, 0.0);
-            cloud.weights.resize(count, 0.0);
+            cloud.log.resize(count, 0.0);
+            cloud.share.resize(count, 0.0);
             let memories = if has_memory { count } else { 0 };
             cloud.memories.resize(memories, Default::default());
             interval.begin.resize(inputs, 0.0);
@@ -432,7 +434,8 @@ impl Persist for ParticleFilter {
 impl Persist for Cloud {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         walk.numbers(&mut self.x)?;
-        walk.numbers(&mut self.weights)?;
+        walk.numbers(&mut self.log)?;
+        walk.numbers(&mut self.share)?;
         self.memories.iter_mut().try_for_each(|m| m.walk(walk))
     }
 }
@@ -476,35 +479,19 @@ fn draw(start: &[f64], root: &[f64], x: &mut [f64], random: &mut ChaCha8Rng) {
     }
 }
 
-/// log Σ exp, over what may be −∞.
-fn log_sum(logarithms: &[f64]) -> f64 {
-    let most = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if !most.is_finite() {
-        return most;
-    }
-    let sum: f64 = logarithms.iter().map(|l| (l - most).exp()).sum();
-    most + sum.ln()
+/// One by one.
+fn sums(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a + b).collect()
 }
 
-/// (Σw)²/Σw².
-fn effective(logarithms: &[f64]) -> f64 {
-    let whole = log_sum(logarithms);
-    let squares: f64 = logarithms.iter().map(|l| (2.0 * (l - whole)).exp()).sum();
-    squares.recip()
-}
-
-/// The places at (k + share)/N of the sum of the weights, whose logarithms these are.
-fn systematic(logarithms: &[f64], share: f64) -> Vec<usize> {
-    let whole = log_sum(logarithms);
-    let count = logarithms.len();
+/// The places at (k + first)/N of these weights one after the other, which sum to 1.
+fn systematic(weights: &[f64], first: f64) -> Vec<usize> {
+    let count = weights.len();
     let mut places = Vec::with_capacity(count);
     let (mut sum, mut last) = (0.0, 0);
-    for (place, logarithm) in logarithms.iter().enumerate() {
-        let weight = (logarithm - whole).exp();
-        if weight > 0.0 {
-            (sum, last) = (sum + weight, place);
-        }
-        while places.len() < count && (places.len() as f64 + share) < sum * count as f64 {
+    for (place, weight) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+        (sum, last) = (sum + weight * count as f64, place);
+        while places.len() < count && places.len() as f64 + first < sum {
             places.push(place);
         }
     }
@@ -519,10 +506,10 @@ mod tests {
 
     #[test]
     fn particles_are_drawn_in_proportion_to_their_weights() {
-        let weights = [0.1, 0.0, 0.5, 0.4].map(f64::ln);
-        let many: Vec<f64> = weights.iter().copied().cycle().take(400).collect();
-        for share in [0.0, 0.3, 0.999] {
-            let places = systematic(&many, share);
+        let weights = [0.1, 0.0, 0.5, 0.4].map(|w| w / 100.0);
+        let many = weights.repeat(100);
+        for first in [0.0, 0.3, 0.999] {
+            let places = systematic(&many, first);
             assert_eq!(places.len(), 400);
             let count = |own: usize| places.iter().filter(|p| *p % 4 == own).count();
             assert_eq!(count(1), 0);
@@ -531,8 +518,15 @@ mod tests {
             }
             assert!(places.is_sorted());
         }
-        assert!((effective(&weights) - 1.0 / 0.42).abs() < 1e-12);
-        assert_eq!(log_sum(&[f64::NEG_INFINITY; 2]), f64::NEG_INFINITY);
-        assert!((log_sum(&[-2000.0, -2000.0]) - (2.0_f64.ln() - 2000.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn weights_too_small_for_numbers_are_weights() {
+        let mut cloud = Cloud::even(3);
+        let whole = cloud.give(vec![-2000.0, -2000.0, f64::NEG_INFINITY]);
+        assert!((whole - (2.0_f64.ln() - 2000.0)).abs() < 1e-12);
+        assert_eq!(cloud.share, [0.5, 0.5, 0.0]);
+        assert_eq!(cloud.give(vec![f64::NEG_INFINITY; 3]), f64::NEG_INFINITY);
+        assert_eq!(cloud.share, [0.5, 0.5, 0.0]);
     }
 }

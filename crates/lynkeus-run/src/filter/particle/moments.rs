@@ -23,17 +23,11 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    fn weigh(&mut self, logarithms: &[f64]) {
-        let whole = super::log_sum(logarithms);
-        self.weights.clear();
-        self.weights
-            .extend(logarithms.iter().map(|l| (l - whole).exp()));
-    }
-
     /// What `m` sensors are expected to show; angles among what they show of each particle are those next to it. Particles
     /// that show nothing do not count.
-    pub fn show(&mut self, logarithms: &[f64], shown: &mut [f64], m: usize, manifold: &Manifold) {
-        self.weigh(logarithms);
+    pub fn show(&mut self, weights: &[f64], shown: &mut [f64], m: usize, manifold: &Manifold) {
+        self.weights.clear();
+        self.weights.extend_from_slice(weights);
         self.expected.clear();
         for i in 0..m {
             if manifold.dials.contains(&i) {
@@ -64,8 +58,9 @@ impl Moments {
     }
 
     /// Mean and deviations of the states.
-    pub fn condense(&mut self, x: &[f64], logarithms: &[f64], manifold: &Manifold, n: usize) {
-        self.weigh(logarithms);
+    pub fn condense(&mut self, x: &[f64], weights: &[f64], manifold: &Manifold, n: usize) {
+        self.weights.clear();
+        self.weights.extend_from_slice(weights);
         if self.manifold != *manifold {
             self.manifold.clone_from(manifold);
         }
@@ -164,7 +159,7 @@ mod tests {
     use super::*;
     use crate::manifold::{angle_between, turned};
 
-    const EVEN: [f64; 2] = [0.0, 0.0];
+    const EVEN: [f64; 2] = [0.5, 0.5];
 
     /// Two angles across the end of a turn, one of them a turn further on.
     #[test]

@@ -34,8 +34,10 @@ const AXES: usize = 8;
 pub(super) struct Cloud {
     /// particle by particle
     pub x: Vec<f64>,
-    /// of weights that need not sum to 1
-    pub weights: Vec<f64>,
+    /// logarithms of their weights
+    pub log: Vec<f64>,
+    /// their weights, which sum to 1
+    pub share: Vec<f64>,
     /// what each remembers of the clauses by which the state jumps; empty where it never does
     pub memories: Vec<Memory>,
 }
@@ -53,10 +55,43 @@ impl Cloud {
         };
         Self {
             x: x.copied().collect(),
-            weights: vec![0.0; ancestors.len()],
             memories,
+            ..Self::even(ancestors.len())
         }
     }
+
+    /// So many particles with the same weight, which are nowhere yet.
+    pub fn even(count: usize) -> Self {
+        let share = (count as f64).recip();
+        Self {
+            log: vec![share.ln(); count],
+            share: vec![share; count],
+            ..Self::default()
+        }
+    }
+
+    /// Gives the particles weights in proportion to those with these logarithms; the logarithm of their sum. Where none
+    /// has any, they stay as they are.
+    pub fn give(&mut self, mut logarithms: Vec<f64>) -> f64 {
+        let Some((whole, share)) = shares(&logarithms) else {
+            return f64::NEG_INFINITY;
+        };
+        logarithms.iter_mut().for_each(|l| *l -= whole);
+        (self.log, self.share) = (logarithms, share);
+        whole
+    }
+}
+
+/// The logarithm of the sum of what has these logarithms, and its shares in it; none where it is 0.
+pub(super) fn shares(logarithms: &[f64]) -> Option<(f64, Vec<f64>)> {
+    let most = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if !most.is_finite() {
+        return None;
+    }
+    let mut shares: Vec<f64> = logarithms.iter().map(|l| (l - most).exp()).collect();
+    let sum: f64 = shares.iter().sum();
+    shares.iter_mut().for_each(|share| *share /= sum);
+    Some((most + sum.ln(), shares))
 }
 
 /// The random numbers of a block in a round.
@@ -529,8 +564,7 @@ mod tests {
             let count = 20_001;
             let mut cloud = Cloud {
                 x: [0.5, 0.0].repeat(count),
-                weights: vec![0.0; count],
-                memories: vec![],
+                ..Cloud::even(count)
             };
             let mut round = 7;
             way.advance(&mut cloud, &interval, 1, Some(&mut round))
