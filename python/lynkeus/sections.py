@@ -327,7 +327,7 @@ class ObserverSection(TypedDict, total=False):
     proposal: Literal["bootstrap", "auxiliary"] | None
     """particle: "bootstrap": particles run, then are weighed; "auxiliary": those are drawn to run that the
     flow without noise takes to where the next readings are likely, which pays where readings are precise
-    beside the process noise (`"bootstrap"`, `"auxiliary"`; default: `"bootstrap"`)"""
+    and the process noise is small (`"bootstrap"`, `"auxiliary"`; default: `"bootstrap"`)"""
 
     resample_below: Number | None
     """particle: particles are drawn anew where their effective number falls below this share of them; 1:

@@ -331,7 +331,7 @@ const DRAWN: [KeySpec; 4] = [
         name: "proposal",
         shape: Shape::Word(&["bootstrap", "auxiliary"]),
         default: "`\"bootstrap\"`",
-        meaning: "\"bootstrap\": particles run, then are weighed; \"auxiliary\": those are drawn to run that the flow without noise takes to where the next readings are likely, which pays where readings are precise beside the process noise",
+        meaning: "\"bootstrap\": particles run, then are weighed; \"auxiliary\": those are drawn to run that the flow without noise takes to where the next readings are likely, which pays where readings are precise and the process noise is small",
     },
     KeySpec {
         name: "resample_below",

@@ -63,7 +63,7 @@ fn filter(kind: FilterKind) -> Estimator {
 
 fn kinds() -> [FilterKind; 4] {
     let particles = Particles {
-        count: 100,
+        count: 40,
         ..Particles::default()
     };
     [

@@ -23,6 +23,7 @@ use super::record::Record;
 use super::sensing::Sensing;
 use super::settings::{FilterSettings, Particles};
 use crate::divergence::{Bound, check_deviations};
+use crate::error::state_text;
 use crate::manifold::Manifold;
 use crate::method::are_finite;
 use crate::noise::Level;
@@ -141,7 +142,7 @@ impl ParticleFilter {
             return Err(Error::NotFinite {
                 time: sample.t,
                 operation: format!("'{}' has no value at any particle", self.sensors[i].name),
-                state: crate::error::state_text(self.way.system().states(), &self.estimate),
+                state: state_text(self.way.system().states(), &self.estimate),
             });
         }
         let readings = self.manifold.signed(sample.readings, expected);
@@ -149,8 +150,20 @@ impl ParticleFilter {
         for (i, reading) in readings.iter().enumerate() {
             let spread = self.moments.spread(&self.shown, i, i);
             let believed = self.sensing.judge(i, *reading, expected[i], spread);
-            // a noise that is a share has an own size at each particle
             taken.extend(believed);
+            let Innovation {
+                value, deviation, ..
+            } = self.sensing.innovations[i];
+            if !(value / deviation).powi(2).is_finite() {
+                let name = &self.sensors[i].name;
+                return Err(Error::NotFinite {
+                    time: sample.t,
+                    operation: format!(
+                        "the reading {reading:e} of '{name}' is too far off for numbers"
+                    ),
+                    state: state_text(self.way.system().states(), &self.estimate),
+                });
+            }
         }
         if let Some(record) = &mut self.sensing.record {
             record.spread(|i, j| self.moments.spread(&self.shown, i, j));
