@@ -92,10 +92,12 @@ fn beside_kalman(count: usize, seed: u64, looks_ahead: bool) -> [f64; 3] {
     for (t, signals) in swing(60) {
         own.push(t, &signals).unwrap();
         exact.push(t, &signals).unwrap();
-        let deviations = exact.deviations().unwrap();
-        for i in 0..2 {
-            squares += ((own.estimate()[i] - exact.estimate()[i]) / deviations[i]).powi(2);
-            spreads += (own.deviations().unwrap()[i] / deviations[i] - 1.0).powi(2);
+        let means = own.estimate().iter().zip(exact.estimate());
+        let deviations = own.deviations().unwrap().iter();
+        let pairs = deviations.zip(exact.deviations().unwrap());
+        for ((mean, expected), (deviation, sd)) in means.zip(pairs) {
+            squares += ((mean - expected) / sd).powi(2);
+            spreads += (deviation / sd - 1.0).powi(2);
             terms += 1.0;
         }
         chance += own.record().unwrap().log_likelihood - exact.record().unwrap().log_likelihood;
