@@ -12,6 +12,9 @@ use crate::{Error, Study};
 /// Updates in a row after which hardly more than one particle counted: what is told of the estimate is then one of them.
 const LOST: usize = 10;
 
+/// Fewer particles that count tell little of what hardly wanders: it keeps the values of these.
+const FEW: f64 = 10.0;
+
 /// A share of the updates that is worth a word.
 const OFTEN: f64 = 0.05;
 
@@ -75,6 +78,12 @@ pub(super) fn tell(
         format!(
             "after {} of {} updates one of {} particles has all the weight",
             told.alone, told.updates, settings.count
+        )
+    } else if told.lowest < FEW {
+        format!(
+            "once only {} of {} particles counted: what hardly wanders, as constants do, keeps the values of these, and its deviation may be too small",
+            figures(told.lowest, 2),
+            settings.count
         )
     } else {
         return;
