@@ -17,6 +17,7 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{Budget, Interval, MissingInput, Node};
+use lynkeus_gain::sampling::SampledError;
 use lynkeus_proof::decay::{self, ErrorModel, SampledProof, Sector};
 use lynkeus_proof::matrix::sum;
 use lynkeus_structure::{AugmentedPlant, Dimension, Innovation, Slopes, range};
@@ -40,6 +41,9 @@ pub struct SampledDecay {
     pub longest: AtSamples,
     /// for the samples that were asked about; none where these are not proved
     pub at: Option<AtSamples>,
+    /// from how long equal intervals on the error grows where slopes stay at an end of their ranges; infinite where it
+    /// was not seen to grow: what no proof that counts every slope of the ranges can reach
+    pub broken: f64,
     /// for readings that are held from one to the next of those; none where nothing bounds what they leave
     pub held: Option<AtSamples>,
     /// a limit that ended the search
@@ -173,8 +177,27 @@ impl SampledSystem {
         Ok(SampledDecay {
             longest: proved(longest.interval, &longest),
             at,
+            broken: self.broken(),
             held: None,
             spent: search.marked().map(Said::LongerSought),
+        })
+    }
+
+    /// The shortest interval at which slopes that stay at their ends let the error grow from sample to sample.
+    fn broken(&self) -> f64 {
+        let n = self.scale.len();
+        let mut C = DMatrix::zeros(self.shown.len(), n);
+        for (j, &state) in self.shown.iter().enumerate() {
+            C[(j, state)] = 1.0;
+        }
+        let S = decay::between_errors(n + self.shown.len(), &self.shown);
+        let ends = self.models.iter().flat_map(|model| {
+            let low = model.sectors.iter().map(|s| s.range.lo()).collect();
+            let high = model.sectors.iter().map(|s| s.range.hi()).collect();
+            [low, high, model.middles()].map(|θ: Vec<f64>| &S * model.at(&θ) * &S)
+        });
+        ends.fold(f64::INFINITY, |least, M| {
+            SampledError::new(M, &C).map_or(least, |error| least.min(error.predict(least)))
         })
     }
 

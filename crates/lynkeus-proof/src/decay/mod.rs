@@ -65,7 +65,10 @@ pub struct SampledProof {
 }
 
 /// S with (e, σ) = S (e, ε) and back: σ_j = e_s − ε_j for the state s that sensor j shows.
-fn between_errors(size: usize, shown: &[usize]) -> DMatrix<f64> {
+///
+/// # Panics
+/// Where more are shown than `size` has room for, or a state that is none.
+pub fn between_errors(size: usize, shown: &[usize]) -> DMatrix<f64> {
     let mut S = DMatrix::identity(size, size);
     for (row, &state) in (size - shown.len()..).zip(shown) {
         S[(row, row)] = -1.0;

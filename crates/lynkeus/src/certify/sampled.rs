@@ -20,6 +20,9 @@ pub(super) struct SampledEntry {
     longest: Option<AtSamplesEntry>,
     /// for the samples of the study's simulation; null where it has none or they are not proved
     at: Option<AtSamplesEntry>,
+    /// from how long equal intervals on slopes at an end of their ranges, if they stayed there, would let the error grow;
+    /// null where that was not seen
+    broken: Option<f64>,
     /// for readings that are held instead, as far apart as the study's: with the proof for continuous sensors
     held: Option<AtSamplesEntry>,
     /// why there is no proof, or what ended the search
@@ -67,6 +70,7 @@ impl From<&Result<SampledDecay, Said>> for SampledEntry {
             at: found
                 .and_then(|found| found.at.as_ref())
                 .map(AtSamplesEntry::from),
+            broken: found.and_then(|found| finite(found.broken)),
             held: found
                 .and_then(|found| found.held.as_ref())
                 .map(AtSamplesEntry::from),
@@ -105,6 +109,12 @@ pub(super) fn tell(
         number(found.longest.interval),
         number(found.longest.rate)
     ));
+    if found.broken.is_finite() {
+        document.item(format!(
+            "slopes that stayed at an end of their ranges would let it grow from {} apart on",
+            number(found.broken)
+        ));
+    }
     if let Some(at) = &found.at {
         let overshoot = at
             .overshoot
