@@ -28,21 +28,19 @@ pub fn holds_between_samples(models: &[ErrorModel], shown: &[usize], proof: &Sam
     let Some(n) = first.nrows().checked_sub(shown.len()) else {
         return false;
     };
-    let counted = !later.is_empty() && proof.multipliers.len() == later.len();
-    let shapes = proof
-        .P
-        .iter()
-        .all(|P| is_form(P) && P.nrows() == first.nrows());
-    if !counted
-        || !shapes
-        || !shown.iter().all(|&s| s < n)
-        || !(proof.interval > 0.0 && proof.interval.is_finite())
-    {
+    let size = first.nrows();
+    let is_fit = !later.is_empty()
+        && proof.multipliers.len() == later.len()
+        && proof.P.iter().all(|P| is_form(P) && P.nrows() == size)
+        && shown.iter().all(|&state| state < n)
+        && proof.interval > 0.0
+        && proof.interval.is_finite();
+    if !is_fit {
         return false;
     }
-    let apart = |i: usize, j: usize| (i < n) == (j < n);
+    let is_together = |i: usize, j: usize| (i < n) == (j < n);
     let is_split =
-        (0..first.nrows()).all(|i| (0..first.nrows()).all(|j| apart(i, j) || first[(i, j)] == 0.0));
+        (0..size).all(|i| (0..size).all(|j| is_together(i, j) || first[(i, j)] == 0.0));
     // what a sample leaves of V: eᵀP(0)e
     let kept = |P: &DMatrix<f64>| {
         square(P.nrows(), |i, j| {

@@ -111,7 +111,7 @@ pub(super) fn tell(
     ));
     if found.broken.is_finite() {
         document.item(format!(
-            "slopes that stayed at an end of their ranges would let it grow from {} apart on",
+            "from {} apart on equal intervals would let it grow, with slopes that stay at an end of their ranges",
             number(found.broken)
         ));
     }
