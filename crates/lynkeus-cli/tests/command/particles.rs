@@ -162,7 +162,7 @@ fn what_particles_cannot_do_is_refused_with_a_reason() {
         (
             DRAWN,
             "",
-            &["export", "study.toml", "--to", "c"][..],
+            &["export", "study.toml", "--to", "c", "-o", "c"][..],
             "not exported",
         ),
         (

@@ -412,8 +412,9 @@ fn readings_of_every_kind_count_as_they_are_declared() {
         }
         for looks_ahead in [false, true] {
             let [off, chance] = beside_grid(&well, &readings, particles(100_000, 2, looks_ahead));
+            // a density that ends in the middle of the grid's cells is known to a share of one
             assert!(
-                off < 0.03 && chance.abs() < 0.1,
+                off < 0.03 && chance.abs() < 0.2,
                 "{noise:?} {limits:?} {looks_ahead}: {off} {chance}"
             );
         }

@@ -520,11 +520,11 @@ mod tests {
     #[test]
     fn particles_are_drawn_in_proportion_to_their_weights() {
         let weights = [0.1, 0.0, 0.5, 0.4].map(|w| w / 100.0);
-        let many = weights.repeat(100);
+        let many: Vec<f64> = weights.iter().flat_map(|w| [*w; 100]).collect();
         for first in [0.0, 0.3, 0.999] {
             let places = systematic(&many, first);
             assert_eq!(places.len(), 400);
-            let count = |own: usize| places.iter().filter(|p| *p % 4 == own).count();
+            let count = |own: usize| places.iter().filter(|p| *p / 100 == own).count();
             assert_eq!(count(1), 0);
             for (own, expected) in [(0, 40), (2, 200), (3, 160)] {
                 assert!(count(own).abs_diff(expected) <= 1, "{own} {}", count(own));
