@@ -3,7 +3,7 @@
 
 use crate::adaptive::Adaptive;
 use crate::divergence::{diverged, largest};
-use crate::events::{Filippov, Memory, Seen, Sides, occur, rates};
+use crate::events::{Filippov, Memory, Seen, Sides, occur};
 use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Method, Result, Step, spectral_radius};
@@ -529,7 +529,7 @@ impl Rk4 {
             let flipped = pairs.filter(|(_, (a, b))| a.holds != b.holds);
             let flipped: Vec<usize> = flipped.map(|(relation, _)| relation).collect();
             if occur(f, memory, (t, to - from), x, &flipped, |_, _| ())? {
-                sent_back = self.sent_back(f, (t, to - from), x, &flipped);
+                sent_back = self.sent_back(f, t, x, &flipped);
             }
         }
         Ok(())
@@ -539,13 +539,13 @@ impl Rk4 {
     fn sent_back(
         &mut self,
         f: &mut impl Dynamics,
-        (t, length): (f64, f64),
+        t: f64,
         x: &[f64],
         flipped: &[usize],
     ) -> Option<usize> {
         let mut slope = vec![0.0; x.len()];
         f.derivatives(t, x, &mut slope);
-        let rates = rates(f, (t, length), x, &slope);
+        let rates = f.rates(t, x, &slope);
         let mut seen = vec![];
         f.watch(t, x, &mut seen);
         let leaves = |relation: &&usize| match seen[**relation].holds {

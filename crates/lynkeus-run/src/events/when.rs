@@ -40,9 +40,12 @@ pub(crate) struct Shape {
     pub needs: Vec<Vec<usize>>,
 }
 
+/// What a clause is beside its expressions.
 #[derive(Debug)]
-pub(crate) struct ClauseShape {
+pub struct ClauseShape {
+    /// of clauses with one number the first that is due takes effect
     pub group: usize,
+    /// of the text, from 1
     pub line: usize,
     /// how many conditions it has; none of what holds at every event
     pub conditions: usize,
@@ -169,8 +172,13 @@ impl WhenRoots {
         parts[3].iter().map(surface).collect::<Vec<_>>().into_iter()
     }
 
+    /// What they are beside their expressions.
+    pub(super) fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
     /// Conditions, values, relations and quantities.
-    fn parts(&self) -> [&[Node]; 4] {
+    pub(super) fn parts(&self) -> [&[Node]; 4] {
         let shape = &self.shape;
         let values = shape.clauses.iter().map(|c| c.changes.len()).sum();
         let (conditions, rest) = self.nodes.split_at(shape.needs.len());
@@ -234,7 +242,7 @@ pub struct Clauses {
     pub(super) relations: usize,
     /// they, then their quantities, over the inputs of the system alone
     seen: Tape,
-    /// entries of the slopes of the quantities by the states
+    /// entries of the slopes of the quantities by all that these inputs are
     gradient: (Tape, Vec<(usize, usize)>),
     /// of each clause its new values, with their slopes by states, states before, and time
     pub(super) values: Vec<Tape>,
@@ -273,7 +281,7 @@ impl Clauses {
             conditions: Tape::new(graph, &all, conditions)?,
             relations: relations.len(),
             seen: Tape::new(graph, inputs, &[relations, quantities].concat())?,
-            gradient: slopes(quantities, own, inputs)?,
+            gradient: slopes(quantities, inputs, inputs)?,
             values: values.collect::<Result<_, _>>()?,
             slopes: parts
                 .iter()
@@ -299,11 +307,21 @@ impl Clauses {
         let values = self.gradient.0.eval_in(&Reals, inputs);
         let mut row = vec![0.0; self.states];
         for (value, (i, j)) in values.iter().zip(&self.gradient.1) {
-            if *i == relation {
-                row[*j] = *value;
+            if *i == relation && (1..=self.states).contains(j) {
+                row[*j - 1] = *value;
             }
         }
         row
+    }
+
+    /// How fast the quantities change where the inputs change so fast, time among them.
+    pub(crate) fn rates(&self, inputs: &[f64], speeds: &[f64]) -> Vec<f64> {
+        let values = self.gradient.0.eval_in(&Reals, inputs);
+        let mut rates = vec![0.0; self.relations];
+        for (value, (i, j)) in values.iter().zip(&self.gradient.1) {
+            rates[*i] += value * speeds[*j];
+        }
+        rates
     }
 
     /// The instants of timers strictly inside an interval.

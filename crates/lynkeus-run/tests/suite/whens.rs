@@ -4,8 +4,8 @@ use lynkeus_expr::Node;
 use lynkeus_model::{LoadOptions, Plant};
 use lynkeus_run::filter::{FilterKind, FilterSettings, NoisyModel, NoisyPlant, Sensor};
 use lynkeus_run::{
-    Blueprint, Error, Estimator, EstimatorSettings, Level, Method, Role, Simulation, Step, System,
-    Tolerances, Trajectory,
+    Blueprint, Error, Estimator, EstimatorSettings, Level, Method, Parts, Role, Simulation, Step,
+    System, Tolerances, Trajectory,
 };
 
 const METHODS: [Method; 2] = [
@@ -30,15 +30,15 @@ fn states(plant: &Plant) -> Vec<(String, Node, f64)> {
 fn run(text: &str, until: f64, rows: f64, method: Method) -> Result<Trajectory, Error> {
     let plant = plant(text);
     let (graph, time) = (&plant.graph, plant.time);
-    let system = System::jumping(
+    let system = System::of(&Parts {
         graph,
         time,
-        &states(&plant),
-        &[],
-        &plant.derivatives,
-        &[],
-        &plant.whens,
-    );
+        states: &states(&plant),
+        signals: &[],
+        derivatives: &plant.derivatives,
+        outputs: &[],
+        whens: Some(&plant.whens),
+    });
     let inputs = System::new(graph, time, &[], &[], &[], &[])?;
     let mut simulation = Simulation::new(system?, inputs, until, rows);
     simulation.method = method;
