@@ -60,7 +60,7 @@ pub const UKF: &dyn Family = &Filter {
     called: "unscented Kalman filter",
     keys: &[&KEYS, &BOUNDS, &POINTS],
     smooths: false,
-    follows_jumps: false,
+    follows_jumps: true,
     kind: |tuning| {
         let SigmaPoints { alpha, beta, kappa } = SigmaPoints::default();
         let [own_alpha, own_beta, own_kappa] = &POINTS;

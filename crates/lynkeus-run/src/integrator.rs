@@ -394,6 +394,18 @@ pub(crate) fn instant(from: f64, to: f64, steps: usize, i: usize) -> f64 {
 /// How often a step is halved on the way to an event.
 const HALVINGS: usize = 50;
 
+/// Most parts of a step with events in it.
+const MOST_PARTS: usize = 10_000;
+
+/// Relations change all along a step.
+fn endless(f: &impl Dynamics, time: f64) -> Error {
+    Error::EndlessEvents {
+        time,
+        line: f.clauses().map_or(0, |clauses| clauses.first_line()),
+        how: format!("its conditions change {MOST_PARTS} times in one step"),
+    }
+}
+
 /// (time of the stage as a fraction of the step, factor of the stage before)
 const STAGES: [(f64, f64); 4] = [(0.0, 0.0), (0.5, 0.5), (0.5, 0.5), (1.0, 1.0)];
 
@@ -472,7 +484,12 @@ impl Rk4 {
         let (mut t, mut was, mut now) = (from, vec![], vec![]);
         let mut sent_back: Option<usize> = None;
         let mut start = x.to_vec();
+        let mut count = 0;
         while to - t > resolution(to) {
+            count += 1;
+            if count > MOST_PARTS {
+                return Err(endless(f, t));
+            }
             let whole = to - t;
             start.copy_from_slice(x);
             f.watch(t, x, &mut was);

@@ -10,9 +10,7 @@ use lynkeus_model::Whens;
 use crate::divergence::explained;
 use crate::equations::{Both, Equations};
 use crate::error::state_text;
-use crate::events::{
-    Clauses, Guards, JumpSlopes, Memory, Seen, TimeEvents, WhenExpressions,
-};
+use crate::events::{Clauses, Guards, JumpSlopes, Memory, Seen, TimeEvents, WhenExpressions};
 use crate::routine::{Routine, Runner};
 use crate::snapshot::{Damaged, Digest, Persist, Walk};
 use crate::{BetweenSamples, Dynamics, Error, Events, Margin, Result, Slopes};
@@ -302,13 +300,16 @@ impl System {
     }
 
     /// Whether it jumps or bends (as max does) with time alone, at instants that are found and at
-    /// which an integration stops; or whether its state jumps by clauses.
-    pub fn has_instants(&self) -> bool {
-        if self.has_clauses() {
-            return true;
-        }
+    /// which an integration stops.
+    pub fn bends_with_time(&self) -> bool {
         let mut switches = self.code.equations.switches.iter();
         switches.any(|switches| !switches.is_empty())
+    }
+
+    /// Whether an integration stops at instants within a step: where it [bends with
+    /// time](Self::bends_with_time), or its state jumps by clauses.
+    pub fn has_instants(&self) -> bool {
+        self.has_clauses() || self.bends_with_time()
     }
 
     /// Whether its state jumps by clauses.

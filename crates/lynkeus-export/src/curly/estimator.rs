@@ -6,7 +6,7 @@ use lynkeus_run::{BetweenSamples, Jacobians, Level, Manifold, Tuned, Updates};
 
 use super::device::{Device, Entry, FirstReading};
 use super::draft::{Arguments, Target, draft, number, places, table};
-use super::events::{integrated_point, remembering};
+use super::events::{discrete, integrated_point, remembering};
 use super::machine::{FIELD, Linear, Machine, Which, code, refuse_jumps};
 use super::syntax::Type;
 use super::template::{chosen, exchanged};
@@ -254,9 +254,18 @@ impl Machine {
         let has_rotations = !model.manifold.rotations.is_empty();
         let has_dials = !model.manifold.dials.is_empty();
         let has_events = flow.has_clauses();
+        let discrete = match settings.kind {
+            FilterKind::Unscented(_) => discrete(model),
+            _ => vec![],
+        };
+        if !discrete.is_empty() {
+            self.size("DISCRETE", discrete.len());
+            self.tables += &places("discrete", discrete.iter().copied());
+        }
         let facts = [
             (confined.is_some(), "confined"),
             (has_events, "events"),
+            (!discrete.is_empty(), "discrete"),
             (has_rotations, "rotations"),
             (has_dials, "dials"),
             (!model.manifold.mirrors.is_empty(), "mirrors"),
@@ -479,6 +488,7 @@ impl Machine {
             (free.is_noisy(), "noisy"),
             (has_limits, "limits"),
             (about.contains(&"events"), "events"),
+            (about.contains(&"discrete"), "discrete"),
             (about.contains(&"rotations"), "rotations"),
             (about.contains(&"dials"), "dials"),
             (about.contains(&"mirrors"), "mirrors"),

@@ -1,6 +1,7 @@
 //! Events at which a flow's state jumps, in the draft: the clauses, what is remembered of them, and steps that end at
 //! events, found as the library's fixed steps find them.
 
+use lynkeus_run::filter::NoisyModel;
 use lynkeus_run::{Method, System, WhenExpressions};
 
 use super::device::Entry;
@@ -23,7 +24,21 @@ fn holds(system: &System) -> Vec<&'static str> {
         (!whens.timers.is_empty(), "timers"),
         (!whens.relations.is_empty(), "watched"),
     ];
-    facts.iter().filter(|fact| fact.0).map(|fact| fact.1).collect()
+    facts
+        .iter()
+        .filter(|fact| fact.0)
+        .map(|fact| fact.1)
+        .collect()
+}
+
+/// States that events alone change, and that have no deviation.
+pub(super) fn discrete(model: &NoisyModel) -> Vec<usize> {
+    let whens = model.flow.system().whens();
+    let discrete = whens
+        .iter()
+        .flat_map(|whens| whens.discrete.iter().copied());
+    let is_sure = |i: &usize| model.initial_variance[*i] == 0.0 && model.process_noise[*i] == 0.0;
+    discrete.filter(is_sure).collect()
 }
 
 /// How a flow is integrated: x with what is carried along it.

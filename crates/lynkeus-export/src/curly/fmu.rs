@@ -188,7 +188,10 @@ fn wrapper(
         ("@STARTS@", component.starts.len().to_string()),
         ("@TOKEN@", token.to_owned()),
         ("@FIRST_SIGNALS@", starts.collect::<Vec<_>>().join(", ")),
-        ("@REASONS@", reasons(codes(component.device).map(|reason| (reason.number, reason.about)))),
+        (
+            "@REASONS@",
+            reasons(codes(component.device).map(|reason| (reason.number, reason.about))),
+        ),
     ];
     title + &version.wrapped(CORE, holds, &values)
 }

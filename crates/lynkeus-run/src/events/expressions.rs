@@ -28,6 +28,8 @@ pub struct WhenExpressions<'s> {
     pub gradient: Vec<(usize, usize, Node)>,
     /// what is told by time alone
     pub timers: Vec<Instants>,
+    /// states that clauses alone change, to values that depend on no other states and not on time
+    pub discrete: &'s [usize],
 }
 
 /// The instants (first + k·step)/scale of a timer, of which first and step are whole numbers where the
@@ -76,6 +78,7 @@ impl WhenRoots {
             quantities,
             gradient: slopes(quantities, &[own, &inputs[..1]].concat()),
             timers: timers.collect(),
+            discrete: &shape.discrete,
         }
     }
 }

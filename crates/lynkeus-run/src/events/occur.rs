@@ -72,11 +72,7 @@ pub(crate) fn occur<D: Dynamics>(
     let mut after = vec![0.0; x.len()];
     f.derivatives(t, x, &mut after);
     let line = match condition {
-        NONE => clauses
-            .shape
-            .clauses
-            .first()
-            .map_or(0, |clause| clause.line),
+        NONE => clauses.first_line(),
         condition => clauses.line_of(condition),
     };
     f.settle((t, &old), x, [&before, &after], cause, line)?;

@@ -38,6 +38,9 @@ pub(crate) struct Shape {
     pub timers: Vec<Timer>,
     /// of each condition, the relations that it is made of
     pub needs: Vec<Vec<usize>>,
+    /// states that clauses alone change, to values that depend on no other states and not on time: where they
+    /// start without a deviation they never have one
+    pub discrete: Vec<usize>,
 }
 
 /// What a clause is beside its expressions.
@@ -148,7 +151,13 @@ impl WhenRoots {
             _ => *relation,
         };
         let quantities: Vec<Node> = relations.iter().map(quantity).collect();
+        let rests = (0..states.len()).filter(|&i| at_rest.contains(&own[i]));
+        let by = [own, &before, &moving[..1]].concat();
+        let slopes = jacobian::forward(graph, &values, &by).entries;
+        let changed: Vec<usize> = clauses.iter().flat_map(|c| c.changes.clone()).collect();
+        let slopes = slopes.iter().map(|slope| (changed[slope.0], slope.1));
         let shape = Shape {
+            discrete: discrete(rests.collect(), &slopes.collect::<Vec<_>>(), states.len()),
             clauses,
             timers: whens.timers.clone(),
             needs,
@@ -185,6 +194,21 @@ impl WhenRoots {
         let (values, rest) = rest.split_at(values);
         let (relations, quantities) = rest.split_at(rest.len() / 2);
         [conditions, values, relations, quantities]
+    }
+}
+
+/// Of states at rest, of so many, those that no clause makes depend on others: slopes are by states, states
+/// before, and time.
+fn discrete(mut rests: Vec<usize>, slopes: &[(usize, usize)], states: usize) -> Vec<usize> {
+    loop {
+        let is_free =
+            |(_, by): &(usize, usize)| *by == 2 * states || !rests.contains(&(by % states));
+        let freed: Vec<usize> = slopes.iter().filter(|s| is_free(s)).map(|s| s.0).collect();
+        let count = rests.len();
+        rests.retain(|state| !freed.contains(state));
+        if rests.len() == count {
+            return rests;
+        }
     }
 }
 
@@ -385,6 +409,16 @@ impl Clauses {
             condition < end
         });
         place.unwrap_or(0)
+    }
+
+    /// States that have no deviation unless they start with one.
+    pub(crate) fn discrete(&self) -> &[usize] {
+        &self.shape.discrete
+    }
+
+    /// The line of the first clause.
+    pub(crate) fn first_line(&self) -> usize {
+        self.shape.clauses.first().map_or(0, |clause| clause.line)
     }
 
     /// The line of a clause that has this condition.

@@ -209,8 +209,14 @@ static truth pass(field f, double from, double to, const real *w, real *z, doubl
     /* a relation beyond which a jump has sent the state back: it may have left and be there again within a step */
     int behind = RELATIONS;
     double t = from;
+    int count = 0;
     while (to - t > shortest(to)) {
         const double whole = to - t;
+        count++;
+        if (count > 10000) {
+            m[ENDLESS] = 1.0;
+            return 0;
+        }
         double h = whole;
         for (int i = 0; i < DIMENSION; i++) {
             start[i] = z[i];
@@ -307,7 +313,13 @@ static truth integrate(field f, double from, double to, int steps, const real *w
 //? timers
     (void)steps;
     double start = from;
+    int stops = 0;
     while (start < to) {
+        stops++;
+        if (stops > 1000000) {
+            m[ENDLESS] = 1.0;
+            return 0;
+        }
         const double end = next_stop(from, start, to);
         const int count = steps_in(end - start, to - from);
 //?

@@ -120,11 +120,19 @@ static void gather(real *points, real *x)
 
 //?
 /* Each point through the flow; P is their spread and W. 0, and nothing changed, where the flow has no value. */
-static truth predict(field f, double from, double to, int steps, const real *w, real *x, real *root)
+static truth predict(field f, double from, double to, int steps, const real *w, real *x, real *rootMEMORY_PARAMETER)
 {
     real points[POINTS * STATES];
     real point[STATES];
     real extra[STATES * STATES];
+//? events
+    /* each point meets events of its own, beside what the estimate remembers */
+    double remembered[MEMORY];
+    double own[MEMORY];
+    for (int i = 0; i < MEMORY; i++) {
+        remembered[i] = m[i];
+    }
+//?
     for (int i = 0; i < STATES * STATES; i++) {
         extra[i] = R(0.0);
     }
@@ -143,7 +151,7 @@ static truth predict(field f, double from, double to, int steps, const real *w, 
 //? noisy
     /* the estimate with what the process noise comes to along it */
     real z[DIMENSION];
-    if (!along(linearised, from, to, steps, w, x, z)) {
+    if (!along(linearised, from, to, steps, w, x, zMEMORY_ARGUMENT)) {
         return 0;
     }
     rows_of_noise(z, w, extra);
@@ -155,12 +163,32 @@ static truth predict(field f, double from, double to, int steps, const real *w, 
         for (int i = 0; i < STATES; i++) {
             point[i] = points[k * STATES + i];
         }
+//? !events
         if (!integrate_point(f, from, to, steps, w, point)) {
             return 0;
         }
+//?
+//? events
+        for (int i = 0; i < MEMORY; i++) {
+            own[i] = remembered[i];
+        }
+        if (!integrate_point(f, from, to, steps, w, point, own)) {
+            m[ENDLESS] = own[ENDLESS];
+            return 0;
+        }
+        for (int i = 0; i < MEMORY && k == 0; i++) {
+            m[i] = own[i];
+        }
+//?
         for (int i = 0; i < STATES; i++) {
             points[k * STATES + i] = point[i];
         }
+//? discrete
+        /* what has no deviation is what it is of the estimate */
+        for (int i = 0; i < DISCRETE; i++) {
+            points[k * STATES + discrete[i]] = points[discrete[i]];
+        }
+//?
     }
 //? !rotations
     centre(points, STATES, x);
