@@ -260,7 +260,7 @@ impl Machine {
         };
         if !discrete.is_empty() {
             self.size("DISCRETE", discrete.len());
-            self.tables += &places("discrete", discrete.iter().copied());
+            self.tables += &places("discrete_states", discrete.iter().copied());
         }
         let facts = [
             (confined.is_some(), "confined"),

@@ -75,7 +75,6 @@ static truth carry_jump(int relation, real late, const real *old, double t, cons
     }
     if (is_moved) {
         const int row = relation * (STATES + 1);
-        real rate = R(0.0);
         real made = R(0.0);
 //? carried
         truth touches = 0;
@@ -84,7 +83,7 @@ static truth carry_jump(int relation, real late, const real *old, double t, cons
             slopes[i] = R(0.0);
         }
         gradient((real)t, old, w, slopes);
-        rate = slopes[row + STATES];
+        real rate = slopes[row + STATES];
         for (int j = 0; j < STATES; j++) {
             rate += slopes[row + j] * before[j];
             made += fabs(slopes[row + j] * before[j]);

@@ -186,7 +186,7 @@ static truth predict(field f, double from, double to, int steps, const real *w, 
 //? discrete
         /* what has no deviation is what it is of the estimate */
         for (int i = 0; i < DISCRETE; i++) {
-            points[k * STATES + discrete[i]] = points[discrete[i]];
+            points[k * STATES + discrete_states[i]] = points[discrete_states[i]];
         }
 //?
     }
