@@ -52,12 +52,19 @@ pub(super) fn integrated(flow: &System, more: &[&'static str]) -> String {
 /// How a flow is integrated from a point, x alone.
 pub(super) fn integrated_point(flow: &System) -> String {
     let text = match flow.has_clauses() {
-        true => chosen(PASS, &holds(flow)),
+        true => {
+            let mut holds = holds(flow);
+            holds.push(match holds.contains(&"watched") {
+                true => "point_watched",
+                false => "point_blind",
+            });
+            chosen(PASS, &holds)
+        }
         false => INTEGRATE.to_owned(),
     };
     exchanged(&text, |word| match word {
         "DIMENSION" => Some("STATES".to_owned()),
-        "integrate" | "leap" | "look" | "carry_jump" | "occur" | "pass" => {
+        "integrate" | "leap" | "look" | "first_change" | "carry_jump" | "occur" | "pass" => {
             Some(format!("{word}_point"))
         }
         _ => None,
@@ -107,7 +114,7 @@ impl Machine {
         self.size("TIMERS", timers);
         let inputs = whens.inputs.len() - 1 - states;
         self.size("VIEW", inputs);
-        let mut size = 0;
+        let (mut size, mut allowed) = (0, 0);
         for (name, count) in [
             ("STARTED", 1),
             ("ENDLESS", 1),
@@ -115,18 +122,26 @@ impl Machine {
             ("SUSPECT", 1),
             ("NEWEST", 1),
             ("AT_ONCE", 1),
+            ("HAPPENED", 1),
+            ("ALLOWED", 1),
             ("TRUTHS", conditions),
             ("NEXT", timers),
             ("LAST", states),
             ("HURRY", 4 * clauses),
         ] {
+            if name == "ALLOWED" {
+                allowed = size;
+            }
             self.size(name, size);
             size += count;
         }
         self.size("MEMORY", size);
         let about = "what is remembered of events: conditions that hold, the next instants of timers, \
                      the state behind the last interval, how soon clauses took effect";
-        self.field("memory", Type::Double, about, vec![0.0; size]);
+        let mut start = vec![0.0; size];
+        // as many events as come
+        start[allowed] = -1.0;
+        self.field("memory", Type::Double, about, start);
     }
 
     fn tables_of_clauses(&mut self, whens: &WhenExpressions<'_>) {

@@ -54,9 +54,16 @@ pub(crate) fn occur<D: Dynamics>(
         let truths = f.truths(t, x)?;
         memory.rebase(&truths, &clauses.shape.needs, &outward, &flips);
     }
+    // what the state causes by itself may be more than is allowed; the clock asks nobody
+    if !causes.is_empty() && memory.is_spent() && !memory.is_due(&clauses, t) {
+        return Ok(false);
+    }
     let Some(condition) = f.happen(t, x, memory)? else {
         return Ok(false);
     };
+    if !causes.is_empty() {
+        memory.note();
+    }
     let needs = clauses.shape.needs.get(condition);
     let mut own = causes
         .iter()

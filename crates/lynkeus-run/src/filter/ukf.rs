@@ -103,8 +103,16 @@ impl Ukf {
             }
         }
         weights.centre(&mut self.points, n, &mut self.mean);
+        self.rest(n);
         weights.centre(&mut self.shown, m, &mut self.expected);
         Ok(())
+    }
+
+    /// Points beside their mean do not differ in what has no deviation, by rounding either.
+    fn rest(&mut self, n: usize) {
+        for point in self.points.chunks_exact_mut(n) {
+            self.discrete.iter().for_each(|&i| point[i] = 0.0);
+        }
     }
 
     /// Corrects by readings of `m` sensors, together.
@@ -219,6 +227,7 @@ impl Ukf {
             false => self.flow(propagation, belief, from, to)?,
             true => self.jump(propagation, belief, from, to)?,
         }
+        let at_rest: Vec<f64> = self.discrete.iter().map(|&i| self.points[i]).collect();
         let straight = self.manifold.is_straight();
         if !straight {
             let mut points = std::mem::take(&mut self.points);
@@ -233,6 +242,10 @@ impl Ukf {
         if straight {
             weights.centre(&mut self.points, n, &mut belief.x);
         }
+        for (&i, value) in self.discrete.iter().zip(at_rest) {
+            belief.x[i] = value;
+        }
+        self.rest(n);
         self.extra.clear();
         propagation.push_root(&mut self.extra);
         self.spread(&mut belief.root);
@@ -261,8 +274,10 @@ impl Ukf {
         Ok(())
     }
 
-    /// The same through events: each point meets its own, and remembers what the estimate does, beside which
-    /// it was drawn. What has no deviation is at the end what it is of the estimate.
+    /// The same through events, at its own instants for each point. All of one belief end on one side of an event: a
+    /// point that has not met what the estimate has is taken through it as if it had, and one that meets more goes on as
+    /// if it did not. Each remembers what the estimate does, beside which it was drawn; what has no deviation is at the
+    /// end what it is of the estimate.
     fn jump(
         &mut self,
         propagation: &mut Propagation,
@@ -272,25 +287,33 @@ impl Ukf {
     ) -> Result<()> {
         let n = belief.x.len();
         let (centre, others) = self.points.split_at_mut(n);
-        let along = propagation.memory().cloned();
-        let along = along.filter(|_| propagation.is_noisy());
-        let remembered = along.clone();
-        let remembered = remembered.unwrap_or_else(|| self.integrator.memory().clone());
-        match along {
-            Some(_) => {
+        let is_noisy = propagation.is_noisy();
+        let along = propagation.memory().filter(|_| is_noisy);
+        let memory = along.unwrap_or_else(|| self.integrator.memory());
+        memory.count(None);
+        let remembered = memory.clone();
+        let own = match is_noisy {
+            true => {
                 propagation.advance(belief, from, to)?;
                 centre.copy_from_slice(&propagation.end);
+                propagation.memory().cloned().unwrap_or_default()
             }
-            None => {
+            false => {
                 let mut point = Point::new(&mut propagation.driven);
                 self.integrator.advance(&mut point, from, to, centre)?;
+                self.integrator.memory().clone()
             }
-        }
-        let own = self.integrator.memory().clone();
+        };
+        let happened = own.happened();
         for image in others.chunks_exact_mut(n) {
             self.integrator.memory().clone_from(&remembered);
+            self.integrator.memory().count(Some(happened));
             let mut point = Point::new(&mut propagation.driven);
             self.integrator.advance(&mut point, from, to, image)?;
+            for _ in self.integrator.memory().happened()..happened {
+                self.integrator
+                    .anticipate(&mut point, (to, to - from), image)?;
+            }
             for &i in &self.discrete {
                 image[i] = centre[i];
             }

@@ -61,6 +61,24 @@ static truth due(double t, truth is_first, real *v, double *m)
 }
 
 //?
+/* Whether the clock has an event at t. */
+static truth is_time(double t, const double *m)
+{
+//? timers
+    const double size = t < 0.0 ? -t : t;
+    for (int i = 0; i < TIMERS; i++) {
+        if (timer_is_initial[i] == 0 && instant_of(i, m[NEXT + i]) <= t + 1.7763568394002505e-15 * size) {
+            return 1;
+        }
+    }
+//?
+//? !timers
+    (void)t;
+    (void)m;
+//?
+    return 0;
+}
+
 /* What clauses read of the states before an event. */
 static void remember(const real *before, real *v)
 {

@@ -141,6 +141,46 @@ static truth carry_jump(int relation, real late, const real *old, double t, cons
     return 1;
 }
 
+//? watched
+/* Of steps from a state, their lengths halved from h on, at whose end z relations are no more what they were, about the
+   shortest: its length, and which have changed. 0.0 where something has no value. */
+static double first_change(field f, double t, double h, const real *w, const real *start, const real *was, real *z, truth *flipped)
+{
+    real end[DIMENSION];
+    real there[RELATIONS_ROOM];
+    real quantities[RELATIONS_ROOM];
+    double low = 0.0;
+    double high = h;
+    int halvings = 0;
+    for (int i = 0; i < DIMENSION; i++) {
+        end[i] = z[i];
+    }
+    while (halvings < 50 && high - low > shortest(t + high)) {
+        const double half = low + 0.5 * (high - low);
+        halvings++;
+        if (!look(f, t, half, w, start, z, there, quantities)) {
+            return 0.0;
+        }
+        if (are_same(was, there)) {
+            low = half;
+        } else {
+            high = half;
+            for (int i = 0; i < DIMENSION; i++) {
+                end[i] = z[i];
+            }
+        }
+    }
+    for (int i = 0; i < DIMENSION; i++) {
+        z[i] = end[i];
+    }
+    relations((real)(t + high), z, w, there, quantities);
+    for (int r = 0; r < RELATIONS; r++) {
+        flipped[r] = is_same(was, there, r) ? 0 : 1;
+    }
+    return high;
+}
+//?
+
 /* The event at t, in an interval of some length, after relations have changed. 0 where it has no end or no value;
    1: nothing has happened; 2: the state has jumped. */
 static int occur(field f, double t, double length, const real *w, const truth *flipped, real *z, double *m)
@@ -153,6 +193,7 @@ static int occur(field f, double t, double length, const real *w, const truth *f
     real jump[STATES * (STATES + 1)];
     const truth is_known = m[STARTED] > 0.0 && m[HAS_LAST] > 0.0 ? 1 : 0;
     int relation = RELATIONS;
+    truth is_own = 0;
     for (int i = 0; i < DIMENSION; i++) {
         old[i] = z[i];
     }
@@ -167,12 +208,24 @@ static int occur(field f, double t, double length, const real *w, const truth *f
             return 0;
         }
     }
+    for (int r = 0; r < RELATIONS; r++) {
+        if (causes[r]) {
+            is_own = 1;
+        }
+    }
+    /* what the state causes by itself may be more than is allowed; the clock asks nobody */
+    if (is_own && m[ALLOWED] >= 0.0 && m[HAPPENED] >= m[ALLOWED] && !is_time(t, m)) {
+        return 1;
+    }
     const int found = happen(t, w, z, m, jump);
     if (found == 0) {
         return 1;
     }
     if (found > CONDITIONS + 1) {
         return 0;
+    }
+    if (is_own) {
+        m[HAPPENED] += 1.0;
     }
     for (int r = RELATIONS - 1; r >= 0; r--) {
         const int place = found > CONDITIONS ? 0 : (found - 1) * RELATIONS + r;
@@ -202,7 +255,6 @@ static truth pass(field f, double from, double to, const real *w, real *z, doubl
     real end[DIMENSION];
     real was[RELATIONS_ROOM];
     real now[RELATIONS_ROOM];
-    real there[RELATIONS_ROOM];
     real quantities[RELATIONS_ROOM];
     truth flipped[RELATIONS_ROOM];
     /* a relation beyond which a jump has sent the state back: it may have left and be there again within a step */
@@ -256,37 +308,11 @@ static truth pass(field f, double from, double to, const real *w, real *z, doubl
                 }
             }
         } else {
-            double low = 0.0;
-            double high = h;
-            int halvings = 0;
-            for (int i = 0; i < DIMENSION; i++) {
-                end[i] = z[i];
+            const double length = first_change(f, t, h, w, start, was, z, flipped);
+            if (length <= 0.0) {
+                return 0;
             }
-            while (halvings < 50 && high - low > shortest(t + high)) {
-                const double half = low + 0.5 * (high - low);
-                halvings++;
-                if (!look(f, t, half, w, start, z, there, quantities)) {
-                    return 0;
-                }
-                if (are_same(was, there)) {
-                    low = half;
-                } else {
-                    high = half;
-                    for (int i = 0; i < DIMENSION; i++) {
-                        end[i] = z[i];
-                    }
-                    for (int r = 0; r < RELATIONS; r++) {
-                        now[r] = there[r];
-                    }
-                }
-            }
-            for (int i = 0; i < DIMENSION; i++) {
-                z[i] = end[i];
-            }
-            for (int r = 0; r < RELATIONS; r++) {
-                flipped[r] = is_same(was, now, r) ? 0 : 1;
-            }
-            t = high < whole ? t + high : to;
+            t = length < whole ? t + length : to;
             const int became = occur(f, t, to - from, w, flipped, z, m);
             if (became == 0) {
                 return 0;
@@ -347,3 +373,62 @@ static truth integrate(field f, double from, double to, int steps, const real *w
     }
     return 1;
 }
+//? point_watched
+
+/* The event that lies ahead of z at t, within a time, as if it had come by then: there, through it, and back again. 0
+   where something has no value. */
+static truth anticipate(field f, double t, double within, const real *w, real *z, double *m)
+{
+    real start[DIMENSION];
+    real was[RELATIONS_ROOM];
+    real now[RELATIONS_ROOM];
+    real quantities[RELATIONS_ROOM];
+    truth flipped[RELATIONS_ROOM];
+    double h = 0.125 * within;
+    int tries = 0;
+    for (int i = 0; i < DIMENSION; i++) {
+        start[i] = z[i];
+    }
+    relations((real)t, start, w, was, quantities);
+    while (tries < 4) {
+        tries++;
+        if (!look(f, t, h, w, start, z, now, quantities)) {
+            return 0;
+        }
+        if (!are_same(was, now)) {
+            const double length = first_change(f, t, h, w, start, was, z, flipped);
+            if (length <= 0.0) {
+                return 0;
+            }
+            const int became = occur(f, t + length, within, w, flipped, z, m);
+            if (became == 0) {
+                return 0;
+            }
+            if (became == 2) {
+                return leap(f, t + length, -length, w, z);
+            }
+            tries = 4;
+        }
+        h *= 2.0;
+    }
+    for (int i = 0; i < DIMENSION; i++) {
+        z[i] = start[i];
+    }
+    return 1;
+}
+//?
+//? point_blind
+
+/* The event that lies ahead of z at t, within a time, as if it had come by then: there, through it, and back again. 0
+   where something has no value. */
+static truth anticipate(field f, double t, double within, const real *w, real *z, double *m)
+{
+    (void)f;
+    (void)t;
+    (void)within;
+    (void)w;
+    (void)z;
+    (void)m;
+    return 1;
+}
+//?
