@@ -63,7 +63,6 @@ equation
 end Wheel;
 ";
 
-/// One state, without process noise for the unscented filter's plain points.
 fn study(family: &str, sections: &str, step: &str) -> String {
     format!(
         "plant = \"m.mo\"\n{sections}[observer]\nfamily = \"{family}\"\ngate = 6\n[estimate]\nmethod = \"rk4\"\n{step}\nsd = true\n"
@@ -128,12 +127,12 @@ fn events_are_those_of_estimate() {
     if !has("gcc") {
         return skipped("gcc is not there");
     }
-    let wandering = "[process_noise]\nv = 0.2\n";
+    let [wandering, exact] = ["0.2", "0"].map(|q| format!("[process_noise]\nv = {q}\n"));
     let folders = [
-        ball("ekf", wandering, "substeps = 3"),
-        ball("ekf", "", "step = 0.03"),
-        ball("ukf", wandering, "substeps = 2"),
-        ball("ukf", "", "step = 0.04"),
+        ball("ekf", &wandering, "substeps = 3"),
+        ball("ekf", &exact, "step = 0.03"),
+        ball("ukf", &wandering, "substeps = 2"),
+        ball("ukf", &exact, "step = 0.04"),
         room("ekf", "step = 0.03"),
         room("ukf", "substeps = 3"),
         wheel("ekf"),

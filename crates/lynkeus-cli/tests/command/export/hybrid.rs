@@ -79,9 +79,11 @@ impl Draft {
         self.declared += declared;
         self.equations += &equations;
         self.noise.push(("y", between(random, 0.02, 0.2)));
-        if random.uniform() < 0.7 {
-            self.process.push((moved, between(random, 0.01, 0.2)));
-        }
+        let density = match random.uniform() < 0.7 {
+            true => between(random, 0.01, 0.2),
+            false => 0.0,
+        };
+        self.process.push((moved, density));
     }
 
     fn angle(&mut self, random: &mut Normal) {

@@ -184,6 +184,9 @@ static void begin_jump(real *jump)
 static void begin_memory(double t, double *m)
 {
     m[STARTED] = 1.0;
+//? !timers
+    (void)t;
+//?
 //? timers
     for (int i = 0; i < TIMERS; i++) {
         m[NEXT + i] = timer_is_initial[i] == 0 ? first_instant(i, t) : 0.0;
