@@ -39,7 +39,7 @@ equation
   elsewhen T <= 19 then
     on = true;
   end when;
-  when {time >= 2.05, edge(on)} then
+  when edge(on) then
     last = T;
   end when;
   when sample(1, 1.5) then

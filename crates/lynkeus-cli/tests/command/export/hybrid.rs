@@ -70,7 +70,7 @@ impl Draft {
             _ => (
                 "Real x(start = 1); Real k(start = 1); Boolean is_open(start = false); discrete Real last(start = 0); output Real y = x;",
                 format!(
-                    "der(x) = (if is_open then 0.8 else -1)*k + 0.3*sin(time); der(k) = 0;\nwhen {{x <= 0.2, time >= 2.3}} then is_open = true; elsewhen x >= {:.2} then is_open = false; end when;\nwhen edge(is_open) then last = pre(last) + x; end when;",
+                    "der(x) = (if is_open then 0.8 else -1)*k + 0.3*sin(time); der(k) = 0;\nwhen x <= 0.2 then is_open = true; elsewhen x >= {:.2} then is_open = false; end when;\nwhen edge(is_open) then last = pre(last) + x; end when;",
                     1.0 + share
                 ),
                 "k",

@@ -368,7 +368,8 @@ static truth correct(STATE *s, double t)
                 count++;
             }
         }
-        if (count == 0) {
+        /* there are no more than SENSORS, which compilers do not see */
+        if (count == 0 || count > SENSORS) {
             continue;
         }
 //? limits
