@@ -65,7 +65,7 @@ pub const UKF: &dyn Family = &Filter {
     called: "unscented Kalman filter",
     keys: &[&KEYS, &BOUNDS, &POINTS],
     smooths: false,
-    follows_jumps: false,
+    follows_jumps: true,
     is_sampled: false,
     kind: |tuning| {
         let SigmaPoints { alpha, beta, kappa } = SigmaPoints::default();

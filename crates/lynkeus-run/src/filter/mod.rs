@@ -50,6 +50,7 @@ mod mhe;
 mod model;
 mod order;
 mod particle;
+mod point;
 mod profile;
 mod record;
 pub(crate) mod root;
@@ -167,9 +168,9 @@ impl Filter {
         if settings.is_window() && !manifold.is_straight() {
             return Err(Error::setting("states", "no quaternion in a window", "one"));
         }
-        if flow.has_clauses() && settings.kind != FilterKind::Extended {
-            let expected = "the extended filter for a plant whose state jumps (`when`)";
-            return Err(Error::setting("filter", expected, "another one"));
+        if flow.has_clauses() && settings.is_window() {
+            let expected = "no window of samples for a plant whose state jumps (`when`)";
+            return Err(Error::setting("filter", expected, "one"));
         }
         let propagation = |flow| Propagation::new(flow, &model.process_noise, run);
         Ok(Self {
@@ -177,7 +178,7 @@ impl Filter {
             engine: match settings.kind {
                 FilterKind::Extended => Engine::Extended(Ekf::default()),
                 FilterKind::Unscented(points) => {
-                    Engine::Unscented(Box::new(Ukf::new(n, points, run.method, &manifold)?))
+                    Engine::Unscented(Box::new(Ukf::new(model, points, run.method)?))
                 }
                 FilterKind::MovingHorizon(length) => {
                     let horizon = Mhe::new(model, length, settings.keep_history)?;
@@ -476,7 +477,12 @@ impl Persist for Filter {
         self.propagation.walk(walk)?;
         match &mut self.engine {
             Engine::Extended(_) => {}
-            Engine::Unscented(ukf) => ukf.integrator.walk(walk)?,
+            Engine::Unscented(ukf) => {
+                ukf.integrator.walk(walk)?;
+                if self.propagation.driven.system().has_clauses() {
+                    ukf.integrator.memory().walk(walk)?;
+                }
+            }
             Engine::MovingHorizon(mhe) => mhe.walk(walk)?,
         }
         if let Some(spare) = &mut self.spare {
