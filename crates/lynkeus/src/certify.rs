@@ -260,6 +260,8 @@ fn account(declared: &Declared, in_mean_square: bool) -> Account {
         screens,
         late,
         manifold,
+        input_noise,
+        correlation,
     } = declared;
     Account::default()
         .leaves(manifold, "no theorem is about angles and rotations")
@@ -279,6 +281,8 @@ fn account(declared: &Declared, in_mean_square: bool) -> Account {
             process_noise,
             "Gaussian, so that no error has a bound for certain, and no bound in mean square is proved",
         )
+        .leaves(input_noise, "a proof is for known inputs that are read as they are")
+        .leaves(correlation, "bounds take the noises of sensors for independent")
         .leaves(
             samples,
             "a proof is for sensors that are read continuously; `sampling` has what the observer stands",

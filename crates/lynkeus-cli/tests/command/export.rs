@@ -7,6 +7,7 @@ mod hidden;
 pub(super) mod javascript;
 mod late;
 mod manifold;
+mod misread;
 mod names;
 mod rust;
 mod slopes;
