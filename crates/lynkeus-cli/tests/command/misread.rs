@@ -62,7 +62,7 @@ fn errors_are_as_large_as_is_claimed() {
         let found = folder.run(&["simulate", "s.toml", "--runs", runs, "--json"]);
         assert_eq!(found.code, 0, "{family}: {}", found.err);
         for name in ["water", "body"] {
-            let size = found.json()["errors"][name]["rms_in_sd"].as_f64().unwrap();
+            let size = found.json()["quantities"][name]["rms_in_sd"].as_f64().unwrap();
             assert!((0.8..1.25).contains(&size), "{family} {name}: {size}");
         }
     }
@@ -137,7 +137,7 @@ fn deviations_of_a_family_count_errors_of_inputs() {
     let run = folder.run(&["simulate", "s.toml", "--runs", "40", "--json"]);
     assert!(run.code <= 1, "{}", run.err);
     for name in ["water", "body"] {
-        let size = run.json()["errors"][name]["rms_in_sd"].as_f64().unwrap();
+        let size = run.json()["quantities"][name]["rms_in_sd"].as_f64().unwrap();
         assert!((0.75..1.3).contains(&size), "{name}: {size}");
     }
     let run = folder.run(&["simulate", "s.toml"]);

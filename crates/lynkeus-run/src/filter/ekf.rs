@@ -67,6 +67,9 @@ impl Ekf {
                 break;
             }
             at.clone_from(&belief.x);
+            // by the shorter way, where it was more than half a turn
+            sensing.manifold.retract(&self.before, &mut at);
+            sensing.manifold.flatten(&self.before, &mut at);
             let mut about = at.clone();
             sensing.manifold.retract(&self.before, &mut about);
             let map = &mut sensing.output_map;

@@ -155,7 +155,16 @@ static truth correct(STATE *s, double t)
         goes_on = !stays(at, s->x, s->root);
         for (int i = 0; i < STATES; i++) {
             at[i] = s->x[i];
-            about[i] = s->x[i];
+        }
+//?
+//? iterated_rotations
+        /* by the shorter way, where it was more than half a turn */
+        retract(before, at);
+        flatten(before, at);
+//?
+//? iterated
+        for (int i = 0; i < STATES; i++) {
+            about[i] = at[i];
         }
 //?
 //? iterated_rotations
