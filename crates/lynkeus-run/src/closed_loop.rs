@@ -302,7 +302,9 @@ impl Loop {
             let disturbances: Vec<f64> = self.sensors.disturbances().collect();
             let shown = self.sensors.shown(&Reals, &y, &disturbances);
             let errors = &disturbances[disturbances.len() - self.sensors.misread()..];
-            let signals = self.wiring.observed(&self.sensors.read(&Reals, &u, errors), &shown);
+            let signals = self
+                .wiring
+                .observed(&self.sensors.read(&Reals, &u, errors), &shown);
             parts.push(part(observer, &signals, &x[plant_x.len()..]).0);
         }
         let guilty = match are_finite(&y) && guilty == 1 {

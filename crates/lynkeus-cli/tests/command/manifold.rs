@@ -533,7 +533,10 @@ fn deviations_are_right_from_far_off() {
         )
     };
     let (whole, within) = size("");
-    assert!((0.7..1.3).contains(&whole) && within > 0.9, "{whole} {within}");
+    assert!(
+        (0.7..1.3).contains(&whole) && within > 0.9,
+        "{whole} {within}"
+    );
     let (once, _) = size("iterations = 1");
     assert!(once > 3.0, "{once}");
 }

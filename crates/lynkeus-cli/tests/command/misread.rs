@@ -62,12 +62,16 @@ fn errors_are_as_large_as_is_claimed() {
         let found = folder.run(&["simulate", "s.toml", "--runs", runs, "--json"]);
         assert_eq!(found.code, 0, "{family}: {}", found.err);
         for name in ["water", "body"] {
-            let size = found.json()["quantities"][name]["rms_in_sd"].as_f64().unwrap();
+            let size = found.json()["quantities"][name]["rms_in_sd"]
+                .as_f64()
+                .unwrap();
             assert!((0.8..1.25).contains(&size), "{family} {name}: {size}");
         }
     }
     let folder = kettle("ekf", "initial_variance = { default = 0 }");
-    let log = folder.run(&["simulate", "s.toml", "--log", "log.csv", "-o", "true.csv", "-q"]);
+    let log = folder.run(&[
+        "simulate", "s.toml", "--log", "log.csv", "-o", "true.csv", "-q",
+    ]);
     assert_eq!(log.code, 0, "{}", log.err);
     let last = |study: &str| {
         folder.write("own.toml", study);
@@ -79,7 +83,10 @@ fn errors_are_as_large_as_is_claimed() {
     let study = folder.read("s.toml");
     let (whole, told) = last(&study);
     assert_eq!(told.code, 0, "{}", told.err);
-    let trusting = study.replace("input_noise = { heat = 0.4 }\n", "[process_noise]\nbody = 0\n");
+    let trusting = study.replace(
+        "input_noise = { heat = 0.4 }\n",
+        "[process_noise]\nbody = 0\n",
+    );
     let trusting = trusting.replace("correlation = { lid = { wall = 0.7 } }\n", "");
     assert!(last(&trusting).0 < 0.3 * whole);
     // what is read is in the log, what is true in the table
@@ -116,7 +123,8 @@ fn how_well_counts_both() {
     };
     let said = folder.run(&["check", "s.toml", "--how-well"]);
     assert!(
-        said.out.contains("`input_noise` and `correlation` are counted"),
+        said.out
+            .contains("`input_noise` and `correlation` are counted"),
         "{}",
         said.out
     );
@@ -125,7 +133,10 @@ fn how_well_counts_both() {
     let alone = foretold(&folder);
     folder.change("s.toml", "heat = 0.4", "heat = 0.1");
     let exact = foretold(&folder);
-    assert!(exact < alone && (both - alone).abs() > 1e-3, "{exact} {alone} {both}");
+    assert!(
+        exact < alone && (both - alone).abs() > 1e-3,
+        "{exact} {alone} {both}"
+    );
 }
 
 /// A family with a theorem counts the errors of its inputs in `sd`, and says that it does not what sensors have in
@@ -133,26 +144,67 @@ fn how_well_counts_both() {
 #[test]
 fn deviations_of_a_family_count_errors_of_inputs() {
     let folder = kettle("triangular", "theta = 1");
-    folder.change("s.toml", "noise = { lid = 0.2, wall = 0.3 }", "measured = [\"lid\"]\nnoise = { lid = 0.2, wall = 0.3 }");
+    folder.change(
+        "s.toml",
+        "noise = { lid = 0.2, wall = 0.3 }",
+        "measured = [\"lid\"]\nnoise = { lid = 0.2, wall = 0.3 }",
+    );
     let run = folder.run(&["simulate", "s.toml", "--runs", "40", "--json"]);
     assert!(run.code <= 1, "{}", run.err);
     for name in ["water", "body"] {
-        let size = run.json()["quantities"][name]["rms_in_sd"].as_f64().unwrap();
+        let size = run.json()["quantities"][name]["rms_in_sd"]
+            .as_f64()
+            .unwrap();
         assert!((0.75..1.3).contains(&size), "{name}: {size}");
     }
     let run = folder.run(&["simulate", "s.toml"]);
-    assert!(run.out.contains("correlated noise (") || run.err.contains("correlated noise ("), "{} {}", run.out, run.err);
+    assert!(
+        run.out.contains("correlated noise (") || run.err.contains("correlated noise ("),
+        "{} {}",
+        run.out,
+        run.err
+    );
 }
 
 #[test]
 fn what_does_not_fit_is_refused() {
     let cases: [(&str, &str, &[&str]); 7] = [
-        ("heat = 0.4", "heet = 0.4", &["`input_noise` of [sensors]: no known input is called \"heet\"", "heat"]),
-        ("heat = 0.4", "heat = -0.4", &["s.toml:4", "a standard deviation >= 0"]),
-        ("wall = 0.7", "wal = 0.7", &["`correlation` of [sensors]: no output is called \"wal\"", "wall"]),
-        ("wall = 0.7", "wall = 1.0", &["s.toml:5", "a correlation between -1 and 1"]),
-        ("{ lid = { wall = 0.7 } }", "{ lid = { wall = 0.7 }, wall = { lid = 0.1 } }", &["each pair of two outputs once"]),
-        ("wall = 0.3", "wall = { uniform = 0.3 }", &["the noise of wall is uniform"]),
+        (
+            "heat = 0.4",
+            "heet = 0.4",
+            &[
+                "`input_noise` of [sensors]: no known input is called \"heet\"",
+                "heat",
+            ],
+        ),
+        (
+            "heat = 0.4",
+            "heat = -0.4",
+            &["s.toml:4", "a standard deviation >= 0"],
+        ),
+        (
+            "wall = 0.7",
+            "wal = 0.7",
+            &[
+                "`correlation` of [sensors]: no output is called \"wal\"",
+                "wall",
+            ],
+        ),
+        (
+            "wall = 0.7",
+            "wall = 1.0",
+            &["s.toml:5", "a correlation between -1 and 1"],
+        ),
+        (
+            "{ lid = { wall = 0.7 } }",
+            "{ lid = { wall = 0.7 }, wall = { lid = 0.1 } }",
+            &["each pair of two outputs once"],
+        ),
+        (
+            "wall = 0.3",
+            "wall = { uniform = 0.3 }",
+            &["the noise of wall is uniform"],
+        ),
         (", wall = 0.3", "", &["wall has no `noise`"]),
     ];
     for (text, other, said) in cases {
@@ -165,12 +217,24 @@ fn what_does_not_fit_is_refused() {
         }
     }
     let folder = kettle("ekf", "");
-    folder.change("kettle.mo", "output Real wall = body;", "output Real wall = body; output Real rim = body;");
+    folder.change(
+        "kettle.mo",
+        "output Real wall = body;",
+        "output Real wall = body; output Real rim = body;",
+    );
     folder.change("s.toml", "wall = 0.3", "wall = 0.3, rim = 0.1");
-    folder.change("s.toml", "{ lid = { wall = 0.7 } }", "{ lid = { wall = 0.9, rim = 0.9 }, wall = { rim = -0.9 } }");
+    folder.change(
+        "s.toml",
+        "{ lid = { wall = 0.7 } }",
+        "{ lid = { wall = 0.9, rim = 0.9 }, wall = { rim = -0.9 } }",
+    );
     let run = folder.run(&["simulate", "s.toml"]);
     assert_eq!(run.code, 2);
-    assert!(run.err.contains("smallest eigenvalue is -0.8"), "{}", run.err);
+    assert!(
+        run.err.contains("smallest eigenvalue is -0.8"),
+        "{}",
+        run.err
+    );
 }
 
 /// The deviation of a noise is found although it goes with another's and the input is wrong.

@@ -163,7 +163,8 @@ impl Outcome {
     /// The study's `[estimate]` gives two of them the same header.
     pub fn log(&self) -> Result<Vec<(String, Series)>, Error> {
         let inputs = self.quantities.iter().filter(|q| q.is_input);
-        let inputs = inputs.filter_map(|q| Some((&q.name, q.measured.as_ref().or(q.truth.as_ref())?)));
+        let inputs =
+            inputs.filter_map(|q| Some((&q.name, q.measured.as_ref().or(q.truth.as_ref())?)));
         let measured = self.measurements.iter().map(|(n, values)| (n, values));
         let mut columns = vec![(self.log_time.clone(), self.time.clone())];
         let mut stamps: Vec<&str> = vec![];

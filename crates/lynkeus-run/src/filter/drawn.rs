@@ -101,7 +101,12 @@ fn groups(sensors: usize, pairs: &[(usize, usize, f64)]) -> Vec<Vec<usize>> {
 pub(crate) fn factor(sensors: usize, pairs: &[(usize, usize, f64)]) -> Option<Vec<f64>> {
     let all: Vec<usize> = (0..sensors).collect();
     let lower = matrix(&all, pairs).cholesky()?.unpack();
-    Some(lower.row_iter().flat_map(|row| row.iter().copied().collect::<Vec<_>>()).collect())
+    Some(
+        lower
+            .row_iter()
+            .flat_map(|row| row.iter().copied().collect::<Vec<_>>())
+            .collect(),
+    )
 }
 
 /// What is drawn anew: symbols for the standard normal numbers of a graph.

@@ -50,7 +50,12 @@ impl Root {
     /// The last states are independent of all else, with variance 1.
     pub fn renew(&mut self, count: usize) {
         let first = self.n - count;
-        for (i, row) in self.entries.chunks_exact_mut(self.n.max(1)).enumerate().skip(first) {
+        for (i, row) in self
+            .entries
+            .chunks_exact_mut(self.n.max(1))
+            .enumerate()
+            .skip(first)
+        {
             row.fill(0.0);
             row[i] = 1.0;
         }

@@ -147,7 +147,9 @@ fn counted(declared: &Declared, is_filtered: bool) -> Vec<&'static str> {
         ("`input_noise`", declared.input_noise.acts()),
         ("`correlation`", declared.correlation.acts()),
     ];
-    let all = all.into_iter().filter(|(_, is_there)| *is_there && is_filtered);
+    let all = all
+        .into_iter()
+        .filter(|(_, is_there)| *is_there && is_filtered);
     all.map(|(key, _)| key).collect()
 }
 

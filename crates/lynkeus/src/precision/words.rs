@@ -144,7 +144,10 @@ impl Report {
             ));
         }
         if !self.counted.is_empty() {
-            let (last, others) = (self.counted[self.counted.len() - 1], &self.counted[..self.counted.len() - 1]);
+            let (last, others) = (
+                self.counted[self.counted.len() - 1],
+                &self.counted[..self.counted.len() - 1],
+            );
             let (keys, are) = match others.is_empty() {
                 true => (last.to_owned(), "is"),
                 false => (format!("{} and {last}", others.join(", ")), "are"),

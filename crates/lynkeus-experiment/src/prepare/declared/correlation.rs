@@ -22,9 +22,12 @@ pub(super) fn read(
     let mut pairs: Vec<(usize, usize, f64)> = vec![];
     for (one, other, correlation) in given {
         let [a, b] = [place(one, noise, outputs)?, place(other, noise, outputs)?];
-        let is_same = |pair: &(usize, usize, f64)| (pair.0, pair.1) == (a, b) || (pair.1, pair.0) == (a, b);
+        let is_same =
+            |pair: &(usize, usize, f64)| (pair.0, pair.1) == (a, b) || (pair.1, pair.0) == (a, b);
         if a == b || pairs.iter().any(is_same) {
-            let message = format!("`correlation` of [sensors]: expected each pair of two outputs once, found {one} and {other} again");
+            let message = format!(
+                "`correlation` of [sensors]: expected each pair of two outputs once, found {one} and {other} again"
+            );
             let refusal = Error::input(message).hint("keep one of the two numbers");
             return Err(other.blame(refusal));
         }
@@ -32,7 +35,9 @@ pub(super) fn read(
         let own = said.entry(outputs[a].clone()).or_default();
         own.push((outputs[b].clone(), *correlation));
     }
-    if let (Err(least), Some((first, ..))) = (Correlation::new(outputs.len(), &pairs), given.first()) {
+    if let (Err(least), Some((first, ..))) =
+        (Correlation::new(outputs.len(), &pairs), given.first())
+    {
         let message = format!(
             "`correlation` of [sensors]: expected a positive definite matrix, found one whose smallest eigenvalue is {}",
             lynkeus_words::figures(least, 3)

@@ -92,7 +92,10 @@ fn least_squares(row: usize, last: usize) -> (f64, f64) {
 }
 
 fn close(found: f64, expected: f64, what: &str) {
-    assert!((found - expected).abs() < 1e-9, "{what}: {found} {expected}");
+    assert!(
+        (found - expected).abs() < 1e-9,
+        "{what}: {found} {expected}"
+    );
 }
 
 #[test]
@@ -290,6 +293,10 @@ fn a_likelihood_counts_them_too() {
         });
         let found = likelihood.score(&[0.1], rows, Step::Substeps(200)).unwrap();
         close(found.value, expected(0.1), "value");
-        assert!((found.gradient[0] - slope).abs() < 1e-5, "{:?}", found.gradient);
+        assert!(
+            (found.gradient[0] - slope).abs() < 1e-5,
+            "{:?}",
+            found.gradient
+        );
     }
 }
