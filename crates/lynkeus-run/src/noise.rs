@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
-use crate::filter::factor;
+use crate::correlation::factor;
 use crate::{Error, Result};
 
 mod draws;

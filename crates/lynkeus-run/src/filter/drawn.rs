@@ -11,103 +11,11 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{Graph, Node};
-use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::likelihood::{ParametricLevel, ParametricPlant};
 use super::model::NoisyPlant;
+use crate::correlation::Correlation;
 use crate::noise::{Level, Limits};
-
-/// Correlations of the noises of sensors, as what they have in common and what each has of its own.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Correlation {
-    /// of each sensor's variance the share that is its own
-    own: Vec<f64>,
-    /// G: of each sensor, in its deviations, what it has of each common noise
-    common: Vec<Vec<f64>>,
-}
-
-impl Correlation {
-    /// Of so many sensors, by the places of two and their correlation.
-    ///
-    /// # Errors
-    /// The smallest eigenvalue of the matrix of correlations where it is not positive.
-    pub fn new(sensors: usize, pairs: &[(usize, usize, f64)]) -> Result<Self, f64> {
-        let mut own = vec![1.0; sensors];
-        let mut common = vec![vec![]; sensors];
-        for group in groups(sensors, pairs) {
-            let matrix = matrix(&group, pairs);
-            let SymmetricEigen {
-                eigenvalues,
-                eigenvectors,
-            } = SymmetricEigen::new(matrix);
-            let least = eigenvalues.min();
-            if least.is_nan() || least <= ROUNDING {
-                return Err(least);
-            }
-            for (mode, value) in eigenvalues.iter().enumerate() {
-                if value - least <= ROUNDING {
-                    continue;
-                }
-                common.iter_mut().for_each(|row| row.push(0.0));
-                for (k, sensor) in group.iter().enumerate() {
-                    let share = (value - least).sqrt() * eigenvectors[(k, mode)];
-                    if let Some(place) = common[*sensor].last_mut() {
-                        *place = share;
-                    }
-                }
-            }
-            group.iter().for_each(|sensor| own[*sensor] = least);
-        }
-        Ok(Self { own, common })
-    }
-
-    fn width(&self) -> usize {
-        self.common.first().map_or(0, Vec::len)
-    }
-}
-
-/// Eigenvalues of correlations below this are none.
-const ROUNDING: f64 = 1e-12;
-
-/// The matrix of the correlations of these sensors.
-fn matrix(group: &[usize], pairs: &[(usize, usize, f64)]) -> DMatrix<f64> {
-    let of = |a: usize, b: usize| {
-        let is_own = |pair: &&(usize, usize, f64)| {
-            (pair.0, pair.1) == (group[a], group[b]) || (pair.1, pair.0) == (group[a], group[b])
-        };
-        match a == b {
-            true => 1.0,
-            false => pairs.iter().find(is_own).map_or(0.0, |pair| pair.2),
-        }
-    };
-    DMatrix::from_fn(group.len(), group.len(), of)
-}
-
-/// Sensors that pairs connect, in their order.
-fn groups(sensors: usize, pairs: &[(usize, usize, f64)]) -> Vec<Vec<usize>> {
-    let mut first: Vec<usize> = (0..sensors).collect();
-    for _ in 0..sensors {
-        for (a, b, _) in pairs {
-            let least = first[*a].min(first[*b]);
-            (first[*a], first[*b]) = (least, least);
-        }
-    }
-    let of = |k: usize| (0..sensors).filter(|i| first[*i] == k).collect();
-    let all = (0..sensors).map(of);
-    all.filter(|group: &Vec<usize>| group.len() > 1).collect()
-}
-
-/// The lower factor of the matrix of such correlations of so many sensors, row by row.
-pub(crate) fn factor(sensors: usize, pairs: &[(usize, usize, f64)]) -> Option<Vec<f64>> {
-    let all: Vec<usize> = (0..sensors).collect();
-    let lower = matrix(&all, pairs).cholesky()?.unpack();
-    Some(
-        lower
-            .row_iter()
-            .flat_map(|row| row.iter().copied().collect::<Vec<_>>())
-            .collect(),
-    )
-}
 
 /// What is drawn anew: symbols for the standard normal numbers of a graph.
 #[derive(Clone, Debug)]
@@ -184,17 +92,18 @@ impl<'g> Drawn<'g> {
     /// The share of the deviation of a sensor's noise that is its own.
     fn own(&self, sensor: usize) -> f64 {
         let own = self.correlation.as_ref();
-        own.map_or(1.0, |own| own.own[sensor].sqrt())
+        own.map_or(1.0, |own| own.own(sensor).sqrt())
     }
 
     /// What a sensor shows beside its own noise, of which a deviation is σ.
     fn shown(&self, sensor: usize, output: Node, σ: Node) -> Node {
-        let Some(Correlation { common, .. }) = &self.correlation else {
+        let Some(correlation) = &self.correlation else {
             return output;
         };
         let (g, σ) = (self.graph, self.graph.expr(σ));
-        let first = self.symbols.len() - common[sensor].len();
-        let shares = common[sensor].iter().zip(&self.symbols[first..]);
+        let common = correlation.common(sensor);
+        let first = self.symbols.len() - common.len();
+        let shares = common.iter().zip(&self.symbols[first..]);
         let shares = shares.filter(|(share, _)| **share != 0.0);
         let all = shares.map(|(share, d)| g.expr(*d) * *share);
         match all.reduce(|sum, one| sum + one) {

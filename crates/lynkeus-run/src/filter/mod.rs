@@ -59,10 +59,10 @@ mod smoother;
 pub(crate) mod transition;
 mod ukf;
 
+pub use crate::correlation::Correlation;
 pub use crate::noise::Limits;
 pub(crate) use belief::Belief;
-pub(crate) use drawn::factor;
-pub use drawn::{Correlation, Drawn};
+pub use drawn::Drawn;
 pub use health::{Health, Innovation, Reading, SensorHealth};
 pub use likelihood::{
     Likelihood, ParametricLevel, ParametricPlant, ParametricSensor, Row, Score, Seen,

@@ -204,35 +204,6 @@ fn correlated_noises_are_those_of_the_sensors_that_report() {
     }
 }
 
-#[test]
-fn what_sensors_have_in_common_makes_their_correlations() {
-    let pairs = [(0, 3, 0.6), (3, 1, -0.4), (0, 1, 0.1)];
-    let Correlation { own, common } = Correlation::new(5, &pairs).unwrap();
-    for i in 0..5 {
-        for j in 0..5 {
-            let both: f64 = common[i].iter().zip(&common[j]).map(|(a, b)| a * b).sum();
-            let same = |pair: &&(usize, usize, f64)| [(i, j), (j, i)].contains(&(pair.0, pair.1));
-            let expected = match i == j {
-                true => 1.0 - own[i],
-                false => pairs.iter().find(same).map_or(0.0, |pair| pair.2),
-            };
-            close(both, expected, "correlation");
-        }
-    }
-    // two alone need one common noise; one that nothing is said of has none
-    assert_eq!((own[2], own[4]), (1.0, 1.0));
-    assert_eq!(Correlation::new(2, &[(0, 1, 0.5)]).unwrap().width(), 1);
-    // 1 + 0.9, 1 + 0.9, 1 − 1.8
-    let impossible = [(0, 1, 0.9), (0, 2, 0.9), (1, 2, -0.9)];
-    let least = Correlation::new(3, &impossible).unwrap_err();
-    close(least, -0.8, "smallest eigenvalue");
-    assert!(factor(3, &impossible).is_none());
-    let lower = factor(2, &[(0, 1, 0.6)]).unwrap();
-    for (found, expected) in lower.iter().zip([1.0, 0.0, 0.6, 0.8]) {
-        close(*found, expected, "factor");
-    }
-}
-
 /// The likelihood of the same rows, by the covariance of all readings; and its slope.
 #[test]
 fn a_likelihood_counts_them_too() {
