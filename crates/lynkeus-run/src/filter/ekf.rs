@@ -6,6 +6,7 @@ use super::root::Root;
 use super::sensing::Sensing;
 use super::smoother::Correction;
 use crate::Result;
+use crate::manifold::Manifold;
 use crate::runner::Sample;
 
 /// A step of the iteration that is smaller than this, in deviations of what is known after it, is the last.
@@ -62,14 +63,12 @@ impl Ekf {
         self.prior.clone_from(&belief.root);
         self.pass(sensing, belief, None);
         let mut at = self.before.clone();
+        self.go_on(&sensing.manifold, &at, at.clone(), &mut belief.x);
         for _ in 1..self.iterations {
             if self.taken.is_empty() || stays(&at, belief) {
                 break;
             }
             at.clone_from(&belief.x);
-            // by the shorter way, where it was more than half a turn
-            sensing.manifold.retract(&self.before, &mut at);
-            sensing.manifold.flatten(&self.before, &mut at);
             let mut about = at.clone();
             sensing.manifold.retract(&self.before, &mut about);
             let map = &mut sensing.output_map;
@@ -81,8 +80,24 @@ impl Ekf {
             belief.root.clone_from(&self.prior);
             self.look(sensing, &at, &about);
             self.pass(sensing, belief, Some(&about));
+            self.go_on(&sensing.manifold, &at, about, &mut belief.x);
         }
         Ok(())
+    }
+
+    /// A step was found in the plane that touches at x̂⁻, where it led from `at` to x: it is gone from the place itself,
+    /// and x is where that is, by the shorter way.
+    fn go_on(&self, manifold: &Manifold, at: &[f64], about: Vec<f64>, x: &mut [f64]) {
+        if manifold.is_straight() {
+            return;
+        }
+        let mut step: Vec<f64> = x.iter().zip(at).map(|(x, at)| x - at).collect();
+        manifold.transport(&self.before, &about, &mut step, 1);
+        for ((x, about), step) in x.iter_mut().zip(&about).zip(step) {
+            *x = about + step;
+        }
+        manifold.retract(&about, x);
+        manifold.flatten(&self.before, x);
     }
 
     /// The innovations about another place, `at` in the plane that touches at x̂⁻, as those of x̂⁻.

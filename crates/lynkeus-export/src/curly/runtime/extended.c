@@ -52,8 +52,8 @@ static truth stays(const real *before, const real *x, const real *root)
 
 //?
 //? iterated_rotations
-/* Slopes that are tangent at one place carried over to another. */
-static void carry_slopes(const real *from, const real *to, real *c)
+/* Rows that are tangent at one place carried over to another. */
+static void carry_rows(const real *from, const real *to, real *rows, int count)
 {
     real way[4];
     real row[4];
@@ -66,14 +66,14 @@ static void carry_slopes(const real *from, const real *to, real *c)
         way[1] = to[q + 1] * row[0] - to[q] * row[1] - to[q + 2] * row[3] + to[q + 3] * row[2];
         way[2] = to[q + 2] * row[0] - to[q] * row[2] + to[q + 1] * row[3] - to[q + 3] * row[1];
         way[3] = to[q + 3] * row[0] - to[q] * row[3] - to[q + 1] * row[2] + to[q + 2] * row[1];
-        for (int k = 0; k < SENSORS; k++) {
+        for (int k = 0; k < count; k++) {
             for (int i = 0; i < 4; i++) {
-                row[i] = c[k * STATES + q + i];
+                row[i] = rows[k * STATES + q + i];
             }
-            c[k * STATES + q] = way[0] * row[0] - way[1] * row[1] - way[2] * row[2] - way[3] * row[3];
-            c[k * STATES + q + 1] = way[0] * row[1] + way[1] * row[0] + way[2] * row[3] - way[3] * row[2];
-            c[k * STATES + q + 2] = way[0] * row[2] - way[1] * row[3] + way[2] * row[0] + way[3] * row[1];
-            c[k * STATES + q + 3] = way[0] * row[3] + way[1] * row[2] - way[2] * row[1] + way[3] * row[0];
+            rows[k * STATES + q] = way[0] * row[0] - way[1] * row[1] - way[2] * row[2] - way[3] * row[3];
+            rows[k * STATES + q + 1] = way[0] * row[1] + way[1] * row[0] + way[2] * row[3] - way[3] * row[2];
+            rows[k * STATES + q + 2] = way[0] * row[2] - way[1] * row[3] + way[2] * row[0] + way[3] * row[1];
+            rows[k * STATES + q + 3] = way[0] * row[3] + way[1] * row[2] - way[2] * row[1] + way[3] * row[0];
         }
     }
 }
@@ -94,6 +94,9 @@ static truth correct(STATE *s, double t)
     real at[STATES];
     real about[STATES];
     truth goes_on = 0;
+//?
+//? iterated_rotations
+    real at_step[STATES];
 //?
     for (int i = 0; i < SENSORS * STATES; i++) {
         c[i] = R(0.0);
@@ -146,6 +149,10 @@ static truth correct(STATE *s, double t)
         }
     }
 //?
+//? iterated_rotations
+    retract(before, s->x);
+    flatten(before, s->x);
+//?
 //? iterated
     for (int i = 0; i < SENSORS; i++) {
         goes_on = goes_on || believed[i] != 0;
@@ -155,15 +162,6 @@ static truth correct(STATE *s, double t)
         goes_on = !stays(at, s->x, s->root);
         for (int i = 0; i < STATES; i++) {
             at[i] = s->x[i];
-        }
-//?
-//? iterated_rotations
-        /* by the shorter way, where it was more than half a turn */
-        retract(before, at);
-        flatten(before, at);
-//?
-//? iterated
-        for (int i = 0; i < STATES; i++) {
             about[i] = at[i];
         }
 //?
@@ -186,7 +184,7 @@ static truth correct(STATE *s, double t)
         if (goes_on) {
 //?
 //? iterated_rotations
-            carry_slopes(about, before, c);
+            carry_rows(about, before, c, SENSORS);
 //?
 //? iterated
             for (int i = 0; i < STATES * STATES; i++) {
@@ -212,6 +210,18 @@ static truth correct(STATE *s, double t)
                     (void)believe(s, i, c, before, h[i], noises[i]);
                 }
             }
+//?
+//? iterated_rotations
+            /* the step is gone from the place itself, and kept by the shorter way */
+            for (int i = 0; i < STATES; i++) {
+                at_step[i] = s->x[i] - at[i];
+            }
+            carry_rows(before, about, at_step, 1);
+            for (int i = 0; i < STATES; i++) {
+                s->x[i] = about[i] + at_step[i];
+            }
+            retract(about, s->x);
+            flatten(before, s->x);
 //?
 //? iterated
         }
