@@ -137,7 +137,7 @@ pub(super) const SECTIONS: [KeySpec; 13] = [
 const LEVEL: Shape = Shape::Either(&[Shape::NotNegative, Shape::Text, Shape::Section(&[&NOISE])]);
 
 /// `[sensors]`
-pub(super) const SENSORS: [KeySpec; 11] = [
+pub(super) const SENSORS: [KeySpec; 13] = [
     KeySpec {
         name: "limits",
         shape: Shape::As(
@@ -173,6 +173,24 @@ pub(super) const SENSORS: [KeySpec; 11] = [
         ),
         default: "no noise",
         meaning: "white measurement noise: its standard deviation, in the output's unit or as a share of its present value; or uniform noise, every error up to ± the number (in the output's unit) equally likely and none larger. Used by `simulate`, `tune`, the [filters](ekf.md), [`check --how-well`](precision.md) and [`certify`](certificates.md)",
+    },
+    KeySpec {
+        name: "input_noise",
+        shape: Shape::As(
+            "table: known input = number, text `\"5%\"`, or `{ uniform = number }`",
+            &Shape::Table(&LEVEL),
+        ),
+        default: "no noise",
+        meaning: "how wrong the reading of a known input is, as `noise` says it of an output: the plant has the input, the observer reads it with an error that is another one in each row and stays until the next ([noisy inputs](#noisy-inputs-and-correlated-sensors)). Counted by the [filters](ekf.md), their smoothers, `sd`, `fit` and `--how-well`; `simulate` draws it",
+    },
+    KeySpec {
+        name: "correlation",
+        shape: Shape::As(
+            "table: output = table: another output = number",
+            &Shape::Table(&Shape::Table(&Shape::Number)),
+        ),
+        default: "independent noises",
+        meaning: "how the noises of two outputs go together, between −1 and 1: `{ left = { right = 0.6 } }`, each pair once. Both have a standard deviation in `noise`. Counted by the [filters](ekf.md), their smoothers, `fit` and `--how-well`; `simulate` draws it",
     },
     KeySpec {
         name: "bias",

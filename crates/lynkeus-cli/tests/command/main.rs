@@ -37,6 +37,7 @@ mod long;
 mod manifold;
 mod mentioned;
 mod messages;
+mod misread;
 mod names;
 mod next_experiment;
 #[path = "../../../lynkeus/tests/normal/mod.rs"]

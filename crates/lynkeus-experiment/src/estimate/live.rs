@@ -152,11 +152,16 @@ fn need_noises(prepared: &Prepared<'_>, process: bool) -> Result<(), Error> {
             format!("how fast {name} wanders"),
             format!("write {name} = … under [process_noise]"),
         ),
-        None if process && !declared.process_noise.is_declared() => missing(
-            "what the model does not know".to_owned(),
-            "write a density for some state under [process_noise], 0 where the model is exact"
-                .to_owned(),
-        ),
+        None if process
+            && !declared.process_noise.is_declared()
+            && !declared.input_noise.acts() =>
+        {
+            missing(
+                "what the model does not know".to_owned(),
+                "write a density for some state under [process_noise], 0 where the model is exact"
+                    .to_owned(),
+            )
+        }
         _ => Ok(()),
     }
 }
