@@ -46,7 +46,7 @@ pub(super) const KEYS: [KeySpec; 5] = [
 ];
 
 /// The sections.
-pub(super) const SECTIONS: [KeySpec; 13] = [
+pub(super) const SECTIONS: [KeySpec; 14] = [
     KeySpec {
         name: "sensors",
         shape: Shape::Section(&[&SENSORS]),
@@ -124,6 +124,12 @@ pub(super) const SECTIONS: [KeySpec; 13] = [
         shape: Shape::Section(&[&COMPARE]),
         default: "none",
         meaning: "which families are compared",
+    },
+    KeySpec {
+        name: "serve",
+        shape: Shape::Section(&[&SERVE]),
+        default: "none",
+        meaning: "how the estimator runs beside a plant ([serve](serve.md))",
     },
     KeySpec {
         name: "plot",
@@ -583,3 +589,11 @@ pub(super) const ESTIMATE: [KeySpec; 11] = [
         meaning: "refuse a log in which a cell that is read has no number, or whose times do not increase",
     },
 ];
+
+/// `[serve]`
+pub(super) const SERVE: [KeySpec; 1] = [KeySpec {
+    name: "wait",
+    shape: Shape::NotNegative,
+    default: "0: rows come in the order of their times",
+    meaning: "how much older than the newest row a row may be when it comes, in units of the plant's time: it is put in its place, and what was told before is corrected",
+}];

@@ -107,6 +107,11 @@ pub mod prepare {
     pub use lynkeus_experiment::prepare::{Prepared, StudyDesign, plant, refuse_misfits};
 }
 
+/// Rows that come one by one under the names of a log, and what is told of them.
+pub mod stream {
+    pub use lynkeus_experiment::stream::{Alarm, Channel, Given, Stream, Told};
+}
+
 /// Values of keys, tried: which is best.
 pub mod tune {
     pub use lynkeus_experiment::tune::{Axis, Change, Foretold, Measure, Peak, Row, Sweep, tune};
