@@ -181,6 +181,7 @@ impl Study {
         if let (Some(plant), Some(folder)) = (study.plant.as_mut(), path.parent()) {
             *plant = folder.join(&*plant);
         }
+        study.serve.beside(path.parent().unwrap_or(Path::new("")));
         Ok(study)
     }
 

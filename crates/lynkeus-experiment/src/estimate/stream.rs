@@ -243,7 +243,9 @@ impl Given {
         let root = parse_expression(text, &graph, &|name| Some(graph.symbol(name).node()));
         let Ok(root) = root else { return own() };
         let symbols = graph.symbols_of(&[root]);
-        let keys = symbols.iter().filter_map(|symbol| graph.symbol_name(*symbol));
+        let keys = symbols
+            .iter()
+            .filter_map(|symbol| graph.symbol_name(*symbol));
         let keys: Vec<String> = keys.collect();
         match Tape::new(&graph, &symbols, &[root]) {
             Ok(tape) => Self::Computed {
@@ -277,8 +279,7 @@ fn waiting(prepared: &Prepared<'_>, mut design: StudyDesign) -> Result<Late, Err
 
 fn told(prepared: &Prepared<'_>, design: &StudyDesign, headers: &mut Headers) -> Vec<Told> {
     let plant = prepared.plant();
-    let has_deviations =
-        design.observer.filter.is_some() || prepared.study().estimate.deviations;
+    let has_deviations = design.observer.filter.is_some() || prepared.study().estimate.deviations;
     let augmented = &prepared.augmented().states;
     let estimates = design.observer.estimates.iter().map(|estimate| {
         let variable = &estimate.variable;
@@ -318,7 +319,9 @@ fn channel(prepared: &Prepared<'_>, name: &str, is_sensor: bool) -> Channel {
         noise: declared.noise.of(name).copied(),
         limits: limits.map(|limits| (limits.low, limits.high)),
         screens: declared.screens.of(name).cloned().unwrap_or_default(),
-        unit: variables.find(|v| v.name == name).and_then(|v| v.unit.clone()),
+        unit: variables
+            .find(|v| v.name == name)
+            .and_then(|v| v.unit.clone()),
     }
 }
 
@@ -336,8 +339,12 @@ fn seconds(study: &Study) -> Option<f64> {
 fn refuse_untold(study: &Study, plant: &Plant) -> Result<(), Error> {
     let rotation = |home: Home| matches!(home, Home::Rotation { .. } | Home::Signed { .. });
     if let Some(state) = plant.states.iter().find(|state| rotation(state.home)) {
-        let message = format!("{} is of a rotation, which a live estimate does not tell so far", state.name);
-        let hint = "leave out `quaternion` of [manifold], or take `lynkeus.Study.estimator` in Python";
+        let message = format!(
+            "{} is of a rotation, which a live estimate does not tell so far",
+            state.name
+        );
+        let hint =
+            "leave out `quaternion` of [manifold], or take `lynkeus.Study.estimator` in Python";
         return Err(Error::input(message).at(&study.file).hint(hint));
     }
     let settings = &study.estimate;
@@ -346,7 +353,9 @@ fn refuse_untold(study: &Study, plant: &Plant) -> Result<(), Error> {
         !names.is_empty() && names != [time.text.as_str()]
     };
     if let Some(time) = settings.log.time.as_ref().filter(is_expression) {
-        let message = format!("`time` of [log]: expected the name under which a row has its time, found the expression {time}");
+        let message = format!(
+            "`time` of [log]: expected the name under which a row has its time, found the expression {time}"
+        );
         return Err(time.blame(Error::input(message)));
     }
     let looks_back = |(_, screen): &&(Name, Screen)| !matches!(screen, Screen::Plausible(..));
