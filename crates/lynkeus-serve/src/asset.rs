@@ -4,8 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use lynkeus::explain;
-use lynkeus::run::filter::Innovation;
-use lynkeus::run::{Late, is_of_row};
+use lynkeus::run::{Late, Revised, is_of_row};
 use lynkeus::stream::Stream;
 use lynkeus::table::Instant;
 
@@ -253,17 +252,22 @@ impl Asset {
             return vec![];
         };
         let newest = late.time().unwrap_or(row.t);
-        let mut changed: Vec<(f64, Vec<f64>, Vec<f64>, Vec<Innovation>)> = vec![];
-        for revised in late.revised() {
-            let deviations = revised.deviations.clone().unwrap_or_default();
-            let innovations = revised.innovations.clone();
-            changed.push((revised.t, revised.estimate.clone(), deviations, innovations));
-        }
-        let deviations = late.deviations().unwrap_or_default().to_vec();
-        let innovations = late.innovations().to_vec();
-        changed.push((newest, late.estimate().to_vec(), deviations, innovations));
+        let mut changed = late.revised().to_vec();
+        changed.push(Revised {
+            t: newest,
+            estimate: late.estimate().to_vec(),
+            deviations: late.deviations().map(<[f64]>::to_vec),
+            innovations: late.innovations().to_vec(),
+        });
         let mut told = vec![];
-        for (t, estimate, deviations, innovations) in changed {
+        for revised in changed {
+            let Revised {
+                t,
+                estimate,
+                deviations,
+                innovations,
+            } = revised;
+            let deviations = deviations.unwrap_or_default();
             for (consistency, innovation) in self.consistencies.iter_mut().zip(&innovations) {
                 consistency.take(t, innovation);
             }

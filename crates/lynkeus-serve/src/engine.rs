@@ -240,9 +240,12 @@ impl Engine {
             }
         }
         let answers = self.apply(rows, came);
-        if self.state.as_ref().is_some_and(State::is_due) && self.renew().is_err() {
+        if self.state.as_ref().is_some_and(State::is_due)
+            && self.renew().is_err()
+            && let Some(state) = &mut self.state
+        {
             // it goes on with the longer file, and tries again later
-            self.state.as_mut().map(State::put_off);
+            state.put_off();
         }
         answers
     }

@@ -113,8 +113,8 @@ fn lines(input: impl Read, sender: &SyncSender<Incoming>) {
     let mut input = BufReader::with_capacity(1 << 16, input);
     loop {
         let mut line = vec![];
-        let read = Read::by_ref(&mut input).take(LONGEST as u64 + 1);
-        let found = match { read }.read_until(b'\n', &mut line) {
+        let mut read = Read::by_ref(&mut input).take(LONGEST as u64 + 1);
+        let found = match read.read_until(b'\n', &mut line) {
             Ok(0) => return,
             Err(error) => Incoming::Failed(error),
             Ok(_) if line.len() > LONGEST && line.last() != Some(&b'\n') => {
