@@ -192,6 +192,9 @@ impl Asset {
             return Ok(None);
         };
         let is_it = |row: &&Published| is_of_row(row.t, t, newest.max(t));
+        if t > newest && !is_of_row(t, newest, t) {
+            return Ok(None);
+        }
         let Some(known) = self.published.iter().rev().find(is_it) else {
             return Ok(None);
         };

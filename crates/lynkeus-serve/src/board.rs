@@ -48,6 +48,15 @@ struct Latest {
     revisions: u64,
 }
 
+/// What a listener hears of an asset.
+#[derive(Debug)]
+pub struct Heard {
+    /// the lines that are kept, the newest last
+    pub before: Vec<Arc<str>>,
+    /// each as it is told
+    pub lines: Receiver<Arc<str>>,
+}
+
 #[derive(Debug)]
 struct Listener {
     asset: usize,
@@ -128,7 +137,7 @@ impl Board {
 
     /// The lines of an asset that are kept, and those from here on; none where too many listen.
     #[must_use]
-    pub fn listen(&self, asset: usize) -> Option<(Vec<Arc<str>>, Receiver<Arc<str>>)> {
+    pub fn listen(&self, asset: usize) -> Option<Heard> {
         let mut inner = self.lock();
         if inner.listeners.len() >= LISTENERS {
             return None;
@@ -136,7 +145,10 @@ impl Board {
         let before = inner.assets.get(asset)?.lines.iter().cloned().collect();
         let (lines, receiver) = sync_channel(BEHIND);
         inner.listeners.push(Listener { asset, lines });
-        Some((before, receiver))
+        Some(Heard {
+            before,
+            lines: receiver,
+        })
     }
 
     /// The last line of each asset, or of one of them, as a JSON object.

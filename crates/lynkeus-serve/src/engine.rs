@@ -17,9 +17,10 @@ use crate::state::{Kind, State};
 
 /// Rows that are taken together, at most.
 pub const BATCH: usize = 256;
-/// Of so many rows it is known what was told of them, so that one that comes once more is answered as before: those
-/// that may be on the disk and were not yet answered when the program was killed.
-const KEPT: u64 = 2 * BATCH as u64;
+/// Of so many rows it is known what was told of them, so that one that comes once more is answered as before. A client
+/// that lost its connection sends again what it has no answer to: what was on its way to it (a pipe holds 64 KiB), and
+/// a batch.
+const KEPT: u64 = 4096;
 /// Fewer rows are over before other threads have begun.
 const WORTHWHILE: usize = 32;
 

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use lynkeus::{Error, report_parts as parts};
 use serde_json::json;
 
-use crate::board::Board;
+use crate::board::{Board, Heard};
 
 /// Bytes of a request, at most.
 const LONGEST: usize = 8 << 10;
@@ -181,7 +181,7 @@ impl Server {
 
     /// Server-sent events: the lines that are kept, then each as it is told.
     fn events(&self, to: &mut TcpStream, asset: usize) -> io::Result<()> {
-        let Some((before, lines)) = self.board.listen(asset) else {
+        let Some(Heard { before, lines }) = self.board.listen(asset) else {
             return send(
                 to,
                 "503 Service Unavailable",

@@ -25,7 +25,7 @@ pub mod stdio;
 
 pub use asset::Line;
 pub use assets::{Named, assets};
-pub use board::Board;
+pub use board::{Board, Heard};
 pub use engine::{Arrival, Engine};
 pub use row::{Reader, Stamp};
 pub use stdio::{Format, serve};

@@ -29,6 +29,9 @@ pub(crate) enum Kind {
     Rows,
 }
 
+/// A record: what it holds, and its bytes.
+pub(crate) type Record<'b> = (Kind, &'b [u8]);
+
 /// The file, open and locked.
 #[derive(Debug)]
 pub(crate) struct State {
@@ -81,7 +84,7 @@ impl State {
     ///
     /// # Errors
     /// It is no state.
-    pub fn records<'b>(path: &Path, bytes: &'b [u8]) -> Result<Vec<(Kind, &'b [u8])>, Error> {
+    pub fn records<'b>(path: &Path, bytes: &'b [u8]) -> Result<Vec<Record<'b>>, Error> {
         let mut records = vec![];
         let Some(mut rest) = bytes.strip_prefix(MAGIC) else {
             // a kill before there was anything in it
@@ -210,7 +213,7 @@ fn framed(kind: Kind, record: &[u8]) -> Vec<u8> {
 }
 
 /// The first record, and what is after it; none where it is not whole.
-fn record(bytes: &[u8]) -> Option<((Kind, &[u8]), &[u8])> {
+fn record(bytes: &[u8]) -> Option<(Record<'_>, &[u8])> {
     let mut head = Parser(bytes);
     let length = usize::try_from(head.word()?).ok()?;
     let kind = match head.word()? {

@@ -16,7 +16,8 @@ fn through_kills(folder: &Folder, rows: &[Row], kills: usize, random: &mut Norma
         let is_last = round == kills;
         let sent = match is_last {
             true => left,
-            false => (left as f64 * 0.1 * random.uniform()).ceil() as usize,
+            // no more than a pipe holds is on its way at once
+            false => (left.min(4000) as f64 * 0.1 * random.uniform()).ceil() as usize,
         };
         serving.send(&json(&rows[answered..answered + sent]));
         let wanted = match is_last {
