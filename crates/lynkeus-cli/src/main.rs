@@ -6,6 +6,8 @@ mod fit;
 mod how_well;
 mod inputs;
 mod limits;
+#[cfg(test)]
+mod listing;
 mod monte_carlo;
 mod options;
 mod output;
@@ -13,6 +15,7 @@ mod progress;
 mod report;
 mod run;
 mod save;
+mod shell;
 mod signals;
 mod tune;
 mod written;
@@ -233,6 +236,17 @@ enum Command {
     },
     /// The JSON Schema of a study, for editors that complete and check TOML
     Schema,
+    /// A script that lets a shell complete commands, options and files
+    Completions {
+        /// The shell
+        #[arg(value_enum)]
+        shell: clap_complete::Shell,
+    },
+    /// The manual page of lynkeus or of one of its commands, as roff for man(1)
+    Man {
+        /// The command; without it lynkeus itself
+        command: Option<String>,
+    },
 }
 
 /// Runs the command line.
@@ -370,6 +384,8 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             output::print(output::json(&lynkeus::schema()).as_bytes())?;
             Ok(ExitCode::SUCCESS)
         }
+        Command::Completions { shell } => shell::completions(shell),
+        Command::Man { command } => shell::manual(command.as_deref()),
     }
 }
 
