@@ -97,9 +97,11 @@ fn pages_keep_to_the_words_of_the_book() {
         let broken = rules
             .iter()
             .filter(|(phrase, _)| text.contains(&format!(" {} ", phrase.replace('-', " "))));
-        found.extend(broken.map(|(phrase, better)| {
-            format!("{}: \"{phrase}\": better {better}", page.display())
-        }));
+        found.extend(
+            broken.map(|(phrase, better)| {
+                format!("{}: \"{phrase}\": better {better}", page.display())
+            }),
+        );
     }
     assert!(found.is_empty(), "{}", found.join("\n"));
     assert!(told <= TOLD, "\"told\" stands {told} times in the pages");

@@ -98,7 +98,10 @@ fn meaning(argument: &Arg) -> String {
     let mut text = help.map(ToString::to_string).unwrap_or_default();
     if argument.get_action().takes_values() {
         let values = argument.get_possible_values();
-        let words: Vec<_> = values.iter().map(|v| format!("`{}`", v.get_name())).collect();
+        let words: Vec<_> = values
+            .iter()
+            .map(|v| format!("`{}`", v.get_name()))
+            .collect();
         if !words.is_empty() {
             let _ = write!(text, ": {}", words.join(", "));
         }
@@ -109,5 +112,7 @@ fn meaning(argument: &Arg) -> String {
         }
     }
     // a table's cell is one line, without bars of its own
-    text.replace('\n', " ").replace('|', "&#124;").replace('<', "&lt;")
+    text.replace('\n', " ")
+        .replace('|', "&#124;")
+        .replace('<', "&lt;")
 }

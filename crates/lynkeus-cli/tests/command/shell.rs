@@ -27,6 +27,10 @@ fn every_command_has_a_manual_page_and_is_completed() {
 fn a_command_that_is_not_there_has_no_page() {
     let ended = Folder::empty().run(&["man", "estmate"]);
     assert_eq!(ended.code, 2);
-    assert!(ended.err.contains("lynkeus has no command estmate"), "{}", ended.err);
+    assert!(
+        ended.err.contains("lynkeus has no command estmate"),
+        "{}",
+        ended.err
+    );
     assert!(ended.err.contains("it has check, design"), "{}", ended.err);
 }
