@@ -30,7 +30,7 @@ fn links_between_files_lead_somewhere() {
     let broken: Vec<String> = pages()
         .iter()
         .flat_map(|page| {
-            let text = read(page);
+            let text = outside_of_code(&read(page));
             let lost = targets(&text)
                 .into_iter()
                 .filter(|target| !root().join(page).with_file_name(target).exists());
@@ -91,7 +91,7 @@ fn pages_keep_to_the_words_of_the_book() {
     let mut found = Vec::new();
     let mut told = 0;
     for page in pages() {
-        let text = prose(&read(&page));
+        let text = outside_of_code(&read(&page)).to_lowercase();
         told += words(&text).filter(|word| *word == "told").count();
         let text = format!(" {} ", words(&text).collect::<Vec<_>>().join(" "));
         let broken = rules
@@ -115,10 +115,9 @@ fn the_first_screen_of_the_readme_is_a_screen() {
     assert!(lines <= FIRST_SCREEN, "{lines} lines before \"Where next\"");
 }
 
-/// A page in lower case without what stands in code blocks.
-fn prose(text: &str) -> String {
-    let outside = text.split("```").step_by(2);
-    outside.collect::<String>().to_lowercase()
+/// A page without what stands in code blocks.
+fn outside_of_code(text: &str) -> String {
+    text.split("```").step_by(2).collect()
 }
 
 fn words(text: &str) -> impl Iterator<Item = &str> {

@@ -23,7 +23,7 @@ mod written;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 
 use lynkeus::run::Backend;
 use lynkeus::{CheckOptions, Error, ErrorKind, interrupt};
@@ -384,8 +384,8 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             output::print(output::json(&lynkeus::schema()).as_bytes())?;
             Ok(ExitCode::SUCCESS)
         }
-        Command::Completions { shell } => shell::completions(shell),
-        Command::Man { command } => shell::manual(command.as_deref()),
+        Command::Completions { shell } => shell::completions(Cli::command(), shell),
+        Command::Man { command } => shell::manual(Cli::command(), command.as_deref()),
     }
 }
 
