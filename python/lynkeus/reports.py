@@ -15,6 +15,7 @@ from ._records import Named, Record
 
 __all__ = [
     "Advice",
+    "AtSamples",
     "AtTheta",
     "Blind",
     "CertificateEntries",
@@ -78,6 +79,7 @@ __all__ = [
     "Revised",
     "RunEntries",
     "RunReport",
+    "SampledProof",
     "SamplingLimits",
     "Scattered",
     "SensorHealth",
@@ -567,6 +569,37 @@ class SamplingLimits(Record):
     """whether the study's is beyond them; of certificates"""
 
 
+class AtSamples(Record):
+    """What is proved for samples at most some interval apart."""
+
+    interval: float
+    """the longest time from one to the next"""
+    rate: float
+    """the decay of the error that is proved, in 1/(unit of time)"""
+    overshoot: float | None
+    """the factor by which the error may peak"""
+    ultimate_bound: float | None
+    """the norm below which the error ends where samples are just so far apart"""
+    ultimate_bounds: Named[float | None]
+    """the same for each quantity, in its unit"""
+
+
+class SampledProof(Record):
+    """What is proved of samples with measurements that follow the model between them."""
+
+    longest: AtSamples | None
+    """for every sequence of samples no further apart than the longest interval found"""
+    at: AtSamples | None
+    """for the samples of the study's simulation; ``None`` where it has none or they are not proved"""
+    broken: float | None
+    """from how long equal intervals on slopes at an end of their ranges, if they stayed there, would let the
+    error grow; ``None`` where that was not seen"""
+    held: AtSamples | None
+    """for readings that are held instead, as far apart as the study's: with the proof for continuous sensors"""
+    obstacle: str | None
+    """why there is no proof, or what ended the search"""
+
+
 class ProofSummary(Record):
     """What one way of proof gives."""
 
@@ -621,6 +654,9 @@ class Proof(Record):
     """what was measured of it, of observers whose theorem needs it"""
     sampling: SamplingLimits | None
     """the study's samples beside what the observer stands"""
+    sampled: SampledProof | None
+    """what is proved of samples with measurements that follow the model between them (``between_samples =
+    "predict"``); ``None`` where nothing is proved of sensors that are read continuously"""
     notes: list[str]
     """what you should know"""
     theorem: ProofSummary | None

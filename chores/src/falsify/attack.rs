@@ -19,6 +19,8 @@ pub struct Plan {
     pub noise: Vec<Signal>,
     /// disturbances, noise and slews at rest
     pub quiet: bool,
+    /// from sample to sample, in the longest intervals that are claimed; over again at their end
+    pub gaps: Vec<f64>,
 }
 
 /// The worst that was seen of one plan.
@@ -39,7 +41,13 @@ pub struct Attack<'a> {
     pub sides: Vec<[f64; 2]>,
     /// observer states beside the estimate that have to stay in a box, too
     pub guards: Vec<(usize, [f64; 2])>,
+    /// the longest interval between samples of an observer whose last states follow the measurements
+    pub samples: Option<f64>,
 }
+
+/// Samples of a run at most, and different gaps between them.
+const SAMPLES: usize = 300;
+const GAPS: usize = 12;
 
 /// Standard deviations that noise stays within.
 const DEVIATIONS: f64 = 3.0;
@@ -86,7 +94,8 @@ impl Attack<'_> {
 
     fn plan(&self, numbers: &mut Numbers) -> Plan {
         let n = self.pair.estimates();
-        let quiet = numbers.chance(0.3);
+        // what is claimed of samples is so of a plant that nothing else acts on
+        let quiet = self.samples.is_some() || numbers.chance(0.3);
         let plant = self.place(numbers, n);
         let estimate = match numbers.chance(0.3) {
             true => {
@@ -105,6 +114,7 @@ impl Attack<'_> {
             inputs: vec![],
             noise: vec![],
             quiet,
+            gaps: gaps(numbers),
         };
         plan.inputs = self.signals(numbers, quiet);
         plan.noise = self.errors(numbers, quiet);
@@ -129,6 +139,7 @@ impl Attack<'_> {
             noise: self.errors(numbers, true).iter().map(constant).collect(),
             inputs: inputs.into_iter().map(still).collect(),
             quiet: true,
+            gaps: vec![1.0],
         }
     }
 
@@ -153,10 +164,11 @@ impl Attack<'_> {
     fn changed(&self, numbers: &mut Numbers, plan: &Plan, run: usize) -> Plan {
         let mut plan = plan.clone();
         let pace = numbers.size(1e-3, 0.5) / (1.0 + 0.02 * run as f64);
-        match numbers.below(6) {
+        match numbers.below(if self.samples.is_some() { 8 } else { 6 }) {
             0 | 1 => shake(numbers, &mut plan.plant, pace),
             2 | 3 => shake(numbers, &mut plan.estimate, pace),
             4 => plan.inputs = self.signals(numbers, plan.quiet),
+            6 | 7 => plan.gaps = gaps(numbers),
             _ => plan.noise = self.errors(numbers, plan.quiet),
         }
         plan
@@ -211,6 +223,9 @@ impl Attack<'_> {
         let length = (40.0 / rate).min(1e6);
         let mut run = Run::new(plan, self.claims, &self.sides, &self.guards, self.pair);
         let mut out = vec![0.0; state.len()];
+        if self.samples.is_some() {
+            run.read(plan.start, &mut state);
+        }
         run.slope(plan.start, &state, &mut out);
         if run.seen(plan.start, &state) {
             let limits = Limits {
@@ -218,7 +233,11 @@ impl Attack<'_> {
                 scale: &scale,
                 budget,
             };
-            follow(&mut run, &state, [plan.start, plan.start + length], &limits);
+            let until = plan.start + length;
+            match self.samples {
+                None => drop(follow(&mut run, &state, [plan.start, until], &limits)),
+                Some(longest) => sampled(&mut run, state, [plan.start, until], longest, &limits),
+            }
         }
         run.worst
     }
@@ -244,6 +263,38 @@ impl Attack<'_> {
                     _ => signal.derivative(plan.start, order),
                 };
             }
+        }
+    }
+}
+
+/// As far apart as is claimed, or less, once in a while or always.
+fn gaps(numbers: &mut Numbers) -> Vec<f64> {
+    let often = numbers.unit();
+    let gap = |_| match numbers.chance(often) {
+        true => 1.0,
+        false => numbers.unit().max(1e-3),
+    };
+    (0..GAPS).map(gap).collect()
+}
+
+/// Follows a plan whose measurements are states, set to what the plant shows at every sample.
+fn sampled(
+    run: &mut Run<'_>,
+    mut state: Vec<f64>,
+    [start, until]: [f64; 2],
+    longest: f64,
+    limits: &Limits<'_>,
+) {
+    let mut t = start;
+    for k in 0..SAMPLES {
+        if t >= until {
+            return;
+        }
+        let next = t + longest * run.gap(k);
+        run.read(t, &mut state);
+        match follow(run, &state, [t, next], limits) {
+            Some(reached) => (t, state) = (next, reached),
+            None => return,
         }
     }
 }

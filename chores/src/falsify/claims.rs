@@ -42,6 +42,8 @@ pub struct Findings {
     /// none where the family does not take the plant
     pub design: Option<StudyDesign>,
     pub claims: Vec<Claim>,
+    /// for samples, with the longest interval between them
+    pub sampled: Option<(Claim, f64)>,
     pub refutations: Vec<Refutation>,
     /// the family that the study asks for
     pub examination: Option<Examination>,
@@ -77,6 +79,19 @@ pub fn findings(prepared: &Prepared<'_>, thorough: bool) -> Findings {
     let theorem = report.theorem.as_ref();
     found.contradicts = report.certificate.verdict() == Standing::Refuted
         && theorem.is_some_and(|theorem| theorem.verdict() == Standing::Proved);
+    found.sampled = report.sampled.as_ref().and_then(|sampled| {
+        let longest = &sampled.as_ref().ok()?.longest;
+        let claim = Claim {
+            basis: format!("samples up to {} apart", longest.interval),
+            rate: longest.rate,
+            overshoot: longest.overshoot,
+            ultimate: None,
+            each: vec![],
+            lyapunov: Some(longest.lyapunov.clone()),
+            sides: report.certificate.region.clone(),
+        };
+        Some((claim, longest.interval))
+    });
     found.certified(report.certificate, true);
     if let Some(theorem) = report.theorem {
         found.certified(theorem, false);
@@ -97,6 +112,7 @@ impl Findings {
         Self {
             design: None,
             claims: vec![],
+            sampled: None,
             refutations: vec![],
             examination: examinations.ok().and_then(|all| all.last().cloned()),
             contradicts: false,

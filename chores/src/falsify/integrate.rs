@@ -61,8 +61,13 @@ pub trait Flow {
     fn seen(&mut self, t: f64, state: &[f64]) -> bool;
 }
 
-/// Follows the flow from `start` until `until`, the budget's end or where it asks to stop.
-pub fn follow(flow: &mut impl Flow, start: &[f64], [t0, until]: [f64; 2], limits: &Limits<'_>) {
+/// Follows the flow from `start` to where it is at `until`; none where the budget ends before, or it asks to stop.
+pub fn follow(
+    flow: &mut impl Flow,
+    start: &[f64],
+    [t0, until]: [f64; 2],
+    limits: &Limits<'_>,
+) -> Option<Vec<f64>> {
     let n = start.len();
     let mut x = start.to_vec();
     let mut k = vec![vec![0.0; n]; 7];
@@ -72,8 +77,11 @@ pub fn follow(flow: &mut impl Flow, start: &[f64], [t0, until]: [f64; 2], limits
     let mut stop = flow.next_break(t).min(until);
     flow.slope(t, &x, &mut k[0]);
     for _ in 0..limits.budget {
-        if t >= until || !h.is_finite() || h <= 1e-15 * t.abs().max(1e-3) {
-            return;
+        if t >= until {
+            return Some(x);
+        }
+        if !h.is_finite() || h <= 1e-15 * t.abs().max(1e-3) {
+            return None;
         }
         let last = t + h >= stop;
         let step = if last { stop - t } else { h };
@@ -109,7 +117,7 @@ pub fn follow(flow: &mut impl Flow, start: &[f64], [t0, until]: [f64; 2], limits
         x.copy_from_slice(&stage);
         t = if last { stop } else { t + step };
         if !flow.seen(t, &x) {
-            return;
+            return None;
         }
         if last {
             stop = flow.next_break(t).min(until);
@@ -124,6 +132,7 @@ pub fn follow(flow: &mut impl Flow, start: &[f64], [t0, until]: [f64; 2], limits
             step * factor
         };
     }
+    (t >= until).then_some(x)
 }
 
 #[cfg(test)]
@@ -153,7 +162,8 @@ mod tests {
             scale: &[1.0; 2],
             budget: 10_000,
         };
-        follow(&mut flow, &[1.0, 0.0], [0.0, 7.5], &limits);
+        let end = follow(&mut flow, &[1.0, 0.0], [0.0, 7.5], &limits);
+        assert_eq!(end.as_ref(), Some(&flow.0));
         assert!((flow.0[0] - 7.5f64.cos()).abs() < 1e-8, "{:?}", flow.0);
         assert!((flow.0[1] + 7.5f64.sin()).abs() < 1e-8, "{:?}", flow.0);
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use lynkeus::Study;
 use lynkeus::observers::Observer;
 use lynkeus::prepare::Prepared;
-use lynkeus::structure::AugmentedPlant;
+use lynkeus::structure::{AugmentedPlant, range};
 
 use super::attack::Attack;
 use super::case::{Case, Kind, Role};
@@ -158,6 +158,7 @@ impl Look<'_, '_> {
         }
         if let Some(design) = &self.found.design {
             self.against_claims(&design.observer, numbers);
+            self.against_samples(&design.observer, numbers);
         }
         if self.effort.facts && self.found.fits() {
             self.against_facts(numbers);
@@ -195,6 +196,42 @@ impl Look<'_, '_> {
         if worst.long {
             self.counts.followed += self.found.claims.len();
         }
+        if worst.ratio > 1.0 + 1e-4 {
+            let evidence = format!("{} (ratio {})\n{plan:#?}", worst.what, worst.ratio);
+            self.note(Flaw::Exceeded, evidence);
+        }
+    }
+
+    /// Plant and sampled observer, with samples as far apart as is claimed or less.
+    fn against_samples(&mut self, observer: &Observer, numbers: &mut Numbers) {
+        let Some((claim, longest)) = &self.found.sampled else {
+            return;
+        };
+        let claims = std::slice::from_ref(claim);
+        let sampled = observer.sampled(self.augmented).map(|s| s.observer);
+        let pair = sampled.and_then(|s| Pair::new(self.augmented.plant, self.augmented, &s));
+        let Ok(mut pair) = pair else {
+            return self.note(
+                Flaw::Exceeded,
+                "the sampled observer reads what nobody knows".into(),
+            );
+        };
+        let mut attack = attack(self.case, self.augmented, &mut pair, claims);
+        // predictions have to stay where the plant's outputs are, too
+        let region = self.augmented.region();
+        let outputs = self.augmented.outputs.iter().map(|o| o.variable.node);
+        attack.guards = (self.augmented.states.len()..)
+            .zip(outputs)
+            .filter_map(|(index, h)| {
+                let shown = range(&self.augmented.plant.graph, h, &region)
+                    .ok()?
+                    .enclosure;
+                Some((index, [shown.lo(), shown.hi()]))
+            })
+            .collect();
+        attack.samples = Some(*longest);
+        self.counts.sampled += 1;
+        let (plan, worst) = attack.search(numbers, self.effort.runs);
         if worst.ratio > 1.0 + 1e-4 {
             let evidence = format!("{} (ratio {})\n{plan:#?}", worst.what, worst.ratio);
             self.note(Flaw::Exceeded, evidence);
@@ -319,5 +356,6 @@ pub fn attack<'a>(
         claims,
         sides,
         guards,
+        samples: None,
     }
 }

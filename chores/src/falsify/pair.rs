@@ -20,8 +20,8 @@ pub struct Pair {
     /// (time, z, inputs, derivatives, measured) → z', estimates, monitors
     observer: Evaluator,
     truths: Vec<Truth>,
-    /// of the observer's inputs among the plant's
-    known: Vec<usize>,
+    /// of the observer's inputs among the plant's; none of the switches of a sampled observer
+    known: Vec<Option<usize>>,
     /// (input, order) of the derivatives that the observer reads
     derivatives: Vec<(usize, usize)>,
     pub states: usize,
@@ -99,11 +99,7 @@ impl Pair {
             plant: Tape::new(graph, &seen, &right)?.evaluator(),
             observer: Tape::new(graph, &own, &left)?.evaluator(),
             truths: names.filter_map(truth).collect(),
-            known: observer
-                .inputs
-                .iter()
-                .filter_map(|s| input(&s.name))
-                .collect(),
+            known: observer.inputs.iter().map(|s| input(&s.name)).collect(),
             derivatives: observer
                 .input_derivatives
                 .iter()
@@ -166,8 +162,9 @@ impl Pair {
         let mut at = 1;
         self.own[at..at + z.len()].copy_from_slice(z);
         at += z.len();
-        for &i in &self.known {
-            self.own[at] = u[i];
+        for known in &self.known {
+            // every measurement follows the model
+            self.own[at] = known.map_or(1.0, |i| u[i]);
             at += 1;
         }
         for &(i, order) in &self.derivatives {

@@ -54,6 +54,24 @@ impl<'a> Run<'a> {
         }
     }
 
+    /// From a sample to the next, as a share of the longest interval.
+    pub fn gap(&self, sample: usize) -> f64 {
+        let gaps = &self.plan.gaps;
+        gaps.get(sample % gaps.len().max(1)).copied().unwrap_or(1.0)
+    }
+
+    /// Sets the last states, the measurements, to what the plant shows. Errors of measurement are no part of what is
+    /// claimed of samples.
+    pub fn read(&mut self, t: f64, state: &mut [f64]) {
+        let mut slope = vec![0.0; state.len()];
+        self.slope(t, state, &mut slope);
+        let x = state[..self.pair.states].to_vec();
+        let n = self.pair.states;
+        let shown = self.pair.plant(t, &x, &self.u)[n..].to_vec();
+        let first = state.len() - shown.len();
+        state[first..].copy_from_slice(&shown);
+    }
+
     fn note(&mut self, found: f64, allowed: f64, what: impl FnOnce() -> String) {
         let ratio = found / (allowed + SLACK * self.size);
         if ratio > self.worst.ratio {

@@ -19,6 +19,8 @@ pub struct Counts {
     pub refuted: usize,
     /// proofs of which a trajectory was followed for at least one time constant
     pub followed: usize,
+    /// proofs for samples that were attacked
+    pub sampled: usize,
     /// cases with a violation
     pub violated: usize,
     /// refutations re-evaluated, and those found wrong
@@ -39,6 +41,7 @@ impl Counts {
         self.undecided += other.undecided;
         self.refuted += other.refuted;
         self.followed += other.followed;
+        self.sampled += other.sampled;
         self.violated += other.violated;
         self.refutations += other.refutations;
         self.wrong += other.wrong;
@@ -63,8 +66,8 @@ impl Tally {
 
     /// A table in Markdown.
     pub fn table(&self) -> String {
-        let mut text = "| | plants | observers | fits | proved | undecided | refuted | followed | violated | witnesses checked | wrong |\n\
-                        |---|---|---|---|---|---|---|---|---|---|---|\n"
+        let mut text = "| | plants | observers | fits | proved | undecided | refuted | followed | of samples | violated | witnesses checked | wrong |\n\
+                        |---|---|---|---|---|---|---|---|---|---|---|---|\n"
             .to_owned();
         let rows = self.0.iter().map(|(kind, counts)| (kind.word(), counts));
         let total = self.total();
@@ -77,6 +80,7 @@ impl Tally {
                 c.undecided,
                 c.refuted,
                 c.followed,
+                c.sampled,
                 c.violated,
                 c.refutations,
                 c.wrong,

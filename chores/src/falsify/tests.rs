@@ -173,6 +173,7 @@ fn a_short_search_finds_no_false_claim() {
     // a search that proves, follows and refutes nothing would find nothing either
     assert!(total.proved as u64 > PLANTS / 4, "{total:?}");
     assert!(2 * total.followed > total.proved, "{total:?}");
+    assert!(total.sampled > 0, "{total:?}");
     assert!(total.refutations as u64 > PLANTS / 30, "{total:?}");
     std::fs::remove_dir_all(folder).unwrap();
 }

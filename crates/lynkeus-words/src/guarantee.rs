@@ -51,6 +51,11 @@ impl Words for Said {
             Self::FasterSought(spent) => format!("a faster rate was sought: {spent}"),
             Self::NoUltimateBound => "no ultimate bound: what acts on the plant unknown to the observer, or a measurement error, has no bound".to_owned(),
             Self::StaysNear => "holds while plant and estimate stay in the box; an estimate that starts near the plant stays near it".to_owned(),
+            Self::ShowsNoState(output) => format!(
+                "the output {output} is not one state times a number: a measurement that follows the model between samples is proved for such outputs only"
+            ),
+            Self::NoInterval => "no interval was found for which one Lyapunov function holds between samples".to_owned(),
+            Self::LongerSought(spent) => format!("a longer interval was sought: {spent}"),
             Self::GrowsEverywhere => "whatever the plant does, the error obeys e' = A e with the same A everywhere, which has an eigenvalue with a positive real part, by interval arithmetic".to_owned(),
             Self::Repelling => "the plant can rest at this point, with these inputs, and there the error's Jacobian has an eigenvalue with a positive real part, both by interval arithmetic: the estimate leaves the plant, however close it starts".to_owned(),
             Self::NoGainUnbounded { term, undeclared } => {

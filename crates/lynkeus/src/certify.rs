@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use lynkeus_observers::guarantee::{Said, SampledDecay, between_samples};
 use lynkeus_observers::{Bounds, Certificate, Claim, Design, Tuning};
 use lynkeus_structure::{AugmentedPlant, Standing};
 use lynkeus_words::Words;
@@ -17,6 +18,7 @@ mod assumptions;
 mod excited;
 mod json;
 mod print;
+mod sampled;
 mod strays;
 
 pub use excited::{AtTheta, Excitation, Excited};
@@ -50,6 +52,9 @@ pub struct CertifyReport {
     /// the study's samples against what the observer stands: every proof is for sensors that are
     /// read continuously. None where the study has no samples, or no limit is known
     pub sampling: Option<Intervals>,
+    /// what the inequality proves of samples with measurements that follow the model between them, or why
+    /// nothing; none where it proves nothing of sensors that are read continuously
+    pub sampled: Option<Result<SampledDecay, Said>>,
     /// α(θ) of Ltaief et al. as the study's run shows it; none for observers without that
     pub excited: Option<Excited>,
 }
@@ -150,15 +155,25 @@ impl<'a> Task<'a> {
             true => Excited::of(&self.prepared, seen, place, family)?,
             false => None,
         };
+        let sampling = seen.and_then(|run| {
+            interval::simulated(&self.prepared, &design, &run.time, &run.quantities)
+        });
+        let interval = sampling.as_ref().map(|sampling| sampling.interval);
+        let sampled = match certificate.rate.filter(|rate| self.explore && *rate > 0.0) {
+            Some(rate) => Some(self.between_samples(place, &design, rate, interval)?),
+            None => None,
+        };
         let certificates = theorem.iter().chain([&certificate]);
         let in_mean_square = certificates.into_iter().any(|c| c.mean_square.is_some());
+        let of_samples = sampled.as_ref().is_some_and(|s: &Result<SampledDecay, _>| {
+            s.as_ref().is_ok_and(|found| found.at.is_some())
+        });
         Ok(CertifyReport {
             plant: self.prepared.plant().name.clone(),
-            declared: account(self.prepared.declared(), in_mean_square),
+            declared: account(self.prepared.declared(), in_mean_square, of_samples),
             strays: Strays::of(&self.prepared, run.as_ref(), place, &design),
-            sampling: seen.and_then(|run| {
-                interval::simulated(&self.prepared, &design, &run.time, &run.quantities)
-            }),
+            sampling,
+            sampled,
             excited,
             design,
             certificate,
@@ -201,6 +216,19 @@ impl<'a> Task<'a> {
     ) -> Result<Certificate, Error> {
         let assumptions = assumptions::of(&self.prepared, augmented)?;
         lynkeus_observers::certify(augmented, &design.observer, &assumptions, claim)
+            .map_err(|error| self.prepared.refusal(error))
+    }
+
+    /// What is proved of samples where the certificate has this rate.
+    fn between_samples(
+        &self,
+        augmented: &AugmentedPlant<'_>,
+        design: &Design,
+        rate: f64,
+        interval: Option<f64>,
+    ) -> Result<Result<SampledDecay, Said>, Error> {
+        let assumptions = assumptions::of(&self.prepared, augmented)?;
+        between_samples(augmented, &design.observer, &assumptions, rate, interval)
             .map_err(|error| self.prepared.refusal(error))
     }
 
@@ -247,7 +275,7 @@ impl<'a> Task<'a> {
 }
 
 /// What a certificate counts.
-fn account(declared: &Declared, in_mean_square: bool) -> Account {
+fn account(declared: &Declared, in_mean_square: bool, of_samples: bool) -> Account {
     let Declared {
         ranges,
         noise,
@@ -279,7 +307,8 @@ fn account(declared: &Declared, in_mean_square: bool) -> Account {
             process_noise,
             "Gaussian, so that no error has a bound for certain, and no bound in mean square is proved",
         )
-        .leaves(
+        .counts_if(
+            of_samples,
             samples,
             "a proof is for sensors that are read continuously; `sampling` has what the observer stands",
         )

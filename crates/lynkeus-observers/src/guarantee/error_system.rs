@@ -173,7 +173,7 @@ fn right(
 }
 
 /// The box in the observer's symbols, with the ranges of what is measured.
-fn seen_by(
+pub(super) fn seen_by(
     augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     assumptions: &Assumptions,
@@ -219,7 +219,7 @@ fn injection(
 }
 
 /// The width of the declared range, else the nominal value, else the start's size.
-fn size(variable: &lynkeus_model::Variable) -> f64 {
+pub(super) fn size(variable: &lynkeus_model::Variable) -> f64 {
     let width = variable.max - variable.min;
     if width.is_finite() && width > 0.0 {
         return width;
@@ -232,54 +232,80 @@ fn size(variable: &lynkeus_model::Variable) -> f64 {
     typical.map_or(1.0, f64::abs)
 }
 
-/// The slopes with the innovations h(x̂) − y and x̂_s − x_s(y), in either order, apart: an observer is
-/// right where they vanish, whatever its gain is there.
+/// The slopes with the innovations apart: an observer is right where they vanish, whatever its gain is there.
 fn around_innovations(
     augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     symbols: &[Node],
     region: &Region,
 ) -> Result<Slopes, MissingInput> {
+    let apart = Apart::new(augmented, observer, region)?;
+    let innovations: Vec<Innovation> = apart.read.into_iter().map(|(_, own)| own).collect();
     let graph = augmented.graph();
-    let hats = hats(augmented, observer);
-    // the nodes that are innovations, over symbols that stand for them and have a side each
-    let (mut innovations, mut images) = (Vec::<Innovation>::new(), HashMap::new());
-    let mut sides = region.clone();
-    for (output, signal) in augmented.outputs.iter().zip(&observer.measured) {
-        let Some((state, slope, offset)) = output.state else {
-            continue;
-        };
-        let name = format!("error of {}", augmented.states[state].name);
-        let symbol = graph.fresh(&name);
-        let [y, slope, offset] = [signal.symbol, slope, offset].map(|node| graph.expr(node));
-        let hat = observer.states[state].0.symbol;
-        let seen = graph.substitute(&[output.variable.node], &hats)[0];
-        let shown = ((y - offset) / slope).node();
-        let pairs = [
-            (seen, signal.symbol, (slope * symbol).node()),
-            (hat, shown, symbol.node()),
-        ];
-        for (estimate, measured, error) in pairs {
-            let forth = graph.binary(Binary::Sub, estimate, measured);
-            let back = graph.binary(Binary::Sub, measured, estimate);
-            images.insert(forth, error);
-            images.insert(back, graph.unary(Unary::Neg, error));
+    Slopes::new(
+        graph,
+        &apart.derivatives,
+        symbols,
+        &innovations,
+        &apart.region,
+    )
+}
+
+/// An observer's equations with the innovations h(x̂) − y and x̂_s − x_s(y), in either order, over symbols of their own.
+pub(super) struct Apart {
+    pub derivatives: Vec<Node>,
+    /// of each sensor that shows one state s: its place, and what stands for x̂_s − x_s as it shows it
+    pub read: Vec<(usize, Innovation)>,
+    /// with a side for each of these symbols
+    pub region: Region,
+}
+
+impl Apart {
+    pub fn new(
+        augmented: &AugmentedPlant<'_>,
+        observer: &Observer,
+        region: &Region,
+    ) -> Result<Self, MissingInput> {
+        let graph = augmented.graph();
+        let hats = hats(augmented, observer);
+        let (mut read, mut images) = (vec![], HashMap::new());
+        let mut sides = region.clone();
+        let sensors = augmented.outputs.iter().zip(&observer.measured);
+        for (sensor, (output, signal)) in sensors.enumerate() {
+            let Some((state, slope, offset)) = output.state else {
+                continue;
+            };
+            let name = format!("error of {}", augmented.states[state].name);
+            let symbol = graph.fresh(&name);
+            let [y, slope, offset] = [signal.symbol, slope, offset].map(|node| graph.expr(node));
+            let hat = observer.states[state].0.symbol;
+            let seen = graph.substitute(&[output.variable.node], &hats)[0];
+            let shown = ((y - offset) / slope).node();
+            let pairs = [
+                (seen, signal.symbol, (slope * symbol).node()),
+                (hat, shown, symbol.node()),
+            ];
+            for (estimate, measured, error) in pairs {
+                let forth = graph.binary(Binary::Sub, estimate, measured);
+                let back = graph.binary(Binary::Sub, measured, estimate);
+                images.insert(forth, error);
+                images.insert(back, graph.unary(Unary::Neg, error));
+            }
+            let symbol = symbol.node();
+            read.push((sensor, Innovation { symbol, state }));
+            let values = range(graph, hat, region)?.enclosure;
+            let size = (Interval::point(values.hi()) - Interval::point(values.lo())).magnitude();
+            let size = Some(size).filter(|size| size.is_finite());
+            let size = size.unwrap_or(f64::INFINITY);
+            let side = Dimension::new(name, symbol, -size, size);
+            sides.dimensions.push(side);
         }
-        // a second sensor of the same state reads the same error
-        if innovations.iter().any(|i| i.state == state) {
-            continue;
-        }
-        let symbol = symbol.node();
-        innovations.push(Innovation { symbol, state });
-        let values = range(graph, hat, region)?.enclosure;
-        let size = (Interval::point(values.hi()) - Interval::point(values.lo())).magnitude();
-        let size = Some(size).filter(|size| size.is_finite());
-        let size = size.unwrap_or(f64::INFINITY);
-        let side = Dimension::new(name, symbol, -size, size);
-        sides.dimensions.push(side);
+        Ok(Self {
+            derivatives: graph.substitute(&observer.derivatives, &images),
+            read,
+            region: sides,
+        })
     }
-    let derivatives = graph.substitute(&observer.derivatives, &images);
-    Slopes::new(graph, &derivatives, symbols, &innovations, &sides)
 }
 
 /// The plant's states as the observer estimates them.

@@ -26,6 +26,7 @@ mod error_system;
 mod lmi;
 mod refute;
 mod said;
+mod sampled;
 
 pub use correction::{Correction, Injection};
 pub use lmi::is_certified_gain;
@@ -40,6 +41,7 @@ use lynkeus_proof::{decay, spectrum};
 use lynkeus_structure::{AugmentedPlant, Standing};
 use nalgebra::DMatrix;
 pub use said::{Inequality, Obstacle, Said};
+pub use sampled::{AtSamples, SampledDecay, between_samples};
 
 use crate::statement::{proved, undecided};
 use crate::{Assumptions, Bounds, Certificate, Check, Constant, DesignError, Observer, Reason};
@@ -265,14 +267,21 @@ fn bounds(
     let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
     let square = sum(pairs.map(|(i, j)| Interval::point(proof.P[(i, j)]).abs() * w[i] * w[j]));
     let r = settled(proof.rate, square.sqrt(), trace);
+    finite_bounds(augmented, &proof.P, r)
+}
+
+/// Bounds of e where √(eᵀPe) ≤ r; none where they are infinite.
+fn finite_bounds(augmented: &AugmentedPlant<'_>, P: &DMatrix<f64>, r: Interval) -> Option<Bounds> {
+    let n = augmented.states.len();
+    let finite = |x: f64| Some(x).filter(|x| x.is_finite());
     let state = |i: usize| {
         let mut unit = DMatrix::zeros(n, n);
         unit[(i, i)] = 1.0;
-        let bound = finite((r * width(&proof.P, &unit)?).hi())?;
+        let bound = finite((r * width(P, &unit)?).hi())?;
         Some((augmented.states[i].name.clone(), bound).into())
     };
     Some(Bounds {
-        norm: finite((r * width(&proof.P, &DMatrix::identity(n, n))?).hi())?,
+        norm: finite((r * width(P, &DMatrix::identity(n, n))?).hi())?,
         states: (0..n).map(state).collect::<Option<_>>()?,
     })
 }

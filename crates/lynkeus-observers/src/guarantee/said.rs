@@ -63,6 +63,12 @@ pub enum Said {
     NoUltimateBound,
     /// where an estimate that starts near the plant stays
     StaysNear,
+    /// this output is no state times a number, plus what does not move
+    ShowsNoState(String),
+    /// no interval between samples was found for which a proof exists
+    NoInterval,
+    /// a limit ended the search for the longest interval
+    LongerSought(Spent),
     /// the error obeys the same unstable e' = A e everywhere
     GrowsEverywhere,
     /// the plant can rest where the error grows

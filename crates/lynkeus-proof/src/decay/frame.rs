@@ -60,25 +60,33 @@ impl Frame {
 
     /// A, B and C of a scaled model e' = (A + B δ C) e in these axes.
     pub fn seen(&self, model: &ErrorModel) -> Seen {
-        let q = model.sectors.len();
-        let mut B = &self.inverse * model.spread();
-        let mut C = model.reads() * &self.axes;
-        let mut weights = DVector::repeat(q, 1.0);
-        for k in 0..q {
-            // b δ cᵀ = (b w) δ (c/w)ᵀ: the same size on both sides
-            let w = (C.row(k).norm() / B.column(k).norm()).sqrt();
-            if w.is_finite() && w > 0.0 {
-                B.column_mut(k).scale_mut(w);
-                C.row_mut(k).scale_mut(1.0 / w);
-                weights[k] = w * w;
-            }
-        }
-        Seen {
-            A: &self.inverse * model.nominal() * &self.axes,
-            B,
-            C,
-            weights,
-        }
+        let A = &self.inverse * model.nominal() * &self.axes;
+        Seen::of(
+            A,
+            &self.inverse * model.spread(),
+            model.reads() * &self.axes,
+        )
+    }
+
+    /// The same axes for (e, ε), where the entries of ε are in units of the states `shown`: W with (e, ε) = W (e′, ε′),
+    /// and its inverse.
+    pub fn widened(&self, shown: &[usize]) -> (DMatrix<f64>, DMatrix<f64>) {
+        let n = self.sizes.len();
+        let sizes: Vec<f64> = shown.iter().map(|&s| self.sizes[s]).collect();
+        let size = |i: usize| self.sizes.get(i).copied().unwrap_or(sizes[i.max(n) - n]);
+        let of = |axes: &DMatrix<f64>, entry: &dyn Fn(usize, usize) -> f64| {
+            DMatrix::from_fn(n + sizes.len(), n + sizes.len(), |i, j| {
+                match i < n && j < n {
+                    true => axes[(i, j)] * entry(i, j),
+                    false if i == j => entry(i, j),
+                    false => 0.0,
+                }
+            })
+        };
+        (
+            of(&self.axes, &|i, _| size(i)),
+            of(&self.inverse, &|_, j| 1.0 / size(j)),
+        )
     }
 
     /// A proof found in this frame, in the user's units. With e = D e′ and time in
@@ -104,6 +112,22 @@ pub(super) struct Seen {
     pub C: DMatrix<f64>,
     /// a multiplier here is this times that of the model
     pub weights: DVector<f64>,
+}
+
+impl Seen {
+    /// With the uncertain part B δ C of the same size on both sides: b δ cᵀ = (b w) δ (c/w)ᵀ.
+    pub fn of(A: DMatrix<f64>, mut B: DMatrix<f64>, mut C: DMatrix<f64>) -> Self {
+        let mut weights = DVector::repeat(C.nrows(), 1.0);
+        for k in 0..C.nrows() {
+            let w = (C.row(k).norm() / B.column(k).norm()).sqrt();
+            if w.is_finite() && w > 0.0 {
+                B.column_mut(k).scale_mut(w);
+                C.row_mut(k).scale_mut(1.0 / w);
+                weights[k] = w * w;
+            }
+        }
+        Self { A, B, C, weights }
+    }
 }
 
 /// The mean of the models' middle matrices, in units of the sizes.

@@ -21,14 +21,16 @@ use crate::matrix::IntervalMatrix;
 use crate::vertices::{Bounds, varying, vertices};
 
 pub use analysis::{fastest, prove};
-pub use check::holds;
+pub use check::{holds, holds_between_samples};
 pub use growth::is_unstable;
+pub use sampled::{longest, prove_between_samples};
 pub use synthesis::{Aim, Gain, NoGain, Request, design, is_reachable};
 
 mod analysis;
 mod check;
 mod frame;
 mod growth;
+mod sampled;
 mod synthesis;
 
 /// A Lyapunov function with its multipliers: what has to be checked.
@@ -40,6 +42,39 @@ pub struct Proof {
     pub P: DMatrix<f64>,
     /// per model: one multiplier per sector
     pub multipliers: Vec<DVector<f64>>,
+}
+
+/// A Lyapunov function that knows the time τ since the last sample: V = zᵀP(τ)z over z = (e, ε), where ε = w − y is
+/// how far a measurement that follows the model has come from the plant's own, in units of the state that its sensor
+/// shows. P(τ) goes along lines between its values at the ends of pieces of equal length.
+///
+/// A sample sets ε to 0. With P(0) without entries between e and ε, and P(τ) no smaller than what P(0) makes of e, no
+/// sample raises V, whenever it comes; and V' ≤ −2·rate·V between samples. So eᵀP(0)e ≤ V falls for every sequence of
+/// samples none of which is further than `interval` from the next (Briat, *Automatica* 49 (2013) 3449, with the clock
+/// free at its end).
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampledProof {
+    /// the longest time from a sample to the next
+    pub interval: f64,
+    /// V' ≤ −2·rate·V
+    pub rate: f64,
+    /// P at the ends of the pieces, from τ = 0 on
+    pub P: Vec<DMatrix<f64>>,
+    /// per piece, at its two ends: per model one multiplier per sector
+    pub multipliers: Vec<[Vec<DVector<f64>>; 2]>,
+}
+
+/// S with (e, σ) = S (e, ε) and back: σ_j = e_s − ε_j for the state s that sensor j shows.
+///
+/// # Panics
+/// Where more are shown than `size` has room for, or a state that is none.
+pub fn between_errors(size: usize, shown: &[usize]) -> DMatrix<f64> {
+    let mut S = DMatrix::identity(size, size);
+    for (row, &state) in (size - shown.len()..).zip(shown) {
+        S[(row, row)] = -1.0;
+        S[(row, state)] = 1.0;
+    }
+    S
 }
 
 /// θ b e_sᵀ with θ in a range: the slope of one nonlinear term in one state.

@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::excited::ExcitationEntry;
+use super::sampled::SampledEntry;
 use super::{CertifyReport, Excited, Strays};
 use lynkeus_experiment::entries::{Condition, Named, Range, Verdict, finite, sides};
 use lynkeus_experiment::judge::interval::SamplingLimits;
@@ -48,6 +49,9 @@ pub(crate) struct Proof<'a> {
     excitation: Option<ExcitationEntry<'a>>,
     /// the study's samples beside what the observer stands
     sampling: Option<SamplingLimits>,
+    /// what is proved of samples with measurements that follow the model between them
+    /// (`between_samples = "predict"`); null where nothing is proved of sensors that are read continuously
+    sampled: Option<SampledEntry>,
     /// what you should know
     notes: Vec<String>,
     /// what the family's theorem gives, where it was asked
@@ -121,6 +125,7 @@ impl<'a> From<&'a CertifyReport> for Proof<'a> {
             outside_box: &report.strays,
             excitation: report.excited.as_ref().map(Excited::entry),
             sampling: report.sampling.as_ref().map(|found| found.entry(true)),
+            sampled: report.sampled.as_ref().map(SampledEntry::from),
             notes: both
                 .flat_map(|certificate| report.notes_of(certificate))
                 .chain(report.assumed.iter().cloned())
@@ -168,7 +173,7 @@ impl From<&Certificate> for ProofSummary {
     }
 }
 
-fn bounds(each: &[UltimateBound]) -> Named<Option<f64>> {
+pub(super) fn bounds(each: &[UltimateBound]) -> Named<Option<f64>> {
     let each = each.iter();
     each.map(|b| (b.name.clone(), finite(b.value))).collect()
 }

@@ -7,7 +7,7 @@ use lynkeus_structure::Standing;
 use lynkeus_words::Words;
 use serde_json::Value;
 
-use super::CertifyReport;
+use super::{CertifyReport, sampled};
 use crate::Answer;
 use lynkeus_experiment::judge::interval::Intervals;
 use lynkeus_experiment::words::{condition, number, side};
@@ -56,6 +56,9 @@ impl Answer for CertifyReport {
         let mut document = Document::new(title.then(self.conclusion()));
         document.line(region(self));
         self.tell_certificates(&mut document);
+        if let Some(sampled) = &self.sampled {
+            sampled::tell(sampled, self, &mut document);
+        }
         if let Some(excited) = &self.excited {
             excited.tell(&mut document);
         }
@@ -121,7 +124,8 @@ fn but(report: &CertifyReport) -> String {
     let samples = samples.map(|words| format!("; {words}"));
     let strays = report.strays.words(report.is_theorem(report.best()));
     let strays = strays.map(|words| format!("; but only inside the box, and {words}"));
-    samples.into_iter().chain(strays).collect()
+    let sampled = sampled::also(report);
+    samples.into_iter().chain(sampled).chain(strays).collect()
 }
 
 /// Bounds named in the first line.
@@ -156,7 +160,7 @@ fn left(report: &CertifyReport, best: &Certificate) -> String {
 const IN_MEAN_SQUARE: &str = "in the end in mean square (the root of E e²) within";
 
 /// `0.3 K of T`, for every bounded quantity.
-fn bounds(report: &CertifyReport, each: &[UltimateBound]) -> Vec<String> {
+pub(super) fn bounds(report: &CertifyReport, each: &[UltimateBound]) -> Vec<String> {
     let estimates = &report.design.observer.estimates;
     let unit = |name: &str| {
         let mut found = estimates.iter().filter(|e| e.variable.name == name);
