@@ -6,6 +6,8 @@ mod fit;
 mod how_well;
 mod inputs;
 mod limits;
+#[cfg(test)]
+mod listing;
 mod monte_carlo;
 mod options;
 mod output;
@@ -15,6 +17,7 @@ mod run;
 mod save;
 #[cfg(feature = "serve")]
 mod serve;
+mod shell;
 mod signals;
 mod tune;
 mod written;
@@ -22,7 +25,7 @@ mod written;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 
 use lynkeus::run::Backend;
 use lynkeus::{CheckOptions, Error, ErrorKind, interrupt};
@@ -246,6 +249,17 @@ enum Command {
     },
     /// The JSON Schema of a study, for editors that complete and check TOML
     Schema,
+    /// A script that lets a shell complete commands, options and files
+    Completions {
+        /// The shell
+        #[arg(value_enum)]
+        shell: clap_complete::Shell,
+    },
+    /// The manual page of lynkeus or of one of its commands, as roff for man(1)
+    Man {
+        /// The command; without it lynkeus itself
+        command: Option<String>,
+    },
 }
 
 /// Runs the command line.
@@ -392,6 +406,8 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             output::print(output::json(&lynkeus::schema()).as_bytes())?;
             Ok(ExitCode::SUCCESS)
         }
+        Command::Completions { shell } => shell::completions(Cli::command(), shell),
+        Command::Man { command } => shell::manual(Cli::command(), command.as_deref()),
     }
 }
 

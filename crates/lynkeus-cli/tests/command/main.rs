@@ -58,6 +58,7 @@ mod said;
 mod samples;
 mod scatter;
 mod screens;
+mod shell;
 mod story;
 mod tables;
 mod texts;
