@@ -55,9 +55,9 @@ const WHEEL: &str = "model Wheel
   output Real y = phi;
 equation
   der(phi) = w;
-  der(w) = -0.3*w;
-  when w <= 2 then
-    reinit(w, pre(w) + 4);
+  der(w) = -0.8*w;
+  when w <= 3 then
+    reinit(w, pre(w) + 1);
     kicks = pre(kicks) + 1;
   end when;
 end Wheel;

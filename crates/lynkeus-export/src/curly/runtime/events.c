@@ -232,10 +232,13 @@ static int happen(double t, const real *w, real *x, double *m, real *jump)
     copy_jump(jump, kept);
     for (int round = 0; round < 100; round++) {
         truth is_done = 0;
-        truth is_due = 0;
         copy_state(x, before);
         copy_jump(jump, kept_next);
+//? !timers
+        const truth is_due = 0;
+//?
 //? timers
+        truth is_due = 0;
         if (round == 0) {
             is_due = due(t, is_first, v, m);
         }
