@@ -2,11 +2,12 @@
 
 use lynkeus_answer::Document;
 use lynkeus_answer::document::{Cell, Line, Table};
-use lynkeus_observers::{Certificate, UltimateBound};
+use lynkeus_observers::Certificate;
 use lynkeus_structure::Standing;
 use lynkeus_words::Words;
 use serde_json::Value;
 
+use super::bounds::bounds;
 use super::{CertifyReport, sampled};
 use crate::Answer;
 use lynkeus_experiment::judge::interval::Intervals;
@@ -158,20 +159,6 @@ fn left(report: &CertifyReport, best: &Certificate) -> String {
 
 /// Of what process noise leaves.
 const IN_MEAN_SQUARE: &str = "in the end in mean square (the root of E e²) within";
-
-/// `0.3 K of T`, for every bounded quantity.
-pub(super) fn bounds(report: &CertifyReport, each: &[UltimateBound]) -> Vec<String> {
-    let estimates = &report.design.observer.estimates;
-    let unit = |name: &str| {
-        let mut found = estimates.iter().filter(|e| e.variable.name == name);
-        let unit = found.next().and_then(|e| e.variable.unit.as_deref());
-        unit.filter(|unit| !unit.is_empty())
-            .map_or(String::new(), |unit| format!(" {unit}"))
-    };
-    each.iter()
-        .map(|b| format!("{}{} of {}", number(b.value), unit(&b.name), b.name))
-        .collect()
-}
 
 /// Equal ranges of an array's elements are one entry.
 fn abbreviated(sides: &[String]) -> String {

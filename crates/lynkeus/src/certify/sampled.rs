@@ -7,8 +7,7 @@ use lynkeus_words::Words;
 use serde::Serialize;
 
 use super::CertifyReport;
-use super::json;
-use super::print::bounds;
+use super::bounds::{bounds, entries};
 use lynkeus_experiment::entries::{Named, finite};
 use lynkeus_experiment::words::number;
 
@@ -53,7 +52,7 @@ impl From<&AtSamples> for AtSamplesEntry {
             rate: at.rate,
             overshoot: at.overshoot.and_then(finite),
             ultimate_bound: ultimate.and_then(|b| finite(b.norm)),
-            ultimate_bounds: json::bounds(ultimate.map_or(&[], |b| &b.states)),
+            ultimate_bounds: entries(ultimate.map_or(&[], |b| &b.states)),
         }
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use lynkeus_run::filter::Correlation;
 use lynkeus_study::{Name, Noise};
 
-use super::Kind;
+use super::kind::Kind;
 use crate::{Error, near};
 
 /// The correlations by the first output of each pair.
