@@ -15,6 +15,8 @@ mod progress;
 mod report;
 mod run;
 mod save;
+#[cfg(feature = "serve")]
+mod serve;
 mod shell;
 mod signals;
 mod tune;
@@ -79,6 +81,7 @@ Examples:
   lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
   lynkeus fit study.toml log.csv --write
   lynkeus tune study.toml --plot tune.svg
+  lynkeus serve study.toml --stdio json
   lynkeus export study.toml --to c -o device
   lynkeus export model.mo --to fmu -o plant
   lynkeus report study.toml log.csv -o report.html
@@ -234,6 +237,16 @@ enum Command {
         #[command(flatten)]
         limits: Limits,
     },
+    /// The estimator beside a plant: rows in, estimates out, for as long as the plant runs
+    #[cfg(feature = "serve")]
+    Serve {
+        /// The study (TOML), with [serve]
+        study: PathBuf,
+        #[command(flatten)]
+        options: serve::Options,
+        #[command(flatten)]
+        limits: Limits,
+    },
     /// The JSON Schema of a study, for editors that complete and check TOML
     Schema,
     /// A script that lets a shell complete commands, options and files
@@ -379,6 +392,15 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
         } => {
             let source = Source::load(&study, limits.for_a_proof())?;
             report::report(&source, log.as_deref(), &options)
+        }
+        #[cfg(feature = "serve")]
+        Command::Serve {
+            study,
+            options,
+            limits,
+        } => {
+            let source = Source::load(&study, limits.budget())?;
+            serve::serve(&source, &options)
         }
         Command::Schema => {
             output::print(output::json(&lynkeus::schema()).as_bytes())?;

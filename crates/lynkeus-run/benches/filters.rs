@@ -4,7 +4,7 @@ use divan::{Bencher, black_box};
 use lynkeus_expr::Graph;
 use lynkeus_run::filter::{
     FilterKind, FilterSettings, Likelihood, Limits, NoisyModel, NoisyPlant, ParametricLevel,
-    ParametricPlant, ParametricSensor, Row, Sensor, SigmaPoints,
+    ParametricPlant, ParametricSensor, Particles, Row, Sensor, SigmaPoints,
 };
 use lynkeus_run::{Blueprint, Error, EstimatorSettings, Fleet, Level, Method, Step, Tolerances};
 
@@ -132,6 +132,17 @@ fn mhe(bencher: Bencher, n: usize) {
     measure(bencher, n, FilterKind::MovingHorizon(10));
 }
 
+/// So many particles of two states, one step of Runge and Kutta between samples.
+#[divan::bench(args = [100, 1000, 10_000, 100_000], sample_count = 20)]
+fn particles(bencher: Bencher, count: usize) {
+    let kind = FilterKind::Particles(Particles {
+        count,
+        ..Particles::default()
+    });
+    let method = Method::Rk4(Step::Substeps(1));
+    measure_by(method, 100, bencher, 2, kind);
+}
+
 /// Cells of the plant whose likelihood is measured, and rows of its log.
 const CELLS: usize = 4;
 const ROWS: usize = 10_000;
@@ -170,6 +181,7 @@ fn likelihood(count: usize) -> Result<Likelihood, Error> {
         process_noise: (0..CELLS).map(|i| value(CELLS + 1 + i).node()).collect(),
         ranges: vec![range; CELLS],
         start: vec![(g.constant(0.5).node(), g.constant(0.01).node()); CELLS],
+        drawn: 0,
         parameters: parameters.iter().map(|p| p.node()).collect(),
     })
 }

@@ -2,11 +2,14 @@
 
 mod corners;
 mod credible;
+mod events;
 mod glitch;
 mod hidden;
+mod hybrid;
 pub(super) mod javascript;
 mod late;
 mod manifold;
+mod misread;
 mod names;
 mod rust;
 mod slopes;

@@ -37,6 +37,7 @@ mod long;
 mod manifold;
 mod mentioned;
 mod messages;
+mod misread;
 mod names;
 mod next_experiment;
 #[path = "../../../lynkeus/tests/normal/mod.rs"]
@@ -45,6 +46,7 @@ mod observability;
 mod open_run;
 mod outside;
 mod parquet_logs;
+mod particles;
 mod random;
 mod reading;
 mod references;

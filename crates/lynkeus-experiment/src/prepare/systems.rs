@@ -3,7 +3,9 @@
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable, parse_expression};
 use lynkeus_observers::{Monitor, Observer, Signal};
-use lynkeus_run::{Column, EstimatorSettings, Margin, Method, Role, Step, System, Tolerances};
+use lynkeus_run::{
+    Column, EstimatorSettings, Margin, Method, Parts, Role, Step, System, Tolerances,
+};
 
 use crate::prepare::manifold;
 use crate::words::explain;
@@ -24,7 +26,8 @@ pub fn settings(study: &Study) -> Result<&SimulateSettings, Error> {
 /// The time between two samples of the simulation where the study says that it is sampled: its
 /// sensors have noise, which is drawn anew with each, or there is a `sample_step`.
 pub(crate) fn sampled_every(study: &Study, settings: &SimulateSettings) -> Option<f64> {
-    let is_noisy = study.sensors.noise.iter().any(|(_, n)| n.size() > 0.0);
+    let mut all = study.sensors.noise.iter().chain(&study.sensors.input_noise);
+    let is_noisy = all.any(|(_, n)| n.size() > 0.0);
     let drawn = is_noisy.then(|| settings.row_step());
     settings.sample_step.or(drawn)
 }
@@ -128,15 +131,15 @@ pub(crate) fn plant_reading(
         .zip(starts)
         .map(|(s, start)| (s.name.clone(), s.node, start))
         .collect();
-    System::jumping(
-        &plant.graph,
-        plant.time,
-        &states,
+    System::of(&Parts {
+        graph: &plant.graph,
+        time: plant.time,
+        states: &states,
         signals,
-        &plant.derivatives,
-        &named(&plant.outputs),
-        &plant.whens,
-    )
+        derivatives: &plant.derivatives,
+        outputs: &named(&plant.outputs),
+        whens: Some(&plant.whens),
+    })
     .map_err(explain)
 }
 

@@ -6,7 +6,8 @@ use lynkeus_run::{BetweenSamples, Jacobians, Level, Manifold, Tuned, Updates};
 
 use super::device::{Device, Entry, FirstReading};
 use super::draft::{Arguments, Target, draft, number, places, table};
-use super::machine::{FIELD, INTEGRATE, Linear, Machine, Which, code, refuse_jumps};
+use super::events::{discrete, integrated_point, remembering};
+use super::machine::{FIELD, Linear, Machine, Which, code, refuse_jumps};
 use super::syntax::Type;
 use super::template::{chosen, exchanged};
 use crate::Refusal;
@@ -141,6 +142,9 @@ impl Machine {
             Some(errors) => {
                 self.spread(errors, &arguments)?;
                 holds.push("deviations");
+                if self.drawn(errors) {
+                    holds.push("drawn");
+                }
                 "linearised"
             }
         };
@@ -252,8 +256,19 @@ impl Machine {
         let is_relative = model.sensors.iter().any(is_share);
         let has_rotations = !model.manifold.rotations.is_empty();
         let has_dials = !model.manifold.dials.is_empty();
+        let has_events = flow.has_clauses();
+        let discrete = match settings.kind {
+            FilterKind::Unscented(_) => discrete(model),
+            _ => vec![],
+        };
+        if !discrete.is_empty() {
+            self.size("DISCRETE", discrete.len());
+            self.tables += &places("discrete_states", discrete.iter().copied());
+        }
         let facts = [
             (confined.is_some(), "confined"),
+            (has_events, "events"),
+            (!discrete.is_empty(), "discrete"),
             (has_rotations, "rotations"),
             (has_dials, "dials"),
             (!model.manifold.mirrors.is_empty(), "mirrors"),
@@ -269,7 +284,18 @@ impl Machine {
                 "deviation",
             ),
         ];
-        let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
+        let mut holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
+        if settings.iterations > 1 && settings.kind == FilterKind::Extended {
+            self.size("ITERATIONS", settings.iterations);
+            holds.push("iterated");
+            holds.extend(has_rotations.then_some("iterated_rotations"));
+            holds.extend(has_limits.then_some("iterated_limits"));
+        }
+        let is_drawn = self.drawn(model);
+        if is_drawn {
+            self.size("SHOWN", states.len() - model.drawn());
+            holds.push("drawn");
+        }
         self.curved(device, model);
         self.measure(model, &arguments, &settings.kind)?;
         let sensors = model.sensors.len();
@@ -281,6 +307,7 @@ impl Machine {
             is_tuned: !device.tunables.is_empty(),
         };
         self.tuned(device, None)?;
+        self.events(flow, &arguments, device.blueprint.run.method)?;
         let field = self.engine(&settings.kind, &free, &arguments, &holds)?;
         let is_extended = settings.kind == FilterKind::Extended;
         let which_inside = Which::Inside {
@@ -300,11 +327,24 @@ impl Machine {
             self.tables += &table("range_from", &ends(|b| b.low));
             self.tables += &table("range_to", &ends(|b| b.high));
         }
-        let text = chosen(FILTER, &holds)
+        let text = remembering(&chosen(FILTER, &holds), has_events)
             .replace("FIELD_INSIDE", "linearised_inside")
             .replace("predict_inside", &which_inside.renamed("predict"));
-        self.add(&text.replace("FIELD", field));
+        let text = text.replace("FIELD", field);
+        self.add(&match is_drawn {
+            true => text,
+            false => text.replace("SHOWN", "STATES"),
+        });
         Ok(())
+    }
+
+    /// Whether some states are drawn anew in every sample, and their number.
+    fn drawn(&mut self, model: &NoisyModel) -> bool {
+        let count = model.drawn();
+        if count > 0 {
+            self.size("DRAWN", count);
+        }
+        count > 0
     }
 
     /// The way from sample to sample, and the correction; the name of the flow.
@@ -318,6 +358,7 @@ impl Machine {
         let n = free.flow.system().states().len();
         match kind {
             FilterKind::MovingHorizon(..) => Err(Refusal::Window),
+            FilterKind::Particles(..) => Err(Refusal::Particles),
             FilterKind::Extended => {
                 self.size("LARGER", n);
                 self.linear(Which::Free, free, arguments)?;
@@ -326,7 +367,12 @@ impl Machine {
                     true => "lifted(i, s->readings[i], predicted)",
                     false => "s->readings[i]",
                 };
-                self.add(&chosen(EXTENDED, holds).replace("READING_HERE", reading));
+                let ordinary = match holds.contains(&"limits") {
+                    true => "believed[i] != 0 && end_of(i, s->readings[i]) == R(0.0)",
+                    false => "believed[i] != 0",
+                };
+                let text = chosen(EXTENDED, holds).replace("ORDINARY", ordinary);
+                self.add(&text.replace("READING_HERE", reading));
                 Ok("linearised")
             }
             FilterKind::Unscented(points) => {
@@ -469,15 +515,13 @@ impl Machine {
             false => self.add(FIELD),
         }
         self.flow(free.flow.system(), arguments)?;
-        self.add(&exchanged(INTEGRATE, |word| match word {
-            "integrate" => Some("integrate_point".to_owned()),
-            "DIMENSION" => Some("STATES".to_owned()),
-            _ => None,
-        }));
+        self.add(&integrated_point(free.flow.system()));
         let facts = [
             (weights.centre >= 0.0, "definite"),
             (free.is_noisy(), "noisy"),
             (has_limits, "limits"),
+            (about.contains(&"events"), "events"),
+            (about.contains(&"discrete"), "discrete"),
             (about.contains(&"rotations"), "rotations"),
             (about.contains(&"dials"), "dials"),
             (about.contains(&"mirrors"), "mirrors"),
@@ -491,7 +535,7 @@ impl Machine {
             true => "lifted(i, s->readings[i], h[i])",
             false => "s->readings[i]",
         };
-        let text = chosen(UNSCENTED, &holds)
+        let text = remembering(&chosen(UNSCENTED, &holds), about.contains(&"events"))
             .replace("BEFORE_PARAMETER", parameter)
             .replace("BEFORE_ARGUMENT", argument)
             .replace("READING_SHOWN", reading);

@@ -42,6 +42,7 @@
 
 mod belief;
 pub(crate) mod censored;
+mod drawn;
 mod ekf;
 pub(crate) mod expressions;
 pub(crate) mod health;
@@ -49,6 +50,8 @@ mod likelihood;
 mod mhe;
 mod model;
 mod order;
+mod particle;
+mod point;
 mod profile;
 mod record;
 pub(crate) mod root;
@@ -58,9 +61,11 @@ mod smoother;
 pub(crate) mod transition;
 mod ukf;
 
+pub use crate::correlation::Correlation;
 pub use crate::noise::Limits;
 pub(crate) use belief::Belief;
-pub use health::{Health, Innovation, Reading, SensorHealth};
+pub use drawn::Drawn;
+pub use health::{Health, Innovation, ParticleHealth, Reading, SensorHealth};
 pub use likelihood::{
     Likelihood, ParametricLevel, ParametricPlant, ParametricSensor, Row, Score, Seen,
 };
@@ -68,7 +73,7 @@ pub(crate) use model::check_counts;
 pub use model::{NoisyModel, NoisyPlant, Sensor};
 pub(crate) use order::by_distance;
 pub use record::Record;
-pub use settings::{FilterKind, FilterSettings, PATIENCE, SigmaPoints, Weights};
+pub use settings::{FilterKind, FilterSettings, PATIENCE, Particles, SigmaPoints, Weights};
 pub use smoother::Smoothed;
 
 use crate::divergence::{Bound, check_deviations};
@@ -79,6 +84,7 @@ use crate::{Error, EstimatorSettings, Result};
 use belief::{Projection, confine};
 use ekf::Ekf;
 use mhe::Mhe;
+use particle::ParticleFilter;
 use profile::Profile;
 use sensing::Sensing;
 use smoother::{History, Step};
@@ -118,6 +124,18 @@ impl Beside {
     }
 }
 
+/// The filter of such settings, at the plant's first estimate.
+pub(crate) fn started(
+    model: &NoisyModel,
+    settings: &FilterSettings,
+    run: EstimatorSettings,
+) -> Result<Box<dyn Runner>> {
+    match &settings.kind {
+        FilterKind::Particles(own) => Ok(Box::new(ParticleFilter::new(model, settings, own, run)?)),
+        _ => Ok(Box::new(Filter::new(model, settings, run)?)),
+    }
+}
+
 /// A filter under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Filter {
@@ -130,6 +148,8 @@ pub(crate) struct Filter {
     ranges: Vec<Limits>,
     manifold: Manifold,
     belief: Belief,
+    /// so many last states are drawn anew in every row
+    drawn: usize,
     projection: Option<Projection>,
     sensing: Sensing,
     deviations: Vec<f64>,
@@ -153,26 +173,37 @@ impl Filter {
         if settings.is_window() && !manifold.is_straight() {
             return Err(Error::setting("states", "no quaternion in a window", "one"));
         }
-        if flow.has_clauses() && settings.kind != FilterKind::Extended {
-            let expected = "the extended filter for a plant whose state jumps (`when`)";
-            return Err(Error::setting("filter", expected, "another one"));
+        if flow.has_clauses() && settings.is_window() {
+            let expected = "no window of samples for a plant whose state jumps (`when`)";
+            return Err(Error::setting("filter", expected, "one"));
         }
-        let propagation = |flow| Propagation::new(flow, &model.process_noise, run);
+        let propagation = |flow| -> Result<Propagation> {
+            let propagation = Propagation::new(flow, &model.process_noise, run)?;
+            Ok(propagation.drawing(model.drawn))
+        };
         Ok(Self {
             propagation: propagation(&model.flow)?,
             engine: match settings.kind {
-                FilterKind::Extended => Engine::Extended(Ekf::default()),
+                FilterKind::Extended => Engine::Extended(Ekf::new(settings.iterations)),
                 FilterKind::Unscented(points) => {
-                    Engine::Unscented(Box::new(Ukf::new(n, points, run.method, &manifold)?))
+                    Engine::Unscented(Box::new(Ukf::new(model, points, run.method)?))
                 }
                 FilterKind::MovingHorizon(length) => {
                     let horizon = Mhe::new(model, length, settings.keep_history)?;
                     Engine::MovingHorizon(Box::new(horizon))
                 }
+                FilterKind::Particles(_) => {
+                    let expected = "one with a covariance";
+                    return Err(Error::setting("filter", expected, "particles"));
+                }
             },
             spare: model.confined.as_ref().map(propagation).transpose()?,
             ranges: model.ranges.clone(),
-            deviations: model.initial_variance.iter().map(|v| v.sqrt()).collect(),
+            deviations: model.initial_variance[..n - model.drawn]
+                .iter()
+                .map(|v| v.sqrt())
+                .collect(),
+            drawn: model.drawn,
             belief: Belief::on(&manifold, flow.start(), &model.initial_variance),
             projection: (settings.projects).then(|| Projection::new(model.ranges.clone())),
             sensing: Sensing::new(model, settings),
@@ -294,6 +325,26 @@ impl Filter {
         }
     }
 
+    /// Without what nobody estimates.
+    fn told(&self, mut rows: Vec<Smoothed>) -> Vec<Smoothed> {
+        let count = self.deviations.len();
+        for row in &mut rows {
+            row.estimate.truncate(count);
+            row.deviations.truncate(count);
+        }
+        rows
+    }
+
+    /// What every row draws anew.
+    fn renew(&mut self) {
+        if self.drawn > 0 {
+            self.belief.renew(self.drawn);
+            if let Some(pending) = &mut self.pending {
+                pending.clear_last(self.drawn);
+            }
+        }
+    }
+
     fn correct(&mut self, sample: &Sample<'_>) -> Result<()> {
         match self.correct_here(sample) {
             // the outputs are evaluated before a reading is counted; a window keeps its states
@@ -347,6 +398,7 @@ impl Runner for Filter {
         // those of an update that failed
         self.sensing.take_corrections();
         self.propagation.driven.start(sample.inputs);
+        self.renew();
         let before = self.before();
         self.correct(sample)?;
         self.land(before);
@@ -367,7 +419,7 @@ impl Runner for Filter {
     }
 
     fn estimate(&self) -> &[f64] {
-        &self.belief.x
+        &self.belief.x[..self.deviations.len()]
     }
 
     fn deviations(&self) -> Option<&[f64]> {
@@ -383,7 +435,7 @@ impl Runner for Filter {
     }
 
     fn keep_record(&mut self) {
-        let (states, sensors) = (self.belief.x.len(), self.sensing.innovations.len());
+        let (states, sensors) = (self.deviations.len(), self.sensing.innovations.len());
         self.sensing.record = Some(Record::new(states, sensors));
     }
 
@@ -412,7 +464,7 @@ impl Runner for Filter {
     fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Option<Vec<Smoothed>> {
         let history = self.history.as_ref()?;
         let Engine::MovingHorizon(horizon) = &self.engine else {
-            return Some(history.smoothed(&[], lag, deviations));
+            return Some(self.told(history.smoothed(&[], lag, deviations)));
         };
         if lag.is_some_and(|lag| lag > horizon.length()) {
             return None;
@@ -429,7 +481,7 @@ impl Runner for Filter {
         for row in &mut rows {
             confine(&mut row.estimate, &self.ranges);
         }
-        Some(rows)
+        Some(self.told(rows))
     }
 
     fn walk_history(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
@@ -458,7 +510,12 @@ impl Persist for Filter {
         self.propagation.walk(walk)?;
         match &mut self.engine {
             Engine::Extended(_) => {}
-            Engine::Unscented(ukf) => ukf.integrator.walk(walk)?,
+            Engine::Unscented(ukf) => {
+                ukf.integrator.walk(walk)?;
+                if self.propagation.driven.system().has_clauses() {
+                    ukf.integrator.memory().walk(walk)?;
+                }
+            }
             Engine::MovingHorizon(mhe) => mhe.walk(walk)?,
         }
         if let Some(spare) = &mut self.spare {

@@ -23,7 +23,7 @@ static int advance(STATE *s, double t)
     if (steps == 0) {
         return INTERVAL;
     }
-    if (predict(FIELD, s->time, t, steps, s->inputs, s->x, s->root)) {
+    if (predict(FIELD, s->time, t, steps, s->inputs, s->x, s->rootMEMORY_OF_STATE)) {
 //? rotations
         settle(s->x, s->root);
 //?
@@ -39,6 +39,11 @@ static int advance(STATE *s, double t)
 //?
 //? confined
         return 0;
+    }
+//?
+//? events
+    if (s->memory[ENDLESS] > 0.0) {
+        return EVENTS;
     }
 //?
     return NOT_FINITE;
@@ -61,6 +66,15 @@ static int update(STATE *s, double t, const real *signals)
             s->inputs[i] = signals[SENSORS + i];
         }
     }
+//? drawn
+    /* errors of readings are other ones in each sample */
+    for (int i = STATES - DRAWN; i < STATES; i++) {
+        s->x[i] = R(0.0);
+        for (int k = 0; k < STATES; k++) {
+            s->root[i * STATES + k] = i == k ? R(1.0) : R(0.0);
+        }
+    }
+//?
     if (correct(s, t)) {
 //? rotations
         land(before, s->x, s->root);
@@ -96,10 +110,10 @@ static int report(STATE *s, double t, const real *signals, real *estimates)
             return DIVERGED;
         }
     }
-    for (int i = 0; i < STATES; i++) {
+    for (int i = 0; i < SHOWN; i++) {
         estimates[i] = s->x[i];
 //? each
-        estimates[STATES + i] = deviations[i];
+        estimates[SHOWN + i] = deviations[i];
 //?
     }
 //? turns
@@ -109,8 +123,8 @@ static int report(STATE *s, double t, const real *signals, real *estimates)
 //?
 //? one
     /* of a rotation the deviation of its angle, in one place */
-    int place = STATES;
-    for (int i = 0; i < STATES; i++) {
+    int place = SHOWN;
+    for (int i = 0; i < SHOWN; i++) {
         if (elements[i] == 0) {
             real squares = R(0.0);
             for (int k = 0; k < 4; k++) {
