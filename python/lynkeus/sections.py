@@ -29,6 +29,7 @@ Family: TypeAlias = Literal[
     "ekf",
     "ukf",
     "mhe",
+    "particle",
 ]
 
 
@@ -151,7 +152,7 @@ class ObserverSection(TypedDict, total=False):
     family: Family | None
     """the observer family; `auto` takes the first with a theorem that is proved to fit, has its keys and is
     fast enough for the run, else `ekf` (`"auto"`, `"triangular"`, `"block-triangular"`, `"state-affine"`,
-    `"drift-observable"`, `"unknown-input"`, `"ekf"`, `"ukf"`, `"mhe"`; default: `"auto"`)"""
+    `"drift-observable"`, `"unknown-input"`, `"ekf"`, `"ukf"`, `"mhe"`, `"particle"`; default: `"auto"`)"""
 
     initial: Mapping[str, Number] | None
     """where the estimate starts; `default` holds for everything not listed (table: name = number, and
@@ -294,18 +295,18 @@ class ObserverSection(TypedDict, total=False):
     inputs a table; default: those of `[certify]`)"""
 
     initial_variance: Mapping[str, Number] | None
-    """ekf, ukf, mhe: how uncertain the first estimate is: the variance of each state and unknown input;
-    `default` holds for everything not listed (table: name = number ≥ 0, and `default`; default: the square
-    of a quarter of the declared range (without a range: of the start value, or 1; of an angle or a
+    """ekf, ukf, mhe, particle: how uncertain the first estimate is: the variance of each state and unknown
+    input; `default` holds for everything not listed (table: name = number ≥ 0, and `default`; default: the
+    square of a quarter of the declared range (without a range: of the start value, or 1; of an angle or a
     rotation: of a turn))"""
 
     gate: Number | None
-    """ekf, ukf, mhe: a reading whose innovation exceeds so many of its standard deviations is rejected and
-    counted (number > 0; default: none)"""
+    """ekf, ukf, mhe, particle: a reading whose innovation exceeds so many of its standard deviations is
+    rejected and counted (number > 0; default: none)"""
 
     gate_patience: Whole | None
-    """ekf, ukf, mhe: after so many rejections of a sensor in a row, at least half of which moved, its next
-    reading is believed (whole number ≥ 1; default: 10)"""
+    """ekf, ukf, mhe, particle: after so many rejections of a sensor in a row, at least half of which moved,
+    its next reading is believed (whole number ≥ 1; default: 10)"""
 
     bounds: Literal["project"] | None
     """ekf, ukf: "project": the estimate is kept in the declared ranges `[min, max]`: after each prediction
@@ -318,6 +319,23 @@ class ObserverSection(TypedDict, total=False):
     horizon: Whole | None
     """mhe: samples over which the states are estimated anew at each sample, within `[min, max]` (whole number
     ≥ 1; default: 10)"""
+
+    particles: Whole | None
+    """particle: how many; the error that they add falls with the root of their number (whole number ≥ 2;
+    default: 1000)"""
+
+    proposal: Literal["bootstrap", "auxiliary"] | None
+    """particle: "bootstrap": particles run, then are weighed; "auxiliary": those are drawn to run that the
+    flow without noise takes to where the next readings are likely, which pays where readings are precise
+    and the process noise is small (`"bootstrap"`, `"auxiliary"`; default: `"bootstrap"`)"""
+
+    resample_below: Number | None
+    """particle: particles are drawn anew where their effective number falls below this share of them; 1:
+    after every reading (number in [0.0, 1.0]; default: 0.5)"""
+
+    seed: Whole | None
+    """particle: of the random numbers: the same seed gives the same digits, on any number of threads (whole
+    number ≥ 0; default: 0)"""
 
 
 #: ranges narrower than the model's `min` and `max` (table: name = number, or `[smallest, largest]`; default:
@@ -467,6 +485,10 @@ class EstimateSection(TypedDict, total=False):
     """also `<name>_innovation` and `<name>_innovation_sd` of each measured output: its reading less what was
     expected of it, and the standard deviation of that (what they are judged by) (true, false; default:
     false)"""
+
+    ess: bool | None
+    """also `ess` of a particle filter: how many particles count after each row, (Σw)²/Σw² (true, false;
+    default: false)"""
 
     between_samples: Literal["hold", "predict", "linear"] | None
     """what the observer sees between two rows: the latest row, as a live observer would; what the model makes
@@ -649,7 +671,7 @@ class CompareSection(TypedDict, total=False):
 
     families: Names | None
     """what `compare` runs; each gets the keys of `[observer]` that it owns (list of families; default: every
-    family that is not refuted, and the filters)"""
+    family that is not refuted, and the filters but `particle`)"""
 
 
 class PlotSection(TypedDict, total=False):

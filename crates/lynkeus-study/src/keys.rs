@@ -262,6 +262,7 @@ pub(super) const OBSERVER: [KeySpec; 3] = [
             "ekf",
             "ukf",
             "mhe",
+            "particle",
         ]),
         default: "`\"auto\"`",
         meaning: "the observer family; `auto` takes the first with a theorem that is proved to fit, has its keys and is fast enough for the run, else `ekf`",
@@ -509,7 +510,7 @@ pub(super) const LOG: [KeySpec; 7] = [
 ];
 
 /// `[estimate]` without the integrator.
-pub(super) const ESTIMATE: [KeySpec; 11] = [
+pub(super) const ESTIMATE: [KeySpec; 12] = [
     KeySpec {
         name: "late",
         shape: Shape::Positive,
@@ -539,6 +540,12 @@ pub(super) const ESTIMATE: [KeySpec; 11] = [
         shape: Shape::Flag,
         default: "false",
         meaning: "also `<name>_innovation` and `<name>_innovation_sd` of each measured output: its reading less what was expected of it, and the standard deviation of that ([what they are judged by](credibility.md))",
+    },
+    KeySpec {
+        name: "ess",
+        shape: Shape::Flag,
+        default: "false",
+        meaning: "also `ess` of a [particle filter](particle.md): how many particles count after each row, (Σw)²/Σw²",
     },
     KeySpec {
         name: "between_samples",

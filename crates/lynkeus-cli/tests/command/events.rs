@@ -161,6 +161,25 @@ fn a_vessel_that_is_emptied_is_estimated_as_by_particles() {
     assert_eq!(column(&table, "batches_hat").last(), Some(&2.0));
 }
 
+/// Particles of this program are those of the other one, whatever the event.
+#[test]
+fn particles_go_through_events_each_by_itself() {
+    let rest = "initial_variance = { h = 0.04, feed = 0.04 }\n[process_noise]\nh = 0.0004\n[estimate]\nsd = true\n";
+    let vessel = folder(BATCH, rest, &OF_BATCH);
+    let cases: [(Folder, &[Row], &str); 2] =
+        [(ball(""), &OF_BALL, "v"), (vessel, &OF_BATCH, "feed")];
+    for (folder, rows, other) in cases {
+        let drawn = "family = \"particle\"\nparticles = 20000";
+        folder.change("study.toml", "family = \"ekf\"", drawn);
+        let [means, deviations] = apart(&estimate(&folder), rows, other);
+        // a constant feed has fewer and fewer values among either's particles
+        assert!(
+            means < 0.1 && deviations < 0.1,
+            "{other}: {means} {deviations}"
+        );
+    }
+}
+
 /// The smoother at the first row knows the start from all readings: nearer, and surer, than the filter.
 #[test]
 fn the_smoother_goes_back_through_a_bounce() {

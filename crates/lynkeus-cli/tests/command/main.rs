@@ -45,6 +45,7 @@ mod observability;
 mod open_run;
 mod outside;
 mod parquet_logs;
+mod particles;
 mod random;
 mod reading;
 mod references;

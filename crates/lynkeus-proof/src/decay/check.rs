@@ -39,8 +39,7 @@ pub fn holds_between_samples(models: &[ErrorModel], shown: &[usize], proof: &Sam
         return false;
     }
     let is_together = |i: usize, j: usize| (i < n) == (j < n);
-    let is_split =
-        (0..size).all(|i| (0..size).all(|j| is_together(i, j) || first[(i, j)] == 0.0));
+    let is_split = (0..size).all(|i| (0..size).all(|j| is_together(i, j) || first[(i, j)] == 0.0));
     // what a sample leaves of V: eᵀP(0)e
     let kept = |P: &DMatrix<f64>| {
         square(P.nrows(), |i, j| {

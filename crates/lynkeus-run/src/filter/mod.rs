@@ -49,6 +49,7 @@ mod likelihood;
 mod mhe;
 mod model;
 mod order;
+mod particle;
 mod point;
 mod profile;
 mod record;
@@ -61,7 +62,7 @@ mod ukf;
 
 pub use crate::noise::Limits;
 pub(crate) use belief::Belief;
-pub use health::{Health, Innovation, Reading, SensorHealth};
+pub use health::{Health, Innovation, ParticleHealth, Reading, SensorHealth};
 pub use likelihood::{
     Likelihood, ParametricLevel, ParametricPlant, ParametricSensor, Row, Score, Seen,
 };
@@ -69,7 +70,7 @@ pub(crate) use model::check_counts;
 pub use model::{NoisyModel, NoisyPlant, Sensor};
 pub(crate) use order::by_distance;
 pub use record::Record;
-pub use settings::{FilterKind, FilterSettings, PATIENCE, SigmaPoints, Weights};
+pub use settings::{FilterKind, FilterSettings, PATIENCE, Particles, SigmaPoints, Weights};
 pub use smoother::Smoothed;
 
 use crate::divergence::{Bound, check_deviations};
@@ -80,6 +81,7 @@ use crate::{Error, EstimatorSettings, Result};
 use belief::{Projection, confine};
 use ekf::Ekf;
 use mhe::Mhe;
+use particle::ParticleFilter;
 use profile::Profile;
 use sensing::Sensing;
 use smoother::{History, Step};
@@ -116,6 +118,18 @@ impl Beside {
             health: Health::of(sensors),
             rejected: vec![(0, 0.0); sensors],
         }
+    }
+}
+
+/// The filter of such settings, at the plant's first estimate.
+pub(crate) fn started(
+    model: &NoisyModel,
+    settings: &FilterSettings,
+    run: EstimatorSettings,
+) -> Result<Box<dyn Runner>> {
+    match &settings.kind {
+        FilterKind::Particles(own) => Ok(Box::new(ParticleFilter::new(model, settings, own, run)?)),
+        _ => Ok(Box::new(Filter::new(model, settings, run)?)),
     }
 }
 
@@ -169,6 +183,10 @@ impl Filter {
                 FilterKind::MovingHorizon(length) => {
                     let horizon = Mhe::new(model, length, settings.keep_history)?;
                     Engine::MovingHorizon(Box::new(horizon))
+                }
+                FilterKind::Particles(_) => {
+                    let expected = "one with a covariance";
+                    return Err(Error::setting("filter", expected, "particles"));
                 }
             },
             spare: model.confined.as_ref().map(propagation).transpose()?,
