@@ -674,6 +674,40 @@ class CompareSection(TypedDict, total=False):
     family that is not refuted, and the filters but `particle`)"""
 
 
+class ServeSection(TypedDict, total=False):
+    """how the estimator runs beside a plant (serve) (table; default: none)"""
+
+    wait: Number | None
+    """how much older than the newest row a row may be when it comes, in units of the plant's time: it is put
+    in its place, and what was told before is corrected (number ≥ 0; default: 0: rows come in the order of
+    their times)"""
+
+    state: str | None
+    """the file that keeps where the estimator is: a row is in it before it is answered, and the next start
+    goes on from there, whatever ended the one before (path, from the study's folder; default: none: it
+    begins anew)"""
+
+    history: str | None
+    """CSV files of what was told, one for each day: `"tank-%Y-%m-%d.csv"` (path with `%Y`, `%m` and `%d`,
+    from the study's folder; default: none)"""
+
+    keep_days: Whole | None
+    """so many days of the history are kept (whole number ≥ 1; default: all)"""
+
+    assets: str | None
+    """the CSV file of many plants of this study: their names under `asset`, and in the other columns
+    parameters in which they differ (path, from the study's folder; default: one plant, and messages
+    without a name)"""
+
+    http: str | None
+    """where a page with the estimates, their events, `/estimates` and `/metrics` are: `"127.0.0.1:8080"`
+    (address and port; default: none)"""
+
+    token: str | None
+    """what a request has to say, as `Authorization: Bearer …` or `?token=…` (text; default: none: this
+    machine alone may look)"""
+
+
 class PlotSection(TypedDict, total=False):
     """what is drawn (table; default: none)"""
 
@@ -754,6 +788,9 @@ class Sections(TypedDict, total=False):
 
     compare: CompareSection | Names | None
     """which families are compared (table; default: none)"""
+
+    serve: ServeSection | None
+    """how the estimator runs beside a plant (serve) (table; default: none)"""
 
     plot: PlotSection | None
     """what is drawn (table; default: none)"""

@@ -3,7 +3,7 @@
 
 pub(crate) mod checkpoint;
 pub mod columns;
-mod computed;
+pub(crate) mod computed;
 pub(crate) mod corrections;
 pub(crate) mod curved;
 pub(crate) mod doubt;

@@ -69,6 +69,9 @@ pub(crate) fn outcome(
             truth: run.column(role.at(place)).cloned(),
             unknown_input: estimated.is_some_and(|i| estimates[i].unknown_input),
             is_input: role == Role::Input,
+            measured: (role == Role::Input)
+                .then(|| run.column(Role::Read.at(place)).cloned())
+                .flatten(),
             ..Quantity::default()
         };
         if let Some(i) = estimated {

@@ -16,7 +16,7 @@
 //!
 //! Nothing is required of the plant, and nothing is proved of the error.
 
-use lynkeus_model::Variable;
+use lynkeus_model::{Home, Variable};
 use lynkeus_run::filter::{FilterKind, PATIENCE, Particles, SigmaPoints};
 use lynkeus_structure::AugmentedPlant;
 
@@ -51,7 +51,7 @@ pub const EKF: &dyn Family = &Filter {
     name: "ekf",
     paper: "Jazwinski 1970, the extended Kalman filter, continuous-discrete",
     called: "extended Kalman filter",
-    keys: &[&KEYS, &BOUNDS],
+    keys: &[&KEYS, &BOUNDS, &ITERATIONS],
     smooths: true,
     follows_jumps: true,
     is_sampled: false,
@@ -127,6 +127,7 @@ impl Filter {
         tuning.positive(GATE.name)?;
         patience(tuning)?;
         projects(tuning)?;
+        iterations(augmented, tuning)?;
         variances(augmented, tuning).map(drop)
     }
 
@@ -161,6 +162,7 @@ impl Filter {
             gate: tuning.positive(GATE.name)?,
             patience: patience(tuning)?,
             projects: projects(tuning)?,
+            iterations: iterations(augmented, tuning)?,
             outputs: copy.at_estimate(&outputs),
             whens: copy.whens(),
             confined,
@@ -283,6 +285,17 @@ const BOUNDS: [KeySpec; 1] = [KeySpec {
     meaning: "\"project\": the estimate is kept in the declared ranges `[min, max]`: after each prediction and correction it is put to the nearest place inside by the covariance's metric, so that what is correlated moves along; the covariance stays",
 }];
 
+/// That of the filter that linearises what the sensors show.
+const ITERATIONS: [KeySpec; 1] = [KeySpec {
+    name: "iterations",
+    shape: Shape::Whole(1),
+    default: "1; 20 with a quaternion",
+    meaning: "how often the readings of a sample are linearised, at most: about the prediction, then about the estimate that they give, until it stays (the iterated extended Kalman filter): for a start that is far off, where what the sensors show is not linear",
+}];
+
+/// Those where a sum of states is none.
+const CURVED: usize = 20;
+
 /// Those of the unscented filter.
 const POINTS: [KeySpec; 3] = [
     KeySpec {
@@ -366,6 +379,16 @@ fn whole(tuning: &Tuning, key: &KeySpec, most: f64) -> Result<Option<usize>, Tun
 /// The patience of the gate.
 fn patience(tuning: &Tuning) -> Result<usize, TuningError> {
     Ok(whole(tuning, &GATE_PATIENCE, 1e4)?.unwrap_or(PATIENCE))
+}
+
+/// How often the readings of a sample are linearised, at most.
+fn iterations(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<usize, TuningError> {
+    let is_rotation = |state: &Variable| matches!(state.home, Home::Rotation { .. });
+    let usual = match augmented.states.iter().any(is_rotation) {
+        true => CURVED,
+        false => 1,
+    };
+    Ok(whole(tuning, &ITERATIONS[0], 1e4)?.unwrap_or(usual))
 }
 
 /// Whether the estimate is kept in the declared ranges.

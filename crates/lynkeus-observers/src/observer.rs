@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use lynkeus_expr::flow::Flow;
 use lynkeus_expr::{Graph, MissingInput, Node, flow};
 use lynkeus_model::{Variable, Whens};
-use lynkeus_run::filter::FilterKind;
+use lynkeus_run::filter::{Drawn, FilterKind};
 use lynkeus_structure::AugmentedPlant;
 
 /// A named symbol.
@@ -104,6 +104,8 @@ pub struct FilterTuning {
     pub patience: usize,
     /// the estimate is kept in the declared ranges
     pub projects: bool,
+    /// how often the readings of a sample are linearised, at most
+    pub iterations: usize,
     /// h(t, x̂, u), one per measured output
     pub outputs: Vec<Node>,
     /// variance of the first estimate, one per state
@@ -178,9 +180,31 @@ impl Sampled {
     /// Puts a state before the measurements that stays as it is: for
     /// [what measurements that are held fall behind by](lynkeus_run::Lag). Returns its place.
     pub fn push_lag(&mut self, graph: &Graph) -> usize {
+        self.push_still(graph, Signal::fresh(graph, "lag of", "what is held"))
+    }
+
+    /// Puts what every row draws anew before the measurements: known inputs are read with errors.
+    pub fn push_drawn(&mut self, graph: &Graph, drawn: &Drawn<'_>) {
+        for (name, symbol) in drawn.states() {
+            let name = name.clone();
+            self.push_still(graph, Signal { name, symbol });
+        }
+        let observer = &mut self.observer;
+        for nodes in [
+            &mut observer.derivatives,
+            &mut self.outputs,
+            &mut self.rates,
+        ] {
+            *nodes = drawn.truly(nodes);
+        }
+        for estimate in &mut observer.estimates {
+            estimate.node = drawn.truly(&[estimate.node])[0];
+        }
+    }
+
+    fn push_still(&mut self, graph: &Graph, state: Signal) -> usize {
         let place = self.observer.states.len() - self.outputs.len();
-        let lag = Signal::fresh(graph, "lag of", "what is held");
-        self.observer.states.insert(place, (lag, 0.0));
+        self.observer.states.insert(place, (state, 0.0));
         let still = graph.constant(0.0).node();
         self.observer.derivatives.insert(place, still);
         place

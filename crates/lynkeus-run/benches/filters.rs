@@ -181,6 +181,7 @@ fn likelihood(count: usize) -> Result<Likelihood, Error> {
         process_noise: (0..CELLS).map(|i| value(CELLS + 1 + i).node()).collect(),
         ranges: vec![range; CELLS],
         start: vec![(g.constant(0.5).node(), g.constant(0.01).node()); CELLS],
+        drawn: 0,
         parameters: parameters.iter().map(|p| p.node()).collect(),
     })
 }

@@ -140,7 +140,10 @@ impl Blueprint {
                 let names = self.flow.estimates();
                 &names[..names.len().saturating_sub(self.sensors.len())]
             }
-            Updates::Filter { .. } => self.flow.states(),
+            Updates::Filter { ref model, .. } => {
+                let names = self.flow.states();
+                &names[..names.len().saturating_sub(model.drawn)]
+            }
         }
     }
 

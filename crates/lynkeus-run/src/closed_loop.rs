@@ -46,6 +46,7 @@ struct Symbols {
     time: Node,
     noise: Vec<Node>,
     drives: Vec<Node>,
+    errors: Vec<Node>,
     /// of inputs, plant and observer: states, modes and held modes
     own: [[Vec<Node>; 3]; 3],
 }
@@ -89,7 +90,7 @@ impl Wiring {
     }
 
     /// One system: its states are the plant's, then the observer's, its signals what disturbs each
-    /// sensor and each moved state, its outputs the values of a row.
+    /// sensor, each moved state and each input that is misread, its outputs the values of a row.
     fn joined(&self, sensors: &Sensors) -> Result<System> {
         let Simulation { plant, inputs, .. } = &self.simulation;
         let observer = self.simulation.observer.as_ref();
@@ -103,6 +104,7 @@ impl Wiring {
             time: g.fresh("time").node(),
             noise: fresh(plant.outputs().len()),
             drives: fresh(sensors.moved().count()),
+            errors: fresh(sensors.misread()),
             own: [Some(inputs), Some(plant), observer].map(own),
         };
         let free = self.roots(&g, sensors, &symbols, false).held;
@@ -120,7 +122,7 @@ impl Wiring {
         let of_observer = of_observer.map(|name| format!("observer's {name}"));
         let equations = Equations {
             states: plant.states().iter().cloned().chain(of_observer).collect(),
-            signals: vec![String::new(); symbols.noise.len() + symbols.drives.len()],
+            signals: vec![String::new(); symbols.disturbances().len()],
             outputs: vec![String::new(); roots.free.outputs.len()],
             inputs: symbols.all(),
             roots,
@@ -156,12 +158,16 @@ impl Wiring {
             derivatives[state] = (g.expr(derivatives[state]) + g.expr(drive)).node();
         }
         let shown = sensors.shown(&Nodes(g), y, &symbols.noise);
+        let read = sensors.read(&Nodes(g), &u, &symbols.errors);
         let mut row = [&own_plant[0][..], &w].concat();
         if simulation.record_outputs {
             row.extend(y.iter().chain(&shown));
+            if !simulation.noise.inputs.is_empty() {
+                row.extend(self.applied(&read));
+            }
         }
         if let Some(observer) = &simulation.observer {
-            let made = over(observer, own_observer, &self.observed(&u, &shown));
+            let made = over(observer, own_observer, &self.observed(&read, &shown));
             roots.surfaces.extend(made.surfaces);
             roots.bends.extend(made.bends);
             roots.whens = roots.whens.or(made.whens);
@@ -183,8 +189,12 @@ impl Symbols {
             let parts = self.own.iter().flat_map(|own| &own[kind]);
             parts.copied().collect::<Vec<_>>()
         });
-        let signals = [&self.noise[..], &self.drives].concat();
-        [vec![self.time], states, signals, modes, held].concat()
+        [vec![self.time], states, self.disturbances(), modes, held].concat()
+    }
+
+    /// In the order of [`Sensors::disturbances`].
+    fn disturbances(&self) -> Vec<Node> {
+        [&self.noise[..], &self.drives, &self.errors].concat()
     }
 }
 
@@ -199,8 +209,14 @@ pub(crate) struct Loop {
 impl Loop {
     /// Of a simulation whose process noise is held for `hold`.
     pub(crate) fn new(simulation: &Simulation, hold: f64) -> Result<Self> {
-        let Simulation { plant, noise, .. } = simulation;
-        let sensors = Sensors::new(noise, plant.outputs(), plant.states(), hold)?;
+        let Simulation {
+            plant,
+            noise,
+            inputs,
+            ..
+        } = simulation;
+        let names = [plant.outputs(), plant.states(), inputs.outputs()];
+        let sensors = Sensors::new(noise, names, hold)?;
         let wiring = Wiring::new(simulation)?;
         Ok(Self {
             joined: wiring.joined(&sensors)?.evaluation(),
@@ -285,7 +301,10 @@ impl Loop {
         if let Some(observer) = &self.wiring.simulation.observer {
             let disturbances: Vec<f64> = self.sensors.disturbances().collect();
             let shown = self.sensors.shown(&Reals, &y, &disturbances);
-            let signals = self.wiring.observed(&u, &shown);
+            let errors = &disturbances[disturbances.len() - self.sensors.misread()..];
+            let signals = self
+                .wiring
+                .observed(&self.sensors.read(&Reals, &u, errors), &shown);
             parts.push(part(observer, &signals, &x[plant_x.len()..]).0);
         }
         let guilty = match are_finite(&y) && guilty == 1 {

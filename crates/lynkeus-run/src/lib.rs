@@ -92,6 +92,7 @@ mod batch;
 mod blueprint;
 mod classical;
 mod closed_loop;
+mod correlation;
 pub mod credible;
 mod divergence;
 mod dynamics;

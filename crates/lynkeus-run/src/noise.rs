@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
+use crate::correlation::factor;
 use crate::{Error, Result};
 
 mod draws;
@@ -38,6 +39,13 @@ pub struct Noise {
     pub process: BTreeMap<String, f64>,
     /// draws of process noise from one sample to the next; as [`process_draws`] finds where it is left out
     pub process_draws: Option<usize>,
+    /// errors of the readings of known inputs, by the input's name: the plant has the input, what observes it reads it
+    /// with an error that is held from one sample to the next. Their streams are those of the names with `~` before
+    /// them
+    pub inputs: BTreeMap<String, Level>,
+    /// correlations of the noises of two outputs that both have normal ones. The normal deviates of the outputs are then
+    /// the lower Cholesky factor of their matrix times those of their streams
+    pub correlations: Vec<(String, String, f64)>,
     /// the range that a sensor can show, by the output's name: value and noise beyond an end of it
     /// are shown as that end
     pub limits: BTreeMap<String, Limits>,
@@ -148,6 +156,10 @@ pub(crate) struct Sensors {
     /// what moves each state besides the plant
     process: Vec<Option<Channel>>,
     limits: Vec<Option<Limits>>,
+    /// what each input is misread by
+    inputs: Vec<Option<Channel>>,
+    /// the lower factor of the correlations of the outputs' deviates, row by row, where there are any
+    correlated: Option<Vec<f64>>,
 }
 
 /// What is drawn for one output or state.
@@ -200,16 +212,19 @@ pub fn deviate(seed: u64, name: &str) -> f64 {
 }
 
 impl Sensors {
-    /// For a plant with these outputs and states; process noise is held for `hold`.
+    /// For a plant with these outputs and states under such inputs; process noise is held for `hold`.
     pub(crate) fn new(
         noise: &Noise,
-        outputs: &[String],
-        states: &[String],
+        [outputs, states, inputs]: [&[String]; 3],
         hold: f64,
     ) -> Result<Self> {
         for (name, level) in &noise.levels {
             check_name("noise", name, "outputs", outputs)?;
             check_size("noise", name, level.size())?;
+        }
+        for (name, level) in &noise.inputs {
+            check_name("input noise", name, "inputs", inputs)?;
+            check_size("input noise", name, level.size())?;
         }
         for (name, &density) in &noise.process {
             check_name("process noise", name, "states", states)?;
@@ -234,8 +249,14 @@ impl Sensors {
             Some(Channel::new(level, noise.seed, &format!("'{name}")))
         };
         let limits = |name: &String| noise.limits.get(name).copied();
+        let misread = |name: &String| {
+            let level = *noise.inputs.get(name).filter(|level| level.size() > 0.0)?;
+            Some(Channel::new(level, noise.seed, &format!("~{name}")))
+        };
         Ok(Self {
             limits: outputs.iter().map(limits).collect(),
+            inputs: inputs.iter().map(misread).collect(),
+            correlated: correlated(noise, outputs)?,
             channels: outputs.iter().map(channel).collect(),
             process: states.iter().map(process).collect(),
         })
@@ -243,7 +264,13 @@ impl Sensors {
 
     /// True where no output is noisy and nothing but the plant moves its states.
     pub(crate) fn are_exact(&self) -> bool {
-        self.channels.iter().all(Option::is_none) && self.process.iter().all(Option::is_none)
+        let mut all = [&self.channels, &self.process, &self.inputs].into_iter();
+        all.all(|channels| channels.iter().all(Option::is_none))
+    }
+
+    /// How many inputs are misread.
+    pub(crate) fn misread(&self) -> usize {
+        self.inputs.iter().flatten().count()
     }
 
     /// The states that noise moves, by place.
@@ -252,18 +279,53 @@ impl Sensors {
         process.filter_map(|(i, channel)| channel.is_some().then_some(i))
     }
 
-    /// What noise does at every sensor, then to every moved state, at present.
+    /// What noise does at every sensor, then to every moved state, then to every input that is misread, at present.
     pub(crate) fn disturbances(&self) -> impl Iterator<Item = f64> + '_ {
         let at = |channel: &Option<Channel>| channel.as_ref().map_or(0.0, Channel::disturbance);
-        let moved = self.process.iter().filter(|channel| channel.is_some());
-        self.channels.iter().chain(moved).map(at)
+        let others = self.process.iter().chain(&self.inputs);
+        let others = others.filter(|channel| channel.is_some());
+        self.channels.iter().chain(others).map(at)
     }
 
     /// Draws what moves the states from here on, and the next sample of every channel, if it is time.
     pub(crate) fn draw(&mut self, is_sample: bool) {
-        let channels = self.channels.iter_mut().filter(|_| is_sample);
-        let drawn = self.process.iter_mut().chain(channels).flatten();
+        let read = self.channels.iter_mut().chain(&mut self.inputs);
+        let read = read.filter(|_| is_sample);
+        let drawn = self.process.iter_mut().chain(read).flatten();
         drawn.for_each(Channel::draw);
+        if is_sample {
+            self.correlate();
+        }
+    }
+
+    /// Makes what was drawn for each sensor what it has in common with those before it, too.
+    fn correlate(&mut self) {
+        let Some(lower) = &self.correlated else {
+            return;
+        };
+        let count = self.channels.len();
+        let drawn = |channel: &Option<Channel>| channel.as_ref().map_or(0.0, |c| c.deviate);
+        let own: Vec<f64> = self.channels.iter().map(drawn).collect();
+        for (row, channel) in lower.chunks_exact(count.max(1)).zip(&mut self.channels) {
+            if let Some(channel) = channel {
+                channel.deviate = row.iter().zip(&own).map(|(l, z)| l * z).sum();
+            }
+        }
+    }
+
+    /// Inputs as they are read, given what disturbs those that are misread: numbers, or expressions.
+    pub(crate) fn read<A: Algebra>(
+        &self,
+        algebra: &A,
+        inputs: &[A::Value],
+        disturbances: &[A::Value],
+    ) -> Vec<A::Value> {
+        let mut disturbances = disturbances.iter();
+        let read = self.inputs.iter().zip(inputs).map(|(channel, value)| {
+            let disturbance = channel.as_ref().and_then(|_| disturbances.next());
+            disturbed(algebra, channel.as_ref(), value, disturbance)
+        });
+        read.collect()
     }
 
     /// What the sensors show of such values that are disturbed so: numbers, or expressions.
@@ -276,19 +338,58 @@ impl Sensors {
         let channels = self.channels.iter().zip(&self.limits);
         let shown = channels.zip(values.iter().zip(disturbances));
         let shown = shown.map(|((channel, limits), (value, disturbance))| {
-            let disturbed = match channel.as_ref().map(|channel| channel.level) {
-                None => value.clone(),
-                Some(Level::Relative(_)) => algebra.binary(Binary::Mul, value, disturbance),
-                Some(Level::Absolute(_) | Level::Uniform(_)) => {
-                    algebra.binary(Binary::Add, value, disturbance)
-                }
-            };
+            let disturbed = disturbed(algebra, channel.as_ref(), value, Some(disturbance));
             match limits {
                 Some(limits) => limits.shown_in(algebra, &disturbed),
                 None => disturbed,
             }
         });
         shown.collect()
+    }
+}
+
+/// A value with what its channel does to it.
+fn disturbed<A: Algebra>(
+    algebra: &A,
+    channel: Option<&Channel>,
+    value: &A::Value,
+    disturbance: Option<&A::Value>,
+) -> A::Value {
+    match (channel.map(|channel| channel.level), disturbance) {
+        (None, _) | (_, None) => value.clone(),
+        (Some(Level::Relative(_)), Some(by)) => algebra.binary(Binary::Mul, value, by),
+        (Some(_), Some(by)) => algebra.binary(Binary::Add, value, by),
+    }
+}
+
+/// The lower factor of the correlations of the outputs' deviates; none where there are none.
+///
+/// # Errors
+/// [`Error::Setting`] for outputs without normal noise, and for a matrix that is not positive definite.
+fn correlated(noise: &Noise, outputs: &[String]) -> Result<Option<Vec<f64>>> {
+    if noise.correlations.is_empty() {
+        return Ok(None);
+    }
+    let place = |name: &String| {
+        check_name("correlation", name, "outputs", outputs)?;
+        if !matches!(
+            noise.levels.get(name),
+            Some(Level::Absolute(_) | Level::Relative(_))
+        ) {
+            let what = format!("noise of '{name}', which has a correlation");
+            return Err(Error::setting(what, "a standard deviation", "none"));
+        }
+        Ok(outputs.iter().position(|o| o == name).unwrap_or_default())
+    };
+    let pairs = noise.correlations.iter();
+    let pairs = pairs.map(|(a, b, correlation)| Ok((place(a)?, place(b)?, *correlation)));
+    let pairs: Vec<(usize, usize, f64)> = pairs.collect::<Result<_>>()?;
+    match factor(outputs.len(), &pairs) {
+        Some(lower) => Ok(Some(lower)),
+        None => {
+            let expected = "a positive definite matrix";
+            Err(Error::setting("correlations", expected, "one that is not"))
+        }
     }
 }
 

@@ -14,11 +14,12 @@ impl Simulation {
     /// Runs to the end.
     ///
     /// The columns are the plant's states, its inputs, its outputs if recorded
-    /// ([`Role::Output`], [`Role::Measured`]), and what the observer reports
+    /// ([`Role::Output`], [`Role::Measured`], and, where readings of inputs have errors, [`Role::Read`]), and what the observer reports
     /// ([`System::estimates`](crate::System::estimates)), each in the order of its system.
     ///
     /// [`Role::Output`]: crate::Role::Output
     /// [`Role::Measured`]: crate::Role::Measured
+    /// [`Role::Read`]: crate::Role::Read
     ///
     /// # Errors
     /// With the rows made before: any of [`Error`]'s settings, integration and
@@ -66,6 +67,9 @@ impl Simulation {
             table = table
                 .with(Role::Output, plant.outputs())
                 .with(Role::Measured, plant.outputs());
+            if !self.noise.inputs.is_empty() {
+                table = table.with(Role::Read, plant.signals());
+            }
         }
         let observer = self.observer.as_ref();
         table.with(Role::Estimate, observer.map_or(&[], System::estimates))

@@ -116,6 +116,7 @@ impl Runner for Sampled {
         self.health.inputs_held += sample.held;
         self.start(sample);
         if let Some(spread) = &mut self.spread {
+            spread.renew();
             spread.judge(sample, &self.x, &self.signals);
         }
         let first = self.x.len() - self.sensors;

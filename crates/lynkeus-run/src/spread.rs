@@ -71,10 +71,13 @@ impl NoisyModel {
         })
     }
 
-    /// The covariance from an exact start: of the lag alone.
+    /// The covariance from an exact start: of the lag, and what every row draws anew.
     fn settled(&self) -> Root {
         let starts = self.initial_variance.iter().enumerate();
-        let starts = starts.map(|(i, v)| if Some(i) == self.lag { *v } else { 0.0 });
+        let end = self.initial_variance.len() - self.sensors.len();
+        let drawn = end - self.drawn..end;
+        let is_there = |i: usize| Some(i) == self.lag || drawn.contains(&i);
+        let starts = starts.map(|(i, v)| if is_there(i) { *v } else { 0.0 });
         Root::diagonal(&starts.collect::<Vec<f64>>())
     }
 }
@@ -168,6 +171,8 @@ pub(crate) struct Spread {
     /// of the flow's outputs
     values: Vec<f64>,
     sensors: Vec<Sensor>,
+    /// so many states before the measurements are drawn anew in every row
+    drawn: usize,
     expected: OutputMap,
     /// of the last readings; empty where they are not judged
     pub innovations: Vec<Innovation>,
@@ -200,6 +205,7 @@ impl Spread {
             jacobians: model.flow.jacobians().clone(),
             values: vec![0.0; flow.outputs().len()],
             sensors: model.sensors.clone(),
+            drawn: model.drawn,
             expected: OutputMap::new(&model.output_map),
             innovations: vec![Innovation::default(); judged],
             deviations: vec![0.0; model.estimates],
@@ -225,6 +231,14 @@ impl Spread {
         let evaluation = &mut self.propagation.driven;
         evaluation.enter(t);
         evaluation.outputs(t, z, &mut self.values);
+    }
+
+    /// What every row draws anew.
+    pub fn renew(&mut self) {
+        let end = self.belief.root.n - self.sensors.len();
+        for root in std::iter::once(&mut self.belief.root).chain(&mut self.settled) {
+            (end - self.drawn..end).for_each(|place| read(root, place, &[], 1.0));
+        }
     }
 
     /// The measurements of the sensors that report are new readings, with errors of their own; z is

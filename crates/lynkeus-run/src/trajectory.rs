@@ -7,6 +7,8 @@ pub enum Role {
     State,
     /// an input, as the plant has it
     Input,
+    /// an input as it is read, where readings of inputs have errors
+    Read,
     /// an output of the plant, exact
     Output,
     /// an output as its sensor shows it

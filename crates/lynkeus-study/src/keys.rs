@@ -46,7 +46,7 @@ pub(super) const KEYS: [KeySpec; 5] = [
 ];
 
 /// The sections.
-pub(super) const SECTIONS: [KeySpec; 13] = [
+pub(super) const SECTIONS: [KeySpec; 14] = [
     KeySpec {
         name: "sensors",
         shape: Shape::Section(&[&SENSORS]),
@@ -126,6 +126,12 @@ pub(super) const SECTIONS: [KeySpec; 13] = [
         meaning: "which families are compared",
     },
     KeySpec {
+        name: "serve",
+        shape: Shape::Section(&[&SERVE]),
+        default: "none",
+        meaning: "how the estimator runs beside a plant ([serve](serve.md))",
+    },
+    KeySpec {
         name: "plot",
         shape: Shape::Section(&[&PLOT]),
         default: "none",
@@ -137,7 +143,7 @@ pub(super) const SECTIONS: [KeySpec; 13] = [
 const LEVEL: Shape = Shape::Either(&[Shape::NotNegative, Shape::Text, Shape::Section(&[&NOISE])]);
 
 /// `[sensors]`
-pub(super) const SENSORS: [KeySpec; 11] = [
+pub(super) const SENSORS: [KeySpec; 13] = [
     KeySpec {
         name: "limits",
         shape: Shape::As(
@@ -173,6 +179,24 @@ pub(super) const SENSORS: [KeySpec; 11] = [
         ),
         default: "no noise",
         meaning: "white measurement noise: its standard deviation, in the output's unit or as a share of its present value; or uniform noise, every error up to ± the number (in the output's unit) equally likely and none larger. Used by `simulate`, `tune`, the [filters](ekf.md), [`check --how-well`](precision.md) and [`certify`](certificates.md)",
+    },
+    KeySpec {
+        name: "input_noise",
+        shape: Shape::As(
+            "table: known input = number, text `\"5%\"`, or `{ uniform = number }`",
+            &Shape::Table(&LEVEL),
+        ),
+        default: "no noise",
+        meaning: "how wrong the reading of a known input is, as `noise` says it of an output: the plant has the input, the observer reads it with an error that is another one in each row and stays until the next ([noisy inputs](#noisy-inputs-and-correlated-sensors)). Counted by the [filters](ekf.md), their smoothers, `sd`, `fit` and `--how-well`; `simulate` draws it",
+    },
+    KeySpec {
+        name: "correlation",
+        shape: Shape::As(
+            "table: output = table: another output = number",
+            &Shape::Table(&Shape::Table(&Shape::Number)),
+        ),
+        default: "independent noises",
+        meaning: "how the noises of two outputs go together, between −1 and 1: `{ left = { right = 0.6 } }`, each pair once. Both have a standard deviation in `noise`. Counted by the [filters](ekf.md), their smoothers, `fit` and `--how-well`; `simulate` draws it",
     },
     KeySpec {
         name: "bias",
@@ -588,5 +612,54 @@ pub(super) const ESTIMATE: [KeySpec; 12] = [
         shape: Shape::As("`true`, `false`", &Shape::Flag),
         default: "`false`",
         meaning: "refuse a log in which a cell that is read has no number, or whose times do not increase",
+    },
+];
+
+/// `[serve]`
+pub(super) const SERVE: [KeySpec; 7] = [
+    KeySpec {
+        name: "wait",
+        shape: Shape::NotNegative,
+        default: "0: rows come in the order of their times",
+        meaning: "how much older than the newest row a row may be when it comes, in units of the plant's time: it is put in its place, and what was told before is corrected",
+    },
+    KeySpec {
+        name: "state",
+        shape: Shape::As("path, from the study's folder", &Shape::Text),
+        default: "none: it begins anew",
+        meaning: "the file that keeps where the estimator is: a row is in it before it is answered, and the next start goes on from there, whatever ended the one before",
+    },
+    KeySpec {
+        name: "history",
+        shape: Shape::As(
+            "path with `%Y`, `%m` and `%d`, from the study's folder",
+            &Shape::Text,
+        ),
+        default: "none",
+        meaning: "CSV files of what was told, one for each day: `\"tank-%Y-%m-%d.csv\"`",
+    },
+    KeySpec {
+        name: "keep_days",
+        shape: Shape::Whole(1),
+        default: "all",
+        meaning: "so many days of the history are kept",
+    },
+    KeySpec {
+        name: "assets",
+        shape: Shape::As("path, from the study's folder", &Shape::Text),
+        default: "one plant, and messages without a name",
+        meaning: "the CSV file of many plants of this study: their names under `asset`, and in the other columns parameters in which they differ",
+    },
+    KeySpec {
+        name: "http",
+        shape: Shape::As("address and port", &Shape::Text),
+        default: "none",
+        meaning: "where a page with the estimates, their events, `/estimates` and `/metrics` are: `\"127.0.0.1:8080\"`",
+    },
+    KeySpec {
+        name: "token",
+        shape: Shape::Text,
+        default: "none: this machine alone may look",
+        meaning: "what a request has to say, as `Authorization: Bearer …` or `?token=…`",
     },
 ];

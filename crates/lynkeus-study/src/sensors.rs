@@ -23,6 +23,10 @@ pub struct Sensors {
     pub noise: Vec<(Name, Noise)>,
     /// The range that a sensor can show: (output, lowest, highest reading).
     pub limits: Vec<(Name, f64, f64)>,
+    /// How wrong the readings of known inputs are, each from sample to sample.
+    pub input_noise: Vec<(Name, Noise)>,
+    /// Correlations of the noises of two outputs.
+    pub correlation: Vec<(Name, Name, f64)>,
     /// Offsets to estimate: outputs and known inputs, with how far off they may be at the start.
     pub bias: Vec<(Name, f64)>,
     /// Which cells of a log are no readings, by output.
@@ -114,14 +118,15 @@ pub(super) fn read(entry: Entry<'_>) -> Result<Sensors, Error> {
         bias: super::simulate::pairs(section.take("bias"), bias)?,
         screens: screens(&mut section)?,
         late: late(&mut section)?,
-        noise: match section.take("noise") {
-            None => Vec::new(),
-            Some(table) => table
-                .pairs()?
-                .into_iter()
-                .map(|(name, value)| Ok((name, noise(value)?)))
-                .collect::<Result<_, Error>>()?,
-        },
+        noise: super::simulate::pairs(section.take("noise"), noise)?,
+        input_noise: super::simulate::pairs(section.take("input_noise"), noise)?,
+        correlation: super::simulate::pairs(section.take("correlation"), correlations)?
+            .into_iter()
+            .flat_map(|(one, others)| {
+                let others = others.into_iter();
+                others.map(move |(other, correlation)| (one.clone(), other, correlation))
+            })
+            .collect(),
     })
 }
 
@@ -150,6 +155,14 @@ pub fn bias_of(signal: &str) -> String {
 fn bias(entry: Entry<'_>) -> Result<f64, Error> {
     let refusal = entry.wrong("a standard deviation > 0, in the unit of the signal");
     entry.number().ok().filter(|sd| *sd > 0.0).ok_or(refusal)
+}
+
+fn correlations(entry: Entry<'_>) -> Result<Vec<(Name, f64)>, Error> {
+    super::simulate::pairs(Some(entry), |entry| {
+        let refusal = entry.wrong("a correlation between -1 and 1");
+        let correlation = entry.number().ok().filter(|c| c.abs() < 1.0);
+        correlation.ok_or(refusal)
+    })
 }
 
 fn screens(section: &mut Section<'_>) -> Result<Vec<(Name, Screen)>, Error> {

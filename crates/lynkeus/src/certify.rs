@@ -288,6 +288,8 @@ fn account(declared: &Declared, in_mean_square: bool, of_samples: bool) -> Accou
         screens,
         late,
         manifold,
+        input_noise,
+        correlation,
     } = declared;
     Account::default()
         .leaves(manifold, "no theorem is about angles and rotations")
@@ -307,6 +309,8 @@ fn account(declared: &Declared, in_mean_square: bool, of_samples: bool) -> Accou
             process_noise,
             "Gaussian, so that no error has a bound for certain, and no bound in mean square is proved",
         )
+        .leaves(input_noise, "a proof is for known inputs that are read as they are")
+        .leaves(correlation, "bounds take the noises of sensors for independent")
         .counts_if(
             of_samples,
             samples,

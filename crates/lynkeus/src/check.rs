@@ -171,6 +171,8 @@ fn account(declared: &Declared) -> Account {
         screens,
         late,
         manifold,
+        input_noise,
+        correlation,
     } = declared;
     let elsewhere = "`certify` counts it, and `check --how-well`";
     Account::default()
@@ -184,6 +186,8 @@ fn account(declared: &Declared) -> Account {
         .counts(input_derivatives)
         .leaves(noise, elsewhere)
         .leaves(process_noise, elsewhere)
+        .leaves(input_noise, "`check --how-well` counts it")
+        .leaves(correlation, "`check --how-well` counts it")
         .counts(limits)
         .leaves(samples, "`check --how-well` counts them")
         .counts(disturbances)

@@ -9,6 +9,7 @@ mod hybrid;
 pub(super) mod javascript;
 mod late;
 mod manifold;
+mod misread;
 mod names;
 mod rust;
 mod slopes;

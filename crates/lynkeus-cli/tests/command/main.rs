@@ -37,6 +37,7 @@ mod long;
 mod manifold;
 mod mentioned;
 mod messages;
+mod misread;
 mod names;
 mod next_experiment;
 #[path = "../../../lynkeus/tests/normal/mod.rs"]
@@ -57,6 +58,7 @@ mod said;
 mod samples;
 mod scatter;
 mod screens;
+mod shell;
 mod story;
 mod tables;
 mod texts;

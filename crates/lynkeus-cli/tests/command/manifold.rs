@@ -512,3 +512,31 @@ fn the_plant_alone_is_compared_modulo_a_turn() {
     let error = &run.json()["errors"]["enc"]["rms"];
     assert!(error.as_f64().is_some_and(|rms| rms < 2.0), "{}", run.out);
 }
+
+/// From starts that are off by a radian about each axis errors are as large as is claimed once corrections are
+/// iterated; with corrections that are linearised once, about the wrong attitude, they are several times larger.
+#[test]
+fn deviations_are_right_from_far_off() {
+    let size = |more: &str| {
+        let folder = attitude("ekf", more);
+        let text = folder.read("s.toml");
+        let initial = text.lines().find(|line| line.contains("\"q[1]\" = 0.5"));
+        folder.change("s.toml", &format!("{}\n", initial.unwrap()), "");
+        folder.change("s.toml", "q = 4.0", "q = 1.0");
+        folder.change("s.toml", "until = 30", "until = 6\nspread = { q = 1.0 }");
+        let run = folder.run(&["simulate", "s.toml", "--runs", "40", "--json"]);
+        assert!(run.code <= 1, "{}", run.err);
+        let own = run.json()["quantities"]["q"].clone();
+        (
+            own["rms_in_sd"].as_f64().unwrap(),
+            own["within_2_sd"].as_f64().unwrap(),
+        )
+    };
+    let (whole, within) = size("");
+    assert!(
+        (0.7..1.3).contains(&whole) && within > 0.9,
+        "{whole} {within}"
+    );
+    let (once, _) = size("iterations = 1");
+    assert!(once > 3.0, "{once}");
+}

@@ -48,6 +48,8 @@ impl Runner {
             && (&own.parameters, own.tables) == (&other.parameters, other.tables)
             && (&sensors.measured, &sensors.unknown) == (&others.measured, &others.unknown)
             && (&sensors.disturbances, &sensors.limits) == (&others.disturbances, &others.limits)
+            && (&sensors.input_noise, &sensors.correlation)
+                == (&others.input_noise, &others.correlation)
             && own.process_noise == other.process_noise
             && own.observer.is_like(&other.observer)
             // a certified gain is chosen by the noise that it lets through

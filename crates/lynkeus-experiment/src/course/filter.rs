@@ -190,6 +190,7 @@ pub(crate) fn blueprint(
         gate: tuning.gate,
         patience: tuning.patience,
         projects: tuning.projects,
+        iterations: tuning.iterations,
         keep_history: study.estimate.smoothing.is_some(),
         ..FilterSettings::of(tuning.kind.clone())
     };
@@ -335,7 +336,13 @@ fn model(
         confined: tuning.whens.is_empty().then(|| tuning.confined.clone()),
         whens: tuning.whens.clone(),
     };
+    let drawn = noise::drawn(declared, augmented, &plant.inputs);
+    let plant = match &drawn {
+        Some(drawn) => plant.drawing(drawn),
+        None => plant,
+    };
     let model = compiled(&plant).map_err(explain)?;
+    let model = model.drawing(drawn.map_or(0, |drawn| drawn.count()));
     Ok(model.on(manifold::of(augmented)))
 }
 

@@ -96,13 +96,17 @@ pub fn seen(plant: &Plant, observer: &Observer, run: &Recorded) -> Samples {
     };
     let readings = observer.measured.iter();
     let inputs = observer.inputs.iter();
+    let input = |at: Option<usize>| {
+        let read = at.and_then(|i| run.column(Role::Read.at(i)));
+        read.cloned().unwrap_or_else(|| column(Role::Input, at))
+    };
     Samples {
         time: run.time.clone(),
         readings: readings
             .map(|s| column(Role::Measured, place(&plant.outputs, &s.name)))
             .collect(),
         inputs: inputs
-            .map(|s| column(Role::Input, place(&plant.inputs, &s.name)))
+            .map(|s| input(place(&plant.inputs, &s.name)))
             .collect(),
     }
 }
@@ -127,7 +131,12 @@ pub(crate) fn recorded(study: &Study, plant: &Plant, step: f64) -> Result<Table,
     };
     let inputs = own(&plant.inputs, Role::Input);
     let seen = own(&plant.outputs, Role::Measured).into_iter();
-    let seen = seen.chain(inputs.clone());
+    let is_misread = run.column(Role::Read.at(0)).is_some();
+    let read = match is_misread {
+        true => own(&plant.inputs, Role::Read),
+        false => inputs.clone(),
+    };
+    let seen = seen.chain(read);
     let seen = seen.map(|(name, values)| (header(settings, &name).to_owned(), values));
     let time = (log_time(plant, settings), run.time.to_vec());
     let truth = own(&plant.states, Role::State).into_iter().chain(inputs);

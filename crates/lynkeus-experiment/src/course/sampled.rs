@@ -142,6 +142,12 @@ pub(crate) fn observer(
     let tuned = tuned(augmented.graph(), &mut sampled)?;
     let predict = study.estimate.between_samples == BetweenSamples::Predict;
     let lag = (follows && !predict).then(|| sampled.push_lag(augmented.graph()));
+    let inputs = sampled.observer.inputs.iter();
+    let inputs: Vec<(String, Node)> = inputs.map(|s| (s.name.clone(), s.symbol)).collect();
+    let drawn = noise::misread(prepared.declared(), augmented, &inputs).filter(|_| follows);
+    if let Some(drawn) = &drawn {
+        sampled.push_drawn(augmented.graph(), drawn);
+    }
     let Sampled {
         observer,
         outputs: expected,
@@ -187,6 +193,9 @@ pub(crate) fn observer(
             if let Some(lag) = &lag {
                 initial_variance[lag.state] = 1.0;
             }
+            let count = drawn.map_or(0, |drawn| drawn.count());
+            let measured = states.len() - sensors.len();
+            initial_variance[measured - count..measured].fill(1.0);
             let levels = noise::levels(prepared.declared(), augmented, samples, notes);
             let each = sensors.iter().zip(&expected).zip(levels);
             let sensors = each.map(|((name, output), noise)| Sensor {
@@ -209,7 +218,7 @@ pub(crate) fn observer(
                 whens: Default::default(),
             };
             let errors = NoisyModel::of_observer(&observer, &estimates, lag);
-            Some(Box::new(errors.map_err(explain)?))
+            Some(Box::new(errors.map_err(explain)?.drawing(count)))
         }
     };
     Ok(Blueprint {

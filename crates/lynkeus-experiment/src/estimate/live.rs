@@ -68,7 +68,15 @@ pub fn estimator(study: &Study) -> Result<Estimator, Error> {
 pub fn late_estimator(study: &Study, wait: f64) -> Result<Late, Error> {
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
-    let estimator = live(&prepared)?;
+    late(&prepared, live(&prepared)?, wait)
+}
+
+/// An estimator that goes back to where the readings of the study's sensors belong.
+pub(super) fn late(
+    prepared: &Prepared<'_>,
+    estimator: Estimator,
+    wait: f64,
+) -> Result<Late, Error> {
     let declared = &prepared.declared().late;
     let outputs = prepared.augmented().outputs.iter();
     let delays = outputs.map(|output| match declared.of(&output.variable.name) {
@@ -152,11 +160,16 @@ fn need_noises(prepared: &Prepared<'_>, process: bool) -> Result<(), Error> {
             format!("how fast {name} wanders"),
             format!("write {name} = … under [process_noise]"),
         ),
-        None if process && !declared.process_noise.is_declared() => missing(
-            "what the model does not know".to_owned(),
-            "write a density for some state under [process_noise], 0 where the model is exact"
-                .to_owned(),
-        ),
+        None if process
+            && !declared.process_noise.is_declared()
+            && !declared.input_noise.acts() =>
+        {
+            missing(
+                "what the model does not know".to_owned(),
+                "write a density for some state under [process_noise], 0 where the model is exact"
+                    .to_owned(),
+            )
+        }
         _ => Ok(()),
     }
 }

@@ -167,7 +167,8 @@ impl Outcome {
     /// The study's `[estimate]` gives two of them the same header.
     pub fn log(&self) -> Result<Vec<(String, Series)>, Error> {
         let inputs = self.quantities.iter().filter(|q| q.is_input);
-        let inputs = inputs.filter_map(|q| Some((&q.name, q.truth.as_ref()?)));
+        let inputs =
+            inputs.filter_map(|q| Some((&q.name, q.measured.as_ref().or(q.truth.as_ref())?)));
         let measured = self.measurements.iter().map(|(n, values)| (n, values));
         let mut columns = vec![(self.log_time.clone(), self.time.clone())];
         let mut stamps: Vec<&str> = vec![];
@@ -441,6 +442,8 @@ fn account(declared: &Declared, design: &Design, is_weighed: bool, replayed: boo
         screens,
         late,
         manifold,
+        input_noise,
+        correlation,
     } = declared;
     let is_filter = design.observer.filter.is_some();
     let unweighed = "the gain is chosen without it: `sd` of [estimate] counts it, and `certify`";
@@ -453,6 +456,12 @@ fn account(declared: &Declared, design: &Design, is_weighed: bool, replayed: boo
         .counts(samples)
         .counts_if(is_weighed, noise, unweighed)
         .counts_if(is_weighed, process_noise, unweighed)
+        .counts_if(is_weighed, input_noise, unweighed)
+        .counts_if(
+            is_filter,
+            correlation,
+            "gain and `sd` take the noises of sensors for independent: a filter counts it",
+        )
         .counts_if(is_filter, limits, saturated::TAKEN)
         .leaves(
             disturbances,

@@ -5,6 +5,7 @@
 //! claim has said which of the two it is.
 
 mod account;
+mod correlation;
 
 use std::collections::BTreeMap;
 
@@ -34,6 +35,10 @@ pub struct Declared {
     pub ranges: Kind<()>,
     /// standard deviations, shares or bounds, by output
     pub noise: Kind<Noise>,
+    /// how wrong the readings of known inputs are
+    pub input_noise: Kind<Noise>,
+    /// correlations of the noises of two outputs, by the first of them
+    pub correlation: Kind<Vec<(String, f64)>>,
     /// what a sensor can show, by output
     pub limits: Kind<Limits>,
     /// the time between two samples of the study's simulation, by output
@@ -87,14 +92,24 @@ impl Declared {
             )
         };
         let limits: Vec<(Name, Limits)> = sensors.limits.iter().map(limits).collect();
+        let noise = Kind::read(
+            "noise",
+            "`noise` of [sensors]",
+            "output",
+            &sensors.noise,
+            &outputs,
+        )?
+        .acting(|noise: &Noise| noise.size() > 0.0);
         Ok(Self {
             ranges: ranges(study, plant),
-            noise: Kind::read(
-                "noise",
-                "`noise` of [sensors]",
-                "output",
-                &sensors.noise,
-                &outputs,
+            correlation: correlation::read(&sensors.correlation, &noise, &outputs)?,
+            noise,
+            input_noise: Kind::read(
+                "input noise",
+                "`input_noise` of [sensors]",
+                "known input",
+                &sensors.input_noise,
+                &known,
             )?
             .acting(|noise| noise.size() > 0.0),
             limits: Kind::read(
@@ -247,6 +262,11 @@ impl<T> Kind<T> {
     /// What is said of a quantity.
     pub fn of(&self, quantity: &str) -> Option<&T> {
         self.said.get(quantity)
+    }
+
+    /// Whether any of it is more than nothing.
+    pub fn acts(&self) -> bool {
+        self.acts
     }
 
     /// Whether anything of this kind is declared.

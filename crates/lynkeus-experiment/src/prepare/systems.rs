@@ -26,7 +26,8 @@ pub fn settings(study: &Study) -> Result<&SimulateSettings, Error> {
 /// The time between two samples of the simulation where the study says that it is sampled: its
 /// sensors have noise, which is drawn anew with each, or there is a `sample_step`.
 pub(crate) fn sampled_every(study: &Study, settings: &SimulateSettings) -> Option<f64> {
-    let is_noisy = study.sensors.noise.iter().any(|(_, n)| n.size() > 0.0);
+    let mut all = study.sensors.noise.iter().chain(&study.sensors.input_noise);
+    let is_noisy = all.any(|(_, n)| n.size() > 0.0);
     let drawn = is_noisy.then(|| settings.row_step());
     settings.sample_step.or(drawn)
 }

@@ -243,6 +243,8 @@ fn account(declared: &Declared, is_simulated: bool, is_filters: bool) -> Account
         screens,
         late,
         manifold,
+        input_noise,
+        correlation,
     } = declared;
     let measured = "the log's own is in its readings";
     let promised = "a promise of what the inputs do: `certify` counts it";
@@ -258,6 +260,8 @@ fn account(declared: &Declared, is_simulated: bool, is_filters: bool) -> Account
         .counts(limits)
         .counts_if(is_simulated || is_filters, noise, measured)
         .counts_if(is_simulated || is_filters, process_noise, measured)
+        .counts_if(is_simulated || is_filters, input_noise, measured)
+        .counts_if(is_simulated || is_filters, correlation, measured)
         .counts_if(is_simulated, samples, "the log has its own")
         .leaves(
             disturbances,

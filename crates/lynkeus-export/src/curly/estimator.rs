@@ -142,6 +142,9 @@ impl Machine {
             Some(errors) => {
                 self.spread(errors, &arguments)?;
                 holds.push("deviations");
+                if self.drawn(errors) {
+                    holds.push("drawn");
+                }
                 "linearised"
             }
         };
@@ -281,7 +284,18 @@ impl Machine {
                 "deviation",
             ),
         ];
-        let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
+        let mut holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
+        if settings.iterations > 1 && settings.kind == FilterKind::Extended {
+            self.size("ITERATIONS", settings.iterations);
+            holds.push("iterated");
+            holds.extend(has_rotations.then_some("iterated_rotations"));
+            holds.extend(has_limits.then_some("iterated_limits"));
+        }
+        let is_drawn = self.drawn(model);
+        if is_drawn {
+            self.size("SHOWN", states.len() - model.drawn());
+            holds.push("drawn");
+        }
         self.curved(device, model);
         self.measure(model, &arguments, &settings.kind)?;
         let sensors = model.sensors.len();
@@ -316,8 +330,21 @@ impl Machine {
         let text = remembering(&chosen(FILTER, &holds), has_events)
             .replace("FIELD_INSIDE", "linearised_inside")
             .replace("predict_inside", &which_inside.renamed("predict"));
-        self.add(&text.replace("FIELD", field));
+        let text = text.replace("FIELD", field);
+        self.add(&match is_drawn {
+            true => text,
+            false => text.replace("SHOWN", "STATES"),
+        });
         Ok(())
+    }
+
+    /// Whether some states are drawn anew in every sample, and their number.
+    fn drawn(&mut self, model: &NoisyModel) -> bool {
+        let count = model.drawn();
+        if count > 0 {
+            self.size("DRAWN", count);
+        }
+        count > 0
     }
 
     /// The way from sample to sample, and the correction; the name of the flow.
@@ -340,7 +367,12 @@ impl Machine {
                     true => "lifted(i, s->readings[i], predicted)",
                     false => "s->readings[i]",
                 };
-                self.add(&chosen(EXTENDED, holds).replace("READING_HERE", reading));
+                let ordinary = match holds.contains(&"limits") {
+                    true => "believed[i] != 0 && end_of(i, s->readings[i]) == R(0.0)",
+                    false => "believed[i] != 0",
+                };
+                let text = chosen(EXTENDED, holds).replace("ORDINARY", ordinary);
+                self.add(&text.replace("READING_HERE", reading));
                 Ok("linearised")
             }
             FilterKind::Unscented(points) => {

@@ -94,9 +94,9 @@ impl Plan {
             seed,
             ..simulation.noise.clone()
         };
-        let plant = &simulation.plant;
+        let (plant, inputs) = (&simulation.plant, simulation.inputs.outputs());
         let hold = self.itinerary.hold();
-        Sensors::new(&noise, plant.outputs(), plant.states(), hold)
+        Sensors::new(&noise, [plant.outputs(), plant.states(), inputs], hold)
     }
 
     /// Number of rows in all.

@@ -33,6 +33,13 @@ impl Belief {
         own
     }
 
+    /// Its last states are drawn anew: nothing is known of them but that they are standard normal.
+    pub fn renew(&mut self, count: usize) {
+        let first = self.x.len() - count;
+        self.x[first..].fill(0.0);
+        self.root.renew(count);
+    }
+
     /// x̂, then the lower triangle of S, row by row.
     pub fn numbers_mut(&mut self) -> impl Iterator<Item = &mut f64> {
         let n = self.root.n;

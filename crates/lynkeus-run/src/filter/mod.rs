@@ -42,6 +42,7 @@
 
 mod belief;
 pub(crate) mod censored;
+mod drawn;
 mod ekf;
 pub(crate) mod expressions;
 pub(crate) mod health;
@@ -60,8 +61,10 @@ mod smoother;
 pub(crate) mod transition;
 mod ukf;
 
+pub use crate::correlation::Correlation;
 pub use crate::noise::Limits;
 pub(crate) use belief::Belief;
+pub use drawn::Drawn;
 pub use health::{Health, Innovation, ParticleHealth, Reading, SensorHealth};
 pub use likelihood::{
     Likelihood, ParametricLevel, ParametricPlant, ParametricSensor, Row, Score, Seen,
@@ -145,6 +148,8 @@ pub(crate) struct Filter {
     ranges: Vec<Limits>,
     manifold: Manifold,
     belief: Belief,
+    /// so many last states are drawn anew in every row
+    drawn: usize,
     projection: Option<Projection>,
     sensing: Sensing,
     deviations: Vec<f64>,
@@ -172,11 +177,14 @@ impl Filter {
             let expected = "no window of samples for a plant whose state jumps (`when`)";
             return Err(Error::setting("filter", expected, "one"));
         }
-        let propagation = |flow| Propagation::new(flow, &model.process_noise, run);
+        let propagation = |flow| -> Result<Propagation> {
+            let propagation = Propagation::new(flow, &model.process_noise, run)?;
+            Ok(propagation.drawing(model.drawn))
+        };
         Ok(Self {
             propagation: propagation(&model.flow)?,
             engine: match settings.kind {
-                FilterKind::Extended => Engine::Extended(Ekf::default()),
+                FilterKind::Extended => Engine::Extended(Ekf::new(settings.iterations)),
                 FilterKind::Unscented(points) => {
                     Engine::Unscented(Box::new(Ukf::new(model, points, run.method)?))
                 }
@@ -191,7 +199,11 @@ impl Filter {
             },
             spare: model.confined.as_ref().map(propagation).transpose()?,
             ranges: model.ranges.clone(),
-            deviations: model.initial_variance.iter().map(|v| v.sqrt()).collect(),
+            deviations: model.initial_variance[..n - model.drawn]
+                .iter()
+                .map(|v| v.sqrt())
+                .collect(),
+            drawn: model.drawn,
             belief: Belief::on(&manifold, flow.start(), &model.initial_variance),
             projection: (settings.projects).then(|| Projection::new(model.ranges.clone())),
             sensing: Sensing::new(model, settings),
@@ -313,6 +325,26 @@ impl Filter {
         }
     }
 
+    /// Without what nobody estimates.
+    fn told(&self, mut rows: Vec<Smoothed>) -> Vec<Smoothed> {
+        let count = self.deviations.len();
+        for row in &mut rows {
+            row.estimate.truncate(count);
+            row.deviations.truncate(count);
+        }
+        rows
+    }
+
+    /// What every row draws anew.
+    fn renew(&mut self) {
+        if self.drawn > 0 {
+            self.belief.renew(self.drawn);
+            if let Some(pending) = &mut self.pending {
+                pending.clear_last(self.drawn);
+            }
+        }
+    }
+
     fn correct(&mut self, sample: &Sample<'_>) -> Result<()> {
         match self.correct_here(sample) {
             // the outputs are evaluated before a reading is counted; a window keeps its states
@@ -366,6 +398,7 @@ impl Runner for Filter {
         // those of an update that failed
         self.sensing.take_corrections();
         self.propagation.driven.start(sample.inputs);
+        self.renew();
         let before = self.before();
         self.correct(sample)?;
         self.land(before);
@@ -386,7 +419,7 @@ impl Runner for Filter {
     }
 
     fn estimate(&self) -> &[f64] {
-        &self.belief.x
+        &self.belief.x[..self.deviations.len()]
     }
 
     fn deviations(&self) -> Option<&[f64]> {
@@ -402,7 +435,7 @@ impl Runner for Filter {
     }
 
     fn keep_record(&mut self) {
-        let (states, sensors) = (self.belief.x.len(), self.sensing.innovations.len());
+        let (states, sensors) = (self.deviations.len(), self.sensing.innovations.len());
         self.sensing.record = Some(Record::new(states, sensors));
     }
 
@@ -431,7 +464,7 @@ impl Runner for Filter {
     fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Option<Vec<Smoothed>> {
         let history = self.history.as_ref()?;
         let Engine::MovingHorizon(horizon) = &self.engine else {
-            return Some(history.smoothed(&[], lag, deviations));
+            return Some(self.told(history.smoothed(&[], lag, deviations)));
         };
         if lag.is_some_and(|lag| lag > horizon.length()) {
             return None;
@@ -448,7 +481,7 @@ impl Runner for Filter {
         for row in &mut rows {
             confine(&mut row.estimate, &self.ranges);
         }
-        Some(rows)
+        Some(self.told(rows))
     }
 
     fn walk_history(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {

@@ -74,6 +74,8 @@ pub struct NoisyModel {
     pub manifold: Manifold,
     /// of an observer: the place of the state that stands for what held measurements lag behind
     pub(crate) lag: Option<usize>,
+    /// so many of the states, the last but for the measurements of an observer, are drawn anew in every row
+    pub(crate) drawn: usize,
     /// how many functions of the states are estimated; the flow has their slopes where they are not the
     /// states
     pub(crate) estimates: usize,
@@ -114,8 +116,23 @@ impl NoisyModel {
             confined,
             manifold: Manifold::default(),
             lag: None,
+            drawn: 0,
             estimates: plant.states.len(),
         })
+    }
+
+    /// The same with so many last states that are drawn anew in every row: those of
+    /// [`Drawn`](super::Drawn), which nobody estimates.
+    #[must_use]
+    pub fn drawing(mut self, count: usize) -> Self {
+        self.drawn = count;
+        self
+    }
+
+    /// How many of the states are drawn anew in every row.
+    #[must_use]
+    pub fn drawn(&self) -> usize {
+        self.drawn
     }
 
     /// The same with states and readings that live elsewhere than among the real numbers: quaternions start with
@@ -165,6 +182,9 @@ impl NoisyModel {
         let _ = write!(digest, "{sensors:?} {q:?} {p:?} {:?}", self.ranges);
         if !self.manifold.is_flat() {
             let _ = write!(digest, "{:?}", self.manifold);
+        }
+        if self.drawn > 0 {
+            let _ = write!(digest, "drawn {}", self.drawn);
         }
     }
 }

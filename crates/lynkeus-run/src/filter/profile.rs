@@ -85,6 +85,14 @@ impl Profile {
         }
     }
 
+    /// The last rows are zero.
+    pub fn clear_last(&mut self, count: usize) {
+        for i in self.n - count..self.n {
+            let span = std::mem::take(&mut self.spans[i]);
+            self.entries[i * self.n + span.start..i * self.n + span.end].fill(0.0);
+        }
+    }
+
     pub fn add_at(&mut self, i: usize, j: usize, value: f64) {
         self.reach(i, &(j..j + 1));
         self.entries[i * self.n + j] += value;

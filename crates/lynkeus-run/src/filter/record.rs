@@ -80,8 +80,8 @@ impl Record {
 
     /// The same where the outputs are linear in the state, as the slopes that were projected say.
     pub(crate) fn spread_projected(&mut self) {
-        let n = self.covariance.len().isqrt();
         let projected = std::mem::take(&mut self.projected);
+        let n = projected.len() / self.innovation.len().max(1);
         let of = |i: usize| &projected[i * n..(i + 1) * n];
         self.spread(|i, j| dot(of(i), of(j)));
         self.projected = projected;
@@ -139,8 +139,11 @@ impl Record {
     }
 
     fn give(&mut self, state: usize, sensor: usize, gain: f64) {
-        let m = self.innovation.len();
-        self.gain[state * m + sensor] = gain;
+        let place = state * self.innovation.len() + sensor;
+        // what is drawn anew in every row is nobody's estimate
+        if let Some(own) = self.gain.get_mut(place) {
+            *own = gain;
+        }
     }
 
     /// That of a sensor's reading.
@@ -162,7 +165,7 @@ impl Record {
 
     /// What is known after the correction.
     pub(crate) fn end(&mut self, belief: &Belief) {
-        let (n, root) = (belief.x.len(), &belief.root);
+        let (n, root) = (self.covariance.len().isqrt(), &belief.root);
         for i in 0..n {
             for j in 0..=i {
                 let entry = dot(root.row(i), root.row(j));

@@ -47,6 +47,20 @@ impl Root {
             .collect()
     }
 
+    /// The last states are independent of all else, with variance 1.
+    pub fn renew(&mut self, count: usize) {
+        let first = self.n - count;
+        for (i, row) in self
+            .entries
+            .chunks_exact_mut(self.n.max(1))
+            .enumerate()
+            .skip(first)
+        {
+            row.fill(0.0);
+            row[i] = 1.0;
+        }
+    }
+
     /// The lower root of the same covariance, after rows of S were changed.
     pub fn restore(&mut self) {
         let n = self.n;

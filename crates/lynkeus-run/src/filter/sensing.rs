@@ -89,7 +89,7 @@ impl Sensing {
             .manifold
             .signed(sample.readings, self.output_map.outputs());
         for (i, reading) in readings.iter().enumerate() {
-            let spread = self.project(i, belief);
+            let spread = self.project(i, belief, None);
             let predicted = self.output_map.outputs()[i];
             taken.extend(self.judge(i, *reading, predicted, spread));
             if let Some(record) = &mut self.record {
@@ -102,9 +102,22 @@ impl Sensing {
         Ok(())
     }
 
-    /// Takes the row of C of a sensor, and what the belief makes of it: the variance of the output.
-    pub fn project(&mut self, sensor: usize, belief: &Belief) -> f64 {
+    /// Takes the row of C of a sensor; where it was linearised elsewhere, carried over from there to another place.
+    pub fn take_slopes(&mut self, sensor: usize, carried: Option<(&[f64], &[f64])>) {
         self.output_map.write_slopes(sensor, &mut self.slopes);
+        if let Some((from, to)) = carried {
+            self.manifold.transport(from, to, &mut self.slopes, 1);
+        }
+    }
+
+    /// The same, and what the belief makes of it: the variance of the output.
+    pub fn project(
+        &mut self,
+        sensor: usize,
+        belief: &Belief,
+        carried: Option<(&[f64], &[f64])>,
+    ) -> f64 {
+        self.take_slopes(sensor, carried);
         let projected = &mut self.projected;
         belief.root.transposed_times(&self.slopes, projected);
         dot(projected, projected)

@@ -65,6 +65,9 @@ pub struct FilterSettings {
     /// nearest place inside by the covariance's metric. The covariance stays: a bound says where
     /// the estimate is, and not how sure it is
     pub projects: bool,
+    /// how often an extended filter linearises the readings of a sample, at most: once about the prediction, then
+    /// about what they make of it
+    pub iterations: usize,
     /// readings are what the model shows, and only covariances are asked for: a sensor with limits
     /// counts as its readings do on average (Fisher's information of a clipped normal number)
     pub foresees: bool,
@@ -80,6 +83,7 @@ impl FilterSettings {
             patience: PATIENCE,
             keep_history: false,
             projects: false,
+            iterations: 1,
             foresees: false,
         }
     }

@@ -25,6 +25,10 @@ pub enum Apart {
     History,
     /// states or readings are angles or rotations
     Manifold,
+    /// readings of inputs have errors, or noises of sensors something in common
+    Drawn,
+    /// corrections are iterated
+    Iterated,
     /// only covariances are asked for
     Foreseen,
     /// the plant or a sensor jumps with time
@@ -51,6 +55,10 @@ impl fmt::Display for Apart {
             Self::Line => f.write_str("inputs are on a line between samples"),
             Self::History => f.write_str("a smoother needs the way of each"),
             Self::Manifold => f.write_str("states or readings are angles or rotations"),
+            Self::Drawn => f.write_str(
+                "readings of inputs have errors, or noises of sensors have something in common",
+            ),
+            Self::Iterated => f.write_str("corrections are iterated"),
             Self::Foreseen => f.write_str("only covariances are asked for"),
             Self::Instants => f.write_str("the plant or a sensor jumps with time"),
             Self::Noiseless(name) => write!(f, "sensor {name} has no noise"),

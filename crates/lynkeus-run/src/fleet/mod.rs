@@ -175,6 +175,12 @@ fn refuse(filter: &Blueprint) -> Result<(), Apart> {
     if !model.manifold.is_flat() {
         return Err(Apart::Manifold);
     }
+    if settings.iterations > 1 {
+        return Err(Apart::Iterated);
+    }
+    if model.drawn > 0 {
+        return Err(Apart::Drawn);
+    }
     if settings.keep_history {
         return Err(Apart::History);
     }

@@ -19,7 +19,7 @@ fn draws_of(level: Level, seed: u64, outputs: &[&str], of: usize, count: usize) 
         levels: levels.collect(),
         ..Noise::default()
     };
-    let mut sensors = Sensors::new(&noise, &outputs, &[], 1.0).unwrap();
+    let mut sensors = Sensors::new(&noise, [&outputs, &[], &[]], 1.0).unwrap();
     let draw = |_| {
         sensors.draw(true);
         measured(&sensors, of, 10.0)
@@ -115,7 +115,7 @@ fn a_sensor_shows_no_more_than_its_range() {
         limits: [("y".to_string(), Limits { low, high })].into(),
         ..Noise::default()
     };
-    let mut sensors = Sensors::new(&of(9.0, 10.5), &outputs, &[], 1.0).unwrap();
+    let mut sensors = Sensors::new(&of(9.0, 10.5), [&outputs, &[], &[]], 1.0).unwrap();
     let free = draws(0, &["y"], 0, 50);
     let mut inside = 0;
     for free in free {
@@ -127,7 +127,7 @@ fn a_sensor_shows_no_more_than_its_range() {
     assert!(inside > 5 && inside < 45, "{inside}");
     assert!(measured(&sensors, 0, f64::NAN).is_nan());
     for (low, high) in [(1.0, 1.0), (2.0, 1.0), (f64::NAN, 1.0)] {
-        let refused = Sensors::new(&of(low, high), &outputs, &[], 1.0);
+        let refused = Sensors::new(&of(low, high), [&outputs, &[], &[]], 1.0);
         assert!(
             matches!(refused, Err(Error::Setting { .. })),
             "{low} {high}"
@@ -138,7 +138,7 @@ fn a_sensor_shows_no_more_than_its_range() {
         levels: BTreeMap::new(),
         ..of(0.0, 1.0)
     };
-    assert!(Sensors::new(&unknown, &other, &[], 1.0).is_err());
+    assert!(Sensors::new(&unknown, [&other, &[], &[]], 1.0).is_err());
 }
 
 #[test]
@@ -153,7 +153,7 @@ fn impossible_levels_are_refused() {
             levels: [(name.to_string(), level)].into(),
             ..Noise::default()
         };
-        let error = Sensors::new(&noise, &outputs, &[], 1.0).unwrap_err();
+        let error = Sensors::new(&noise, [&outputs, &[], &[]], 1.0).unwrap_err();
         assert!(matches!(error, Error::Setting { .. }), "{error}");
     }
 }

@@ -167,6 +167,7 @@ impl Case {
                 .iter()
                 .map(|_| (start.node(), g.constant(0.2).node()))
                 .collect(),
+            drawn: 0,
             parameters: nodes,
             states,
         })
@@ -375,6 +376,7 @@ fn the_information_is_fisher_s() {
         process_noise: vec![zero],
         ranges: vec![],
         start: vec![(c.node(), zero)],
+        drawn: 0,
         parameters: vec![c.node(), r.node()],
     })
     .unwrap();
@@ -447,6 +449,7 @@ fn a_plant_without_parameters_has_a_value() {
         process_noise: vec![number(0.0)],
         ranges: vec![],
         start: vec![(number(0.0), number(0.0))],
+        drawn: 0,
         parameters: vec![],
     })
     .unwrap();
@@ -491,6 +494,7 @@ fn an_estimate_without_a_value_is_put_into_its_range() {
         process_noise: vec![number(0.1)],
         ranges: vec![range],
         start: vec![(number(1.0), number(0.3))],
+        drawn: 0,
         parameters: vec![k.node()],
     })
     .unwrap();
@@ -582,6 +586,7 @@ fn what_has_decayed_leaves_the_derivatives() {
                 .collect(),
             ranges: vec![],
             start: states.iter().map(|_| (number(1.0), number(0.1))).collect(),
+            drawn: 0,
             parameters: vec![k.node(), a.node()],
         })
         .unwrap();
@@ -640,6 +645,7 @@ fn the_order_of_the_states_does_not_matter() {
             process_noise: ordered(&density),
             ranges: vec![],
             start: vec![(g.constant(0.5).node(), g.constant(0.2).node()); 3],
+            drawn: 0,
             parameters: vec![q.node()],
         })
         .unwrap();
@@ -685,6 +691,7 @@ fn driven(rate: f64, steps: usize, is_implicit: bool) -> lynkeus_run::filter::Sc
         process_noise: vec![number(0.0), number(0.0)],
         ranges: vec![],
         start: vec![(number(1.5), number(0.0)), (number(1.0), number(0.0))],
+        drawn: 0,
         parameters: vec![λ.node()],
     })
     .unwrap();
@@ -757,6 +764,7 @@ fn a_noise_may_depend_on_the_state() {
         process_noise: vec![number(0.0)],
         ranges: vec![],
         start: vec![(number(2.0), number(0.0))],
+        drawn: 0,
         parameters: vec![θ.node()],
     })
     .unwrap();
@@ -802,6 +810,7 @@ fn a_reading_of_which_all_is_certain_does_not_count() {
             process_noise: vec![number(0.0)],
             ranges: vec![],
             start: vec![(number(0.0), number(0.0))],
+            drawn: 0,
             parameters: vec![θ.node()],
         };
         let log: Log = vec![(0.0, vec![first], vec![]), (1.0, vec![at_end], vec![])];

@@ -13,6 +13,7 @@ use lynkeus_structure::AugmentedPlant;
 
 use super::unknown::{Kind, Unknown};
 use crate::{Error, Study, near};
+use lynkeus_experiment::course::filter::noise::drawn;
 use lynkeus_experiment::prepare::{self, Prepared};
 use lynkeus_experiment::words::explain;
 
@@ -69,6 +70,7 @@ impl Source<'_> {
             further,
         } = *self;
         refuse_curved(prepared.study(), symbolic, tuning, is_alone)?;
+        refuse_iterated(prepared.study(), tuning, is_alone)?;
         let graph = symbolic.graph();
         let number = |value: f64| graph.constant(value).node();
         let symbols: Vec<Node> = (unknowns.iter())
@@ -158,7 +160,15 @@ impl Source<'_> {
                 })
                 .collect(),
             start: symbolic.states.iter().enumerate().map(start).collect(),
+            drawn: 0,
             parameters: symbols,
+        };
+        let named = |input: &lynkeus_model::Variable| (input.name.clone(), input.node);
+        let inputs: Vec<(String, Node)> = symbolic.inputs.iter().map(named).collect();
+        let drawn = drawn(declared, symbolic, &inputs).filter(|_| !is_alone);
+        let plant = match &drawn {
+            Some(drawn) => plant.drawing(drawn),
+            None => plant,
         };
         let likelihood = match tuning.kind {
             FilterKind::Unscented(points) if !is_alone => Likelihood::unscented(&plant, points),
@@ -195,6 +205,19 @@ fn refuse_curved(
         dial.name
     );
     let hint = "fit with family = \"ekf\"; the unscented filter takes what it finds";
+    Err(Error::input(message).at(&study.file).hint(hint))
+}
+
+/// Likelihoods are of corrections that are linearised once.
+fn refuse_iterated(study: &Study, tuning: &FilterTuning, is_alone: bool) -> Result<(), Error> {
+    if is_alone || tuning.iterations < 2 || tuning.kind != FilterKind::Extended {
+        return Ok(());
+    }
+    let message = format!(
+        "a likelihood is one of corrections that are linearised once, and `iterations` of [observer] says up to {}",
+        tuning.iterations
+    );
+    let hint = "fit without `iterations`: once the start is forgotten both filters are nearly one";
     Err(Error::input(message).at(&study.file).hint(hint))
 }
 

@@ -55,8 +55,8 @@ pub struct Report {
     /// By horizon, the standard deviations of the extended Kalman filter on the study's noises; none
     /// where it breaks down.
     pub filtered: Option<Vec<Vec<f64>>>,
-    /// The study declares `[process_noise]`: then the present standard errors count it.
-    pub counts_process_noise: bool,
+    /// What the study declares of how far the model is right, by key: then the present standard errors count it.
+    pub counted: Vec<&'static str>,
     /// Which of the study's declarations the present standard errors count.
     pub declared: Account,
     /// All sensors considered, the study's first.
@@ -103,9 +103,8 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     let mut run = open_loop(study, settings, &plant)?;
     run.until = run.start + found.horizons.last().copied().unwrap_or_default();
     let filtered = filtered::filtered(&prepared, &setup, run)?;
-    let counts_process_noise =
-        prepared.declared().process_noise.is_declared() && filtered.is_some();
-    if let (true, Some(filtered)) = (counts_process_noise, &filtered) {
+    let counted = counted(prepared.declared(), filtered.is_some());
+    if let (false, Some(filtered)) = (counted.is_empty(), &filtered) {
         deviations
             .iter_mut()
             .zip(filtered)
@@ -116,8 +115,8 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
         asked: setup.experiment.window.horizons.len(),
         exact,
         filtered,
-        counts_process_noise,
-        declared: account(prepared.declared(), counts_process_noise),
+        declared: account(prepared.declared(), !counted.is_empty()),
+        counted,
         plant: plant.name.clone(),
         time_unit: study.time_unit.clone(),
         states: plant.states.len(),
@@ -138,8 +137,24 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     ended(study).map_or(Ok(report), Err)
 }
 
+/// The section of the densities.
+pub(super) const PROCESS_NOISE: &str = "[process_noise]";
+
+/// The keys whose noises are counted, by the filter where it does not break down.
+fn counted(declared: &Declared, is_filtered: bool) -> Vec<&'static str> {
+    let all = [
+        (PROCESS_NOISE, declared.process_noise.is_declared()),
+        ("`input_noise`", declared.input_noise.acts()),
+        ("`correlation`", declared.correlation.acts()),
+    ];
+    let all = all
+        .into_iter()
+        .filter(|(_, is_there)| *is_there && is_filtered);
+    all.map(|(key, _)| key).collect()
+}
+
 /// What the standard errors count.
-fn account(declared: &Declared, counts_process_noise: bool) -> Account {
+fn account(declared: &Declared, by_filter: bool) -> Account {
     let Declared {
         ranges,
         noise,
@@ -152,7 +167,10 @@ fn account(declared: &Declared, counts_process_noise: bool) -> Account {
         screens,
         late,
         manifold,
+        input_noise,
+        correlation,
     } = declared;
+    let broken = "the filter on the study's noises breaks down along this run";
     Account::default()
         .counts(manifold)
         .leaves(screens, "they are of logs: every simulated reading counts")
@@ -164,11 +182,9 @@ fn account(declared: &Declared, counts_process_noise: bool) -> Account {
         .counts(noise)
         .counts(limits)
         .counts(samples)
-        .counts_if(
-            counts_process_noise,
-            process_noise,
-            "the filter on the study's noises breaks down along this run",
-        )
+        .counts_if(by_filter, process_noise, broken)
+        .counts_if(by_filter, input_noise, broken)
+        .counts_if(by_filter, correlation, broken)
         .leaves(disturbances, "taken as zero, as the observer takes them")
         .leaves(
             slew,

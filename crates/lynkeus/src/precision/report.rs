@@ -139,7 +139,7 @@ impl Report {
             standard_error_of_start: self.of_all(last.map(|d| &d.start)),
             standard_error_exact_model: self.by_name(self.exact.last()),
             filter_sd: self.by_name(self.filtered.as_ref().and_then(|all| all.last())),
-            counts_process_noise: self.counts_process_noise,
+            counts_process_noise: self.counted.contains(&super::PROCESS_NOISE),
             declared: &self.declared,
             disturbances_taken_as_zero: &self.disturbances,
             ranked: ranked.iter().map(|&i| &*self.names[i]).collect(),

@@ -119,7 +119,7 @@ impl Report {
 
     /// What stands in the last column.
     fn beside(&self) -> &'static str {
-        match (self.counts_process_noise, &self.filtered) {
+        match (!self.counted.is_empty(), &self.filtered) {
             (true, _) => "if model exact",
             (false, Some(_)) => "sd of ekf",
             (false, None) => "",
@@ -127,7 +127,7 @@ impl Report {
     }
 
     fn other(&self, quantity: usize) -> String {
-        let values = match self.counts_process_noise {
+        let values = match !self.counted.is_empty() {
             true => self.exact.last(),
             false => self.filtered.as_ref().and_then(|all| all.last()),
         };
@@ -143,8 +143,16 @@ impl Report {
                 self.disturbances.join(", ")
             ));
         }
-        if self.counts_process_noise {
-            document.line("[process_noise] is counted: these are the standard deviations of the extended Kalman filter; sensor sets are compared for an exact model");
+        if !self.counted.is_empty() {
+            let (last, others) = (
+                self.counted[self.counted.len() - 1],
+                &self.counted[..self.counted.len() - 1],
+            );
+            let (keys, are) = match others.is_empty() {
+                true => (last.to_owned(), "is"),
+                false => (format!("{} and {last}", others.join(", ")), "are"),
+            };
+            document.line(format!("{keys} {are} counted: these are the standard deviations of the extended Kalman filter; sensor sets are compared for an exact model"));
         } else if self.filtered.is_some() {
             document.line("the model is taken as exact; a filter without [process_noise] trusts it less, and its sd says so");
         }

@@ -1,7 +1,9 @@
 //! The noises of a filter: as the study declares them, else from the log and the ranges.
 
+use lynkeus_expr::Node;
 use lynkeus_model::Variable;
 use lynkeus_run::Level;
+use lynkeus_run::filter::{Correlation, Drawn};
 use lynkeus_structure::AugmentedPlant;
 use lynkeus_words::short;
 
@@ -36,6 +38,48 @@ pub(crate) fn levels(
         });
     }
     levels
+}
+
+/// What every row draws anew: errors of the readings of these inputs, and what the noises of the measured outputs have
+/// in common; none where nothing is declared of either.
+pub fn drawn<'g>(
+    declared: &Declared,
+    augmented: &AugmentedPlant<'g>,
+    inputs: &[(String, Node)],
+) -> Option<Drawn<'g>> {
+    let measured = augmented.outputs.iter();
+    let measured: Vec<&str> = measured.map(|o| o.variable.name.as_str()).collect();
+    let place = |name: &str| measured.iter().position(|output| *output == name);
+    let pairs = declared.correlation.iter().flat_map(|(one, others)| {
+        let others = others.iter();
+        others.filter_map(|(other, value)| Some((place(one)?, place(other)?, *value)))
+    });
+    let pairs: Vec<(usize, usize, f64)> = pairs.filter(|pair| pair.2 != 0.0).collect();
+    // a part of a positive definite matrix is one
+    let correlation = Correlation::new(measured.len(), &pairs).ok();
+    let correlation = correlation.filter(|_| !pairs.is_empty());
+    let errors = errors(declared, inputs);
+    let is_there = !errors.is_empty() || correlation.is_some();
+    is_there.then(|| Drawn::new(augmented.graph(), &errors, correlation))
+}
+
+/// The first of these alone.
+pub(crate) fn misread<'g>(
+    declared: &Declared,
+    augmented: &AugmentedPlant<'g>,
+    inputs: &[(String, Node)],
+) -> Option<Drawn<'g>> {
+    let errors = errors(declared, inputs);
+    (!errors.is_empty()).then(|| Drawn::new(augmented.graph(), &errors, None))
+}
+
+/// The inputs whose readings have errors.
+fn errors(declared: &Declared, inputs: &[(String, Node)]) -> Vec<(String, Node, Level)> {
+    let error = |(name, symbol): &(String, Node)| {
+        let level = Level::from(*declared.input_noise.of(name)?);
+        (level.size() > 0.0).then(|| (name.clone(), *symbol, level))
+    };
+    inputs.iter().filter_map(error).collect()
 }
 
 /// Readings that do not scatter: a thousandth of their range, or of their size.
@@ -99,7 +143,8 @@ fn off_line(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> f64 {
 pub(crate) fn densities(prepared: &Prepared<'_>, span: f64, notes: &mut Vec<String>) -> Vec<f64> {
     let (study, augmented) = (prepared.study(), prepared.augmented());
     let declared = &prepared.declared().process_noise;
-    let is_declared = declared.is_declared();
+    // who says how wrong the readings of inputs are has said what moves the plant otherwise
+    let is_declared = declared.is_declared() || prepared.declared().input_noise.acts();
     let is_constant = |state: &Variable| {
         let mut names = study.sensors.unknown.iter();
         names.any(|name| name.is_or_has(&state.name))
@@ -125,7 +170,7 @@ pub(crate) fn densities(prepared: &Prepared<'_>, span: f64, notes: &mut Vec<Stri
         .collect();
     if is_awake {
         notes.push(format!(
-            "without [process_noise] the model is taken as right up to {} % of each state's range in a tenth of the log, so that the filter does not fall asleep",
+            "without [process_noise] the model is taken as right up to {} % of each state's range in a tenth of the log, so that the gain does not decay to zero",
             100.0 * DOUBT
         ));
     }

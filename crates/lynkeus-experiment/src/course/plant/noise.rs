@@ -41,6 +41,19 @@ pub(crate) fn noise(
         limits: limits
             .map(|(name, limits)| (name.clone(), *limits))
             .collect(),
+        inputs: declared
+            .input_noise
+            .iter()
+            .map(|(name, noise)| (name.clone(), Level::from(*noise)))
+            .collect(),
+        correlations: declared
+            .correlation
+            .iter()
+            .flat_map(|(one, others)| {
+                let others = others.iter();
+                others.map(|(other, value)| (one.clone(), other.clone(), *value))
+            })
+            .collect(),
         process_draws: None,
     })
 }

@@ -66,6 +66,15 @@ static int update(STATE *s, double t, const real *signals)
             s->inputs[i] = signals[SENSORS + i];
         }
     }
+//? drawn
+    /* errors of readings are other ones in each sample */
+    for (int i = STATES - DRAWN; i < STATES; i++) {
+        s->x[i] = R(0.0);
+        for (int k = 0; k < STATES; k++) {
+            s->root[i * STATES + k] = i == k ? R(1.0) : R(0.0);
+        }
+    }
+//?
     if (correct(s, t)) {
 //? rotations
         land(before, s->x, s->root);
@@ -101,10 +110,10 @@ static int report(STATE *s, double t, const real *signals, real *estimates)
             return DIVERGED;
         }
     }
-    for (int i = 0; i < STATES; i++) {
+    for (int i = 0; i < SHOWN; i++) {
         estimates[i] = s->x[i];
 //? each
-        estimates[STATES + i] = deviations[i];
+        estimates[SHOWN + i] = deviations[i];
 //?
     }
 //? turns
@@ -114,8 +123,8 @@ static int report(STATE *s, double t, const real *signals, real *estimates)
 //?
 //? one
     /* of a rotation the deviation of its angle, in one place */
-    int place = STATES;
-    for (int i = 0; i < STATES; i++) {
+    int place = SHOWN;
+    for (int i = 0; i < SHOWN; i++) {
         if (elements[i] == 0) {
             real squares = R(0.0);
             for (int k = 0; k < 4; k++) {

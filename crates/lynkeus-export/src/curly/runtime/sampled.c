@@ -54,6 +54,16 @@ static int update(STATE *s, double t, const real *signals)
     }
     reading_slopes((real)t, s->x, s->inputs, c);
 //?
+//? drawn
+    /* errors of readings of inputs are other ones in each sample */
+    real nothing[STATES];
+    for (int k = 0; k < STATES; k++) {
+        nothing[k] = R(0.0);
+    }
+    for (int i = OWN - DRAWN; i < OWN; i++) {
+        renew(s->root, i, nothing, R(1.0));
+    }
+//?
 //? weighed
     real y[OUTPUTS];
     real spread[STATES];

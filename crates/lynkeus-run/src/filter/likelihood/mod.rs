@@ -82,6 +82,7 @@ pub struct Score {
 ///     process_noise: vec![number(0.0)],
 ///     ranges: vec![],
 ///     start: vec![(level.node(), number(0.0))],
+///     drawn: 0,
 ///     parameters: vec![level.node()],
 /// })?;
 /// let rows = [1.0, 2.0, 6.0].map(|y| [y]);
@@ -243,6 +244,8 @@ struct Passes<const L: usize> {
     sensors: Vec<Sensor<L>>,
     inputs: usize,
     states: usize,
+    /// places in the belief of what is drawn anew in every row, with its numbers
+    drawn: Vec<(usize, f64)>,
     belief: Vec<Bundle<L>>,
     /// at the row before its readings count: x̂, and the variances of noises that are shares
     at: Vec<Bundle<L>>,
@@ -370,6 +373,7 @@ impl<const L: usize> Passes<L> {
             sensors: sensors.collect::<Result<_>>()?,
             inputs: plant.inputs.len(),
             states,
+            drawn: sample.drawn(points.map_or(states, |points| points.plant.states.len())),
             at: vec![vec![[0.0; L]; 2 * sample.known_before()]; belief.len()],
             belief,
             seen: Tangents {
@@ -512,6 +516,12 @@ impl<const L: usize> Passes<L> {
 
     /// The readings of a row, one after the other; h and its slopes are those at the estimate before them.
     fn take(&mut self, row: &Row<'_>, score: &mut Score, see: &mut impl FnMut(Seen)) {
+        for belief in &mut self.belief {
+            let half = belief.len() / 2;
+            for &(place, number) in &self.drawn {
+                (belief[place], belief[half + place]) = ([number; L], [0.0; L]);
+            }
+        }
         if let Some(show) = &mut self.show {
             for (pass, belief) in self.belief.iter_mut().enumerate() {
                 let found = show.run(pass, [&[row.t], row.inputs], &[belief]);

@@ -30,6 +30,8 @@ pub struct ParametricPlant<'g> {
     pub ranges: Vec<Limits>,
     /// the first estimate of each state, and its standard deviation
     pub start: Vec<(Node, Node)>,
+    /// so many of the states, the last, are drawn anew in every row
+    pub drawn: usize,
     /// symbols of θ
     pub parameters: Vec<Node>,
 }

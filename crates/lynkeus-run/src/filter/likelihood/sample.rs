@@ -134,6 +134,17 @@ impl<'p, 'g> Sample<'p, 'g> {
         self.plant.states.len() + self.pattern.len()
     }
 
+    /// The places of the numbers of what is drawn anew in every row, the last of so many states, with what they are
+    /// then.
+    pub fn drawn(&self, states: usize) -> Vec<(usize, f64)> {
+        let last = states - self.plant.drawn..states;
+        let means = last.clone().map(|i| (i, 0.0));
+        let entries = (self.plant.states.len()..).zip(&self.pattern);
+        let entries = entries.filter(|(_, (i, _))| last.contains(i));
+        let entries = entries.map(|(place, (i, j))| (place, f64::from(u8::from(i == j))));
+        means.chain(entries).collect()
+    }
+
     pub fn plant(&self) -> &'p ParametricPlant<'g> {
         self.plant
     }

@@ -43,6 +43,8 @@ pub(crate) struct Propagation {
     ordered: Vec<f64>,
     rows: Vec<f64>,
     sums: Vec<f64>,
+    /// so many last states are drawn anew in every row
+    drawn: usize,
 }
 
 /// How Φ and W are found.
@@ -78,7 +80,14 @@ impl Propagation {
             ordered: vec![],
             rows: vec![],
             sums: vec![0.0; n],
+            drawn: 0,
         })
+    }
+
+    /// The same with so many last states that are drawn anew in every row: [`Propagation::stage`] goes to one.
+    pub fn drawing(mut self, count: usize) -> Self {
+        self.drawn = count;
+        self
     }
 
     /// The way to the next sample from the belief's estimate, which stays.
@@ -133,10 +142,19 @@ impl Propagation {
         self.advance(&about, from, to)?;
         let mut noise = vec![];
         self.push_root(&mut noise);
+        let (mut end, mut transition) = (self.end.clone(), self.transition.matrix.clone());
+        if self.drawn > 0 {
+            let n = end.len();
+            let first = n - self.drawn;
+            end[first..].fill(0.0);
+            transition.clear_last(self.drawn);
+            noise.resize(n * n, 0.0);
+            (first..n).for_each(|i| noise[i * n + i] = 1.0);
+        }
         Ok(Stage {
             about: about.x,
-            end: self.end.clone(),
-            transition: Arc::new(self.transition.matrix.clone()),
+            end,
+            transition: Arc::new(transition),
             noise,
         })
     }

@@ -213,7 +213,7 @@ struct Start {
     is_at_reading: bool,
 }
 
-/// Where the states start; what is held of the measurements is none.
+/// Where the states start; what is held of the measurements is none, and neither is what every sample draws anew.
 fn starts(made: &Made<'_>) -> Vec<Start> {
     let Blueprint {
         flow,
@@ -222,8 +222,10 @@ fn starts(made: &Made<'_>) -> Vec<Start> {
         ..
     } = made.device.blueprint;
     let held = match updates {
-        Updates::Jumps { .. } => sensors.len(),
-        Updates::Filter { .. } => 0,
+        Updates::Jumps { errors, .. } => {
+            sensors.len() + errors.as_ref().map_or(0, |model| model.drawn())
+        }
+        Updates::Filter { model, .. } => model.drawn(),
     };
     let own = flow.states().len().saturating_sub(held);
     let first = made.device.first_readings;
