@@ -1,7 +1,5 @@
-//! Events at which a flow's state jumps, in the draft: the clauses, what is remembered of them, and steps that end at
-//! events, found as the library's fixed steps find them.
+//! Events at which a flow's state jumps, in the draft: the clauses, and what is remembered of them.
 
-use lynkeus_run::filter::NoisyModel;
 use lynkeus_run::{Method, System, WhenExpressions};
 
 use super::device::Entry;
@@ -14,16 +12,6 @@ use crate::Refusal;
 use crate::code::{Code, Solver};
 
 const EVENTS: &str = include_str!("runtime/events.c");
-
-/// States that events alone change, and that have no deviation.
-pub(super) fn discrete(model: &NoisyModel) -> Vec<usize> {
-    let whens = model.flow.system().whens();
-    let discrete = whens
-        .iter()
-        .flat_map(|whens| whens.discrete.iter().copied());
-    let is_sure = |i: &usize| model.initial_variance[*i] == 0.0 && model.process_noise[*i] == 0.0;
-    discrete.filter(is_sure).collect()
-}
 
 impl Machine {
     /// The clauses of a flow, and what is remembered of them; nothing where its state never jumps.

@@ -1,6 +1,8 @@
-//! The pieces of the runtime that take a flow from one instant to another, with events on the way or without.
+//! How a flow is integrated in the draft: smooth, or in steps that end at events, found as the library's fixed steps
+//! find them.
 
 use lynkeus_run::System;
+use lynkeus_run::filter::NoisyModel;
 
 use super::template::{chosen, exchanged};
 
@@ -21,6 +23,16 @@ pub(super) fn holds(system: &System) -> Vec<&'static str> {
         .filter(|fact| fact.0)
         .map(|fact| fact.1)
         .collect()
+}
+
+/// States that events alone change, and that have no deviation.
+pub(super) fn discrete(model: &NoisyModel) -> Vec<usize> {
+    let whens = model.flow.system().whens();
+    let discrete = whens
+        .iter()
+        .flat_map(|whens| whens.discrete.iter().copied());
+    let is_sure = |i: &usize| model.initial_variance[*i] == 0.0 && model.process_noise[*i] == 0.0;
+    discrete.filter(is_sure).collect()
 }
 
 /// How a flow is integrated: x with what is carried along it.

@@ -1,4 +1,4 @@
-//! Bounds of single quantities, for people and machines.
+//! What is left of an error in the end, for every quantity.
 
 use lynkeus_experiment::entries::{Named, finite};
 use lynkeus_experiment::words::number;
@@ -7,7 +7,7 @@ use lynkeus_observers::UltimateBound;
 use super::CertifyReport;
 
 /// `0.3 K of T`, for every bounded quantity.
-pub(super) fn bounds(report: &CertifyReport, each: &[UltimateBound]) -> Vec<String> {
+pub(super) fn in_words(report: &CertifyReport, each: &[UltimateBound]) -> Vec<String> {
     let estimates = &report.design.observer.estimates;
     let unit = |name: &str| {
         let mut found = estimates.iter().filter(|e| e.variable.name == name);
@@ -20,8 +20,8 @@ pub(super) fn bounds(report: &CertifyReport, each: &[UltimateBound]) -> Vec<Stri
         .collect()
 }
 
-/// By name, in the quantity's unit.
-pub(super) fn entries(each: &[UltimateBound]) -> Named<Option<f64>> {
+/// The same for machines.
+pub(super) fn by_name(each: &[UltimateBound]) -> Named<Option<f64>> {
     let each = each.iter();
     each.map(|b| (b.name.clone(), finite(b.value))).collect()
 }

@@ -5,10 +5,9 @@ use lynkeus_words::Words;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::bounds::entries;
 use super::excited::ExcitationEntry;
 use super::sampled::SampledEntry;
-use super::{CertifyReport, Excited, Strays};
+use super::{CertifyReport, Excited, Strays, bounds};
 use lynkeus_experiment::entries::{Condition, Named, Range, Verdict, finite, sides};
 use lynkeus_experiment::judge::interval::SamplingLimits;
 use lynkeus_experiment::prepare::correction::InjectionEntry;
@@ -165,9 +164,9 @@ impl From<&Certificate> for ProofSummary {
             verdict: certificate.verdict().into(),
             rate: certificate.rate,
             ultimate_bound: certificate.ultimate_bound,
-            ultimate_bounds: entries(&certificate.ultimate),
+            ultimate_bounds: bounds::by_name(&certificate.ultimate),
             mean_square_bound: mean_square.map(|b| b.norm),
-            mean_square_bounds: entries(mean_square.map_or(&[], |b| &b.states)),
+            mean_square_bounds: bounds::by_name(mean_square.map_or(&[], |b| &b.states)),
             region: sides(&certificate.region),
             constants: constants.collect(),
         }

@@ -7,8 +7,7 @@ use lynkeus_structure::Standing;
 use lynkeus_words::Words;
 use serde_json::Value;
 
-use super::bounds::bounds;
-use super::{CertifyReport, sampled};
+use super::{CertifyReport, bounds, sampled};
 use crate::Answer;
 use lynkeus_experiment::judge::interval::Intervals;
 use lynkeus_experiment::words::{condition, number, side};
@@ -142,7 +141,7 @@ fn left(report: &CertifyReport, best: &Certificate) -> String {
             return "; what disturbances, process noise and measurement errors leave of it has no bound, see the notes".to_owned();
         }
     };
-    let bounds = bounds(report, each);
+    let bounds = bounds::in_words(report, each);
     match bounds.len() {
         0 => format!(
             ", {what} {} (Euclidean norm of all quantities)",
@@ -190,11 +189,11 @@ fn certificate(document: &mut Document, report: &CertifyReport, certificate: &Ce
     });
     document.table(Table::plain(["constant", "value", "meaning"]).with(rows));
     if !certificate.ultimate.is_empty() && certificate.ultimate_bound.is_some_and(|b| b > 0.0) {
-        let bounds = bounds(report, &certificate.ultimate).join(", ");
+        let bounds = bounds::in_words(report, &certificate.ultimate).join(", ");
         document.item(format!("in the end within: {bounds}"));
     }
     if let Some(found) = &certificate.mean_square {
-        let bounds = bounds(report, &found.states).join(", ");
+        let bounds = bounds::in_words(report, &found.states).join(", ");
         document.item(format!("{IN_MEAN_SQUARE}: {bounds}"));
     }
     document.notes(report.notes_of(certificate));
