@@ -43,7 +43,7 @@ from .model import Model
 #: in which order `Study` takes its sections, and what stands for itself beside them
 SENSORS = ("measured", "unknown", "disturbances", "noise", "limits")
 SECTIONS = ("sensors", "process_noise", "parameters", "manifold", "observer", "box", "certify", "simulate")
-SECTIONS += ("log", "estimate", "tune", "fit", "compare", "plot", "tables", "delay_states")
+SECTIONS += ("log", "estimate", "tune", "fit", "compare", "serve", "plot", "tables", "delay_states")
 #: what may be said briefly
 BRIEFLY = {"observer": "Family", "compare": "Names"}
 PLANT = {

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import json
 import logging
 import posixpath
 import re
@@ -27,6 +28,8 @@ LOG = logging.getLogger("mkdocs.hooks.lynkeus")
 TOP = ["ARCHITECTURE.md", "BENCHMARKS.md", "CHANGELOG.md", "CONTRIBUTING.md"]
 #: made by the notebooks, beside their pages
 PICTURES: set[str] = set()
+#: languages of the gallery's files
+SUFFIX = {".toml": "toml", ".mo": "modelica"}
 #: the target of a link or picture, outside of code; a heading's text may have brackets of its own
 LINK = re.compile(r"(?<=\]\()(?!\w+:|#)([^)\s]+)(?=\))")
 #: what everything else is met through
@@ -34,6 +37,9 @@ FIRST = ["Study", "Model", "Estimator", "Log", "Answer", "Table", "Run"]
 #: what modules have that are imported by themselves, and what `from lynkeus import *` leaves out
 MODULES = ["abs", "ray.campaign", "ray.sweep", "spark.estimate", "spark.follow", "mpc.Estimator", "results.figures"]
 MODULES += ["reports", "sections"]
+#: stands for the repository's address where mkdocs.yml has none
+NOWHERE = "source:"
+SOURCE = re.compile(r'<a href="source:[^"]*">(.*?)</a>', re.DOTALL)
 ROLE = re.compile(r":(?:attr|class|exc|func|meth|mod):(?=<code>)")
 CODE = re.compile(r"(^(?:```|~~~).*?^(?:```|~~~)\s*?$|`[^`\n]+`)", re.MULTILINE | re.DOTALL)
 
@@ -51,6 +57,8 @@ def on_files(files: Files, config: Any) -> Files:
         for name, content in notebooks.rendered(path, run).items():
             files.append(File.generated(config, f"notebooks/{name}", content=content))
             PICTURES.add(name)
+    files.append(File.generated(config, "gallery.md", content=gallery()))
+    files.append(File.generated(config, "reference/json.md", content=json_reference()))
     files.append(File.generated(config, "reference/python.md", content=python_reference()))
     files.append(File.generated(config, "reference/rust.md", content=rust_reference(files, config)))
     return files
@@ -69,13 +77,14 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
 
 
 def on_page_content(html: str, page: Any, config: Any, files: Files) -> str:
-    """Roles of docstrings (``:class:`Study```) are words in code here."""
+    """Roles of docstrings (``:class:`Study```) are words in code here, and links to sources without an address words."""
+    html = SOURCE.sub(r"\1", html)
     return ROLE.sub("", html) if page.file.src_uri == "reference/python.md" else html
 
 
 def pages() -> list[str]:
     """Markdown files of the repository that are pages."""
-    found = [*ROOT.glob("docs/*.md"), *ROOT.glob("examples/README.md"), *ROOT.glob("examples/*/README.md")]
+    found = [*ROOT.glob("docs/*.md"), *ROOT.glob("docs/tutorials/*.md"), *ROOT.glob("docs/how-to/*.md"), *ROOT.glob("examples/README.md"), *ROOT.glob("examples/*/README.md")]
     return ["README.md", *TOP, *(path.relative_to(ROOT).as_posix() for path in found)]
 
 
@@ -94,7 +103,7 @@ def source_of(site: str) -> str | None:
         return "README.md"
     if site.startswith("notebooks/"):
         return site.removesuffix(".md") + ".py"
-    if site.startswith("reference/"):
+    if site.startswith("reference/") or site == "gallery.md":
         return None
     return site if site in TOP or site.startswith("examples/") else f"docs/{site}"
 
@@ -114,7 +123,7 @@ def mapped(link: str, source: str, site: str, config: Any) -> str:
     is_here = target in pages() or target.startswith("docs/") or target.startswith("notebooks/")
     if not is_here or found.is_dir() and not target.endswith(".md"):
         kind = "tree" if found.is_dir() else "blob"
-        return f"{config.repo_url}/{kind}/main/{target}{hash_}{anchor}"
+        return f"{config.repo_url or NOWHERE}/{kind}/main/{target}{hash_}{anchor}"
     return posixpath.relpath(page_of(target), posixpath.dirname(site) or ".") + hash_ + anchor
 
 
@@ -129,6 +138,66 @@ def python_reference() -> str:
     ordered = sorted(names, key=lambda name: (FIRST.index(name) if name in FIRST else len(FIRST), name))
     blocks = "\n\n".join(f"::: lynkeus.{name}" for name in [*ordered, *MODULES])
     return f"# Python reference\n\n[Lynkeus in Python](../python.md) shows how they go together.\n\n{blocks}\n"
+
+
+def gallery() -> str:
+    """Every picture that is drawn from a study, with the study and the command."""
+    parts = ["# Gallery", "Every picture is drawn by the command beside it from a study that the repository ships."]
+    for study in sorted((ROOT / "examples").glob("*/*.toml")):
+        what = study.stem.removeprefix("study").lstrip("-")
+        name = f"{study.parent.name}-{what}" if what else study.parent.name
+        if not (ROOT / "docs" / "pictures" / f"{name}.svg").exists():
+            continue
+        log = study.with_name("log.csv").exists()
+        command = f"lynkeus {'estimate' if log else 'simulate'} {study.name}{' log.csv' if log else ''} --plot {name}.svg"
+        parts += [f"## {name}", f"![{name}](pictures/{name}.svg)", f"```sh\n{command}\n```"]
+        for path in (study, *sorted(study.parent.glob("*.mo"))):
+            parts.append(f'```{SUFFIX[path.suffix]} title="{path.name}"\n{path.read_text(encoding="utf-8").rstrip()}\n```')
+        parts.append(f"[About this plant](examples/{study.parent.name}/README.md)")
+    return "\n\n".join(parts) + "\n"
+
+
+def json_reference() -> str:
+    """What every command prints with ``--json``, from the schema."""
+    schema = json.loads((ROOT / "docs" / "answers.schema.json").read_text(encoding="utf-8"))
+    text = "Every command takes `--json` and prints one object. This page is made from"
+    parts = ["# JSON", f"{text} [the schema](../answers.schema.json); [that of studies](../study.schema.json) is `lynkeus schema`."]
+    for name, found in sorted(schema["$defs"].items()):
+        parts.append(f"## {name}")
+        parts += [found["description"]] if "description" in found else []
+        if properties := found.get("properties"):
+            needed = found.get("required", [])
+            rows = [f"| `{key}` | {kind(of)} | {cell(of, key in needed)} |" for key, of in properties.items()]
+            parts.append("\n".join(["| entry | type | meaning |", "|---|---|---|", *rows]))
+        else:
+            parts.append(kind(found))
+    return "\n\n".join(parts) + "\n"
+
+
+def cell(of: Any, is_needed: bool) -> str:
+    """The meaning of an entry."""
+    text = of.get("description", "") if isinstance(of, dict) else ""
+    return " ".join(text.split()).replace("|", "&#124;") + ("" if is_needed else " (may be absent)")
+
+
+def kind(of: Any) -> str:
+    """A type of the schema in words, with links to the others of the page."""
+    if not isinstance(of, dict):
+        return "anything"
+    if "$ref" in of:
+        name = of["$ref"].rsplit("/", 1)[-1]
+        return f"[{name}](#{name.lower()})"
+    for several in ("anyOf", "oneOf", "allOf"):
+        if several in of:
+            return " or ".join(dict.fromkeys(kind(one) for one in of[several]))
+    if "enum" in of or "const" in of:
+        return ", ".join(f"`{json.dumps(word)}`" for word in of.get("enum", [of.get("const")]))
+    if "items" in of:
+        return f"list of {kind(of['items'])}"
+    if "additionalProperties" in of and of["additionalProperties"]:
+        return f"by name: {kind(of['additionalProperties'])}"
+    named = of.get("type", "anything")
+    return " or ".join(named) if isinstance(named, list) else str(named)
 
 
 def rust_reference(files: Files, config: Any) -> str:

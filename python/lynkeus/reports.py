@@ -66,6 +66,7 @@ __all__ = [
     "OpenRunReport",
     "Outside",
     "OutsideBox",
+    "ParticleCounts",
     "Peak",
     "Point",
     "PortionErrors",
@@ -787,6 +788,23 @@ class InnovationCounts(Record):
     """the same over the last half of the rows"""
 
 
+class ParticleCounts(Record):
+    """How particles went."""
+
+    particles: int
+    """how many there are"""
+    updates: int
+    """updates by readings"""
+    resampled: int
+    """times that they were drawn anew"""
+    lowest_ess: float | None
+    """the least number that counted after an update, (Σw)²/Σw²"""
+    starved: int
+    """updates whose readings no particle explains"""
+    alone: int
+    """updates after which one had all the weight"""
+
+
 class Ended(Record):
     """Why a run ended before its last row."""
 
@@ -799,7 +817,17 @@ class Ended(Record):
 class Doubt(Record):
     """Something that speaks against an estimate."""
 
-    kind: Literal["ended", "range", "innovations", "rejected", "frozen", "jump", "noise", "coloured"]
+    kind: Literal[
+        "ended",
+        "range",
+        "innovations",
+        "rejected",
+        "frozen",
+        "jump",
+        "particles",
+        "noise",
+        "coloured",
+    ]
     """what it rests on"""
     name: str
     """the measured output, or the estimated quantity"""
@@ -840,6 +868,8 @@ class RunEntries:
     """where the run leaves the declared ranges"""
     innovations: Named[InnovationCounts]
     """of a filter, by sensor"""
+    particles: ParticleCounts | None
+    """of a particle filter"""
     credible: bool
     """whether nothing speaks against the estimates"""
     declared: Declared

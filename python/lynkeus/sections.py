@@ -29,6 +29,7 @@ Family: TypeAlias = Literal[
     "ekf",
     "ukf",
     "mhe",
+    "particle",
 ]
 
 
@@ -171,7 +172,7 @@ class ObserverSection(TypedDict, total=False):
     family: Family | None
     """the observer family; `auto` takes the first with a theorem that is proved to fit, has its keys and is
     fast enough for the run, else `ekf` (`"auto"`, `"triangular"`, `"block-triangular"`, `"state-affine"`,
-    `"drift-observable"`, `"unknown-input"`, `"ekf"`, `"ukf"`, `"mhe"`; default: `"auto"`)"""
+    `"drift-observable"`, `"unknown-input"`, `"ekf"`, `"ukf"`, `"mhe"`, `"particle"`; default: `"auto"`)"""
 
     initial: Mapping[str, Number] | None
     """where the estimate starts; `default` holds for everything not listed (table: name = number, and
@@ -314,18 +315,18 @@ class ObserverSection(TypedDict, total=False):
     inputs a table; default: those of `[certify]`)"""
 
     initial_variance: Mapping[str, Number] | None
-    """ekf, ukf, mhe: how uncertain the first estimate is: the variance of each state and unknown input;
-    `default` holds for everything not listed (table: name = number ≥ 0, and `default`; default: the square
-    of a quarter of the declared range (without a range: of the start value, or 1; of an angle or a
+    """ekf, ukf, mhe, particle: how uncertain the first estimate is: the variance of each state and unknown
+    input; `default` holds for everything not listed (table: name = number ≥ 0, and `default`; default: the
+    square of a quarter of the declared range (without a range: of the start value, or 1; of an angle or a
     rotation: of a turn))"""
 
     gate: Number | None
-    """ekf, ukf, mhe: a reading whose innovation exceeds so many of its standard deviations is rejected and
-    counted (number > 0; default: none)"""
+    """ekf, ukf, mhe, particle: a reading whose innovation exceeds so many of its standard deviations is
+    rejected and counted (number > 0; default: none)"""
 
     gate_patience: Whole | None
-    """ekf, ukf, mhe: after so many rejections of a sensor in a row, at least half of which moved, its next
-    reading is believed (whole number ≥ 1; default: 10)"""
+    """ekf, ukf, mhe, particle: after so many rejections of a sensor in a row, at least half of which moved,
+    its next reading is believed (whole number ≥ 1; default: 10)"""
 
     bounds: Literal["project"] | None
     """ekf, ukf: "project": the estimate is kept in the declared ranges `[min, max]`: after each prediction
@@ -343,6 +344,23 @@ class ObserverSection(TypedDict, total=False):
     horizon: Whole | None
     """mhe: samples over which the states are estimated anew at each sample, within `[min, max]` (whole number
     ≥ 1; default: 10)"""
+
+    particles: Whole | None
+    """particle: how many; the error that they add falls with the root of their number (whole number ≥ 2;
+    default: 1000)"""
+
+    proposal: Literal["bootstrap", "auxiliary"] | None
+    """particle: "bootstrap": particles run, then are weighed; "auxiliary": those are drawn to run that the
+    flow without noise takes to where the next readings are likely, which pays where readings are precise
+    and the process noise is small (`"bootstrap"`, `"auxiliary"`; default: `"bootstrap"`)"""
+
+    resample_below: Number | None
+    """particle: particles are drawn anew where their effective number falls below this share of them; 1:
+    after every reading (number in [0.0, 1.0]; default: 0.5)"""
+
+    seed: Whole | None
+    """particle: of the random numbers: the same seed gives the same digits, on any number of threads (whole
+    number ≥ 0; default: 0)"""
 
 
 #: ranges narrower than the model's `min` and `max` (table: name = number, or `[smallest, largest]`; default:
@@ -492,6 +510,10 @@ class EstimateSection(TypedDict, total=False):
     """also `<name>_innovation` and `<name>_innovation_sd` of each measured output: its reading less what was
     expected of it, and the standard deviation of that (what they are judged by) (true, false; default:
     false)"""
+
+    ess: bool | None
+    """also `ess` of a particle filter: how many particles count after each row, (Σw)²/Σw² (true, false;
+    default: false)"""
 
     between_samples: Literal["hold", "predict", "linear"] | None
     """what the observer sees between two rows: the latest row, as a live observer would; what the model makes
@@ -674,7 +696,41 @@ class CompareSection(TypedDict, total=False):
 
     families: Names | None
     """what `compare` runs; each gets the keys of `[observer]` that it owns (list of families; default: every
-    family that is not refuted, and the filters)"""
+    family that is not refuted, and the filters but `particle`)"""
+
+
+class ServeSection(TypedDict, total=False):
+    """how the estimator runs beside a plant (serve) (table; default: none)"""
+
+    wait: Number | None
+    """how much older than the newest row a row may be when it comes, in units of the plant's time: it is put
+    in its place, and what was told before is corrected (number ≥ 0; default: 0: rows come in the order of
+    their times)"""
+
+    state: str | None
+    """the file that keeps where the estimator is: a row is in it before it is answered, and the next start
+    goes on from there, whatever ended the one before (path, from the study's folder; default: none: it
+    begins anew)"""
+
+    history: str | None
+    """CSV files of what was told, one for each day: `"tank-%Y-%m-%d.csv"` (path with `%Y`, `%m` and `%d`,
+    from the study's folder; default: none)"""
+
+    keep_days: Whole | None
+    """so many days of the history are kept (whole number ≥ 1; default: all)"""
+
+    assets: str | None
+    """the CSV file of many plants of this study: their names under `asset`, and in the other columns
+    parameters in which they differ (path, from the study's folder; default: one plant, and messages
+    without a name)"""
+
+    http: str | None
+    """where a page with the estimates, their events, `/estimates` and `/metrics` are: `"127.0.0.1:8080"`
+    (address and port; default: none)"""
+
+    token: str | None
+    """what a request has to say, as `Authorization: Bearer …` or `?token=…` (text; default: none: this
+    machine alone may look)"""
 
 
 class PlotSection(TypedDict, total=False):
@@ -757,6 +813,9 @@ class Sections(TypedDict, total=False):
 
     compare: CompareSection | Names | None
     """which families are compared (table; default: none)"""
+
+    serve: ServeSection | None
+    """how the estimator runs beside a plant (serve) (table; default: none)"""
 
     plot: PlotSection | None
     """what is drawn (table; default: none)"""

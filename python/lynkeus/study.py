@@ -52,6 +52,7 @@ from .sections import (
     ParametersSection,
     PlotSection,
     ProcessNoiseSection,
+    ServeSection,
     SensorsNoise,
     SensorsSection,
     SimulateSection,
@@ -86,7 +87,7 @@ class Study(Batched):
         The section ``[observer]``, or the name of a family.
     box : mapping of str to float or list of float, optional
         Ranges narrower than the model's, in its units.
-    certify, simulate, log, estimate, tune, fit, plot : dict, optional
+    certify, simulate, log, estimate, tune, fit, serve, plot : dict, optional
         The sections of these names.
     compare : dict or list of str, optional
         The section ``[compare]``, or the names of families.
@@ -141,6 +142,7 @@ class Study(Batched):
         tune: TuneSection | None = None,
         fit: FitSection | None = None,
         compare: CompareSection | Names | None = None,
+        serve: ServeSection | None = None,
         plot: PlotSection | None = None,
         tables: Literal["linear", "monotone"] | None = None,
         delay_states: Whole | None = None,
@@ -161,6 +163,7 @@ class Study(Batched):
             "tune": tune,
             "fit": fit,
             "compare": compare,
+            "serve": serve,
             "plot": plot,
             "measured": measured,
             "unknown": unknown,

@@ -269,8 +269,8 @@ def test_starts_can_be_set(command: Path, tmp_path: Path) -> None:
 
 def theta(study: str, value: float, more: str = "") -> str:
     """The two tanks' study with another θ."""
-    assert "theta = 0.03 " in study
-    return study.replace("theta = 0.03 ", f"theta = {value} {more}")
+    assert "theta = 0.09 " in study
+    return study.replace("theta = 0.09 ", f"theta = {value} {more}")
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -280,7 +280,7 @@ def test_theta_can_be_changed(command: Path, tmp_path: Path, version: int) -> No
     log, study = table(tmp_path / "log.csv"), (tmp_path / "s.toml").read_text()
     middle = log["t"][100]
     file = exported(command, tmp_path, version)
-    later = f"\ntransient = {{ theta = 0.03, until = {middle} }}\n"
+    later = f"\ntransient = {{ theta = 0.09, until = {middle} }}\n"
     for name, text in (("from_start", theta(study, 0.05)), ("later", theta(study, 0.05, later))):
         (tmp_path / f"{name}.toml").write_text(text)
         run(command, tmp_path, "estimate", f"{name}.toml", "log.csv", "-q", "-o", f"{name}.csv")
@@ -288,7 +288,7 @@ def test_theta_can_be_changed(command: Path, tmp_path: Path, version: int) -> No
         expected = table(tmp_path / f"{name}.csv")
         tool, past, kept = Tool(file, log["t"][0]), None, None
         (parameter,) = (v for v in tool.model.modelVariables if v.variability == "tunable")
-        assert (parameter.name, parameter.causality, float(parameter.start)) == ("theta", "parameter", 0.03)
+        assert (parameter.name, parameter.causality, float(parameter.start)) == ("theta", "parameter", 0.09)
         assert float(parameter.min) > 0 and "guaranteed" in parameter.description
         names = [v.name for v in tool.model.modelVariables if v.causality == "output"]
         for row, (t, inputs) in enumerate(samples(log, tool)):
@@ -310,8 +310,8 @@ def test_theta_can_be_changed(command: Path, tmp_path: Path, version: int) -> No
             wanted = [expected[name][row] for name in names]
             np.testing.assert_allclose(tool.get(names), wanted, rtol=1e-9, atol=1e-9)
             past = t
-        assert tool.get(["theta"]) == [0.03 if change is None else 0.05]
+        assert tool.get(["theta"]) == [0.09 if change is None else 0.05]
         tool.fmu.reset()
         tool.begin(0.0)
-        assert tool.get(["theta"]) == [0.03]
+        assert tool.get(["theta"]) == [0.09]
         tool.close()

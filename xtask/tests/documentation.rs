@@ -13,14 +13,14 @@ fn read(path: impl AsRef<Path>) -> String {
 }
 
 #[test]
-fn the_readme_shows_the_shipped_plant_and_study() {
-    let readme = read("README.md");
+fn the_page_of_the_tanks_shows_the_shipped_plant_and_study() {
+    let page = read("examples/two-tanks/README.md");
     for (language, file) in [("modelica", "two_tanks.mo"), ("toml", "study.toml")] {
         let shipped = read(Path::new("examples/two-tanks").join(file));
         let block = format!("```{language}\n{}\n```", shipped.trim_end());
         assert!(
-            readme.contains(&block),
-            "README.md shows another {file} than examples/two-tanks"
+            page.contains(&block),
+            "examples/two-tanks/README.md shows another {file} than is shipped"
         );
     }
 }
@@ -30,7 +30,7 @@ fn links_between_files_lead_somewhere() {
     let broken: Vec<String> = pages()
         .iter()
         .flat_map(|page| {
-            let text = read(page);
+            let text = outside_of_code(&read(page));
             let lost = targets(&text)
                 .into_iter()
                 .filter(|target| !root().join(page).with_file_name(target).exists());
@@ -44,7 +44,8 @@ fn links_between_files_lead_somewhere() {
 /// Every Markdown file of the root, of `docs` and of the examples, relative to the root.
 fn pages() -> Vec<PathBuf> {
     let examples = names_in(Path::new("examples"));
-    [PathBuf::new(), "docs".into(), "examples".into()]
+    let here = ["", "docs", "docs/tutorials", "docs/how-to", "examples"];
+    here.map(PathBuf::from)
         .into_iter()
         .chain(examples.filter(|path| root().join(path).is_dir()))
         .flat_map(|folder| names_in(&folder))
@@ -69,4 +70,57 @@ fn targets(text: &str) -> Vec<&str> {
         .map(|(target, _)| target.split('#').next().unwrap_or(target))
         .filter(|target| !target.is_empty() && !target.contains("://"))
         .collect()
+}
+
+/// How often a word that says who speaks, and not what, may stand in all pages.
+const TOLD: usize = 10;
+
+/// The lines of the README before it sends readers on.
+const FIRST_SCREEN: usize = 80;
+
+#[test]
+fn pages_keep_to_the_words_of_the_book() {
+    let style = read("docs/style.toml");
+    let rules: Vec<(&str, &str)> = style
+        .lines()
+        .filter(|line| line.starts_with('"'))
+        .filter_map(|line| line.split_once(" = "))
+        .map(|(phrase, better)| (phrase.trim_matches('"'), better))
+        .collect();
+    assert!(rules.len() > 10, "docs/style.toml has no rules");
+    let mut found = Vec::new();
+    let mut told = 0;
+    for page in pages() {
+        let text = outside_of_code(&read(&page)).to_lowercase();
+        told += words(&text).filter(|word| *word == "told").count();
+        let text = format!(" {} ", words(&text).collect::<Vec<_>>().join(" "));
+        let broken = rules
+            .iter()
+            .filter(|(phrase, _)| text.contains(&format!(" {} ", phrase.replace('-', " "))));
+        found.extend(
+            broken.map(|(phrase, better)| {
+                format!("{}: \"{phrase}\": better {better}", page.display())
+            }),
+        );
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+    assert!(told <= TOLD, "\"told\" stands {told} times in the pages");
+}
+
+#[test]
+fn the_first_screen_of_the_readme_is_a_screen() {
+    let readme = read("README.md");
+    let first = readme.split("## Where next").next().unwrap_or_default();
+    let lines = first.lines().count();
+    assert!(lines <= FIRST_SCREEN, "{lines} lines before \"Where next\"");
+}
+
+/// A page without what stands in code blocks.
+fn outside_of_code(text: &str) -> String {
+    text.split("```").step_by(2).collect()
+}
+
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| !c.is_alphabetic())
+        .filter(|word| !word.is_empty())
 }

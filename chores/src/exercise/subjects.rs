@@ -135,6 +135,16 @@ const KINDS: &[Kind] = &[
             observer = { family = "mhe", horizon = 4 }
             estimate = { method = "rk4", substeps = 1 }"#,
     },
+    Kind {
+        name: "particle",
+        plant: TANKS,
+        step: 4.0,
+        size: 5.0,
+        study: r#"
+            sensors = { measured = ["level"], unknown = ["pump"], noise = { level = 0.02 } }
+            process_noise = { pump = 0.001 }
+            observer = { family = "particle", particles = 100, proposal = "auxiliary" }"#,
+    },
 ];
 
 /// All of them.

@@ -148,7 +148,6 @@ pub const ROWS: &[Row] = &[
         label: "[two tanks](../examples/two-tanks)",
         study: "two-tanks/study.toml",
         place: "upper in [2, 8], lower in [1, 10]",
-        certify: "[box]\nupper = [2, 8]\nlower = [1, 10]",
         unknown: &["pump"],
         spread: 0.5,
         by: 2000.0,

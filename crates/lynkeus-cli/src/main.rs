@@ -6,6 +6,8 @@ mod fit;
 mod how_well;
 mod inputs;
 mod limits;
+#[cfg(test)]
+mod listing;
 mod monte_carlo;
 mod options;
 mod output;
@@ -13,6 +15,9 @@ mod progress;
 mod report;
 mod run;
 mod save;
+#[cfg(feature = "serve")]
+mod serve;
+mod shell;
 mod signals;
 mod tune;
 mod written;
@@ -20,7 +25,7 @@ mod written;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 
 use lynkeus::run::Backend;
 use lynkeus::{CheckOptions, Error, ErrorKind, interrupt};
@@ -76,6 +81,7 @@ Examples:
   lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
   lynkeus fit study.toml log.csv --write
   lynkeus tune study.toml --plot tune.svg
+  lynkeus serve study.toml --stdio json
   lynkeus export study.toml --to c -o device
   lynkeus export model.mo --to fmu -o plant
   lynkeus report study.toml log.csv -o report.html
@@ -231,8 +237,29 @@ enum Command {
         #[command(flatten)]
         limits: Limits,
     },
+    /// The estimator beside a plant: rows in, estimates out, for as long as the plant runs
+    #[cfg(feature = "serve")]
+    Serve {
+        /// The study (TOML), with [serve]
+        study: PathBuf,
+        #[command(flatten)]
+        options: serve::Options,
+        #[command(flatten)]
+        limits: Limits,
+    },
     /// The JSON Schema of a study, for editors that complete and check TOML
     Schema,
+    /// A script that lets a shell complete commands, options and files
+    Completions {
+        /// The shell
+        #[arg(value_enum)]
+        shell: clap_complete::Shell,
+    },
+    /// The manual page of lynkeus or of one of its commands, as roff for man(1)
+    Man {
+        /// The command; without it lynkeus itself
+        command: Option<String>,
+    },
 }
 
 /// Runs the command line.
@@ -366,10 +393,21 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             let source = Source::load(&study, limits.for_a_proof())?;
             report::report(&source, log.as_deref(), &options)
         }
+        #[cfg(feature = "serve")]
+        Command::Serve {
+            study,
+            options,
+            limits,
+        } => {
+            let source = Source::load(&study, limits.budget())?;
+            serve::serve(&source, &options)
+        }
         Command::Schema => {
             output::print(output::json(&lynkeus::schema()).as_bytes())?;
             Ok(ExitCode::SUCCESS)
         }
+        Command::Completions { shell } => shell::completions(Cli::command(), shell),
+        Command::Man { command } => shell::manual(Cli::command(), command.as_deref()),
     }
 }
 

@@ -246,6 +246,7 @@ fn left_out(prepared: &Prepared<'_>) -> Vec<String> {
     let examined = |name: &str| observer.families().any(|family| family.name() == name);
     let families = lynkeus_observers::FAMILIES
         .iter()
+        .filter(|family| !family.is_sampled())
         .map(|family| family.name());
     let names: Vec<&str> = families.filter(|name| !examined(name)).collect();
     let keys: Vec<&str> = observer.tuning.values.keys().map(String::as_str).collect();

@@ -92,13 +92,15 @@ pub fn compare(
 }
 
 /// The families asked for; else those that are not refuted, whose required keys are there or not,
-/// and the filters.
+/// and the filters; those that draw random numbers where they are asked for.
 fn families(study: &Study, plant: &Plant) -> Result<Vec<&'static dyn Family>, Error> {
     if let Some(asked) = asked(study)? {
         return Ok(asked);
     }
     let mut found = vec![];
-    let is_able = |family: &&&'static dyn Family| plant.whens.is_empty() || family.follows_jumps();
+    let is_able = |family: &&&'static dyn Family| {
+        !family.is_sampled() && (plant.whens.is_empty() || family.follows_jumps())
+    };
     for &family in FAMILIES.iter().filter(is_able) {
         let own = of_family(study, family);
         let prepared = Prepared::new(&own, plant)?;

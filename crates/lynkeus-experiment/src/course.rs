@@ -3,7 +3,7 @@
 
 pub(crate) mod checkpoint;
 pub mod columns;
-mod computed;
+pub(crate) mod computed;
 pub(crate) mod corrections;
 pub(crate) mod curved;
 pub(crate) mod doubt;
@@ -26,7 +26,7 @@ pub(crate) mod trace;
 
 use lynkeus_expr::Spent;
 use lynkeus_observers::Observer;
-use lynkeus_run::filter::SensorHealth;
+use lynkeus_run::filter::{ParticleHealth, SensorHealth};
 use lynkeus_run::{Error as RunError, Role};
 
 use crate::course::corrections::Corrections;
@@ -131,6 +131,12 @@ pub struct Course {
     pub innovations: Vec<Series>,
     /// what is kept of a filter's corrections
     pub records: Records,
+    /// whether the effective numbers of particles are kept, row by row
+    pub keeps_effective: bool,
+    /// where they are: one column, or none
+    pub effective: Vec<Series>,
+    /// how the particles went, and how many there are; of a particle filter
+    pub particles: Option<(usize, ParticleHealth)>,
     /// what they are made of, where all is kept
     pub corrections: Option<Corrections>,
     /// ŷ of each sensor before it corrects, where the likelihood is kept

@@ -2,6 +2,7 @@
 
 mod followed;
 pub(crate) mod live;
+pub mod stream;
 mod suspected;
 mod told;
 

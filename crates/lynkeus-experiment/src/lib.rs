@@ -64,6 +64,7 @@ pub use course::doubt::{Doubt, Kind as DoubtKind, Level as DoubtLevel};
 pub use course::quantity::Quantity;
 pub use course::sampling::Resolution;
 pub use estimate::live::{blueprint, estimator, late_estimator};
+pub use estimate::stream;
 pub use estimate::{estimate, estimate_resumed, estimated, side_by_side};
 pub use judge::accuracy::{Accuracy, Coverage, Settling};
 pub use judge::frozen::Frozen;

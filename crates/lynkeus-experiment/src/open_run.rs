@@ -12,7 +12,7 @@ use crate::answer::Origin;
 use lynkeus_expr::Node;
 use lynkeus_model::{Home, Plant, Variable};
 use lynkeus_observers::starts;
-use lynkeus_run::{Error as RunError, Estimator, System};
+use lynkeus_run::{Error as RunError, Estimator, Parts, System};
 use lynkeus_study::{Generator, Name};
 use lynkeus_words::short;
 
@@ -234,15 +234,15 @@ impl Driven {
         let names = self::told(plant).map(|variable| variable.name.clone());
         let outputs: Vec<(String, Node)> = names.zip(told).collect();
         let derivatives = put(&plant.derivatives);
-        System::jumping(
-            &plant.graph,
-            plant.time,
-            &states,
-            &self.signals,
-            &derivatives,
-            &outputs,
-            &plant.whens.substituted(&plant.graph, &self.made),
-        )
+        System::of(&Parts {
+            graph: &plant.graph,
+            time: plant.time,
+            states: &states,
+            signals: &self.signals,
+            derivatives: &derivatives,
+            outputs: &outputs,
+            whens: Some(&plant.whens.substituted(&plant.graph, &self.made)),
+        })
         .map_err(explain)
     }
 }

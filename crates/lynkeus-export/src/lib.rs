@@ -47,6 +47,12 @@ pub enum Refusal {
          take family = \"ekf\" or \"ukf\""
     )]
     Window,
+    /// Random numbers at every sample.
+    #[error(
+        "a particle filter runs many copies of the plant on random numbers, which is not exported: \
+         take family = \"ekf\" or \"ukf\""
+    )]
+    Particles,
     /// The estimate is put into bounds by a problem of optimisation.
     #[error(
         "`bounds = \"project\"` solves a problem of optimisation where the estimate leaves its range, \

@@ -33,6 +33,10 @@ pub trait Family: Sync {
     fn is_filter(&self) -> bool {
         false
     }
+    /// Whether it draws random numbers: it takes some time, and is run where it is named.
+    fn is_sampled(&self) -> bool {
+        false
+    }
     /// Whether what it estimates over a log can be smoothed.
     fn smooths(&self) -> bool {
         false

@@ -11,10 +11,13 @@
 //! `mhe`: moving-horizon estimation (Rao, Rawlings and Mayne, *IEEE Transactions on Automatic
 //! Control* 48 (2003) 246–258), whose states stay within their declared ranges.
 //!
+//! `particle`: particles that are drawn and weighed, for what no Gaussian holds (Gordon, Salmond and Smith, *IEE
+//! Proceedings F* 140 (1993) 107–113; Pitt and Shephard, *Journal of the American Statistical Association* 94 (1999) 590–599).
+//!
 //! Nothing is required of the plant, and nothing is proved of the error.
 
 use lynkeus_model::{Home, Variable};
-use lynkeus_run::filter::{FilterKind, PATIENCE, SigmaPoints};
+use lynkeus_run::filter::{FilterKind, PATIENCE, Particles, SigmaPoints};
 use lynkeus_structure::AugmentedPlant;
 
 use crate::estimate::{PlantCopy, Speed, limited, no_such_estimate};
@@ -39,6 +42,7 @@ struct Filter {
     keys: &'static [&'static [KeySpec]],
     smooths: bool,
     follows_jumps: bool,
+    is_sampled: bool,
     kind: fn(&Tuning) -> Result<FilterKind, TuningError>,
 }
 
@@ -50,6 +54,7 @@ pub const EKF: &dyn Family = &Filter {
     keys: &[&KEYS, &BOUNDS, &ITERATIONS],
     smooths: true,
     follows_jumps: true,
+    is_sampled: false,
     kind: |_| Ok(FilterKind::Extended),
 };
 
@@ -60,7 +65,8 @@ pub const UKF: &dyn Family = &Filter {
     called: "unscented Kalman filter",
     keys: &[&KEYS, &BOUNDS, &POINTS],
     smooths: false,
-    follows_jumps: false,
+    follows_jumps: true,
+    is_sampled: false,
     kind: |tuning| {
         let SigmaPoints { alpha, beta, kappa } = SigmaPoints::default();
         let [own_alpha, own_beta, own_kappa] = &POINTS;
@@ -80,9 +86,37 @@ pub const MHE: &dyn Family = &Filter {
     keys: &[&KEYS, &WINDOW],
     smooths: false,
     follows_jumps: false,
+    is_sampled: false,
     kind: |tuning| {
-        let length = whole(tuning, &WINDOW[0])?;
+        let length = whole(tuning, &WINDOW[0], 1e4)?;
         Ok(FilterKind::MovingHorizon(length.unwrap_or(HORIZON)))
+    },
+};
+
+/// The family `particle`.
+pub const PARTICLE: &dyn Family = &Filter {
+    name: "particle",
+    paper: "Gordon, Salmond and Smith 1993, the bootstrap filter; Pitt and Shephard 1999, the auxiliary one",
+    called: "particle filter",
+    keys: &[&KEYS, &DRAWN],
+    smooths: false,
+    follows_jumps: true,
+    is_sampled: true,
+    kind: |tuning| {
+        let own = Particles::default();
+        let [count, proposal, below, seed] = &DRAWN;
+        let share = number(tuning, below)?.unwrap_or(own.resample_below);
+        if !(0.0..=1.0).contains(&share) {
+            return Err(below.wrong(share));
+        }
+        Ok(FilterKind::Particles(Particles {
+            count: whole(tuning, count, Particles::MOST as f64)?.unwrap_or(own.count),
+            looks_ahead: tuning
+                .meant(proposal, [false, true])?
+                .unwrap_or(own.looks_ahead),
+            resample_below: share,
+            seed: whole(tuning, seed, MOST_EXACT)?.unwrap_or(own.seed as usize) as u64,
+        }))
     },
 };
 
@@ -177,6 +211,10 @@ impl Family for Filter {
 
     fn follows_jumps(&self) -> bool {
         self.follows_jumps
+    }
+
+    fn is_sampled(&self) -> bool {
+        self.is_sampled
     }
 
     fn verify(&self, augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<(), TuningError> {
@@ -291,18 +329,56 @@ const WINDOW: [KeySpec; 1] = [KeySpec {
     meaning: "samples over which the states are estimated anew at each sample, within `[min, max]`",
 }];
 
-/// A number of samples or readings.
-fn whole(tuning: &Tuning, key: &KeySpec) -> Result<Option<usize>, TuningError> {
+/// Whole numbers up to here are those of a study.
+const MOST_EXACT: f64 = 9_007_199_254_740_992.0;
+
+/// Those of particles.
+const DRAWN: [KeySpec; 4] = [
+    KeySpec {
+        name: "particles",
+        shape: Shape::Whole(2),
+        default: "1000",
+        meaning: "how many; the error that they add falls with the root of their number",
+    },
+    KeySpec {
+        name: "proposal",
+        shape: Shape::Word(&["bootstrap", "auxiliary"]),
+        default: "`\"bootstrap\"`",
+        meaning: "\"bootstrap\": particles run, then are weighed; \"auxiliary\": those are drawn to run that the flow without noise takes to where the next readings are likely, which pays where readings are precise and the process noise is small",
+    },
+    KeySpec {
+        name: "resample_below",
+        shape: Shape::Between {
+            least: 0.0,
+            most: 1.0,
+        },
+        default: "0.5",
+        meaning: "particles are drawn anew where their effective number falls below this share of them; 1: after every reading",
+    },
+    KeySpec {
+        name: "seed",
+        shape: Shape::Whole(0),
+        default: "0",
+        meaning: "of the random numbers: the same seed gives the same digits, on any number of threads",
+    },
+];
+
+/// A number of samples, readings or particles.
+fn whole(tuning: &Tuning, key: &KeySpec, most: f64) -> Result<Option<usize>, TuningError> {
+    let least = match key.shape {
+        Shape::Whole(least) => f64::from(least),
+        _ => 0.0,
+    };
     match number(tuning, key)? {
         None => Ok(None),
-        Some(x) if x >= 1.0 && x.fract() == 0.0 && x <= 1e4 => Ok(Some(x as usize)),
+        Some(x) if x >= least && x.fract() == 0.0 && x <= most => Ok(Some(x as usize)),
         Some(x) => Err(key.wrong(x)),
     }
 }
 
 /// The patience of the gate.
 fn patience(tuning: &Tuning) -> Result<usize, TuningError> {
-    Ok(whole(tuning, &GATE_PATIENCE)?.unwrap_or(PATIENCE))
+    Ok(whole(tuning, &GATE_PATIENCE, 1e4)?.unwrap_or(PATIENCE))
 }
 
 /// How often the readings of a sample are linearised, at most.
@@ -312,7 +388,7 @@ fn iterations(augmented: &AugmentedPlant<'_>, tuning: &Tuning) -> Result<usize, 
         true => CURVED,
         false => 1,
     };
-    Ok(whole(tuning, &ITERATIONS[0])?.unwrap_or(usual))
+    Ok(whole(tuning, &ITERATIONS[0], 1e4)?.unwrap_or(usual))
 }
 
 /// Whether the estimate is kept in the declared ranges.

@@ -54,7 +54,7 @@ pub use unknown_input::Farza;
 
 use block_triangular::BLOCK_TRIANGULAR;
 use drift_observable::DRIFT_OBSERVABLE;
-use kalman::{EKF, MHE, UKF};
+use kalman::{EKF, MHE, PARTICLE, UKF};
 use state_affine::STATE_AFFINE;
 use triangular::TRIANGULAR;
 use unknown_input::UNKNOWN_INPUT;
@@ -69,6 +69,7 @@ pub const FAMILIES: &[&dyn Family] = &[
     EKF,
     UKF,
     MHE,
+    PARTICLE,
 ];
 
 /// The family of that name.

@@ -58,11 +58,12 @@ pub(super) type Pixel = (i32, i32);
 pub(super) struct Svg(String);
 
 impl Svg {
-    /// What is drawn, on a white sheet. Its title is for screen readers and hovering.
+    /// What is drawn, on a white sheet. Its title is for screen readers and hovering, its metadata say what drew it.
     pub fn sheet(self, (width, height): Pixel, title: &str) -> String {
         let title = safe(title);
         let mut sheet = Self(format!(
-            "<svg width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" xmlns=\"http://www.w3.org/2000/svg\">\n<title>{title}</title>\n"
+            "<svg width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" xmlns=\"http://www.w3.org/2000/svg\">\n<title>{title}</title>\n<metadata>lynkeus {}</metadata>\n",
+            env!("CARGO_PKG_VERSION")
         ));
         sheet.rectangle((0, 0), (width, height), WHITE);
         sheet.0 + &self.0 + "</svg>\n"

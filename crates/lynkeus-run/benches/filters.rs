@@ -4,7 +4,7 @@ use divan::{Bencher, black_box};
 use lynkeus_expr::Graph;
 use lynkeus_run::filter::{
     FilterKind, FilterSettings, Likelihood, Limits, NoisyModel, NoisyPlant, ParametricLevel,
-    ParametricPlant, ParametricSensor, Row, Sensor, SigmaPoints,
+    ParametricPlant, ParametricSensor, Particles, Row, Sensor, SigmaPoints,
 };
 use lynkeus_run::{Blueprint, Error, EstimatorSettings, Fleet, Level, Method, Step, Tolerances};
 
@@ -130,6 +130,17 @@ fn ukf(bencher: Bencher, n: usize) {
 #[divan::bench(args = [2, 8, 25, 61, 200], sample_count = 20)]
 fn mhe(bencher: Bencher, n: usize) {
     measure(bencher, n, FilterKind::MovingHorizon(10));
+}
+
+/// So many particles of two states, one step of Runge and Kutta between samples.
+#[divan::bench(args = [100, 1000, 10_000, 100_000], sample_count = 20)]
+fn particles(bencher: Bencher, count: usize) {
+    let kind = FilterKind::Particles(Particles {
+        count,
+        ..Particles::default()
+    });
+    let method = Method::Rk4(Step::Substeps(1));
+    measure_by(method, 100, bencher, 2, kind);
 }
 
 /// Cells of the plant whose likelihood is measured, and rows of its log.

@@ -345,6 +345,10 @@ impl Dynamics for Loop {
         self.joined.watch(t, x, seen);
     }
 
+    fn rates(&mut self, t: f64, x: &[f64], dx: &[f64]) -> Vec<f64> {
+        self.joined.rates(t, x, dx)
+    }
+
     fn truths(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>> {
         self.joined.truths(t, x)
     }

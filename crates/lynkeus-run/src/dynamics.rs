@@ -43,6 +43,11 @@ pub trait Dynamics {
     /// Writes what the relations of the clauses are at (t, x).
     fn watch(&mut self, _t: f64, _x: &[f64], _seen: &mut Vec<Seen>) {}
 
+    /// How fast the quantities of the relations change at (t, x) as the state moves with `dx`.
+    fn rates(&mut self, _t: f64, _x: &[f64], _dx: &[f64]) -> Vec<f64> {
+        vec![]
+    }
+
     /// Which conditions of the clauses hold at (t, x).
     ///
     /// # Errors

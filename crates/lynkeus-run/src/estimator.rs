@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::filter::{Filter, Health, Innovation, Record, Smoothed};
+use crate::filter::{self, Health, Innovation, Record, Smoothed};
 use crate::runner::{Runner, Sample, check_time, no_number};
 use crate::sampled::Sampled;
 use crate::snapshot::{self, Damaged, Walk};
@@ -82,9 +82,7 @@ impl Estimator {
             Updates::Jumps {
                 predict, errors, ..
             } => Box::new(Sampled::new(&blueprint, *predict, errors.as_deref())?),
-            Updates::Filter { model, settings } => {
-                Box::new(Filter::new(model, settings, blueprint.run)?)
-            }
+            Updates::Filter { model, settings } => filter::started(model, settings, blueprint.run)?,
         };
         let names = [&blueprint.sensors, blueprint.inputs()].concat();
         Ok(Self {
@@ -223,6 +221,19 @@ impl Estimator {
     #[must_use]
     pub fn record(&self) -> Option<&Record> {
         self.runner.record()
+    }
+
+    /// How many particles count, (Σw)²/Σw² after the last update and before they were drawn anew; none of what
+    /// has no particles.
+    #[must_use]
+    pub fn effective(&self) -> Option<f64> {
+        self.runner.effective()
+    }
+
+    /// The particles, one after the other, and their weights, which sum to 1; none of what has no particles.
+    #[must_use]
+    pub fn particles(&self) -> Option<(&[f64], &[f64])> {
+        self.runner.particles()
     }
 
     /// Time of the last sample or prediction.

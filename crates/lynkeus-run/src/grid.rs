@@ -26,6 +26,14 @@ impl Grid {
         decimal.unwrap_or(Self::Binary { start, step })
     }
 
+    /// Start, step and scale of the times (start + k·step)/scale.
+    pub(crate) fn whole(&self) -> [f64; 3] {
+        match *self {
+            Self::Binary { start, step } => [start, step, 1.0],
+            Self::Decimal { start, step, scale } => [start as f64, step as f64, scale as f64],
+        }
+    }
+
     /// Time `k`.
     pub(crate) fn time(&self, k: usize) -> f64 {
         let (start, step) = match *self {

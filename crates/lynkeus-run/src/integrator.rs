@@ -3,7 +3,7 @@
 
 use crate::adaptive::Adaptive;
 use crate::divergence::{diverged, largest};
-use crate::events::{Filippov, Memory, Seen, Sides, occur, rates};
+use crate::events::{Filippov, Memory, Seen, Sides, occur};
 use crate::method::{are_finite, resolution};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Method, Result, Step, spectral_radius};
@@ -166,6 +166,17 @@ impl Integrator {
             self.sides.memory.leave(&x[..clauses.states()]);
         }
         Ok(())
+    }
+
+    /// Takes `x` at `t` through the event ahead of it, as if that had come by then; by single steps of the classical
+    /// Runge–Kutta method. Whether there is one within a time.
+    pub(crate) fn anticipate(
+        &mut self,
+        f: &mut impl Dynamics,
+        (t, within): (f64, f64),
+        x: &mut [f64],
+    ) -> Result<bool> {
+        Rk4::new(x.len()).anticipate(f, &mut self.sides.memory, (t, within), x)
     }
 
     /// What is remembered of clauses.
@@ -394,6 +405,24 @@ pub(crate) fn instant(from: f64, to: f64, steps: usize, i: usize) -> f64 {
 /// How often a step is halved on the way to an event.
 const HALVINGS: usize = 50;
 
+/// Most parts of a step with events in it.
+const MOST_PARTS: usize = 10_000;
+
+/// Relations change all along a step.
+fn endless(f: &impl Dynamics, time: f64) -> Error {
+    Error::EndlessEvents {
+        time,
+        line: f.clauses().map_or(0, |clauses| clauses.first_line()),
+        how: format!("its conditions change {MOST_PARTS} times in one step"),
+    }
+}
+
+/// The relations that differ.
+fn changed(a: &[Seen], b: &[Seen]) -> impl Iterator<Item = usize> {
+    let pairs = a.iter().zip(b).enumerate();
+    pairs.filter_map(|(relation, (a, b))| (a.holds != b.holds).then_some(relation))
+}
+
 /// (time of the stage as a fraction of the step, factor of the stage before)
 const STAGES: [(f64, f64); 4] = [(0.0, 0.0), (0.5, 0.5), (0.5, 0.5), (1.0, 1.0)];
 
@@ -472,7 +501,12 @@ impl Rk4 {
         let (mut t, mut was, mut now) = (from, vec![], vec![]);
         let mut sent_back: Option<usize> = None;
         let mut start = x.to_vec();
+        let mut count = 0;
         while to - t > resolution(to) {
+            count += 1;
+            if count > MOST_PARTS {
+                return Err(endless(f, t));
+            }
             let whole = to - t;
             start.copy_from_slice(x);
             f.watch(t, x, &mut was);
@@ -497,55 +531,96 @@ impl Rk4 {
                     f.watch(t + h, x, &mut now);
                 }
             }
-            let changes = |a: &[Seen], b: &[Seen]| a.iter().zip(b).any(|(a, b)| a.holds != b.holds);
-            if !changes(&was, &now) {
+            if changed(&was, &now).next().is_none() {
                 t = if h == whole { to } else { t + h };
                 self.check(f, memory, t, x, &now)?;
                 continue;
             }
-            let (mut low, mut high) = (0.0, h);
-            let mut end = x.to_vec();
-            let mut there = vec![];
-            for _ in 0..HALVINGS {
-                let middle = low + 0.5 * (high - low);
-                if high - low <= resolution(t + high) {
-                    break;
-                }
-                x.copy_from_slice(&start);
-                self.step(f, t, middle, x)?;
-                f.watch(t + middle, x, &mut there);
-                match changes(&was, &there) {
-                    true => {
-                        high = middle;
-                        end.copy_from_slice(x);
-                        now.clone_from(&there);
-                    }
-                    false => low = middle,
-                }
-            }
-            x.copy_from_slice(&end);
-            t = if high == whole { to } else { t + high };
-            let pairs = was.iter().zip(&now).enumerate();
-            let flipped = pairs.filter(|(_, (a, b))| a.holds != b.holds);
-            let flipped: Vec<usize> = flipped.map(|(relation, _)| relation).collect();
+            let (length, flipped) = self.first_change(f, (t, h), &start, &was, x)?;
+            t = if length == whole { to } else { t + length };
             if occur(f, memory, (t, to - from), x, &flipped, |_, _| ())? {
-                sent_back = self.sent_back(f, (t, to - from), x, &flipped);
+                sent_back = self.sent_back(f, t, x, &flipped);
             }
         }
         Ok(())
+    }
+
+    /// Of steps from `start` at `t`, their lengths halved from `h` on, at whose end `x` relations are no more what they
+    /// `were`, about the shortest: its length, with `x` at its end and the relations that have changed.
+    fn first_change(
+        &mut self,
+        f: &mut impl Dynamics,
+        (t, h): (f64, f64),
+        start: &[f64],
+        were: &[Seen],
+        x: &mut [f64],
+    ) -> Result<(f64, Vec<usize>)> {
+        let (mut low, mut high) = (0.0, h);
+        let mut end = x.to_vec();
+        let mut there = vec![];
+        for _ in 0..HALVINGS {
+            if high - low <= resolution(t + high) {
+                break;
+            }
+            let middle = low + 0.5 * (high - low);
+            x.copy_from_slice(start);
+            self.step(f, t, middle, x)?;
+            f.watch(t + middle, x, &mut there);
+            match changed(were, &there).next() {
+                Some(_) => {
+                    high = middle;
+                    end.copy_from_slice(x);
+                }
+                None => low = middle,
+            }
+        }
+        x.copy_from_slice(&end);
+        f.watch(t + high, x, &mut there);
+        Ok((high, changed(were, &there).collect()))
+    }
+
+    /// The event that lies ahead of `x` at `t`, as if it had come by then: there, through it, and back again. Whether
+    /// there is one within a time.
+    fn anticipate(
+        &mut self,
+        f: &mut impl Dynamics,
+        memory: &mut Memory,
+        (t, within): (f64, f64),
+        x: &mut [f64],
+    ) -> Result<bool> {
+        let start = x.to_vec();
+        let (mut were, mut now) = (vec![], vec![]);
+        f.watch(t, x, &mut were);
+        for share in [0.125, 0.25, 0.5, 1.0] {
+            let h = share * within;
+            x.copy_from_slice(&start);
+            self.step(f, t, h, x)?;
+            f.watch(t + h, x, &mut now);
+            if changed(&were, &now).next().is_none() {
+                continue;
+            }
+            let (length, flipped) = self.first_change(f, (t, h), &start, &were, x)?;
+            if !occur(f, memory, (t + length, within), x, &flipped, |_, _| ())? {
+                break;
+            }
+            self.step(f, t + length, -length, x)?;
+            return Ok(true);
+        }
+        x.copy_from_slice(&start);
+        Ok(false)
     }
 
     /// The relation that still holds behind an event and is left from there.
     fn sent_back(
         &mut self,
         f: &mut impl Dynamics,
-        (t, length): (f64, f64),
+        t: f64,
         x: &[f64],
         flipped: &[usize],
     ) -> Option<usize> {
         let mut slope = vec![0.0; x.len()];
         f.derivatives(t, x, &mut slope);
-        let rates = rates(f, (t, length), x, &slope);
+        let rates = f.rates(t, x, &slope);
         let mut seen = vec![];
         f.watch(t, x, &mut seen);
         let leaves = |relation: &&usize| match seen[**relation].holds {

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::ops::Deref;
 
+use crate::filter::Innovation;
 use crate::runner::no_number;
 use crate::snapshot::{self, Damaged, Walk};
 use crate::{Digest, Error, Estimator, Result, SnapshotFault};
@@ -90,6 +91,8 @@ pub struct Revised {
     pub estimate: Vec<f64>,
     /// its standard deviations, where the estimator has them
     pub deviations: Option<Vec<f64>>,
+    /// what became of its readings, as [`Estimator::innovations`]
+    pub innovations: Vec<Innovation>,
 }
 
 impl Late {
@@ -275,6 +278,7 @@ impl Late {
                     t: row.t,
                     estimate: self.estimator.estimate().to_vec(),
                     deviations: self.estimator.deviations().map(<[f64]>::to_vec),
+                    innovations: self.estimator.innovations().to_vec(),
                 });
             }
         }

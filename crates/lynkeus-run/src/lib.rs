@@ -129,7 +129,9 @@ pub use dynamics::{Dynamics, Events, Function};
 pub(crate) use error::Result;
 pub use error::{Error, Interrupted, Margin};
 pub use estimator::Estimator;
-pub use events::{Cause, Clauses, Guards, Memory, Seen, first_jump};
+pub use events::{
+    Cause, ClauseShape, Clauses, Guards, Instants, Memory, Seen, WhenExpressions, first_jump,
+};
 pub use fleet::{Apart, Fleet};
 pub use integrator::{Integrator, Rk4, StepAdvice};
 pub use jacobian::{Fastest, spectral_radius};
@@ -144,5 +146,5 @@ pub use simulation::Simulation;
 pub use slopes::{Place, Slopes};
 pub use snapshot::{Digest, SnapshotFault};
 pub use spread::Lag;
-pub use system::{Evaluation, Expressions, System};
+pub use system::{Evaluation, Expressions, Parts, System};
 pub use trajectory::{Column, Role, Trajectory};

@@ -8,7 +8,7 @@ use lynkeus_model::Whens;
 use crate::filter::by_distance;
 use crate::method::are_finite;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Evaluation, Events, Result, System};
+use crate::{Dynamics, Evaluation, Events, Parts, Result, System};
 
 /// A [`System`] x' = f(t, x, w), y = h(t, x, w), x̂ = g(t, x, w) with those of its Jacobians F = ∂f/∂x,
 /// G = ∂g/∂x and C = ∂h/∂x that are asked for.
@@ -58,39 +58,31 @@ impl Linearised {
         outputs: &[(String, Node)],
         jacobians: &Jacobians<Entries>,
     ) -> Result<Self> {
-        let none = Whens::default();
-        Self::jumping(
+        let parts = Parts {
             graph,
             time,
             states,
             signals,
             derivatives,
             outputs,
-            jacobians,
-            &none,
-        )
+            whens: None,
+        };
+        Self::of(&parts, jacobians)
     }
 
-    #[expect(clippy::too_many_arguments, reason = "what a system is made of")]
-    fn jumping(
-        graph: &Graph,
-        time: Node,
-        states: &[(String, Node, f64)],
-        signals: &[(String, Node)],
-        derivatives: &[Node],
-        outputs: &[(String, Node)],
-        jacobians: &Jacobians<Entries>,
-        whens: &Whens,
-    ) -> Result<Self> {
+    fn of(parts: &Parts<'_>, jacobians: &Jacobians<Entries>) -> Result<Self> {
         let mut all = vec![];
         let state = Jacobian::among(&mut all, &jacobians.state);
-        all.extend_from_slice(outputs);
+        all.extend_from_slice(parts.outputs);
         let jacobians = Jacobians {
             state,
             estimate: Jacobian::among(&mut all, &jacobians.estimate),
             output: Jacobian::among(&mut all, &jacobians.output),
         };
-        let system = System::jumping(graph, time, states, signals, derivatives, &all, whens)?;
+        let system = System::of(&Parts {
+            outputs: &all,
+            ..*parts
+        })?;
         Ok(Self { system, jacobians })
     }
 
@@ -111,16 +103,16 @@ impl Linearised {
             state: jacobian::forward(graph, derivatives, &symbols).entries,
             ..Jacobians::default()
         };
-        Self::jumping(
+        let parts = Parts {
             graph,
             time,
             states,
             signals,
             derivatives,
-            &[],
-            &jacobians,
-            whens,
-        )
+            outputs: &[],
+            whens: Some(whens),
+        };
+        Self::of(&parts, &jacobians)
     }
 
     /// Outputs h with C by x: a system without states, whose signals are x and w.

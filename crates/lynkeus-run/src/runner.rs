@@ -51,6 +51,16 @@ pub(crate) trait Runner: Persist + Debug + Send + Sync {
         None
     }
 
+    /// How many particles count; of what has some.
+    fn effective(&self) -> Option<f64> {
+        None
+    }
+
+    /// The particles, and their weights, which sum to 1.
+    fn particles(&self) -> Option<(&[f64], &[f64])> {
+        None
+    }
+
     /// The state of the observer itself.
     fn state(&self) -> &[f64] {
         self.estimate()

@@ -10,7 +10,7 @@ use lynkeus_model::Whens;
 use crate::divergence::explained;
 use crate::equations::{Both, Equations};
 use crate::error::state_text;
-use crate::events::{Clauses, Guards, JumpSlopes, Memory, Seen, TimeEvents};
+use crate::events::{Clauses, Guards, JumpSlopes, Memory, Seen, TimeEvents, WhenExpressions};
 use crate::routine::{Routine, Runner};
 use crate::snapshot::{Damaged, Digest, Persist, Walk};
 use crate::{BetweenSamples, Dynamics, Error, Events, Margin, Result, Slopes};
@@ -26,6 +26,25 @@ pub struct System {
     code: Arc<Code>,
     start: Vec<f64>,
     margins: Arc<[Margin]>,
+}
+
+/// What a [`System`] is made of: symbols and expressions of a graph.
+#[derive(Clone, Copy, Debug)]
+pub struct Parts<'a> {
+    /// which holds them
+    pub graph: &'a Graph,
+    /// a symbol
+    pub time: Node,
+    /// name, symbol and start value of each
+    pub states: &'a [(String, Node, f64)],
+    /// name and symbol of each
+    pub signals: &'a [(String, Node)],
+    /// in the order of the states
+    pub derivatives: &'a [Node],
+    /// name and expression of each
+    pub outputs: &'a [(String, Node)],
+    /// by which the state jumps, where it does; their symbols are those above
+    pub whens: Option<&'a Whens>,
 }
 
 /// The equations of a [`System`] as expressions.
@@ -74,24 +93,33 @@ impl System {
         derivatives: &[Node],
         outputs: &[(String, Node)],
     ) -> Result<Self> {
-        let none = Whens::default();
-        Self::jumping(graph, time, states, signals, derivatives, outputs, &none)
+        Self::of(&Parts {
+            graph,
+            time,
+            states,
+            signals,
+            derivatives,
+            outputs,
+            whens: None,
+        })
     }
 
-    /// The same of a system whose state jumps by clauses, whose symbols are those of the states, time
-    /// and signals.
+    /// The same, of what may jump.
     ///
     /// # Errors
     /// As [`System::new`].
-    pub fn jumping(
-        graph: &Graph,
-        time: Node,
-        states: &[(String, Node, f64)],
-        signals: &[(String, Node)],
-        derivatives: &[Node],
-        outputs: &[(String, Node)],
-        whens: &Whens,
-    ) -> Result<Self> {
+    pub fn of(parts: &Parts<'_>) -> Result<Self> {
+        let Parts {
+            graph,
+            time,
+            states,
+            signals,
+            derivatives,
+            outputs,
+            whens,
+        } = *parts;
+        let none = Whens::default();
+        let whens = whens.unwrap_or(&none);
         if states.len() != derivatives.len() {
             let (expected, found) = (per_state(states.len()), derivatives.len());
             return Err(Error::setting("number of derivatives", expected, found));
@@ -257,6 +285,14 @@ impl System {
         }
     }
 
+    /// The clauses by which its state jumps, over its [inputs](Expressions::inputs); none where it never does.
+    pub fn whens(&self) -> Option<WhenExpressions<'_>> {
+        let equations = &*self.code.equations;
+        let inputs = &equations.inputs[..equations.smooth_inputs()];
+        let whens = equations.roots.whens.as_ref()?;
+        Some(whens.expressions(&equations.graph(), inputs, self.states().len()))
+    }
+
     /// How many values the switches in time have: what jumps with time alone is an input of the
     /// equations.
     pub fn modes(&self) -> usize {
@@ -264,13 +300,16 @@ impl System {
     }
 
     /// Whether it jumps or bends (as max does) with time alone, at instants that are found and at
-    /// which an integration stops; or whether its state jumps by clauses.
-    pub fn has_instants(&self) -> bool {
-        if self.has_clauses() {
-            return true;
-        }
+    /// which an integration stops.
+    pub fn bends_with_time(&self) -> bool {
         let mut switches = self.code.equations.switches.iter();
         switches.any(|switches| !switches.is_empty())
+    }
+
+    /// Whether an integration stops at instants within a step: where it [bends with
+    /// time](Self::bends_with_time), or its state jumps by clauses.
+    pub fn has_instants(&self) -> bool {
+        self.has_clauses() || self.bends_with_time()
     }
 
     /// Whether its state jumps by clauses.
@@ -543,6 +582,19 @@ impl Dynamics for Evaluation {
         if let Some(clauses) = self.system.code.clauses.clone() {
             clauses.see(self.smooth_at(t, x), seen);
         }
+    }
+
+    fn rates(&mut self, t: f64, x: &[f64], dx: &[f64]) -> Vec<f64> {
+        let Some(clauses) = self.system.code.clauses.clone() else {
+            return vec![];
+        };
+        let mut beside = vec![];
+        self.beside(t, &mut beside);
+        let states = self.system.states().len();
+        let time = std::iter::once(1.0);
+        let speeds = time.chain(dx[..states].iter().copied());
+        let speeds: Vec<f64> = speeds.chain(beside.iter().map(|pair| pair[1])).collect();
+        clauses.rates(self.smooth_at(t, x), &speeds)
     }
 
     fn truths(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>> {

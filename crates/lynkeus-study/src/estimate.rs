@@ -31,6 +31,8 @@ pub struct EstimateSettings {
     pub deviations: bool,
     /// Innovations of the measured outputs, with theirs.
     pub innovations: bool,
+    /// How many particles count, row by row.
+    pub effective: bool,
 }
 
 impl EstimateSettings {
@@ -110,6 +112,7 @@ fn read_section(mut section: Section<'_>, mut log: LogSettings) -> Result<Estima
         innovations: section
             .optional("innovations", Entry::boolean)?
             .unwrap_or_default(),
+        effective: section.optional("ess", Entry::boolean)?.unwrap_or_default(),
         log,
         input_derivatives: section
             .optional("input_derivatives", |entry| {

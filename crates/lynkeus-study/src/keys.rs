@@ -46,7 +46,7 @@ pub(super) const KEYS: [KeySpec; 5] = [
 ];
 
 /// The sections.
-pub(super) const SECTIONS: [KeySpec; 13] = [
+pub(super) const SECTIONS: [KeySpec; 14] = [
     KeySpec {
         name: "sensors",
         shape: Shape::Section(&[&SENSORS]),
@@ -124,6 +124,12 @@ pub(super) const SECTIONS: [KeySpec; 13] = [
         shape: Shape::Section(&[&COMPARE]),
         default: "none",
         meaning: "which families are compared",
+    },
+    KeySpec {
+        name: "serve",
+        shape: Shape::Section(&[&SERVE]),
+        default: "none",
+        meaning: "how the estimator runs beside a plant ([serve](serve.md))",
     },
     KeySpec {
         name: "plot",
@@ -280,6 +286,7 @@ pub(super) const OBSERVER: [KeySpec; 3] = [
             "ekf",
             "ukf",
             "mhe",
+            "particle",
         ]),
         default: "`\"auto\"`",
         meaning: "the observer family; `auto` takes the first with a theorem that is proved to fit, has its keys and is fast enough for the run, else `ekf`",
@@ -527,7 +534,7 @@ pub(super) const LOG: [KeySpec; 7] = [
 ];
 
 /// `[estimate]` without the integrator.
-pub(super) const ESTIMATE: [KeySpec; 11] = [
+pub(super) const ESTIMATE: [KeySpec; 12] = [
     KeySpec {
         name: "late",
         shape: Shape::Positive,
@@ -557,6 +564,12 @@ pub(super) const ESTIMATE: [KeySpec; 11] = [
         shape: Shape::Flag,
         default: "false",
         meaning: "also `<name>_innovation` and `<name>_innovation_sd` of each measured output: its reading less what was expected of it, and the standard deviation of that ([what they are judged by](credibility.md))",
+    },
+    KeySpec {
+        name: "ess",
+        shape: Shape::Flag,
+        default: "false",
+        meaning: "also `ess` of a [particle filter](particle.md): how many particles count after each row, (Σw)²/Σw²",
     },
     KeySpec {
         name: "between_samples",
@@ -599,5 +612,54 @@ pub(super) const ESTIMATE: [KeySpec; 11] = [
         shape: Shape::As("`true`, `false`", &Shape::Flag),
         default: "`false`",
         meaning: "refuse a log in which a cell that is read has no number, or whose times do not increase",
+    },
+];
+
+/// `[serve]`
+pub(super) const SERVE: [KeySpec; 7] = [
+    KeySpec {
+        name: "wait",
+        shape: Shape::NotNegative,
+        default: "0: rows come in the order of their times",
+        meaning: "how much older than the newest row a row may be when it comes, in units of the plant's time: it is put in its place, and what was told before is corrected",
+    },
+    KeySpec {
+        name: "state",
+        shape: Shape::As("path, from the study's folder", &Shape::Text),
+        default: "none: it begins anew",
+        meaning: "the file that keeps where the estimator is: a row is in it before it is answered, and the next start goes on from there, whatever ended the one before",
+    },
+    KeySpec {
+        name: "history",
+        shape: Shape::As(
+            "path with `%Y`, `%m` and `%d`, from the study's folder",
+            &Shape::Text,
+        ),
+        default: "none",
+        meaning: "CSV files of what was told, one for each day: `\"tank-%Y-%m-%d.csv\"`",
+    },
+    KeySpec {
+        name: "keep_days",
+        shape: Shape::Whole(1),
+        default: "all",
+        meaning: "so many days of the history are kept",
+    },
+    KeySpec {
+        name: "assets",
+        shape: Shape::As("path, from the study's folder", &Shape::Text),
+        default: "one plant, and messages without a name",
+        meaning: "the CSV file of many plants of this study: their names under `asset`, and in the other columns parameters in which they differ",
+    },
+    KeySpec {
+        name: "http",
+        shape: Shape::As("address and port", &Shape::Text),
+        default: "none",
+        meaning: "where a page with the estimates, their events, `/estimates` and `/metrics` are: `\"127.0.0.1:8080\"`",
+    },
+    KeySpec {
+        name: "token",
+        shape: Shape::Text,
+        default: "none: this machine alone may look",
+        meaning: "what a request has to say, as `Authorization: Bearer …` or `?token=…`",
     },
 ];

@@ -36,6 +36,7 @@ mod observer;
 mod schema;
 mod section;
 mod sensors;
+mod serve;
 mod simulate;
 mod source;
 mod swept;
@@ -57,6 +58,7 @@ pub use manifold::ManifoldSettings;
 pub use observer::ObserverSettings;
 pub use schema::schema;
 pub use sensors::{Late, Noise, Screen, Sensors, bias_of};
+pub use serve::ServeSettings;
 pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
 pub use tune::{Scale, Swept, TuneSettings, Values};
@@ -110,6 +112,8 @@ pub struct Study {
     pub fit: FitSettings,
     /// The families that `compare` runs; `None` means each that fits, and the filters.
     pub compare: Option<Vec<Name>>,
+    /// How its estimator runs beside a plant.
+    pub serve: ServeSettings,
     /// The quantities to draw, one panel each; `None` lets the tool choose.
     pub show: Option<Vec<Name>>,
     /// The plant's unit of time, of `[plot]` or of `[log]`: the one on the time axis.
@@ -177,6 +181,7 @@ impl Study {
         if let (Some(plant), Some(folder)) = (study.plant.as_mut(), path.parent()) {
             *plant = folder.join(&*plant);
         }
+        study.serve.beside(path.parent().unwrap_or(Path::new("")));
         Ok(study)
     }
 
@@ -259,6 +264,7 @@ impl Study {
             tune: top.optional("tune", tune::read)?.unwrap_or_default(),
             fit: top.optional("fit", fit::read)?.unwrap_or_default(),
             compare: top.optional("compare", compare)?.flatten(),
+            serve: top.optional("serve", serve::read)?.unwrap_or_default(),
             show,
             time_unit,
             records: Records::default(),

@@ -30,14 +30,14 @@ pub struct ObserverSettings {
 
 impl ObserverSettings {
     /// The families that may be used: the one asked for, or all that own the keys given, and the
-    /// filters, which stand in where none of those will do.
+    /// filters, which stand in where none of those will do; those that draw random numbers where they are asked for.
     pub fn families(&self) -> impl Iterator<Item = &'static dyn Family> + '_ {
         FAMILIES
             .iter()
             .copied()
             .filter(|family| match &self.family {
                 Some(name) => family.name() == name.text,
-                None => family.is_filter() || self.owns_all(*family),
+                None => !family.is_sampled() && (family.is_filter() || self.owns_all(*family)),
             })
             .filter(|family| family.is_filter() || !self.is_curved)
     }

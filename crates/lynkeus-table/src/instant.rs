@@ -31,6 +31,12 @@ impl Instant {
         self.zoned
     }
 
+    /// What a text says: RFC 3339, or a relaxation of it that leaves no doubt.
+    #[must_use]
+    pub fn read(text: &str) -> Option<Self> {
+        read(text)
+    }
+
     /// So many seconds after this one, to the nanosecond.
     pub(super) fn later(self, seconds: f64) -> Self {
         let whole = seconds.floor();
@@ -41,8 +47,9 @@ impl Instant {
         }
     }
 
-    /// From `origin` to here, rounded once where that is less than 104 days.
-    pub(super) fn seconds_since(self, origin: Self) -> f64 {
+    /// From `origin` to here in seconds, rounded once where that is less than 104 days.
+    #[must_use]
+    pub fn seconds_since(self, origin: Self) -> f64 {
         seconds(self.nanoseconds - origin.nanoseconds)
     }
 }

@@ -64,8 +64,9 @@ impl Pattern {
         &self.text
     }
 
-    /// The time that a text says.
-    pub(super) fn instant(&self, text: &str) -> Option<Instant> {
+    /// The time that a text says; none where it is not written so.
+    #[must_use]
+    pub fn instant(&self, text: &str) -> Option<Instant> {
         let mut scan = Scan::new(text);
         let mut civil = Civil::default();
         let mut is_afternoon = None;

@@ -2,7 +2,7 @@
 
 use lynkeus_observability::{Kind, Note, Symmetry};
 
-use crate::Words;
+use crate::{Words, counted};
 
 /// Names before the rest becomes a count.
 const LISTED: usize = 8;
@@ -17,14 +17,15 @@ impl Words for Symmetry {
             None => {
                 let count = self.moves.len();
                 let known = count - self.directions.min(count);
+                let known = counted(known, "combination");
                 return format!(
-                    "{moves} can change together without a trace in the outputs: {known} combinations of these {count} can be known"
+                    "{moves} can change together without a trace in the outputs: {known} of these {count} can be known"
                 );
             }
         };
         match (self.invariants.is_empty(), &self.moves[..]) {
-            (true, [only]) => format!("{only} can have any value: the outputs do not feel it"),
-            (true, _) => format!("{moves} can have any values: the outputs do not feel them"),
+            (true, [only]) => format!("{only} can have any value: the outputs do not depend on it"),
+            (true, _) => format!("{moves} can have any values: the outputs do not depend on them"),
             (false, _) => format!(
                 "of {moves}, which can be {how} together, only {} can be known",
                 listed(&self.invariants)

@@ -68,7 +68,8 @@ impl Words for Shown {
 /// `1, 2.5`
 fn listed(numbers: &[f64]) -> String {
     let number = |x: &f64| match x.is_finite() {
-        true => x.to_string(),
+        // what a product of two numbers leaves in the last digits is noise to a reader
+        true => rounded(*x, 10).to_string(),
         false => "beyond the range of numbers".to_owned(),
     };
     numbers.iter().map(number).collect::<Vec<_>>().join(", ")

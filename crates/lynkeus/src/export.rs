@@ -67,7 +67,6 @@ fn written(
     let mut notes = vec![];
     let study = &causal(study, &mut notes);
     let plant = prepare::plant(study)?;
-    prepare::whens::refuse(study, &plant, "export")?;
     let prepared = Prepared::new(study, &plant)?;
     refuse_late(&prepared, options.to, options.tunable)?;
     let mut design = match is_tunable {

@@ -107,6 +107,16 @@ pub mod prepare {
     pub use lynkeus_experiment::prepare::{Prepared, StudyDesign, plant, refuse_misfits};
 }
 
+/// Rows that come one by one under the names of a log, and what is told of them.
+pub mod stream {
+    pub use lynkeus_experiment::stream::{Alarm, Channel, Given, Stream, Told};
+}
+
+/// What every page is made of: its style, and what draws pictures in it.
+pub mod report_parts {
+    pub use crate::report::{PLOT, PLOT_LICENSE, PLOT_STYLE, STYLE};
+}
+
 /// Values of keys, tried: which is best.
 pub mod tune {
     pub use lynkeus_experiment::tune::{Axis, Change, Foretold, Measure, Peak, Row, Sweep, tune};

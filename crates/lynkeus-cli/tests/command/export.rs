@@ -2,8 +2,10 @@
 
 mod corners;
 mod credible;
+mod events;
 mod glitch;
 mod hidden;
+mod hybrid;
 pub(super) mod javascript;
 mod late;
 mod manifold;

@@ -169,7 +169,6 @@ fn a_grid_that_overflows_is_refused_with_its_size() {
 #[test]
 fn a_log_that_is_too_coarse_for_the_gain_is_told() {
     let folder = crate::Folder::new();
-    folder.change("study.toml", "theta = 0.03 ", "theta = 0.09 ");
     folder.change(
         "study.toml",
         "between_samples = \"linear\"",

@@ -124,7 +124,7 @@ fn studies_that_cannot_be_read() {
         ],
     );
     let text = refused(
-        |f| f.change("study.toml", "theta = 0.03", "theta = -0.03"),
+        |f| f.change("study.toml", "theta = 0.09", "theta = -0.09"),
         2,
     );
     says(
@@ -132,7 +132,7 @@ fn studies_that_cannot_be_read() {
         &[
             "study.toml:10:9",
             "`theta` of [observer]",
-            "expected positive numbers, found -0.03",
+            "expected positive numbers, found -0.09",
         ],
     );
     let text = refused(|f| f.change("study.toml", "[\"pump\"]", "[\"pmup\"]"), 2);

@@ -43,6 +43,10 @@ fn the_hidden_pump_of_the_measured_tanks() {
             "[estimate]",
             "[estimate]\ncolumns = { level = \"y\", pump = \"u\" }",
         );
+        // the measured levels go further, and their noise wants a slower observer
+        folder.change("study.toml", "theta = 0.09", "theta = 0.03");
+        folder.change("study.toml", "[2, 8]", "[0.05, 10]");
+        folder.change("study.toml", "[1, 10]", "[0.05, 10]");
         let path = path.canonicalize().unwrap();
         let ended = folder.run(&["estimate", "study.toml", path.to_str().unwrap()]);
         assert_eq!(ended.code, 0, "{}", ended.err);

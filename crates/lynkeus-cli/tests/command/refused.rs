@@ -162,7 +162,7 @@ fn a_device_that_is_full() {
 #[test]
 fn a_wrong_theta_of_a_named_family_is_refused_by_check() {
     for (study, given, wrong) in [
-        ("two-tanks/study.toml", "theta = 0.03", "[0.03, 0.05]"),
+        ("two-tanks/study.toml", "theta = 0.09", "[0.09, 0.05]"),
         ("lee/study.toml", "theta = [3, 9]", "[3, 3, 3, 3, 3, 3, 3]"),
         ("ltaief/study.toml", "theta = 10", "[10]"),
         ("farza/study.toml", "theta = [60, 15]", "60"),

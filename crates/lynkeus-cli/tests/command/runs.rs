@@ -223,7 +223,7 @@ fn a_simulation_sums_its_errors_up() {
         let (x, hat) = (place(name), place(&format!("{name}_hat")));
         rows.iter().map(|row| (row[hat] - row[x]).abs()).collect()
     };
-    for (name, width) in [("pump", 10.0), ("upper", 9.95)] {
+    for (name, width) in [("pump", 10.0), ("upper", 6.0)] {
         let told = &ended.json()["errors"][name];
         let errors = errors(name);
         let late = &errors[errors.len() / 2..];

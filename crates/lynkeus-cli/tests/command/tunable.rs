@@ -27,7 +27,7 @@ const CASES: [Case; 11] = [
         example: "two-tanks",
         study: "study.toml",
         setting: &[],
-        change: ("theta = 0.03", "theta = 0.05"),
+        change: ("theta = 0.09", "theta = 0.05"),
         arguments: &["theta=0.05"],
     },
     // two chains, exponents that are no whole numbers, remedies against peaking
@@ -239,7 +239,7 @@ fn what_is_no_number_above_0_is_refused() {
     compiled(folder.path.path(), &[]);
     let header = folder.read("c/twotanks.h");
     assert!(
-        header.contains("0  theta θ of the gain of level; 0.03"),
+        header.contains("0  theta θ of the gain of level; 0.09"),
         "{header}"
     );
     for wrong in ["theta=0", "theta=-1", "theta=nan", "theta=inf"] {

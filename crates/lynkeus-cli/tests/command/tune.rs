@@ -51,11 +51,11 @@ fn the_chosen_value_is_written_and_nothing_else() {
     let ended = folder.run(&["tune", "study.toml", "--write"]);
     assert_eq!(ended.code, 0, "{}", ended.err);
     assert!(
-        ended.out.contains("study.toml: theta: 0.03 becomes 0.08"),
+        ended.out.contains("study.toml: theta: 0.09 becomes 0.08"),
         "{}",
         ended.out
     );
-    let expected = text.replace("theta = 0.03 ", "theta = 0.08 ");
+    let expected = text.replace("theta = 0.09 ", "theta = 0.08 ");
     assert_eq!(folder.read("study.toml"), expected);
 }
 

@@ -236,6 +236,7 @@ fn columns(course: &Course) -> impl Iterator<Item = &Series> {
         .chain(&course.monitors)
         .chain(deviations)
         .chain(&course.innovations)
+        .chain(&course.effective)
 }
 
 fn columns_mut(course: &mut Course) -> impl Iterator<Item = &mut Series> {
@@ -246,6 +247,7 @@ fn columns_mut(course: &mut Course) -> impl Iterator<Item = &mut Series> {
         .chain(&mut course.monitors)
         .chain(deviations)
         .chain(&mut course.innovations)
+        .chain(&mut course.effective)
 }
 
 /// Whose replay it is.

@@ -17,7 +17,7 @@ pub(super) fn given(settings: &EstimateSettings) -> impl Iterator<Item = &Name> 
 }
 
 /// The names that such a text reads if it is an expression.
-pub(super) fn names(text: &str) -> Vec<String> {
+pub(crate) fn names(text: &str) -> Vec<String> {
     let graph = Graph::new();
     let every = RefCell::new(vec![]);
     let known = |name: &str| {

@@ -33,6 +33,8 @@ pub enum Kind {
     Frozen,
     /// A single reading moves the estimate by many of its deviations.
     Jump,
+    /// Few particles count, or none.
+    Particles,
     /// Readings are much closer to the estimate than declared.
     Noise,
     /// Innovations that follow from the ones before.
@@ -71,6 +73,9 @@ impl Kind {
             }
             Self::Frozen => {
                 "mend the sensor, or declare its range (`limits` of [sensors]) if that is what its readings show (the result is written all the same)"
+            }
+            Self::Particles => {
+                "take more `particles`, proposal = \"auxiliary\", a larger `initial_variance` or densities under [process_noise], or a noise that explains the readings (the result is written all the same)"
             }
             _ => {
                 "declare larger densities under [process_noise] for what the model does not know, or a larger noise of the sensor; compare units, signs and columns of the log with the model (the result is written all the same)"

@@ -23,6 +23,7 @@ use lynkeus_study::{Records, Smoothing};
 use lynkeus_table::series::Store;
 
 pub mod noise;
+mod particles;
 
 /// Runs the design's filter over samples.
 ///
@@ -38,11 +39,16 @@ pub(crate) fn run(
     let (study, augmented) = (prepared.study(), prepared.augmented());
     let mut course = Course {
         keeps_innovations: study.estimate.innovations,
+        keeps_effective: study.estimate.effective,
         records: study.records,
         ..Course::default()
     };
     let notes = &mut course.notes;
     let filter = blueprint(prepared, design, samples, settings, notes)?;
+    let densities = match &filter.updates {
+        Updates::Filter { model, .. } => model.process_noise.clone(),
+        Updates::Jumps { .. } => vec![],
+    };
     let mut filter = filter.estimator().map_err(explain)?;
     if study.records != Records::Nothing {
         filter.keep_record();
@@ -50,6 +56,7 @@ pub(crate) fn run(
     let n = filter.names().len();
     replay(&mut filter, samples, n, &mut course, watch)?;
     tell(filter.health(), samples, &mut course);
+    particles::tell(prepared, design, &densities, filter.health(), &mut course);
     let smoothed = match study.estimate.smoothing {
         None => None,
         Some(Smoothing::Interval) => filter.smoothed(None, study.estimate.deviations),
@@ -177,6 +184,7 @@ pub(crate) fn blueprint(
     refuse_longer_lag(study, &tuning.kind)?;
     refuse_smoothed_bounds(study, tuning)?;
     refuse_rotations(prepared, &tuning.kind)?;
+    particles::refuse(study, &tuning.kind)?;
     let model = model(prepared, design, tuning, samples, notes)?;
     let kept = FilterSettings {
         gate: tuning.gate,

@@ -42,7 +42,7 @@ pub(crate) fn rounded(step: f64) -> f64 {
 /// What a step does that `estimate` and `simulate` do not.
 pub fn bends(system: &System) -> Option<String> {
     let told = "the model bends with time alone (max, min, abs of time): lynkeus stops at these instants, here a step goes across them";
-    system.has_instants().then(|| told.to_owned())
+    system.bends_with_time().then(|| told.to_owned())
 }
 
 /// What fixed steps may lose of a plant that jumps with its state.

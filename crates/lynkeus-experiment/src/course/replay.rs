@@ -55,6 +55,9 @@ pub(crate) fn replay(
         course,
         (estimates, deviations, estimator.innovations().len()),
     );
+    if course.keeps_effective && estimator.effective().is_some() {
+        course.effective = course.columns(1);
+    }
     match course.records {
         Records::Nothing => {}
         Records::Likelihood => course.predicted = course.columns(estimator.sensors()),
@@ -87,6 +90,7 @@ pub(crate) fn replay(
             add_row(columns, row.iter().copied());
         }
         judge(course, time, estimator.innovations().iter().copied());
+        add_row(&mut course.effective, estimator.effective());
         if let Some(record) = estimator.record() {
             course.log_likelihood += record.log_likelihood;
             add_row(&mut course.predicted, record.predicted.iter().copied());

@@ -102,7 +102,7 @@ pub fn refuse_settings(prepared: &Prepared<'_>, design: &Design) -> Result<(), E
     let Some(filter) = &design.observer.filter else {
         if study.records != Records::Nothing {
             let message = format!(
-                "record: expected a filter (\"ekf\", \"ukf\" or \"mhe\"), found the {} observer, which has neither innovation covariances nor a likelihood",
+                "record: expected a filter (\"ekf\", \"ukf\", \"mhe\" or \"particle\"), found the {} observer, which has neither innovation covariances nor a likelihood",
                 design.examination.family
             );
             return Err(Error::input(message).at(&study.file));

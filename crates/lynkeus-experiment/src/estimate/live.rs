@@ -68,7 +68,15 @@ pub fn estimator(study: &Study) -> Result<Estimator, Error> {
 pub fn late_estimator(study: &Study, wait: f64) -> Result<Late, Error> {
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
-    let estimator = live(&prepared)?;
+    late(&prepared, live(&prepared)?, wait)
+}
+
+/// An estimator that goes back to where the readings of the study's sensors belong.
+pub(super) fn late(
+    prepared: &Prepared<'_>,
+    estimator: Estimator,
+    wait: f64,
+) -> Result<Late, Error> {
     let declared = &prepared.declared().late;
     let outputs = prepared.augmented().outputs.iter();
     let delays = outputs.map(|output| match declared.of(&output.variable.name) {

@@ -6,6 +6,7 @@ use lynkeus_expr::Spent;
 use lynkeus_model::{Home, Plant};
 use lynkeus_observers::{Design, Monitor, Signal};
 use lynkeus_run::Error as RunError;
+use lynkeus_run::filter::ParticleHealth;
 use serde::Serialize;
 
 use crate::answer::Origin;
@@ -109,7 +110,10 @@ pub struct Outcome {
     /// how the readings went together with what was expected of them, by measured output; none for
     /// an observer without deviations
     pub innovations: Vec<Innovations>,
-    /// these row by row with their standard deviations, where they are asked for, under their headers
+    /// how the particles went, and how many there are; of a particle filter
+    pub particles: Option<(usize, ParticleHealth)>,
+    /// these row by row with their standard deviations, where they are asked for, under their headers; and how many
+    /// particles count
     pub innovation_columns: Vec<(String, Series)>,
     /// what the corrections of a filter are made of, where [`Study::records`](lynkeus_study::Study::records) asks for all of it
     pub corrections: Option<Corrections>,
@@ -392,6 +396,7 @@ impl Raw<'_> {
             }),
             innovations,
             innovation_columns,
+            particles: course.particles,
             corrections: course.corrections,
             origin,
             accuracies,
@@ -466,7 +471,7 @@ fn account(declared: &Declared, design: &Design, is_weighed: bool, replayed: boo
         .leaves(input_derivatives, promised)
 }
 
-/// The innovations row by row, each followed by its standard deviation.
+/// The innovations row by row, each followed by its standard deviation; then how many particles count.
 fn innovation_columns(
     design: &Design,
     course: &mut Course,
@@ -479,7 +484,12 @@ fn innovation_columns(
         let header = headers.free(&format!("{name}_{what}"), &format!("the {what} of {name}"));
         (header, values)
     });
-    named.collect()
+    let mut named: Vec<_> = named.collect();
+    for values in std::mem::take(&mut course.effective) {
+        let header = headers.free("ess", "the effective number of particles");
+        named.push((header, values));
+    }
+    named
 }
 
 /// What a judge sees of a run.

@@ -3,7 +3,9 @@
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable, parse_expression};
 use lynkeus_observers::{Monitor, Observer, Signal};
-use lynkeus_run::{Column, EstimatorSettings, Margin, Method, Role, Step, System, Tolerances};
+use lynkeus_run::{
+    Column, EstimatorSettings, Margin, Method, Parts, Role, Step, System, Tolerances,
+};
 
 use crate::prepare::manifold;
 use crate::words::explain;
@@ -129,15 +131,15 @@ pub(crate) fn plant_reading(
         .zip(starts)
         .map(|(s, start)| (s.name.clone(), s.node, start))
         .collect();
-    System::jumping(
-        &plant.graph,
-        plant.time,
-        &states,
+    System::of(&Parts {
+        graph: &plant.graph,
+        time: plant.time,
+        states: &states,
         signals,
-        &plant.derivatives,
-        &named(&plant.outputs),
-        &plant.whens,
-    )
+        derivatives: &plant.derivatives,
+        outputs: &named(&plant.outputs),
+        whens: Some(&plant.whens),
+    })
     .map_err(explain)
 }
 

@@ -189,10 +189,8 @@ impl Frame<'_> {
         }
         let (name, capitals, real) = (&self.prefix, self.capitals(), self.real());
         let sensors = self.device.sensors();
-        let room = format!("the rows that are kept end after a late sample: raise {capitals}_ROWS");
         format!(
-            "#define {capitals}_ROOM 7 /* {room} */\n\n\
-             /* Rows that are kept, so that a late reading finds its place: at least those of the longest delay, and one\n\
+            "/* Rows that are kept, so that a late reading finds its place: at least those of the longest delay, and one\n\
              \x20  more for each late reading in it. */\n\
              #ifndef {capitals}_ROWS\n#define {capitals}_ROWS 64\n#endif\n\
              typedef char {name}_rows_suffice[{capitals}_ROWS > {sensors} + 2 ? 1 : -1];\n\n\
@@ -226,8 +224,15 @@ impl Frame<'_> {
         let Device {
             signals, estimates, ..
         } = self.device;
-        let codes = codes(self.device).enumerate().map(|(k, (code, about))| {
-            format!("#define {capitals}_{code} {} /* {about} */\n", k + 1)
+        let codes = codes(self.device).map(|reason| {
+            let about = match reason.word {
+                "ROOM" => reason.about.replace("ROWS", &format!("{capitals}_ROWS")),
+                _ => reason.about.to_owned(),
+            };
+            format!(
+                "#define {capitals}_{} {} /* {about} */\n",
+                reason.word, reason.number
+            )
         });
         let codes: String = codes.collect();
         let fields: String = self

@@ -84,38 +84,73 @@ impl Device<'_> {
     }
 }
 
-/// What `push` of every device can say, from 1 on.
-const CODES: [(&str, &str); 5] = [
-    (
-        "TIME",
-        "the time is no number, or before that of the last sample",
-    ),
-    ("INPUT", "the first value of an input is no number"),
-    (
-        "INTERVAL",
-        "the interval is too short, or takes more than a million steps",
-    ),
-    ("DIVERGED", "an estimate has run away"),
-    ("NOT_FINITE", "the equations have no value there"),
-];
+/// A reason of `push`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reason {
+    pub word: &'static str,
+    pub number: usize,
+    pub about: &'static str,
+}
 
-/// What it says of numbers that may be changed, after the other codes.
-const TUNING: (&str, &str) = (
-    "TUNING",
-    "a number that may be changed is not finite and above 0",
-);
+/// What `push` can say; a number is taken once, whatever a device has.
+const CODES: [Reason; 8] = [
+    Reason {
+        word: "TIME",
+        number: 1,
+        about: "the time is no number, or before that of the last sample",
+    },
+    Reason {
+        word: "INPUT",
+        number: 2,
+        about: "the first value of an input is no number",
+    },
+    Reason {
+        word: "INTERVAL",
+        number: 3,
+        about: "the interval is too short, or takes more than a million steps",
+    },
+    Reason {
+        word: "DIVERGED",
+        number: 4,
+        about: "an estimate has run away",
+    },
+    Reason {
+        word: "NOT_FINITE",
+        number: 5,
+        about: "the equations have no value there",
+    },
+    Reason {
+        word: "TUNING",
+        number: 6,
+        about: "a number that may be changed is not finite and above 0",
+    },
+    Reason {
+        word: "ROOM",
+        number: 7,
+        about: "the rows that are kept end after a late sample: raise ROWS",
+    },
+    Reason {
+        word: "EVENTS",
+        number: 8,
+        about: "events follow each other without end, or one is touched and not crossed",
+    },
+];
 
 /// So many samples in a row that are refused because the equations have no value, or an estimate has run
 /// away, are behind an absurd reading that was taken: from the next on it starts anew.
 pub(super) const PATIENCE: usize = 5;
 
-/// What `push` of a device can say, from 1 on.
-pub(super) fn codes(device: &Device<'_>) -> impl Iterator<Item = (&'static str, &'static str)> {
-    codes_of(!device.tunables.is_empty())
-}
-
-fn codes_of(is_tunable: bool) -> impl Iterator<Item = (&'static str, &'static str)> {
-    CODES.into_iter().chain(is_tunable.then_some(TUNING))
+/// What `push` of a device can say.
+pub(super) fn codes(device: &Device<'_>) -> impl Iterator<Item = Reason> {
+    let is_tunable = !device.tunables.is_empty();
+    let is_late = !device.delays.is_empty();
+    let has_events = device.blueprint.flow.has_clauses();
+    CODES.into_iter().filter(move |reason| match reason.word {
+        "TUNING" => is_tunable,
+        "ROOM" => is_late,
+        "EVENTS" => has_events,
+        _ => true,
+    })
 }
 
 /// What can become of a reading of a filter, from 0 on.
@@ -135,11 +170,9 @@ pub(super) const CREDIBLE: &str =
 
 /// The number of a word of the draft, where it is one of these.
 pub(super) fn number_of(word: &str) -> Option<usize> {
-    let is_it = |own: &(&str, &str)| own.0 == word;
-    let code = codes_of(true)
-        .position(|own| is_it(&own))
-        .map(|place| place + 1);
-    code.or_else(|| READINGS.iter().position(is_it))
+    let code = CODES.iter().find(|own| own.word == word);
+    let reading = READINGS.iter().position(|own| own.0 == word);
+    code.map(|own| own.number).or(reading)
 }
 
 #[cfg(test)]
@@ -148,15 +181,15 @@ mod tests {
 
     #[test]
     fn a_word_has_one_number() {
-        let words = codes_of(true).chain(READINGS);
-        let words: Vec<&str> = words.map(|word| word.0).collect();
+        let codes = CODES.iter().map(|reason| reason.word);
+        let words: Vec<&str> = codes.chain(READINGS.map(|word| word.0)).collect();
         for (place, word) in words.iter().enumerate() {
             assert!(!words[..place].contains(word), "{word}");
         }
         let of = |words: &[&str]| words.iter().map(|w| number_of(w)).collect::<Vec<_>>();
         assert_eq!(
-            of(&["TIME", "TUNING", "MISSING", "AT_LIMIT", "STATE"]),
-            [Some(1), Some(6), Some(0), Some(3), None]
+            of(&["TIME", "TUNING", "EVENTS", "MISSING", "AT_LIMIT", "STATE"]),
+            [Some(1), Some(6), Some(8), Some(0), Some(3), None]
         );
     }
 }

@@ -29,10 +29,12 @@ typeof undefined union unix unsigned var void volatile w while with x y yield
 
 /// Words in capitals that the runtime has a meaning for.
 const SIZES: &str = "
-CARRIED CARRIED_INSIDE DIMENSION DIMENSION_INSIDE DRAWN ENTRIES ENTRIES_INSIDE ENTRIES_ROOM
-ENTRIES_ROOM_INSIDE EPSILON ESTIMATED INFINITY INPUTS ITERATIONS LARGER NAN OUTPUTS OWN PARAMETERS POINTS R
-RANK REPORTED SENSORS SHOWN SIGNALS SMALLEST STATE STATES TOLD TUNABLES TUNABLE_NAMES TUNED WIDTH
-WIDTH_INSIDE
+ALLOWED AT_ONCE CARRIED CARRIED_INSIDE CHANGES CLAUSES CONDITIONS CONDITIONS_ROOM DIMENSION
+DIMENSION_INSIDE DISCRETE DRAWN ENDLESS ENTRIES ENTRIES_INSIDE ENTRIES_ROOM ENTRIES_ROOM_INSIDE
+EPSILON ESTIMATED HAPPENED HAS_LAST HURRY INFINITY INPUTS ITERATIONS LARGER LAST MEMORY MIRRORS NAN
+NEWEST NEXT OUTPUTS OWN PARAMETERS POINTS R RANK RELATIONS RELATIONS_ROOM REPORTED ROTATIONS SENSORS
+SHOWN SIGNALS SMALLEST STARTED STATE STATES SUSPECT TIMERS TOLD TRUTHS TUNABLES TUNABLE_NAMES TUNED
+TURNS VIEW WIDTH WIDTH_INSIDE
 ";
 
 /// What math.h defines in capitals, here or there.
@@ -280,6 +282,12 @@ pub(super) fn number(value: f64) -> String {
 pub(super) fn table(name: &str, values: &[f64]) -> String {
     let texts: Vec<String> = values.iter().map(|value| number(*value)).collect();
     listed("real", name, texts, "R(0.0)")
+}
+
+/// A table of times, or of what counts them.
+pub(super) fn times(name: &str, values: impl Iterator<Item = f64>) -> String {
+    let texts = values.map(|value| format!("{value:?}")).collect();
+    listed("double", name, texts, "0.0")
 }
 
 /// A table of places.

@@ -6,7 +6,8 @@ use lynkeus_run::{BetweenSamples, Jacobians, Level, Manifold, Tuned, Updates};
 
 use super::device::{Device, Entry, FirstReading};
 use super::draft::{Arguments, Target, draft, number, places, table};
-use super::machine::{FIELD, INTEGRATE, Linear, Machine, Which, code, refuse_jumps};
+use super::events::{discrete, integrated_point, remembering};
+use super::machine::{FIELD, Linear, Machine, Which, code, refuse_jumps};
 use super::syntax::Type;
 use super::template::{chosen, exchanged};
 use crate::Refusal;
@@ -255,8 +256,19 @@ impl Machine {
         let is_relative = model.sensors.iter().any(is_share);
         let has_rotations = !model.manifold.rotations.is_empty();
         let has_dials = !model.manifold.dials.is_empty();
+        let has_events = flow.has_clauses();
+        let discrete = match settings.kind {
+            FilterKind::Unscented(_) => discrete(model),
+            _ => vec![],
+        };
+        if !discrete.is_empty() {
+            self.size("DISCRETE", discrete.len());
+            self.tables += &places("discrete_states", discrete.iter().copied());
+        }
         let facts = [
             (confined.is_some(), "confined"),
+            (has_events, "events"),
+            (!discrete.is_empty(), "discrete"),
             (has_rotations, "rotations"),
             (has_dials, "dials"),
             (!model.manifold.mirrors.is_empty(), "mirrors"),
@@ -295,6 +307,7 @@ impl Machine {
             is_tuned: !device.tunables.is_empty(),
         };
         self.tuned(device, None)?;
+        self.events(flow, &arguments, device.blueprint.run.method)?;
         let field = self.engine(&settings.kind, &free, &arguments, &holds)?;
         let is_extended = settings.kind == FilterKind::Extended;
         let which_inside = Which::Inside {
@@ -314,7 +327,7 @@ impl Machine {
             self.tables += &table("range_from", &ends(|b| b.low));
             self.tables += &table("range_to", &ends(|b| b.high));
         }
-        let text = chosen(FILTER, &holds)
+        let text = remembering(&chosen(FILTER, &holds), has_events)
             .replace("FIELD_INSIDE", "linearised_inside")
             .replace("predict_inside", &which_inside.renamed("predict"));
         let text = text.replace("FIELD", field);
@@ -345,6 +358,7 @@ impl Machine {
         let n = free.flow.system().states().len();
         match kind {
             FilterKind::MovingHorizon(..) => Err(Refusal::Window),
+            FilterKind::Particles(..) => Err(Refusal::Particles),
             FilterKind::Extended => {
                 self.size("LARGER", n);
                 self.linear(Which::Free, free, arguments)?;
@@ -501,15 +515,13 @@ impl Machine {
             false => self.add(FIELD),
         }
         self.flow(free.flow.system(), arguments)?;
-        self.add(&exchanged(INTEGRATE, |word| match word {
-            "integrate" => Some("integrate_point".to_owned()),
-            "DIMENSION" => Some("STATES".to_owned()),
-            _ => None,
-        }));
+        self.add(&integrated_point(free.flow.system()));
         let facts = [
             (weights.centre >= 0.0, "definite"),
             (free.is_noisy(), "noisy"),
             (has_limits, "limits"),
+            (about.contains(&"events"), "events"),
+            (about.contains(&"discrete"), "discrete"),
             (about.contains(&"rotations"), "rotations"),
             (about.contains(&"dials"), "dials"),
             (about.contains(&"mirrors"), "mirrors"),
@@ -523,7 +535,7 @@ impl Machine {
             true => "lifted(i, s->readings[i], h[i])",
             false => "s->readings[i]",
         };
-        let text = chosen(UNSCENTED, &holds)
+        let text = remembering(&chosen(UNSCENTED, &holds), about.contains(&"events"))
             .replace("BEFORE_PARAMETER", parameter)
             .replace("BEFORE_ARGUMENT", argument)
             .replace("READING_SHOWN", reading);

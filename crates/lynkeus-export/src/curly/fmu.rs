@@ -145,12 +145,12 @@ impl Version {
 }
 
 /// Cases of a `switch` that say what went wrong.
-pub(super) fn reasons(codes: impl Iterator<Item = (&'static str, &'static str)>) -> String {
-    let case = |(k, (_, about)): (usize, (&str, &str))| {
+pub(super) fn reasons(codes: impl Iterator<Item = (usize, &'static str)>) -> String {
+    let case = |(number, about): (usize, &str)| {
         let about = comment(about);
-        format!("    case {}:\n        return \"{about}\";\n", k + 1)
+        format!("    case {number}:\n        return \"{about}\";\n")
     };
-    codes.enumerate().map(case).collect()
+    codes.map(case).collect()
 }
 
 fn wrapper(
@@ -188,7 +188,10 @@ fn wrapper(
         ("@STARTS@", component.starts.len().to_string()),
         ("@TOKEN@", token.to_owned()),
         ("@FIRST_SIGNALS@", starts.collect::<Vec<_>>().join(", ")),
-        ("@REASONS@", reasons(codes(component.device))),
+        (
+            "@REASONS@",
+            reasons(codes(component.device).map(|reason| (reason.number, reason.about))),
+        ),
     ];
     title + &version.wrapped(CORE, holds, &values)
 }

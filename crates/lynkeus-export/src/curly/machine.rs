@@ -5,6 +5,7 @@ use lynkeus_expr::Node;
 use lynkeus_run::{Expressions, Level, Linearised, Method, Step, System};
 
 use super::draft::{Arguments, Target, draft, places, table};
+use super::events::{integrated, remembering};
 use super::syntax::Type;
 use super::template::{chosen, exchanged, mentions, parts};
 use crate::code::Solver;
@@ -136,7 +137,7 @@ pub(super) fn code(of: &Expressions<'_>, parts: &[&[Node]]) -> Result<Code, Refu
 }
 
 /// The length of a step, for an interval of some `length`.
-fn step_length(method: Method) -> Result<String, Refusal> {
+pub(super) fn step_length(method: Method) -> Result<String, Refusal> {
     match method {
         Method::Rk4(Step::AtMost(h)) => Ok(format!("(length < {h:?} ? length : {h:?})")),
         Method::Rk4(Step::Substeps(n)) => Ok(format!("(length / {n}.0)")),
@@ -319,7 +320,8 @@ impl Machine {
         self.add(&which.renamed(&own));
         if !which.shares() {
             let along = linear.along(scale);
-            self.add(&which.renamed(&[INTEGRATE, &along].join("\n")));
+            let integrated = integrated(linear.flow.system(), linear.holds());
+            self.add(&which.renamed(&[integrated, along].join("\n")));
         }
         Ok(())
     }
@@ -327,7 +329,9 @@ impl Machine {
     /// P = ΦPΦᵀ + W along a flow that is drafted already.
     pub fn carried(&mut self, which: Which, linear: &Linear<'_>) {
         if !which.is_carried() {
-            self.add(&which.renamed(&chosen(PREDICT, linear.holds())));
+            let predict = chosen(PREDICT, linear.holds());
+            let has_events = linear.flow.system().has_clauses();
+            self.add(&which.renamed(&remembering(&predict, has_events)));
         }
     }
 }
@@ -343,7 +347,8 @@ impl Linear<'_> {
             None => at.to_owned(),
             Some(_) => format!("noise_order[{at}]"),
         };
-        chosen(ALONG, self.holds())
+        let has_events = self.flow.system().has_clauses();
+        remembering(&chosen(ALONG, self.holds()), has_events)
             .replace("NOISE_SCALE", &scale)
             .replace("PLACE_I", &place("i"))
             .replace("PLACE_J", &place("j"))

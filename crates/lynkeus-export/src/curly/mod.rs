@@ -11,6 +11,7 @@ mod description;
 mod device;
 mod draft;
 mod estimator;
+mod events;
 pub mod fmu;
 pub mod javascript;
 mod machine;

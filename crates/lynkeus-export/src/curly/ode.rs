@@ -297,7 +297,7 @@ impl Exchange<'_> {
             ("@TOKEN@", token.to_owned()),
             ("@FIRST_GIVEN@", listed(given.collect())),
             ("@NOMINALS@", listed(nominals.collect())),
-            ("@REASONS@", reasons(CODES.into_iter())),
+            ("@REASONS@", reasons((1..).zip(CODES.map(|code| code.1)))),
         ];
         let file = version.wrapper();
         format!("/* {file}: {name} as a functional mock-up unit. */\n")

@@ -251,14 +251,18 @@ mod tests {
     fn found(model: &ErrorModel, rate: f64) -> f64 {
         let n = model.size() - 1;
         let proof = longest(
-            &[model.clone()],
+            std::slice::from_ref(model),
             &[0],
             &vec![1.0; n],
             rate,
             &Budget::default(),
         );
         let proof = proof.expect("decays with short intervals");
-        assert!(holds_between_samples(&[model.clone()], &[0], &proof));
+        assert!(holds_between_samples(
+            std::slice::from_ref(model),
+            &[0],
+            &proof
+        ));
         proof.interval
     }
 
@@ -292,8 +296,19 @@ mod tests {
         };
         model.sectors = vec![slope(0, &weights), slope(1, &weights)];
         let budget = Budget::default();
-        let proof = longest(&[model.clone()], &[0], &[1.0, 1.0], 0.2, &budget).unwrap();
-        assert!(holds_between_samples(&[model.clone()], &[0], &proof));
+        let proof = longest(
+            std::slice::from_ref(&model),
+            &[0],
+            &[1.0, 1.0],
+            0.2,
+            &budget,
+        )
+        .unwrap();
+        assert!(holds_between_samples(
+            std::slice::from_ref(&model),
+            &[0],
+            &proof
+        ));
         assert!(proof.interval > 0.2, "{}", proof.interval);
         let P = proof.P[0].view((0, 0), (2, 2)).into_owned();
         let mut seed = 1_u64;

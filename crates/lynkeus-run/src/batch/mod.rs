@@ -17,6 +17,7 @@ use std::thread::{Builder, available_parallelism};
 
 use crate::{Column, Error, Result, Simulation};
 pub use block::Ended;
+pub(crate) use plan::Divided;
 
 use block::{Block, Desk, IsOver, Record, groups};
 use plan::{Event, Plan, Program};

@@ -698,6 +698,10 @@ impl<D: Dynamics> Dynamics for Filippov<'_, D> {
         self.inner.watch(t, x, seen);
     }
 
+    fn rates(&mut self, t: f64, x: &[f64], dx: &[f64]) -> Vec<f64> {
+        self.inner.rates(t, x, dx)
+    }
+
     fn truths(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>> {
         self.inner.truths(t, x)
     }

@@ -2,7 +2,8 @@
 
 use lynkeus_model::Timer;
 
-use super::when::{Clauses, Seen, first_after};
+use super::when::{Clauses, SAME, Seen, first_after};
+use crate::grid::Grid;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, Result};
 
@@ -38,6 +39,9 @@ pub struct Memory {
     at_once: usize,
     /// a clause that takes effect ever sooner, and its relation
     suspect: Option<(usize, usize)>,
+    /// events by the state since somebody counts them, and how many there may be
+    happened: usize,
+    allowed: Option<usize>,
 }
 
 /// When a clause took effect.
@@ -102,6 +106,35 @@ impl Memory {
         };
         self.timers = clauses.shape.timers.iter().map(first).collect();
         self.hurry = vec![Hurry::default(); clauses.shape.clauses.len()];
+    }
+
+    /// Counts events by the state from now on, of which there may be so many.
+    pub(crate) fn count(&mut self, allowed: Option<usize>) {
+        (self.happened, self.allowed) = (0, allowed);
+    }
+
+    /// How many there were.
+    pub(crate) fn happened(&self) -> usize {
+        self.happened
+    }
+
+    /// One more.
+    pub(super) fn note(&mut self) {
+        self.happened += 1;
+    }
+
+    /// Whether there may be no more.
+    pub(super) fn is_spent(&self) -> bool {
+        self.allowed.is_some_and(|allowed| self.happened >= allowed)
+    }
+
+    /// Whether a timer is due.
+    pub(super) fn is_due(&self, clauses: &Clauses, t: f64) -> bool {
+        let timers = clauses.shape.timers.iter().zip(&self.timers);
+        let mut timers = timers.filter(|(timer, _)| !timer.is_initial);
+        timers.any(|(timer, &next)| {
+            Grid::new(timer.start, timer.interval).time(next) <= t + SAME * t.abs()
+        })
     }
 
     /// An interval is over.

@@ -4,6 +4,7 @@
 //! system, what jumps is taken out of them, and integrators are told of them by
 //! [`Events`](crate::Events). At an event the state goes on as it is.
 
+mod expressions;
 mod extract;
 mod filippov;
 mod guards;
@@ -13,14 +14,15 @@ mod rounds;
 mod time;
 mod when;
 
+pub use expressions::{Instants, WhenExpressions};
 pub use extract::first_jump;
 pub(crate) use extract::{bends, state_events, time_events};
 pub(crate) use filippov::{Filippov, Jump, Sides, Span};
 pub use guards::Guards;
 pub(crate) use guards::{Ahead, COEFFICIENTS, Poly, Surface};
 pub use memory::Memory;
-pub(crate) use occur::{occur, rates, saltation};
+pub(crate) use occur::{occur, saltation};
 pub(crate) use rounds::JumpSlopes;
 pub(crate) use time::TimeEvents;
 pub(crate) use when::WhenRoots;
-pub use when::{Cause, Clauses, Seen};
+pub use when::{Cause, ClauseShape, Clauses, Seen};

@@ -2,7 +2,7 @@
 
 use super::memory::{Memory, NONE};
 use super::rounds::JumpSlopes;
-use super::when::{Cause, Seen};
+use super::when::Cause;
 use crate::{Dynamics, Error, Result};
 
 /// γ̇ is nothing against what it is made of.
@@ -26,13 +26,14 @@ pub(crate) fn occur<D: Dynamics>(
     f.derivatives(t, x, &mut before);
     let mut causes = flipped.to_vec();
     let mut late = vec![0.0; clauses.relations];
-    // what somebody else has changed since the end of the last interval
+    // what somebody else has changed since the end of the last interval, which is looked at once
     let n = clauses.states;
-    if memory.is_started && memory.last.len() == n && memory.last != x[..n] {
-        let rates = rates(f, (t, length), x, &before);
+    let last = std::mem::take(&mut memory.last);
+    if memory.is_started && last.len() == n && last != x[..n] {
+        let rates = f.rates(t, x, &before);
         let (mut was, mut now) = (vec![], vec![]);
         let mut there = x.to_vec();
-        there[..n].copy_from_slice(&memory.last);
+        there[..n].copy_from_slice(&last);
         f.watch(t, &there, &mut was);
         f.watch(t, x, &mut now);
         let pairs = was.iter().zip(&now);
@@ -52,11 +53,17 @@ pub(crate) fn occur<D: Dynamics>(
         }
         let truths = f.truths(t, x)?;
         memory.rebase(&truths, &clauses.shape.needs, &outward, &flips);
-        memory.last.clear();
+    }
+    // what the state causes by itself may be more than is allowed; the clock asks nobody
+    if !causes.is_empty() && memory.is_spent() && !memory.is_due(&clauses, t) {
+        return Ok(false);
     }
     let Some(condition) = f.happen(t, x, memory)? else {
         return Ok(false);
     };
+    if !causes.is_empty() {
+        memory.note();
+    }
     let needs = clauses.shape.needs.get(condition);
     let mut own = causes
         .iter()
@@ -65,43 +72,18 @@ pub(crate) fn occur<D: Dynamics>(
     memory.hurried(&clauses, t, condition, relation)?;
     let cause = relation.map(|relation| Cause {
         relation,
-        rate: rates(f, (t, length), &old, &before)[relation],
+        rate: f.rates(t, &old, &before)[relation],
         late: late[relation],
     });
     restart(f, x);
     let mut after = vec![0.0; x.len()];
     f.derivatives(t, x, &mut after);
     let line = match condition {
-        NONE => clauses
-            .shape
-            .clauses
-            .first()
-            .map_or(0, |clause| clause.line),
+        NONE => clauses.first_line(),
         condition => clauses.line_of(condition),
     };
     f.settle((t, &old), x, [&before, &after], cause, line)?;
     Ok(true)
-}
-
-/// How fast the quantities change as the state moves with dx: central differences.
-pub(crate) fn rates<D: Dynamics>(
-    f: &mut D,
-    (t, length): (f64, f64),
-    x: &[f64],
-    dx: &[f64],
-) -> Vec<f64> {
-    let size = |values: &[f64]| values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-    let stays = (1e-5 * size(x).max(1e-3)) / size(dx).max(f64::MIN_POSITIVE);
-    let step = (1e-5 * length).min(stays);
-    let mut at = |step: f64| {
-        let moved: Vec<f64> = x.iter().zip(dx).map(|(x, dx)| x + step * dx).collect();
-        let mut seen = vec![];
-        f.watch(t + step, &moved, &mut seen);
-        seen
-    };
-    let (after, before) = (at(step), at(-step));
-    let rate = |(after, before): (&Seen, &Seen)| (after.value - before.value) / (2.0 * step);
-    after.iter().zip(&before).map(rate).collect()
 }
 
 /// What an event does to deviations: the saltation matrix, row by row, and how far the state has to be moved

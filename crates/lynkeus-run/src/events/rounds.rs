@@ -62,7 +62,7 @@ impl Clauses {
             memory.truths = rounds.truths();
         }
         let mut first = None;
-        let mut line = self.shape.clauses.first().map_or(0, |clause| clause.line);
+        let mut line = self.first_line();
         // what a round has changed is a change to the next one, too, which so sees an edge of it
         let (mut old, mut kept) = (rounds.x.to_vec(), rounds.kept());
         for round in 0..ROUNDS {

@@ -38,11 +38,17 @@ pub(crate) struct Shape {
     pub timers: Vec<Timer>,
     /// of each condition, the relations that it is made of
     pub needs: Vec<Vec<usize>>,
+    /// states that clauses alone change, to values that depend on no other states and not on time: where they
+    /// start without a deviation they never have one
+    pub discrete: Vec<usize>,
 }
 
+/// What a clause is beside its expressions.
 #[derive(Debug)]
-pub(crate) struct ClauseShape {
+pub struct ClauseShape {
+    /// of clauses with one number the first that is due takes effect
     pub group: usize,
+    /// of the text, from 1
     pub line: usize,
     /// how many conditions it has; none of what holds at every event
     pub conditions: usize,
@@ -145,7 +151,13 @@ impl WhenRoots {
             _ => *relation,
         };
         let quantities: Vec<Node> = relations.iter().map(quantity).collect();
+        let rests = (0..states.len()).filter(|&i| at_rest.contains(&own[i]));
+        let by = [own, &before, &moving[..1]].concat();
+        let slopes = jacobian::forward(graph, &values, &by).entries;
+        let changed: Vec<usize> = clauses.iter().flat_map(|c| c.changes.clone()).collect();
+        let slopes = slopes.iter().map(|slope| (changed[slope.0], slope.1));
         let shape = Shape {
+            discrete: discrete(rests.collect(), &slopes.collect::<Vec<_>>(), states.len()),
             clauses,
             timers: whens.timers.clone(),
             needs,
@@ -169,14 +181,34 @@ impl WhenRoots {
         parts[3].iter().map(surface).collect::<Vec<_>>().into_iter()
     }
 
+    /// What they are beside their expressions.
+    pub(super) fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
     /// Conditions, values, relations and quantities.
-    fn parts(&self) -> [&[Node]; 4] {
+    pub(super) fn parts(&self) -> [&[Node]; 4] {
         let shape = &self.shape;
         let values = shape.clauses.iter().map(|c| c.changes.len()).sum();
         let (conditions, rest) = self.nodes.split_at(shape.needs.len());
         let (values, rest) = rest.split_at(values);
         let (relations, quantities) = rest.split_at(rest.len() / 2);
         [conditions, values, relations, quantities]
+    }
+}
+
+/// Of states at rest, of so many, those that no clause makes depend on others: slopes are by states, states
+/// before, and time.
+fn discrete(mut rests: Vec<usize>, slopes: &[(usize, usize)], states: usize) -> Vec<usize> {
+    loop {
+        let is_free =
+            |(_, by): &(usize, usize)| *by == 2 * states || !rests.contains(&(by % states));
+        let freed: Vec<usize> = slopes.iter().filter(|s| is_free(s)).map(|s| s.0).collect();
+        let count = rests.len();
+        rests.retain(|state| !freed.contains(state));
+        if rests.len() == count {
+            return rests;
+        }
     }
 }
 
@@ -234,7 +266,7 @@ pub struct Clauses {
     pub(super) relations: usize,
     /// they, then their quantities, over the inputs of the system alone
     seen: Tape,
-    /// entries of the slopes of the quantities by the states
+    /// entries of the slopes of the quantities by all that these inputs are
     gradient: (Tape, Vec<(usize, usize)>),
     /// of each clause its new values, with their slopes by states, states before, and time
     pub(super) values: Vec<Tape>,
@@ -273,7 +305,7 @@ impl Clauses {
             conditions: Tape::new(graph, &all, conditions)?,
             relations: relations.len(),
             seen: Tape::new(graph, inputs, &[relations, quantities].concat())?,
-            gradient: slopes(quantities, own, inputs)?,
+            gradient: slopes(quantities, inputs, inputs)?,
             values: values.collect::<Result<_, _>>()?,
             slopes: parts
                 .iter()
@@ -299,11 +331,21 @@ impl Clauses {
         let values = self.gradient.0.eval_in(&Reals, inputs);
         let mut row = vec![0.0; self.states];
         for (value, (i, j)) in values.iter().zip(&self.gradient.1) {
-            if *i == relation {
-                row[*j] = *value;
+            if *i == relation && (1..=self.states).contains(j) {
+                row[*j - 1] = *value;
             }
         }
         row
+    }
+
+    /// How fast the quantities change where the inputs change so fast, time among them.
+    pub(crate) fn rates(&self, inputs: &[f64], speeds: &[f64]) -> Vec<f64> {
+        let values = self.gradient.0.eval_in(&Reals, inputs);
+        let mut rates = vec![0.0; self.relations];
+        for (value, (i, j)) in values.iter().zip(&self.gradient.1) {
+            rates[*i] += value * speeds[*j];
+        }
+        rates
     }
 
     /// The instants of timers strictly inside an interval.
@@ -367,6 +409,16 @@ impl Clauses {
             condition < end
         });
         place.unwrap_or(0)
+    }
+
+    /// States that have no deviation unless they start with one.
+    pub(crate) fn discrete(&self) -> &[usize] {
+        &self.shape.discrete
+    }
+
+    /// The line of the first clause.
+    pub(crate) fn first_line(&self) -> usize {
+        self.shape.clauses.first().map_or(0, |clause| clause.line)
     }
 
     /// The line of a clause that has this condition.

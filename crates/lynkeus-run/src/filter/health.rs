@@ -95,6 +95,73 @@ impl SensorHealth {
     }
 }
 
+/// Counts of particles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParticleHealth {
+    /// updates by readings
+    pub updates: usize,
+    /// times that they were drawn anew
+    pub resampled: usize,
+    /// updates whose readings no particle explains
+    pub starved: usize,
+    /// the least effective number after an update
+    pub lowest: f64,
+    /// updates after which hardly more than one particle counted
+    pub alone: usize,
+    /// most of them in a row
+    pub longest_alone: usize,
+    /// of them in a row, up to now
+    row: usize,
+    /// times that a particle came to where the plant has no value and was put back into the declared ranges
+    pub put_back: usize,
+}
+
+impl Default for ParticleHealth {
+    fn default() -> Self {
+        Self {
+            updates: 0,
+            resampled: 0,
+            starved: 0,
+            lowest: f64::INFINITY,
+            alone: 0,
+            longest_alone: 0,
+            row: 0,
+            put_back: 0,
+        }
+    }
+}
+
+impl ParticleHealth {
+    /// An update that leaves so many particles that count, where fewer than `least` are one.
+    pub(crate) fn see(&mut self, effective: f64, least: f64) {
+        self.updates += 1;
+        self.lowest = self.lowest.min(effective);
+        match effective < least {
+            true => (self.alone, self.row) = (self.alone + 1, self.row + 1),
+            false => self.row = 0,
+        }
+        self.longest_alone = self.longest_alone.max(self.row);
+    }
+}
+
+impl Persist for ParticleHealth {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.number(&mut self.lowest)?;
+        for count in [
+            &mut self.updates,
+            &mut self.resampled,
+            &mut self.starved,
+            &mut self.alone,
+            &mut self.longest_alone,
+            &mut self.row,
+            &mut self.put_back,
+        ] {
+            walk.count(count)?;
+        }
+        Ok(())
+    }
+}
+
 /// Counts of a whole run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Health {
@@ -109,6 +176,8 @@ pub struct Health {
     pub projected: usize,
     /// samples at which a moving horizon has not come to the minimum over its window
     pub unsolved: usize,
+    /// how the particles went; none of what has no particles
+    pub particles: Option<ParticleHealth>,
 }
 
 impl Health {
@@ -135,7 +204,9 @@ impl Persist for Health {
         walk.count(&mut self.inputs_held)?;
         walk.count(&mut self.confined)?;
         walk.count(&mut self.projected)?;
-        walk.count(&mut self.unsolved)
+        walk.count(&mut self.unsolved)?;
+        // whether there are some is no state
+        self.particles.iter_mut().try_for_each(|own| own.walk(walk))
     }
 }
 

@@ -50,6 +50,8 @@ mod likelihood;
 mod mhe;
 mod model;
 mod order;
+mod particle;
+mod point;
 mod profile;
 mod record;
 pub(crate) mod root;
@@ -63,7 +65,7 @@ pub use crate::correlation::Correlation;
 pub use crate::noise::Limits;
 pub(crate) use belief::Belief;
 pub use drawn::Drawn;
-pub use health::{Health, Innovation, Reading, SensorHealth};
+pub use health::{Health, Innovation, ParticleHealth, Reading, SensorHealth};
 pub use likelihood::{
     Likelihood, ParametricLevel, ParametricPlant, ParametricSensor, Row, Score, Seen,
 };
@@ -71,7 +73,7 @@ pub(crate) use model::check_counts;
 pub use model::{NoisyModel, NoisyPlant, Sensor};
 pub(crate) use order::by_distance;
 pub use record::Record;
-pub use settings::{FilterKind, FilterSettings, PATIENCE, SigmaPoints, Weights};
+pub use settings::{FilterKind, FilterSettings, PATIENCE, Particles, SigmaPoints, Weights};
 pub use smoother::Smoothed;
 
 use crate::divergence::{Bound, check_deviations};
@@ -82,6 +84,7 @@ use crate::{Error, EstimatorSettings, Result};
 use belief::{Projection, confine};
 use ekf::Ekf;
 use mhe::Mhe;
+use particle::ParticleFilter;
 use profile::Profile;
 use sensing::Sensing;
 use smoother::{History, Step};
@@ -118,6 +121,18 @@ impl Beside {
             health: Health::of(sensors),
             rejected: vec![(0, 0.0); sensors],
         }
+    }
+}
+
+/// The filter of such settings, at the plant's first estimate.
+pub(crate) fn started(
+    model: &NoisyModel,
+    settings: &FilterSettings,
+    run: EstimatorSettings,
+) -> Result<Box<dyn Runner>> {
+    match &settings.kind {
+        FilterKind::Particles(own) => Ok(Box::new(ParticleFilter::new(model, settings, own, run)?)),
+        _ => Ok(Box::new(Filter::new(model, settings, run)?)),
     }
 }
 
@@ -158,9 +173,9 @@ impl Filter {
         if settings.is_window() && !manifold.is_straight() {
             return Err(Error::setting("states", "no quaternion in a window", "one"));
         }
-        if flow.has_clauses() && settings.kind != FilterKind::Extended {
-            let expected = "the extended filter for a plant whose state jumps (`when`)";
-            return Err(Error::setting("filter", expected, "another one"));
+        if flow.has_clauses() && settings.is_window() {
+            let expected = "no window of samples for a plant whose state jumps (`when`)";
+            return Err(Error::setting("filter", expected, "one"));
         }
         let propagation = |flow| -> Result<Propagation> {
             let propagation = Propagation::new(flow, &model.process_noise, run)?;
@@ -171,11 +186,15 @@ impl Filter {
             engine: match settings.kind {
                 FilterKind::Extended => Engine::Extended(Ekf::new(settings.iterations)),
                 FilterKind::Unscented(points) => {
-                    Engine::Unscented(Box::new(Ukf::new(n, points, run.method, &manifold)?))
+                    Engine::Unscented(Box::new(Ukf::new(model, points, run.method)?))
                 }
                 FilterKind::MovingHorizon(length) => {
                     let horizon = Mhe::new(model, length, settings.keep_history)?;
                     Engine::MovingHorizon(Box::new(horizon))
+                }
+                FilterKind::Particles(_) => {
+                    let expected = "one with a covariance";
+                    return Err(Error::setting("filter", expected, "particles"));
                 }
             },
             spare: model.confined.as_ref().map(propagation).transpose()?,
@@ -491,7 +510,12 @@ impl Persist for Filter {
         self.propagation.walk(walk)?;
         match &mut self.engine {
             Engine::Extended(_) => {}
-            Engine::Unscented(ukf) => ukf.integrator.walk(walk)?,
+            Engine::Unscented(ukf) => {
+                ukf.integrator.walk(walk)?;
+                if self.propagation.driven.system().has_clauses() {
+                    ukf.integrator.memory().walk(walk)?;
+                }
+            }
             Engine::MovingHorizon(mhe) => mhe.walk(walk)?,
         }
         if let Some(spare) = &mut self.spare {

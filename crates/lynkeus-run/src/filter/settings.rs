@@ -12,6 +12,38 @@ pub enum FilterKind {
     Unscented(SigmaPoints),
     /// moving-horizon estimation over so many samples, the states within the model's ranges
     MovingHorizon(usize),
+    /// particles: no Gaussian, but points with weights
+    Particles(Particles),
+}
+
+/// How particles are drawn and weighed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Particles {
+    /// how many, from 2 to [`Particles::MOST`]
+    pub count: usize,
+    /// of their random numbers
+    pub seed: u64,
+    /// they are drawn anew where the effective number falls below this share of them
+    pub resample_below: f64,
+    /// drawn by what the next readings say of where the flow takes them: the auxiliary filter
+    pub looks_ahead: bool,
+}
+
+impl Particles {
+    /// Most of them.
+    pub const MOST: usize = 10_000_000;
+}
+
+impl Default for Particles {
+    /// A thousand, drawn anew where less than half of them count.
+    fn default() -> Self {
+        Self {
+            count: 1000,
+            seed: 0,
+            resample_below: 0.5,
+            looks_ahead: false,
+        }
+    }
 }
 
 /// The patience of a gate, where nothing else is said.
@@ -67,6 +99,17 @@ impl FilterSettings {
         if (self.projects || self.is_window()) && ranges != n {
             let expected = format!("{n}, one pair per state");
             return Err(Error::setting("bounds", expected, ranges));
+        }
+        if matches!(self.kind, FilterKind::Particles(_)) {
+            for (what, is_asked) in [
+                ("smoother", self.keep_history),
+                ("bounds", self.projects),
+                ("covariances without readings", self.foresees),
+            ] {
+                if is_asked {
+                    return Err(Error::setting(what, "none of particles", "one"));
+                }
+            }
         }
         if self.projects && self.keep_history {
             let found = "a smoother beside them";

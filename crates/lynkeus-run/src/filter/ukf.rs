@@ -2,6 +2,8 @@
 
 use super::belief::Belief;
 use super::censored::Believed;
+use super::model::NoisyModel;
+use super::point::Point;
 use super::profile::Profile;
 use super::root::{Factor, Root, dot, substitute};
 use super::sensing::Sensing;
@@ -10,7 +12,7 @@ use super::smoother::Correction;
 use super::transition::Propagation;
 use crate::manifold::Manifold;
 use crate::runner::Sample;
-use crate::{Integrator, Method, Result};
+use crate::{Dynamics, Integrator, Method, Result};
 
 /// Images of two points that differ by no more than this share of their size do not differ.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -37,13 +39,22 @@ pub(crate) struct Ukf {
     sums: Vec<f64>,
     factor: Factor,
     manifold: Manifold,
+    /// states that events alone change, without a deviation
+    discrete: Vec<usize>,
 }
 
 impl Ukf {
-    /// Of n states.
-    pub fn new(n: usize, points: SigmaPoints, method: Method, manifold: &Manifold) -> Result<Self> {
+    /// Of a model, by this method.
+    pub fn new(model: &NoisyModel, points: SigmaPoints, method: Method) -> Result<Self> {
+        let n = model.process_noise.len();
+        let driven = model.flow.system().evaluation();
+        let clauses = driven.clauses();
+        let discrete = clauses.iter().flat_map(|clauses| clauses.discrete());
+        let is_sure =
+            |i: &&usize| model.initial_variance[**i] == 0.0 && model.process_noise[**i] == 0.0;
         Ok(Self {
-            manifold: manifold.clone(),
+            manifold: model.manifold.clone(),
+            discrete: discrete.filter(is_sure).copied().collect(),
             integrator: Integrator::new(method, n)?,
             weights: points.weights(n)?,
             points: vec![],
@@ -92,8 +103,16 @@ impl Ukf {
             }
         }
         weights.centre(&mut self.points, n, &mut self.mean);
+        self.rest(n);
         weights.centre(&mut self.shown, m, &mut self.expected);
         Ok(())
+    }
+
+    /// Points beside their mean do not differ in what has no deviation, by rounding either.
+    fn rest(&mut self, n: usize) {
+        for point in self.points.chunks_exact_mut(n) {
+            self.discrete.iter().for_each(|&i| point[i] = 0.0);
+        }
     }
 
     /// Corrects by readings of `m` sensors, together.
@@ -204,17 +223,11 @@ impl Ukf {
         for point in self.points.chunks_exact_mut(n) {
             self.manifold.retract(&belief.x, point);
         }
-        let mut points = self.points.chunks_exact_mut(n);
-        if propagation.is_noisy()
-            && let Some(centre) = points.next()
-        {
-            propagation.advance(belief, from, to)?;
-            centre.copy_from_slice(&propagation.end);
+        match propagation.driven.system().has_clauses() {
+            false => self.flow(propagation, belief, from, to)?,
+            true => self.jump(propagation, belief, from, to)?,
         }
-        for point in points {
-            self.integrator
-                .advance(&mut propagation.driven, from, to, point)?;
-        }
+        let at_rest: Vec<f64> = self.discrete.iter().map(|&i| self.points[i]).collect();
         let straight = self.manifold.is_straight();
         if !straight {
             let mut points = std::mem::take(&mut self.points);
@@ -229,10 +242,84 @@ impl Ukf {
         if straight {
             weights.centre(&mut self.points, n, &mut belief.x);
         }
+        for (&i, value) in self.discrete.iter().zip(at_rest) {
+            belief.x[i] = value;
+        }
+        self.rest(n);
         self.extra.clear();
         propagation.push_root(&mut self.extra);
         self.spread(&mut belief.root);
         Ok(transition)
+    }
+
+    /// Each point to its image.
+    fn flow(
+        &mut self,
+        propagation: &mut Propagation,
+        belief: &Belief,
+        from: f64,
+        to: f64,
+    ) -> Result<()> {
+        let mut points = self.points.chunks_exact_mut(belief.x.len());
+        if propagation.is_noisy()
+            && let Some(centre) = points.next()
+        {
+            propagation.advance(belief, from, to)?;
+            centre.copy_from_slice(&propagation.end);
+        }
+        for point in points {
+            self.integrator
+                .advance(&mut propagation.driven, from, to, point)?;
+        }
+        Ok(())
+    }
+
+    /// The same through events, at its own instants for each point. All of one belief end on one side of an event: a
+    /// point that has not met what the estimate has is taken through it as if it had, and one that meets more goes on as
+    /// if it did not. Each remembers what the estimate does, beside which it was drawn; what has no deviation is at the
+    /// end what it is of the estimate.
+    fn jump(
+        &mut self,
+        propagation: &mut Propagation,
+        belief: &Belief,
+        from: f64,
+        to: f64,
+    ) -> Result<()> {
+        let n = belief.x.len();
+        let (centre, others) = self.points.split_at_mut(n);
+        let is_noisy = propagation.is_noisy();
+        let along = propagation.memory().filter(|_| is_noisy);
+        let memory = along.unwrap_or_else(|| self.integrator.memory());
+        memory.count(None);
+        let remembered = memory.clone();
+        let own = match is_noisy {
+            true => {
+                propagation.advance(belief, from, to)?;
+                centre.copy_from_slice(&propagation.end);
+                propagation.memory().cloned().unwrap_or_default()
+            }
+            false => {
+                let mut point = Point::new(&mut propagation.driven);
+                self.integrator.advance(&mut point, from, to, centre)?;
+                self.integrator.memory().clone()
+            }
+        };
+        let happened = own.happened();
+        for image in others.chunks_exact_mut(n) {
+            self.integrator.memory().clone_from(&remembered);
+            self.integrator.memory().count(Some(happened));
+            let mut point = Point::new(&mut propagation.driven);
+            self.integrator.advance(&mut point, from, to, image)?;
+            for _ in self.integrator.memory().happened()..happened {
+                self.integrator
+                    .anticipate(&mut point, (to, to - from), image)?;
+            }
+            for &i in &self.discrete {
+                image[i] = centre[i];
+            }
+        }
+        *self.integrator.memory() = own;
+        Ok(())
     }
 
     /// The mean of points of which some numbers are those of quaternions, and the points beside it, in the plane that

@@ -2,7 +2,7 @@
 
 use lynkeus_expr::Graph;
 use lynkeus_run::filter::{
-    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
+    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Particles, Sensor, SigmaPoints,
 };
 use lynkeus_run::{Blueprint, Error, Estimator, EstimatorSettings, Late, Level};
 
@@ -61,8 +61,13 @@ fn filter(kind: FilterKind) -> Estimator {
     blueprint.estimator().unwrap()
 }
 
-fn kinds() -> [FilterKind; 3] {
+fn kinds() -> [FilterKind; 4] {
+    let particles = Particles {
+        count: 40,
+        ..Particles::default()
+    };
     [
+        FilterKind::Particles(particles),
         FilterKind::Extended,
         FilterKind::Unscented(SigmaPoints::default()),
         FilterKind::MovingHorizon(5),

@@ -10,6 +10,7 @@ mod late;
 mod likelihood;
 mod linear_plants;
 mod manifold;
+mod particles;
 mod replay;
 mod second_opinion;
 mod simulation;

@@ -2,7 +2,7 @@
 
 use lynkeus_expr::{Expr, Graph};
 use lynkeus_run::filter::{
-    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
+    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Particles, Sensor, SigmaPoints,
 };
 use lynkeus_run::{
     BetweenSamples, Blueprint, Estimator, EstimatorSettings, Level, Method, Step, System,
@@ -81,13 +81,21 @@ fn chain(n: usize, kind: FilterKind, method: Method) -> Estimator {
         whens: Default::default(),
     };
     let of_filter = FilterSettings {
-        keep_history: true,
+        keep_history: !matches!(kind, FilterKind::Particles(_)),
         ..FilterSettings::of(kind)
     };
     let model = NoisyModel::new(&plant).unwrap();
     Blueprint::filter(model.clone(), of_filter, settings(method))
         .estimator()
         .unwrap()
+}
+
+fn particles(looks_ahead: bool) -> FilterKind {
+    FilterKind::Particles(Particles {
+        count: 300,
+        looks_ahead,
+        ..Particles::default()
+    })
 }
 
 fn bits(values: &[f64]) -> Vec<u64> {
@@ -185,6 +193,8 @@ fn filters_of_every_size_go_on() {
             FilterKind::Extended,
             FilterKind::Unscented(SigmaPoints::default()),
             FilterKind::MovingHorizon(4),
+            particles(false),
+            particles(true),
         ] {
             for method in [
                 Method::Explicit(tolerances()),
@@ -204,6 +214,7 @@ fn a_call_that_is_refused_changes_nothing() {
     for kind in [
         FilterKind::Extended,
         FilterKind::Unscented(SigmaPoints::default()),
+        particles(true),
     ] {
         let mut filter = chain(3, kind, Method::Rk4(Step::Auto));
         filter.push(1.0, &[0.3, 0.5]).unwrap();

@@ -2,10 +2,12 @@
 
 use lynkeus_expr::Node;
 use lynkeus_model::{LoadOptions, Plant};
-use lynkeus_run::filter::{FilterKind, FilterSettings, NoisyModel, NoisyPlant, Sensor};
+use lynkeus_run::filter::{
+    FilterKind, FilterSettings, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
+};
 use lynkeus_run::{
-    Blueprint, Error, Estimator, EstimatorSettings, Level, Method, Role, Simulation, Step, System,
-    Tolerances, Trajectory,
+    Blueprint, Error, Estimator, EstimatorSettings, Level, Method, Parts, Role, Simulation, Step,
+    System, Tolerances, Trajectory,
 };
 
 const METHODS: [Method; 2] = [
@@ -30,15 +32,15 @@ fn states(plant: &Plant) -> Vec<(String, Node, f64)> {
 fn run(text: &str, until: f64, rows: f64, method: Method) -> Result<Trajectory, Error> {
     let plant = plant(text);
     let (graph, time) = (&plant.graph, plant.time);
-    let system = System::jumping(
+    let system = System::of(&Parts {
         graph,
         time,
-        &states(&plant),
-        &[],
-        &plant.derivatives,
-        &[],
-        &plant.whens,
-    );
+        states: &states(&plant),
+        signals: &[],
+        derivatives: &plant.derivatives,
+        outputs: &[],
+        whens: Some(&plant.whens),
+    });
     let inputs = System::new(graph, time, &[], &[], &[], &[])?;
     let mut simulation = Simulation::new(system?, inputs, until, rows);
     simulation.method = method;
@@ -240,6 +242,22 @@ fn filter_from(
     noise: &[f64],
     method: Method,
 ) -> Estimator {
+    filter_of(
+        FilterKind::Extended,
+        text,
+        starts,
+        [variances, noise],
+        method,
+    )
+}
+
+fn filter_of(
+    kind: FilterKind,
+    text: &str,
+    starts: Option<&[f64]>,
+    [variances, noise]: [&[f64]; 2],
+    method: Method,
+) -> Estimator {
     let plant = plant(text);
     let mut all = states(&plant);
     for (state, start) in all.iter_mut().zip(starts.into_iter().flatten()) {
@@ -269,27 +287,28 @@ fn filter_from(
     };
     let settings = FilterSettings {
         keep_history: true,
-        ..FilterSettings::of(FilterKind::Extended)
+        ..FilterSettings::of(kind)
     };
     let blueprint = Blueprint::filter(model.unwrap(), settings, run);
     blueprint.estimator().unwrap()
 }
 
+const DRUM: &str = "model M
+  Real x(start = 1); Real v(start = 0.3); Real k(start = 2); Real c(start = 0); output Real y = x;
+equation
+  der(x) = v; der(v) = -k*x - 0.1*v^3; der(k) = -0.05*k;
+  when x <= 0.4*sin(3*time) then
+reinit(v, 0.7*abs(v) + 0.2*x + 0.1*time); c = pre(c) + x^2;
+  end when;
+  when sample(0.5, 0.7) then reinit(x, x + 0.1*v); end when;
+  when time >= 1.3 then reinit(k, 1.5*k + x*v); end when;
+end M;";
+
 /// Without noise and readings the deviations are |Φ| times the one at the start, and Φ is what
 /// differences of runs from neighbouring starts tell: through jumps that the state, time and both cause.
 #[test]
 fn deviations_go_through_jumps_as_neighbouring_runs_do() {
-    let drum = "model M
-      Real x(start = 1); Real v(start = 0.3); Real k(start = 2); Real c(start = 0); output Real y = x;
-    equation
-      der(x) = v; der(v) = -k*x - 0.1*v^3; der(k) = -0.05*k;
-      when x <= 0.4*sin(3*time) then
-        reinit(v, 0.7*abs(v) + 0.2*x + 0.1*time); c = pre(c) + x^2;
-      end when;
-      when sample(0.5, 0.7) then reinit(x, x + 0.1*v); end when;
-      when time >= 1.3 then reinit(k, 1.5*k + x*v); end when;
-    end M;";
-    let pairs = [(BALL, 1.6, 3), (drum, 2.0, 4)];
+    let pairs = [(BALL, 1.6, 3), (DRUM, 2.0, 4)];
     for (text, until, n) in pairs {
         for method in METHODS {
             for column in 0..if n == 3 { 2 } else { 3 } {
@@ -335,11 +354,60 @@ fn deviations_go_through_jumps_as_neighbouring_runs_do() {
     }
 }
 
+const UNSCENTED: FilterKind = FilterKind::Unscented(SigmaPoints {
+    alpha: 1.0,
+    beta: 0.0,
+    kappa: 0.0,
+});
+
+/// Points that are near to each other deviate as the saltation matrix says, and rows near an event find all on one side:
+/// with process noise and without.
+#[test]
+fn points_go_through_jumps_as_deviations_do() {
+    for (text, until, n) in [(BALL, 1.6, 3), (DRUM, 2.0, 4)] {
+        for method in METHODS {
+            for noise in [0.0, 1e-8] {
+                let mut variances = vec![0.0; n];
+                variances[..2].copy_from_slice(&[1e-8, 4e-8]);
+                let mut noises = vec![0.0; n];
+                noises[1] = noise;
+                let numbers = [&variances[..], &noises[..]];
+                let [mut points, mut extended] = [UNSCENTED, FilterKind::Extended]
+                    .map(|kind| filter_of(kind, text, None, numbers, method));
+                for k in 0..=60 {
+                    let t = until * f64::from(k) / 60.0;
+                    for filter in [&mut points, &mut extended] {
+                        filter.push(t, &[f64::NAN]).unwrap();
+                    }
+                    let pairs = points.estimate().iter().zip(extended.estimate());
+                    for (i, (a, b)) in pairs.enumerate() {
+                        assert!((a - b).abs() < 1e-6, "{i} at {t}: {a} beside {b}");
+                    }
+                    let [a, b] = [&points, &extended].map(|f| f.deviations().unwrap());
+                    for (i, (a, b)) in a.iter().zip(b).enumerate() {
+                        let off = (a - b).abs();
+                        assert!(off < 3e-3 * b + 1e-8, "{i} at {t}: {a} beside {b}");
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// What was saved in the middle goes on to the bit.
 #[test]
 fn a_snapshot_remembers_what_has_happened() {
-    for method in METHODS {
-        let new = || filter(BALL, &[0.01, 0.04, 0.0], &[0.0, 0.02, 0.0], method);
+    let kinds = [
+        (FilterKind::Extended, 0.02),
+        (UNSCENTED, 0.02),
+        (UNSCENTED, 0.0),
+    ];
+    for (method, (kind, noise)) in METHODS
+        .into_iter()
+        .flat_map(|m| kinds.clone().map(|kind| (m, kind)))
+    {
+        let numbers: [&[f64]; 2] = [&[0.01, 0.04, 0.0], &[0.0, noise, 0.0]];
+        let new = || filter_of(kind.clone(), BALL, None, numbers, method);
         let reading = |t: f64| [ball(t).0 + 0.02 * (40.0 * t).sin()];
         let mut whole = new();
         let mut half = new();

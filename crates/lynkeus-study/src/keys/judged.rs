@@ -225,7 +225,7 @@ pub(crate) const PRIOR: [KeySpec; 2] = [
 pub(crate) const COMPARE: [KeySpec; 1] = [KeySpec {
     name: "families",
     shape: Shape::As("list of families", &Shape::NAMES),
-    default: "every family that is not refuted, and the filters",
+    default: "every family that is not refuted, and the filters but `particle`",
     meaning: "what `compare` runs; each gets the keys of `[observer]` that it owns",
 }];
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::*;
 use crate::keys::{
     CERTIFY, COMPARE, ESTIMATE, FIT, GENERATOR, INTEGRATOR, KEYS, LOG, MANIFOLD, PLOT, SENSORS,
-    SIMULATE, TUNE,
+    SERVE, SIMULATE, TUNE,
 };
 
 const HEADER: &str = "| key | type | default | meaning |\n|---|---|---|---|\n";
@@ -61,7 +61,7 @@ fn the_schema_is_the_committed_one() {
 fn the_page_of_studies_shows_the_keys() {
     let path = document("study.md");
     let mut page = fs::read_to_string(&path).unwrap();
-    let tables: [(&str, &[KeySpec]); 14] = [
+    let tables: [(&str, &[KeySpec]); 15] = [
         ("\n## Top level\n", &KEYS),
         ("\n## `[sensors]`\n", &SENSORS),
         ("\n## `[manifold]`\n", &MANIFOLD),
@@ -75,6 +75,7 @@ fn the_page_of_studies_shows_the_keys() {
         ("\n## `[tune]`\n", &TUNE),
         ("\n## `[fit]`\n", &FIT),
         ("\n## `[compare]`\n", &COMPARE),
+        ("\n## `[serve]`\n", &SERVE),
         ("\n## `[plot]`\n", &PLOT),
     ];
     for (heading, keys) in tables {

@@ -38,7 +38,9 @@ fn write(to: &mut (impl Write + Send), columns: &[(&str, &Series)]) -> Result<()
     let fields: Result<Vec<_>, ParquetError> = columns.iter().map(field).collect();
     let schema = Type::group_type_builder("estimates").with_fields(fields?);
     let compression = Compression::ZSTD(ZstdLevel::default());
-    let properties = WriterProperties::builder().set_compression(compression);
+    let properties = WriterProperties::builder()
+        .set_compression(compression)
+        .set_created_by(concat!("lynkeus version ", env!("CARGO_PKG_VERSION")).to_owned());
     let schema = Arc::new(schema.build()?);
     let mut writer = SerializedFileWriter::new(to, schema, Arc::new(properties.build()))?;
     let rows = columns.iter().map(|(_, v)| v.len()).min().unwrap_or(0);

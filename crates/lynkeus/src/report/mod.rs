@@ -148,11 +148,15 @@ fn checked(study: &Study) -> Result<check::Report, Error> {
     Ok(report)
 }
 
-const STYLE: &str = include_str!("../../assets/report/report.css");
+/// The style of a page.
+pub const STYLE: &str = include_str!("../../assets/report/report.css");
 const SCRIPT: &str = include_str!("../../assets/report/report.js");
-const PLOT: &str = include_str!("../../assets/uplot/uPlot.iife.min.js");
-const PLOT_STYLE: &str = include_str!("../../assets/uplot/uPlot.min.css");
-const PLOT_LICENSE: &str = include_str!("../../assets/uplot/LICENSE");
+/// What draws its pictures: uPlot.
+pub const PLOT: &str = include_str!("../../assets/uplot/uPlot.iife.min.js");
+/// Their style.
+pub const PLOT_STYLE: &str = include_str!("../../assets/uplot/uPlot.min.css");
+/// Under which licence they are drawn; a page has it in it.
+pub const PLOT_LICENSE: &str = include_str!("../../assets/uplot/LICENSE");
 
 /// Nothing is asked for, whatever the page holds.
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";

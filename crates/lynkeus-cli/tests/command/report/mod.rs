@@ -147,11 +147,11 @@ fn the_slider_is_a_change_of_the_study() {
     let page_data = data(&page(&folder, &["study.toml", "log.csv"]));
     let positions = page_data["knob"]["positions"].as_array().unwrap();
     assert_eq!(positions.len(), 11);
-    assert_eq!(positions[5]["value"], 0.03);
+    assert_eq!(positions[5]["value"], 0.09);
     let (value, steps) = (&positions[8]["value"], positions[8]["steps"].as_str());
-    assert!(value.as_f64().unwrap() > 0.06, "{value}");
+    assert!(value.as_f64().unwrap() > 0.15, "{value}");
     let study = stepped(&folder.read("study.toml"), steps.unwrap(), "");
-    let faster = study.replace("theta = 0.03 ", &format!("theta = {value} "));
+    let faster = study.replace("theta = 0.09 ", &format!("theta = {value} "));
     assert_ne!(study, faster);
     let off = difference(&estimated(&folder, &faster), &node(&folder, Some(8)), "θ");
     assert!(off <= 1e-12, "{off:e}");

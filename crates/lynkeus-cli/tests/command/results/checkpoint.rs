@@ -170,7 +170,7 @@ fn a_checkpoint_of_something_else_is_refused_and_stays() {
     let Slow { folder, .. } = plain();
     assert!(killed(&folder, Duration::from_millis(300)));
     let study = folder.read("study.toml");
-    folder.change("study.toml", "theta = 0.03", "theta = 0.04");
+    folder.change("study.toml", "theta = 0.09", "theta = 0.08");
     refused(&folder, &ARGUMENTS, &["run.checkpoint", "of another study"]);
     folder.write("study.toml", &study);
     folder.change("log.csv", "4,5.15621265697", "4,5.15621265698");

@@ -170,7 +170,7 @@ pub(crate) fn densities(prepared: &Prepared<'_>, span: f64, notes: &mut Vec<Stri
         .collect();
     if is_awake {
         notes.push(format!(
-            "without [process_noise] the model is taken as right up to {} % of each state's range in a tenth of the log, so that the filter does not fall asleep",
+            "without [process_noise] the model is taken as right up to {} % of each state's range in a tenth of the log, so that the gain does not decay to zero",
             100.0 * DOUBT
         ));
     }

@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::{Ended, Outcome, Watch};
-use crate::entries::Named;
+use crate::entries::{Named, finite};
 use crate::judge::InnovationCounts;
 use crate::judge::interval::SamplingLimits;
 use crate::judge::outside::OutsideBox;
@@ -47,6 +47,8 @@ pub struct RunReport<'a> {
     outside_box: OutsideBox<'a>,
     /// of a filter, by sensor
     innovations: Named<InnovationCounts>,
+    /// of a particle filter
+    particles: Option<ParticleCounts>,
     /// whether nothing speaks against the estimates
     credible: bool,
     /// what of the study's declarations was counted
@@ -59,6 +61,24 @@ pub struct RunReport<'a> {
     warnings: &'a [String],
     /// what you should know
     notes: &'a [String],
+}
+
+/// How particles went.
+#[derive(Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+struct ParticleCounts {
+    /// how many there are
+    particles: usize,
+    /// updates by readings
+    updates: usize,
+    /// times that they were drawn anew
+    resampled: usize,
+    /// the least number that counted after an update, (Σw)²/Σw²
+    lowest_ess: Option<f64>,
+    /// updates whose readings no particle explains
+    starved: usize,
+    /// updates after which one had all the weight
+    alone: usize,
 }
 
 impl Outcome {
@@ -104,6 +124,14 @@ impl Outcome {
                 .iter()
                 .map(|i| (i.output.clone(), i.into()))
                 .collect(),
+            particles: self.particles.map(|(count, told)| ParticleCounts {
+                particles: count,
+                updates: told.updates,
+                resampled: told.resampled,
+                lowest_ess: finite(told.lowest),
+                starved: told.starved,
+                alone: told.alone,
+            }),
             credible: self.is_credible(),
             declared: &self.declared,
             ended: self.ended.as_ref(),

@@ -1,5 +1,5 @@
 /* x, then the rows of (Phi W), from one time to another along a flow. 0 where it has no value. */
-static truth along(field f, double from, double to, int steps, const real *w, const real *x, real *z)
+static truth along(field f, double from, double to, int steps, const real *w, const real *x, real *zMEMORY_PARAMETER)
 {
     for (int i = 0; i < DIMENSION; i++) {
         z[i] = R(0.0);
@@ -8,7 +8,7 @@ static truth along(field f, double from, double to, int steps, const real *w, co
         z[i] = x[i];
         z[STATES + i * WIDTH + i] = R(1.0);
     }
-    return integrate(f, from, to, steps, w, z);
+    return integrate(f, from, to, steps, w, zMEMORY_ARGUMENT);
 }
 //? noisy
 

@@ -23,7 +23,7 @@ static int advance(STATE *s, double t)
     if (steps == 0) {
         return INTERVAL;
     }
-    if (predict(FIELD, s->time, t, steps, s->inputs, s->x, s->root)) {
+    if (predict(FIELD, s->time, t, steps, s->inputs, s->x, s->rootMEMORY_OF_STATE)) {
 //? rotations
         settle(s->x, s->root);
 //?
@@ -39,6 +39,11 @@ static int advance(STATE *s, double t)
 //?
 //? confined
         return 0;
+    }
+//?
+//? events
+    if (s->memory[ENDLESS] > 0.0) {
+        return EVENTS;
     }
 //?
     return NOT_FINITE;

@@ -1,10 +1,10 @@
 /* x and the root of P to another time: P = Phi P Phi' + W. 0, and nothing changed, where the flow
    has no value. */
-static truth predict(field f, double from, double to, int steps, const real *w, real *x, real *root)
+static truth predict(field f, double from, double to, int steps, const real *w, real *x, real *rootMEMORY_PARAMETER)
 {
     real z[DIMENSION];
     real rows[CARRIED * STATES];
-    if (!along(f, from, to, steps, w, x, z)) {
+    if (!along(f, from, to, steps, w, x, zMEMORY_ARGUMENT)) {
         return 0;
     }
     for (int i = 0; i < CARRIED * STATES; i++) {

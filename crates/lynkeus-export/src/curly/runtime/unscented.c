@@ -36,6 +36,18 @@ static void centre(real *points, int size, real *mean)
     }
 }
 
+//? discrete
+/* Points beside their mean do not differ in what has no deviation, by rounding either. */
+static void still(real *points)
+{
+    for (int k = 0; k < POINTS; k++) {
+        for (int i = 0; i < DISCRETE; i++) {
+            points[k * STATES + discrete_states[i]] = R(0.0);
+        }
+    }
+}
+
+//?
 /* The lower root of the weighted sum of squares of the points, and of some rows more. */
 static void root_of_points(const real *points, const real *extra, int count, real *root)
 {
@@ -120,11 +132,20 @@ static void gather(real *points, real *x)
 
 //?
 /* Each point through the flow; P is their spread and W. 0, and nothing changed, where the flow has no value. */
-static truth predict(field f, double from, double to, int steps, const real *w, real *x, real *root)
+static truth predict(field f, double from, double to, int steps, const real *w, real *x, real *rootMEMORY_PARAMETER)
 {
     real points[POINTS * STATES];
     real point[STATES];
     real extra[STATES * STATES];
+//? events
+    /* each point meets events of its own, beside what the estimate remembers, and as many */
+    double remembered[MEMORY];
+    double own[MEMORY];
+    m[HAPPENED] = 0.0;
+    for (int i = 0; i < MEMORY; i++) {
+        remembered[i] = m[i];
+    }
+//?
     for (int i = 0; i < STATES * STATES; i++) {
         extra[i] = R(0.0);
     }
@@ -143,7 +164,7 @@ static truth predict(field f, double from, double to, int steps, const real *w, 
 //? noisy
     /* the estimate with what the process noise comes to along it */
     real z[DIMENSION];
-    if (!along(linearised, from, to, steps, w, x, z)) {
+    if (!along(linearised, from, to, steps, w, x, zMEMORY_ARGUMENT)) {
         return 0;
     }
     rows_of_noise(z, w, extra);
@@ -155,18 +176,61 @@ static truth predict(field f, double from, double to, int steps, const real *w, 
         for (int i = 0; i < STATES; i++) {
             point[i] = points[k * STATES + i];
         }
+//? !events
         if (!integrate_point(f, from, to, steps, w, point)) {
             return 0;
         }
+//?
+//? events
+        for (int i = 0; i < MEMORY; i++) {
+            own[i] = remembered[i];
+        }
+        own[ALLOWED] = k == 0 ? -1.0 : m[HAPPENED];
+        if (!integrate_point(f, from, to, steps, w, point, own)) {
+            m[ENDLESS] = own[ENDLESS];
+            return 0;
+        }
+        if (k == 0) {
+            for (int i = 0; i < MEMORY; i++) {
+                m[i] = own[i];
+            }
+        }
+        double missing = m[HAPPENED] - own[HAPPENED];
+        while (missing > 0.5) {
+            missing -= 1.0;
+            if (!anticipate(f, to, to - from, w, point, own)) {
+                m[ENDLESS] = own[ENDLESS];
+                return 0;
+            }
+        }
+//?
         for (int i = 0; i < STATES; i++) {
             points[k * STATES + i] = point[i];
         }
+//? discrete
+        /* what has no deviation is what it is of the estimate */
+        for (int i = 0; i < DISCRETE; i++) {
+            points[k * STATES + discrete_states[i]] = points[discrete_states[i]];
+        }
+//?
     }
+//? discrete
+    real at_rest[DISCRETE];
+    for (int i = 0; i < DISCRETE; i++) {
+        at_rest[i] = points[discrete_states[i]];
+    }
+//?
 //? !rotations
     centre(points, STATES, x);
 //?
 //? rotations
     gather(points, x);
+//?
+//? discrete
+    for (int i = 0; i < DISCRETE; i++) {
+        x[discrete_states[i]] = at_rest[i];
+    }
+    still(points);
 //?
     root_of_points(points, extra, STATES, root);
     return 1;
@@ -216,6 +280,9 @@ static truth show(STATE *s, double t, BEFORE_PARAMETERreal *points, real *shown,
         }
     }
     centre(points, STATES, mean);
+//? discrete
+    still(points);
+//?
     centre(shown, SENSORS, h);
     return 1;
 }
@@ -301,7 +368,8 @@ static truth correct(STATE *s, double t)
                 count++;
             }
         }
-        if (count == 0) {
+        /* there are no more than SENSORS, which compilers do not see */
+        if (count == 0 || count > SENSORS) {
             continue;
         }
 //? limits

@@ -262,14 +262,22 @@ impl Frame<'_> {
 
 /// The codes, and what they are for people.
 fn codes(device: &Device<'_>) -> String {
-    let all = || super::device::codes(device).enumerate();
-    let constants = all().map(|(k, (code, _))| format!("const {code}: usize = {};\n", k + 1));
+    let all = || super::device::codes(device);
+    let constants =
+        all().map(|reason| format!("const {}: usize = {};\n", reason.word, reason.number));
     let variants =
-        all().map(|(_, (code, about))| format!("    /// {about}\n    {},\n", camel(code)));
-    let known =
-        all().map(|(_, (code, _))| format!("            {code} => Self::{},\n", camel(code)));
-    let words = all()
-        .map(|(_, (code, about))| format!("            Self::{} => {about:?},\n", camel(code)));
+        all().map(|reason| format!("    /// {}\n    {},\n", reason.about, camel(reason.word)));
+    let known = all().map(|reason| {
+        let word = reason.word;
+        format!("            {word} => Self::{},\n", camel(word))
+    });
+    let words = all().map(|reason| {
+        format!(
+            "            Self::{} => {:?},\n",
+            camel(reason.word),
+            reason.about
+        )
+    });
     format!(
         "{}\n/// Why a sample was refused; nothing has changed then but `refused` of the state.\n\
          #[derive(Clone, Copy, Debug, PartialEq, Eq)]\npub enum Refused {{\n{}}}\n\n\

@@ -301,8 +301,8 @@ impl<'a> Block<'a> {
 
     /// Its text; `take` is the function that takes a sample.
     pub fn text(&self, take: &Made) -> String {
-        let codes = codes(self.frame.device).enumerate();
-        let codes = codes.map(|(k, (_, about))| format!("{}: {about}", k + 1));
+        let codes = codes(self.frame.device);
+        let codes = codes.map(|reason| format!("{}: {}", reason.number, reason.about));
         let codes: Vec<String> = codes.collect();
         format!(
             "(* Takes a sample at each call. Where it is refused, nothing changes but code:\n   {}.\n\

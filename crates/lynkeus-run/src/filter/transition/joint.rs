@@ -283,6 +283,10 @@ impl Dynamics for Variational<'_> {
         self.driven.watch(t, z, seen);
     }
 
+    fn rates(&mut self, t: f64, z: &[f64], dz: &[f64]) -> Vec<f64> {
+        self.driven.rates(t, z, dz)
+    }
+
     fn truths(&mut self, t: f64, z: &[f64]) -> Result<Vec<bool>> {
         self.driven.truths(t, z)
     }

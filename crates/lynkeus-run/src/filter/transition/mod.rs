@@ -12,6 +12,7 @@ use super::belief::Belief;
 use super::profile::Profile;
 use super::root::{Factor, Root, dot};
 use crate::Evaluation;
+use crate::events::Memory;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{EstimatorSettings, Linearised, Method, Result, Step};
 use joint::Joint;
@@ -168,6 +169,14 @@ impl Propagation {
         if let (true, Scheme::Joint(joint)) = (self.is_behind, &self.scheme) {
             joint.write_last(&mut self.transition);
             self.is_behind = false;
+        }
+    }
+
+    /// What is remembered of clauses.
+    pub fn memory(&mut self) -> Option<&mut Memory> {
+        match &mut self.scheme {
+            Scheme::Joint(joint) => Some(joint.integrator.memory()),
+            Scheme::Piecewise(_) => None,
         }
     }
 

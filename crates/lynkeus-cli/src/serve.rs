@@ -1,0 +1,88 @@
+//! `serve`: the estimator beside a plant.
+
+use std::io;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use clap::{Args, ValueEnum};
+
+use lynkeus::{Error, interrupt};
+use lynkeus_serve::{Board, Engine, Format, Reader, http};
+
+use super::inputs::Source;
+use super::output;
+
+/// How a study is served.
+#[derive(Debug, Args)]
+pub(super) struct Options {
+    /// What the messages on standard input and output are written in
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    stdio: Messages,
+    /// No notes on standard error, only warnings
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// [`Format`] in the words of the command line.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Messages {
+    /// A JSON object in each line
+    Json,
+    /// InfluxDB's line protocol: a processor of Telegraf (`execd`)
+    Influx,
+}
+
+impl From<Messages> for Format {
+    fn from(messages: Messages) -> Self {
+        match messages {
+            Messages::Json => Self::Json,
+            Messages::Influx => Self::Influx,
+        }
+    }
+}
+
+pub(super) fn serve(source: &Source, options: &Options) -> Result<ExitCode, Error> {
+    let study = &source.study;
+    let settings = &study.serve;
+    let files = source
+        .files()
+        .reads("the assets", settings.assets.as_deref());
+    let files = files.writes("`state` of [serve]", settings.state.as_deref());
+    files.check()?;
+    let assets = lynkeus_serve::assets(study)?;
+    let Some((_, stream)) = assets.first().cloned() else {
+        return Err(Error::input("there is no asset").at(&study.file));
+    };
+    let names: Vec<String> = assets.iter().map(|(name, _)| name.clone()).collect();
+    let mut engine = Engine::new(assets);
+    if let Some(pattern) = &settings.history {
+        engine.write_history(pattern, settings.keep_days);
+    }
+    if let Some(path) = &settings.state {
+        engine.keep(path)?;
+    }
+    let notes = stream.notes.iter().chain(engine.notes());
+    notes
+        .filter(|_| !options.quiet)
+        .for_each(|text| output::note(text));
+    let board = match &settings.http {
+        None => None,
+        Some(address) => {
+            let board = Arc::new(Board::new(Arc::clone(&stream), names));
+            let token = settings.token.as_ref().map(|token| token.text.clone());
+            let listening = http::listen(&address.text, token, Arc::clone(&board));
+            let own = listening.map_err(|error| address.blame(error))?;
+            output::note(&format!("the page is at http://{own}/"));
+            Some(board)
+        }
+    };
+    lynkeus_serve::serve(
+        &mut engine,
+        (Reader::new(stream), board.as_deref()),
+        options.stdio.into(),
+        (io::stdin(), &mut io::stdout()),
+        &interrupt::interrupted,
+        &mut output::warn,
+    )?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,493 @@
+//! One plant under way: its estimator, what was told of it, and whether that is credible.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use lynkeus::explain;
+use lynkeus::run::{Late, Revised, is_of_row};
+use lynkeus::stream::Stream;
+use lynkeus::table::Instant;
+
+use crate::bytes::{Parser, Writer};
+use crate::consistency::Consistency;
+use crate::row::Stamp;
+use crate::sensor::{Sensor, Steps, is_plausible};
+
+/// A row so many usual steps after the one before says that the clock went on, or that nobody sent any.
+const JUMP: f64 = 100.0;
+/// In widths of its declared range: an estimate so far outside is none.
+const AWAY: f64 = 1.0;
+
+/// What is told of a row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// when the row was sampled
+    pub stamp: Stamp,
+    /// estimates, then monitors, in the order of the [`Stream`]
+    pub estimate: Vec<f64>,
+    /// standard deviations of the estimates, where there are any
+    pub deviations: Vec<f64>,
+    /// whether nothing speaks against the estimate
+    pub is_credible: bool,
+    /// how many times the row was told before
+    pub revision: u64,
+    /// what speaks against it, and what the user should know
+    pub notes: Vec<String>,
+    /// it was told so before: its row came once more
+    pub is_repeated: bool,
+}
+
+/// A row that was told, and may be told again.
+#[derive(Clone, Debug)]
+struct Published {
+    t: f64,
+    stamp: Stamp,
+    /// as it came
+    read: Vec<f64>,
+    estimate: Vec<f64>,
+    deviations: Vec<f64>,
+    revision: u64,
+    /// of the row that it came with
+    sequence: u64,
+}
+
+/// One plant.
+#[derive(Clone, Debug)]
+pub(crate) struct Asset {
+    stream: Arc<Stream>,
+    /// its first row, once there is one
+    first: Vec<f64>,
+    late: Option<Late>,
+    /// what counts as zero, where times are dates
+    origin: Option<Instant>,
+    /// in the order of time
+    published: VecDeque<Published>,
+    /// by sensor
+    consistencies: Vec<Consistency>,
+    /// by sensor
+    sensors: Vec<Sensor>,
+    /// of rows
+    steps: Steps,
+}
+
+impl Asset {
+    /// Before its first row.
+    pub fn new(stream: Arc<Stream>) -> Self {
+        let sensors = stream.channels.iter().filter(|c| c.is_sensor).count();
+        Self {
+            first: vec![],
+            late: None,
+            origin: None,
+            published: VecDeque::new(),
+            consistencies: vec![Consistency::default(); sensors],
+            sensors: vec![Sensor::default(); sensors],
+            steps: Steps::default(),
+            stream,
+        }
+    }
+
+    /// Its study.
+    pub fn stream(&self) -> &Stream {
+        &self.stream
+    }
+
+    /// A number that differs for assets of other studies or parameters.
+    pub fn fingerprint(&self) -> u64 {
+        self.stream.fingerprint()
+    }
+
+    /// Takes a row, which is the `sequence`-th of all; what is told of it and of rows before. Of the last `keep` rows
+    /// of all it is known whether they are told again.
+    ///
+    /// # Errors
+    /// Why the row cannot be used: nothing has changed.
+    pub fn take(
+        &mut self,
+        stamp: Stamp,
+        values: &[f64],
+        (sequence, keep): (u64, u64),
+    ) -> Result<Vec<Line>, String> {
+        let t = self.time(stamp)?;
+        if let Some(line) = self.again(t, values)? {
+            return Ok(vec![Line {
+                is_repeated: true,
+                ..line
+            }]);
+        }
+        self.refuse(t, stamp, values)?;
+        let newest = self.newest();
+        let is_new = newest.is_none_or(|newest| t > newest);
+        // what fails changes nothing
+        let mut sensors = self.sensors.clone();
+        let readings = self.screened(&mut sensors, t, values, is_new);
+        match &mut self.late {
+            Some(late) => {
+                late.push(t, &readings).map_err(said)?;
+            }
+            None => {
+                let begun = self.stream.begin(&readings);
+                let mut late = begun.map_err(|error| error.message().to_owned())?;
+                late.push(t, &readings).map_err(said)?;
+                self.late = Some(late);
+                self.first.clone_from(&readings);
+                self.origin = match stamp {
+                    Stamp::Date(instant) => Some(instant),
+                    Stamp::Number(_) => None,
+                };
+            }
+        }
+        self.sensors = sensors;
+        let jumped = is_new.then(|| self.steps.lacks(t, JUMP)).flatten();
+        if is_new {
+            self.steps.take(t);
+        }
+        let row = Published {
+            t,
+            stamp,
+            read: values.to_vec(),
+            estimate: vec![],
+            deviations: vec![],
+            revision: 0,
+            sequence,
+        };
+        let lines = self.publish(row, jumped);
+        self.forget(keep);
+        Ok(lines)
+    }
+
+    /// A time as the plant counts it.
+    fn time(&self, stamp: Stamp) -> Result<f64, String> {
+        let found = match stamp {
+            Stamp::Number(_) => "a number",
+            Stamp::Date(_) => "a date",
+        };
+        match (stamp, self.origin) {
+            (Stamp::Number(t), None) => Ok(t),
+            (Stamp::Date(instant), origin) if origin.is_some() || self.late.is_none() => {
+                let origin = origin.unwrap_or(instant);
+                if origin.is_zoned() != instant.is_zoned() {
+                    return Err(format!(
+                        "the time {stamp}: some rows say how far their clock is from UTC, and some do not"
+                    ));
+                }
+                let seconds = self.stream.seconds.ok_or_else(|| {
+                    "dates count in seconds, and `time_unit` of [plot] says that the plant's time does not: write it under [log]".to_owned()
+                })?;
+                Ok(instant.seconds_since(origin) / seconds)
+            }
+            _ => Err(format!(
+                "the time {stamp} is {found}, and the first row's is none"
+            )),
+        }
+    }
+
+    /// The time of the newest row.
+    pub fn newest(&self) -> Option<f64> {
+        self.late.as_ref().and_then(|late| late.time())
+    }
+
+    /// The line of a row that was told and comes once more.
+    fn again(&self, t: f64, values: &[f64]) -> Result<Option<Line>, String> {
+        let Some(newest) = self.newest() else {
+            return Ok(None);
+        };
+        let is_it = |row: &&Published| is_of_row(row.t, t, newest.max(t));
+        if t > newest && !is_of_row(t, newest, t) {
+            return Ok(None);
+        }
+        let Some(known) = self.published.iter().rev().find(is_it) else {
+            return Ok(None);
+        };
+        let same = |(own, known): (&f64, &f64)| own.is_nan() || own == known;
+        if values.iter().zip(&known.read).all(same) {
+            return Ok(Some(self.line(known, self.doubts(), vec![])));
+        }
+        match self.stream.wait() > 0.0 {
+            true => Ok(None),
+            false => Err(format!(
+                "the row at {} was there with other values; with `wait` of [serve] the later one would count",
+                known.stamp
+            )),
+        }
+    }
+
+    /// Refuses what cannot be used.
+    fn refuse(&self, t: f64, stamp: Stamp, values: &[f64]) -> Result<(), String> {
+        if self.stream.is_strict() {
+            let mut channels = self.stream.channels.iter().zip(values);
+            if let Some((channel, _)) = channels.find(|(_, y)| y.is_nan()) {
+                return Err(format!(
+                    "{} is missing, and [estimate] says `strict`",
+                    channel.name
+                ));
+            }
+        }
+        let newest = self.newest().filter(|newest| t < *newest);
+        let before = newest.zip(self.published.back());
+        match before {
+            Some((newest, row)) if t < newest - self.stream.wait() => Err(format!(
+                "the row at {stamp} comes too late after the one at {}: older rows are waited for for {}, `wait` of [serve]",
+                row.stamp,
+                self.stream.wait()
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// A row without what is no reading.
+    fn screened(&self, sensors: &mut [Sensor], t: f64, values: &[f64], is_new: bool) -> Vec<f64> {
+        let mut readings = values.to_vec();
+        let channels = self.stream.channels.iter();
+        for ((y, channel), sensor) in readings.iter_mut().zip(channels).zip(sensors) {
+            let passes = |y: f64| channel.screens.iter().all(|screen| is_plausible(y, screen));
+            *y = match is_new {
+                true => sensor.take(t, *y, channel),
+                false if passes(*y) => *y,
+                false => f64::NAN,
+            };
+        }
+        readings
+    }
+
+    /// What the last push changed: the row itself, and those after it.
+    fn publish(&mut self, row: Published, jumped: Option<f64>) -> Vec<Line> {
+        let Some(late) = &self.late else {
+            return vec![];
+        };
+        let newest = late.time().unwrap_or(row.t);
+        let mut changed = late.revised().to_vec();
+        changed.push(Revised {
+            t: newest,
+            estimate: late.estimate().to_vec(),
+            deviations: late.deviations().map(<[f64]>::to_vec),
+            innovations: late.innovations().to_vec(),
+        });
+        let mut told = vec![];
+        for revised in changed {
+            let Revised {
+                t,
+                estimate,
+                deviations,
+                innovations,
+            } = revised;
+            let deviations = deviations.unwrap_or_default();
+            for (consistency, innovation) in self.consistencies.iter_mut().zip(&innovations) {
+                consistency.take(t, innovation);
+            }
+            let place = self.published.partition_point(|known| known.t < t);
+            let known = self.published.get_mut(place).filter(|known| known.t == t);
+            let is_own = is_of_row(t, row.t, newest);
+            match known {
+                Some(known) => {
+                    if is_own {
+                        join(&mut known.read, &row.read);
+                        known.sequence = row.sequence;
+                    }
+                    let was = (bits(&known.estimate), bits(&known.deviations));
+                    if was == (bits(&estimate), bits(&deviations)) && !is_own {
+                        continue;
+                    }
+                    known.revision += 1;
+                    (known.estimate, known.deviations) = (estimate, deviations);
+                }
+                None if is_own => self.published.insert(
+                    place,
+                    Published {
+                        t,
+                        estimate,
+                        deviations,
+                        ..row.clone()
+                    },
+                ),
+                // it was told so long ago that nobody asks
+                None => continue,
+            }
+            told.push(place);
+        }
+        let doubts = self.doubts();
+        let notes = |place: usize| match jumped {
+            Some(step) if place + 1 == self.published.len() => {
+                vec![format!("no row for {step}: silence, or the clock went on")]
+            }
+            _ => vec![],
+        };
+        let rows = told.iter().filter_map(|place| {
+            let row = self.published.get(*place)?;
+            Some(self.line(row, doubts.clone(), notes(*place)))
+        });
+        rows.collect()
+    }
+
+    /// What is told of a row.
+    fn line(&self, row: &Published, doubts: Doubts, mut notes: Vec<String>) -> Line {
+        let mut estimate = row.estimate.clone();
+        let told = self.stream.estimates.iter();
+        for (x, told) in estimate.iter_mut().zip(told.clone()) {
+            if let Some(from) = told.turn {
+                *x -= std::f64::consts::TAU * ((*x - from) / std::f64::consts::TAU).floor();
+            }
+        }
+        let mut is_credible = doubts.is_credible;
+        notes.extend(doubts.notes);
+        for (x, told) in estimate.iter().zip(told.clone()) {
+            let (low, high) = told.range;
+            let width = high - low;
+            if width.is_finite() && (*x < low - AWAY * width || *x > high + AWAY * width) {
+                is_credible = false;
+                notes.push(format!("{} is far outside of its range", told.name));
+            }
+        }
+        let monitors = estimate.iter().skip(told.len()).zip(&self.stream.monitors);
+        let low = monitors.filter(|(x, monitor)| **x < monitor.below);
+        notes.extend(
+            low.map(|(_, monitor)| format!("{} is low: {}", monitor.header, monitor.meaning)),
+        );
+        let has_deviations = self.stream.estimates.iter().any(|t| t.deviation.is_some());
+        Line {
+            stamp: row.stamp,
+            deviations: match has_deviations {
+                true => row.deviations.clone(),
+                false => vec![],
+            },
+            estimate,
+            is_credible,
+            revision: row.revision,
+            notes,
+            is_repeated: false,
+        }
+    }
+
+    /// What the sensors say against the estimate.
+    fn doubts(&self) -> Doubts {
+        let mut doubts = Doubts {
+            is_credible: true,
+            notes: vec![],
+        };
+        let t = self.newest().unwrap_or_default();
+        let channels = self.stream.channels.iter().filter(|c| c.is_sensor);
+        let sensors = self.sensors.iter().zip(&self.consistencies);
+        let mut silent = 0;
+        for (channel, (sensor, consistency)) in channels.zip(sensors) {
+            let name = &channel.name;
+            if let Some(since) = sensor.is_silent(t) {
+                silent += 1;
+                doubts.notes.push(format!("{name}: no reading for {since}"));
+            }
+            if let Some(run) = sensor.hangs(channel) {
+                doubts.is_credible = false;
+                let text =
+                    format!("{name} hangs: {run} equal readings, which its noise would not let it");
+                doubts.notes.push(text);
+            }
+            if consistency.contradicts(self.stream.by) {
+                doubts.is_credible = false;
+                let text = format!("the readings of {name} are not what is expected of them");
+                doubts.notes.push(text);
+            }
+        }
+        if silent > 0 && silent == self.sensors.len() {
+            doubts.is_credible = false;
+        }
+        doubts
+    }
+
+    /// Leaves out what nobody asks for any more; the newest row stays.
+    fn forget(&mut self, keep: u64) {
+        let newest = self.newest().unwrap_or_default();
+        let last = self.published.back().map_or(0, |row| row.sequence);
+        let oldest = newest - self.stream.wait();
+        let is_old = |row: &Published| {
+            row.t < oldest && !is_of_row(row.t, oldest, newest) && row.sequence + keep <= last
+        };
+        while self.published.len() > 1 && self.published.front().is_some_and(is_old) {
+            self.published.pop_front();
+        }
+    }
+
+    /// Everything that the future depends on.
+    pub fn save(&self, to: &mut Writer) {
+        to.numbers(&self.first);
+        let Some(late) = &self.late else {
+            return;
+        };
+        to.bytes(&late.snapshot());
+        to.word(u64::from(self.origin.is_some()));
+        if let Some(origin) = self.origin {
+            Stamp::Date(origin).save(to);
+        }
+        to.word(self.published.len() as u64);
+        for row in &self.published {
+            to.number(row.t);
+            row.stamp.save(to);
+            to.numbers(&row.read);
+            to.numbers(&row.estimate);
+            to.numbers(&row.deviations);
+            to.word(row.revision);
+            to.word(row.sequence);
+        }
+        self.consistencies.iter().for_each(|c| c.save(to));
+        self.sensors.iter().for_each(|s| s.save(to));
+        self.steps.save(to);
+    }
+
+    /// To where it was; none where that is no state of it.
+    pub fn load(&mut self, from: &mut Parser<'_>) -> Option<()> {
+        self.first = from.numbers()?;
+        if self.first.is_empty() {
+            return Some(());
+        }
+        let mut late = self.stream.begin(&self.first).ok()?;
+        late.restore(from.bytes()?).ok()?;
+        self.late = Some(late);
+        if from.word()? == 1 {
+            let Stamp::Date(origin) = Stamp::load(from)? else {
+                return None;
+            };
+            self.origin = Some(origin);
+        }
+        for _ in 0..from.count(56)? {
+            self.published.push_back(Published {
+                t: from.number()?,
+                stamp: Stamp::load(from)?,
+                read: from.numbers()?,
+                estimate: from.numbers()?,
+                deviations: from.numbers()?,
+                revision: from.word()?,
+                sequence: from.word()?,
+            });
+        }
+        for consistency in &mut self.consistencies {
+            *consistency = Consistency::load(from)?;
+        }
+        for sensor in &mut self.sensors {
+            *sensor = Sensor::load(from)?;
+        }
+        self.steps = Steps::load(from)?;
+        Some(())
+    }
+}
+
+/// What speaks against an estimate.
+#[derive(Clone, Debug)]
+struct Doubts {
+    is_credible: bool,
+    notes: Vec<String>,
+}
+
+/// Why a row was not taken, in words.
+fn said(error: lynkeus::run::Error) -> String {
+    explain(error).message().to_owned()
+}
+
+fn bits(numbers: &[f64]) -> Vec<u64> {
+    numbers.iter().map(|x| x.to_bits()).collect()
+}
+
+/// What was read at one time, the later reading before the earlier.
+fn join(read: &mut [f64], later: &[f64]) {
+    for (own, later) in read.iter_mut().zip(later) {
+        if later.is_finite() {
+            *own = *later;
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Messages as JSON, one object in a line.
+
+use std::fmt::Write;
+
+use lynkeus::stream::Stream;
+use lynkeus::table::exact;
+use lynkeus::visible;
+use serde_json::{Map, Value};
+
+use crate::asset::Line;
+use crate::row::{Field, Reader, Stamp};
+
+/// The name under which a message says whose row it is.
+pub const ASSET: &str = "asset";
+
+/// A message that was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Message {
+    /// whose row it is, where it says so
+    pub asset: Option<String>,
+    /// when it was sampled
+    pub stamp: Stamp,
+    /// by channel, NaN where there is none
+    pub values: Vec<f64>,
+    /// names in it that nobody reads
+    pub strangers: Vec<String>,
+}
+
+/// Reads a message.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn read(text: &str, reader: &mut Reader) -> Result<Message, String> {
+    let value: Value = serde_json::from_str(text).map_err(|e| format!("no JSON: {e}"))?;
+    let Value::Object(message) = value else {
+        return Err("expected a JSON object".to_owned());
+    };
+    let get = |key: &str| field(&message, key);
+    let stamp = reader.stamp(get(&reader.stream().time))?;
+    let values = reader.values(&get)?;
+    let asset = match message.get(ASSET) {
+        Some(Value::String(name)) => Some(name.clone()),
+        Some(Value::Number(number)) => Some(number.to_string()),
+        Some(Value::Null) | None => None,
+        Some(_) => return Err(format!("\"{ASSET}\": expected a text")),
+    };
+    let is_strange = |key: &&String| key.as_str() != ASSET && !reader.knows(key);
+    Ok(Message {
+        asset,
+        stamp,
+        values,
+        strangers: message.keys().filter(is_strange).cloned().collect(),
+    })
+}
+
+fn field(message: &Map<String, Value>, key: &str) -> Field {
+    match message.get(key) {
+        None | Some(Value::Null) => Field::Nothing,
+        Some(Value::Number(number)) => match number.as_f64() {
+            Some(x) => Field::Number(x),
+            None => Field::Other("a number that is too large"),
+        },
+        Some(Value::String(text)) => Field::Text(text.clone()),
+        Some(Value::Bool(_)) => Field::Other("a truth value"),
+        Some(Value::Array(_)) => Field::Other("a list"),
+        Some(Value::Object(_)) => Field::Other("an object"),
+    }
+}
+
+/// Appends what is told of a row, with the end of its line.
+pub fn write(line: &Line, asset: &str, stream: &Stream, to: &mut String) {
+    to.push('{');
+    key(&stream.told_time, to);
+    match line.stamp {
+        Stamp::Number(t) => to.push_str(&exact(t)),
+        date @ Stamp::Date(_) => text(&date.to_string(), to),
+    }
+    if !asset.is_empty() {
+        to.push(',');
+        key(ASSET, to);
+        text(asset, to);
+    }
+    let told = stream.estimates.iter().zip(&line.estimate).enumerate();
+    for (place, (told, estimate)) in told {
+        to.push(',');
+        key(&told.header, to);
+        to.push_str(&exact(*estimate));
+        if let (Some(header), Some(sd)) = (&told.deviation, line.deviations.get(place)) {
+            to.push(',');
+            key(header, to);
+            to.push_str(&exact(*sd));
+        }
+    }
+    let monitors = line.estimate.iter().skip(stream.estimates.len());
+    for (monitor, value) in stream.monitors.iter().zip(monitors) {
+        to.push(',');
+        key(&monitor.header, to);
+        to.push_str(&exact(*value));
+    }
+    // a string takes what is written
+    let _ = write!(
+        to,
+        ",\"credible\":{},\"revision\":{}",
+        line.is_credible, line.revision
+    );
+    if !line.notes.is_empty() {
+        to.push_str(",\"notes\":[");
+        for (place, note) in line.notes.iter().enumerate() {
+            to.push_str(if place > 0 { "," } else { "" });
+            text(note, to);
+        }
+        to.push(']');
+    }
+    to.push_str("}\n");
+}
+
+/// Appends why line `number` was not used.
+pub fn refuse(why: &str, number: u64, to: &mut String) {
+    to.push_str("{\"error\":");
+    text(&visible::line(why), to);
+    // a string takes what is written
+    let _ = writeln!(to, ",\"line\":{number}}}");
+}
+
+fn key(name: &str, to: &mut String) {
+    text(name, to);
+    to.push(':');
+}
+
+fn text(text: &str, to: &mut String) {
+    to.push_str(&Value::from(text).to_string());
+}
