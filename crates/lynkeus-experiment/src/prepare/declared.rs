@@ -6,7 +6,6 @@
 
 mod account;
 mod correlation;
-mod kind;
 
 use std::collections::BTreeMap;
 
@@ -17,8 +16,17 @@ use lynkeus_structure::{AugmentedPlant, range};
 use crate::words::explain;
 use crate::{Error, Study, near, prepare::calibrate, prepare::systems};
 pub use account::Account;
-pub use kind::Kind;
 use lynkeus_study::{Late, Name, Noise, Screen};
+
+/// One kind of declaration: what is said of single quantities, by their names.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Kind<T> {
+    /// what it is, in words
+    name: &'static str,
+    said: BTreeMap<String, T>,
+    /// whether any of it is more than nothing: a density of 0 is none
+    acts: bool,
+}
 
 /// What a study declares.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,9 +100,12 @@ impl Declared {
             &outputs,
         )?
         .acting(|noise: &Noise| noise.size() > 0.0);
+        let size = |name: &str| noise.of(name).copied();
+        let correlated = correlation::read(&sensors.correlation, &size, &outputs)?;
         Ok(Self {
             ranges: ranges(study, plant),
-            correlation: correlation::read(&sensors.correlation, &noise, &outputs)?,
+            correlation: Kind::new("correlated noise", correlated)
+                .acting(|pairs: &Vec<(String, f64)>| pairs.iter().any(|pair| pair.1 != 0.0)),
             noise,
             input_noise: Kind::read(
                 "input noise",
@@ -235,6 +246,40 @@ impl<T: Clone> Kind<T> {
         }
         let of = |k: &String| Some((k.clone(), Name::best(given, k)?.clone()));
         Ok(Self::new(name, known.iter().filter_map(of)))
+    }
+}
+
+impl<T> Kind<T> {
+    fn new(name: &'static str, said: impl IntoIterator<Item = (String, T)>) -> Self {
+        let said: BTreeMap<String, T> = said.into_iter().collect();
+        let acts = !said.is_empty();
+        Self { name, said, acts }
+    }
+
+    /// With what makes it more than nothing.
+    fn acting(self, is_something: impl Fn(&T) -> bool) -> Self {
+        let acts = self.said.values().any(is_something);
+        Self { acts, ..self }
+    }
+
+    /// What is said of a quantity.
+    pub fn of(&self, quantity: &str) -> Option<&T> {
+        self.said.get(quantity)
+    }
+
+    /// Whether any of it is more than nothing.
+    pub fn acts(&self) -> bool {
+        self.acts
+    }
+
+    /// Whether anything of this kind is declared.
+    pub fn is_declared(&self) -> bool {
+        !self.said.is_empty()
+    }
+
+    /// The quantities with what is said of them.
+    pub fn iter(&self) -> impl Iterator<Item = (&String, &T)> {
+        self.said.iter()
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::kind::Kind;
+use super::Kind;
 use crate::entries;
 
 /// What a claim counts of what the study declares, and what it leaves aside, with the reason. What is not
