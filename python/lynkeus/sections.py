@@ -41,6 +41,14 @@ class SensorsNoise(TypedDict):
     default: required)"""
 
 
+class SensorsInputNoise(TypedDict):
+    """A value of ``input_noise`` in ``[sensors]``."""
+
+    uniform: Number
+    """every error up to ± this, in the output's unit, is equally likely and none is larger (number ≥ 0;
+    default: required)"""
+
+
 class SensorsSection(TypedDict, total=False):
     """what is measured, what is unknown, how noisy (table; default: none)"""
 
@@ -67,6 +75,18 @@ class SensorsSection(TypedDict, total=False):
     value; or uniform noise, every error up to ± the number (in the output's unit) equally likely and none
     larger. Used by `simulate`, `tune`, the filters, `check --how-well` and `certify` (table: output =
     number, text `"5%"`, or `{ uniform = number }`; default: no noise)"""
+
+    input_noise: Mapping[str, Number | str | SensorsInputNoise] | None
+    """how wrong the reading of a known input is, as `noise` says it of an output: the plant has the input,
+    the observer reads it with an error that is another one in each row and stays until the next (noisy
+    inputs). Counted by the filters, their smoothers, `sd`, `fit` and `--how-well`; `simulate` draws it
+    (table: known input = number, text `"5%"`, or `{ uniform = number }`; default: no noise)"""
+
+    correlation: Mapping[str, Mapping[str, Number]] | None
+    """how the noises of two outputs go together, between −1 and 1: `{ left = { right = 0.6 } }`, each pair
+    once. Both have a standard deviation in `noise`. Counted by the filters, their smoothers, `fit` and
+    `--how-well`; `simulate` draws it (table: output = table: another output = number; default: independent
+    noises)"""
 
     bias: Mapping[str, Number] | None
     """a constant offset of a sensor that is estimated along, y = h + b or f(u − b): a state `NAME_bias` that
@@ -312,6 +332,11 @@ class ObserverSection(TypedDict, total=False):
     """ekf, ukf: "project": the estimate is kept in the declared ranges `[min, max]`: after each prediction
     and correction it is put to the nearest place inside by the covariance's metric, so that what is
     correlated moves along; the covariance stays ("project"; default: none)"""
+
+    iterations: Whole | None
+    """ekf: how often the readings of a sample are linearised, at most: about the prediction, then about the
+    estimate that they give, until it stays (the iterated extended Kalman filter): for a start that is far
+    off, where what the sensors show is not linear (whole number ≥ 1; default: 1; 20 with a quaternion)"""
 
     kappa: Number | None
     """ukf: κ, with n + κ above 0; the defaults make the cubature filter (number; default: 0)"""

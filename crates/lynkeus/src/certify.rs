@@ -15,6 +15,7 @@ use lynkeus_experiment::prepare::{Prepared, StudyDesign};
 use lynkeus_experiment::{prepare, words};
 
 mod assumptions;
+mod bounds;
 mod excited;
 mod json;
 mod print;

@@ -12,7 +12,7 @@ fn every_command_has_a_manual_page_and_is_completed() {
     let scripts = shells.map(|shell| folder.run(&["completions", shell]).out);
     for command in [
         "check", "design", "certify", "simulate", "estimate", "fit", "tune", "compare", "export",
-        "report", "schema",
+        "report", "serve", "schema",
     ] {
         let page = folder.run(&["man", command]).out;
         assert!(page.contains(&format!(".TH lynkeus-{command} 1")), "{page}");

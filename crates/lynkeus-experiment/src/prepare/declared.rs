@@ -100,9 +100,12 @@ impl Declared {
             &outputs,
         )?
         .acting(|noise: &Noise| noise.size() > 0.0);
+        let size = |name: &str| noise.of(name).copied();
+        let correlated = correlation::read(&sensors.correlation, &size, &outputs)?;
         Ok(Self {
             ranges: ranges(study, plant),
-            correlation: correlation::read(&sensors.correlation, &noise, &outputs)?,
+            correlation: Kind::new("correlated noise", correlated)
+                .acting(|pairs: &Vec<(String, f64)>| pairs.iter().any(|pair| pair.1 != 0.0)),
             noise,
             input_noise: Kind::read(
                 "input noise",

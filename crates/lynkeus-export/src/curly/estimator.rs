@@ -6,8 +6,8 @@ use lynkeus_run::{BetweenSamples, Jacobians, Level, Manifold, Tuned, Updates};
 
 use super::device::{Device, Entry, FirstReading};
 use super::draft::{Arguments, Target, draft, number, places, table};
-use super::events::{discrete, integrated_point, remembering};
 use super::machine::{FIELD, Linear, Machine, Which, code, refuse_jumps};
+use super::pass::{discrete, integrated_point, remembering};
 use super::syntax::Type;
 use super::template::{chosen, exchanged};
 use crate::Refusal;

@@ -1,86 +1,17 @@
-//! Events at which a flow's state jumps, in the draft: the clauses, what is remembered of them, and steps that end at
-//! events, found as the library's fixed steps find them.
+//! Events at which a flow's state jumps, in the draft: the clauses, and what is remembered of them.
 
-use lynkeus_run::filter::NoisyModel;
 use lynkeus_run::{Method, System, WhenExpressions};
 
 use super::device::Entry;
 use super::draft::{Arguments, Target, draft, places, times};
-use super::machine::{INTEGRATE, Machine, code, step_length};
+use super::machine::{Machine, code, step_length};
+use super::pass::holds;
 use super::syntax::Type;
-use super::template::{chosen, exchanged};
+use super::template::chosen;
 use crate::Refusal;
 use crate::code::{Code, Solver};
 
 const EVENTS: &str = include_str!("runtime/events.c");
-const PASS: &str = include_str!("runtime/pass.c");
-
-/// Facts that pieces of the runtime ask for: there is a timer, a relation.
-fn holds(system: &System) -> Vec<&'static str> {
-    let Some(whens) = system.whens() else {
-        return vec![];
-    };
-    let facts = [
-        (!whens.timers.is_empty(), "timers"),
-        (!whens.relations.is_empty(), "watched"),
-    ];
-    facts
-        .iter()
-        .filter(|fact| fact.0)
-        .map(|fact| fact.1)
-        .collect()
-}
-
-/// States that events alone change, and that have no deviation.
-pub(super) fn discrete(model: &NoisyModel) -> Vec<usize> {
-    let whens = model.flow.system().whens();
-    let discrete = whens
-        .iter()
-        .flat_map(|whens| whens.discrete.iter().copied());
-    let is_sure = |i: &usize| model.initial_variance[*i] == 0.0 && model.process_noise[*i] == 0.0;
-    discrete.filter(is_sure).collect()
-}
-
-/// How a flow is integrated: x with what is carried along it.
-pub(super) fn integrated(flow: &System, more: &[&'static str]) -> String {
-    match flow.has_clauses() {
-        true => chosen(PASS, &[&holds(flow), more, &["carried"]].concat()),
-        false => INTEGRATE.to_owned(),
-    }
-}
-
-/// How a flow is integrated from a point, x alone.
-pub(super) fn integrated_point(flow: &System) -> String {
-    let text = match flow.has_clauses() {
-        true => {
-            let mut holds = holds(flow);
-            holds.push(match holds.contains(&"watched") {
-                true => "point_watched",
-                false => "point_blind",
-            });
-            chosen(PASS, &holds)
-        }
-        false => INTEGRATE.to_owned(),
-    };
-    exchanged(&text, |word| match word {
-        "DIMENSION" => Some("STATES".to_owned()),
-        "integrate" | "leap" | "look" | "first_change" | "carry_jump" | "occur" | "pass" => {
-            Some(format!("{word}_point"))
-        }
-        _ => None,
-    })
-}
-
-/// A piece of the runtime with what is remembered of events, handed on where there are some.
-pub(super) fn remembering(text: &str, has_events: bool) -> String {
-    let words = match has_events {
-        true => [", double *m", ", m", ", s->memory"],
-        false => [""; 3],
-    };
-    text.replace("MEMORY_PARAMETER", words[0])
-        .replace("MEMORY_ARGUMENT", words[1])
-        .replace("MEMORY_OF_STATE", words[2])
-}
 
 impl Machine {
     /// The clauses of a flow, and what is remembered of them; nothing where its state never jumps.

@@ -5,7 +5,7 @@ use lynkeus_expr::Node;
 use lynkeus_run::{Expressions, Level, Linearised, Method, Step, System};
 
 use super::draft::{Arguments, Target, draft, places, table};
-use super::events::{integrated, remembering};
+use super::pass::{INTEGRATE, integrated, remembering};
 use super::syntax::Type;
 use super::template::{chosen, exchanged, mentions, parts};
 use crate::code::Solver;
@@ -153,7 +153,6 @@ pub(super) fn refuse_jumps(system: &System) -> Result<(), Refusal> {
     }
 }
 
-pub(super) const INTEGRATE: &str = include_str!("runtime/integrate.c");
 const LINEARISED: &str = include_str!("runtime/linearised.c");
 const ALONG: &str = include_str!("runtime/along.c");
 const PREDICT: &str = include_str!("runtime/predict.c");

@@ -16,6 +16,7 @@ pub mod fmu;
 pub mod javascript;
 mod machine;
 mod ode;
+mod pass;
 pub mod rust;
 pub mod structured;
 mod syntax;

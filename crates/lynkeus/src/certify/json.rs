@@ -1,13 +1,13 @@
 //! Certificates for machines.
 
-use lynkeus_observers::{Certificate, UltimateBound};
+use lynkeus_observers::Certificate;
 use lynkeus_words::Words;
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::excited::ExcitationEntry;
 use super::sampled::SampledEntry;
-use super::{CertifyReport, Excited, Strays};
+use super::{CertifyReport, Excited, Strays, bounds};
 use lynkeus_experiment::entries::{Condition, Named, Range, Verdict, finite, sides};
 use lynkeus_experiment::judge::interval::SamplingLimits;
 use lynkeus_experiment::prepare::correction::InjectionEntry;
@@ -164,16 +164,11 @@ impl From<&Certificate> for ProofSummary {
             verdict: certificate.verdict().into(),
             rate: certificate.rate,
             ultimate_bound: certificate.ultimate_bound,
-            ultimate_bounds: bounds(&certificate.ultimate),
+            ultimate_bounds: bounds::by_name(&certificate.ultimate),
             mean_square_bound: mean_square.map(|b| b.norm),
-            mean_square_bounds: bounds(mean_square.map_or(&[], |b| &b.states)),
+            mean_square_bounds: bounds::by_name(mean_square.map_or(&[], |b| &b.states)),
             region: sides(&certificate.region),
             constants: constants.collect(),
         }
     }
-}
-
-pub(super) fn bounds(each: &[UltimateBound]) -> Named<Option<f64>> {
-    let each = each.iter();
-    each.map(|b| (b.name.clone(), finite(b.value))).collect()
 }

@@ -2,12 +2,12 @@
 
 use lynkeus_answer::Document;
 use lynkeus_answer::document::{Cell, Line, Table};
-use lynkeus_observers::{Certificate, UltimateBound};
+use lynkeus_observers::Certificate;
 use lynkeus_structure::Standing;
 use lynkeus_words::Words;
 use serde_json::Value;
 
-use super::{CertifyReport, sampled};
+use super::{CertifyReport, bounds, sampled};
 use crate::Answer;
 use lynkeus_experiment::judge::interval::Intervals;
 use lynkeus_experiment::words::{condition, number, side};
@@ -141,7 +141,7 @@ fn left(report: &CertifyReport, best: &Certificate) -> String {
             return "; what disturbances, process noise and measurement errors leave of it has no bound, see the notes".to_owned();
         }
     };
-    let bounds = bounds(report, each);
+    let bounds = bounds::in_words(report, each);
     match bounds.len() {
         0 => format!(
             ", {what} {} (Euclidean norm of all quantities)",
@@ -158,20 +158,6 @@ fn left(report: &CertifyReport, best: &Certificate) -> String {
 
 /// Of what process noise leaves.
 const IN_MEAN_SQUARE: &str = "in the end in mean square (the root of E e²) within";
-
-/// `0.3 K of T`, for every bounded quantity.
-pub(super) fn bounds(report: &CertifyReport, each: &[UltimateBound]) -> Vec<String> {
-    let estimates = &report.design.observer.estimates;
-    let unit = |name: &str| {
-        let mut found = estimates.iter().filter(|e| e.variable.name == name);
-        let unit = found.next().and_then(|e| e.variable.unit.as_deref());
-        unit.filter(|unit| !unit.is_empty())
-            .map_or(String::new(), |unit| format!(" {unit}"))
-    };
-    each.iter()
-        .map(|b| format!("{}{} of {}", number(b.value), unit(&b.name), b.name))
-        .collect()
-}
 
 /// Equal ranges of an array's elements are one entry.
 fn abbreviated(sides: &[String]) -> String {
@@ -203,11 +189,11 @@ fn certificate(document: &mut Document, report: &CertifyReport, certificate: &Ce
     });
     document.table(Table::plain(["constant", "value", "meaning"]).with(rows));
     if !certificate.ultimate.is_empty() && certificate.ultimate_bound.is_some_and(|b| b > 0.0) {
-        let bounds = bounds(report, &certificate.ultimate).join(", ");
+        let bounds = bounds::in_words(report, &certificate.ultimate).join(", ");
         document.item(format!("in the end within: {bounds}"));
     }
     if let Some(found) = &certificate.mean_square {
-        let bounds = bounds(report, &found.states).join(", ");
+        let bounds = bounds::in_words(report, &found.states).join(", ");
         document.item(format!("{IN_MEAN_SQUARE}: {bounds}"));
     }
     document.notes(report.notes_of(certificate));

@@ -6,9 +6,7 @@ use lynkeus_observers::guarantee::{AtSamples, Said, SampledDecay};
 use lynkeus_words::Words;
 use serde::Serialize;
 
-use super::CertifyReport;
-use super::json;
-use super::print::bounds;
+use super::{CertifyReport, bounds};
 use lynkeus_experiment::entries::{Named, finite};
 use lynkeus_experiment::words::number;
 
@@ -53,7 +51,7 @@ impl From<&AtSamples> for AtSamplesEntry {
             rate: at.rate,
             overshoot: at.overshoot.and_then(finite),
             ultimate_bound: ultimate.and_then(|b| finite(b.norm)),
-            ultimate_bounds: json::bounds(ultimate.map_or(&[], |b| &b.states)),
+            ultimate_bounds: bounds::by_name(ultimate.map_or(&[], |b| &b.states)),
         }
     }
 }
@@ -103,7 +101,12 @@ pub(super) fn tell(
             return;
         }
     };
-    document.heading(heading.decided("proved"));
+    // no theorem: a plant that leaves the box is not covered
+    let verdict = match report.strays.words(false) {
+        Some(_) => "proved inside the box",
+        None => "proved",
+    };
+    document.heading(heading.decided(verdict));
     document.item(format!(
         "up to {} apart, however they come: the error decays at {} or faster",
         number(found.longest.interval),
@@ -127,7 +130,7 @@ pub(super) fn tell(
         ));
         let ultimate = at.ultimate.as_ref().filter(|b| b.norm > 0.0);
         if let Some(ultimate) = ultimate {
-            let bounds = bounds(report, &ultimate.states).join(", ");
+            let bounds = bounds::in_words(report, &ultimate.states).join(", ");
             document.item(format!(
                 "in the end within, where they come regularly: {bounds}"
             ));
@@ -143,7 +146,7 @@ pub(super) fn tell(
         .as_ref()
         .and_then(|h| Some((h, h.ultimate.as_ref()?)))
     {
-        let bounds = bounds(report, &ultimate.states).join(", ");
+        let bounds = bounds::in_words(report, &ultimate.states).join(", ");
         document.item(format!(
             "held instead for up to {}: at {} or faster, in the end within {bounds}",
             number(held.interval),

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use lynkeus_run::filter::Correlation;
 use lynkeus_study::{Name, Noise};
 
-use super::Kind;
 use crate::{Error, near};
 
 /// The correlations by the first output of each pair.
@@ -15,9 +14,9 @@ use crate::{Error, near};
 /// that is not positive definite.
 pub(super) fn read(
     given: &[(Name, Name, f64)],
-    noise: &Kind<Noise>,
+    noise: &dyn Fn(&str) -> Option<Noise>,
     outputs: &[String],
-) -> Result<Kind<Vec<(String, f64)>>, Error> {
+) -> Result<BTreeMap<String, Vec<(String, f64)>>, Error> {
     let mut said: BTreeMap<String, Vec<(String, f64)>> = BTreeMap::new();
     let mut pairs: Vec<(usize, usize, f64)> = vec![];
     for (one, other, correlation) in given {
@@ -46,11 +45,15 @@ pub(super) fn read(
             "noises that go with one another so much cannot do so all at once: take smaller correlations",
         )));
     }
-    Ok(Kind::new("correlated noise", said).acting(|pairs| pairs.iter().any(|pair| pair.1 != 0.0)))
+    Ok(said)
 }
 
 /// The place of an output whose noise has a standard deviation.
-fn place(name: &Name, noise: &Kind<Noise>, outputs: &[String]) -> Result<usize, Error> {
+fn place(
+    name: &Name,
+    noise: &dyn Fn(&str) -> Option<Noise>,
+    outputs: &[String],
+) -> Result<usize, Error> {
     let refuse = |what: String, hint: String| {
         let message = format!("`correlation` of [sensors]: {what}");
         name.blame(Error::input(message).hint(hint))
@@ -59,7 +62,7 @@ fn place(name: &Name, noise: &Kind<Noise>, outputs: &[String]) -> Result<usize, 
         let hint = near::suggest(&name.text, outputs.iter().map(String::as_str));
         return Err(refuse(format!("no output is called \"{name}\""), hint));
     };
-    match noise.of(&name.text) {
+    match noise(&name.text) {
         Some(Noise::Absolute(_) | Noise::Relative(_)) => Ok(place),
         Some(Noise::Uniform(_)) => Err(refuse(
             format!("the noise of {name} is uniform, and correlations are of normal noises"),
