@@ -56,7 +56,9 @@ pub(crate) struct ParticleFilter {
     round: u64,
     /// known inputs from the last sample on
     inputs: Vec<f64>,
+    /// of all states
     estimate: Vec<f64>,
+    /// without those that every row draws anew and nobody estimates
     deviations: Vec<f64>,
     /// the estimate is that of another cloud
     is_stale: bool,
@@ -101,7 +103,10 @@ impl ParticleFilter {
             round: 0,
             inputs: vec![0.0; flow.signals().len()],
             estimate: start.clone(),
-            deviations: model.initial_variance.iter().map(|v| v.sqrt()).collect(),
+            deviations: model.initial_variance[..n - model.drawn]
+                .iter()
+                .map(|v| v.sqrt())
+                .collect(),
             is_stale: true,
             effective: particles.count as f64,
             bound: Bound::new(flow.start()),
@@ -295,7 +300,8 @@ impl ParticleFilter {
         let (Cloud { x, share, .. }, moments) = (&self.cloud, &mut self.moments);
         moments.condense(x, share, &self.manifold, self.estimate.len());
         self.estimate.copy_from_slice(&moments.mean);
-        self.deviations.copy_from_slice(&moments.deviations);
+        let told = self.deviations.len();
+        self.deviations.copy_from_slice(&moments.deviations[..told]);
         self.is_stale = false;
     }
 
@@ -363,8 +369,11 @@ impl Runner for ParticleFilter {
         self.condense();
         if let Some(record) = &mut self.sensing.record {
             record.log_likelihood = log_likelihood;
-            self.moments
-                .write_covariance(&self.cloud.x, &mut record.covariance);
+            self.moments.write_covariance(
+                &self.cloud.x,
+                self.deviations.len(),
+                &mut record.covariance,
+            );
         }
         self.resample();
         Ok(())
@@ -380,7 +389,7 @@ impl Runner for ParticleFilter {
     }
 
     fn estimate(&self) -> &[f64] {
-        &self.estimate
+        &self.estimate[..self.deviations.len()]
     }
 
     fn deviations(&self) -> Option<&[f64]> {
@@ -396,7 +405,7 @@ impl Runner for ParticleFilter {
     }
 
     fn keep_record(&mut self) {
-        let (states, sensors) = (self.estimate.len(), self.sensors.len());
+        let (states, sensors) = (self.deviations.len(), self.sensors.len());
         self.sensing.record = Some(Record::new(states, sensors));
     }
 

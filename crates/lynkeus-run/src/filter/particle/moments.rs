@@ -101,8 +101,7 @@ impl Moments {
     }
 
     /// The covariance of the states that were condensed last, row by row.
-    pub fn write_covariance(&self, x: &[f64], covariance: &mut [f64]) {
-        let n = self.mean.len();
+    pub fn write_covariance(&self, x: &[f64], n: usize, covariance: &mut [f64]) {
         covariance.fill(0.0);
         self.each(x, |w, x| {
             for (place, entry) in covariance.iter_mut().enumerate() {

@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
 
 use super::code::{self, BLOCK, Code, Stride, line};
 use crate::events::{Clauses, Memory, Seen};
@@ -122,6 +123,8 @@ pub(super) struct Way {
     sensors: Evaluation,
     ranges: Vec<Limits>,
     noise: Vec<f64>,
+    /// so many last states are drawn anew in every row
+    drawn: usize,
     pub evaluation: Evaluation,
     integrator: Integrator,
     /// signals are lines between samples
@@ -146,6 +149,7 @@ impl Way {
             sensors: model.output_map.system().evaluation(),
             ranges: model.ranges.clone(),
             noise: model.process_noise.clone(),
+            drawn: model.drawn,
             evaluation: flow.driven(run.between),
             integrator: Integrator::new(Method::Rk4(Step::Substeps(1)), flow.states().len())?,
             follows: run.between == crate::BetweenSamples::Linear,
@@ -188,7 +192,25 @@ impl Way {
             }
             put_back += self.chunk(cloud, interval, strides, own);
         }
+        if self.drawn > 0 {
+            let own = round.map(|round| {
+                *round += 1;
+                (seed, *round)
+            });
+            self.renew(cloud, own);
+        }
         Ok(put_back)
+    }
+
+    /// What the row at the end draws anew, of every particle; nothing of it without noise.
+    fn renew(&self, cloud: &mut Cloud, random: Option<(u64, u64)>) {
+        let n = self.system().states().len();
+        for (block, x) in cloud.x.chunks_mut(BLOCK * n).enumerate() {
+            let mut random = random.map(|(seed, round)| stream(seed, round, block));
+            for drawn in x.chunks_exact_mut(n).flat_map(|x| &mut x[n - self.drawn..]) {
+                *drawn = random.as_mut().map_or(0.0, |r| StandardNormal.sample(r));
+            }
+        }
     }
 
     /// Some steps of all particles, block by block.
