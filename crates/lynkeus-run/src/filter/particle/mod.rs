@@ -5,7 +5,7 @@
 //! of their number, they are drawn anew from the weights, systematically (N. J. Gordon, D. J. Salmond and A. F. M. Smith,
 //! *IEE Proceedings F* 140 (1993) 107–113; G. Kitagawa, *Journal of Computational and Graphical Statistics* 5 (1996) 1–25).
 //! With a look ahead particles are drawn before they run, by how likely the readings are where the flow without noise
-//! takes them, and weighed by what that did not know (M. K. Pitt and N. Shephard, *Journal of the American Statistical
+//! takes them (half of them; the others as they are), and weighed by what that did not know (M. K. Pitt and N. Shephard, *Journal of the American Statistical
 //! Association* 94 (1999) 590–599).
 
 mod code;
@@ -223,23 +223,27 @@ impl ParticleFilter {
         let seed = self.settings.seed;
         self.way.advance(&mut places, interval, seed, None).ok()?;
         let first = self.likelihoods_of(&places, taken, sample);
-        let (chance, share) = shares(&sums(&before.log, &first))?;
-        let ancestors = self.ancestors(&share);
+        let (_, foreseen) = shares(&sums(&before.log, &first))?;
+        // half of them as they are: what the flow without noise misses is drawn, too, and no weight is beyond all others
+        let pairs = foreseen.iter().zip(&before.share);
+        let drawn: Vec<f64> = pairs.map(|(f, w)| 0.5 * (f + w)).collect();
+        let ancestors = self.ancestors(&drawn);
         let mut cloud = before.of(&ancestors, n);
         let round = Some(&mut self.round);
         let put_back = self.way.advance(&mut cloud, interval, seed, round).ok()?;
         self.normalise(&mut cloud);
         let second = self.likelihoods_of(&cloud, taken, sample);
         let pairs = second.iter().zip(&ancestors);
-        let rest = cloud.give(pairs.map(|(l, a)| l - first[*a]).collect());
-        if !rest.is_finite() {
+        let rest = pairs.map(|(l, a)| l + (before.share[*a] / drawn[*a]).ln());
+        let chance = cloud.give(rest.collect());
+        if !chance.is_finite() {
             return None;
         }
         self.cloud = cloud;
         let told = self.told();
         told.put_back += put_back;
         told.resampled += 1;
-        Some(chance + rest - (ancestors.len() as f64).ln())
+        Some(chance - (ancestors.len() as f64).ln())
     }
 
     /// The same of another cloud.
