@@ -532,6 +532,10 @@ impl Dynamics for Disturbed<'_> {
         self.plant.watch(t, x, seen);
     }
 
+    fn rates(&mut self, t: f64, x: &[f64], dx: &[f64]) -> Vec<f64> {
+        self.plant.rates(t, x, dx)
+    }
+
     fn truths(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>> {
         self.plant.truths(t, x)
     }
