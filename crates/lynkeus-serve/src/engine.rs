@@ -225,7 +225,7 @@ impl Engine {
         self.places.get(name).copied()
     }
 
-    /// Takes rows in their order, at most [`BATCH`], and keeps them before they are answered.
+    /// Takes rows in their order, at most `BATCH`, and keeps them before they are answered.
     pub fn take(&mut self, rows: &[Arrival]) -> Vec<Answer> {
         if rows.is_empty() {
             return vec![];

@@ -1,7 +1,7 @@
 //! A study's estimator beside a plant: rows in, estimates out, for as long as the plant runs.
 //!
 //! A message ([`json`], [`influx`]) is a row of one asset. An [`Engine`] writes the rows of a batch to its
-//! [`state`], takes them to the estimators of their assets, and answers each with lines: the estimate at the row, and
+//! `state`, takes them to the estimators of their assets, and answers each with lines: the estimate at the row, and
 //! corrections of what was told before where a row came late. What it answered is on the disk, so that it goes on
 //! after `kill -9` as if nothing had been. [`stdio`] is the loop between standard input and output.
 //!
