@@ -100,7 +100,7 @@ impl Moments {
         self.deviations.extend(squares.iter().map(|s| s.sqrt()));
     }
 
-    /// The covariance of the states that were condensed last, row by row.
+    /// The covariance of the first `n` of the states that were condensed last, row by row.
     pub fn write_covariance(&self, x: &[f64], n: usize, covariance: &mut [f64]) {
         covariance.fill(0.0);
         self.each(x, |w, x| {
@@ -180,7 +180,7 @@ mod tests {
         let deviation = std::f64::consts::PI - 3.1;
         assert!((moments.deviations[0] - deviation).abs() < 1e-12);
         let mut covariance = [0.0; 4];
-        moments.write_covariance(&x, &mut covariance);
+        moments.write_covariance(&x, moments.mean.len(), &mut covariance);
         assert!((covariance[1] - deviation).abs() < 1e-12, "{covariance:?}");
         let mut shown = [3.1, -3.1];
         moments.show(&EVEN, &mut shown, 1, &circle);
