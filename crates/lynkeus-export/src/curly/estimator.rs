@@ -521,6 +521,7 @@ impl Machine {
             (free.is_noisy(), "noisy"),
             (has_limits, "limits"),
             (about.contains(&"events"), "events"),
+            (about.contains(&"events") && weights.centre >= 0.0, "moving"),
             (about.contains(&"discrete"), "discrete"),
             (about.contains(&"rotations"), "rotations"),
             (about.contains(&"dials"), "dials"),
@@ -535,10 +536,15 @@ impl Machine {
             true => "lifted(i, s->readings[i], h[i])",
             false => "s->readings[i]",
         };
+        let root = match about.contains(&"events") {
+            true => "root_of_moving",
+            false => "root_of_rows",
+        };
         let text = remembering(&chosen(UNSCENTED, &holds), about.contains(&"events"))
             .replace("BEFORE_PARAMETER", parameter)
             .replace("BEFORE_ARGUMENT", argument)
-            .replace("READING_SHOWN", reading);
+            .replace("READING_SHOWN", reading)
+            .replace("ROOT_OF_ROWS", root);
         let first = u8::from(free.is_noisy());
         let rounds = if has_limits { "SENSORS + 1" } else { "1" };
         let text = exchanged(&text, |word| {

@@ -41,6 +41,8 @@ pub(crate) struct Ukf {
     manifold: Manifold,
     /// states that events alone change, without a deviation
     discrete: Vec<usize>,
+    /// whether there are events
+    jumps: bool,
 }
 
 impl Ukf {
@@ -55,6 +57,7 @@ impl Ukf {
         Ok(Self {
             manifold: model.manifold.clone(),
             discrete: discrete.filter(is_sure).copied().collect(),
+            jumps: clauses.is_some(),
             integrator: Integrator::new(method, n)?,
             weights: points.weights(n)?,
             points: vec![],
@@ -192,7 +195,10 @@ impl Ukf {
             }
             rows.extend_from_slice(&self.extra);
             self.sums.resize(n, 0.0);
-            root.of_rows(rows, &mut self.sums);
+            match self.jumps {
+                true => root_of_moving(rows, &mut self.sums, root),
+                false => root.of_rows(rows, &mut self.sums),
+            }
             return;
         }
         rows.resize(n * n, 0.0);
@@ -223,7 +229,7 @@ impl Ukf {
         for point in self.points.chunks_exact_mut(n) {
             self.manifold.retract(&belief.x, point);
         }
-        match propagation.driven.system().has_clauses() {
+        match self.jumps {
             false => self.flow(propagation, belief, from, to)?,
             true => self.jump(propagation, belief, from, to)?,
         }
@@ -409,6 +415,31 @@ impl Ukf {
             }
         }
         Ok(())
+    }
+}
+
+/// The lower root of AᵀA for rows A, without a column for states that do not differ: what stands there else depends on
+/// rounding, and so would the points.
+fn root_of_moving(rows: &mut [f64], sums: &mut [f64], root: &mut Root) {
+    let n = root.n;
+    let moves = |i: &usize| rows.iter().skip(*i).step_by(n).any(|x| *x != 0.0);
+    let moving: Vec<usize> = (0..n).filter(moves).collect();
+    if moving.len() == n {
+        return root.of_rows(rows, sums);
+    }
+    for row in rows.chunks_exact_mut(n) {
+        for (place, &i) in moving.iter().enumerate() {
+            row[place] = row[i];
+        }
+        row[moving.len()..].fill(0.0);
+    }
+    root.of_rows(rows, sums);
+    let packed = root.entries.clone();
+    root.entries.fill(0.0);
+    for (a, i) in moving.iter().enumerate() {
+        for (b, j) in moving[..=a].iter().enumerate() {
+            root.entries[i * n + j] = packed[a * n + b];
+        }
     }
 }
 

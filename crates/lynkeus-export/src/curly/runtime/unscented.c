@@ -48,6 +48,44 @@ static void still(real *points)
 }
 
 //?
+//? moving
+/* The lower root of the sum of squares of some rows, which are used up, without a column for states that do not differ:
+   what stands there else depends on rounding, and so would the points. */
+static void root_of_moving(real *rows, int count, real *root)
+{
+    real packed[STATES * STATES];
+    int places[STATES];
+    int moving = 0;
+    for (int i = 0; i < STATES; i++) {
+        truth is_moving = 0;
+        for (int r = 0; r < count; r++) {
+            if (rows[r * STATES + i] < R(0.0) || rows[r * STATES + i] > R(0.0)) {
+                is_moving = 1;
+            }
+        }
+        places[i] = 0;
+        if (is_moving) {
+            places[moving] = i;
+            moving++;
+        }
+    }
+    for (int r = 0; r < count; r++) {
+        for (int i = 0; i < STATES; i++) {
+            rows[r * STATES + i] = i < moving ? rows[r * STATES + places[i]] : R(0.0);
+        }
+    }
+    root_of_rows(rows, count, packed);
+    for (int i = 0; i < STATES * STATES; i++) {
+        root[i] = R(0.0);
+    }
+    for (int i = 0; i < moving; i++) {
+        for (int j = 0; j <= i; j++) {
+            root[places[i] * STATES + places[j]] = packed[i * STATES + j];
+        }
+    }
+}
+
+//?
 /* The lower root of the weighted sum of squares of the points, and of some rows more. */
 static void root_of_points(const real *points, const real *extra, int count, real *root)
 {
@@ -61,7 +99,7 @@ static void root_of_points(const real *points, const real *extra, int count, rea
     for (int i = 0; i < count * STATES; i++) {
         rows[POINTS * STATES + i] = extra[i];
     }
-    root_of_rows(rows, POINTS + count, root);
+    ROOT_OF_ROWS(rows, POINTS + count, root);
 //?
 //? !definite
     real sum[STATES * STATES];
