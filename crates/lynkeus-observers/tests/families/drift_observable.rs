@@ -11,7 +11,7 @@ use crate::common::{assert_follows, design_with, plant, reference, refused, run,
 use lynkeus_expr::{Tape, jacobian};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Design, DesignError, Initial, Tuning, Value, drift_observable::DRIFT_OBSERVABLE,
+    Design, DesignError, Initial, ParameterValue, Tuning, Value, drift_observable::DRIFT_OBSERVABLE,
 };
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing, Verdict};
 use lynkeus_words::Words;
@@ -105,6 +105,15 @@ fn parameter(design: &Design, name: &str) -> String {
     row.unwrap_or_else(|| panic!("{name} in {:?}", design.parameters))
         .1
         .words()
+}
+
+/// The same as numbers, with all their digits.
+fn numbers(design: &Design, name: &str) -> Vec<f64> {
+    let row = design.parameters.iter().find(|(n, _)| n == name);
+    match row.map(|row| &row.1) {
+        Some(ParameterValue::Numbers(numbers)) => numbers.clone(),
+        other => panic!("{name}: {other:?}"),
+    }
 }
 
 fn assert_near(found: &[f64], expected: &[f64], tolerance: f64) {
@@ -404,11 +413,10 @@ fn lemma_3_2_gives_the_poles() {
     let plant = plant(PLANT);
     let tuning = Tuning::from([("alpha", 0.5), ("beta", 1.0), ("gamma", 0.8)]);
     let design = design_with(DRIFT_OBSERVABLE, &plant, &[], &tuning).unwrap();
-    let σ: f64 = parameter(&design, "σ of Lemma 3.2").parse().unwrap();
+    let σ = numbers(&design, "σ of Lemma 3.2")[0];
     // σ ≥ α + 3β²/2 + γ²‖V⁻¹‖²/2 with ‖V⁻¹‖ > 1
     assert!(σ > 0.5 + 1.5 + 0.32 && σ < 3.2, "{σ}");
-    let K = parameter(&design, "K of y");
-    let k1: f64 = K.split(", ").next().unwrap().parse().unwrap();
+    let k1 = numbers(&design, "K of y")[0];
     assert_near(&[k1], &[σ + σ.powi(2) + σ.powi(3)], 1e-14);
 }
 
