@@ -58,6 +58,8 @@ mod said;
 mod samples;
 mod scatter;
 mod screens;
+#[cfg(feature = "serve")]
+mod serve;
 mod shell;
 mod story;
 mod tables;

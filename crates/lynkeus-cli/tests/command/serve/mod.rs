@@ -1,15 +1,9 @@
 //! `serve`: what it answers equals what `estimate` makes of the same rows, whatever happens on the way.
-#![cfg(feature = "serve")]
-#![allow(clippy::unwrap_used)]
 
 mod hostile;
 mod kept;
 mod many;
 mod metrics;
-// uniform numbers are enough
-#[allow(dead_code)]
-#[path = "../../../lynkeus/tests/normal/mod.rs"]
-mod normal;
 mod order;
 mod page;
 mod process;
@@ -20,46 +14,9 @@ use std::ops::ControlFlow;
 use lynkeus::{Study, Table};
 use serde_json::Value;
 
-use normal::Normal;
+use crate::normal::Normal;
+use crate::Folder;
 use process::served;
-
-/// A folder of a test.
-struct Folder {
-    path: tempfile::TempDir,
-}
-
-impl Folder {
-    fn write(&self, file: &str, text: &str) {
-        std::fs::write(self.path.path().join(file), text).unwrap();
-    }
-
-    fn read(&self, file: &str) -> String {
-        std::fs::read_to_string(self.path.path().join(file)).unwrap()
-    }
-
-    /// A file with every occurrence of `from` replaced; there has to be one.
-    fn change(&self, file: &str, from: &str, to: &str) {
-        let text = self.read(file);
-        assert!(text.contains(from), "{file} has no {from:?}");
-        self.write(file, &text.replace(from, to));
-    }
-
-    fn files(&self) -> Vec<String> {
-        let entries = std::fs::read_dir(self.path.path()).unwrap();
-        let names = entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned());
-        let mut names: Vec<String> = names.collect();
-        names.sort();
-        names
-    }
-}
-
-/// What a run left behind.
-#[derive(Debug)]
-struct Ended {
-    code: i32,
-    out: String,
-    err: String,
-}
 
 /// A tank with an input; both of its outputs are measured.
 const PLANT: &str = "model Tank
@@ -76,8 +33,7 @@ end Tank;
 
 /// The study of a family, with more lines at its end.
 fn folder(family: &str, more: &str) -> Folder {
-    let path = tempfile::tempdir().unwrap();
-    let folder = Folder { path };
+    let folder = Folder::empty();
     folder.write("tank.mo", PLANT);
     let tuning = match family {
         "ekf" | "ukf" | "mhe" => "initial_variance = { default = 1 }",
