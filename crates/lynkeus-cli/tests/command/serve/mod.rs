@@ -14,8 +14,8 @@ use std::ops::ControlFlow;
 use lynkeus::{Study, Table};
 use serde_json::Value;
 
-use crate::normal::Normal;
 use crate::Folder;
+use crate::normal::Normal;
 use process::served;
 
 /// A tank with an input; both of its outputs are measured.
