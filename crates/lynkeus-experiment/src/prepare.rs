@@ -7,7 +7,7 @@ pub mod correction;
 pub mod declared;
 mod dials;
 pub mod headers;
-pub(crate) mod manifold;
+pub mod manifold;
 pub(crate) mod mentioned;
 pub mod modes;
 pub(crate) mod spread;

@@ -253,8 +253,8 @@ impl Family for Filter {
 const VARIANCE: KeySpec = KeySpec {
     name: "initial_variance",
     shape: Shape::As(
-        "table: name = number ≥ 0, and `default`",
-        &Shape::Table(&Shape::NotNegative),
+        "table: name = number ≥ 0, an array = list of them, and `default`",
+        &Shape::Table(&Shape::Either(&[Shape::NotNegative, Shape::List(&Shape::NotNegative)])),
     ),
     default: "the square of a quarter of the declared range (without a range: of the start value, or 1; of an angle or a rotation: of a turn)",
     meaning: "how uncertain the first estimate is: the variance of each state and unknown input; `default` holds for everything not listed",

@@ -182,6 +182,7 @@ fn likelihood(count: usize) -> Result<Likelihood, Error> {
         ranges: vec![range; CELLS],
         start: vec![(g.constant(0.5).node(), g.constant(0.01).node()); CELLS],
         drawn: 0,
+        whens: Default::default(),
         parameters: parameters.iter().map(|p| p.node()).collect(),
     })
 }

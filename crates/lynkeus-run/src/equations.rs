@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard};
 use lynkeus_expr::{Graph, MissingInput, Node};
 use lynkeus_model::Whens;
 
-use crate::events::{Jump, Surface, TimeEvents, WhenRoots, bends, state_events, time_events};
+use crate::events::{by_the_clock, Jump, Surface, TimeEvents, WhenRoots, bends, state_events, time_events};
 
 /// x' = f(t, x, w) and y = h(t, x, w), with all that jumps taken out, in a graph of their own.
 #[derive(Debug)]
@@ -57,8 +57,9 @@ impl Equations {
         whens: &Whens,
     ) -> Result<Self, MissingInput> {
         let own = Graph::new();
-        let read = WhenRoots::read(whens);
-        let clauses = &read[..WhenRoots::count(whens)];
+        let (whens, compared) = by_the_clock(graph, symbols[0], whens);
+        let read = WhenRoots::read(&whens);
+        let clauses = &read[..WhenRoots::count(&whens)];
         let roots = [derivatives, outputs, clauses].concat();
         let image = own.copied(graph, &[symbols, &roots, &read].concat());
         let moving: Vec<Node> = symbols.iter().map(|s| image[s]).collect();
@@ -69,11 +70,17 @@ impl Equations {
             derivatives: roots[..count].to_vec(),
             outputs: roots[count..].to_vec(),
         };
+        let hidden: HashMap<Node, Node> = (compared.iter())
+            .map(|node| (image[node], own.fresh("compared").node()))
+            .collect();
+        let clauses = own.substitute(&roots.split_off(all), &hidden);
+        roots.extend(clauses);
         let (modes, switches) = time_events(&own, moving[0], &mut roots)?;
-        let clauses = roots.split_off(all);
+        let shown = hidden.into_iter().map(|(node, symbol)| (symbol, node));
+        let clauses = own.substitute(&roots.split_off(all), &shown.collect());
         let whens = (!whens.is_empty()).then(|| {
             let (states, rates) = (&symbols[1..=count], &roots[..count]);
-            WhenRoots::new(&own, whens, states, &moving, rates, &clauses, &image)
+            WhenRoots::new(&own, &whens, states, &moving, rates, &clauses, &image)
         });
         let free = both(&roots);
         let (held_modes, jumps, mut surfaces) = state_events(&own, &moving, &mut roots, count);

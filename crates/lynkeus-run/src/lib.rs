@@ -130,7 +130,8 @@ pub(crate) use error::Result;
 pub use error::{Error, Interrupted, Margin};
 pub use estimator::Estimator;
 pub use events::{
-    Cause, ClauseShape, Clauses, Guards, Instants, Memory, Seen, WhenExpressions, first_jump,
+    Cause, ClauseShape, Clauses, Guards, Instants, JumpSlopes, Memory, Seen, WhenExpressions,
+    first_jump,
 };
 pub use fleet::{Apart, Fleet};
 pub use integrator::{Integrator, Rk4, StepAdvice};

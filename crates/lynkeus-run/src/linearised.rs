@@ -70,7 +70,11 @@ impl Linearised {
         Self::of(&parts, jacobians)
     }
 
-    fn of(parts: &Parts<'_>, jacobians: &Jacobians<Entries>) -> Result<Self> {
+    /// The same of a system with all its parts; the Jacobians come before its outputs.
+    ///
+    /// # Errors
+    /// As [`System::new`].
+    pub fn of(parts: &Parts<'_>, jacobians: &Jacobians<Entries>) -> Result<Self> {
         let mut all = vec![];
         let state = Jacobian::among(&mut all, &jacobians.state);
         all.extend_from_slice(parts.outputs);

@@ -10,7 +10,9 @@ use lynkeus_model::Whens;
 use crate::divergence::explained;
 use crate::equations::{Both, Equations};
 use crate::error::state_text;
-use crate::events::{Clauses, Guards, JumpSlopes, Memory, Seen, TimeEvents, WhenExpressions};
+use crate::events::{
+    Cause, Clauses, Guards, JumpSlopes, Memory, Seen, TimeEvents, WhenExpressions, saltation,
+};
 use crate::routine::{Routine, Runner};
 use crate::snapshot::{Damaged, Digest, Persist, Walk};
 use crate::{BetweenSamples, Dynamics, Error, Events, Margin, Result, Slopes};
@@ -495,7 +497,10 @@ impl Evaluation {
     }
 
     /// Lets clauses take effect, as [`Dynamics::happen`], with the slopes of the jump.
-    pub(crate) fn jump(
+    ///
+    /// # Errors
+    /// As there.
+    pub fn jump(
         &mut self,
         t: f64,
         x: &mut [f64],
@@ -510,8 +515,26 @@ impl Evaluation {
         clauses.happen(&inputs, &mut x[..states], memory, slopes)
     }
 
+    /// What a jump at (t, x) makes of deviations, as [`Dynamics::settle`] has it of states without what a wrapper adds:
+    /// the saltation matrix row by row, and how far the state moves where the event was late.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn saltation(
+        &mut self,
+        (t, x): (f64, &[f64]),
+        jump: &JumpSlopes,
+        rates: [&[f64]; 2],
+        cause: Option<Cause>,
+        line: usize,
+    ) -> Result<(Vec<f64>, Vec<f64>)> {
+        let gradient = cause.map(|cause| self.gradient(t, x, cause.relation));
+        let gradient = gradient.unwrap_or_default();
+        saltation(jump, &gradient, rates, cause, (t, line))
+    }
+
     /// The slopes of the quantity of a relation by the states at (t, x).
-    pub(crate) fn gradient(&mut self, t: f64, x: &[f64], relation: usize) -> Vec<f64> {
+    fn gradient(&mut self, t: f64, x: &[f64], relation: usize) -> Vec<f64> {
         match self.system.code.clauses.clone() {
             Some(clauses) => clauses.gradient(self.smooth_at(t, x), relation),
             None => vec![],

@@ -294,11 +294,11 @@ pub(super) const OBSERVER: [KeySpec; 3] = [
     KeySpec {
         name: "initial",
         shape: Shape::As(
-            "table: name = number, and `default`",
-            &Shape::Table(&Shape::Number),
+            "table: name = number, an array = list of numbers, and `default`",
+            &Shape::Table(&Shape::Either(&[Shape::Number, Shape::List(&Shape::Number)])),
         ),
         default: "the plant's start values",
-        meaning: "where the estimate starts; `default` holds for everything not listed",
+        meaning: "where the estimate starts, `{ q = [1, 0, 0, 0] }`; `default` holds for everything not listed",
     },
     KeySpec {
         name: "clamp",
@@ -413,7 +413,10 @@ pub(super) const SIMULATE: [KeySpec; 8] = [
     },
     KeySpec {
         name: "initial",
-        shape: Shape::Table(&Shape::Number),
+        shape: Shape::As(
+            "table: name = number, an array = list of numbers",
+            &Shape::Table(&Shape::Either(&[Shape::Number, Shape::List(&Shape::Number)])),
+        ),
         default: "the plant's start values",
         meaning: "where the *plant* starts",
     },

@@ -24,6 +24,8 @@ pub struct ObserverSettings {
     pub tuning: Tuning,
     /// Whether a state or an output is an angle or a rotation: no family with a theorem takes it then.
     pub is_curved: bool,
+    /// Lists that stand for the elements of arrays, with their lengths.
+    pub lists: Vec<(Name, usize)>,
     /// Where the keys stand, for messages.
     places: BTreeMap<String, Place>,
 }
@@ -110,6 +112,8 @@ pub(super) fn read(entry: Entry<'_>) -> Result<ObserverSettings, Error> {
     let known: Vec<KeySpec> = OBSERVER.iter().chain(&owned).copied().collect();
     let mut section = entry.section("[observer]", &known)?;
     let family = section.optional("family", family)?.flatten();
+    let mut lists = vec![];
+    let initial = |entry| initial(entry, &mut lists);
     let mut settings = ObserverSettings {
         tuning: Tuning {
             initial: section.optional("initial", initial)?.unwrap_or_default(),
@@ -119,6 +123,7 @@ pub(super) fn read(entry: Entry<'_>) -> Result<ObserverSettings, Error> {
             ..Tuning::default()
         },
         is_curved: false,
+        lists,
         places: BTreeMap::new(),
         family,
     };
@@ -133,10 +138,11 @@ pub(super) fn read(entry: Entry<'_>) -> Result<ObserverSettings, Error> {
             return Err(foreign(&entry, key, family));
         }
         settings.places.insert(key.to_owned(), entry.place());
-        settings
-            .tuning
-            .values
-            .insert(key.to_owned(), entry.value()?);
+        let value = match key {
+            "initial_variance" if entry.is_table() => variances(entry, &mut settings.lists)?,
+            _ => entry.value()?,
+        };
+        settings.tuning.values.insert(key.to_owned(), value);
     }
     refuse_mixture(&section, &settings)?;
     Ok(settings)
@@ -182,9 +188,9 @@ fn family(entry: Entry<'_>) -> Result<Option<Name>, Error> {
     }
 }
 
-fn initial(entry: Entry<'_>) -> Result<Initial, Error> {
+fn initial(entry: Entry<'_>, lists: &mut Vec<(Name, usize)>) -> Result<Initial, Error> {
     let mut start = Initial::default();
-    for (name, value) in entry.pairs()? {
+    for (name, value) in entry.elements(lists)? {
         let value = value.number()?;
         if name.text == "default" {
             start.default = Some(value);
@@ -193,6 +199,12 @@ fn initial(entry: Entry<'_>) -> Result<Initial, Error> {
         }
     }
     Ok(start)
+}
+
+fn variances(entry: Entry<'_>, lists: &mut Vec<(Name, usize)>) -> Result<Value, Error> {
+    let all = entry.elements(lists)?.into_iter();
+    let all = all.map(|(name, entry)| Ok((name.text, entry.value()?)));
+    Ok(Value::Table(all.collect::<Result<_, Error>>()?))
 }
 
 impl Entry<'_> {

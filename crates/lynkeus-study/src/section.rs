@@ -229,6 +229,27 @@ impl<'a> Entry<'a> {
             .collect())
     }
 
+    /// The same, a list under an array's name as the values of its elements: `q = [1, 0]` is `"q[1]" = 1` and
+    /// `"q[2]" = 0`. What was a list is noted with its length.
+    pub fn elements(self, lists: &mut Vec<(Name, usize)>) -> Result<Vec<(Name, Entry<'a>)>, Error> {
+        let mut found = vec![];
+        for (name, entry) in self.pairs()? {
+            if !entry.is_list() {
+                found.push((name, entry));
+                continue;
+            }
+            let values = entry.list()?;
+            lists.push((name.clone(), values.len()));
+            let element = |(i, value)| {
+                let text = format!("{}[{}]", name.text, i + 1);
+                let place = name.place.clone();
+                (Name { text, place }, value)
+            };
+            found.extend(values.into_iter().enumerate().map(element));
+        }
+        Ok(found)
+    }
+
     fn table(self) -> Result<DeTable<'a>, Error> {
         let refusal = self.wrong("a table of keys and values");
         match self.value.into_inner() {

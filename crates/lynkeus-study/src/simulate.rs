@@ -22,6 +22,8 @@ pub struct SimulateSettings {
     pub inputs: Vec<(Name, Expression)>,
     /// Start values that replace those of the plant.
     pub initial: Vec<(Name, f64)>,
+    /// Lists that stand in `initial` for the elements of arrays, with their lengths.
+    pub lists: Vec<(Name, usize)>,
     /// The integrator and its steps or tolerances.
     pub method: Method,
     /// The seed of the noise and of `spread`.
@@ -123,13 +125,20 @@ pub(super) fn read(entry: Entry<'_>) -> Result<SimulateSettings, Error> {
     if until <= start {
         return Err(too_early);
     }
+    let mut lists = vec![];
+    let initial = section.optional("initial", |entry| {
+        let all = entry.elements(&mut lists)?.into_iter();
+        all.map(|(name, value)| Ok((name, value.number()?)))
+            .collect::<Result<Vec<_>, Error>>()
+    })?;
     Ok(SimulateSettings {
         start,
         until,
         output_step: section.optional("output_step", Entry::positive)?,
         sample_step: section.optional("sample_step", Entry::positive)?,
         inputs: pairs(section.take("inputs"), expression)?,
-        initial: pairs(section.take("initial"), Entry::number)?,
+        initial: initial.unwrap_or_default(),
+        lists,
         method: method(&mut section)?,
         seed: section
             .optional("seed", |e| e.whole(0))?

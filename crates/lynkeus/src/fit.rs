@@ -113,7 +113,6 @@ pub fn fit(
 ) -> Result<Fit, Error> {
     let (study, notes) = posed::with_filter(study)?;
     let plant = prepare::plant(&study)?;
-    prepare::whens::refuse(&study, &plant, "fit")?;
     let prepared = Prepared::new(&study, &plant)?;
     let design = prepared.design()?;
     let logs = posed::logs(&prepared, &design, tables)?;
@@ -404,7 +403,11 @@ impl Work<'_> {
     }
 
     fn no_value(&self) -> Error {
-        Error::refused("the likelihood has no value at the study's own values, nor at any other start")
+        let mut failures = self.problem.terms.iter().filter_map(|t| t.likelihood.failure());
+        let why = failures.next().map_or_else(String::new, |error| {
+            format!(" ({error})")
+        });
+        Error::refused(format!("the likelihood has no value at the study's own values, nor at any other start{why}"))
             .at(&self.study.file)
             .hint("start nearer to the plant, by [parameters] and `initial`, or try more `starts` in [fit] with narrower `bounds`")
     }

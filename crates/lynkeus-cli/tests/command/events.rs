@@ -17,6 +17,22 @@ equation
 end Ball;
 ";
 
+const THERMOSTAT: &str = "model Thermostat
+  Real T(start = 18);
+  Real heat(start = 8);
+  Boolean on(start = true);
+  output Real y = T;
+equation
+  der(T) = (if on then heat else 0) - 0.5*(T - 12);
+  der(heat) = 0;
+  when T >= 21 then
+    on = false;
+  elsewhen T <= 19 then
+    on = true;
+  end when;
+end Thermostat;
+";
+
 const BATCH: &str = "model Batch
   Real h(start = 0.5);
   Real feed(start = 1);
@@ -85,6 +101,54 @@ const OF_BATCH: [Row; 17] = [
     (4.00, 0.209, 0.0, 0.0, 0.0, 0.0),
 ];
 
+const OF_THERMOSTAT: [Row; 45] = [
+    (0.00, 17.959, 17.9702, 0.2568, 8.0027, 0.8034),
+    (0.10, 18.377, 18.4243, 0.1968, 7.9690, 0.7913),
+    (0.20, 18.775, 18.8480, 0.1795, 7.8905, 0.7517),
+    (0.30, 19.175, 19.2454, 0.1773, 7.7990, 0.6897),
+    (0.40, 20.041, 19.7895, 0.1781, 8.1293, 0.6166),
+    (0.50, 20.212, 20.2059, 0.1773, 8.1369, 0.5451),
+    (0.60, 20.243, 0.0, 0.0, 0.0, 0.0),
+    (0.70, 20.305, 0.0, 0.0, 0.0, 0.0),
+    (0.80, 20.744, 0.0, 0.0, 0.0, 0.0),
+    (0.90, 20.252, 0.0, 0.0, 0.0, 0.0),
+    (1.00, 19.969, 19.9920, 0.1682, 7.8451, 0.3799),
+    (1.10, 19.371, 19.5494, 0.1435, 7.9142, 0.3774),
+    (1.20, 19.116, 0.0, 0.0, 0.0, 0.0),
+    (1.30, 19.363, 0.0, 0.0, 0.0, 0.0),
+    (1.40, 19.150, 19.5305, 0.1555, 7.7778, 0.3509),
+    (1.50, 20.300, 20.0156, 0.1481, 7.8976, 0.3435),
+    (1.60, 20.386, 20.3926, 0.1463, 7.8921, 0.3303),
+    (1.70, 20.639, 0.0, 0.0, 0.0, 0.0),
+    (1.80, 21.074, 0.0, 0.0, 0.0, 0.0),
+    (1.90, 19.986, 20.3946, 0.1464, 7.9610, 0.2956),
+    (2.00, 19.546, 19.9016, 0.1323, 8.0457, 0.3029),
+    (2.10, 20.116, 19.6135, 0.1200, 7.9525, 0.3008),
+    (2.20, 18.735, 0.0, 0.0, 0.0, 0.0),
+    (2.30, 19.146, 0.0, 0.0, 0.0, 0.0),
+    (2.40, 19.540, 19.6096, 0.1341, 7.9740, 0.3106),
+    (2.50, 19.997, 20.0122, 0.1340, 7.9679, 0.3076),
+    (2.60, 20.278, 20.3739, 0.1351, 7.9354, 0.3020),
+    (2.70, 21.120, 0.0, 0.0, 0.0, 0.0),
+    (2.80, 21.091, 0.0, 0.0, 0.0, 0.0),
+    (2.90, 19.865, 20.3207, 0.1324, 8.0887, 0.2840),
+    (3.00, 20.748, 20.0573, 0.1268, 7.9529, 0.2862),
+    (3.10, 19.564, 19.6484, 0.1171, 7.9680, 0.2919),
+    (3.20, 19.272, 0.0, 0.0, 0.0, 0.0),
+    (3.30, 18.799, 0.0, 0.0, 0.0, 0.0),
+    (3.40, 19.656, 19.5119, 0.1231, 7.9655, 0.3044),
+    (3.50, 19.618, 19.8686, 0.1238, 7.8992, 0.3035),
+    (3.60, 20.739, 20.3446, 0.1308, 8.0192, 0.3018),
+    (3.70, 21.029, 0.0, 0.0, 0.0, 0.0),
+    (3.80, 20.560, 0.0, 0.0, 0.0, 0.0),
+    (3.90, 20.274, 20.3341, 0.1447, 8.1898, 0.2931),
+    (4.00, 19.703, 19.8844, 0.1231, 8.2333, 0.2912),
+    (4.10, 19.705, 19.5294, 0.1168, 8.2080, 0.2966),
+    (4.20, 19.008, 0.0, 0.0, 0.0, 0.0),
+    (4.30, 19.096, 0.0, 0.0, 0.0, 0.0),
+    (4.40, 19.699, 19.6820, 0.1350, 8.1984, 0.3057),
+];
+
 fn folder(plant: &str, rest: &str, rows: &[Row]) -> Folder {
     let folder = Folder::empty();
     folder.write("plant.mo", plant);
@@ -117,10 +181,9 @@ fn estimate(folder: &Folder) -> String {
 }
 
 /// How far means are apart in deviations, and how deviations differ, at most.
-fn apart(table: &str, rows: &[Row], other: &str) -> [f64; 2] {
-    let [h, h_sd] = ["h_hat", "h_sd"].map(|name| column(table, name));
-    let x = column(table, &format!("{other}_hat"));
-    let x_sd = column(table, &format!("{other}_sd"));
+fn apart(table: &str, rows: &[Row], [one, other]: [&str; 2]) -> [f64; 2] {
+    let of = |name: &str| ["hat", "sd"].map(|part| column(table, &format!("{name}_{part}")));
+    let ([h, h_sd], [x, x_sd]) = (of(one), of(other));
     let (mut means, mut deviations) = (0.0_f64, 0.0_f64);
     for (k, row) in rows.iter().enumerate().filter(|(_, row)| row.3 > 0.0) {
         for (own, sd, mean, deviation) in
@@ -139,7 +202,7 @@ fn a_bouncing_ball_is_estimated_as_by_particles() {
     for family in ["ekf", "ukf"] {
         folder.change("study.toml", "\"ekf\"", &format!("\"{family}\""));
         let table = estimate(&folder);
-        let [means, deviations] = apart(&table, &OF_BALL, "v");
+        let [means, deviations] = apart(&table, &OF_BALL, ["h", "v"]);
         assert!(means < 0.06 && deviations < 0.04, "{means} {deviations}");
         let n = column(&table, "n_hat");
         assert!(n[..=9].iter().all(|n| *n == 0.0) && n[10..].iter().all(|n| *n == 1.0));
@@ -152,13 +215,32 @@ fn a_vessel_that_is_emptied_is_estimated_as_by_particles() {
     let rest = "initial_variance = { h = 0.04, feed = 0.04 }\n[process_noise]\nh = 0.0004\n[estimate]\nsd = true\n";
     let folder = folder(BATCH, rest, &OF_BATCH);
     let table = estimate(&folder);
-    let [means, deviations] = apart(&table, &OF_BATCH, "feed");
+    let [means, deviations] = apart(&table, &OF_BATCH, ["h", "feed"]);
     let before: Vec<Row> = OF_BATCH[..7].to_vec();
-    let [exact, alike] = apart(&table, &before, "feed");
+    let [exact, alike] = apart(&table, &before, ["h", "feed"]);
     assert!(exact < 0.06 && alike < 0.03, "{exact} {alike}");
     // that it is not emptied yet tells particles what no linear correction says
     assert!(means < 0.7 && deviations < 0.35, "{means} {deviations}");
     assert_eq!(column(&table, "batches_hat").last(), Some(&2.0));
+}
+
+/// Eight switchings, each of which hits its neighbours' instants by less than a row: what is left of a threshold that is
+/// nearly certain not to have been met yet is what no linear correction says.
+#[test]
+fn a_thermostat_is_estimated_as_by_particles() {
+    let rest = "initial_variance = { T = 0.25, heat = 0.64 }\n[process_noise]\nT = 0.02\nheat = 0.05\n[estimate]\nsd = true\n";
+    let folder = folder(THERMOSTAT, rest, &OF_THERMOSTAT);
+    folder.change("study.toml", "y = 0.05", "y = 0.3");
+    for family in ["ekf", "ukf"] {
+        folder.change("study.toml", "\"ekf\"", &format!("\"{family}\""));
+        let table = estimate(&folder);
+        let [means, deviations] = apart(&table, &OF_THERMOSTAT, ["T", "heat"]);
+        let before = &OF_THERMOSTAT[..6];
+        let [exact, alike] = apart(&table, before, ["T", "heat"]);
+        println!("{family}: {means} {deviations}, {exact} {alike}");
+        assert!(exact < 0.03 && alike < 0.03, "{family}: {exact} {alike}");
+        assert!(means < 0.5 && deviations < 0.2, "{family}: {means} {deviations}");
+    }
 }
 
 /// Particles of this program are those of the other one, whatever the event.
@@ -171,7 +253,7 @@ fn particles_go_through_events_each_by_itself() {
     for (folder, rows, other) in cases {
         let drawn = "family = \"particle\"\nparticles = 20000";
         folder.change("study.toml", "family = \"ekf\"", drawn);
-        let [means, deviations] = apart(&estimate(&folder), rows, other);
+        let [means, deviations] = apart(&estimate(&folder), rows, ["h", other]);
         // a constant feed has fewer and fewer values among either's particles
         assert!(
             means < 0.1 && deviations < 0.1,

@@ -1,6 +1,7 @@
 //! The command as a user types it.
 #![allow(clippy::unwrap_used)]
 
+mod attitude;
 mod backends;
 mod bias;
 mod certify;
@@ -14,6 +15,7 @@ mod faulty;
 mod filters;
 mod filters_noise;
 mod fit;
+mod fit_events;
 mod fit_noise;
 mod fit_search;
 mod fit_shown;

@@ -85,14 +85,14 @@ q = 1e-4
 b = 1e-6
 [observer]
 family = \"{family}\"
-initial = {{ \"q[1]\" = 0.5, \"q[2]\" = 0.5, \"q[3]\" = 0.5, \"q[4]\" = 0.5 }}
+initial = {{ q = [0.5, 0.5, 0.5, 0.5] }}
 initial_variance = {{ q = 4.0, b = 0.01 }}
 {more}
 [simulate]
 until = 30
 output_step = 0.05
 inputs = {{ \"w[1]\" = \"0.5*sin(0.7*time)\", \"w[2]\" = \"0.4*cos(0.5*time)\", \"w[3]\" = \"0.3*sin(0.3*time + 1)\" }}
-initial = {{ \"b[1]\" = 0.05, \"b[2]\" = -0.03, \"b[3]\" = 0.02 }}
+initial = {{ b = [0.05, -0.03, 0.02] }}
 method = \"rk4\"
 step = 0.05
 [estimate]
@@ -326,7 +326,7 @@ fn what_is_no_angle_and_no_rotation_is_refused() {
     for (file, from, to, command, parts) in rotors {
         refused(&with(rotor("ekf", ""), file, from, to), command, parts);
     }
-    let bodies: [Refused<'_>; 7] = [
+    let bodies: [Refused<'_>; 9] = [
         (
             "m.mo",
             "(start = {2, 0, 0, 0})",
@@ -374,6 +374,24 @@ fn what_is_no_angle_and_no_rotation_is_refused() {
         ),
         (
             "s.toml",
+            "q = [0.5, 0.5, 0.5, 0.5]",
+            "q = [1, 0, 0]",
+            check,
+            &[
+                "s.toml:11:13",
+                "q has 4 elements in the plant 'Body', and this list 3",
+                "\"q[1]\" = …",
+            ],
+        ),
+        (
+            "s.toml",
+            "b = [0.05, -0.03, 0.02]",
+            "b = [0.05, [1], 0.02]",
+            check,
+            &["\"b\"", "expected a number"],
+        ),
+        (
+            "s.toml",
             "family = \"ekf\"",
             "family = \"mhe\"",
             simulate,
@@ -396,13 +414,7 @@ fn what_is_no_angle_and_no_rotation_is_refused() {
         &["s.toml:9:10", "triangular takes no [manifold]"],
     );
     let folder = attitude("ekf", "");
-    for name in ["q[1]", "q[2]", "q[3]", "q[4]"] {
-        folder.change(
-            "s.toml",
-            &format!("\"{name}\" = 0.5"),
-            &format!("\"{name}\" = 0"),
-        );
-    }
+    folder.change("s.toml", "q = [0.5, 0.5, 0.5, 0.5]", "q = [0, 0, 0, 0]");
     refused(
         &folder,
         simulate,
@@ -520,7 +532,7 @@ fn deviations_are_right_from_far_off() {
     let size = |more: &str| {
         let folder = attitude("ekf", more);
         let text = folder.read("s.toml");
-        let initial = text.lines().find(|line| line.contains("\"q[1]\" = 0.5"));
+        let initial = text.lines().find(|line| line.contains("q = [0.5"));
         folder.change("s.toml", &format!("{}\n", initial.unwrap()), "");
         folder.change("s.toml", "q = 4.0", "q = 1.0");
         folder.change("s.toml", "until = 30", "until = 6\nspread = { q = 1.0 }");

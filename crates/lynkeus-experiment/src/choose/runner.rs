@@ -12,7 +12,8 @@ use crate::course::rig::Rig;
 use crate::prepare::{Prepared, StudyDesign, is_certified_gain};
 use crate::simulate;
 use crate::{Error, Outcome, Study, Table, choose, estimate, prepare, prepare::systems};
-use lynkeus_study::SimulateSettings;
+use lynkeus_observers::Tuning;
+use lynkeus_study::{Sensors, SimulateSettings};
 
 /// Runs a study as [`simulate`](crate::simulate()) and [`estimate`](crate::estimate()) do, to the
 /// bit, and keeps its plant and observer for further runs and for studies that
@@ -40,22 +41,11 @@ impl Runner {
     #[must_use]
     pub fn serves(&self, other: &Study) -> bool {
         let own = &self.study;
-        let (sensors, others) = (&own.sensors, &other.sensors);
         // a file may change
         own.plant_text.is_some()
-            && own.plant_text == other.plant_text
-            && (&own.file, &own.plant, &own.model) == (&other.file, &other.plant, &other.model)
-            && (&own.parameters, own.tables) == (&other.parameters, other.tables)
-            && (&sensors.measured, &sensors.unknown) == (&others.measured, &others.unknown)
-            && (&sensors.disturbances, &sensors.limits) == (&others.disturbances, &others.limits)
-            && (&sensors.input_noise, &sensors.correlation)
-                == (&others.input_noise, &others.correlation)
-            && own.process_noise == other.process_noise
+            && asked(own) == asked(other)
             && own.observer.is_like(&other.observer)
-            // a certified gain is chosen by the noise that it lets through
-            && (sensors.noise == others.noise || !is_certified_gain(&own.observer.tuning))
-            && (&own.narrower, &own.certify) == (&other.narrower, &other.certify)
-            && own.estimate == other.estimate
+            && like(&own.sensors, &other.sensors, &own.observer.tuning)
             && own.simulate.as_ref().map(undrawn) == other.simulate.as_ref().map(undrawn)
     }
 
@@ -136,11 +126,59 @@ impl Runner {
     }
 }
 
+/// What plant and observer are made of, beside what is compared by itself: every field of a study is named here.
+fn asked(study: &Study) -> impl PartialEq + use<'_> {
+    let Study {
+        file,
+        plant,
+        plant_text,
+        model,
+        parameters,
+        tables,
+        delay_states,
+        process_noise,
+        manifold,
+        narrower,
+        certify,
+        estimate,
+        time_unit,
+        // by themselves
+        sensors: _,
+        observer: _,
+        simulate: _,
+        // what is done with results, and other commands
+        tune: _,
+        fit: _,
+        compare: _,
+        serve: _,
+        show: _,
+        records: _,
+        budget: _,
+    } = study;
+    let model = (file, plant, plant_text, model, parameters, tables, delay_states);
+    let filter = (process_noise, manifold, narrower, certify, estimate, time_unit);
+    (model, filter)
+}
+
+/// Whether an observer with such a tuning sees the same of the plant.
+fn like(one: &Sensors, other: &Sensors, tuning: &Tuning) -> bool {
+    // a certified gain is chosen by the noise that it lets through
+    let of = |sensors: &Sensors| match is_certified_gain(tuning) {
+        true => sensors.clone(),
+        false => Sensors {
+            noise: vec![],
+            ..sensors.clone()
+        },
+    };
+    of(one) == of(other)
+}
+
 /// The settings without what no observer depends on.
 fn undrawn(settings: &SimulateSettings) -> SimulateSettings {
     SimulateSettings {
         seed: 0,
         initial: vec![],
+        lists: vec![],
         spread: vec![],
         ..settings.clone()
     }
@@ -204,6 +242,8 @@ impl Runners {
 
 #[cfg(test)]
 mod tests {
+    use lynkeus_study::{Late, Screen};
+
     use super::*;
 
     const TANK: &str = "model Tank\n  input Real inflow(min = 0, max = 5);\n  \
@@ -372,6 +412,11 @@ mod tests {
             with(|s| s.estimate.deviations = true),
             with(|s| s.parameters = [("k".to_owned(), 1.0)].into()),
             with(|s| s.plant_text = None),
+            with(|s| s.sensors.bias.push(("y".into(), 0.1))),
+            with(|s| s.sensors.late.push(("y".into(), Late::By(0.5)))),
+            with(|s| s.sensors.screens.push(("y".into(), Screen::Frozen(3)))),
+            with(|s| s.manifold.circles.push("level".into())),
+            with(|s| s.delay_states = Some(4)),
         ];
         for other in others {
             assert!(!first.serves(&other), "{other:?}");

@@ -363,8 +363,30 @@ fn array(element: &str) -> String {
     array.to_owned()
 }
 
+/// The plant with what is known of its quaternions as outputs: their length is 1. None where it has none.
+pub fn with_lengths(plant: &Plant) -> Option<Plant> {
+    let lengths = firsts(&plant.states).map(|(first, _)| {
+        let own = plant.states[first..first + 4].iter();
+        let squares = own.map(|q| plant.graph.expr(q.node).powi(2));
+        let length = squares.reduce(|sum, square| sum + square);
+        let state = &plant.states[first];
+        Variable {
+            // no name of the plant's has this form
+            name: format!(" length of {}", state.name),
+            node: length.map_or(state.node, |length| length.node()),
+            ..state.clone()
+        }
+    });
+    let lengths: Vec<Variable> = lengths.collect();
+    (!lengths.is_empty()).then(|| {
+        let mut own = plant.clone();
+        own.outputs.extend(lengths);
+        own
+    })
+}
+
 /// Where states and readings of a plant live.
-pub(crate) fn of(augmented: &AugmentedPlant<'_>) -> Manifold {
+pub fn of(augmented: &AugmentedPlant<'_>) -> Manifold {
     let outputs = augmented.outputs.iter().enumerate();
     let dials = outputs.clone();
     let dials = dials.filter(|(_, output)| is_circle(&output.variable));

@@ -16,6 +16,7 @@ use lynkeus_study::{Name, Noise, Swept};
 /// # Errors
 /// The first such name, in the words of the command that reads it.
 pub(crate) fn refuse_strangers(study: &Study, plant: &Plant) -> Result<(), Error> {
+    refuse_other_lengths(study, plant)?;
     if let Some(settings) = &study.simulate {
         systems::check_inputs(plant, settings)?;
         systems::starts(plant, &settings.initial)?;
@@ -34,6 +35,25 @@ pub(crate) fn refuse_strangers(study: &Study, plant: &Plant) -> Result<(), Error
         study.refuse_strange_keys(false)?;
         refuse_strange_noises(study, plant)?;
         asked(study)?;
+    }
+    Ok(())
+}
+
+/// Refuses lists that are longer or shorter than their arrays; what is no array is refused by its name.
+fn refuse_other_lengths(study: &Study, plant: &Plant) -> Result<(), Error> {
+    let simulated = study.simulate.iter().flat_map(|settings| &settings.lists);
+    for (name, count) in study.observer.lists.iter().chain(simulated) {
+        let own = plant.states.iter().chain(&plant.inputs);
+        let elements = own.filter(|v| name.is_or_has(&v.name)).count();
+        if elements > 0 && elements != *count {
+            let message = format!(
+                "{name} has {elements} elements in the plant '{}', and this list {count}",
+                plant.name
+            );
+            return Err(name.blame(Error::input(message).hint(format!(
+                "write as many numbers, or some of them by name: \"{name}[1]\" = …"
+            ))));
+        }
     }
     Ok(())
 }

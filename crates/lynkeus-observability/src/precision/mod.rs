@@ -22,7 +22,7 @@
 //! // a cart: its place is measured ten times, 1 s apart, each time to ±0.1 m
 //! let g = Graph::new();
 //! let [time, place, speed] = ["time", "place", "speed"].map(|name| g.symbol(name));
-//! let state = |name: &str, node, start, scale| Quantity { name: name.into(), node, start, scale };
+//! let state = |name: &str, node, start, scale| Quantity { name: name.into(), node, start, scale, is_known: false };
 //! let cart = Experiment {
 //!     states: vec![
 //!         state("place", place.node(), 0.0, 10.0),
@@ -46,6 +46,7 @@ mod sets;
 mod tangent;
 
 use lynkeus_expr::{Budget, Graph, Node};
+use lynkeus_model::Whens;
 use lynkeus_run::filter::Limits;
 use lynkeus_run::{Error, Method};
 
@@ -72,6 +73,8 @@ pub struct Quantity {
     pub start: f64,
     /// its range or magnitude, in its unit, above 0: what errors are compared with
     pub scale: f64,
+    /// its start is known exactly: what changes at events alone
+    pub is_known: bool,
 }
 
 /// The standard deviation of one sample.
@@ -185,6 +188,8 @@ pub struct Experiment<'g> {
     pub states: Vec<Quantity>,
     /// their derivatives, expressions in time, states and inputs
     pub derivatives: Vec<Node>,
+    /// by which the states jump; none where they never do
+    pub whens: Whens,
     /// inputs that are to be estimated: the error of each is a constant over the window
     pub unknown: Vec<Quantity>,
     /// every input, the unknown ones included, with its course as an expression of time
@@ -205,6 +210,7 @@ impl<'g> Experiment<'g> {
             time,
             states: vec![],
             derivatives: vec![],
+            whens: Whens::default(),
             unknown: vec![],
             inputs: vec![],
             sensors: vec![],

@@ -2,9 +2,14 @@
 
 use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use lynkeus_expr::{Budget, Node, jacobian};
-use lynkeus_run::{Dynamics, Error, Evaluation, Events, Integrator, Jacobians, Linearised, Method};
+use lynkeus_model::Whens;
+use lynkeus_run::{
+    Cause, Clauses, Dynamics, Error, Evaluation, Events, Integrator, Jacobians, JumpSlopes,
+    Linearised, Memory, Method, Parts, Seen,
+};
 use nalgebra::DMatrix;
 
 use super::deviations::Information;
@@ -58,8 +63,8 @@ impl Tangent {
         let (relative, absolute) = tolerances(experiment.method);
         Ok(Self {
             states: experiment.states.len(),
-            flow: linearised(experiment, &[], flow)?,
-            sight: linearised(experiment, &seen, sight)?,
+            flow: linearised(experiment, &[], flow, &experiment.whens)?,
+            sight: linearised(experiment, &seen, sight, &Whens::default())?,
             scales: experiment.quantities().map(|q| q.scale).collect(),
             units: experiment.states.iter().map(|q| q.scale.min(1.0)).collect(),
             floor: absolute / relative,
@@ -78,7 +83,9 @@ impl Tangent {
     /// Batches of sensitivities, by the quantities that they belong to.
     fn batches(&self, experiment: &Experiment<'_>) -> Result<Vec<Batch<'_>>, Error> {
         let wide = (BATCH / self.states.max(1)).saturating_sub(1).max(1);
-        let all: Vec<usize> = (0..self.scales.len()).collect();
+        let quantities = experiment.quantities().enumerate();
+        let unsure = quantities.filter(|(_, quantity)| !quantity.is_known);
+        let all: Vec<usize> = unsure.map(|(place, _)| place).collect();
         all.chunks(wide)
             .map(|columns| Batch::new(self, columns.to_vec(), experiment))
             .collect()
@@ -90,6 +97,7 @@ fn linearised(
     experiment: &Experiment<'_>,
     outputs: &[Node],
     mut jacobians: Jacobians<Vec<(usize, usize, Node)>>,
+    whens: &Whens,
 ) -> Result<Linearised, Error> {
     let courses: HashMap<Node, Node> = experiment.inputs.iter().copied().collect();
     let graph = experiment.graph;
@@ -112,16 +120,17 @@ fn linearised(
         .map(|q| (q.name.clone(), q.node, q.start))
         .collect();
     let derivatives = graph.substitute(&experiment.derivatives, &courses);
-    let time = experiment.time;
-    Linearised::new(
+    let whens = whens.substituted(graph, &courses);
+    let parts = Parts {
         graph,
-        time,
-        &states,
-        &[],
-        &derivatives,
-        &outputs,
-        &jacobians,
-    )
+        time: experiment.time,
+        states: &states,
+        signals: &[],
+        derivatives: &derivatives,
+        outputs: &outputs,
+        whens: Some(&whens),
+    };
+    Linearised::of(&parts, &jacobians)
 }
 
 /// (relative, absolute) errors per step. Fixed steps differentiate to the exact
@@ -340,6 +349,7 @@ impl<'t> Batch<'t> {
                 flow: tangent.flow.system().evaluation(),
                 slopes: vec![0.0; tangent.flow.jacobians().state.places().len()],
                 states: vec![0.0; n],
+                jump: JumpSlopes::default(),
                 budget: tangent.budget.clone(),
             },
             sight: tangent.sight.system().evaluation(),
@@ -441,7 +451,18 @@ struct Variation<'t> {
     slopes: Vec<f64>,
     /// states as they are
     states: Vec<f64>,
+    /// of the last event
+    jump: JumpSlopes,
     budget: Budget,
+}
+
+impl Variation<'_> {
+    /// Takes the states, or their rates, as they are.
+    fn own(&mut self, x: &[f64]) -> Vec<f64> {
+        let tangent = self.tangent;
+        tangent.in_own_units(&x[..tangent.states], &mut self.states);
+        self.states.clone()
+    }
 }
 
 impl Dynamics for Variation<'_> {
@@ -476,6 +497,66 @@ impl Dynamics for Variation<'_> {
 
     fn events(&mut self) -> Option<&mut dyn Events> {
         Some(self)
+    }
+
+    fn clauses(&self) -> Option<Arc<Clauses>> {
+        self.flow.clauses()
+    }
+
+    fn watch(&mut self, t: f64, x: &[f64], seen: &mut Vec<Seen>) {
+        let x = self.own(x);
+        self.flow.watch(t, &x, seen);
+    }
+
+    fn rates(&mut self, t: f64, x: &[f64], dx: &[f64]) -> Vec<f64> {
+        let (x, dx) = (self.own(x), self.own(dx));
+        self.flow.rates(t, &x, &dx)
+    }
+
+    fn truths(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>, Error> {
+        let x = self.own(x);
+        self.flow.truths(t, &x)
+    }
+
+    fn happen(
+        &mut self,
+        t: f64,
+        x: &mut [f64],
+        memory: &mut Memory,
+    ) -> Result<Option<usize>, Error> {
+        let mut own = self.own(x);
+        let happened = self.flow.jump(t, &mut own, memory, Some(&mut self.jump))?;
+        let units = own.iter().zip(&self.tangent.units);
+        let changed = x.iter_mut().zip(units);
+        changed.for_each(|(x, (own, unit))| *x = own / unit);
+        Ok(happened)
+    }
+
+    /// Each sensitivity is one of Ξ times what it was.
+    fn settle(
+        &mut self,
+        (t, x): (f64, &[f64]),
+        jumped: &mut [f64],
+        [before, after]: [&[f64]; 2],
+        cause: Option<Cause>,
+        line: usize,
+    ) -> Result<(), Error> {
+        let tangent = self.tangent;
+        let (n, units) = (tangent.states, &tangent.units);
+        let (x, before, after) = (self.own(x), self.own(before), self.own(after));
+        let rates = [&before[..], &after[..]];
+        let (matrix, moved) = self.flow.saltation((t, &x), &self.jump, rates, cause, line)?;
+        for (x, (moved, unit)) in jumped.iter_mut().zip(moved.iter().zip(units)) {
+            *x += moved / unit;
+        }
+        for column in jumped[n..].chunks_exact_mut(n.max(1)) {
+            let own: Vec<f64> = column.iter().zip(units).map(|(s, unit)| s * unit).collect();
+            for (i, into) in column.iter_mut().enumerate() {
+                let row = matrix[i * n..(i + 1) * n].iter().zip(&own);
+                *into = row.map(|(xi, s)| xi * s).sum::<f64>() / units[i];
+            }
+        }
+        Ok(())
     }
 
     fn is_over(&mut self) -> bool {

@@ -8,6 +8,7 @@ fn quantity(name: &str, node: Node, start: f64) -> Quantity {
         node,
         start,
         scale: 2.0,
+        is_known: false,
     }
 }
 

@@ -4,6 +4,7 @@
 //! system, what jumps is taken out of them, and integrators are told of them by
 //! [`Events`](crate::Events). At an event the state goes on as it is.
 
+mod clock;
 mod expressions;
 mod extract;
 mod filippov;
@@ -14,6 +15,7 @@ mod rounds;
 mod time;
 mod when;
 
+pub(crate) use clock::by_the_clock;
 pub use expressions::{Instants, WhenExpressions};
 pub use extract::first_jump;
 pub(crate) use extract::{bends, state_events, time_events};
@@ -22,7 +24,7 @@ pub use guards::Guards;
 pub(crate) use guards::{Ahead, COEFFICIENTS, Poly, Surface};
 pub use memory::Memory;
 pub(crate) use occur::{occur, saltation};
-pub(crate) use rounds::JumpSlopes;
+pub use rounds::JumpSlopes;
 pub(crate) use time::TimeEvents;
 pub(crate) use when::WhenRoots;
 pub use when::{Cause, ClauseShape, Clauses, Seen};

@@ -14,11 +14,11 @@ const ROUNDS: usize = 100;
 
 /// The slopes of a jump.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct JumpSlopes {
+pub struct JumpSlopes {
     /// ∂g/∂x, row by row
-    pub by_state: Vec<f64>,
+    pub(crate) by_state: Vec<f64>,
     /// ∂g/∂t
-    pub by_time: Vec<f64>,
+    pub(crate) by_time: Vec<f64>,
 }
 
 /// One event under way.

@@ -139,7 +139,7 @@ impl WhenRoots {
             .copied()
             .filter(|s| !at_rest.contains(s))
             .collect();
-        let relations = relations(graph, &conditions, &always, &flows);
+        let relations = relations(graph, &conditions, &always, (&flows, moving[0]));
         let (relations, needs) = relations;
         let nothing = graph.constant(0.0).node();
         let now = before.iter().copied().zip(own.iter().copied());
@@ -213,12 +213,12 @@ fn discrete(mut rests: Vec<usize>, slopes: &[(usize, usize)], states: usize) -> 
 }
 
 /// The relations of conditions that a flow can change, and which of them each condition is made of: those
-/// of an equation that gives a variable that it reads are its own.
+/// of an equation that gives a variable that it reads are its own. What the clock alone decides is told by timers.
 fn relations(
     graph: &Graph,
     conditions: &[Node],
     always: &HashMap<Node, Node>,
-    flows: &HashSet<Node>,
+    (flows, time): (&HashSet<Node>, Node),
 ) -> (Vec<Node>, Vec<Vec<usize>>) {
     let mut found: Vec<Node> = vec![];
     let mut relations_of = |roots: &[Node]| {
@@ -229,7 +229,8 @@ fn relations(
                 Op::Binary(Binary::Less | Binary::LessEq, ..)
             );
             let symbols = graph.symbols_of(&[node]);
-            if is_relation && symbols.iter().any(|symbol| flows.contains(symbol)) {
+            let is_watched = symbols != [time] && symbols.iter().any(|symbol| flows.contains(symbol));
+            if is_relation && is_watched {
                 let place = found.iter().position(|known| *known == node);
                 own.push(place.unwrap_or(found.len()));
                 if place.is_none() {

@@ -164,6 +164,7 @@ impl ParametricPlant<'_> {
         let (g, count) = (self.graph, drawn.count());
         let [nothing, one] = [0.0, 1.0].map(|value| g.constant(value).node());
         self.derivatives = drawn.truly(&self.derivatives);
+        self.whens = self.whens.substituted(g, &drawn.read);
         for (i, sensor) in self.sensors.iter_mut().enumerate() {
             let h = drawn.truly(&[sensor.output])[0];
             let own = drawn.own(i);

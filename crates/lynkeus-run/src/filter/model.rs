@@ -170,6 +170,31 @@ impl NoisyModel {
         Ok(changed)
     }
 
+    /// Starts here from now on, with such variances and densities.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for numbers that are impossible.
+    pub(crate) fn start_with(
+        &mut self,
+        start: Vec<f64>,
+        variances: Vec<f64>,
+        densities: Vec<f64>,
+    ) -> Result<()> {
+        for (what, values) in [
+            ("process noise", &densities),
+            ("initial variance", &variances),
+        ] {
+            for (name, value) in self.flow.system().states().iter().zip(values) {
+                check_size(what, name, *value)?;
+            }
+        }
+        for flow in [&mut self.flow].into_iter().chain(&mut self.confined) {
+            flow.start_at(start.clone())?;
+        }
+        (self.process_noise, self.initial_variance) = (densities, variances);
+        Ok(())
+    }
+
     /// Equations, noises, limits and ranges.
     pub(crate) fn tell(&self, digest: &mut Digest) {
         let all = [&self.flow, &self.output_map].into_iter();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::events::{Cause, Clauses, JumpSlopes, Memory, Seen, saltation};
+use crate::events::{Cause, Clauses, JumpSlopes, Memory, Seen};
 use crate::{Dynamics, Error, Evaluation, Events, Result, Slopes};
 
 /// A flow whose state is moved where an event is late: a point may be drawn beyond a surface that it
@@ -66,10 +66,9 @@ impl Dynamics for Point<'_> {
         cause: Option<Cause>,
         line: usize,
     ) -> Result<()> {
-        let gradient = cause.map(|cause| self.driven.gradient(t, x, cause.relation));
-        let gradient = gradient.unwrap_or_default();
+        let jump = &self.jump;
         // a surface that is touched decides of deviations, and a point has none
-        if let Ok((_, moved)) = saltation(&self.jump, &gradient, rates, cause, (t, line)) {
+        if let Ok((_, moved)) = self.driven.saltation((t, x), jump, rates, cause, line) {
             jumped
                 .iter_mut()
                 .zip(moved)

@@ -1,7 +1,7 @@
 //! What a correction is made of, for those who ask for it.
 
 use super::belief::Belief;
-use super::censored::Believed;
+use super::censored::{Believed, End};
 use super::root::{Factor, Root, dot, substitute};
 
 /// What a filter made of its last sample, kept where
@@ -28,6 +28,18 @@ pub struct Record {
     /// Sᵀc by sensor, S the root of P⁻
     projected: Vec<f64>,
     factor: Factor,
+    /// the readings that corrected, one after the other
+    pub(crate) independent: Vec<Independent>,
+}
+
+/// A reading given those of the same row before it: what is left of its innovation, with its variance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Independent {
+    pub sensor: usize,
+    pub innovation: f64,
+    pub variance: f64,
+    /// of the sensor's range, where it is at one
+    pub end: Option<End>,
 }
 
 impl Record {
@@ -49,6 +61,7 @@ impl Record {
         self.gain.fill(if has_gain { 0.0 } else { f64::NAN });
         self.log_likelihood = 0.0;
         self.projected.clear();
+        self.independent.clear();
     }
 
     /// A sensor's reading beside what was predicted; NaN where there is none.
@@ -91,6 +104,18 @@ impl Record {
     pub(crate) fn count(&mut self, taken: &[Believed]) {
         let (block, size) = self.block(taken);
         let lower = self.factor.of(&block, size);
+        let mut unit: Vec<f64> = vec![];
+        for (a, believed) in taken.iter().enumerate() {
+            let (row, pivot) = (&lower[a * size..a * size + a], lower[a * size + a]);
+            let left = believed.innovation - dot(row, &unit);
+            unit.push(if pivot > 0.0 { left / pivot } else { 0.0 });
+            self.independent.push(Independent {
+                sensor: believed.sensor,
+                innovation: left,
+                variance: pivot * pivot,
+                end: None,
+            });
+        }
         let mut weighed: Vec<f64> = taken.iter().map(|b| b.innovation).collect();
         substitute(lower, size, &mut weighed);
         for (a, believed) in taken.iter().enumerate() {
@@ -107,6 +132,14 @@ impl Record {
     /// and has `moved` since it was predicted.
     pub(crate) fn count_at_end(&mut self, believed: &Believed, moved: f64, spread: f64) {
         self.log_likelihood += believed.log_likelihood(moved, spread);
+        if believed.end.is_some() {
+            self.independent.push(Independent {
+                sensor: believed.sensor,
+                innovation: believed.innovation - moved,
+                variance: spread + believed.variance,
+                end: believed.end,
+            });
+        }
     }
 
     /// K = P⁻CᵀS⁻¹ over readings that correct together, from the slopes that were projected.

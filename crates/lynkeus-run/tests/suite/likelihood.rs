@@ -29,9 +29,9 @@ impl Random {
 const SHARE: f64 = 9.0;
 
 /// A log: time, readings (NaN in gaps), inputs.
-type Log = Vec<(f64, Vec<f64>, Vec<f64>)>;
+pub(crate) type Log = Vec<(f64, Vec<f64>, Vec<f64>)>;
 
-fn rows(log: &Log) -> impl Iterator<Item = Row<'_>> {
+pub(crate) fn rows(log: &Log) -> impl Iterator<Item = Row<'_>> {
     log.iter().map(|(t, readings, inputs)| Row {
         t: *t,
         readings,
@@ -40,18 +40,18 @@ fn rows(log: &Log) -> impl Iterator<Item = Row<'_>> {
 }
 
 /// A plant of random structure: rates, a density, a noise and a start are parameters.
-struct Case {
+pub(crate) struct Case {
     graph: Graph,
     n: usize,
     sensors: usize,
     /// [rates…, density, noise, start]
-    values: Vec<f64>,
-    log: Log,
+    pub values: Vec<f64>,
+    pub log: Log,
     seed: u64,
 }
 
 impl Case {
-    fn new(seed: u64) -> Self {
+    pub fn new(seed: u64) -> Self {
         let mut random = Random(seed);
         let n = 1 + seed as usize % 4;
         let sensors = 1 + (seed + seed / 4) as usize % 2;
@@ -86,7 +86,7 @@ impl Case {
     }
 
     /// The noise of others grows with the output.
-    fn is_share(&self) -> bool {
+    pub fn is_share(&self) -> bool {
         self.seed / 4 % 3 == 1
     }
 
@@ -129,11 +129,11 @@ impl Case {
         )
     }
 
-    fn likelihood(&self) -> Likelihood {
+    pub fn likelihood(&self) -> Likelihood {
         self.likelihood_by(Likelihood::new)
     }
 
-    fn likelihood_by(
+    pub fn likelihood_by(
         &self,
         make: impl FnOnce(&ParametricPlant<'_>) -> Result<Likelihood, lynkeus_run::Error>,
     ) -> Likelihood {
@@ -168,6 +168,7 @@ impl Case {
                 .map(|_| (start.node(), g.constant(0.2).node()))
                 .collect(),
             drawn: 0,
+            whens: Default::default(),
             parameters: nodes,
             states,
         })
@@ -377,6 +378,7 @@ fn the_information_is_fisher_s() {
         ranges: vec![],
         start: vec![(c.node(), zero)],
         drawn: 0,
+        whens: Default::default(),
         parameters: vec![c.node(), r.node()],
     })
     .unwrap();
@@ -450,6 +452,7 @@ fn a_plant_without_parameters_has_a_value() {
         ranges: vec![],
         start: vec![(number(0.0), number(0.0))],
         drawn: 0,
+        whens: Default::default(),
         parameters: vec![],
     })
     .unwrap();
@@ -495,6 +498,7 @@ fn an_estimate_without_a_value_is_put_into_its_range() {
         ranges: vec![range],
         start: vec![(number(1.0), number(0.3))],
         drawn: 0,
+        whens: Default::default(),
         parameters: vec![k.node()],
     })
     .unwrap();
@@ -587,6 +591,7 @@ fn what_has_decayed_leaves_the_derivatives() {
             ranges: vec![],
             start: states.iter().map(|_| (number(1.0), number(0.1))).collect(),
             drawn: 0,
+            whens: Default::default(),
             parameters: vec![k.node(), a.node()],
         })
         .unwrap();
@@ -646,6 +651,7 @@ fn the_order_of_the_states_does_not_matter() {
             ranges: vec![],
             start: vec![(g.constant(0.5).node(), g.constant(0.2).node()); 3],
             drawn: 0,
+            whens: Default::default(),
             parameters: vec![q.node()],
         })
         .unwrap();
@@ -692,6 +698,7 @@ fn driven(rate: f64, steps: usize, is_implicit: bool) -> lynkeus_run::filter::Sc
         ranges: vec![],
         start: vec![(number(1.5), number(0.0)), (number(1.0), number(0.0))],
         drawn: 0,
+        whens: Default::default(),
         parameters: vec![λ.node()],
     })
     .unwrap();
@@ -765,6 +772,7 @@ fn a_noise_may_depend_on_the_state() {
         ranges: vec![],
         start: vec![(number(2.0), number(0.0))],
         drawn: 0,
+        whens: Default::default(),
         parameters: vec![θ.node()],
     })
     .unwrap();
@@ -811,6 +819,7 @@ fn a_reading_of_which_all_is_certain_does_not_count() {
             ranges: vec![],
             start: vec![(number(0.0), number(0.0))],
             drawn: 0,
+            whens: Default::default(),
             parameters: vec![θ.node()],
         };
         let log: Log = vec![(0.0, vec![first], vec![]), (1.0, vec![at_end], vec![])];

@@ -5,6 +5,7 @@ mod batches;
 mod common;
 mod coverage;
 mod fleet;
+mod followed;
 mod integration;
 mod late;
 mod likelihood;

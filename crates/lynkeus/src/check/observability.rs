@@ -2,7 +2,7 @@
 
 use lynkeus_answer::Document;
 use lynkeus_expr::Budget;
-use lynkeus_model::{Home, Plant, Variable};
+use lynkeus_model::Plant;
 use lynkeus_observability::{Answer, Quantity, Question, QuestionError, Verdict, analyse};
 use lynkeus_structure::Sensors;
 use lynkeus_words::Words;
@@ -10,6 +10,7 @@ use lynkeus_words::Words;
 use super::knowledge::in_part;
 use super::{CheckOptions, Report};
 use crate::{Error, Study};
+use lynkeus_experiment::prepare::manifold::with_lengths;
 use lynkeus_experiment::words::explain;
 use lynkeus_experiment::words::listed;
 
@@ -40,29 +41,6 @@ pub(super) fn answer(
     };
     let plant = own.as_ref().unwrap_or(plant);
     analyse(plant, &question).map_err(|error| blame(study, error))
-}
-
-/// The plant with what is known of its quaternions as outputs: their length is 1. None where it has none.
-fn with_lengths(plant: &Plant) -> Option<Plant> {
-    let states = plant.states.iter().enumerate();
-    let firsts = states.filter(|(_, s)| s.home == Home::Rotation { element: 0 });
-    let lengths = firsts.map(|(first, state)| {
-        let own = plant.states[first..first + 4].iter();
-        let squares = own.map(|q| plant.graph.expr(q.node).powi(2));
-        let length = squares.reduce(|sum, square| sum + square);
-        Variable {
-            // no name of the plant's has this form
-            name: format!(" length of {}", state.name),
-            node: length.map_or(state.node, |length| length.node()),
-            ..state.clone()
-        }
-    });
-    let lengths: Vec<Variable> = lengths.collect();
-    (!lengths.is_empty()).then(|| {
-        let mut own = plant.clone();
-        own.outputs.extend(lengths);
-        own
-    })
 }
 
 /// The place in the study of a name that does not fit.

@@ -75,7 +75,6 @@ pub struct LogInnovations {
 pub fn likelihood(study: &Study, tables: &[Table]) -> Result<LikelihoodFunction, Error> {
     let (study, mut notes) = posed::with_filter(study)?;
     let plant = prepare::plant(&study)?;
-    prepare::whens::refuse(&study, &plant, "the likelihood")?;
     let prepared = Prepared::new(&study, &plant)?;
     let design = prepared.design()?;
     let logs = posed::logs(&prepared, &design, tables)?;

@@ -12,7 +12,7 @@ use super::plant;
 use super::problem::{Point, Problem};
 use super::unknown::{Kind, Unknown};
 use crate::Error;
-use lynkeus_experiment::prepare::{self, Prepared, calibrate};
+use lynkeus_experiment::prepare::{self, Prepared, calibrate, manifold};
 use lynkeus_experiment::words::explain;
 
 /// The time for what the sensors can tell at all.
@@ -53,15 +53,22 @@ pub(super) fn exact(
     };
     let states = symbolic.states.iter().enumerate();
     let known = states.filter(|(place, _)| is_exact(*place) && !is_fitted(*place));
+    let with_lengths = manifold::with_lengths(symbolic);
+    let mut measured = sensors.measured;
+    if let (Some(own), false) = (&with_lengths, measured.is_empty()) {
+        let known = own.outputs[symbolic.outputs.len()..].iter();
+        measured.extend(known.map(|output| output.name.clone()));
+    }
     let question = Question {
-        measured: sensors.measured,
+        measured,
         disturbances: sensors.disturbances,
         parameters: true,
         known_starts: known.map(|(_, state)| state.name.clone()).collect(),
         budget: study.budget.within(EXACT),
         ..Question::default()
     };
-    let answer = analyse(symbolic, &question).map_err(|e| explain(e).at(&study.file))?;
+    let seen = with_lengths.as_ref().unwrap_or(symbolic);
+    let answer = analyse(seen, &question).map_err(|e| explain(e).at(&study.file))?;
     let of_noises = of_noises(prepared, symbolic)?;
     let hidden = answer.quantities.iter().filter(|(asked, kind)| {
         *kind == Quantity::Parameter

@@ -3,18 +3,19 @@
 use std::collections::{BTreeSet, HashMap};
 
 use lynkeus_expr::{Expr, Node};
-use lynkeus_model::{Home, Plant};
+use lynkeus_model::{Home, Plant, Variable};
 use lynkeus_observers::FilterTuning;
-use lynkeus_run::Level;
 use lynkeus_run::filter::{
-    FilterKind, Likelihood, Limits, ParametricLevel, ParametricPlant, ParametricSensor,
+    FilterKind, FilterSettings, Likelihood, Limits, ParametricLevel, ParametricPlant,
+    ParametricSensor,
 };
+use lynkeus_run::{Level, Manifold};
 use lynkeus_structure::AugmentedPlant;
 
 use super::unknown::{Kind, Unknown};
 use crate::{Error, Study, near};
 use lynkeus_experiment::course::filter::noise::drawn;
-use lynkeus_experiment::prepare::{self, Prepared};
+use lynkeus_experiment::prepare::{self, Prepared, manifold};
 use lynkeus_experiment::words::explain;
 
 /// The plant with the parameters that are found as symbols.
@@ -69,8 +70,6 @@ impl Source<'_> {
             is_alone,
             further,
         } = *self;
-        refuse_curved(prepared.study(), symbolic, tuning, is_alone)?;
-        refuse_iterated(prepared.study(), tuning, is_alone)?;
         let graph = symbolic.graph();
         let number = |value: f64| graph.constant(value).node();
         let symbols: Vec<Node> = (unknowns.iter())
@@ -98,7 +97,12 @@ impl Source<'_> {
         });
         let declared = prepared.declared();
         let initial = &prepared.study().observer.tuning.initial;
-        let start = |(i, state): (usize, &lynkeus_model::Variable)| {
+        // of a rotation, those of its vector
+        let share = |state: &Variable| match state.home {
+            Home::Rotation { .. } => 0.25,
+            _ => 1.0,
+        };
+        let start = |(i, state): (usize, &Variable)| {
             if let Some(&symbol) = begins.get(&i) {
                 return (symbol, number(0.0));
             }
@@ -107,16 +111,21 @@ impl Source<'_> {
             let own = state.start_node.filter(|_| given.is_none());
             let deviation = match is_alone {
                 true => 0.0,
-                false => tuning.initial_variance[i].sqrt(),
+                false => (share(state) * tuning.initial_variance[i]).sqrt(),
             };
             (own.unwrap_or(number(starts[i])), number(deviation))
         };
-        let density = |(i, state): (usize, &lynkeus_model::Variable)| {
+        let density = |(i, state): (usize, &Variable)| {
             let own = declared.process_noise.of(&state.name).copied();
-            match densities.get(&i) {
+            let first = match state.home {
+                Home::Rotation { element } => i - element,
+                _ => i,
+            };
+            match densities.get(&first) {
                 _ if is_alone => number(0.0),
-                Some(&symbol) => symbol,
-                None => number(own.unwrap_or(0.0)),
+                Some(&symbol) if first == i && share(state) == 1.0 => symbol,
+                Some(&symbol) => (graph.expr(symbol) * share(state)).node(),
+                None => number(share(state) * own.unwrap_or(0.0)),
             }
         };
         let sensors = symbolic.outputs.iter().enumerate().map(|(i, output)| {
@@ -154,71 +163,66 @@ impl Source<'_> {
             ranges: symbolic
                 .states
                 .iter()
-                .map(|state| Limits {
-                    low: state.min,
-                    high: state.max,
+                .map(|state| match state.home {
+                    Home::Rotation { .. } => Limits {
+                        low: f64::NEG_INFINITY,
+                        high: f64::INFINITY,
+                    },
+                    _ => Limits {
+                        low: state.min,
+                        high: state.max,
+                    },
                 })
                 .collect(),
             start: symbolic.states.iter().enumerate().map(start).collect(),
             drawn: 0,
+            whens: symbolic.whens.clone(),
             parameters: symbols,
         };
-        let named = |input: &lynkeus_model::Variable| (input.name.clone(), input.node);
+        let named = |input: &Variable| (input.name.clone(), input.node);
         let inputs: Vec<(String, Node)> = symbolic.inputs.iter().map(named).collect();
         let drawn = drawn(declared, symbolic, &inputs).filter(|_| !is_alone);
         let plant = match &drawn {
             Some(drawn) => plant.drawing(drawn),
             None => plant,
         };
-        let likelihood = match tuning.kind {
-            FilterKind::Unscented(points) if !is_alone => Likelihood::unscented(&plant, points),
-            _ => Likelihood::new(&plant),
-        };
+        let likelihood = compiled(&plant, manifold::of(symbolic), tuning, is_alone);
         likelihood.map_err(explain)
     }
 }
 
-/// Likelihoods are of sums, and along sigma points of readings that are no angles.
-fn refuse_curved(
-    study: &Study,
-    plant: &AugmentedPlant<'_>,
+/// The likelihood by straight-line code with tangents; along the filter itself where the states jump or a rotation is
+/// among them, where corrections are iterated, and of an angle by sigma points.
+fn compiled(
+    plant: &ParametricPlant<'_>,
+    manifold: Manifold,
     tuning: &FilterTuning,
     is_alone: bool,
-) -> Result<(), Error> {
-    let mut states = plant.states.iter();
-    if let Some(state) = states.find(|s| matches!(s.home, Home::Rotation { .. })) {
-        let message = format!(
-            "a likelihood takes no quaternion, and [manifold] has one ({})",
-            state.name
-        );
-        let hint = "fit in a study of which [manifold] names none: near the truth its filter is the same to first order, with der(q) + k*(1 - q*q)*q to keep the length";
-        return Err(Error::input(message).at(&study.file).hint(hint));
-    }
-    let mut outputs = plant.outputs.iter().map(|o| &o.variable);
-    let dial = outputs.find(|o| matches!(o.home, Home::Circle { .. }));
-    let is_unscented = matches!(tuning.kind, FilterKind::Unscented(_)) && !is_alone;
-    let Some(dial) = dial.filter(|_| is_unscented) else {
-        return Ok(());
+) -> Result<Likelihood, lynkeus_run::Error> {
+    let kind = match is_alone {
+        true => FilterKind::Extended,
+        false => tuning.kind.clone(),
     };
-    let message = format!(
-        "the likelihood along an unscented filter takes no angle, and {} is one by [manifold]",
-        dial.name
-    );
-    let hint = "fit with family = \"ekf\"; the unscented filter takes what it finds";
-    Err(Error::input(message).at(&study.file).hint(hint))
-}
-
-/// Likelihoods are of corrections that are linearised once.
-fn refuse_iterated(study: &Study, tuning: &FilterTuning, is_alone: bool) -> Result<(), Error> {
-    if is_alone || tuning.iterations < 2 || tuning.kind != FilterKind::Extended {
-        return Ok(());
+    let is_extended = kind == FilterKind::Extended;
+    let iterations = match is_alone {
+        true => 1,
+        false => tuning.iterations,
+    };
+    let is_iterated = is_extended && iterations > 1;
+    let is_smooth = plant.whens.is_empty() && manifold.rotations.is_empty();
+    match kind {
+        FilterKind::Extended if is_smooth && !is_iterated => Likelihood::new(plant),
+        FilterKind::Unscented(points) if is_smooth && manifold.dials.is_empty() => {
+            Likelihood::unscented(plant, points)
+        }
+        kind => {
+            let settings = FilterSettings {
+                iterations,
+                ..FilterSettings::of(kind)
+            };
+            Likelihood::along(plant, &settings, manifold)
+        }
     }
-    let message = format!(
-        "a likelihood is one of corrections that are linearised once, and `iterations` of [observer] says up to {}",
-        tuning.iterations
-    );
-    let hint = "fit without `iterations`: once the start is forgotten both filters are nearly one";
-    Err(Error::input(message).at(&study.file).hint(hint))
 }
 
 /// A noise of this size, of the kind that it is.

@@ -1,6 +1,6 @@
 //! What a fit finds: its names, where the search starts, within what, and what was known before.
 
-use lynkeus_model::{Plant, Variable};
+use lynkeus_model::{Home, Plant, Variable};
 use lynkeus_study::{Chosen, FitSettings, Name, Noise, Objective, Prior};
 
 use crate::{Error, Study, near};
@@ -366,9 +366,19 @@ fn densities(prepared: &Prepared<'_>, logs: &[FittedLog]) -> Result<Vec<Unknown>
         let place = augmented.state_index(&variable.name).unwrap_or_default();
         let start = declared(variable).filter(|q| *q > 0.0);
         let start = start.unwrap_or_else(|| noise::guessed(variable, span));
-        noise_of(Kind::Density(place), variable, start)
+        let mut own = noise_of(Kind::Density(place), variable, start);
+        // one for the vector of a rotation
+        if matches!(variable.home, Home::Rotation { .. }) {
+            let array = own.name.rsplit_once('[').map(|(array, _)| array.to_owned());
+            own.name = array.unwrap_or(own.name);
+        }
+        own
     };
-    Ok(asked.into_iter().map(of).collect())
+    let is_own = |v: &&Variable| match v.home {
+        Home::Rotation { element } => element == 0,
+        _ => true,
+    };
+    Ok(asked.into_iter().filter(is_own).map(of).collect())
 }
 
 fn starts(prepared: &Prepared<'_>, logs: &[FittedLog]) -> Result<Vec<Unknown>, Error> {
@@ -380,6 +390,14 @@ fn starts(prepared: &Prepared<'_>, logs: &[FittedLog]) -> Result<Vec<Unknown>, E
         names,
         &augmented.states,
     )?;
+    if let Some(variable) = asked.iter().find(|v| matches!(v.home, Home::Rotation { .. })) {
+        let message = format!(
+            "`initial` of [fit]: {} is a number of a quaternion, and four numbers of length 1 are not found one by one",
+            variable.name
+        );
+        let hint = "leave it out: the filter finds the attitude, from `initial` with `initial_variance` of [observer]";
+        return Err(Error::input(message).at(&prepared.study().file).hint(hint));
+    }
     let of = |(log, fitted): (usize, &FittedLog)| {
         let asked = asked.iter().map(move |variable| {
             let state = augmented.state_index(&variable.name).unwrap_or_default();

@@ -108,6 +108,7 @@ impl<'p> Setup<'p> {
             node: v.node,
             start: start(&v.name),
             scale: reach.scale(v),
+            is_known: v.discrete,
         };
         let inputs: Vec<Node> = plant.inputs.iter().map(|i| i.node).collect();
         let courses = systems::input_expressions(study, plant, settings)?;
@@ -117,6 +118,7 @@ impl<'p> Setup<'p> {
             experiment: Experiment {
                 states: states.iter().map(quantity).collect(),
                 derivatives: plant.derivatives.clone(),
+                whens: plant.whens.clone(),
                 unknown: unknown.iter().map(quantity).collect(),
                 inputs: inputs
                     .into_iter()

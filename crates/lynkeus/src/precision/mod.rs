@@ -12,7 +12,8 @@ mod report;
 mod tests;
 mod words;
 
-use lynkeus_model::Home;
+use lynkeus_expr::Node;
+use lynkeus_model::{Home, Plant, Variable};
 use lynkeus_observability::precision::{Advice, Deviations, SensorSet};
 
 use crate::{Error, Study};
@@ -79,7 +80,7 @@ pub struct Report {
 pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     let settings = systems::settings(study)?;
     let plant = prepare::plant(study)?;
-    prepare::whens::refuse(study, &plant, "precision")?;
+    refuse_driven_events(study, &plant)?;
     let prepared = Prepared::new(study, &plant)?;
     let mut states = plant.states.iter();
     if let Some(state) = states.find(|s| matches!(s.home, Home::Rotation { .. })) {
@@ -135,6 +136,27 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     };
     // what was computed after the end does not count
     ended(study).map_or(Ok(report), Err)
+}
+
+/// Events come when the states say so: an input that nobody measures has no say in them here.
+fn refuse_driven_events(study: &Study, plant: &Plant) -> Result<(), Error> {
+    let unknown = prepare::sensors(study, plant).unknown;
+    let inputs = plant.inputs.iter().filter(|input| unknown.contains(&input.name));
+    let inputs: Vec<&Variable> = inputs.collect();
+    for clause in &plant.whens.clauses {
+        let values = clause.changes.iter().map(|change| change.1);
+        let read: Vec<Node> = clause.conditions.iter().copied().chain(values).collect();
+        let read = plant.graph.symbols_of(&read);
+        if let Some(input) = inputs.iter().find(|input| read.contains(&input.node)) {
+            let message = format!(
+                "the `when` of line {} reads the unknown input {}: how well it can be known is not foretold through such events",
+                clause.line, input.name
+            );
+            let hint = "`lynkeus simulate STUDY --runs 100` says how well a filter knows it";
+            return Err(Error::input(message).at(&study.file).hint(hint));
+        }
+    }
+    Ok(())
 }
 
 /// The section of the densities.

@@ -100,6 +100,25 @@ impl Draft {
         self.process.push(("w", between(random, 0.01, 0.2)));
     }
 
+    /// What the clock switches, at instants of rows among others, alone and with a condition on the state.
+    fn clock(&mut self, random: &mut Normal) {
+        let first = pick(random, &["0.5", "1.0", "1.234", "0.1 + 0.7"]);
+        let then = pick(
+            random,
+            &["time > 2.2", "time >= 2.5 and z < 0.9", "not time < 3", "2.0 < time"],
+        );
+        self.declared +=
+            "Real z(start = 1.2); discrete Real on(start = 0); output Real yz = z;";
+        write!(
+            self.equations,
+            "\nder(z) = on - {:.2}*z;\nwhen time >= {first} then on = 1.5; elsewhen {then} then on = pre(on) - 0.7; reinit(z, 0.5*pre(z)); end when;",
+            between(random, 0.3, 1.5)
+        )
+        .unwrap();
+        self.noise.push(("yz", 0.05));
+        self.process.push(("z", 0.02));
+    }
+
     fn rotation(&mut self) {
         self.declared += "Real q[4](start = {1, 0, 0, 0}); input Real p; output Real a = 2*(q[2]*q[4] - q[1]*q[3]); output Real b = 2*(q[3]*q[4] + q[1]*q[2]);";
         self.equations += "\nder(q[1]) = 0.5*(-q[2]*p - 0.2*q[4]); der(q[2]) = 0.5*(q[1]*p + 0.2*q[3]); der(q[3]) = 0.5*(-0.2*q[2] + q[4]*p); der(q[4]) = 0.5*(0.2*q[1] - q[3]*p);";
@@ -191,6 +210,9 @@ impl Draft {
     }
 }
 
+/// Plants from here on have something that the clock switches.
+const CLOCKED: u64 = 1000;
+
 /// A study of such a plant; with late sensors by every third seed.
 fn drafted(seed: u64) -> (Folder, Vec<String>, bool) {
     let mut random = Normal(5000 + seed);
@@ -201,6 +223,9 @@ fn drafted(seed: u64) -> (Folder, Vec<String>, bool) {
     }
     if random.uniform() < 0.25 {
         draft.rotation();
+    }
+    if seed >= CLOCKED {
+        draft.clock(&mut random);
     }
     let is_late = seed.is_multiple_of(3);
     let delay = match is_late {
@@ -246,6 +271,17 @@ fn looked_late(seed: u64, folder: &Folder, log: &[String]) -> bool {
 #[test]
 fn plants_with_events_and_angles_are_those_of_estimate() {
     agree(&(0..6).collect::<Vec<_>>());
+}
+
+#[test]
+fn plants_that_the_clock_switches_are_those_of_estimate() {
+    agree(&(CLOCKED..CLOCKED + 4).collect::<Vec<_>>());
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn two_hundred_plants_that_the_clock_switches_are_those_of_estimate() {
+    agree(&(CLOCKED..CLOCKED + 200).collect::<Vec<_>>());
 }
 
 #[test]

@@ -50,6 +50,7 @@ fn computed(plant: &Plant) -> Precision {
         node: v.node,
         start: v.start.unwrap_or(0.0),
         scale: 1.0,
+        is_known: false,
     };
     let unknown = plant.inputs.iter().filter(|i| i.name == "Zf");
     let window = Window {

@@ -22,6 +22,7 @@ fn errors_of_two_thousand_fits_spread_as_computed() {
         node: [angle, speed, torque][i].node(),
         start: START[i],
         scale: 1.0,
+        is_known: false,
     };
     let experiment = Experiment {
         states: vec![quantity("angle", 0), quantity("speed", 1)],

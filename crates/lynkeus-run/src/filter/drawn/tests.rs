@@ -227,6 +227,7 @@ fn a_likelihood_counts_them_too() {
         ranges: vec![],
         start: vec![(number(0.0), number(1.0))],
         drawn: 0,
+        whens: Default::default(),
         parameters: vec![noise.node()],
     };
     let plant = plant.drawing(&drawn);

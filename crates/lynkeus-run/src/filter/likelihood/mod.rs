@@ -8,6 +8,7 @@
 //! inverse is the covariance of what it finds (K. J. Åström, *Automatica* 16 (1980) 551–574).
 
 mod code;
+mod followed;
 mod interval;
 mod plant;
 mod sample;
@@ -17,12 +18,14 @@ mod unscented;
 use lynkeus_expr::Tape;
 use lynkeus_native::Function;
 
-use super::SigmaPoints;
+use super::{FilterSettings, SigmaPoints};
 use super::censored::{End, Tail};
 use crate::integrator::fixed_steps;
+use crate::manifold::Manifold;
 use crate::noise::Limits;
 use crate::{Error, Method, Result, Step};
 use code::{Bundle, Code, passes};
+use followed::Followed;
 use interval::{GRADED, Interval, MOST_GRADED};
 pub use plant::{ParametricLevel, ParametricPlant, ParametricSensor};
 use sample::Sample;
@@ -83,6 +86,7 @@ pub struct Score {
 ///     ranges: vec![],
 ///     start: vec![(level.node(), number(0.0))],
 ///     drawn: 0,
+///     whens: Default::default(),
 ///     parameters: vec![level.node()],
 /// })?;
 /// let rows = [1.0, 2.0, 6.0].map(|y| [y]);
@@ -100,6 +104,8 @@ pub struct Likelihood(Wide);
 enum Wide {
     Four(Box<Passes<4>>),
     Eight(Box<Passes<8>>),
+    /// none: the filter itself is followed
+    Followed(Box<Followed>),
 }
 
 /// An innovation on the way.
@@ -125,6 +131,7 @@ impl Likelihood {
     /// expressions.
     pub fn new(plant: &ParametricPlant<'_>) -> Result<Self> {
         plant.check()?;
+        plant.refuse_events()?;
         Self::of(&Sample::new(plant), None)
     }
 
@@ -134,6 +141,7 @@ impl Likelihood {
     /// As [`Self::new`], and those of [`SigmaPoints::weights`].
     pub fn unscented(plant: &ParametricPlant<'_>, points: SigmaPoints) -> Result<Self> {
         plant.check()?;
+        plant.refuse_events()?;
         let weights = points.weights(plant.states.len())?;
         let shown = unscented::shown(plant);
         let sample = Sample::full(&shown);
@@ -143,6 +151,31 @@ impl Likelihood {
             weights,
         };
         Self::of(&sample, Some(&own))
+    }
+
+    /// The same along a filter with such settings itself, of a plant whose states and readings live on a manifold: events
+    /// ([`ParametricPlant::whens`]) and iterated corrections are followed. Derivatives are differences then, of
+    /// innovations and their variances, to about six digits.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; [`Error::Setting`] for a filter without a covariance, for what it does not take, and for a noise that
+    /// depends on more than θ.
+    pub fn along(
+        plant: &ParametricPlant<'_>,
+        settings: &FilterSettings,
+        manifold: Manifold,
+    ) -> Result<Self> {
+        plant.check()?;
+        let followed = Followed::new(plant, settings, manifold)?;
+        Ok(Self(Wide::Followed(Box::new(followed))))
+    }
+
+    /// Why the last score has no value, where a filter is followed.
+    pub fn failure(&self) -> Option<&Error> {
+        match &self.0 {
+            Wide::Followed(followed) => followed.failure(),
+            Wide::Four(_) | Wide::Eight(_) => None,
+        }
     }
 
     fn of(sample: &Sample<'_, '_>, points: Option<&Unscented<'_, '_>>) -> Result<Self> {
@@ -167,6 +200,7 @@ impl Likelihood {
         match &mut self.0 {
             Wide::Four(passes) => passes.implicit(is_implicit),
             Wide::Eight(passes) => passes.implicit(is_implicit),
+            Wide::Followed(_) => false,
         }
     }
 
@@ -175,6 +209,7 @@ impl Likelihood {
         match &mut self.0 {
             Wide::Four(passes) => passes.times = times.max(1),
             Wide::Eight(passes) => passes.times = times.max(1),
+            Wide::Followed(followed) => followed.shorten(times),
         }
     }
 
@@ -208,6 +243,7 @@ impl Likelihood {
         match &mut self.0 {
             Wide::Four(passes) => passes.score(parameters, rows, step, see),
             Wide::Eight(passes) => passes.score(parameters, rows, step, see),
+            Wide::Followed(followed) => followed.score(parameters, rows, step, see),
         }
     }
 }
@@ -345,7 +381,7 @@ impl<const L: usize> Passes<L> {
                     None => Predict::Sample(sample.confined(compile)?),
                     Some(points) => {
                         let n = points.plant.states.len();
-                        let limited = sample.limited();
+                        let limited = plant.limited();
                         Predict::Points(Box::new(points.predict(&limited[..n], compile)?))
                     }
                 },

@@ -1,6 +1,7 @@
 //! A plant as a function of what is not known.
 
 use lynkeus_expr::{Graph, Node};
+use lynkeus_model::Whens;
 
 use crate::noise::Limits;
 use crate::{Error, Result};
@@ -32,6 +33,8 @@ pub struct ParametricPlant<'g> {
     pub start: Vec<(Node, Node)>,
     /// so many of the states, the last, are drawn anew in every row
     pub drawn: usize,
+    /// by which the states jump; none where they never do
+    pub whens: Whens,
     /// symbols of θ
     pub parameters: Vec<Node>,
 }
@@ -53,6 +56,37 @@ impl ParametricPlant<'_> {
             return Err(Error::setting("states", expected, n));
         }
         Ok(())
+    }
+
+    /// Straight-line code goes through no event.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] where the states jump.
+    pub(super) fn refuse_events(&self) -> Result<()> {
+        match self.whens.is_empty() {
+            true => Ok(()),
+            false => Err(Error::setting(
+                "plant",
+                "one whose states do not jump; another is followed along its filter",
+                "`when`",
+            )),
+        }
+    }
+
+    /// The derivatives of the states limited to their ranges.
+    pub(super) fn limited(&self) -> Vec<Node> {
+        let g = self.graph;
+        let limited = self.states.iter().zip(&self.ranges).map(|(&x, range)| {
+            let mut image = g.expr(x);
+            if range.high.is_finite() {
+                image = image.min(g.constant(range.high));
+            }
+            if range.low.is_finite() {
+                image = image.max(g.constant(range.low));
+            }
+            (x, image.node())
+        });
+        g.substitute(&self.derivatives, &limited.collect())
     }
 }
 

@@ -234,23 +234,7 @@ impl<'p, 'g> Sample<'p, 'g> {
 
     /// The same with the states limited to their ranges.
     pub fn confined<const L: usize>(&self, compile: Compile<L>) -> Result<Code<L>> {
-        self.predict_by(&self.limited(), compile)
-    }
-
-    /// The derivatives of the states limited to their ranges.
-    pub fn limited(&self) -> Vec<Node> {
-        let (plant, g) = (self.plant, self.plant.graph);
-        let limited = plant.states.iter().zip(&plant.ranges).map(|(&x, range)| {
-            let mut image = g.expr(x);
-            if range.high.is_finite() {
-                image = image.min(g.constant(range.high));
-            }
-            if range.low.is_finite() {
-                image = image.max(g.constant(range.low));
-            }
-            (x, image.node())
-        });
-        g.substitute(&plant.derivatives, &limited.collect())
+        self.predict_by(&self.plant.limited(), compile)
     }
 
     fn predict_by<const L: usize>(

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::series::Transition;
 use super::straight::Straight;
 use crate::Evaluation;
-use crate::events::{Cause, Clauses, JumpSlopes, Memory, Seen, saltation};
+use crate::events::{Cause, Clauses, JumpSlopes, Memory, Seen};
 use crate::filter::belief::Belief;
 use crate::filter::profile::Profile;
 use crate::filter::root::Root;
@@ -306,11 +306,9 @@ impl Dynamics for Variational<'_> {
         line: usize,
     ) -> Result<()> {
         let (n, width) = (self.equation.n, self.equation.width);
-        let gradient = cause.map(|cause| self.driven.gradient(t, z, cause.relation));
-        let gradient = gradient.unwrap_or_default();
         let rates = [&before[..n], &after[..n]];
         let jump = &self.equation.jump;
-        let (matrix, moved) = saltation(jump, &gradient, rates, cause, (t, line))?;
+        let (matrix, moved) = self.driven.saltation((t, z), jump, rates, cause, line)?;
         for (x, moved) in jumped.iter_mut().zip(moved) {
             *x += moved;
         }
