@@ -76,6 +76,8 @@ pub struct Fit {
     pub(crate) optima: Vec<Optimum>,
     /// what the logs do not tell
     pub undetermined: Vec<String>,
+    /// what is not told may be so because events on which it has a say do not happen at these values
+    pub(crate) has_events: bool,
     pub(crate) exact: Exact,
     /// where that is asked
     pub(crate) ahead: Option<Ahead>,
@@ -568,6 +570,7 @@ impl Work<'_> {
             uncertainty,
             optima,
             undetermined: vec![],
+            has_events: self.problem.has_knees(),
             exact: self.exact,
             ahead,
             errors,

@@ -290,7 +290,6 @@ fn refused(folder: &Folder, arguments: &[&str], told: &str) {
 fn what_does_not_follow_events_says_so_with_the_line() {
     let line = "the state of 'Ball' jumps at events (`when` of line 9)";
     let folder = ball("");
-    refused(&folder, &["fit", "study.toml", "log.csv"], line);
     let plant = ["export", "study.toml", "--system", "plant", "--to", "fmu"];
     refused(&folder, &[&plant[..], &["-o", "out.fmu"]].concat(), line);
     folder.change("study.toml", "\"ekf\"", "\"mhe\"");

@@ -18,10 +18,8 @@ fn fitted(folder: &Folder, from: &str, to: &str, names: &[&str]) -> Vec<[f64; 2]
     assert_eq!(run.code, 0, "{}\n{}", run.out, run.err);
     let json = run.json();
     let of = |name: &&str| {
-        let all = json["parameters"].as_array().unwrap();
-        let own = all.iter().find(|p| p["name"] == **name);
-        let own = own.unwrap_or_else(|| panic!("{name}: {json}"));
-        ["value", "sd"].map(|key| own[key].as_f64().unwrap())
+        let own = &json["parameters"][*name];
+        ["value", "sd"].map(|key| own[key].as_f64().unwrap_or_else(|| panic!("{json}")))
     };
     names.iter().map(of).collect()
 }
@@ -76,7 +74,7 @@ equation
   end when;
 end Thermostat;
 ";
-    let study = "[parameters]\nlow = 19\nhigh = 21\nheat = 8\n[sensors]\nnoise = { y = 0.1 }\n[process_noise]\nT = 1e-4\n[observer]\nfamily = \"ekf\"\ninitial_variance = { T = 0.01 }\n[simulate]\nuntil = 8\noutput_step = 0.05\nseed = 2\n[fit]\nparameters = [\"low\", \"high\", \"heat\"]\n";
+    let study = "[parameters]\nlow = 19\nhigh = 21\nheat = 8\n[sensors]\nnoise = { y = 0.1 }\n[process_noise]\nT = 0.01\n[observer]\nfamily = \"ekf\"\ninitial_variance = { T = 0.01 }\n[simulate]\nuntil = 8\noutput_step = 0.05\nseed = 2\n[fit]\nparameters = [\"low\", \"high\", \"heat\"]\n";
     let folder = folder(model, study);
     let (from, to) = ("low = 19\nhigh = 21\nheat = 8\n", "low = 18.9\nhigh = 21.15\nheat = 8.1\n");
     let found = fitted(&folder, from, to, &["low", "high", "heat"]);

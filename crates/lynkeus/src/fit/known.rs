@@ -154,17 +154,24 @@ pub(super) fn flat(matrix: &DMatrix<f64>, free: &[usize]) -> Vec<usize> {
 /// How far from the start it is looked again, as a share of a range or of a value.
 const ASIDE: [f64; 2] = [0.03, -0.02];
 
-/// The unknowns that the logs do not tell: at the start, and at two places beside it.
+/// The same where a threshold may not be met there.
+const FARTHER: [f64; 6] = [0.03, -0.02, 0.1, -0.1, 0.3, -0.3];
+
+/// The unknowns that the logs do not tell: at the start, and at two places beside it; more where events decide.
 ///
 /// # Errors
 /// As [`Problem::at`].
 pub(super) fn undetermined(problem: &mut Problem<'_>, start: &Point) -> Result<Vec<usize>, Error> {
     let all: Vec<usize> = (0..start.z.len()).collect();
-    let found = flat(&start.information, &all);
+    let mut found = flat(&start.information, &all);
     if found.is_empty() {
         return Ok(found);
     }
-    for aside in ASIDE {
+    let asides: &[f64] = match problem.has_knees() {
+        true => &FARTHER,
+        false => &ASIDE,
+    };
+    for aside in asides {
         let z = problem.unknowns.iter().zip(&start.z).enumerate();
         let z = z.map(|(i, (unknown, &z))| {
             let turn = aside * (1.0 + 0.37 * i as f64);
@@ -182,8 +189,18 @@ pub(super) fn undetermined(problem: &mut Problem<'_>, start: &Point) -> Result<V
         let z = DVector::from_iterator(start.z.len(), z);
         let point = problem.at(z)?;
         // a place where the plant has no value says nothing
-        if point.value.is_finite() && flat(&point.information, &all).is_empty() {
-            return Ok(vec![]);
+        if !point.value.is_finite() {
+            continue;
+        }
+        let there = flat(&point.information, &all);
+        // one threshold may be met here and another there
+        match problem.has_knees() {
+            true => found.retain(|place| there.contains(place)),
+            false if there.is_empty() => found.clear(),
+            false => {}
+        }
+        if found.is_empty() {
+            break;
         }
     }
     Ok(found)

@@ -153,6 +153,11 @@ impl Problem<'_> {
         Ok(point)
     }
 
+    /// Whether −log L may have knees and steps, which no Hessian tells of.
+    pub fn has_knees(&self) -> bool {
+        self.terms.iter().any(|term| term.likelihood.has_knees())
+    }
+
     /// Whether a limit struck: what has been computed before still counts.
     pub fn is_spent(&self) -> bool {
         self.budget.spent().is_some()

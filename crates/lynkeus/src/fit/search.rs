@@ -47,10 +47,19 @@ pub(crate) fn search(
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<Found, Error> {
     let mut descent = Descent::new(problem, start, held);
-    descent.score(watch)?;
+    let is_done = descent.score(watch)?;
     if !descent.point.value.is_finite() {
         descent.is_ended = descent.problem.is_spent();
         return Ok(descent.found(None));
+    }
+    if descent.problem.has_knees() {
+        // a gradient need not vanish at a knee: the end is where no step wins anything
+        let information = descent.point.information.clone();
+        let is_converged = is_done && !descent.is_ended;
+        return Ok(Found {
+            is_converged,
+            ..descent.found(Some(information))
+        });
     }
     descent.damping = 0.0;
     descent.growth = 2.0;
@@ -114,15 +123,15 @@ impl<'d, 'p> Descent<'d, 'p> {
         }
     }
 
-    /// By Fisher's information.
-    fn score(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) -> Result<(), Error> {
+    /// By Fisher's information; whether it came to where no step wins anything.
+    fn score(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) -> Result<bool, Error> {
         for _ in 0..STEPS[0] {
             let matrix = self.point.information.clone();
             if !self.point.value.is_finite() || !self.goes_on(&matrix, watch)? {
-                break;
+                return Ok(true);
             }
         }
-        Ok(())
+        Ok(false)
     }
 
     /// At a bound, and pressed against it.
@@ -131,10 +140,13 @@ impl<'d, 'p> Descent<'d, 'p> {
         (z <= low && g > 0.0) || (z >= high && g < 0.0)
     }
 
-    /// The unknowns that may move.
+    /// The unknowns that may move. A threshold that is not met has no say until others have brought the state there.
     fn free(&self) -> Vec<usize> {
         let all = 0..self.point.z.len();
+        let has_knees = self.problem.has_knees();
+        let has_say = |i: &usize| !has_knees || self.point.information[(*i, *i)] > 0.0;
         all.filter(|&i| !self.held[i] && !self.is_bound(i))
+            .filter(has_say)
             .collect()
     }
 

@@ -66,6 +66,14 @@ impl Answer for Fit {
         let at = |error: Error| Some(error.at(&self.file));
         if !self.undetermined.is_empty() {
             let names = self.undetermined.join(", ");
+            if self.has_events {
+                let message = format!(
+                    "at these values the logs do not tell {names}: events in which they have a say do not happen"
+                );
+                return at(Error::refused(message).hint(
+                    "start nearer, by [parameters], or try more `starts` in [fit] within `bounds`",
+                ));
+            }
             let message = format!("the logs do not tell {names}");
             return at(Error::refused(message).hint(self.remedy()));
         }

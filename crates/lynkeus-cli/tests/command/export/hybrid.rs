@@ -108,10 +108,10 @@ impl Draft {
             &["time > 2.2", "time >= 2.5 and z < 0.9", "not time < 3", "2.0 < time"],
         );
         self.declared +=
-            "Real z(start = 1.2); discrete Real on(start = 0); output Real yz = z;";
+            "Real z(start = 1.2); discrete Real lit(start = 0); output Real yz = z;";
         write!(
             self.equations,
-            "\nder(z) = on - {:.2}*z;\nwhen time >= {first} then on = 1.5; elsewhen {then} then on = pre(on) - 0.7; reinit(z, 0.5*pre(z)); end when;",
+            "\nder(z) = lit - {:.2}*z;\nwhen time >= {first} then lit = 1.5; elsewhen {then} then lit = pre(lit) - 0.7; reinit(z, 0.5*pre(z)); end when;",
             between(random, 0.3, 1.5)
         )
         .unwrap();

@@ -116,6 +116,10 @@ impl Followed {
         self.times = times.max(1);
     }
 
+    pub fn has_events(&self) -> bool {
+        self.model.flow.system().has_clauses()
+    }
+
     /// Why there was no value.
     pub fn failure(&self) -> Option<&Error> {
         self.failure.as_ref()

@@ -170,6 +170,14 @@ impl Likelihood {
         Ok(Self(Wide::Followed(Box::new(followed))))
     }
 
+    /// Whether it may have knees and steps: where an event passes a reading.
+    pub fn has_knees(&self) -> bool {
+        match &self.0 {
+            Wide::Followed(followed) => followed.has_events(),
+            Wide::Four(_) | Wide::Eight(_) => false,
+        }
+    }
+
     /// Why the last score has no value, where a filter is followed.
     pub fn failure(&self) -> Option<&Error> {
         match &self.0 {
