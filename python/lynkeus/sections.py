@@ -174,9 +174,9 @@ class ObserverSection(TypedDict, total=False):
     fast enough for the run, else `ekf` (`"auto"`, `"triangular"`, `"block-triangular"`, `"state-affine"`,
     `"drift-observable"`, `"unknown-input"`, `"ekf"`, `"ukf"`, `"mhe"`, `"particle"`; default: `"auto"`)"""
 
-    initial: Mapping[str, Number] | None
-    """where the estimate starts; `default` holds for everything not listed (table: name = number, and
-    `default`; default: the plant's start values)"""
+    initial: Mapping[str, Number | Numbers] | None
+    """where the estimate starts, `{ q = [1, 0, 0, 0] }`; `default` holds for everything not listed (table:
+    name = number, an array = list of numbers, and `default`; default: the plant's start values)"""
 
     clamp: bool | None
     """the plant's functions see the estimate limited to `[min, max]`; the reported estimate is never altered
@@ -314,11 +314,11 @@ class ObserverSection(TypedDict, total=False):
     """drift-observable: bounds of |u'|, …, |u^(n−r)|, read by guarantees only (n − r numbers; for several
     inputs a table; default: those of `[certify]`)"""
 
-    initial_variance: Mapping[str, Number] | None
+    initial_variance: Mapping[str, Number | Numbers] | None
     """ekf, ukf, mhe, particle: how uncertain the first estimate is: the variance of each state and unknown
-    input; `default` holds for everything not listed (table: name = number ≥ 0, and `default`; default: the
-    square of a quarter of the declared range (without a range: of the start value, or 1; of an angle or a
-    rotation: of a turn))"""
+    input; `default` holds for everything not listed (table: name = number ≥ 0, an array = list of them,
+    and `default`; default: the square of a quarter of the declared range (without a range: of the start
+    value, or 1; of an angle or a rotation: of a turn))"""
 
     gate: Number | None
     """ekf, ukf, mhe, particle: a reading whose innovation exceeds so many of its standard deviations is
@@ -349,10 +349,16 @@ class ObserverSection(TypedDict, total=False):
     """particle: how many; the error that they add falls with the root of their number (whole number ≥ 2;
     default: 1000)"""
 
-    proposal: Literal["bootstrap", "auxiliary"] | None
+    proposal: Literal["bootstrap", "auxiliary", "ensemble"] | None
     """particle: "bootstrap": particles run, then are weighed; "auxiliary": those are drawn to run that the
     flow without noise takes to where the next readings are likely, which pays where readings are precise
-    and the process noise is small (`"bootstrap"`, `"auxiliary"`; default: `"bootstrap"`)"""
+    and the process noise is small; "ensemble": none is weighed, and readings move all together by Kalman's
+    formula with their covariances, for many states that few runs of the plant have to stand for
+    (`"bootstrap"`, `"auxiliary"`, `"ensemble"`; default: `"bootstrap"`)"""
+
+    inflation: Number | None
+    """particle: of an ensemble: by this factor the particles are farther from their mean after each update,
+    which makes up for their small number (number; default: 1)"""
 
     resample_below: Number | None
     """particle: particles are drawn anew where their effective number falls below this share of them; 1:
@@ -402,8 +408,9 @@ class SimulateSection(TypedDict, total=False):
     """the plant's inputs, the unknown ones included; `pi` is known (table: name = number, or Modelica
     expression of `time` as text; default: the inputs' start values)"""
 
-    initial: Mapping[str, Number] | None
-    """where the *plant* starts (table: name = number; default: the plant's start values)"""
+    initial: Mapping[str, Number | Numbers] | None
+    """where the *plant* starts (table: name = number, an array = list of numbers; default: the plant's start
+    values)"""
 
     seed: Whole | None
     """seed of the noise and of `spread` (whole number ≥ 0; default: 0)"""

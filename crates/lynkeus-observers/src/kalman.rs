@@ -96,7 +96,7 @@ pub const MHE: &dyn Family = &Filter {
 /// The family `particle`.
 pub const PARTICLE: &dyn Family = &Filter {
     name: "particle",
-    paper: "Gordon, Salmond and Smith 1993, the bootstrap filter; Pitt and Shephard 1999, the auxiliary one",
+    paper: "Gordon, Salmond and Smith 1993, the bootstrap filter; Pitt and Shephard 1999, the auxiliary one; Whitaker and Hamill 2002, the ensemble",
     called: "particle filter",
     keys: &[&KEYS, &DRAWN],
     smooths: false,
@@ -104,16 +104,21 @@ pub const PARTICLE: &dyn Family = &Filter {
     is_sampled: true,
     kind: |tuning| {
         let own = Particles::default();
-        let [count, proposal, below, seed] = &DRAWN;
+        let [count, proposal, inflation, below, seed] = &DRAWN;
         let share = number(tuning, below)?.unwrap_or(own.resample_below);
         if !(0.0..=1.0).contains(&share) {
             return Err(below.wrong(share));
         }
+        let factor = number(tuning, inflation)?;
+        let meant = tuning.meant(proposal, [0, 1, 2])?.unwrap_or(0);
+        if factor.is_some_and(|factor| !(factor >= 1.0) || meant != 2) {
+            let expected = "1 or more, with proposal = \"ensemble\"";
+            return Err(TuningError::new(inflation.name, expected, factor.unwrap_or(1.0)));
+        }
         Ok(FilterKind::Particles(Particles {
+            inflation: (meant == 2).then_some(factor.unwrap_or(1.0)),
             count: whole(tuning, count, Particles::MOST as f64)?.unwrap_or(own.count),
-            looks_ahead: tuning
-                .meant(proposal, [false, true])?
-                .unwrap_or(own.looks_ahead),
+            looks_ahead: meant == 1,
             resample_below: share,
             seed: whole(tuning, seed, MOST_EXACT)?.unwrap_or(own.seed as usize) as u64,
         }))
@@ -333,7 +338,7 @@ const WINDOW: [KeySpec; 1] = [KeySpec {
 const MOST_EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// Those of particles.
-const DRAWN: [KeySpec; 4] = [
+const DRAWN: [KeySpec; 5] = [
     KeySpec {
         name: "particles",
         shape: Shape::Whole(2),
@@ -342,9 +347,15 @@ const DRAWN: [KeySpec; 4] = [
     },
     KeySpec {
         name: "proposal",
-        shape: Shape::Word(&["bootstrap", "auxiliary"]),
+        shape: Shape::Word(&["bootstrap", "auxiliary", "ensemble"]),
         default: "`\"bootstrap\"`",
-        meaning: "\"bootstrap\": particles run, then are weighed; \"auxiliary\": those are drawn to run that the flow without noise takes to where the next readings are likely, which pays where readings are precise and the process noise is small",
+        meaning: "\"bootstrap\": particles run, then are weighed; \"auxiliary\": those are drawn to run that the flow without noise takes to where the next readings are likely, which pays where readings are precise and the process noise is small; \"ensemble\": none is weighed, and readings move all together by Kalman's formula with their covariances, for many states that few runs of the plant have to stand for",
+    },
+    KeySpec {
+        name: "inflation",
+        shape: Shape::Number,
+        default: "1",
+        meaning: "of an ensemble: by this factor the particles are farther from their mean after each update, which makes up for their small number",
     },
     KeySpec {
         name: "resample_below",

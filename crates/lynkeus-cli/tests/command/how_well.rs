@@ -142,3 +142,36 @@ fn disturbances_that_are_not_counted_are_named() {
         &["check", "s.toml", "--how-well"],
     );
 }
+
+/// Through the switchings of a thermostat: its own mode is known, its temperature better than a reading, and the heater is
+/// told by how soon they come.
+#[test]
+fn what_is_known_goes_through_events() {
+    let folder = Folder::empty();
+    folder.write(
+        "m.mo",
+        "model Thermostat
+  Real T(start = 18);
+  Real heat(start = 8);
+  Boolean on(start = true);
+  output Real y = T;
+equation
+  der(T) = (if on then heat else 0) - 0.5*(T - 12);
+  der(heat) = 0;
+  when T >= 21 then
+    on = false;
+  elsewhen T <= 19 then
+    on = true;
+  end when;
+end Thermostat;
+",
+    );
+    let study = "plant = \"m.mo\"\nsensors = { noise = { y = 0.3 } }\n[simulate]\nuntil = 5\noutput_step = 0.05\n";
+    folder.write("s.toml", study);
+    let ended = folder.run(&["check", "s.toml", "--how-well", "--json"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let json = ended.json();
+    let of = |name: &str| json["standard_error"][name].as_f64().unwrap();
+    assert_eq!(of("on"), 0.0, "{json}");
+    assert!(of("T") < 0.1 && of("heat") < 0.3, "{json}");
+}

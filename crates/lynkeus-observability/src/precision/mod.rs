@@ -265,6 +265,8 @@ pub struct Precision {
     pub sensors: Vec<String>,
     /// ends of the horizons, measured from the start of the window, in the plant's unit of time
     pub horizons: Vec<f64>,
+    /// whose start is known exactly
+    known: Vec<bool>,
     /// relative accuracy of the sensitivities
     accuracy: f64,
     /// of what is computed from here on; once it is spent, results do not count
@@ -346,6 +348,7 @@ impl Precision {
         let checkpoint = self.checkpoints.get(horizon);
         let forward = checkpoint.and_then(|checkpoint| checkpoint.forward.as_ref());
         let carried = forward.and_then(|forward| forward.deviations(set, &self.budget));
+        self.know(&mut found.start);
         let Some([start, present]) = carried else {
             return found;
         };
@@ -361,7 +364,14 @@ impl Precision {
                 }
             }
         }
+        self.know(&mut found.start);
         found
+    }
+
+    /// Nothing is left to find of what is known at the start.
+    fn know(&self, start: &mut [f64]) {
+        let known = start.iter_mut().zip(&self.known);
+        known.filter(|(_, is_known)| **is_known).for_each(|(σ, _)| *σ = 0.0);
     }
 }
 

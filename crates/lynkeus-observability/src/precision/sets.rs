@@ -50,14 +50,16 @@ impl Precision {
         let deviations = self.deviations(last, &sensors);
         let relative = self.relative(&deviations);
         let seen = || relative.iter().filter(|r| r.is_finite());
-        let count = seen().count();
-        let sum: f64 = seen().map(|r| r.max(LEAST).ln()).sum();
+        // what is certain has no say in the mean
+        let told = || seen().filter(|r| **r > 0.0);
+        let count = told().count();
+        let sum: f64 = told().map(|r| r.max(LEAST).ln()).sum();
         let worst = (0..relative.len()).max_by(|&i, &j| relative[i].total_cmp(&relative[j]));
         SensorSet {
             sensors,
             deviations,
             score: sum / count.max(1) as f64,
-            unseen: relative.len() - count,
+            unseen: relative.len() - seen().count(),
             worst: worst.unwrap_or(0),
         }
     }

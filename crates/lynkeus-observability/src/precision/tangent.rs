@@ -44,6 +44,9 @@ struct Tangent {
     budget: Budget,
 }
 
+/// What is known at the start has an error of one range over this.
+const CERTAIN: f64 = 1e9;
+
 /// The share of the time for the integration.
 const INTEGRATION: f64 = 0.7;
 
@@ -83,9 +86,7 @@ impl Tangent {
     /// Batches of sensitivities, by the quantities that they belong to.
     fn batches(&self, experiment: &Experiment<'_>) -> Result<Vec<Batch<'_>>, Error> {
         let wide = (BATCH / self.states.max(1)).saturating_sub(1).max(1);
-        let quantities = experiment.quantities().enumerate();
-        let unsure = quantities.filter(|(_, quantity)| !quantity.is_known);
-        let all: Vec<usize> = unsure.map(|(place, _)| place).collect();
+        let all: Vec<usize> = (0..self.scales.len()).collect();
         all.chunks(wide)
             .map(|columns| Batch::new(self, columns.to_vec(), experiment))
             .collect()
@@ -157,7 +158,12 @@ impl Experiment<'_> {
         let mut batches = tangent.batches(self)?;
         let window = &self.window;
         let wide = tangent.scales.len();
-        let mut gathered = vec![Information::new(wide); self.sensors.len()];
+        let mut known = Information::new(wide);
+        for (place, _) in self.quantities().enumerate().filter(|(_, q)| q.is_known) {
+            let row = (0..wide).map(|i| if i == place { CERTAIN } else { 0.0 });
+            known.push(row.clone(), row);
+        }
+        let mut gathered = vec![known; self.sensors.len()];
         let mut checkpoints = vec![];
         let mut next = 0;
         for &horizon in &window.horizons {
@@ -180,6 +186,7 @@ impl Experiment<'_> {
         let mut found = Precision {
             names: self.quantities().map(|q| q.name.clone()).collect(),
             scales: tangent.scales.clone(),
+            known: self.quantities().map(|q| q.is_known).collect(),
             sensors: self.sensors.iter().map(|s| s.name.clone()).collect(),
             horizons: window
                 .horizons
@@ -358,6 +365,12 @@ impl<'t> Batch<'t> {
             t: experiment.window.start,
         };
         batch.restart();
+        // no error of these begins
+        let known: Vec<bool> = experiment.quantities().map(|q| q.is_known).collect();
+        let own = batch.dynamics.columns.iter().enumerate();
+        for (place, _) in own.filter(|(_, j)| known[**j]) {
+            batch.x[n * (1 + place)..n * (2 + place)].fill(0.0);
+        }
         Ok(batch)
     }
 

@@ -27,6 +27,9 @@ pub struct Particles {
     pub resample_below: f64,
     /// drawn by what the next readings say of where the flow takes them: the auxiliary filter
     pub looks_ahead: bool,
+    /// readings move all of them together by Kalman's formula with their sample covariances, and nothing weighs them;
+    /// what is off their mean is then larger by this factor: the ensemble filter
+    pub inflation: Option<f64>,
 }
 
 impl Particles {
@@ -42,6 +45,7 @@ impl Default for Particles {
             seed: 0,
             resample_below: 0.5,
             looks_ahead: false,
+            inflation: None,
         }
     }
 }

@@ -603,3 +603,141 @@ fn what_particles_cannot_do_is_refused() {
     let told = refused(&well.model(), plain);
     assert!(told.contains("noise of 'y'"), "{told}");
 }
+
+/// E. N. Lorenz's model of 40 places on a circle of latitude, all of them measured with deviation 1.
+fn lorenz(start: &[f64]) -> NoisyModel {
+    let g = Graph::new();
+    let x: Vec<Expr<'_>> = (0..PLACES).map(|i| g.symbol(&format!("x{i}"))).collect();
+    let at = |i: usize| x[i % PLACES];
+    let rate = |i: usize| {
+        (at(i + 1) - at(i + PLACES - 2)) * at(i + PLACES - 1) - at(i) + g.constant(FORCING)
+    };
+    let states = x.iter().zip(start).enumerate();
+    NoisyModel::new(&NoisyPlant {
+        graph: &g,
+        time: g.symbol("time").node(),
+        states: states
+            .map(|(i, (x, start))| (format!("x{i}"), x.node(), *start))
+            .collect(),
+        derivatives: (0..PLACES).map(|i| rate(i).node()).collect(),
+        inputs: vec![],
+        sensors: (x.iter().enumerate())
+            .map(|(i, x)| Sensor {
+                name: format!("y{i}"),
+                output: x.node(),
+                noise: Level::Absolute(1.0),
+                limits: None,
+            })
+            .collect(),
+        process_noise: vec![0.0; PLACES],
+        initial_variance: vec![1.0; PLACES],
+        ranges: anywhere(PLACES),
+        confined: None,
+        whens: Default::default(),
+    })
+    .unwrap()
+}
+
+const PLACES: usize = 40;
+const FORCING: f64 = 8.0;
+const APART: f64 = 0.05;
+
+/// A step of Runge and Kutta, written down here.
+fn weather(x: &[f64]) -> Vec<f64> {
+    let rates = |x: &[f64]| -> Vec<f64> {
+        let at = |i: usize| x[i % PLACES];
+        let rate = |i| (at(i + 1) - at(i + PLACES - 2)) * at(i + PLACES - 1) - at(i) + FORCING;
+        (0..PLACES).map(rate).collect()
+    };
+    let beside = |k: &[f64], h: f64| -> Vec<f64> {
+        x.iter().zip(k).map(|(x, k)| x + h * k).collect()
+    };
+    let first = rates(x);
+    let second = rates(&beside(&first, 0.5 * APART));
+    let third = rates(&beside(&second, 0.5 * APART));
+    let fourth = rates(&beside(&third, APART));
+    let step = |i: usize| first[i] + 2.0 * (second[i] + third[i]) + fourth[i];
+    (0..PLACES).map(|i| x[i] + APART / 6.0 * step(i)).collect()
+}
+
+/// The root mean square error of the estimates, on average over so many updates after the first 400, and the mean of the
+/// deviations.
+fn error_of_weather(count: usize, inflation: f64, updates: usize, seed: u64) -> [f64; 2] {
+    let mut normal = crate::coverage::Normal(seed);
+    let mut truth: Vec<f64> = (0..PLACES).map(|i| FORCING + 0.01 * (i as f64).sin()).collect();
+    for _ in 0..1000 {
+        truth = weather(&truth);
+    }
+    let start: Vec<f64> = truth.iter().map(|x| x + normal.next()).collect();
+    let kind = FilterKind::Particles(Particles {
+        count,
+        seed,
+        inflation: Some(inflation),
+        ..Particles::default()
+    });
+    let run = EstimatorSettings {
+        method: Method::Rk4(Step::Substeps(1)),
+        ..EstimatorSettings::default()
+    };
+    let mut filter = estimator(&lorenz(&start), kind, run);
+    let (mut errors, mut spreads) = (0.0, 0.0);
+    for k in 0..400 + updates {
+        let readings: Vec<f64> = truth.iter().map(|x| x + normal.next()).collect();
+        let estimate = filter.push(APART * k as f64, &readings).unwrap();
+        let squares = estimate.iter().zip(&truth).map(|(e, x)| (e - x).powi(2));
+        let error = (squares.sum::<f64>() / PLACES as f64).sqrt();
+        let deviations = filter.deviations().unwrap();
+        let spread = (deviations.iter().map(|d| d * d).sum::<f64>() / PLACES as f64).sqrt();
+        if k >= 400 {
+            (errors, spreads) = (errors + error, spreads + spread);
+        }
+        truth = weather(&truth);
+    }
+    [errors, spreads].map(|sum| sum / updates as f64)
+}
+
+/// 28 members follow 40 chaotic states: DAPPER prints 0.18 for its square-root filters of this size and inflation.
+#[test]
+fn an_ensemble_follows_the_weather() {
+    let [error, spread] = error_of_weather(28, 1.02, 400, 1);
+    assert!(error < 0.24 && (0.7..1.5).contains(&(spread / error)), "{error} {spread}");
+}
+
+/// `cargo test -p lynkeus-run --test suite ensemble_of_dapper -- --ignored --nocapture`: the table of docs/particle.md.
+#[test]
+#[ignore = "minutes"]
+fn the_table_of_ensembles_of_dapper() {
+    for (count, inflation) in [(24, 1.02), (24, 1.04), (28, 1.02), (40, 1.01), (100, 1.01)] {
+        let all = (0..3).map(|seed| error_of_weather(count, inflation, 10_000, seed));
+        let all: Vec<[f64; 2]> = all.collect();
+        println!("N = {count}, inflation {inflation}: {all:.3?}");
+    }
+}
+
+/// An ensemble of 2,000 is Kalman's filter up to what so many leave to chance.
+#[test]
+fn a_large_ensemble_is_kalmans_filter() {
+    let run = EstimatorSettings::default();
+    let model = oscillator();
+    let kind = FilterKind::Particles(Particles {
+        count: 2000,
+        seed: 3,
+        inflation: Some(1.0),
+        ..Particles::default()
+    });
+    let mut own = estimator(&model, kind, run);
+    let mut exact = estimator(&model, FilterKind::Extended, run);
+    for (t, signals) in swing(60) {
+        own.push(t, &signals).unwrap();
+        exact.push(t, &signals).unwrap();
+        let deviations = own.deviations().unwrap().iter();
+        let pairs = deviations.zip(exact.deviations().unwrap());
+        let means = own.estimate().iter().zip(exact.estimate());
+        for ((mean, expected), (deviation, sd)) in means.zip(pairs) {
+            assert!((mean - expected).abs() < 0.12 * sd, "{t}: {mean} {expected} {sd}");
+            assert!((deviation / sd - 1.0).abs() < 0.08, "{t}: {deviation} {sd}");
+        }
+        let chance = own.record().unwrap().log_likelihood - exact.record().unwrap().log_likelihood;
+        assert!(chance.abs() < 0.2, "{t}: {chance}");
+    }
+}

@@ -256,12 +256,13 @@ impl Report {
         let all = 0..self.names.len();
         let shares: Vec<f64> = all.map(|i| self.share(deviations, i)).collect();
         let seen = || shares.iter().filter(|s| s.is_finite());
-        let logs: f64 = seen().map(|s| s.max(1e-12).ln()).sum();
-        let count = seen().count();
-        let mean = (logs / count.max(1) as f64).exp();
-        match count {
+        // what is certain has no say in the mean
+        let told = || seen().filter(|s| **s > 0.0);
+        let logs: f64 = told().map(|s| s.max(1e-12).ln()).sum();
+        let mean = (logs / told().count().max(1) as f64).exp();
+        match seen().count() {
             0 => (f64::INFINITY, shares.len()),
-            _ => (mean, shares.len() - count),
+            count => (mean, shares.len() - count),
         }
     }
 

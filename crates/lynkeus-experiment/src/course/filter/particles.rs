@@ -45,7 +45,7 @@ pub(super) fn tell(
         return;
     };
     course.particles = Some((settings.count, told));
-    if told.updates > 0 {
+    if told.updates > 0 && settings.inflation.is_none() {
         course.notes.push(format!(
             "particles: drawn anew {} times in {} updates; at least {} of {} counted",
             told.resampled,
@@ -59,6 +59,10 @@ pub(super) fn tell(
             "the model has no value where noise took particles: {} times one was put back into the declared ranges",
             told.put_back
         ));
+    }
+    // an ensemble draws nothing anew
+    if settings.inflation.is_some() {
+        return;
     }
     course
         .notes

@@ -6,9 +6,10 @@
 //! *IEE Proceedings F* 140 (1993) 107–113; G. Kitagawa, *Journal of Computational and Graphical Statistics* 5 (1996) 1–25).
 //! With a look ahead particles are drawn before they run, by how likely the readings are where the flow without noise
 //! takes them (half of them; the others as they are), and weighed by what that did not know (M. K. Pitt and N. Shephard, *Journal of the American Statistical
-//! Association* 94 (1999) 590–599).
+//! Association* 94 (1999) 590–599). Or all of them move together, as an ensemble ([`ensemble`]).
 
 mod code;
+mod ensemble;
 mod likelihood;
 mod moments;
 mod way;
@@ -31,6 +32,7 @@ use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings, Result};
 use code::BLOCK;
+use ensemble::Ensemble;
 use likelihood::Likelihood;
 use moments::Moments;
 use way::{Cloud, Interval, Way, shares, stream};
@@ -84,6 +86,17 @@ impl ParticleFilter {
         let n = flow.states().len();
         settings.check(n, model.ranges.len())?;
         particles.check(&model.sensors)?;
+        if particles.inflation.is_some() {
+            let refused = |what: &str, found: &str| {
+                Err(Error::setting(what, "none in an ensemble", found))
+            };
+            if !model.manifold.is_straight() {
+                return refused("quaternion", "one");
+            }
+            if flow.has_clauses() {
+                return refused("event", "`when`");
+            }
+        }
         let (start, root) = model.start();
         let mut own = Self {
             settings: particles.clone(),
@@ -132,6 +145,30 @@ impl ParticleFilter {
         self.sensing.health.particles.get_or_insert_default()
     }
 
+    /// An ensemble's sample covariances are those of what it is drawn from; weights are probabilities.
+    fn unbiased(&self) -> f64 {
+        let count = self.count() as f64;
+        match self.settings.inflation {
+            Some(_) => count / (count - 1.0),
+            None => 1.0,
+        }
+    }
+
+    /// Moves all particles together by these readings.
+    fn move_together(&mut self, taken: &[Believed], inflation: f64) -> f64 {
+        self.round += 1;
+        let mut random = stream(self.settings.seed, self.round, 0);
+        let mut ensemble = Ensemble {
+            x: &mut self.cloud.x,
+            n: self.estimate.len(),
+            shown: &mut self.shown,
+            m: self.sensors.len(),
+        };
+        let log_likelihood = ensemble.take(taken, &self.moments.expected);
+        ensemble.spread(inflation, &mut random);
+        log_likelihood
+    }
+
     /// What the sensors show at a sample, and what becomes of its readings.
     fn judge(&mut self, sample: &Sample<'_>) -> Result<Vec<Believed>> {
         self.way
@@ -152,8 +189,9 @@ impl ParticleFilter {
         }
         let readings = self.manifold.signed(sample.readings, expected);
         let mut taken = vec![];
+        let unbiased = self.unbiased();
         for (i, reading) in readings.iter().enumerate() {
-            let spread = self.moments.spread(&self.shown, i, i);
+            let spread = unbiased * self.moments.spread(&self.shown, i, i);
             let believed = self.sensing.judge(i, *reading, expected[i], spread);
             taken.extend(believed);
             let Innovation {
@@ -171,7 +209,7 @@ impl ParticleFilter {
             }
         }
         if let Some(record) = &mut self.sensing.record {
-            record.spread(|i, j| self.moments.spread(&self.shown, i, j));
+            record.spread(|i, j| unbiased * self.moments.spread(&self.shown, i, j));
         }
         Ok(taken)
     }
@@ -286,7 +324,7 @@ impl ParticleFilter {
     /// Particles in the place of those with little weight, where few count.
     fn resample(&mut self) {
         let few = self.settings.resample_below * self.count() as f64;
-        if self.effective >= few {
+        if self.effective >= few || self.settings.inflation.is_some() {
             return;
         }
         let weights = std::mem::take(&mut self.cloud.share);
@@ -302,6 +340,8 @@ impl ParticleFilter {
         self.estimate.copy_from_slice(&moments.mean);
         let told = self.deviations.len();
         self.deviations.copy_from_slice(&moments.deviations[..told]);
+        let unbiased = self.unbiased().sqrt();
+        self.deviations.iter_mut().for_each(|d| *d *= unbiased);
         self.is_stale = false;
     }
 
@@ -343,7 +383,8 @@ impl Runner for ParticleFilter {
             false => f64::NEG_INFINITY,
         };
         if !are_finite(&self.cloud.x)
-            && !self.cloud.give(particles.map(alive).collect()).is_finite()
+            && (self.settings.inflation.is_some()
+                || !self.cloud.give(particles.map(alive).collect()).is_finite())
         {
             let memory = self.cloud.memories.first();
             return Err(self.way.why(&self.estimate, memory, &interval));
@@ -363,10 +404,14 @@ impl Runner for ParticleFilter {
         let taken = self.judge(sample)?;
         let mut log_likelihood = 0.0;
         if !taken.is_empty() {
-            log_likelihood = self.weigh(&taken, sample);
+            log_likelihood = match self.settings.inflation {
+                Some(inflation) => self.move_together(&taken, inflation),
+                None => self.weigh(&taken, sample),
+            };
             self.count_effective();
         }
         self.condense();
+        let unbiased = self.unbiased();
         if let Some(record) = &mut self.sensing.record {
             record.log_likelihood = log_likelihood;
             self.moments.write_covariance(
@@ -374,6 +419,7 @@ impl Runner for ParticleFilter {
                 self.deviations.len(),
                 &mut record.covariance,
             );
+            record.covariance.iter_mut().for_each(|entry| *entry *= unbiased);
         }
         self.resample();
         Ok(())
@@ -477,6 +523,12 @@ impl Particles {
         if !(0.0..=1.0).contains(&share) {
             let expected = "a share of the particles, from 0 to 1";
             return Err(Error::setting("resample_below", expected, share));
+        }
+        if let Some(inflation) = self.inflation
+            && !(inflation >= 1.0 && inflation.is_finite())
+        {
+            let expected = "a number of 1 at least";
+            return Err(Error::setting("inflation", expected, inflation));
         }
         let is_exact = |sensor: &&Sensor| {
             let (Level::Absolute(size) | Level::Relative(size) | Level::Uniform(size)) =
