@@ -113,7 +113,11 @@ pub const PARTICLE: &dyn Family = &Filter {
         let meant = tuning.meant(proposal, [0, 1, 2])?.unwrap_or(0);
         if factor.is_some_and(|factor| !(factor >= 1.0) || meant != 2) {
             let expected = "1 or more, with proposal = \"ensemble\"";
-            return Err(TuningError::new(inflation.name, expected, factor.unwrap_or(1.0)));
+            return Err(TuningError::new(
+                inflation.name,
+                expected,
+                factor.unwrap_or(1.0),
+            ));
         }
         Ok(FilterKind::Particles(Particles {
             inflation: (meant == 2).then_some(factor.unwrap_or(1.0)),
@@ -259,7 +263,10 @@ const VARIANCE: KeySpec = KeySpec {
     name: "initial_variance",
     shape: Shape::As(
         "table: name = number ≥ 0, an array = list of them, and `default`",
-        &Shape::Table(&Shape::Either(&[Shape::NotNegative, Shape::List(&Shape::NotNegative)])),
+        &Shape::Table(&Shape::Either(&[
+            Shape::NotNegative,
+            Shape::List(&Shape::NotNegative),
+        ])),
     ),
     default: "the square of a quarter of the declared range (without a range: of the start value, or 1; of an angle or a rotation: of a turn)",
     meaning: "how uncertain the first estimate is: the variance of each state and unknown input; `default` holds for everything not listed",

@@ -6,7 +6,9 @@ use std::sync::{Mutex, MutexGuard};
 use lynkeus_expr::{Graph, MissingInput, Node};
 use lynkeus_model::Whens;
 
-use crate::events::{by_the_clock, Jump, Surface, TimeEvents, WhenRoots, bends, state_events, time_events};
+use crate::events::{
+    Jump, Surface, TimeEvents, WhenRoots, bends, by_the_clock, state_events, time_events,
+};
 
 /// x' = f(t, x, w) and y = h(t, x, w), with all that jumps taken out, in a graph of their own.
 #[derive(Debug)]

@@ -295,7 +295,10 @@ pub(super) const OBSERVER: [KeySpec; 3] = [
         name: "initial",
         shape: Shape::As(
             "table: name = number, an array = list of numbers, and `default`",
-            &Shape::Table(&Shape::Either(&[Shape::Number, Shape::List(&Shape::Number)])),
+            &Shape::Table(&Shape::Either(&[
+                Shape::Number,
+                Shape::List(&Shape::Number),
+            ])),
         ),
         default: "the plant's start values",
         meaning: "where the estimate starts, `{ q = [1, 0, 0, 0] }`; `default` holds for everything not listed",
@@ -415,7 +418,10 @@ pub(super) const SIMULATE: [KeySpec; 8] = [
         name: "initial",
         shape: Shape::As(
             "table: name = number, an array = list of numbers",
-            &Shape::Table(&Shape::Either(&[Shape::Number, Shape::List(&Shape::Number)])),
+            &Shape::Table(&Shape::Either(&[
+                Shape::Number,
+                Shape::List(&Shape::Number),
+            ])),
         ),
         default: "the plant's start values",
         meaning: "where the *plant* starts",

@@ -405,10 +405,14 @@ impl Work<'_> {
     }
 
     fn no_value(&self) -> Error {
-        let mut failures = self.problem.terms.iter().filter_map(|t| t.likelihood.failure());
-        let why = failures.next().map_or_else(String::new, |error| {
-            format!(" ({error})")
-        });
+        let mut failures = self
+            .problem
+            .terms
+            .iter()
+            .filter_map(|t| t.likelihood.failure());
+        let why = failures
+            .next()
+            .map_or_else(String::new, |error| format!(" ({error})"));
         Error::refused(format!("the likelihood has no value at the study's own values, nor at any other start{why}"))
             .at(&self.study.file)
             .hint("start nearer to the plant, by [parameters] and `initial`, or try more `starts` in [fit] with narrower `bounds`")

@@ -41,16 +41,32 @@ fn turn(v: Vector) -> Matrix {
 fn of_quaternion(q: &[f64]) -> Matrix {
     let [w, x, y, z] = [q[0], q[1], q[2], q[3]];
     [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        [
+            1.0 - 2.0 * (y * y + z * z),
+            2.0 * (x * y - w * z),
+            2.0 * (x * z + w * y),
+        ],
+        [
+            2.0 * (x * y + w * z),
+            1.0 - 2.0 * (x * x + z * z),
+            2.0 * (y * z - w * x),
+        ],
+        [
+            2.0 * (x * z - w * y),
+            2.0 * (y * z + w * x),
+            1.0 - 2.0 * (x * x + y * y),
+        ],
     ]
 }
 
 /// The angle between two attitudes.
 fn between(a: &Matrix, b: &Matrix) -> f64 {
     let off = times(&transposed(a), b);
-    let sine = [off[2][1] - off[1][2], off[0][2] - off[2][0], off[1][0] - off[0][1]];
+    let sine = [
+        off[2][1] - off[1][2],
+        off[0][2] - off[2][0],
+        off[1][0] - off[0][1],
+    ];
     let sine = sine.iter().map(|x| x * x).sum::<f64>().sqrt();
     sine.atan2(off[0][0] + off[1][1] + off[2][2] - 1.0)
 }
@@ -65,7 +81,11 @@ impl ByHand {
     fn new(attitude: Matrix) -> Self {
         let mut p = [[0.0; 6]; 6];
         (0..6).for_each(|i| p[i][i] = VARIANCES[i]);
-        Self { attitude, offset: [0.0; 3], p }
+        Self {
+            attitude,
+            offset: [0.0; 3],
+            p,
+        }
     }
 
     fn predict(&mut self, h: f64, gyro: &[f64]) {
@@ -94,7 +114,8 @@ impl ByHand {
         let into = transposed(&self.attitude);
         let mut moved = [0.0; 6];
         for (k, vector) in WORLD.iter().enumerate() {
-            let seen: Vector = std::array::from_fn(|i| (0..3).map(|j| into[i][j] * vector[j]).sum());
+            let seen: Vector =
+                std::array::from_fn(|i| (0..3).map(|j| into[i][j] * vector[j]).sum());
             for (i, slopes) in cross(seen).into_iter().enumerate() {
                 let projected: [f64; 6] =
                     std::array::from_fn(|a| (0..3).map(|b| self.p[a][b] * slopes[b]).sum());
@@ -117,12 +138,21 @@ impl ByHand {
 fn from_far_off_no_filter_is_worse_than_one_by_hand() {
     for seed in 1..=3 {
         let folder = attitude("ekf", "");
-        folder.change("s.toml", "until = 30", &format!("until = 20\nseed = {seed}"));
-        let run = folder.run(&["simulate", "s.toml", "-q", "-o", "sim.csv", "--log", "log.csv"]);
+        folder.change(
+            "s.toml",
+            "until = 30",
+            &format!("until = 20\nseed = {seed}"),
+        );
+        let run = folder.run(&[
+            "simulate", "s.toml", "-q", "-o", "sim.csv", "--log", "log.csv",
+        ]);
         assert_eq!(run.code, 0, "{}", run.err);
         let (header, truth) = csv(&folder.read("sim.csv"));
         let first = header.iter().position(|h| h == "q[1]").unwrap();
-        let truth: Vec<Matrix> = truth.iter().map(|row| of_quaternion(&row[first..])).collect();
+        let truth: Vec<Matrix> = truth
+            .iter()
+            .map(|row| of_quaternion(&row[first..]))
+            .collect();
         let (header, log) = csv(&folder.read("log.csv"));
         let column = |name: &str| header.iter().position(|h| h == name).unwrap();
         let (acc, mag, gyro) = (column("acc[1]"), column("mag[1]"), column("w[1]"));
@@ -148,7 +178,9 @@ fn from_far_off_no_filter_is_worse_than_one_by_hand() {
             let (header, rows) = csv(&folder.read("out.csv"));
             let first = header.iter().position(|h| h == "q[1]_hat").unwrap();
             let own = rows.iter().zip(&truth);
-            let own: Vec<f64> = own.map(|(row, q)| between(&of_quaternion(&row[first..]), q)).collect();
+            let own: Vec<f64> = own
+                .map(|(row, q)| between(&of_quaternion(&row[first..]), q))
+                .collect();
             let (own, other) = (of(&own), of(&angles));
             for (own, other) in own.iter().zip(other) {
                 assert!(*own < 1.1 * other, "{seed} {family}: {own} beside {other}");

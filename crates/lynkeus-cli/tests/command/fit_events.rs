@@ -11,7 +11,9 @@ fn folder(model: &str, study: &str) -> Folder {
 
 /// Simulates a log, changes where the fit starts, and fits: values with their standard deviations, by name.
 fn fitted(folder: &Folder, from: &str, to: &str, names: &[&str]) -> Vec<[f64; 2]> {
-    let run = folder.run(&["simulate", "s.toml", "-q", "--log", "log.csv", "-o", "sim.csv"]);
+    let run = folder.run(&[
+        "simulate", "s.toml", "-q", "--log", "log.csv", "-o", "sim.csv",
+    ]);
     assert!(run.code <= 1, "{}", run.err);
     folder.change("s.toml", from, to);
     let run = folder.run(&["fit", "s.toml", "log.csv", "--json"]);
@@ -47,10 +49,18 @@ fn the_restitution_of_a_ball_is_found() {
             "[parameters]\ne = 0.8\ng = 9.81\n[sensors]\nnoise = {{ y = 0.02 }}\n[process_noise]\nv = 1e-3\n[observer]\nfamily = \"ekf\"\ninitial_variance = {{ h = 0.01, v = 0.01 }}\n[simulate]\nuntil = 2.4\noutput_step = 0.04\nseed = 3\n[fit]\nparameters = [\"e\", \"g\"]\nobjective = \"{objective}\"\n"
         );
         let folder = folder(BALL, &study);
-        let found = fitted(&folder, "e = 0.8\ng = 9.81", "e = 0.74\ng = 9.5", &["e", "g"]);
+        let found = fitted(
+            &folder,
+            "e = 0.8\ng = 9.81",
+            "e = 0.74\ng = 9.5",
+            &["e", "g"],
+        );
         for ([value, sd], (truth, most)) in found.into_iter().zip([(0.8, 0.01), (9.81, 0.15)]) {
             assert!(sd < most, "{objective}: {value} ± {sd}");
-            assert!((value - truth).abs() < 3.0 * sd, "{objective}: {value} ± {sd}");
+            assert!(
+                (value - truth).abs() < 3.0 * sd,
+                "{objective}: {value} ± {sd}"
+            );
         }
     }
 }
@@ -76,10 +86,16 @@ end Thermostat;
 ";
     let study = "[parameters]\nlow = 19\nhigh = 21\nheat = 8\n[sensors]\nnoise = { y = 0.1 }\n[process_noise]\nT = 0.01\n[observer]\nfamily = \"ekf\"\ninitial_variance = { T = 0.01 }\n[simulate]\nuntil = 8\noutput_step = 0.05\nseed = 2\n[fit]\nparameters = [\"low\", \"high\", \"heat\"]\n";
     let folder = folder(model, study);
-    let (from, to) = ("low = 19\nhigh = 21\nheat = 8\n", "low = 18.9\nhigh = 21.15\nheat = 8.1\n");
+    let (from, to) = (
+        "low = 19\nhigh = 21\nheat = 8\n",
+        "low = 18.9\nhigh = 21.15\nheat = 8.1\n",
+    );
     let found = fitted(&folder, from, to, &["low", "high", "heat"]);
     for ([value, sd], truth) in found.into_iter().zip([19.0, 21.0, 8.0]) {
-        assert!(sd < 0.1 && (value - truth).abs() < 3.0 * sd, "{value} ± {sd} for {truth}");
+        assert!(
+            sd < 0.1 && (value - truth).abs() < 3.0 * sd,
+            "{value} ± {sd} for {truth}"
+        );
     }
 }
 
@@ -93,10 +109,17 @@ fn the_scale_of_a_gyroscope_is_found() {
         folder.change("s.toml", "q = [0.5, 0.5, 0.5, 0.5]", "q = [1, 0.1, 0, 0]");
         folder.change("s.toml", "q = 4.0", "q = 0.01");
         folder.change("s.toml", "until = 30", "until = 20");
-        folder.change("s.toml", "[manifold]", "[parameters]\nk = 1.02\n[fit]\nparameters = [\"k\"]\n[manifold]");
+        folder.change(
+            "s.toml",
+            "[manifold]",
+            "[parameters]\nk = 1.02\n[fit]\nparameters = [\"k\"]\n[manifold]",
+        );
         let [[value, sd]] = fitted(&folder, "k = 1.02", "k = 1.0", &["k"])[..] else {
             panic!("one value");
         };
-        assert!(sd < 0.02 && (value - 1.02).abs() < 3.0 * sd, "{family}: {value} ± {sd}");
+        assert!(
+            sd < 0.02 && (value - 1.02).abs() < 3.0 * sd,
+            "{family}: {value} ± {sd}"
+        );
     }
 }

@@ -487,22 +487,24 @@ fn no_theorem_is_about_angles() {
 /// A fit sees wrapped readings as they are meant: k of −k sin θ by a log of many turns.
 #[test]
 fn a_parameter_is_found_from_wrapped_readings() {
-    let folder = rotor("ekf", "");
-    folder.change("m.mo", "-2*sin", "-k*sin");
-    folder.change(
-        "m.mo",
-        "  Real theta",
-        "  parameter Real k(min = 0, max = 10) = 2;\n  Real theta",
-    );
-    let run = folder.run(&["simulate", "s.toml", "--log", "log.csv", "-q"]);
-    assert_eq!(run.code, 0, "{}", run.err);
-    let study = folder.read("s.toml") + "[parameters]\nk = 3\n[fit]\nparameters = [\"k\"]\n";
-    folder.write("s.toml", &study);
-    let run = folder.run(&["fit", "s.toml", "log.csv", "--json"]);
-    assert_eq!(run.code, 0, "{}", run.err);
-    let found = &run.json()["parameters"]["k"];
-    let [k, sd] = ["value", "sd"].map(|name| found[name].as_f64().unwrap());
-    assert!((k - 2.0).abs() < 3.0 * sd && sd < 0.3, "{k} ± {sd}");
+    for (family, more) in [("ekf", ""), ("ukf", ""), ("ekf", "iterations = 3")] {
+        let folder = rotor(family, more);
+        folder.change("m.mo", "-2*sin", "-k*sin");
+        folder.change(
+            "m.mo",
+            "  Real theta",
+            "  parameter Real k(min = 0, max = 10) = 2;\n  Real theta",
+        );
+        let run = folder.run(&["simulate", "s.toml", "--log", "log.csv", "-q"]);
+        assert_eq!(run.code, 0, "{}", run.err);
+        let study = folder.read("s.toml") + "[parameters]\nk = 3\n[fit]\nparameters = [\"k\"]\n";
+        folder.write("s.toml", &study);
+        let run = folder.run(&["fit", "s.toml", "log.csv", "--json"]);
+        assert_eq!(run.code, 0, "{}", run.err);
+        let found = &run.json()["parameters"]["k"];
+        let [k, sd] = ["value", "sd"].map(|name| found[name].as_f64().unwrap());
+        assert!((k - 2.0).abs() < 3.0 * sd && sd < 0.3, "{k} ± {sd}");
+    }
 }
 
 /// The plant alone beside a wrapped log.

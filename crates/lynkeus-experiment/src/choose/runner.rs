@@ -155,8 +155,23 @@ fn asked(study: &Study) -> impl PartialEq + use<'_> {
         records: _,
         budget: _,
     } = study;
-    let model = (file, plant, plant_text, model, parameters, tables, delay_states);
-    let filter = (process_noise, manifold, narrower, certify, estimate, time_unit);
+    let model = (
+        file,
+        plant,
+        plant_text,
+        model,
+        parameters,
+        tables,
+        delay_states,
+    );
+    let filter = (
+        process_noise,
+        manifold,
+        narrower,
+        certify,
+        estimate,
+        time_unit,
+    );
     (model, filter)
 }
 

@@ -371,7 +371,9 @@ impl Precision {
     /// Nothing is left to find of what is known at the start.
     fn know(&self, start: &mut [f64]) {
         let known = start.iter_mut().zip(&self.known);
-        known.filter(|(_, is_known)| **is_known).for_each(|(σ, _)| *σ = 0.0);
+        known
+            .filter(|(_, is_known)| **is_known)
+            .for_each(|(σ, _)| *σ = 0.0);
     }
 }
 

@@ -558,7 +558,9 @@ impl Dynamics for Variation<'_> {
         let (n, units) = (tangent.states, &tangent.units);
         let (x, before, after) = (self.own(x), self.own(before), self.own(after));
         let rates = [&before[..], &after[..]];
-        let (matrix, moved) = self.flow.saltation((t, &x), &self.jump, rates, cause, line)?;
+        let (matrix, moved) = self
+            .flow
+            .saltation((t, &x), &self.jump, rates, cause, line)?;
         for (x, (moved, unit)) in jumped.iter_mut().zip(moved.iter().zip(units)) {
             *x += moved / unit;
         }

@@ -229,7 +229,8 @@ fn relations(
                 Op::Binary(Binary::Less | Binary::LessEq, ..)
             );
             let symbols = graph.symbols_of(&[node]);
-            let is_watched = symbols != [time] && symbols.iter().any(|symbol| flows.contains(symbol));
+            let is_watched =
+                symbols != [time] && symbols.iter().any(|symbol| flows.contains(symbol));
             if is_relation && is_watched {
                 let place = found.iter().position(|known| *known == node);
                 own.push(place.unwrap_or(found.len()));

@@ -38,7 +38,8 @@ fn differences_are_what_tangents_say() {
                 .likelihood_by(|plant| Likelihood::along(plant, &settings, Manifold::default()));
             let mut is_surprised = false;
             let mut score = |of: &mut Likelihood| {
-                let see = |seen: Seen| is_surprised |= seen.innovation.powi(2) > 9.0 * seen.variance;
+                let see =
+                    |seen: Seen| is_surprised |= seen.innovation.powi(2) > 9.0 * seen.variance;
                 of.watched(&case.values, rows(&case.log), Step::AtMost(1.0), see)
                     .unwrap()
             };
@@ -49,7 +50,10 @@ fn differences_are_what_tangents_say() {
             }
             compared += 1;
             assert_eq!(own.readings, exact.readings);
-            assert!((own.value - exact.value).abs() < 1e-8 * (1.0 + exact.value.abs()), "{seed}");
+            assert!(
+                (own.value - exact.value).abs() < 1e-8 * (1.0 + exact.value.abs()),
+                "{seed}"
+            );
             let slopes = off(&own.gradient, &exact.gradient);
             let told = off(&own.information, &exact.information);
             assert!(slopes < 1e-5 && told < 1e-5, "{seed}: {slopes:e} {told:e}");
@@ -111,7 +115,10 @@ end M;";
         parameters,
     };
     // straight-line code goes through no event
-    assert!(matches!(Likelihood::new(&parametric), Err(Error::Setting { .. })));
+    assert!(matches!(
+        Likelihood::new(&parametric),
+        Err(Error::Setting { .. })
+    ));
     let settings = FilterSettings::of(FilterKind::Extended);
     Likelihood::along(&parametric, &settings, Manifold::default()).unwrap()
 }
@@ -137,8 +144,7 @@ fn a_ball_bounces_in_the_likelihood() {
     let mut likelihood = ball(0.0);
     let at = [0.8, 9.81];
     let own = score(&mut likelihood, at);
-    let readings =
-        |k: usize| height(APART * k as f64, 0.78, 9.7) + 0.05 * (7.0 * k as f64).sin();
+    let readings = |k: usize| height(APART * k as f64, 0.78, 9.7) + 0.05 * (7.0 * k as f64).sin();
     let innovation = |k: usize, [e, g]: [f64; 2]| readings(k) - height(APART * k as f64, e, g);
     let (mut value, mut gradient, mut information) = (0.0, [0.0; 2], [0.0; 4]);
     for k in 0..ROWS {
@@ -158,8 +164,16 @@ fn a_ball_bounces_in_the_likelihood() {
             (0..2).for_each(|q| information[2 * p + q] += slopes[p] * slopes[q] / 0.01);
         }
     }
-    assert!((own.value - value).abs() < 1e-9 * value.abs(), "{} {value}", own.value);
-    assert!(off(&own.gradient, &gradient) < 1e-6, "{:?} {gradient:?}", own.gradient);
+    assert!(
+        (own.value - value).abs() < 1e-9 * value.abs(),
+        "{} {value}",
+        own.value
+    );
+    assert!(
+        off(&own.gradient, &gradient) < 1e-6,
+        "{:?} {gradient:?}",
+        own.gradient
+    );
     assert!(off(&own.information, &information) < 1e-6);
 }
 

@@ -649,9 +649,8 @@ fn weather(x: &[f64]) -> Vec<f64> {
         let rate = |i| (at(i + 1) - at(i + PLACES - 2)) * at(i + PLACES - 1) - at(i) + FORCING;
         (0..PLACES).map(rate).collect()
     };
-    let beside = |k: &[f64], h: f64| -> Vec<f64> {
-        x.iter().zip(k).map(|(x, k)| x + h * k).collect()
-    };
+    let beside =
+        |k: &[f64], h: f64| -> Vec<f64> { x.iter().zip(k).map(|(x, k)| x + h * k).collect() };
     let first = rates(x);
     let second = rates(&beside(&first, 0.5 * APART));
     let third = rates(&beside(&second, 0.5 * APART));
@@ -664,7 +663,9 @@ fn weather(x: &[f64]) -> Vec<f64> {
 /// deviations.
 fn error_of_weather(count: usize, inflation: f64, updates: usize, seed: u64) -> [f64; 2] {
     let mut normal = crate::coverage::Normal(seed);
-    let mut truth: Vec<f64> = (0..PLACES).map(|i| FORCING + 0.01 * (i as f64).sin()).collect();
+    let mut truth: Vec<f64> = (0..PLACES)
+        .map(|i| FORCING + 0.01 * (i as f64).sin())
+        .collect();
     for _ in 0..1000 {
         truth = weather(&truth);
     }
@@ -700,7 +701,10 @@ fn error_of_weather(count: usize, inflation: f64, updates: usize, seed: u64) -> 
 #[test]
 fn an_ensemble_follows_the_weather() {
     let [error, spread] = error_of_weather(28, 1.02, 400, 1);
-    assert!(error < 0.24 && (0.7..1.5).contains(&(spread / error)), "{error} {spread}");
+    assert!(
+        error < 0.24 && (0.7..1.5).contains(&(spread / error)),
+        "{error} {spread}"
+    );
 }
 
 /// `cargo test -p lynkeus-run --test suite ensemble_of_dapper -- --ignored --nocapture`: the table of docs/particle.md.
@@ -734,7 +738,10 @@ fn a_large_ensemble_is_kalmans_filter() {
         let pairs = deviations.zip(exact.deviations().unwrap());
         let means = own.estimate().iter().zip(exact.estimate());
         for ((mean, expected), (deviation, sd)) in means.zip(pairs) {
-            assert!((mean - expected).abs() < 0.12 * sd, "{t}: {mean} {expected} {sd}");
+            assert!(
+                (mean - expected).abs() < 0.12 * sd,
+                "{t}: {mean} {expected} {sd}"
+            );
             assert!((deviation / sd - 1.0).abs() < 0.08, "{t}: {deviation} {sd}");
         }
         let chance = own.record().unwrap().log_likelihood - exact.record().unwrap().log_likelihood;

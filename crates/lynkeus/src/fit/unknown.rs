@@ -390,7 +390,10 @@ fn starts(prepared: &Prepared<'_>, logs: &[FittedLog]) -> Result<Vec<Unknown>, E
         names,
         &augmented.states,
     )?;
-    if let Some(variable) = asked.iter().find(|v| matches!(v.home, Home::Rotation { .. })) {
+    if let Some(variable) = asked
+        .iter()
+        .find(|v| matches!(v.home, Home::Rotation { .. }))
+    {
         let message = format!(
             "`initial` of [fit]: {} is a number of a quaternion, and four numbers of length 1 are not found one by one",
             variable.name

@@ -141,7 +141,10 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
 /// Events come when the states say so: an input that nobody measures has no say in them here.
 fn refuse_driven_events(study: &Study, plant: &Plant) -> Result<(), Error> {
     let unknown = prepare::sensors(study, plant).unknown;
-    let inputs = plant.inputs.iter().filter(|input| unknown.contains(&input.name));
+    let inputs = plant
+        .inputs
+        .iter()
+        .filter(|input| unknown.contains(&input.name));
     let inputs: Vec<&Variable> = inputs.collect();
     for clause in &plant.whens.clauses {
         let values = clause.changes.iter().map(|change| change.1);

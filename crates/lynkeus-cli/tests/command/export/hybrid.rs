@@ -105,10 +105,14 @@ impl Draft {
         let first = pick(random, &["0.5", "1.0", "1.234", "0.1 + 0.7"]);
         let then = pick(
             random,
-            &["time > 2.2", "time >= 2.5 and z < 0.9", "not time < 3", "2.0 < time"],
+            &[
+                "time > 2.2",
+                "time >= 2.5 and z < 0.9",
+                "not time < 3",
+                "2.0 < time",
+            ],
         );
-        self.declared +=
-            "Real z(start = 1.2); discrete Real lit(start = 0); output Real yz = z;";
+        self.declared += "Real z(start = 1.2); discrete Real lit(start = 0); output Real yz = z;";
         write!(
             self.equations,
             "\nder(z) = lit - {:.2}*z;\nwhen time >= {first} then lit = 1.5; elsewhen {then} then lit = pre(lit) - 0.7; reinit(z, 0.5*pre(z)); end when;",

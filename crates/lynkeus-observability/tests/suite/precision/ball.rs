@@ -97,7 +97,10 @@ end Ball;";
             let expected = [start, present].map(|p| p[(place, place)].sqrt());
             let found = [σ.start[own], σ.present[own]];
             for (found, expected) in found.into_iter().zip(expected) {
-                assert!((found / expected - 1.0).abs() < 1e-6, "{name}: {found} {expected}");
+                assert!(
+                    (found / expected - 1.0).abs() < 1e-6,
+                    "{name}: {found} {expected}"
+                );
             }
         }
         let count = plant.states.iter().position(|s| s.discrete).unwrap();

@@ -175,7 +175,13 @@ impl Followed {
             }
         }
         // a value that comes near zero has still the size that it had
-        let least = |value: f64| if value == 0.0 { 1.0 } else { 0.01 * value.abs() };
+        let least = |value: f64| {
+            if value == 0.0 {
+                1.0
+            } else {
+                0.01 * value.abs()
+            }
+        };
         let found = shares.iter().zip(at).map(|(share, x)| (*share, least(*x)));
         self.steps = Some(found.collect());
         Ok(None)
@@ -196,7 +202,11 @@ impl Followed {
         let mut center = Some(self.walk(at, step)?);
         let beside = (0..2 * count).map(|k| {
             let mut there = at.to_vec();
-            there[k / 2] += if k % 2 == 0 { -steps[k / 2] } else { steps[k / 2] };
+            there[k / 2] += if k % 2 == 0 {
+                -steps[k / 2]
+            } else {
+                steps[k / 2]
+            };
             // where it cannot begin the other side counts
             self.walk(&there, step).ok()
         });
@@ -334,9 +344,8 @@ fn seen(walk: &Option<Walk>) -> &[Independent] {
 
 /// The slopes of an innovation and of its variance by a parameter, of those a step less and a step more.
 fn slopes(at: &Independent, sides: [Option<&Independent>; 2], step: f64) -> (f64, f64) {
-    let [less, more] = sides.map(|side| {
-        side.map(|s| [s.innovation - at.innovation, s.variance - at.variance])
-    });
+    let [less, more] =
+        sides.map(|side| side.map(|s| [s.innovation - at.innovation, s.variance - at.variance]));
     let σ = at.variance.sqrt();
     let found = match (less, more) {
         (Some(less), Some(more)) => {
@@ -387,6 +396,9 @@ fn shortened(step: Step, times: usize) -> Step {
 
 /// The derivatives within the ranges, for where they have no value; events have a say where the state is.
 fn confined(plant: &ParametricPlant<'_>) -> Option<Vec<Node>> {
-    let has_ends = plant.ranges.iter().any(|range| range.low.is_finite() || range.high.is_finite());
+    let has_ends = plant
+        .ranges
+        .iter()
+        .any(|range| range.low.is_finite() || range.high.is_finite());
     (plant.whens.is_empty() && has_ends).then(|| plant.limited())
 }

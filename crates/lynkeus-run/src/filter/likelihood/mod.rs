@@ -18,8 +18,8 @@ mod unscented;
 use lynkeus_expr::Tape;
 use lynkeus_native::Function;
 
-use super::{FilterSettings, SigmaPoints};
 use super::censored::{End, Tail};
+use super::{FilterSettings, SigmaPoints};
 use crate::integrator::fixed_steps;
 use crate::manifold::Manifold;
 use crate::noise::Limits;

@@ -124,11 +124,18 @@ mod tests {
     fn an_ensemble_is_corrected_as_kalman_says() {
         let (n, m, count) = (3, 2, 8);
         let mut random = stream(5, 0, 0);
-        let mut x: Vec<f64> = (0..n * count).map(|_| StandardNormal.sample(&mut random)).collect();
+        let mut x: Vec<f64> = (0..n * count)
+            .map(|_| StandardNormal.sample(&mut random))
+            .collect();
         let c = DMatrix::from_row_slice(m, n, &[1.0, 0.5, 0.0, -0.3, 0.0, 2.0]);
         let mut shown: Vec<f64> = x
             .chunks_exact(n)
-            .flat_map(|x| (&c * DVector::from_row_slice(x)).iter().copied().collect::<Vec<_>>())
+            .flat_map(|x| {
+                (&c * DVector::from_row_slice(x))
+                    .iter()
+                    .copied()
+                    .collect::<Vec<_>>()
+            })
             .collect();
         let (mean, p) = moments(&x, n);
         let expected = &c * &mean;
@@ -145,7 +152,12 @@ mod tests {
                 end: None,
             })
             .collect();
-        let mut ensemble = Ensemble { x: &mut x, n, shown: &mut shown, m };
+        let mut ensemble = Ensemble {
+            x: &mut x,
+            n,
+            shown: &mut shown,
+            m,
+        };
         let told = ensemble.take(&taken, expected.as_slice());
         let density = (std::f64::consts::TAU * &s).determinant().ln()
             + off.dot(&(s.try_inverse().unwrap() * &off));
@@ -156,7 +168,12 @@ mod tests {
         // what is mixed keeps both
         let (mean, p) = moments(&x, n);
         let before = x.clone();
-        let mut ensemble = Ensemble { x: &mut x, n, shown: &mut [], m: 0 };
+        let mut ensemble = Ensemble {
+            x: &mut x,
+            n,
+            shown: &mut [],
+            m: 0,
+        };
         ensemble.spread(1.0, &mut random);
         let (mixed_mean, mixed) = moments(&x, n);
         assert!((mixed_mean - &mean).amax() < 1e-14 && (mixed - &p).amax() < 1e-14);

@@ -87,9 +87,8 @@ impl ParticleFilter {
         settings.check(n, model.ranges.len())?;
         particles.check(&model.sensors)?;
         if particles.inflation.is_some() {
-            let refused = |what: &str, found: &str| {
-                Err(Error::setting(what, "none in an ensemble", found))
-            };
+            let refused =
+                |what: &str, found: &str| Err(Error::setting(what, "none in an ensemble", found));
             if !model.manifold.is_straight() {
                 return refused("quaternion", "one");
             }
@@ -419,7 +418,10 @@ impl Runner for ParticleFilter {
                 self.deviations.len(),
                 &mut record.covariance,
             );
-            record.covariance.iter_mut().for_each(|entry| *entry *= unbiased);
+            record
+                .covariance
+                .iter_mut()
+                .for_each(|entry| *entry *= unbiased);
         }
         self.resample();
         Ok(())
