@@ -20,7 +20,7 @@ const ARGUMENTS: [&str; 7] = [
 ];
 
 /// Long enough to be killed a few times, whatever else the machine does.
-const LONG: Duration = Duration::from_secs(2);
+const LONG: Duration = Duration::from_secs(1);
 
 /// The two tanks with so many substeps that a run takes long, and what it gives in the end.
 struct Slow {
@@ -107,7 +107,7 @@ fn killed(folder: &Folder, later: Duration) -> bool {
 /// Kills a run at several moments; what it ends with is what an uninterrupted one gives.
 #[track_caller]
 fn goes_on(Slow { folder, whole, .. }: &Slow) {
-    for later in [0, 37, 210, 90] {
+    for later in [0, 37, 120, 60] {
         assert!(
             killed(folder, Duration::from_millis(later)),
             "too fast to be killed after {later} ms"
