@@ -123,7 +123,9 @@ fn test(is_all: bool) -> Result<(), String> {
 fn long_tests() -> Result<(), String> {
     begins("the tests that take minutes");
     let mut tests = cargo(&TESTS);
-    run(tests.args(["--release", "--", "--ignored"]).env(package::ALL, "1"))
+    run(tests
+        .args(["--release", "--", "--ignored"])
+        .env(package::ALL, "1"))
 }
 
 /// An interpreter for something; none where that is skipped, with a word.

@@ -76,7 +76,9 @@ fn exported(folder: &Folder, to: &str, more: &[&str]) {
 
 /// The studies whose turn it is as modules of one program, against what `estimate` gives.
 pub(super) fn check(looked: &[Looked]) {
-    let in_turn = looked.iter().filter(|looked| Other::Rust.takes(looked.seed));
+    let in_turn = looked
+        .iter()
+        .filter(|looked| Other::Rust.takes(looked.seed));
     let looked: Vec<&Looked> = in_turn.collect();
     let whole = Folder::empty();
     let mut main = REPLAY.to_owned();
