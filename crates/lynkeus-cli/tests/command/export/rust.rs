@@ -80,6 +80,9 @@ pub(super) fn check(looked: &[Looked]) {
         .iter()
         .filter(|looked| Other::Rust.takes(looked.seed));
     let looked: Vec<&Looked> = in_turn.collect();
+    if looked.is_empty() {
+        return;
+    }
     let whole = Folder::empty();
     let mut main = REPLAY.to_owned();
     let mut calls = String::new();
