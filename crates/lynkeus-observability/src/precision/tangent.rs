@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 
 use super::deviations::Information;
 use super::forward::{Forward, WIDE};
-use super::{Checkpoint, Experiment, Precision, share, side_by_side};
+use super::{Checkpoint, Experiment, Precision, Quantity, share, side_by_side};
 
 /// Samples gathered before they are worked into the information.
 const CHUNK: usize = 256;
@@ -64,12 +64,17 @@ impl Tangent {
             ..Jacobians::default()
         };
         let (relative, absolute) = tolerances(experiment.method);
+        // surfaces are watched in the states' own units
+        let unit = |quantity: &Quantity| match experiment.whens.is_empty() {
+            true => quantity.scale.min(1.0),
+            false => 1.0,
+        };
         Ok(Self {
             states: experiment.states.len(),
             flow: linearised(experiment, &[], flow, &experiment.whens)?,
             sight: linearised(experiment, &seen, sight, &Whens::default())?,
             scales: experiment.quantities().map(|q| q.scale).collect(),
-            units: experiment.states.iter().map(|q| q.scale.min(1.0)).collect(),
+            units: experiment.states.iter().map(unit).collect(),
             floor: absolute / relative,
             budget: graph.budget().part(INTEGRATION),
         })
@@ -469,15 +474,6 @@ struct Variation<'t> {
     budget: Budget,
 }
 
-impl Variation<'_> {
-    /// Takes the states, or their rates, as they are.
-    fn own(&mut self, x: &[f64]) -> Vec<f64> {
-        let tangent = self.tangent;
-        tangent.in_own_units(&x[..tangent.states], &mut self.states);
-        self.states.clone()
-    }
-}
-
 impl Dynamics for Variation<'_> {
     fn dimension(&self) -> usize {
         self.tangent.states * (1 + self.columns.len())
@@ -509,7 +505,10 @@ impl Dynamics for Variation<'_> {
     }
 
     fn events(&mut self) -> Option<&mut dyn Events> {
-        Some(self)
+        match self.flow.clauses() {
+            Some(_) => self.flow.events(),
+            None => Some(self),
+        }
     }
 
     fn clauses(&self) -> Option<Arc<Clauses>> {
@@ -517,18 +516,15 @@ impl Dynamics for Variation<'_> {
     }
 
     fn watch(&mut self, t: f64, x: &[f64], seen: &mut Vec<Seen>) {
-        let x = self.own(x);
-        self.flow.watch(t, &x, seen);
+        self.flow.watch(t, x, seen);
     }
 
     fn rates(&mut self, t: f64, x: &[f64], dx: &[f64]) -> Vec<f64> {
-        let (x, dx) = (self.own(x), self.own(dx));
-        self.flow.rates(t, &x, &dx)
+        self.flow.rates(t, x, dx)
     }
 
     fn truths(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>, Error> {
-        let x = self.own(x);
-        self.flow.truths(t, &x)
+        self.flow.truths(t, x)
     }
 
     fn happen(
@@ -537,12 +533,7 @@ impl Dynamics for Variation<'_> {
         x: &mut [f64],
         memory: &mut Memory,
     ) -> Result<Option<usize>, Error> {
-        let mut own = self.own(x);
-        let happened = self.flow.jump(t, &mut own, memory, Some(&mut self.jump))?;
-        let units = own.iter().zip(&self.tangent.units);
-        let changed = x.iter_mut().zip(units);
-        changed.for_each(|(x, (own, unit))| *x = own / unit);
-        Ok(happened)
+        self.flow.jump(t, x, memory, Some(&mut self.jump))
     }
 
     /// Each sensitivity is one of Ξ times what it was.
@@ -554,21 +545,17 @@ impl Dynamics for Variation<'_> {
         cause: Option<Cause>,
         line: usize,
     ) -> Result<(), Error> {
-        let tangent = self.tangent;
-        let (n, units) = (tangent.states, &tangent.units);
-        let (x, before, after) = (self.own(x), self.own(before), self.own(after));
-        let rates = [&before[..], &after[..]];
-        let (matrix, moved) = self
-            .flow
-            .saltation((t, &x), &self.jump, rates, cause, line)?;
-        for (x, (moved, unit)) in jumped.iter_mut().zip(moved.iter().zip(units)) {
-            *x += moved / unit;
+        let n = self.tangent.states;
+        let (jump, rates) = (&self.jump, [&before[..n], &after[..n]]);
+        let (matrix, moved) = self.flow.saltation((t, x), jump, rates, cause, line)?;
+        let (states, columns) = jumped.split_at_mut(n);
+        for (x, moved) in states.iter_mut().zip(moved) {
+            *x += moved;
         }
-        for column in jumped[n..].chunks_exact_mut(n.max(1)) {
-            let own: Vec<f64> = column.iter().zip(units).map(|(s, unit)| s * unit).collect();
-            for (i, into) in column.iter_mut().enumerate() {
-                let row = matrix[i * n..(i + 1) * n].iter().zip(&own);
-                *into = row.map(|(xi, s)| xi * s).sum::<f64>() / units[i];
+        for column in columns.chunks_exact_mut(n.max(1)) {
+            let old = column.to_vec();
+            for (into, row) in column.iter_mut().zip(matrix.chunks_exact(n.max(1))) {
+                *into = row.iter().zip(&old).map(|(xi, s)| xi * s).sum();
             }
         }
         Ok(())

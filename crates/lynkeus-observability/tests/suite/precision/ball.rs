@@ -53,7 +53,7 @@ equation
   end when;
 end Ball;";
     let plant = Plant::from_modelica(text, "m.mo", &LoadOptions::default()).unwrap();
-    // one of the units is small, so that states are integrated in multiples of it
+    // one of the scales is small
     let quantity = |v: &Variable| Quantity {
         name: v.name.clone(),
         node: v.node,
