@@ -237,7 +237,6 @@ fn a_thermostat_is_estimated_as_by_particles() {
         let [means, deviations] = apart(&table, &OF_THERMOSTAT, ["T", "heat"]);
         let before = &OF_THERMOSTAT[..6];
         let [exact, alike] = apart(&table, before, ["T", "heat"]);
-        println!("{family}: {means} {deviations}, {exact} {alike}");
         assert!(exact < 0.03 && alike < 0.03, "{family}: {exact} {alike}");
         assert!(
             means < 0.5 && deviations < 0.2,
