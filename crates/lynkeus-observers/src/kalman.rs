@@ -111,7 +111,8 @@ pub const PARTICLE: &dyn Family = &Filter {
         }
         let factor = number(tuning, inflation)?;
         let meant = tuning.meant(proposal, [0, 1, 2])?.unwrap_or(0);
-        if factor.is_some_and(|factor| !(factor >= 1.0) || meant != 2) {
+        // a study has no number that is none
+        if factor.is_some_and(|factor| factor < 1.0 || meant != 2) {
             let expected = "1 or more, with proposal = \"ensemble\"";
             return Err(TuningError::new(
                 inflation.name,

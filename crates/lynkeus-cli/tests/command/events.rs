@@ -224,8 +224,7 @@ fn a_vessel_that_is_emptied_is_estimated_as_by_particles() {
     assert_eq!(column(&table, "batches_hat").last(), Some(&2.0));
 }
 
-/// Eight switchings, each of which hits its neighbours' instants by less than a row: what is left of a threshold that is
-/// nearly certain not to have been met yet is what no linear correction says.
+/// Eight switchings: that a threshold was not met yet tells particles what no linear correction says.
 #[test]
 fn a_thermostat_is_estimated_as_by_particles() {
     let rest = "initial_variance = { T = 0.25, heat = 0.64 }\n[process_noise]\nT = 0.02\nheat = 0.05\n[estimate]\nsd = true\n";
