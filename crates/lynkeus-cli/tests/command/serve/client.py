@@ -11,7 +11,7 @@ import time
 import paho.mqtt.client as mqtt
 
 port, heard = int(sys.argv[1]), sys.argv[2]
-client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2, client_id=f"test-{port}", clean_session=False)
+client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2, client_id=f"test-{heard}", clean_session=False)
 if len(sys.argv) > 3:
     client.tls_set(ca_certs=sys.argv[3])
 
