@@ -20,6 +20,8 @@ def say(text: str) -> None:
     print(text, flush=True)
 
 
+published: set[int] = set()
+client.on_publish = lambda _, __, mid, *___: published.add(mid)
 client.on_connect = lambda c, *_: c.subscribe(heard, qos=1)
 client.on_subscribe = lambda *_: say("ready")
 client.on_message = lambda _, __, message: say(message.payload.decode())
@@ -36,6 +38,9 @@ for line in sys.stdin:
         say("there")
         continue
     topic, flags, payload = line.rstrip("\n").split(" ", 2)
-    client.publish(topic, payload.encode("utf-8", "surrogateescape"), qos=1, retain="r" in flags).wait_for_publish(60)
+    sent = client.publish(topic, payload.encode("utf-8", "surrogateescape"), qos=1, retain="r" in flags)
+    # the broker may be away: then it is sent once it is there
+    while sent.mid not in published:
+        time.sleep(0.001)
 client.loop_stop()
 client.disconnect()
