@@ -198,6 +198,7 @@ fn a_broker_that_begins_again_loses_nothing() {
     let expected = estimated(&folder, &rows);
     let mut client = Client::new(&folder, broker.port, "plant/estimates", None);
     let serving = Serving::begin(&folder, &[], "");
+    serving.wait_for("is connected");
     client.publish("plant/rows", rows[0].json().trim());
     for part in rows.chunks(20) {
         for (topic, payload) in part.iter().flat_map(messages) {
