@@ -17,17 +17,12 @@ use lynkeus::table::{Instant, exact};
 
 use crate::asset::Line;
 use crate::bytes::{Parser, Writer, beside};
-use crate::parquet;
+use crate::parquet::{self, ASSET, CREDIBLE, REVISION};
 
 const SECOND: i128 = 1_000_000_000;
 const DAY: i128 = 86_400 * SECOND;
 /// Days beyond those that are kept of which files are looked for.
 const LONG_AGO: i128 = 400;
-
-/// The headers of the columns that are no numbers, but for the time.
-pub(crate) const ASSET: &str = "asset";
-pub(crate) const CREDIBLE: &str = "credible";
-pub(crate) const REVISION: &str = "revision";
 
 /// The files of a history.
 #[derive(Debug)]

@@ -16,8 +16,12 @@ use ::parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use ::parquet::schema::types::Type;
 use lynkeus::table::Instant;
 
-use super::bytes::beside;
-use super::history::{ASSET, CREDIBLE, REVISION};
+use crate::bytes::beside;
+
+/// The headers of the columns that are no numbers, but for the time.
+pub(crate) const ASSET: &str = "asset";
+pub(crate) const CREDIBLE: &str = "credible";
+pub(crate) const REVISION: &str = "revision";
 
 /// Rows of a group.
 const GROUP: usize = 1 << 17;

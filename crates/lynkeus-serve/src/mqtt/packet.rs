@@ -455,7 +455,7 @@ mod tests {
         assert_eq!(bytes, b"\x3b\x0a\0\x03a/b\0\x0a1.5");
         bytes.clear();
         publish(MqttVersion::V5, &message, (None, false), &mut bytes);
-        assert_eq!(bytes, b"\x31\x09\0\x03a/b\01.5");
+        assert_eq!(bytes, b"\x31\x09\0\x03a/b\x001.5");
         let read3 = |bytes: &[u8]| read(MqttVersion::V3, bytes).unwrap().map(|f| f.0);
         assert_eq!(
             read3(b"\x40\x02\x12\x34"),

@@ -59,7 +59,7 @@ impl Topics {
                 );
                 let known = reader.columns().collect::<Vec<_>>().join(", ");
                 return Err(
-                    column.blame(Error::input(text).hint(&format!("its columns are {known}")))
+                    column.blame(Error::input(text).hint(format!("its columns are {known}")))
                 );
             }
             let meaning = Meaning::Column(column.text.clone());
