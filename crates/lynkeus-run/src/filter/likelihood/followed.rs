@@ -9,7 +9,8 @@
 
 use lynkeus_expr::{Node, Reals, Tape};
 
-use super::{ParametricLevel, ParametricPlant, Row, Score, Seen, Tangents, check};
+use super::plant::{ParametricLevel, ParametricPlant};
+use super::score::{Row, Score, Seen, Tangents, check};
 use crate::filter::censored::End;
 use crate::filter::record::Independent;
 use crate::filter::{Filter, FilterSettings, NoisyModel, NoisyPlant, Sensor};
