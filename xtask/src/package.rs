@@ -168,7 +168,10 @@ fn install(python: &Path, wheel: &Path) -> Command {
 }
 
 /// The only wheel in a folder.
-fn built(folder: &Path) -> Result<PathBuf, String> {
+///
+/// # Errors
+/// There is none.
+pub fn built(folder: &Path) -> Result<PathBuf, String> {
     let entries = fs::read_dir(folder).map_err(|e| format!("cannot read the wheels: {e}"))?;
     let mut wheels = entries.flatten().map(|entry| entry.path());
     let wheel = wheels.find(|path| path.extension().is_some_and(|kind| kind == "whl"));

@@ -1,9 +1,9 @@
 //! `lynkeus simulate --runs`.
 
-use std::process::ExitCode;
 
 use lynkeus::Error;
 
+use super::ending::Ending;
 use super::inputs::Source;
 use super::limits;
 use super::options::Output;
@@ -15,7 +15,7 @@ pub(super) fn monte_carlo(
     source: &Source,
     output: &Output,
     runs: usize,
-) -> Result<ExitCode, Error> {
+) -> Result<Ending, Error> {
     source.files().asked(output).check()?;
     let study = &source.study;
     let mut progress = Progress::new("simulating", output.quiet);

@@ -1,6 +1,7 @@
 //! Positions in a source text, problems found at them, and the refusals that users read.
 
 use std::fmt;
+use std::panic::Location;
 use std::path::PathBuf;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
@@ -56,17 +57,20 @@ pub(crate) struct Details {
     pub message: String,
     pub label: Option<String>,
     pub hint: Option<String>,
+    pub origin: &'static Location<'static>,
 }
 
 pub(crate) type Result<T> = std::result::Result<T, Problem>;
 
 impl Problem {
+    #[track_caller]
     pub(crate) fn new(span: Span, message: impl Into<String>) -> Self {
         Self(Box::new(Details {
             span,
             message: message.into(),
             label: None,
             hint: None,
+            origin: Location::caller(),
         }))
     }
 
@@ -130,6 +134,8 @@ pub struct Diagnostic {
     pub label: Option<String>,
     /// what to do
     pub hint: Option<String>,
+    /// where the sources have the message
+    pub origin: &'static Location<'static>,
     excerpt: Box<Excerpt>,
 }
 
@@ -163,6 +169,7 @@ impl Diagnostic {
             message: problem.message,
             label: problem.label,
             hint: problem.hint,
+            origin: problem.origin,
             excerpt: Box::new(Excerpt::new(
                 source,
                 line_start..line_end,
