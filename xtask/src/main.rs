@@ -1,5 +1,6 @@
 //! The project's own chores, run as `cargo xtask <task>`.
 
+mod licences;
 mod package;
 mod release;
 mod tutorial;
