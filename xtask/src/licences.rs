@@ -15,7 +15,14 @@ const DENY: &str = include_str!("../../deny.toml");
 /// # Errors
 /// Which packages have which licence.
 pub fn check(list: &Path) -> Result<(), String> {
-    let asked = cargo(&["metadata", "--format-version", "1", "--locked", "--all-features"]).output();
+    let asked = cargo(&[
+        "metadata",
+        "--format-version",
+        "1",
+        "--locked",
+        "--all-features",
+    ])
+    .output();
     let asked = asked.map_err(|error| format!("cannot ask cargo for the dependencies: {error}"))?;
     let found: Value = serde_json::from_slice(&asked.stdout)
         .map_err(|error| format!("cannot read what cargo says of the dependencies: {error}"))?;
@@ -146,6 +153,9 @@ mod tests {
     #[test]
     fn the_list_is_read() {
         let allowed = allowed(DENY);
-        assert!(allowed.contains(&"MIT") && allowed.contains(&"Zlib"), "{allowed:?}");
+        assert!(
+            allowed.contains(&"MIT") && allowed.contains(&"Zlib"),
+            "{allowed:?}"
+        );
     }
 }

@@ -68,7 +68,10 @@ fn packages() -> Result<(), String> {
 fn audit() -> Result<(), String> {
     let list = emptied("audit")?.join("licences.txt");
     licences::check(&list)?;
-    begins(&format!("release: licences are allowed: {}", list.display()));
+    begins(&format!(
+        "release: licences are allowed: {}",
+        list.display()
+    ));
     let python = environment()?;
     for list in ["python", "docs", "xtask"] {
         audited(&python, &format!("{list}/requirements.txt"))?;

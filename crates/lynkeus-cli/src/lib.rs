@@ -35,8 +35,8 @@ use lynkeus::{CheckOptions, Error, interrupt};
 use inputs::Source;
 use options::Output;
 
-use limits::Limits;
 pub use ending::Ending;
+use limits::Limits;
 pub use limits::allocated;
 
 /// Estimates what nobody measures: hidden states and unknown inputs, from a plant's equations and a few sensors.

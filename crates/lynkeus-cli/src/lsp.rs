@@ -146,7 +146,8 @@ impl Sheets {
             let mut unknown = study.sensors.unknown.iter();
             unknown.find(|name| name.is_or_has(&asked.name))
         }) {
-            let words = format!("{name} leaves no trace in what is measured: it cannot be estimated");
+            let words =
+                format!("{name} leaves no trace in what is measured: it cannot be estimated");
             self.error(&name.blame(Error::refused(words)));
         }
         let family = study.observer.family.as_ref();

@@ -1,6 +1,5 @@
 //! `lynkeus simulate --runs`.
 
-
 use lynkeus::Error;
 
 use super::ending::Ending;
@@ -11,11 +10,7 @@ use super::progress::Progress;
 use super::save::Results;
 
 /// Everything is computed before the first file is written.
-pub(super) fn monte_carlo(
-    source: &Source,
-    output: &Output,
-    runs: usize,
-) -> Result<Ending, Error> {
+pub(super) fn monte_carlo(source: &Source, output: &Output, runs: usize) -> Result<Ending, Error> {
     source.files().asked(output).check()?;
     let study = &source.study;
     let mut progress = Progress::new("simulating", output.quiet);

@@ -1,6 +1,5 @@
 //! What a shell and its manual are given of the command line.
 
-
 use clap::Command;
 use clap_complete::Shell;
 use lynkeus::Error;
