@@ -130,7 +130,7 @@ impl Sheets {
         let message = with_hint(&message, found.hint.as_deref());
         let file = self.0.iter().position(|sheet| sheet.name == found.file);
         let at = found.span.start as usize..found.span.end as usize;
-        let code = code(found.origin);
+        let code = code(found.origin());
         self.add(file.unwrap_or_default(), at, severity, &code, &message);
     }
 

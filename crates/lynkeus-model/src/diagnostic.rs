@@ -134,8 +134,6 @@ pub struct Diagnostic {
     pub label: Option<String>,
     /// what to do
     pub hint: Option<String>,
-    /// where the sources have the message
-    pub origin: &'static Location<'static>,
     excerpt: Box<Excerpt>,
 }
 
@@ -149,6 +147,8 @@ struct Excerpt {
     cut: bool,
     /// told as a warning
     is_warning: bool,
+    /// where the sources have the message
+    origin: &'static Location<'static>,
 }
 
 impl Diagnostic {
@@ -169,11 +169,11 @@ impl Diagnostic {
             message: problem.message,
             label: problem.label,
             hint: problem.hint,
-            origin: problem.origin,
             excerpt: Box::new(Excerpt::new(
                 source,
                 line_start..line_end,
                 start..end.max(start),
+                problem.origin,
             )),
         }
     }
@@ -183,6 +183,11 @@ impl Diagnostic {
         let mut warning = Self::new(problem, file, source);
         warning.excerpt.is_warning = true;
         warning
+    }
+
+    /// Where the sources have the message.
+    pub fn origin(&self) -> &'static Location<'static> {
+        self.excerpt.origin
     }
 
     /// `file:line:column: message (hint)` on one line.
@@ -237,7 +242,12 @@ impl std::error::Error for Diagnostic {}
 
 impl Excerpt {
     /// The line, or a window of it around the marked bytes where it is long.
-    fn new(source: &str, line: std::ops::Range<usize>, marked: std::ops::Range<usize>) -> Self {
+    fn new(
+        source: &str,
+        line: std::ops::Range<usize>,
+        marked: std::ops::Range<usize>,
+        origin: &'static Location<'static>,
+    ) -> Self {
         let marked_end = marked.end.min(line.end).min(marked.start + WINDOW);
         let from = source.floor_char_boundary(marked.start.saturating_sub(WINDOW).max(line.start));
         let to = source.floor_char_boundary((marked_end + WINDOW).min(line.end));
@@ -248,6 +258,7 @@ impl Excerpt {
             marked: marked.start - from..marked_end - from,
             cut: from > line.start || to < line.end,
             is_warning: false,
+            origin,
         }
     }
 }
