@@ -17,20 +17,23 @@ NEAR = 600
 
 
 def page(root: Path) -> str:
-    """Every file of the sources with messages, in a section that its code names."""
+    """Every crate with messages, in the order of its files."""
     parts = ["# Messages", INTRODUCTION]
     for crate in sorted((root / "crates").iterdir()):
+        rows = []
         for path in sorted((crate / "src").rglob("*.rs")):
-            rows = messages(path.read_text(encoding="utf-8")) if "tests" not in path.with_suffix("").parts else []
-            if rows:
-                table = "\n".join(f"| {cell(message)} | {cell(hint)} |" for message, hint in rows)
-                parts.append(f"## {code(crate, path)}\n\n| message | what to do |\n|---|---|\n{table}")
+            if "tests" in path.with_suffix("").parts:
+                continue
+            for message, hint in messages(path.read_text(encoding="utf-8")):
+                rows.append(f"| {cell(message)} | {cell(hint)} | `{code(crate, path)}` |")
+        if rows:
+            parts.append("\n".join([f"## {crate.name}\n", "| message | what to do | code |", "|---|---|---|", *rows]))
     return "\n\n".join(parts) + "\n"
 
 
 INTRODUCTION = """What is refused, why, and what to do. The page is made from the sources: a word in braces stands for what was found. Those that are put
 together from several texts are left out.
-A section is a subject, and its title the code of its messages: `lynkeus check STUDY --lsp` gives it with each diagnostic.
+The code is what `lynkeus check STUDY --lsp` gives with a diagnostic: the subject of the message, and the file of the sources that has it.
 What a message that users meet often means, at length: [troubleshooting](../troubleshooting.md)."""
 
 
@@ -59,4 +62,7 @@ def cell(text: str) -> str:
     text = re.sub(r"\\\n\s*", "", text)
     text = text.replace('\\"', '"').replace("\\n", " ").replace("\\\\", "\\").replace("{{", "{").replace("}}", "}")
     text = re.sub(r"\{(\w*)[^}]*\}", lambda m: "{" + (m[1] or "…") + "}", text)
-    return text.replace("\\", "\\\\").replace("|", "&#124;").replace("<", "&lt;").replace("*", "\\*").replace("_", "\\_").replace("[", "\\[")
+    parts = text.replace("|", "&#124;").split("`")
+    # every other part is code
+    parts[::2] = [re.sub(r"([\\*_\[])", r"\\\1", part).replace("<", "&lt;") for part in parts[::2]]
+    return "`".join(parts)
