@@ -699,6 +699,60 @@ class CompareSection(TypedDict, total=False):
     family that is not refuted, and the filters but `particle`)"""
 
 
+class ServeMqtt(TypedDict):
+    """the MQTT broker from which rows come and to which estimates go (serve) (table; default: none)"""
+
+    url: str
+    """where the broker is: `"mqtt://host:1883"`, or `"mqtts://host:8883"` for an encrypted connection (text;
+    default: required)"""
+
+    version: NotRequired[Literal["3.1.1", "5"]]
+    """the version of MQTT that is spoken (`"3.1.1"`, `"5"`; default: `"3.1.1"`)"""
+
+    user: NotRequired[str]
+    """who this is to the broker (text; default: none)"""
+
+    password: NotRequired[str]
+    """the user's password (text; default: the variable `LYNKEUS_MQTT_PASSWORD` of the environment, if there
+    is one)"""
+
+    ca: NotRequired[str]
+    """PEM file of the certificates that vouch for the broker's (path, from the study's folder; default: those
+    whom the system trusts)"""
+
+    cert: NotRequired[str]
+    """PEM file of this client's certificate, where the broker asks for one (path, from the study's folder;
+    default: none)"""
+
+    key: NotRequired[str]
+    """PEM file of the private key of `cert` (path, from the study's folder; default: none)"""
+
+    client: NotRequired[str]
+    """by this name the broker knows the service again; two with one name end each other's connection (text;
+    default: `lynkeus-` and the name of the study's file)"""
+
+    topics: NotRequired[Mapping[str, str]]
+    """the topics of single values, by the names that columns have in a log. With `assets` a level `{asset}`
+    of a topic is the asset's name (table: column = topic; default: none)"""
+
+    rows: NotRequired[str]
+    """the topic of whole rows as JSON objects (topic; default: none)"""
+
+    publish: NotRequired[str]
+    """the topic of the estimates, a JSON object for each line; `{asset}` in it is the asset's name (topic;
+    default: none: nothing is published)"""
+
+    status: NotRequired[str]
+    """the topic that holds `online` as long as the service is connected, and `offline` after it (a last will)
+    (topic; default: none)"""
+
+    qos: NotRequired[Number]
+    """whether messages are acknowledged, and sent again until they are (1), or not (0) (0, 1; default: 1)"""
+
+    retain: NotRequired[bool]
+    """whether the broker keeps the last estimate for those who subscribe later (true, false; default: false)"""
+
+
 class ServeSection(TypedDict, total=False):
     """how the estimator runs beside a plant (serve) (table; default: none)"""
 
@@ -713,8 +767,8 @@ class ServeSection(TypedDict, total=False):
     begins anew)"""
 
     history: str | None
-    """CSV files of what was told, one for each day: `"tank-%Y-%m-%d.csv"` (path with `%Y`, `%m` and `%d`,
-    from the study's folder; default: none)"""
+    """CSV or Parquet files of what was told, one for each day: `"tank-%Y-%m-%d.csv"` (path with `%Y`, `%m`
+    and `%d`, from the study's folder; default: none)"""
 
     keep_days: Whole | None
     """so many days of the history are kept (whole number ≥ 1; default: all)"""
@@ -731,6 +785,9 @@ class ServeSection(TypedDict, total=False):
     token: str | None
     """what a request has to say, as `Authorization: Bearer …` or `?token=…` (text; default: none: this
     machine alone may look)"""
+
+    mqtt: ServeMqtt | None
+    """the MQTT broker from which rows come and to which estimates go (serve) (table; default: none)"""
 
 
 class PlotSection(TypedDict, total=False):

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use clap::{Args, ValueEnum};
 
 use lynkeus::{Error, interrupt};
-use lynkeus_serve::{Board, Engine, Format, Reader, http};
+use lynkeus_serve::{Board, Engine, Format, Reader, http, mqtt};
 
 use super::ending::Ending;
 use super::inputs::Source;
@@ -15,9 +15,9 @@ use super::output;
 /// How a study is served.
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// What the messages on standard input and output are written in
+    /// Rows come on standard input and estimates go to standard output, written in this; without it they come and go as `mqtt` in [serve] says
     #[arg(long, value_enum, value_name = "FORMAT")]
-    stdio: Messages,
+    stdio: Option<Messages>,
     /// No notes on standard error, only warnings
     #[arg(short, long)]
     quiet: bool,
@@ -44,6 +44,12 @@ impl From<Messages> for Format {
 pub(super) fn serve(source: &Source, options: &Options) -> Result<Ending, Error> {
     let study = &source.study;
     let settings = &study.serve;
+    if options.stdio.is_none() && settings.mqtt.is_none() {
+        let error = Error::input("no rows would come").at(&study.file);
+        return Err(error.hint(
+            "add `--stdio json` (or influx), or `mqtt` with a broker to [serve] of the study",
+        ));
+    }
     let files = source
         .files()
         .reads("the assets", settings.assets.as_deref());
@@ -76,13 +82,25 @@ pub(super) fn serve(source: &Source, options: &Options) -> Result<Ending, Error>
             Some(board)
         }
     };
-    lynkeus_serve::serve(
-        &mut engine,
-        (Reader::new(stream), board.as_deref()),
-        options.stdio.into(),
-        (io::stdin(), &mut io::stdout()),
-        &interrupt::interrupted,
-        &mut output::warn,
-    )?;
+    let reader = Reader::new(stream);
+    let door = (reader, board.as_deref());
+    match (options.stdio, &settings.mqtt) {
+        (Some(messages), _) => lynkeus_serve::serve(
+            &mut engine,
+            door,
+            messages.into(),
+            (io::stdin(), &mut io::stdout()),
+            &interrupt::interrupted,
+            &mut output::warn,
+        )?,
+        (None, Some(settings)) => mqtt::serve(
+            &mut engine,
+            door,
+            settings,
+            &interrupt::interrupted,
+            &mut output::note,
+        )?,
+        (None, None) => {}
+    }
     Ok(Ending::Done)
 }

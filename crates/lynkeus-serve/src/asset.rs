@@ -68,6 +68,8 @@ pub(crate) struct Asset {
     sensors: Vec<Sensor>,
     /// of rows
     steps: Steps,
+    /// up to this row of all it is what a state says
+    since: u64,
 }
 
 impl Asset {
@@ -82,6 +84,7 @@ impl Asset {
             consistencies: vec![Consistency::default(); sensors],
             sensors: vec![Sensor::default(); sensors],
             steps: Steps::default(),
+            since: 0,
             stream,
         }
     }
@@ -107,6 +110,9 @@ impl Asset {
         values: &[f64],
         (sequence, keep): (u64, u64),
     ) -> Result<Vec<Line>, String> {
+        if sequence <= self.since {
+            return Ok(vec![]);
+        }
         let t = self.time(stamp)?;
         if let Some(line) = self.again(t, values)? {
             return Ok(vec![Line {
@@ -209,6 +215,18 @@ impl Asset {
                 known.stamp
             )),
         }
+    }
+
+    /// What was told last of the rows that may still be corrected, in the order of their times.
+    pub fn recent(&self) -> Vec<Line> {
+        let Some(newest) = self.newest() else {
+            return vec![];
+        };
+        let oldest = newest - self.stream.wait();
+        let rows = self.published.iter();
+        let rows = rows.filter(|row| row.t >= oldest || is_of_row(row.t, oldest, newest));
+        rows.map(|row| self.line(row, self.doubts(), vec![]))
+            .collect()
     }
 
     /// Refuses what cannot be used.
@@ -430,8 +448,9 @@ impl Asset {
         self.steps.save(to);
     }
 
-    /// To where it was; none where that is no state of it.
-    pub fn load(&mut self, from: &mut Parser<'_>) -> Option<()> {
+    /// To where it was after so many rows of all; none where that is no state of it.
+    pub fn load(&mut self, from: &mut Parser<'_>, sequence: u64) -> Option<()> {
+        self.since = sequence;
         self.first = from.numbers()?;
         if self.first.is_empty() {
             return Some(());

@@ -1,4 +1,6 @@
-//! Numbers and texts as bytes, and back.
+//! Numbers and texts as bytes, and back; files beside others.
+
+use std::path::{Path, PathBuf};
 
 /// What is written.
 #[derive(Debug, Default)]
@@ -60,4 +62,11 @@ impl<'b> Parser<'b> {
         let count = self.count(8)?;
         (0..count).map(|_| self.number()).collect()
     }
+}
+
+/// The path of a file with something after its name.
+pub(crate) fn beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.to_owned().into_os_string();
+    name.push(ending);
+    PathBuf::from(name)
 }

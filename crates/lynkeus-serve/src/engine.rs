@@ -5,6 +5,7 @@ use std::num::NonZero;
 use std::path::Path;
 use std::sync::Arc;
 use std::thread;
+use std::time::{Duration, Instant};
 
 use lynkeus::Error;
 use lynkeus::stream::Stream;
@@ -12,6 +13,7 @@ use lynkeus::stream::Stream;
 use crate::asset::{Asset, Line};
 use crate::bytes::{Parser, Writer};
 use crate::history::{History, now};
+use crate::json::{ASSET, Message};
 use crate::row::Stamp;
 use crate::state::{Kind, State};
 
@@ -21,6 +23,8 @@ pub const BATCH: usize = 256;
 /// that lost its connection sends again what it has no answer to: what was on its way to it (a pipe holds 64 KiB), and
 /// a batch.
 const KEPT: u64 = 4096;
+/// How long rows wait at once while the state is written anew.
+const SLICE: Duration = Duration::from_micros(500);
 /// Fewer rows are over before other threads have begun.
 const WORTHWHILE: usize = 32;
 
@@ -45,13 +49,35 @@ pub struct Engine {
     sequence: u64,
     threads: usize,
     state: Option<State>,
+    /// while the state is written anew, so many assets are in it
+    saved: Option<usize>,
+    /// the day of the history in the last state, whether it is on the disk or not
+    day: i128,
     history: Option<History>,
     /// what the user should know of how it began
     notes: Vec<String>,
 }
 
-/// What became of a row: lines, or why it was not taken.
-pub type Answer = Result<Vec<Line>, String>;
+/// What became of a row: lines, or why there are none.
+pub type Answer = Result<Vec<Line>, Refusal>;
+
+/// Why a row has no lines.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Refusal {
+    /// it will never be used
+    Unusable(String),
+    /// it could not be kept: once there is room it may be sent again
+    NotKept(String),
+}
+
+impl std::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Unusable(why) => f.write_str(why),
+            Self::NotKept(why) => write!(f, "not taken: {why}"),
+        }
+    }
+}
 
 impl Engine {
     /// Of assets by their names, each with its study; one without a name where there is only one.
@@ -68,6 +94,8 @@ impl Engine {
             sequence: 0,
             threads: thread::available_parallelism().map_or(1, NonZero::get),
             state: None,
+            saved: None,
+            day: i128::MIN,
             history: None,
             notes: vec![],
         }
@@ -76,7 +104,7 @@ impl Engine {
     /// Writes what is told to these files, one for each day: `%Y`, `%m` and `%d` of a path are its date. So many days
     /// are kept, if any number is said. Where there is a [state](Self::keep), this comes before it.
     pub fn write_history(&mut self, pattern: &Path, keep: Option<u64>) {
-        let has_assets = self.place("").is_none();
+        let has_assets = self.has_names();
         let stream = self.assets.first().map(Asset::stream);
         self.history = stream.map(|stream| History::new(pattern, keep, stream, has_assets));
     }
@@ -91,14 +119,19 @@ impl Engine {
         if let Some(history) = &mut self.history {
             history.begin().map_err(|error| unwritten(&error))?;
         }
-        for (kind, record) in State::records(path, &bytes)? {
+        let records = State::records(path, &bytes)?;
+        let damaged = || State::damaged(path);
+        for (kind, record) in &records {
             let known = match kind {
-                Kind::Snapshot => self.load(record, path)?,
-                Kind::Rows => self.again(record),
+                Kind::Asset => self.load(record, path)?,
+                Kind::End => self.load_end(record)?,
+                Kind::Rows => Some(()),
             };
-            if known.is_none() {
-                return Err(State::damaged(path));
-            }
+            known.ok_or_else(damaged)?;
+        }
+        // each asset knows which of them are new to it
+        for (_, rows) in records.iter().filter(|(kind, _)| *kind == Kind::Rows) {
+            self.again(rows).ok_or_else(damaged)?;
         }
         if self.sequence > 0 {
             let text = format!("went on after row {} of {}", self.sequence, path.display());
@@ -108,7 +141,8 @@ impl Engine {
         if let Some(history) = &mut self.history {
             history.is_up_to_date();
         }
-        self.renew().map_err(|error| State::unusable(path, &error))
+        self.renew_all()
+            .map_err(|error| State::unusable(path, &error))
     }
 
     /// What the user should know of how it began.
@@ -117,63 +151,57 @@ impl Engine {
         &self.notes
     }
 
-    /// The estimators of all assets, into a record of the state.
-    fn snapshot(&self) -> Vec<u8> {
+    /// The estimator of an asset as a record of the state.
+    fn record(&self, place: usize) -> Option<Vec<u8>> {
+        let (name, asset) = (self.names.get(place)?, self.assets.get(place)?);
         let mut to = Writer::default();
+        to.bytes(name.as_bytes());
+        to.word(asset.fingerprint());
         to.word(self.sequence);
-        to.word(self.assets.len() as u64);
-        for (name, asset) in self.names.iter().zip(&self.assets) {
-            to.bytes(name.as_bytes());
-            to.word(asset.fingerprint());
-            let mut own = Writer::default();
-            asset.save(&mut own);
-            to.bytes(&own.0);
-        }
-        if let Some(history) = &self.history {
-            history.save(&mut to);
-        }
-        to.0
+        asset.save(&mut to);
+        Some(to.0)
     }
 
-    /// What a snapshot says of the assets that there are; none where it is damaged.
+    /// What a record says of an asset; none where it is damaged.
     fn load(&mut self, record: &[u8], path: &Path) -> Result<Option<()>, Error> {
         let mut from = Parser(record);
-        let head = |from: &mut Parser<'_>| Some((from.word()?, from.count(24)?));
-        let Some((sequence, count)) = head(&mut from) else {
+        let head = |from: &mut Parser<'_>| Some((from.text()?, from.word()?, from.word()?));
+        let Some((name, fingerprint, sequence)) = head(&mut from) else {
+            return Ok(None);
+        };
+        let Some(asset) = self.place(&name).and_then(|i| self.assets.get_mut(i)) else {
+            let text =
+                format!("the state of \"{name}\" is left out: no asset is called so any more");
+            self.notes.push(text);
+            return Ok(Some(()));
+        };
+        if asset.fingerprint() != fingerprint {
+            let of = if name.is_empty() {
+                String::new()
+            } else {
+                format!(" of \"{name}\"")
+            };
+            let message = format!(
+                "this is the state{of} of another study: its plant, its observer, its numbers or the names of its columns differ"
+            );
+            return Err(Error::input(message)
+                .at(path.display())
+                .hint("go back to the study that made it, or move the file away and begin anew"));
+        }
+        Ok(asset.load(&mut from, sequence))
+    }
+
+    /// What a snapshot says of everything else.
+    fn load_end(&mut self, record: &[u8]) -> Result<Option<()>, Error> {
+        let mut from = Parser(record);
+        let Some(sequence) = from.word() else {
             return Ok(None);
         };
         self.sequence = sequence;
-        for _ in 0..count {
-            let Some((name, fingerprint, own)) = saved(&mut from) else {
-                return Ok(None);
-            };
-            let Some(asset) = self.place(&name).and_then(|i| self.assets.get_mut(i)) else {
-                let text =
-                    format!("the state of \"{name}\" is left out: no asset is called so any more");
-                self.notes.push(text);
-                continue;
-            };
-            if asset.fingerprint() != fingerprint {
-                let of = if name.is_empty() {
-                    String::new()
-                } else {
-                    format!(" of \"{name}\"")
-                };
-                let message = format!(
-                    "this is the state{of} of another study: its plant, its observer, its numbers or the names of its columns differ"
-                );
-                return Err(Error::input(message).at(path.display()).hint(
-                    "go back to the study that made it, or move the file away and begin anew",
-                ));
-            }
-            if asset.load(&mut Parser(own)).is_none() {
-                return Ok(None);
-            }
-        }
         match &mut self.history {
             // there was no history so far
             Some(_) if from.0.is_empty() => {}
-            Some(history) => match history.load(&mut from) {
+            Some(history) => match history.load(&mut from, sequence) {
                 None => return Ok(None),
                 Some(done) => done.map_err(|error| unwritten(&error))?,
             },
@@ -185,6 +213,8 @@ impl Engine {
     /// Rows that were kept and are taken once more.
     fn again(&mut self, record: &[u8]) -> Option<()> {
         let mut from = Parser(record);
+        // before the first of them
+        self.sequence = from.word()?;
         let came = i128::from(from.word()? as i64);
         let mut rows = vec![];
         for _ in 0..from.count(32)? {
@@ -202,27 +232,160 @@ impl Engine {
     ///
     /// # Errors
     /// The disk is full, or failed: the file is as it was.
-    fn renew(&mut self) -> std::io::Result<()> {
+    fn renew_all(&mut self) -> std::io::Result<()> {
+        if let Some(state) = &mut self.state
+            && self.saved.is_none()
+        {
+            state.wait()?;
+            state.renew();
+            self.saved = Some(0);
+        }
+        self.save_some(Duration::MAX)?;
+        if let Some(state) = &mut self.state
+            && state.wait()?
+        {
+            self.is_over();
+        }
+        Ok(())
+    }
+
+    /// The last state is on the disk: the days of the history before it are over.
+    fn is_over(&mut self) {
         if let Some(history) = &mut self.history {
-            history.sync()?;
+            history.is_over(self.day);
         }
-        let snapshot = self.snapshot();
-        match &mut self.state {
-            Some(state) => state.renew(&snapshot),
-            None => Ok(()),
+    }
+
+    /// Writes a part of it where it is time to write it anew.
+    fn renew(&mut self) {
+        let day = self.history.as_ref().map_or(i128::MIN, History::day);
+        let Some(state) = &mut self.state else {
+            if day != self.day {
+                self.day = day;
+                self.is_over();
+            }
+            return;
+        };
+        // where it failed it goes on with the longer file, and tries again later
+        let is_there = state.settle().unwrap_or(false);
+        if day != self.day {
+            state.make_due();
         }
+        if state.is_due() {
+            state.renew();
+            self.saved = Some(0);
+        }
+        if is_there {
+            self.is_over();
+        }
+        // what cannot be written yet is tried with the next rows
+        let _ = self.save_some(SLICE);
+    }
+
+    /// Goes on with the assets, for so long; the end where all are there.
+    fn save_some(&mut self, most: Duration) -> std::io::Result<()> {
+        let began = Instant::now();
+        while let Some(place) = self.saved {
+            if let Some(record) = self.record(place) {
+                if let Some(state) = &mut self.state {
+                    state.add(&record);
+                }
+                self.saved = Some(place + 1);
+                if began.elapsed() > most {
+                    return Ok(());
+                }
+                continue;
+            }
+            let mut end = Writer::default();
+            end.word(self.sequence);
+            let mut file = None;
+            if let Some(history) = &mut self.history {
+                file = history.written()?;
+                history.save(&mut end);
+                self.day = history.day();
+            }
+            if let Some(state) = &mut self.state {
+                state.complete(&end.0, file);
+            }
+            self.saved = None;
+        }
+        Ok(())
     }
 
     /// The end of all: the next start has nothing to go over again.
     pub fn close(&mut self) {
         // the rows are on the disk in any case
-        let _ = self.renew();
+        let _ = self.renew_all();
     }
 
     /// The place of an asset; none where nobody is called so.
     #[must_use]
     pub fn place(&self, name: &str) -> Option<usize> {
         self.places.get(name).copied()
+    }
+
+    /// Whether messages say whose rows they are.
+    #[must_use]
+    pub fn has_names(&self) -> bool {
+        self.place("").is_none()
+    }
+
+    /// The names of the assets, in their order; one that is empty where there is only one.
+    #[must_use]
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The study of an asset.
+    #[must_use]
+    pub fn stream(&self, asset: usize) -> Option<&Stream> {
+        self.assets.get(asset).map(Asset::stream)
+    }
+
+    /// Whether an asset had its first row.
+    #[must_use]
+    pub fn has_begun(&self, asset: usize) -> bool {
+        let asset = self.assets.get(asset);
+        asset.is_some_and(|asset| asset.newest().is_some())
+    }
+
+    /// Whether the next start goes on from here.
+    #[must_use]
+    pub fn is_kept(&self) -> bool {
+        self.state.is_some()
+    }
+
+    /// The row of a message.
+    ///
+    /// # Errors
+    /// It is nobody's.
+    pub fn arrival(&self, message: &Message) -> Result<Arrival, String> {
+        let asset = match (self.has_names(), &message.asset) {
+            (false, _) => 0,
+            (true, Some(name)) => match self.place(name) {
+                Some(place) => place,
+                None => return Err(format!("no asset is called \"{name}\"")),
+            },
+            (true, None) => {
+                return Err(format!("expected the name of an asset under \"{ASSET}\""));
+            }
+        };
+        Ok(Arrival {
+            asset,
+            stamp: message.stamp,
+            values: message.values.clone(),
+        })
+    }
+
+    /// What was told last of the rows that may still be corrected, by asset.
+    #[must_use]
+    pub fn recent(&self) -> Vec<(usize, Line)> {
+        let all = self.assets.iter().enumerate();
+        let lines = all.flat_map(|(place, asset)| {
+            let own = asset.recent().into_iter();
+            own.map(move |line| (place, line))
+        });
+        lines.collect()
     }
 
     /// Takes rows in their order, at most `BATCH`, and keeps them before they are answered.
@@ -233,7 +396,7 @@ impl Engine {
         let came = now();
         match self.write_down(rows, came) {
             Ok(()) => {}
-            Err(why) if rows.len() == 1 => return vec![Err(why)],
+            Err(why) if rows.len() == 1 => return vec![Err(Refusal::NotKept(why))],
             // there may be room for some of them
             Err(_) => {
                 let (some, others) = rows.split_at(rows.len() / 2);
@@ -241,13 +404,7 @@ impl Engine {
             }
         }
         let answers = self.apply(rows, came);
-        if self.state.as_ref().is_some_and(State::is_due)
-            && self.renew().is_err()
-            && let Some(state) = &mut self.state
-        {
-            // it goes on with the longer file, and tries again later
-            state.put_off();
-        }
+        self.renew();
         answers
     }
 
@@ -255,40 +412,43 @@ impl Engine {
     fn write_down(&mut self, rows: &[Arrival], came: i128) -> Result<(), String> {
         if let Some(history) = &mut self.history {
             let done = history.flush();
-            done.map_err(|error| format!("not taken: the history cannot be written: {error}"))?;
+            done.map_err(|error| format!("the history cannot be written: {error}"))?;
         }
         match &mut self.state {
             None => Ok(()),
             Some(state) => state
-                .append(&record(rows, came))
-                .map_err(|error| format!("not taken: the state cannot be kept: {error}")),
+                .append(&record(self.sequence, rows, came))
+                .map_err(|error| format!("the state cannot be kept: {error}")),
         }
     }
 
     fn apply(&mut self, rows: &[Arrival], came: i128) -> Vec<Answer> {
         let answers = self.push(rows);
-        self.sequence += rows.len() as u64;
         if let Some(history) = &mut self.history {
-            for (row, lines) in rows.iter().zip(&answers) {
+            for (sequence, (row, lines)) in (self.sequence + 1..).zip(rows.iter().zip(&answers)) {
                 let name = self.names.get(row.asset).map_or("", String::as_str);
-                history.add(lines.as_deref().unwrap_or_default(), name, came);
+                let lines = lines.as_deref().unwrap_or_default();
+                history.add(lines, name, (came, sequence));
             }
             // what does not find room waits, and the next rows with it
             let _ = history.flush();
         }
+        self.sequence += rows.len() as u64;
         answers
     }
 
     fn push(&mut self, rows: &[Arrival]) -> Vec<Answer> {
         let first = self.sequence + 1;
         let push = |asset: &mut Asset, place: usize, row: &Arrival| {
-            asset.take(row.stamp, &row.values, (first + place as u64, KEPT))
+            let taken = asset.take(row.stamp, &row.values, (first + place as u64, KEPT));
+            taken.map_err(Refusal::Unusable)
         };
+        let failed = |why: &str| Err(Refusal::Unusable(why.to_owned()));
         let numbered = rows.iter().enumerate();
         if rows.len() < WORTHWHILE || self.threads < 2 || self.assets.len() < 2 {
             let answers = numbered.map(|(place, row)| match self.assets.get_mut(row.asset) {
                 Some(asset) => push(asset, place, row),
-                None => Err("no such asset".to_owned()),
+                None => failed("no such asset"),
             });
             return answers.collect();
         }
@@ -310,8 +470,8 @@ impl Engine {
             let done = workers.into_iter().map(|worker| worker.join());
             done.flat_map(Result::unwrap_or_default).collect::<Vec<_>>()
         });
-        let lost = || Err("the estimator failed; the row was not taken".to_owned());
-        let mut answers: Vec<Answer> = rows.iter().map(|_| lost()).collect();
+        let lost = |_| failed("the estimator failed; the row was not taken");
+        let mut answers: Vec<Answer> = rows.iter().map(lost).collect();
         for (place, answer) in done {
             answers[place] = answer;
         }
@@ -319,9 +479,10 @@ impl Engine {
     }
 }
 
-/// Rows as a record of the state.
-fn record(rows: &[Arrival], came: i128) -> Vec<u8> {
+/// Rows after the first ones so many, as a record of the state.
+fn record(sequence: u64, rows: &[Arrival], came: i128) -> Vec<u8> {
     let mut to = Writer::default();
+    to.word(sequence);
     // until the year 2262
     to.word(came as u64);
     to.word(rows.len() as u64);
@@ -331,11 +492,6 @@ fn record(rows: &[Arrival], came: i128) -> Vec<u8> {
         to.numbers(&row.values);
     }
     to.0
-}
-
-/// The name of an asset, its fingerprint and its state.
-fn saved<'b>(from: &mut Parser<'b>) -> Option<(String, u64, &'b [u8])> {
-    Some((from.text()?, from.word()?, from.bytes()?))
 }
 
 fn unwritten(error: &std::io::Error) -> Error {

@@ -1,19 +1,23 @@
-//! What was told, in a CSV file for each day (of UTC) on which it was told.
+//! What was told, in a CSV file for each day (of UTC) on which it was told; as Parquet, where that is asked for, once the
+//! day is over.
 //!
 //! The state knows how far the file of the day was when the state was written: what follows is written once more from
-//! the rows since, so that after a kill each line is there once.
+//! the rows since, so that after a kill each line is there once. A day becomes Parquet after a state that begins later is
+//! on the disk, and its CSV file is left until then.
 
 use std::fmt::Write as _;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::thread::{self, JoinHandle};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use lynkeus::stream::Stream;
 use lynkeus::table::{Instant, exact};
 
 use crate::asset::Line;
-use crate::bytes::{Parser, Writer};
+use crate::bytes::{Parser, Writer, beside};
+use crate::parquet::{self, ASSET, CREDIBLE, REVISION};
 
 const SECOND: i128 = 1_000_000_000;
 const DAY: i128 = 86_400 * SECOND;
@@ -37,6 +41,12 @@ pub(crate) struct History {
     pending: String,
     /// the rows of the state are gone over again: files of later days are written anew
     is_repeating: bool,
+    /// the lines up to this row are there
+    since: u64,
+    /// days are to become Parquet
+    is_parquet: bool,
+    /// makes them so
+    worker: Option<JoinHandle<()>>,
 }
 
 /// The present, in nanoseconds since 1970.
@@ -49,7 +59,7 @@ impl History {
     pub fn new(pattern: &Path, keep: Option<u64>, stream: &Stream, has_assets: bool) -> Self {
         let mut header = stream.told_time.clone();
         if has_assets {
-            header += ",asset";
+            header = header + "," + ASSET;
         }
         for told in &stream.estimates {
             for name in std::iter::once(&told.header).chain(&told.deviation) {
@@ -61,7 +71,7 @@ impl History {
             header.push(',');
             cell(&monitor.header, &mut header);
         }
-        header += ",credible,revision\n";
+        header = header + "," + CREDIBLE + "," + REVISION + "\n";
         Self {
             pattern: pattern.display().to_string(),
             keep,
@@ -72,6 +82,11 @@ impl History {
             length: 0,
             pending: String::new(),
             is_repeating: false,
+            since: 0,
+            is_parquet: pattern
+                .extension()
+                .is_some_and(|ending| ending == "parquet"),
+            worker: None,
         }
     }
 
@@ -83,8 +98,43 @@ impl History {
         PathBuf::from(path.replace("%d", day))
     }
 
-    /// Takes lines of a row that came at `came`; what could not be written waits.
-    pub fn add(&mut self, lines: &[Line], asset: &str, came: i128) {
+    /// The file of a day that is not over.
+    fn draft(&self, day: i128) -> PathBuf {
+        match self.is_parquet {
+            true => beside(&self.path(day), ".csv"),
+            false => self.path(day),
+        }
+    }
+
+    /// The day whose lines are written.
+    pub fn day(&self) -> i128 {
+        self.day
+    }
+
+    /// Days before this one are over for good: they become Parquet, in a thread.
+    pub fn is_over(&mut self, day: i128) {
+        let is_busy = |worker: &JoinHandle<()>| !worker.is_finished();
+        if !self.is_parquet || self.worker.as_ref().is_some_and(is_busy) {
+            return;
+        }
+        let days = (day - LONG_AGO..day).map(|day| (self.draft(day), self.path(day)));
+        let drafts: Vec<_> = days.filter(|(draft, _)| draft.exists()).collect();
+        if drafts.is_empty() {
+            return;
+        }
+        self.worker = Some(thread::spawn(move || {
+            for (draft, path) in drafts {
+                // what cannot be written stays as it is, and is tried again
+                let _ = close(&draft, &path);
+            }
+        }));
+    }
+
+    /// Takes lines of the `sequence`-th row, which came at `came`; what could not be written waits.
+    pub fn add(&mut self, lines: &[Line], asset: &str, (came, sequence): (i128, u64)) {
+        if sequence <= self.since {
+            return;
+        }
         for line in lines.iter().filter(|line| !line.is_repeated) {
             let day = came.div_euclid(DAY);
             if day > self.day {
@@ -100,12 +150,16 @@ impl History {
 
     fn turn(&mut self, day: i128) {
         self.day = day;
-        self.file = None;
+        if let Some(file) = self.file.take() {
+            // where this fails it is on the disk a little later
+            let _ = file.sync_data();
+        }
         if let Some(keep) = self.keep {
             let oldest = day - i128::from(keep);
             for old in oldest - LONG_AGO..oldest {
                 // most of them are not there
                 let _ = std::fs::remove_file(self.path(old));
+                let _ = std::fs::remove_file(self.draft(old));
             }
         }
     }
@@ -167,22 +221,19 @@ impl History {
     fn open(&mut self) -> io::Result<()> {
         let mut options = OpenOptions::new();
         options.write(true).create(true).truncate(self.is_repeating);
-        let file = options.open(self.path(self.day))?;
+        let file = options.open(self.draft(self.day))?;
         self.length = file.metadata()?.len();
         self.file = Some(file);
         Ok(())
     }
 
-    /// All of it is on the disk.
+    /// Writes what waits; the file of the day, which may not be on the disk yet.
     ///
     /// # Errors
     /// The disk is full, or failed.
-    pub fn sync(&mut self) -> io::Result<()> {
+    pub fn written(&mut self) -> io::Result<Option<File>> {
         self.flush()?;
-        match &self.file {
-            Some(file) => file.sync_data(),
-            None => Ok(()),
-        }
+        self.file.as_ref().map(File::try_clone).transpose()
     }
 
     /// Where it is.
@@ -201,11 +252,12 @@ impl History {
     }
 
     /// Goes back to where it was: the rows since will be told once more.
-    pub fn load(&mut self, from: &mut Parser<'_>) -> Option<io::Result<()>> {
+    pub fn load(&mut self, from: &mut Parser<'_>, sequence: u64) -> Option<io::Result<()>> {
+        self.since = sequence;
         let (day, length) = (i128::from(from.word()? as i64), from.word()?);
         self.is_repeating = true;
         self.day = day;
-        let file = OpenOptions::new().write(true).open(self.path(day));
+        let file = OpenOptions::new().write(true).open(self.draft(day));
         Some(match file {
             Ok(file) => self.shorten(file, length),
             // somebody took it away
@@ -227,6 +279,25 @@ impl History {
     }
 }
 
+/// A day as Parquet, in the place of its CSV file.
+fn close(draft: &Path, path: &Path) -> io::Result<()> {
+    let mut to = path.to_owned();
+    if draft.metadata()?.len() == 0 {
+        return std::fs::remove_file(draft);
+    }
+    if path.exists() {
+        if parquet::rows(path)? == parquet::lines(draft)? {
+            // a kill came between the two files
+            return std::fs::remove_file(draft);
+        }
+        // the clock went back to a day that was over: nothing is written over
+        let mut others = (2..).map(|count: u32| path.with_extension(format!("{count}.parquet")));
+        to = others.find(|other| !other.exists()).unwrap_or(to);
+    }
+    parquet::convert(draft, &to)?;
+    std::fs::remove_file(draft)
+}
+
 /// A text as a cell.
 fn cell(text: &str, to: &mut String) {
     match text.contains([',', '"', '\n', '\r']) {
@@ -236,5 +307,142 @@ fn cell(text: &str, to: &mut String) {
             to.push('"');
         }
         false => to.push_str(text),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use lynkeus::Study;
+
+    use super::*;
+    use crate::row::Stamp;
+
+    /// A tank, and the history of its estimates.
+    fn history(folder: &Path, name: &str, keep: Option<u64>) -> History {
+        let plant = "model Tank\n  Real x(start = 1);\n  output Real y = x;\nequation\n  der(x) = -x;\nend Tank;\n";
+        std::fs::write(folder.join("tank.mo"), plant).unwrap();
+        let study = "plant = \"tank.mo\"\nprocess_noise = { x = 0.1 }\n[sensors]\nnoise = { y = 0.1 }\n[observer]\nfamily = \"ekf\"\ninitial_variance = { default = 1 }\n";
+        std::fs::write(folder.join("study.toml"), study).unwrap();
+        let study = Study::load(folder.join("study.toml")).unwrap();
+        let stream = Arc::new(Stream::new(&study).unwrap());
+        History::new(&folder.join(name), keep, &stream, true)
+    }
+
+    fn line(stamp: Stamp, x: f64) -> Line {
+        Line {
+            stamp,
+            estimate: vec![x],
+            deviations: vec![x / 3.0],
+            is_credible: x > 0.0,
+            revision: 2,
+            notes: vec![],
+            is_repeated: false,
+        }
+    }
+
+    fn files(folder: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(folder).unwrap();
+        let names = entries.map(|e| e.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = names.filter(|name| name.starts_with('h')).collect();
+        names.sort();
+        names
+    }
+
+    fn wait(history: &mut History) {
+        if let Some(worker) = history.worker.take() {
+            worker.join().unwrap();
+        }
+    }
+
+    #[test]
+    fn a_day_that_is_over_becomes_parquet() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut history = history(folder.path(), "h-%Y-%m-%d.parquet", Some(3));
+        let day = 20_000 * DAY;
+        let date = |k: i64| Stamp::Date(Instant::at(day + i128::from(k) * 1_000_000_007, true));
+        let xs: Vec<f64> = (0..200).map(|k| (f64::from(k) - 3.0) / 7.0).collect();
+        for (k, x) in (0..).zip(&xs) {
+            history.add(
+                &[line(date(k), *x)],
+                "tank, 1",
+                (day + i128::from(k), k as u64 + 1),
+            );
+        }
+        history.flush().unwrap();
+        assert_eq!(files(folder.path()), ["h-2024-10-04.parquet.csv"]);
+        history.add(&[line(date(500), 1.0)], "tank, 1", (day + DAY, 201));
+        history.flush().unwrap();
+        // not before a state says that its lines will not be written again
+        assert_eq!(
+            files(folder.path()),
+            ["h-2024-10-04.parquet.csv", "h-2024-10-05.parquet.csv"]
+        );
+        history.is_over(20_001);
+        wait(&mut history);
+        assert_eq!(
+            files(folder.path()),
+            ["h-2024-10-04.parquet", "h-2024-10-05.parquet.csv"]
+        );
+        use ::parquet::file::reader::{FileReader, SerializedFileReader};
+        use ::parquet::record::Field;
+        let file = File::open(folder.path().join("h-2024-10-04.parquet")).unwrap();
+        let reader = SerializedFileReader::new(file).unwrap();
+        let rows: Vec<Vec<(String, Field)>> = reader
+            .get_row_iter(None)
+            .unwrap()
+            .map(|row| row.unwrap().into_columns())
+            .collect();
+        assert_eq!(rows.len(), xs.len());
+        for (k, (row, x)) in (0..).zip(rows.iter().zip(&xs)) {
+            let expected = [
+                (
+                    "t",
+                    Field::Long((day + i128::from(k) * 1_000_000_007) as i64),
+                ),
+                ("asset", Field::Str("tank, 1".into())),
+                ("x_hat", Field::Double(*x)),
+                ("x_sd", Field::Double(x / 3.0)),
+                ("credible", Field::Bool(*x > 0.0)),
+                ("revision", Field::Long(2)),
+            ];
+            let expected = expected.map(|(name, field)| (name.to_owned(), field));
+            assert_eq!(row[..], expected);
+        }
+        // the clock goes back to a day that is over: nothing is lost
+        std::fs::write(
+            folder.path().join("h-2024-10-04.parquet.csv"),
+            "t,asset,x_hat,x_sd,credible,revision\n1,a,1,1,true,0\n",
+        )
+        .unwrap();
+        history.is_over(20_001);
+        wait(&mut history);
+        assert!(files(folder.path()).contains(&"h-2024-10-04.2.parquet".to_owned()));
+        // what is old goes
+        history.add(&[line(date(501), 1.0)], "b", (day + 9 * DAY, 202));
+        history.flush().unwrap();
+        assert!(
+            !files(folder.path()).contains(&"h-2024-10-04.parquet".to_owned()),
+            "{:?}",
+            files(folder.path())
+        );
+    }
+
+    /// A kill may come between the new file and the end of the old one.
+    #[test]
+    fn a_day_is_not_written_twice() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut history = history(folder.path(), "h-%Y-%m-%d.parquet", None);
+        let draft = folder.path().join("h-2024-10-04.parquet.csv");
+        history.add(&[line(Stamp::Number(1.0), 1.0)], "a", (20_000 * DAY, 1));
+        history.flush().unwrap();
+        let text = std::fs::read(&draft).unwrap();
+        history.is_over(20_001);
+        wait(&mut history);
+        std::fs::write(&draft, text).unwrap();
+        history.is_over(20_001);
+        wait(&mut history);
+        assert_eq!(files(folder.path()), ["h-2024-10-04.parquet"]);
     }
 }

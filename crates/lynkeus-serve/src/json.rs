@@ -12,6 +12,8 @@ use crate::row::{Field, Reader, Stamp};
 
 /// The name under which a message says whose row it is.
 pub const ASSET: &str = "asset";
+/// The name under which an object for one quantity has it.
+const VALUE: &str = "value";
 
 /// A message that was read.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,12 +33,20 @@ pub struct Message {
 /// # Errors
 /// What is wrong with it.
 pub fn read(text: &str, reader: &mut Reader) -> Result<Message, String> {
-    let value: Value = serde_json::from_str(text).map_err(|e| format!("no JSON: {e}"))?;
-    let Value::Object(message) = value else {
-        return Err("expected a JSON object".to_owned());
-    };
+    read_at(text, None, reader)
+}
+
+/// Reads a message, which has this time where it says none.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn read_at(text: &str, came: Option<Stamp>, reader: &mut Reader) -> Result<Message, String> {
+    let message = object(text)?;
     let get = |key: &str| field(&message, key);
-    let stamp = reader.stamp(get(&reader.stream().time))?;
+    let stamp = match (get(&reader.stream().time), came) {
+        (Field::Nothing, Some(came)) => came,
+        (time, _) => reader.stamp(time)?,
+    };
     let values = reader.values(&get)?;
     let asset = match message.get(ASSET) {
         Some(Value::String(name)) => Some(name.clone()),
@@ -51,6 +61,26 @@ pub fn read(text: &str, reader: &mut Reader) -> Result<Message, String> {
         values,
         strangers: message.keys().filter(is_strange).cloned().collect(),
     })
+}
+
+/// The `value` of an object, and its time.
+///
+/// # Errors
+/// It is none.
+pub fn value(text: &str, time: &str) -> Result<(Field, Field), String> {
+    let wrong = || format!("expected a number, or an object with \"{VALUE}\"");
+    let message = object(text).map_err(|_| wrong())?;
+    match message.contains_key(VALUE) {
+        true => Ok((field(&message, VALUE), field(&message, time))),
+        false => Err(wrong()),
+    }
+}
+
+fn object(text: &str) -> Result<Map<String, Value>, String> {
+    match serde_json::from_str(text).map_err(|e| format!("no JSON: {e}"))? {
+        Value::Object(object) => Ok(object),
+        _ => Err("expected a JSON object".to_owned()),
+    }
 }
 
 fn field(message: &Map<String, Value>, key: &str) -> Field {

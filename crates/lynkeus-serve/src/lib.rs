@@ -3,7 +3,8 @@
 //! A message ([`json`], [`influx`]) is a row of one asset. An [`Engine`] writes the rows of a batch to its
 //! `state`, takes them to the estimators of their assets, and answers each with lines: the estimate at the row, and
 //! corrections of what was told before where a row came late. What it answered is on the disk, so that it goes on
-//! after `kill -9` as if nothing had been. [`stdio`] is the loop between standard input and output.
+//! after `kill -9` as if nothing had been. [`stdio`] is the loop between standard input and output,
+//! [`mqtt`] the one between topics of a broker.
 //!
 //! It knows studies as [`Stream`](lynkeus::stream::Stream) has them, and no family, plant or file of one.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
@@ -18,6 +19,8 @@ mod history;
 pub mod http;
 pub mod influx;
 pub mod json;
+pub mod mqtt;
+mod parquet;
 mod row;
 mod sensor;
 mod state;
@@ -26,6 +29,6 @@ pub mod stdio;
 pub use asset::Line;
 pub use assets::{Named, assets};
 pub use board::{Board, Heard};
-pub use engine::{Arrival, Engine};
+pub use engine::{Answer, Arrival, Engine, Refusal};
 pub use row::{Reader, Stamp};
 pub use stdio::{Format, serve};

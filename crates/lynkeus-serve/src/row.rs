@@ -1,5 +1,6 @@
 //! A row: when it was sampled, and what each channel reads.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use lynkeus::expr::Evaluator;
@@ -7,6 +8,9 @@ use lynkeus::stream::{Given, Stream};
 use lynkeus::table::{Instant, exact};
 
 use crate::bytes::{Parser, Writer};
+
+/// Names that nobody reads of which the user hears.
+const STRANGERS: usize = 16;
 
 /// When a row was sampled, as it says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +22,16 @@ pub enum Stamp {
 }
 
 impl Stamp {
+    /// Whether it is earlier; of a number and a date nobody knows.
+    #[must_use]
+    pub fn is_before(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Number(own), Self::Number(other)) => own < other,
+            (Self::Date(own), Self::Date(other)) => own.nanoseconds() < other.nanoseconds(),
+            _ => false,
+        }
+    }
+
     pub(crate) fn save(self, to: &mut Writer) {
         match self {
             Self::Number(t) => {
@@ -76,6 +90,8 @@ pub struct Reader {
     evaluators: Vec<Option<Evaluator>>,
     /// every name that a message of this study may have
     known: Vec<String>,
+    /// names that nobody reads, as far as they were told
+    strangers: BTreeSet<String>,
 }
 
 impl Reader {
@@ -98,6 +114,7 @@ impl Reader {
         Self {
             evaluators,
             known,
+            strangers: BTreeSet::new(),
             stream,
         }
     }
@@ -112,6 +129,22 @@ impl Reader {
     #[must_use]
     pub fn knows(&self, name: &str) -> bool {
         self.known.iter().any(|known| known == name)
+    }
+
+    /// The names that a message of this study may have, but for its time.
+    pub fn columns(&self) -> impl Iterator<Item = &str> {
+        self.known.iter().skip(1).map(String::as_str)
+    }
+
+    /// Those of some names that nobody reads which the user has not heard of; not more than a few of all.
+    pub fn strange(&mut self, names: Vec<String>) -> Vec<String> {
+        let mut news = vec![];
+        for name in names {
+            if self.strangers.len() < STRANGERS && self.strangers.insert(name.clone()) {
+                news.push(name);
+            }
+        }
+        news
     }
 
     /// The values of the channels of a message: NaN where there is none.

@@ -1,18 +1,21 @@
-//! The file in which a service keeps its state: a snapshot, then the rows since, each batch before it is answered.
+//! The file in which a service keeps its state: a snapshot, and the rows since, each batch before it is answered.
 //!
 //! It is only ever appended to, or written anew beside itself and renamed. A record that a kill or a full disk cut short
-//! is left out when the file is read: it was not answered.
+//! is left out when the file is read: it was not answered. Rows go on while it is written anew, asset by asset, by a
+//! thread: each asset says up to which row it is, and the rows since the first one stand between them.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufWriter, IntoInnerError, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{self, JoinHandle};
 
 use lynkeus::Error;
 use lynkeus::run::Digest;
 
-use crate::bytes::Parser;
+use crate::bytes::{Parser, beside};
 
-const MAGIC: &[u8; 8] = b"LYNKSRV1";
+const MAGIC: &[u8; 8] = b"LYNKSRV2";
 /// Length, kind and checksum before each record.
 const HEAD: usize = 24;
 /// Rows since the snapshot take at least so many bytes before it is written anew.
@@ -23,10 +26,12 @@ const TIMES: u64 = 4;
 /// What a record holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// all assets
-    Snapshot,
-    /// rows since
+    /// all assets are there: what else there is to know
+    End,
+    /// rows
     Rows,
+    /// an asset
+    Asset,
 }
 
 /// A record: what it holds, and its bytes.
@@ -41,8 +46,28 @@ pub(crate) struct State {
     length: u64,
     /// at which it is written anew
     due: u64,
+    /// under way
+    renewal: Option<Renewal>,
     /// nobody else has it while this is open
     _lock: File,
+}
+
+/// The file as it is written anew, beside the one that is there.
+#[derive(Debug)]
+struct Renewal {
+    /// to the thread that writes it; none once all is there
+    to: Option<Sender<Piece>>,
+    worker: JoinHandle<io::Result<(File, u64)>>,
+    /// rows since all was there
+    rest: Vec<u8>,
+}
+
+/// What goes into it.
+#[derive(Debug)]
+enum Piece {
+    Record(Vec<u8>),
+    /// of another file, which has to be on the disk before
+    Other(File),
 }
 
 impl State {
@@ -75,6 +100,7 @@ impl State {
             file,
             length: bytes.len() as u64,
             due: LONG,
+            renewal: None,
             _lock: lock,
         };
         Ok((state, bytes))
@@ -115,6 +141,7 @@ impl State {
         match done.and_then(|()| self.file.sync_data()) {
             Ok(()) => {
                 self.length += framed.len() as u64;
+                self.pass_on(framed);
                 Ok(())
             }
             Err(error) => {
@@ -127,31 +154,92 @@ impl State {
 
     /// Whether it is time to write it anew.
     pub fn is_due(&self) -> bool {
-        self.length >= self.due
+        self.length >= self.due && self.renewal.is_none()
     }
 
-    /// It could not be written anew: later.
-    pub fn put_off(&mut self) {
-        self.due = self.length + LONG;
+    /// Begins to write it anew.
+    pub fn renew(&mut self) {
+        let (to, pieces) = channel();
+        let new = beside(&self.path, ".new");
+        self.renewal = Some(Renewal {
+            to: Some(to),
+            worker: thread::spawn(move || written(&new, &pieces)),
+            rest: vec![],
+        });
     }
 
-    /// Writes it anew beside itself, with this snapshot alone, and puts that in its place.
+    /// Adds an asset.
+    pub fn add(&mut self, asset: &[u8]) {
+        self.pass_on(framed(Kind::Asset, asset));
+    }
+
+    /// All assets are there; the other file has to be on the disk as it is now.
+    pub fn complete(&mut self, end: &[u8], other: Option<File>) {
+        if let Some(Renewal { to: Some(to), .. }) = &self.renewal
+            && let Some(other) = other
+        {
+            // a thread that ended says why
+            let _ = to.send(Piece::Other(other));
+        }
+        self.pass_on(framed(Kind::End, end));
+        if let Some(renewal) = &mut self.renewal {
+            renewal.to = None;
+        }
+    }
+
+    fn pass_on(&mut self, framed: Vec<u8>) {
+        match &mut self.renewal {
+            Some(Renewal { to: Some(to), .. }) => {
+                // a thread that ended says why
+                let _ = to.send(Piece::Record(framed));
+            }
+            Some(Renewal { rest, .. }) => rest.extend_from_slice(&framed),
+            None => {}
+        }
+    }
+
+    /// Puts the new file in the place of the old one, if it is written by now; whether it did.
     ///
     /// # Errors
-    /// The disk is full, or failed: the file is as it was.
-    pub fn renew(&mut self, snapshot: &[u8]) -> io::Result<()> {
+    /// The disk is full, or failed: the file is as it was, and grows for a while.
+    pub fn settle(&mut self) -> io::Result<bool> {
+        match &self.renewal {
+            Some(renewal) if renewal.worker.is_finished() => self.wait(),
+            _ => Ok(false),
+        }
+    }
+
+    /// It is time to write it anew, whatever there is in it.
+    pub fn make_due(&mut self) {
+        self.due = 0;
+    }
+
+    /// The same, once it is written.
+    ///
+    /// # Errors
+    /// As [`settle`](Self::settle).
+    pub fn wait(&mut self) -> io::Result<bool> {
+        let Some(Renewal { worker, rest, .. }) = self.renewal.take() else {
+            return Ok(false);
+        };
         let new = beside(&self.path, ".new");
-        let done = written(&new, snapshot).and_then(|made| {
+        let failed = |_| Err(io::Error::other("the thread that writes it failed"));
+        let done = worker.join().unwrap_or_else(failed);
+        let done = done.and_then(|(mut file, length)| {
+            file.write_all(&rest)?;
+            file.sync_data()?;
             std::fs::rename(&new, &self.path)?;
-            Ok(made)
+            Ok((file, length + rest.len() as u64))
         });
         match done {
             Ok((file, length)) => {
+                name_lasts(&self.path);
                 (self.file, self.length) = (file, length);
                 self.due = length + LONG.max(TIMES * length);
-                Ok(())
+                Ok(true)
             }
             Err(error) => {
+                self.due = self.length + LONG;
                 // it may never have been made
                 let _ = std::fs::remove_file(&new);
                 Err(error)
@@ -170,37 +258,38 @@ impl State {
     }
 }
 
-/// A new file with a snapshot, on the disk, and its length.
-fn written(path: &Path, snapshot: &[u8]) -> io::Result<(File, u64)> {
-    let framed = framed(Kind::Snapshot, snapshot);
+/// A new file with all pieces, on the disk, and its length.
+fn written(path: &Path, pieces: &Receiver<Piece>) -> io::Result<(File, u64)> {
     let mut options = OpenOptions::new();
-    let mut file = options
+    let file = options
         .read(true)
         .write(true)
         .create(true)
         .truncate(true)
         .open(path)?;
-    file.write_all(MAGIC)?;
-    file.write_all(&framed)?;
-    file.sync_all()?;
-    // the name is to last, too; not every system has folders that can be opened
-    if let Some(folder) = path.parent().map(|f| {
-        if f.as_os_str().is_empty() {
-            Path::new(".")
-        } else {
-            f
+    let mut to = BufWriter::new(file);
+    to.write_all(MAGIC)?;
+    let mut length = MAGIC.len();
+    for piece in pieces {
+        match piece {
+            Piece::Record(framed) => {
+                to.write_all(&framed)?;
+                length += framed.len();
+            }
+            Piece::Other(file) => file.sync_data()?,
         }
-    }) && let Ok(folder) = File::open(folder)
-    {
-        let _ = folder.sync_all();
     }
-    Ok((file, (MAGIC.len() + framed.len()) as u64))
+    let file = to.into_inner().map_err(IntoInnerError::into_error)?;
+    file.sync_all()?;
+    Ok((file, length as u64))
 }
 
-fn beside(path: &Path, ending: &str) -> PathBuf {
-    let mut name = path.to_owned().into_os_string();
-    name.push(ending);
-    PathBuf::from(name)
+/// The name of a file is to last, too; not every system has folders that can be opened.
+fn name_lasts(path: &Path) {
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
+    if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
+        let _ = folder.sync_all();
+    }
 }
 
 fn framed(kind: Kind, record: &[u8]) -> Vec<u8> {
@@ -217,8 +306,9 @@ fn record(bytes: &[u8]) -> Option<(Record<'_>, &[u8])> {
     let mut head = Parser(bytes);
     let length = usize::try_from(head.word()?).ok()?;
     let kind = match head.word()? {
-        0 => Kind::Snapshot,
+        0 => Kind::End,
         1 => Kind::Rows,
+        2 => Kind::Asset,
         _ => return None,
     };
     let sum = head.word()?;
@@ -244,7 +334,10 @@ mod tests {
         let path = folder.path().join("a.state");
         let (mut state, bytes) = State::open(&path).unwrap();
         assert!(bytes.is_empty());
-        state.renew(b"all").unwrap();
+        state.renew();
+        state.add(b"all");
+        state.complete(b"end", None);
+        state.wait().unwrap();
         state.append(b"first").unwrap();
         state.append(b"second row").unwrap();
         drop(state);
@@ -253,16 +346,56 @@ mod tests {
             let records = State::records(&path, bytes).unwrap();
             records.into_iter().map(|(_, r)| r.to_vec()).collect()
         };
-        assert_eq!(kinds(&whole), [&b"all"[..], b"first", b"second row"]);
+        assert_eq!(
+            kinds(&whole),
+            [&b"all"[..], b"end", b"first", b"second row"]
+        );
         let last = whole.len() - HEAD - b"second row".len();
         for length in last..whole.len() {
-            assert_eq!(kinds(&whole[..length]).len(), 2);
+            assert_eq!(kinds(&whole[..length]).len(), 3);
         }
         for bit in 8 * last..8 * whole.len() {
             let mut flipped = whole.clone();
             flipped[bit / 8] ^= 1 << (bit % 8);
-            assert_eq!(kinds(&flipped).len(), 2, "bit {bit}");
+            assert_eq!(kinds(&flipped).len(), 3, "bit {bit}");
         }
+    }
+
+    /// Rows that come while it is written anew are in the old file and in the new one.
+    #[test]
+    fn rows_go_on_while_it_is_written_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.state");
+        let (mut state, _) = State::open(&path).unwrap();
+        state.renew();
+        state.complete(b"nothing", None);
+        state.wait().unwrap();
+        let records = || {
+            let bytes = std::fs::read(&path).unwrap();
+            let records = State::records(&path, &bytes).unwrap();
+            let all = records.into_iter().map(|(_, r)| r.to_vec());
+            String::from_utf8(all.collect::<Vec<_>>().join(&b' ')).unwrap()
+        };
+        state.append(b"1").unwrap();
+        state.renew();
+        state.add(b"one");
+        state.append(b"2").unwrap();
+        state.add(b"two");
+        state.complete(b"end", Some(File::open(&path).unwrap()));
+        state.append(b"3").unwrap();
+        assert_eq!(records(), "nothing 1 2 3");
+        state.wait().unwrap();
+        assert_eq!(records(), "one 2 two end 3");
+        state.append(b"4").unwrap();
+        assert_eq!(records(), "one 2 two end 3 4");
+        // there is no folder any more in which to write it anew
+        let elsewhere = folder.path().join("moved");
+        state.path = elsewhere.join("a.state");
+        state.renew();
+        state.complete(b"end", None);
+        assert!(state.wait().is_err());
+        state.append(b"5").unwrap();
+        assert_eq!(records(), "one 2 two end 3 4 5");
     }
 
     #[test]

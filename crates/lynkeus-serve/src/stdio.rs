@@ -1,6 +1,5 @@
 //! Between standard input and output: each line that comes is answered, in order.
 
-use std::collections::BTreeSet;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
@@ -11,15 +10,13 @@ use lynkeus::Error;
 use crate::board::Board;
 use crate::engine::{Answer, Arrival, BATCH, Engine};
 use crate::influx;
-use crate::json::{self, Message};
+use crate::json;
 use crate::row::{Reader, Stamp};
 
 /// Bytes of a line, at most.
 const LONGEST: usize = 64 << 10;
 /// How often it is looked whether somebody asks to stop.
 const LOOK: Duration = Duration::from_millis(50);
-/// Names that nobody reads of which the user hears.
-const STRANGERS: usize = 16;
 
 /// What messages are written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,8 +65,6 @@ struct Service<'s> {
     format: Format,
     /// whether messages say whose rows they are
     has_assets: bool,
-    /// names that nobody reads, as far as they were told
-    strangers: BTreeSet<String>,
     /// those who look
     board: Option<&'s Board>,
     /// lines so far
@@ -94,12 +89,11 @@ pub fn serve(
     // it ends with the input, or with the program
     thread::spawn(move || lines(input, &sender));
     let mut service = Service {
-        has_assets: engine.place("").is_none(),
+        has_assets: engine.has_names(),
         engine,
         reader,
         format,
         board,
-        strangers: BTreeSet::new(),
         count: 0,
         tell,
     };
@@ -262,39 +256,19 @@ impl Service<'_> {
         match read {
             Err(why) => Asked::Refused(why, passed),
             Ok((None, _)) => Asked::Passed(passed),
-            Ok((Some(message), asker)) => match self.arrival(message) {
-                Err(why) => Asked::Refused(why, passed),
-                Ok(arrival) => {
-                    rows.push(arrival);
-                    Asked::Row(rows.len() - 1, asker)
+            Ok((Some(mut message), asker)) => {
+                for stranger in self.reader.strange(std::mem::take(&mut message.strangers)) {
+                    (self.tell)(&format!("\"{stranger}\" of a message is read by nobody"));
                 }
-            },
-        }
-    }
-
-    /// The row of a message.
-    fn arrival(&mut self, message: Message) -> Result<Arrival, String> {
-        for stranger in message.strangers {
-            if self.strangers.len() < STRANGERS && !self.strangers.contains(&stranger) {
-                (self.tell)(&format!("\"{stranger}\" of a message is read by nobody"));
-                self.strangers.insert(stranger);
+                match self.engine.arrival(&message) {
+                    Err(why) => Asked::Refused(why, passed),
+                    Ok(arrival) => {
+                        rows.push(arrival);
+                        Asked::Row(rows.len() - 1, asker)
+                    }
+                }
             }
         }
-        let asset = match (self.has_assets, message.asset) {
-            (false, _) => Some(0),
-            (true, Some(name)) => match self.engine.place(&name) {
-                Some(place) => Some(place),
-                None => return Err(format!("no asset is called \"{name}\"")),
-            },
-            (true, None) => None,
-        };
-        Ok(Arrival {
-            asset: asset.ok_or_else(|| {
-                format!("expected the name of an asset under \"{}\"", json::ASSET)
-            })?,
-            stamp: message.stamp,
-            values: message.values,
-        })
     }
 
     fn write(&mut self, answer: Answer, (stamp, asker): (Stamp, &Asker), to: &mut String) {
@@ -305,7 +279,7 @@ impl Service<'_> {
                     Asker::Json { .. } => "",
                     Asker::Influx { text, .. } => text,
                 };
-                return self.refuse(&why, text, to);
+                return self.refuse(&why.to_string(), text, to);
             }
         };
         let stream = self.reader.stream();

@@ -616,7 +616,7 @@ pub(super) const ESTIMATE: [KeySpec; 12] = [
 ];
 
 /// `[serve]`
-pub(super) const SERVE: [KeySpec; 7] = [
+pub(super) const SERVE: [KeySpec; 8] = [
     KeySpec {
         name: "wait",
         shape: Shape::NotNegative,
@@ -636,7 +636,7 @@ pub(super) const SERVE: [KeySpec; 7] = [
             &Shape::Text,
         ),
         default: "none",
-        meaning: "CSV files of what was told, one for each day: `\"tank-%Y-%m-%d.csv\"`",
+        meaning: "CSV or Parquet files of what was told, one for each day: `\"tank-%Y-%m-%d.csv\"`",
     },
     KeySpec {
         name: "keep_days",
@@ -661,5 +661,105 @@ pub(super) const SERVE: [KeySpec; 7] = [
         shape: Shape::Text,
         default: "none: this machine alone may look",
         meaning: "what a request has to say, as `Authorization: Bearer …` or `?token=…`",
+    },
+    KeySpec {
+        name: "mqtt",
+        shape: Shape::Section(&[&MQTT]),
+        default: "none",
+        meaning: "the MQTT broker from which rows come and to which estimates go ([serve](serve.md#mqtt))",
+    },
+];
+
+/// `mqtt` in `[serve]`
+pub(super) const MQTT: [KeySpec; 14] = [
+    KeySpec {
+        name: "url",
+        shape: Shape::Text,
+        default: REQUIRED,
+        meaning: "where the broker is: `\"mqtt://host:1883\"`, or `\"mqtts://host:8883\"` for an encrypted connection",
+    },
+    KeySpec {
+        name: "version",
+        shape: Shape::Word(&["3.1.1", "5"]),
+        default: "`\"3.1.1\"`",
+        meaning: "the version of MQTT that is spoken",
+    },
+    KeySpec {
+        name: "user",
+        shape: Shape::Text,
+        default: "none",
+        meaning: "who this is to the broker",
+    },
+    KeySpec {
+        name: "password",
+        shape: Shape::Text,
+        default: "the variable `LYNKEUS_MQTT_PASSWORD` of the environment, if there is one",
+        meaning: "the user's password",
+    },
+    KeySpec {
+        name: "ca",
+        shape: Shape::As("path, from the study's folder", &Shape::Text),
+        default: "those whom the system trusts",
+        meaning: "PEM file of the certificates that vouch for the broker's",
+    },
+    KeySpec {
+        name: "cert",
+        shape: Shape::As("path, from the study's folder", &Shape::Text),
+        default: "none",
+        meaning: "PEM file of this client's certificate, where the broker asks for one",
+    },
+    KeySpec {
+        name: "key",
+        shape: Shape::As("path, from the study's folder", &Shape::Text),
+        default: "none",
+        meaning: "PEM file of the private key of `cert`",
+    },
+    KeySpec {
+        name: "client",
+        shape: Shape::Text,
+        default: "`lynkeus-` and the name of the study's file",
+        meaning: "by this name the broker knows the service again; two with one name end each other's connection",
+    },
+    KeySpec {
+        name: "topics",
+        shape: Shape::As("table: column = topic", &Shape::Table(&Shape::Text)),
+        default: "none",
+        meaning: "the topics of single values, by the names that columns have in a log. With `assets` a level `{asset}` of a topic is the asset's name",
+    },
+    KeySpec {
+        name: "rows",
+        shape: Shape::As("topic", &Shape::Text),
+        default: "none",
+        meaning: "the topic of whole rows as JSON objects",
+    },
+    KeySpec {
+        name: "publish",
+        shape: Shape::As("topic", &Shape::Text),
+        default: "none: nothing is published",
+        meaning: "the topic of the estimates, a JSON object for each line; `{asset}` in it is the asset's name",
+    },
+    KeySpec {
+        name: "status",
+        shape: Shape::As("topic", &Shape::Text),
+        default: "none",
+        meaning: "the topic that holds `online` as long as the service is connected, and `offline` after it (a last will)",
+    },
+    KeySpec {
+        name: "qos",
+        shape: Shape::As(
+            "0, 1",
+            &Shape::Between {
+                least: 0.0,
+                most: 1.0,
+            },
+        ),
+        default: "1",
+        meaning: "whether messages are acknowledged, and sent again until they are (1), or not (0)",
+    },
+    KeySpec {
+        name: "retain",
+        shape: Shape::Flag,
+        default: "false",
+        meaning: "whether the broker keeps the last estimate for those who subscribe later",
     },
 ];

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::Name;
-use super::keys::SERVE;
+use super::keys::{MQTT, SERVE};
 use super::section::Entry;
 use lynkeus_answer::Error;
 
@@ -24,13 +24,60 @@ pub struct ServeSettings {
     pub http: Option<Name>,
     /// What those who look have to say.
     pub token: Option<Name>,
+    /// The broker from which rows come, and to which estimates go.
+    pub mqtt: Option<MqttSettings>,
+}
+
+/// A broker, and what is read and published there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MqttSettings {
+    /// Where it is: `mqtt://host:port`, `mqtts://host:port`.
+    pub url: Name,
+    /// What is spoken.
+    pub version: MqttVersion,
+    /// Who this is.
+    pub user: Option<Name>,
+    /// What the broker asks for beside it.
+    pub password: Option<Name>,
+    /// Certificates of those who vouch for the broker; `None`: whom the system trusts.
+    pub ca: Option<PathBuf>,
+    /// The certificate of this client.
+    pub cert: Option<PathBuf>,
+    /// The private key of that.
+    pub key: Option<PathBuf>,
+    /// The name of this client.
+    pub client: Option<Name>,
+    /// By column of a row, the topic of its values.
+    pub topics: Vec<(Name, Name)>,
+    /// The topic of whole rows.
+    pub rows: Option<Name>,
+    /// The topic of the estimates.
+    pub publish: Option<Name>,
+    /// The topic that says whether the service is there.
+    pub status: Option<Name>,
+    /// Whether messages are acknowledged (1) or not (0).
+    pub qos: u8,
+    /// Whether the broker keeps the last estimate for those who subscribe.
+    pub retain: bool,
+}
+
+/// A version of MQTT.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MqttVersion {
+    /// 3.1.1
+    #[default]
+    V3,
+    /// 5
+    V5,
 }
 
 impl ServeSettings {
     /// Files of a study are named from its folder.
     pub(super) fn beside(&mut self, folder: &Path) {
         let paths = [&mut self.state, &mut self.history, &mut self.assets];
-        for path in paths.into_iter().flatten() {
+        let mqtt = self.mqtt.iter_mut();
+        let mqtt = mqtt.flat_map(|mqtt| [&mut mqtt.ca, &mut mqtt.cert, &mut mqtt.key]);
+        for path in paths.into_iter().chain(mqtt).flatten() {
             *path = folder.join(&*path);
         }
     }
@@ -46,7 +93,53 @@ pub(super) fn read(entry: Entry<'_>) -> Result<ServeSettings, Error> {
         assets: section.optional("assets", path)?,
         http: section.optional("http", Entry::name)?,
         token: section.optional("token", Entry::name)?,
+        mqtt: section.optional("mqtt", mqtt)?,
     })
+}
+
+fn mqtt(entry: Entry<'_>) -> Result<MqttSettings, Error> {
+    let refusal = entry.refuse_key("needs `url`, such as \"mqtt://localhost:1883\"");
+    let halves = entry.refuse_key("needs both `cert` and `key`, or neither");
+    let mut section = entry.section("mqtt in [serve]", &MQTT)?;
+    let versions = [("3.1.1", MqttVersion::V3), ("5", MqttVersion::V5)];
+    let version = section.optional("version", |e| e.choice(&versions))?;
+    let topics = section.optional("topics", |e| {
+        let pairs = e.pairs()?.into_iter();
+        pairs
+            .map(|(column, topic)| Ok((column, topic.name()?)))
+            .collect()
+    })?;
+    let settings = MqttSettings {
+        url: section.optional("url", Entry::name)?.ok_or(refusal)?,
+        version: version.unwrap_or_default(),
+        user: section.optional("user", Entry::name)?,
+        password: section.optional("password", Entry::name)?,
+        ca: section.optional("ca", path)?,
+        cert: section.optional("cert", path)?,
+        key: section.optional("key", path)?,
+        client: section.optional("client", Entry::name)?,
+        topics: topics.unwrap_or_default(),
+        rows: section.optional("rows", Entry::name)?,
+        publish: section.optional("publish", Entry::name)?,
+        status: section.optional("status", Entry::name)?,
+        qos: section.optional("qos", quality)?.unwrap_or(1),
+        retain: section.optional("retain", Entry::boolean)?.unwrap_or(false),
+    };
+    match settings.cert.is_some() == settings.key.is_some() {
+        true => Ok(settings),
+        false => Err(halves),
+    }
+}
+
+/// A quality of service.
+fn quality(entry: Entry<'_>) -> Result<u8, Error> {
+    let refusal =
+        entry.wrong("0 or 1 (a row that comes twice counts once, so that 2 gives nothing more)");
+    match entry.whole(0) {
+        Ok(0) => Ok(0),
+        Ok(1) => Ok(1),
+        _ => Err(refusal),
+    }
 }
 
 /// A time to wait.
@@ -61,11 +154,12 @@ fn path(entry: Entry<'_>) -> Result<PathBuf, Error> {
 
 /// The path of a file for each day.
 fn history(entry: Entry<'_>) -> Result<PathBuf, Error> {
-    let refusal = entry.wrong("the path of a CSV file with %Y, %m and %d: \"tank-%Y-%m-%d.csv\"");
+    let refusal =
+        entry.wrong("the path of a CSV or Parquet file with %Y, %m and %d: \"tank-%Y-%m-%d.csv\"");
     let name = entry.name()?.text;
     let is_whole = ["%Y", "%m", "%d"].iter().all(|part| name.contains(part));
-    let is_csv = name.ends_with(".csv");
-    (is_whole && is_csv)
+    let is_known = name.ends_with(".csv") || name.ends_with(".parquet");
+    (is_whole && is_known)
         .then(|| PathBuf::from(name))
         .ok_or(refusal)
 }

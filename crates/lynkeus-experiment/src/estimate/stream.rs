@@ -160,18 +160,24 @@ impl Stream {
         })
     }
 
+    /// What a first row lacks: known inputs, and sensors at whose first reading the estimate starts.
+    #[must_use]
+    pub fn lacking(&self, row: &[f64]) -> Vec<&str> {
+        let is_missing = |place: &usize| !row.get(*place).is_some_and(|y| y.is_finite());
+        let inputs = self.late.sensors()..self.channels.len();
+        let needed = self.starts.iter().copied().chain(inputs);
+        needed
+            .filter(is_missing)
+            .filter_map(|place| Some(self.channels.get(place)?.name.as_str()))
+            .collect()
+    }
+
     /// The estimator, waiting for its first row, which is this one.
     ///
     /// # Errors
     /// It starts at the first reading of a channel that the row does not have, or needs the first value of an input.
     pub fn begin(&self, row: &[f64]) -> Result<Late, Error> {
-        let is_missing = |place: &usize| !row.get(*place).is_some_and(|y| y.is_finite());
-        let inputs = self.late.sensors()..self.channels.len();
-        let needed = self.starts.iter().copied().chain(inputs);
-        let lacking: Vec<&str> = needed
-            .filter(is_missing)
-            .filter_map(|place| Some(self.channels.get(place)?.name.as_str()))
-            .collect();
+        let lacking = self.lacking(row);
         if !lacking.is_empty() {
             return Err(Error::input(format!(
                 "the first row needs {}: the estimate starts there",

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::*;
 use crate::keys::{
-    CERTIFY, COMPARE, ESTIMATE, FIT, GENERATOR, INTEGRATOR, KEYS, LOG, MANIFOLD, PLOT, SENSORS,
-    SERVE, SIMULATE, TUNE,
+    CERTIFY, COMPARE, ESTIMATE, FIT, GENERATOR, INTEGRATOR, KEYS, LOG, MANIFOLD, MQTT, PLOT,
+    SENSORS, SERVE, SIMULATE, TUNE,
 };
 
 const HEADER: &str = "| key | type | default | meaning |\n|---|---|---|---|\n";
@@ -61,7 +61,7 @@ fn the_schema_is_the_committed_one() {
 fn the_page_of_studies_shows_the_keys() {
     let path = document("study.md");
     let mut page = fs::read_to_string(&path).unwrap();
-    let tables: [(&str, &[KeySpec]); 15] = [
+    let tables: [(&str, &[KeySpec]); 16] = [
         ("\n## Top level\n", &KEYS),
         ("\n## `[sensors]`\n", &SENSORS),
         ("\n## `[manifold]`\n", &MANIFOLD),
@@ -76,6 +76,7 @@ fn the_page_of_studies_shows_the_keys() {
         ("\n## `[fit]`\n", &FIT),
         ("\n## `[compare]`\n", &COMPARE),
         ("\n## `[serve]`\n", &SERVE),
+        ("\n### A broker\n", &MQTT),
         ("\n## `[plot]`\n", &PLOT),
     ];
     for (heading, keys) in tables {

@@ -1,69 +1,11 @@
-// Opens a page in a headless browser, without any other tool than Node: the browser's own protocol over
-// pipes. Prints what was seen as JSON. Arguments: the browser, a folder for its own files, the page, and a folder
+// Opens a page in a headless browser. Prints what was seen as JSON. Arguments: the browser, a folder for its own files, the page, and a folder
 // for screenshots, if wanted.
-import { spawn } from "node:child_process";
-import { once } from "node:events";
-import { writeFileSync } from "node:fs";
 import { join, resolve } from "node:path";
 import { pathToFileURL } from "node:url";
 
+import { call, close, open, seen, shot, value } from "./driver.mjs";
+
 const [browser, profile, page, shots] = process.argv.slice(2);
-const options = ["--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--hide-scrollbars", "--disable-dev-shm-usage"];
-const child = spawn(browser, [...options, "--remote-debugging-pipe", `--user-data-dir=${profile}`, "about:blank"], {
-    stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"],
-});
-const seen = { requests: [], complaints: [] };
-const waiting = new Map();
-let count = 0;
-let rest = "";
-
-function heard(message) {
-    if (waiting.has(message.id)) {
-        waiting.get(message.id)(message);
-        waiting.delete(message.id);
-    }
-    const { method, params } = message;
-    if (method === "Network.requestWillBeSent" || method === "Network.webSocketCreated") {
-        seen.requests.push((params.request ?? params).url);
-    }
-    if (method === "Runtime.exceptionThrown") {
-        seen.complaints.push(params.exceptionDetails.exception?.description ?? params.exceptionDetails.text);
-    }
-    if (method === "Runtime.consoleAPICalled" && params.type !== "log") {
-        seen.complaints.push(params.args.map((a) => a.value ?? a.description).join(" "));
-    }
-    if (method === "Log.entryAdded" && params.entry.level !== "verbose") {
-        seen.complaints.push(params.entry.text);
-    }
-}
-
-child.stdio[4].setEncoding("utf8");
-child.stdio[4].on("data", (text) => {
-    const messages = (rest + text).split("\0");
-    rest = messages.pop();
-    messages.forEach((message) => heard(JSON.parse(message)));
-});
-
-let session;
-async function call(method, params = {}) {
-    count += 1;
-    const id = count;
-    const answer = new Promise((done) => waiting.set(id, done));
-    child.stdio[3].write(`${JSON.stringify({ id, method, params, sessionId: session })}\0`);
-    const { result, error } = await answer;
-    if (error) {
-        throw new Error(`${method}: ${error.message}`);
-    }
-    return result;
-}
-
-async function value(expression) {
-    const answer = await call("Runtime.evaluate", { expression, awaitPromise: true, returnByValue: true });
-    if (answer.exceptionDetails) {
-        throw new Error(answer.exceptionDetails.exception.description);
-    }
-    return answer.result.value;
-}
 
 async function ready() {
     for (let tries = 0; tries < 600; tries += 1) {
@@ -84,17 +26,10 @@ async function move(id, position) {
     await ready();
 }
 
-async function shot(name, width, scheme, height = 900) {
-    if (!shots) {
-        return;
+async function picture(name, width, scheme, height) {
+    if (shots) {
+        await shot(join(shots, `${name}.png`), width, scheme, height);
     }
-    await call("Emulation.setEmulatedMedia", { features: [{ name: "prefers-color-scheme", value: scheme }] });
-    await call("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor: 1, mobile: width < 600 });
-    await new Promise((done) => setTimeout(done, 400));
-    const { cssContentSize } = await call("Page.getLayoutMetrics");
-    const clip = { x: 0, y: 0, width, height: Math.min(cssContentSize.height, 6000), scale: 1 };
-    const { data } = await call("Page.captureScreenshot", { clip, captureBeyondViewport: true });
-    writeFileSync(join(shots, `${name}.png`), Buffer.from(data, "base64"));
 }
 
 // The last series of every chart is the estimate.
@@ -115,14 +50,7 @@ const ROW = `[...document.querySelectorAll("#tradeoff .wide tbody tr")].flatMap(
 const PICTURE = "compromises[0]?.ctx.canvas.toDataURL()";
 
 try {
-    const { targetInfos } = await call("Target.getTargets");
-    const { targetId } = targetInfos.find((target) => target.type === "page");
-    ({ sessionId: session } = await call("Target.attachToTarget", { targetId, flatten: true }));
-    for (const domain of ["Page", "Runtime", "Network", "Log"]) {
-        await call(`${domain}.enable`);
-    }
-    await call("Emulation.setDeviceMetricsOverride", { width: 1280, height: 900, deviceScaleFactor: 1, mobile: false });
-    await call("Page.navigate", { url: pathToFileURL(resolve(page)).href });
+    await open(browser, profile, pathToFileURL(resolve(page)).href);
     await ready();
     seen.title = await value("document.title");
     seen.painted = await value(paintedOf("charts.map(({ plot }) => plot)"));
@@ -132,19 +60,19 @@ try {
     seen.first = await value(CURVES);
     seen.last = await value("charts.map(({ plot }) => plot.series.findLast((series) => series.show).label)");
     seen.status = await value(`document.getElementById("status")?.textContent`);
-    await shot("light", 1280, "light");
+    await picture("light", 1280, "light");
     seen.all = await value("charts.every(({ plot }) => plot.scales.x.min === data.time[0] && plot.scales.x.max === data.time[data.time.length - 1])");
     if (await value(`document.getElementById("knob") !== null`)) {
         await move("knob", 0);
         seen.slow = await value(CURVES);
         Object.assign(seen.row, { slow: await value(ROW), slow_picture: await value(PICTURE) });
-        await shot("moved", 1280, "dark");
+        await picture("moved", 1280, "dark");
         await move("knob", await value("data.knob.own"));
     }
     if (await value(`document.getElementById("noise") !== null`)) {
         await move("noise", 20);
         seen.noisy = await value(CURVES);
-        await shot("noisy", 1280, "light");
+        await picture("noisy", 1280, "light");
         await move("noise", 0);
         seen.back = await value(CURVES);
     }
@@ -155,12 +83,10 @@ try {
     await new Promise((done) => setTimeout(done, 300));
     seen.width = await value("document.documentElement.scrollWidth");
     await value("whole()");
-    await shot("phone", 390, "dark", 844);
+    await picture("phone", 390, "dark", 844);
 } catch (error) {
     seen.failed = error.stack;
 } finally {
-    const gone = once(child, "exit");
-    child.stdio[3].write(`${JSON.stringify({ id: 0, method: "Browser.close" })}\0`);
-    await gone;
+    await close();
 }
 process.stdout.write(JSON.stringify(seen), () => process.exit(0));

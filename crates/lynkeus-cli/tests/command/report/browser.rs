@@ -9,19 +9,25 @@ use super::{data, example, page};
 use crate::export::has;
 use crate::{Folder, skipped};
 
-/// The browser to look at pages with.
-fn browser() -> Option<&'static str> {
+/// How a browser is asked.
+pub(crate) const DRIVER: &str = include_str!("driver.mjs");
+
+/// The browser to look at pages with, by Node.
+pub(crate) fn browser() -> Option<&'static str> {
     let known = ["chromium", "chromium-browser", "google-chrome", "chrome"];
-    known.into_iter().find(|browser| has(browser))
+    let found = known.into_iter().find(|browser| has(browser));
+    let found = found.filter(|_| has("node"));
+    if found.is_none() {
+        skipped("no browser (chromium) or no node");
+    }
+    found
 }
 
 /// What a browser makes of the page of a folder; none where there is none.
 pub(super) fn browsed(folder: &Folder) -> Option<Value> {
-    let Some(browser) = browser().filter(|_| has("node")) else {
-        skipped("no browser (chromium) or no node");
-        return None;
-    };
+    let browser = browser()?;
     let profile = tempfile::tempdir().unwrap();
+    folder.write("driver.mjs", DRIVER);
     folder.write("browser.mjs", include_str!("browser.mjs"));
     let mut node = Command::new("node");
     node.args(["browser.mjs", browser])

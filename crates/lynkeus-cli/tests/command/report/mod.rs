@@ -1,7 +1,7 @@
 //! `lynkeus report`: one file that asks for nothing, says what the other commands say, and whose
 //! observer gives what `estimate` gives.
 
-mod browser;
+pub(crate) mod browser;
 pub(crate) mod markup;
 mod tradeoff;
 

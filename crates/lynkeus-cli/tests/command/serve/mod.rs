@@ -1,9 +1,12 @@
 //! `serve`: what it answers equals what `estimate` makes of the same rows, whatever happens on the way.
 
+mod broker;
+mod browsed;
 mod hostile;
 mod kept;
 mod many;
 mod metrics;
+mod mqtt;
 mod order;
 mod page;
 mod process;

@@ -8,7 +8,7 @@ use super::process::Serving;
 use super::*;
 
 /// A port that is free.
-fn port() -> u16 {
+pub(super) fn port() -> u16 {
     TcpListener::bind("127.0.0.1:0")
         .unwrap()
         .local_addr()
@@ -45,7 +45,7 @@ fn body(answer: &str) -> &str {
     answer.split_once("\r\n\r\n").unwrap().1
 }
 
-fn folder_with(port: u16, more: &str) -> Folder {
+pub(super) fn folder_with(port: u16, more: &str) -> Folder {
     folder(
         "ekf",
         &format!("[estimate]\nsd = true\n[serve]\nhttp = \"127.0.0.1:{port}\"\n{more}"),

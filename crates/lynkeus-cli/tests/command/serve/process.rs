@@ -1,8 +1,9 @@
 //! A service under way: no test waits for it for ever.
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -16,17 +17,25 @@ pub(super) struct Serving {
     child: Child,
     input: Option<ChildStdin>,
     answers: Receiver<String>,
-    errors: Option<thread::JoinHandle<String>>,
+    /// what was said on standard error so far
+    said: Arc<Mutex<String>>,
+    errors: Option<thread::JoinHandle<()>>,
 }
 
 impl Serving {
-    /// Begins with `study.toml`; `before` is what a shell does first.
+    /// Begins with `study.toml` on standard input; `before` is what a shell does first.
     pub fn new(folder: &Folder, format: &str, before: &str) -> Self {
+        Self::begin(folder, &["--stdio", format], before)
+    }
+
+    /// Begins with `study.toml` and options.
+    pub fn begin(folder: &Folder, options: &[&str], before: &str) -> Self {
+        let options = options.join(" ");
         let program = env!("CARGO_BIN_EXE_lynkeus");
         let mut child = Command::new("sh")
             .args([
                 "-c",
-                &format!("{before} exec {program} serve study.toml --stdio {format}"),
+                &format!("{before} exec {program} serve study.toml {options}"),
             ])
             .current_dir(folder.path.path())
             .stdin(Stdio::piped())
@@ -43,16 +52,19 @@ impl Serving {
                 }
             }
         });
-        let mut error = child.stderr.take().unwrap();
+        let error = BufReader::new(child.stderr.take().unwrap());
+        let said = Arc::new(Mutex::new(String::new()));
+        let to = Arc::clone(&said);
         let errors = thread::spawn(move || {
-            let mut text = String::new();
-            let _ = error.read_to_string(&mut text);
-            text
+            for line in error.lines().map_while(Result::ok) {
+                *to.lock().unwrap() += &(line + "\n");
+            }
         });
         Self {
             input: child.stdin.take(),
             child,
             answers,
+            said,
             errors: Some(errors),
         }
     }
@@ -73,6 +85,24 @@ impl Serving {
             Err(RecvTimeoutError::Disconnected) => None,
             Err(RecvTimeoutError::Timeout) => panic!("no answer"),
         }
+    }
+
+    /// Waits until standard error says something.
+    pub fn wait_for(&self, words: &str) {
+        let began = Instant::now();
+        while !self.said.lock().unwrap().contains(words) {
+            let said = || self.said.lock().unwrap().clone();
+            assert!(began.elapsed() < LIMIT, "{words} is not said: {}", said());
+            thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// Asks it to end, and waits.
+    pub fn stop(self) -> Ended {
+        let id = self.child.id().to_string();
+        let asked = Command::new("kill").args(["-TERM", &id]).status();
+        assert!(asked.unwrap().success());
+        self.end()
     }
 
     /// Ends it as a power cut would.
@@ -97,7 +127,8 @@ impl Serving {
             out += &line;
             out.push('\n');
         }
-        let err = self.errors.take().unwrap().join().unwrap();
+        self.errors.take().unwrap().join().unwrap();
+        let err = self.said.lock().unwrap().clone();
         Ended { code, out, err }
     }
 }
