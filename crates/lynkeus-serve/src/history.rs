@@ -344,6 +344,7 @@ mod tests {
             revision: 2,
             notes: vec![],
             is_repeated: false,
+            innovations: vec![],
         }
     }
 

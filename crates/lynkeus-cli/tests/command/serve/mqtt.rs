@@ -374,7 +374,9 @@ fn a_broker_that_does_not_want_us_is_said() {
 /// The certificate of a broker is looked at.
 #[test]
 fn what_is_encrypted_is_trusted_by_a_certificate() {
-    let has_openssl = std::process::Command::new("openssl").arg("version").output();
+    let has_openssl = std::process::Command::new("openssl")
+        .arg("version")
+        .output();
     if !has_mosquitto() || has_openssl.is_err() {
         return;
     }
