@@ -3,6 +3,7 @@
 use std::io;
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::thread;
 
 use clap::{Args, ValueEnum};
 
@@ -79,6 +80,7 @@ pub(super) fn serve(source: &Source, options: &Options) -> Result<ExitCode, Erro
             let listening = http::listen(&address.text, token, Arc::clone(&board));
             let own = listening.map_err(|error| address.blame(error))?;
             output::note(&format!("the page is at http://{own}/"));
+            prove(study.clone(), Arc::clone(&board));
             Some(board)
         }
     };
@@ -103,4 +105,15 @@ pub(super) fn serve(source: &Source, options: &Options) -> Result<ExitCode, Erro
         (None, None) => {}
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Finds in a thread of its own what is proved of a study's observer, for the page.
+fn prove(study: Study, board: Arc<Board>) {
+    thread::spawn(move || {
+        let text = match lynkeus::certify(&study) {
+            Ok(report) => report.document().to_html(),
+            Err(error) => Line::from(error.message()).to_html(),
+        };
+        board.is_proved(text);
+    });
 }
