@@ -7,7 +7,7 @@ use std::thread;
 
 use clap::{Args, ValueEnum};
 
-use lynkeus::{Error, interrupt};
+use lynkeus::{Answer, Error, Study, interrupt};
 use lynkeus_serve::{Board, Engine, Format, Reader, http, mqtt};
 
 use super::inputs::Source;
@@ -110,10 +110,9 @@ pub(super) fn serve(source: &Source, options: &Options) -> Result<ExitCode, Erro
 /// Finds in a thread of its own what is proved of a study's observer, for the page.
 fn prove(study: Study, board: Arc<Board>) {
     thread::spawn(move || {
-        let text = match lynkeus::certify(&study) {
-            Ok(report) => report.document().to_html(),
-            Err(error) => Line::from(error.message()).to_html(),
-        };
-        board.is_proved(text);
+        // what the command would refuse to prove is not known
+        if let Ok(report) = lynkeus::certify(&study) {
+            board.is_proved(report.document().to_html());
+        }
     });
 }
