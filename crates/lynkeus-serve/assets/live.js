@@ -59,7 +59,9 @@ function heading(text, room) {
     const head = document.createElement("h3");
     head.textContent = text;
     const place = document.createElement("div");
-    room.append(head, place);
+    const card = document.createElement("section");
+    card.append(head, place);
+    room.append(card);
     return place;
 }
 
