@@ -90,8 +90,7 @@ fn compiled() -> Result<(), String> {
         .args(["--lib", "--bins", "--tests"]))
 }
 
-/// Runs every test, those of the Python package beside those in Rust; of what several of those in Python do alike,
-/// all or a sample.
+/// Runs every test, those of the Python package beside those in Rust; of what several do alike, all or a sample.
 fn test(is_all: bool) -> Result<(), String> {
     begins("the tests, compiled, beside the Python environments");
     let ((checks, package), compiled) = std::thread::scope(|scope| {
@@ -106,6 +105,9 @@ fn test(is_all: bool) -> Result<(), String> {
         Some(path) => tests.env(python::VARIABLE, path),
         None => tests.env_remove(python::VARIABLE),
     };
+    if is_all {
+        tests.env(package::ALL, "1");
+    }
     // some tests wait, for limits and for signals
     if std::env::var_os("RUST_TEST_THREADS").is_none() {
         let processors = std::thread::available_parallelism().map_or(2, std::num::NonZero::get);
@@ -120,7 +122,10 @@ fn test(is_all: bool) -> Result<(), String> {
 /// Runs the tests in Rust that are left out for the time that they take.
 fn long_tests() -> Result<(), String> {
     begins("the tests that take minutes");
-    run(cargo(&TESTS).args(["--release", "--", "--ignored"]))
+    let mut tests = cargo(&TESTS);
+    run(tests
+        .args(["--release", "--", "--ignored"])
+        .env(package::ALL, "1"))
 }
 
 /// An interpreter for something; none where that is skipped, with a word.

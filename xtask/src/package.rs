@@ -15,8 +15,8 @@ const REQUIREMENTS: &str = include_str!("../../python/requirements.txt");
 /// The tests compare with the command that this names.
 const COMMAND: &str = "LYNKEUS_COMMAND";
 
-/// Where it is set, they are no sample.
-const ALL: &str = "LYNKEUS_ALL_TESTS";
+/// Where it is set, what several tests do alike is no sample.
+pub const ALL: &str = "LYNKEUS_ALL_TESTS";
 
 /// Builds the wheel, installs it, and tries it as users have it; all tests run beside those in Rust.
 ///

@@ -172,7 +172,7 @@ impl<'a> Search<'a> {
             };
             multipliers.push([at(&ends[0]), at(&ends[1])]);
         }
-        let point = problem.inside().ok()?;
+        let point = problem.inside_soon().ok()?;
         let restored = |(T, model): (&Affine, &Seen)| -> DVector<f64> {
             let diagonal = T.at(&point).diagonal();
             diagonal.component_div(&model.weights) / frame.unit

@@ -54,16 +54,22 @@ impl Barrier<'_> {
     /// From a point inside to near the minimum, until `good(x, gap)`: the gap bounds
     /// how far cᵀx is above its minimum. Where the arithmetic gives out, or the budget
     /// or the steps, the last point is returned: it is still inside, but nothing is decided.
-    /// None where the start is not.
+    /// None where the start is not. `ends` may end it at any point, from its gap as if it were central and
+    /// the steps since t has grown.
     pub(super) fn minimise(
         &self,
         mut x: DVector<f64>,
         good: impl Fn(&DVector<f64>, f64) -> bool,
+        ends: impl Fn(&DVector<f64>, f64, usize) -> bool,
     ) -> Option<Ended> {
         let order = 1.0 + self.blocks.iter().map(|b| b.size as f64).sum::<f64>();
         let mut local = self.local(&x, self.factors(&x)?);
         let mut t = self.first(&x, &local, order)?;
-        for _ in 0..STEPS {
+        let mut grown = 0;
+        for steps in 0..STEPS {
+            if ends(&x, order / t, steps - grown) {
+                return Some(Ended { x, decided: true });
+            }
             let Some(curvature) = &local.curvature else {
                 break;
             };
@@ -75,7 +81,7 @@ impl Barrier<'_> {
                 if done {
                     return Some(Ended { x, decided: true });
                 }
-                t *= GROWTH;
+                (t, grown) = (t * GROWTH, steps);
                 continue;
             }
             match self.advanced(&x, &step, &local.factors, t, decrement) {
@@ -561,12 +567,20 @@ mod tests {
             budget: &budget,
         };
         let start = || DVector::from_element(1, 0.3);
-        let found = barrier.minimise(start(), |_, gap| gap < 1e-6).unwrap();
+        let found = barrier
+            .minimise(start(), |_, gap| gap < 1e-6, |_, _, _| false)
+            .unwrap();
         assert!(found.decided && found.x[0] > 0.0 && found.x[0] < 1e-6);
-        let found = barrier.minimise(start(), |_, _| false).unwrap();
+        let found = barrier
+            .minimise(start(), |_, _| false, |_, _, _| false)
+            .unwrap();
         assert!(!found.decided && barrier.is_inside(&found.x));
         let outside = DVector::from_element(1, 0.6);
-        assert!(barrier.minimise(outside, |_, _| true).is_none());
+        assert!(
+            barrier
+                .minimise(outside, |_, _| true, |_, _, _| false)
+                .is_none()
+        );
     }
 
     /// tr(F W) and W F W of a term with several rows against the whole matrices.

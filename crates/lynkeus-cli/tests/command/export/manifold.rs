@@ -12,8 +12,8 @@ fn angles_and_rotations_are_those_of_estimate() {
         return skipped("gcc is not there");
     }
     let mut looked = vec![];
-    let mut seeds = 0..;
-    for (family, more) in [("ekf", "gate = 6"), ("ukf", "")] {
+    // each plant in other languages by each filter
+    for (family, more, mut seeds) in [("ekf", "gate = 6", 0..), ("ukf", "", 4..)] {
         for folder in [rotor(family, more), attitude(family, more), tracked(family)] {
             let log = folder.run(&["simulate", "s.toml", "--log", "log.csv", "-q"]);
             assert!(log.code <= 1, "{}", log.err);
@@ -28,7 +28,7 @@ fn angles_and_rotations_are_those_of_estimate() {
         "m.mo",
         &ROTOR.replace("min = -3.14159, max = 3.14159, ", ""),
     );
-    looked.push(look(7, folder).unwrap());
+    looked.push(look(8, folder).unwrap());
     let code = looked[1].folder.read("c/body.h");
     assert!(code.contains("q_sd") && !code.contains("q[1]_sd"), "{code}");
     rust::check(&looked);
