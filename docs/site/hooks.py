@@ -11,6 +11,7 @@ import ast
 import importlib.util
 import json
 import logging
+import os
 import posixpath
 import re
 import sys
@@ -22,7 +23,9 @@ from mkdocs.structure.files import File, Files
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(Path(__file__).parent))
 
-import notebooks  # noqa: E402  (beside this file)
+import formulas  # noqa: E402  (beside this file)
+import messages  # noqa: E402
+import notebooks  # noqa: E402
 
 LOG = logging.getLogger("mkdocs.hooks.lynkeus")
 TOP = ["ARCHITECTURE.md", "BENCHMARKS.md", "CHANGELOG.md", "CONTRIBUTING.md"]
@@ -44,8 +47,23 @@ ROLE = re.compile(r":(?:attr|class|exc|func|meth|mod):(?=<code>)")
 CODE = re.compile(r"(^(?:```|~~~).*?^(?:```|~~~)\s*?$|`[^`\n]+`)", re.MULTILINE | re.DOTALL)
 
 
+def on_config(config: Any) -> Any:
+    """Pages with formulas need KaTeX's style; without KaTeX they show formulas as they are written."""
+    try:
+        formulas.install()
+        config.extra_css += ["formulas/katex.min.css", "formulas/formulas.css"]
+    except formulas.Missing as why:
+        say = LOG.warning if os.environ.get("CI") else LOG.info
+        say("formulas are shown as they are written: %s", why)
+    return config
+
+
 def on_files(files: Files, config: Any) -> Files:
     """Adds the pages that are not in docs/."""
+    if config.extra_css:
+        for path in (*formulas.files(), formulas.HERE / "formulas.css"):
+            name = f"fonts/{path.name}" if path.suffix == ".woff2" else path.name
+            files.append(File.generated(config, f"formulas/{name}", abs_src_path=str(path)))
     for source in pages():
         if not source.startswith("docs/"):
             text = (ROOT / source).read_text(encoding="utf-8")
@@ -59,6 +77,7 @@ def on_files(files: Files, config: Any) -> Files:
             PICTURES.add(name)
     files.append(File.generated(config, "gallery.md", content=gallery()))
     files.append(File.generated(config, "reference/json.md", content=json_reference()))
+    files.append(File.generated(config, "reference/messages.md", content=messages.page(ROOT)))
     files.append(File.generated(config, "reference/python.md", content=python_reference()))
     files.append(File.generated(config, "reference/rust.md", content=rust_reference(files, config)))
     return files
@@ -77,8 +96,14 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
 
 
 def on_page_content(html: str, page: Any, config: Any, files: Files) -> str:
-    """Roles of docstrings (``:class:`Study```) are words in code here, and links to sources without an address words."""
+    """Formulas are set; roles of docstrings (``:class:`Study```) are words in code here, and links to sources without an
+    address words."""
     html = SOURCE.sub(r"\1", html)
+    if config.extra_css:
+        try:
+            html = formulas.rendered(html)
+        except ValueError as why:
+            LOG.warning("%s: a formula cannot be set: %s", page.file.src_uri, why)
     return ROLE.sub("", html) if page.file.src_uri == "reference/python.md" else html
 
 

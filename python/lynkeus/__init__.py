@@ -9,6 +9,7 @@
 """
 
 from ._lynkeus import Estimator, Log
+from ._lynkeus import __version__ as __version__
 from .errors import ArgumentError, InputError, LimitError, LogWarning, LynkeusError, NotCredible, RefusedError, TraceError
 # not among the names of `from lynkeus import *`: it would hide Python's own
 from .functions import abs as abs

@@ -15,6 +15,9 @@ from .study import Study as _Study
 
 _Column = NDArray[np.float64]
 
+#: of the package and of the command
+__version__: str
+
 #: MiB that a call may take where nothing else is said
 MEMORY: float
 
@@ -432,6 +435,9 @@ class Estimator:
         InputError
             It is damaged, or of another study.
         """
+
+def command(arguments: list[str]) -> int:
+    """Runs a command line; its exit code."""
 
 def families() -> list[tuple[str, bool]]:
     """Names of the families, and which are filters."""

@@ -309,6 +309,8 @@ class Next(Record):
 class CheckEntries:
     """What :meth:`lynkeus.Study.check` answers."""
 
+    lynkeus: str
+    """The version of Lynkeus that answers."""
     plant: str
     """the name of the model"""
     states: list[str]
@@ -420,6 +422,8 @@ class Advice(Record):
 class HowWellEntries:
     """What :meth:`lynkeus.Study.how_well` answers."""
 
+    lynkeus: str
+    """The version of Lynkeus that answers."""
     plant: str
     """the name of the model"""
     start: float
@@ -667,6 +671,8 @@ class Proof(Record):
 class DesignEntries:
     """What :meth:`lynkeus.Study.design` answers."""
 
+    lynkeus: str
+    """The version of Lynkeus that answers."""
     plant: str
     """the name of the model"""
     family: str
@@ -697,6 +703,8 @@ class DesignReport(DesignEntries, Record):
 class CertificateEntries:
     """What :meth:`lynkeus.Study.certify` answers."""
 
+    lynkeus: str
+    """The version of Lynkeus that answers."""
     plant: str
     """the name of the model"""
     family: str
@@ -840,6 +848,8 @@ class Doubt(Record):
 class RunEntries:
     """What :meth:`lynkeus.Study.simulate` and :meth:`lynkeus.Study.estimate` answers."""
 
+    lynkeus: str
+    """The version of Lynkeus that answers."""
     plant: str
     """the name of the model"""
     family: str
@@ -933,6 +943,8 @@ class Scattered(Record):
 class MonteCarloEntries:
     """What :meth:`lynkeus.Study.simulate` with ``runs`` answers."""
 
+    lynkeus: str
+    """The version of Lynkeus that answers."""
     plant: str
     """the name of the model"""
     family: str
@@ -987,6 +999,8 @@ class Misfit(Record):
 class OpenRunEntries:
     """What :meth:`lynkeus.Study.simulate` with a log as ``inputs`` answers."""
 
+    lynkeus: str
+    """The version of Lynkeus that answers."""
     plant: str
     """the name of the model"""
     log: str
@@ -1079,6 +1093,8 @@ class SweptRow(Record):
 class SweepEntries:
     """What :meth:`lynkeus.Study.tune` answers."""
 
+    lynkeus: str
+    """The version of Lynkeus that answers."""
     plant: str
     """the name of the model"""
     log: str | None
@@ -1193,6 +1209,8 @@ class NextExperiment(Record):
 class FitEntries:
     """What :meth:`lynkeus.Study.fit` answers."""
 
+    lynkeus: str
+    """The version of Lynkeus that answers."""
     plant: str
     """the name of the model"""
     logs: list[str]
@@ -1291,6 +1309,8 @@ class Compared(Record):
 class ComparisonEntries:
     """What :meth:`lynkeus.Study.compare` answers."""
 
+    lynkeus: str
+    """The version of Lynkeus that answers."""
     plant: str
     """the name of the model"""
     against: Literal["simulation", "log", "nothing"]

@@ -5,8 +5,11 @@ from __future__ import annotations
 import copy
 import doctest
 import importlib
+import json
 import pickle
 import pkgutil
+import subprocess
+import sys
 import time
 import tomllib
 from pathlib import Path
@@ -236,3 +239,19 @@ def test_columns_are_the_same_one_by_one_and_together(study: lynkeus.Study) -> N
         for place, name in enumerate(answer.columns):
             np.testing.assert_array_equal(table[:, place], answer[name])
         assert answer._core.column(len(answer.columns)) is None
+
+
+def test_the_package_has_the_command_inside(tmp_path: Path) -> None:
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        words = [sys.executable, "-m", "lynkeus", *arguments]
+        return subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    assert run("--version").stdout == f"lynkeus {lynkeus.__version__}\n"
+    (tmp_path / "tank.mo").write_text(TEXT)
+    (tmp_path / "s.toml").write_text('plant = "tank.mo"\n[sensors]\nunknown = ["inflow"]\n')
+    asked = run("check", "s.toml", "--json")
+    answer, ours = json.loads(asked.stdout), lynkeus.check(tmp_path / "s.toml").summary
+    assert asked.returncode == 0 and answer["families"] == ours["families"]
+    assert list(answer)[0] == "lynkeus" and answer["lynkeus"] == ours["lynkeus"] == lynkeus.__version__
+    missing = run("check", "none.toml")
+    assert (missing.returncode, missing.stdout) == (2, "") and "no study file" in missing.stderr

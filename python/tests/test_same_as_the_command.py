@@ -58,11 +58,11 @@ def test_reports(command: Path, study: str) -> None:
 
 
 def shorter(study: str, folder: Path) -> str:
-    """The study with a fifth of its run, beside its model."""
+    """The study with a tenth of its run, beside its model."""
     for model in (ROOT / study).parent.glob("*.mo"):
         shutil.copy(model, folder)
     text = (ROOT / study).read_text(encoding="utf-8")
-    text = re.sub(r"(?m)^until = ([^\s#]+)", lambda until: f"until = {float(until[1]) / 5}", text)
+    text = re.sub(r"(?m)^until = ([^\s#]+)", lambda until: f"until = {float(until[1]) / 10}", text)
     (folder / "study.toml").write_text(text, encoding="utf-8")
     return str(folder / "study.toml")
 

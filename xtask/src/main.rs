@@ -1,6 +1,9 @@
 //! The project's own chores, run as `cargo xtask <task>`.
 
+mod licences;
 mod package;
+mod release;
+mod tutorial;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -16,6 +19,8 @@ usage: cargo xtask <task>
   package   build the Python package as a wheel, install it into .venv-package and try it there
   ci        format check, lints, documentation, then `test`
   site      build the documentation site into target/site, every link checked
+  release-check  make what is published and try it as users have it: packages, audit, wheel, binary,
+            shells, or only the parts that are named
 
 and, built with --release first (`chores` runs their own tests, which `test` leaves out):
 
@@ -62,6 +67,7 @@ fn main() -> ExitCode {
         ("chores", 1) => run(&mut cargo(&["test", "--workspace", "--bin", "chores"])),
         ("package", 1) => package::interpreter().and_then(|python| package::wheel(&python)),
         ("site", 1) => package::site(),
+        ("release-check", _) => release::check(&arguments[1..]),
         _ if CHORES.contains(&task) => {
             let mut chore = cargo(&["run", "--release", "--package", "chores", "--"]);
             run(chore.args(&arguments))

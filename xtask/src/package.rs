@@ -72,9 +72,14 @@ fn steps(python: &Path, log: &File, is_all: bool) -> Result<(), String> {
     told(&mut types(python))
 }
 
+/// Where the package is as a folder, once it was tested.
+fn made() -> PathBuf {
+    target().join("package").join("folder")
+}
+
 /// The package as a folder to import it from: its Python files, and the library beside them.
 fn folder() -> Result<PathBuf, String> {
-    let folder = target().join("package").join("folder");
+    let folder = made();
     let package = folder.join("lynkeus");
     let cannot = |error: std::io::Error| format!("cannot make {}: {error}", package.display());
     match fs::remove_dir_all(&folder) {
@@ -125,7 +130,8 @@ pub fn interpreter() -> Result<PathBuf, String> {
     python::environment(".venv-package", REQUIREMENTS)
 }
 
-/// Builds the documentation site; a link that leads nowhere is an error.
+/// Builds the documentation site; a link that leads nowhere is an error. Where the tests have made a folder of the package,
+/// the notebooks run and are shown with their results.
 ///
 /// # Errors
 /// What is missing, or what the page is whose link is broken.
@@ -136,6 +142,10 @@ pub fn site() -> Result<(), String> {
         .args(["-m", "mkdocs", "build", "--quiet", "--strict"])
         .env("NO_MKDOCS_2_WARNING", "1")
         .current_dir(root());
+    let package = made();
+    if package.is_dir() {
+        build.env("PYTHONPATH", package);
+    }
     run(&mut build)
 }
 
@@ -168,7 +178,10 @@ fn install(python: &Path, wheel: &Path) -> Command {
 }
 
 /// The only wheel in a folder.
-fn built(folder: &Path) -> Result<PathBuf, String> {
+///
+/// # Errors
+/// There is none.
+pub fn built(folder: &Path) -> Result<PathBuf, String> {
     let entries = fs::read_dir(folder).map_err(|e| format!("cannot read the wheels: {e}"))?;
     let mut wheels = entries.flatten().map(|entry| entry.path());
     let wheel = wheels.find(|path| path.extension().is_some_and(|kind| kind == "whl"));

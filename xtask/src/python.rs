@@ -52,7 +52,11 @@ fn interpreter_in(environment: &Path) -> PathBuf {
     }
 }
 
-fn create(folder: &Path) -> Result<(), String> {
+/// Makes an empty environment.
+///
+/// # Errors
+/// What is missing and how to supply it.
+pub fn create(folder: &Path) -> Result<(), String> {
     let system = ["python3", "python"]
         .into_iter()
         .find(|name| answers(Path::new(name)))

@@ -107,6 +107,58 @@ fn pages_keep_to_the_words_of_the_book() {
     assert!(told <= TOLD, "\"told\" stands {told} times in the pages");
 }
 
+/// Words of a sentence that is read at one go, up to a full stop, a colon or a semicolon.
+const SENTENCE: usize = 40;
+
+/// How many may be longer in the pages for users: what a formula or a list makes long.
+const LONG_SENTENCES: usize = 12;
+
+#[test]
+fn sentences_are_short() {
+    let for_users =
+        |page: &&PathBuf| page.parent() != Some(Path::new("")) || page.ends_with("README.md");
+    let mut long = Vec::new();
+    for page in pages().iter().filter(for_users) {
+        let text = prose(&read(page));
+        let found = text
+            .split(". ")
+            .flat_map(|part| part.split([';', ':', '!', '?']));
+        let found = found.filter(|sentence| sentence.split_whitespace().count() > SENTENCE);
+        long.extend(found.map(|sentence| {
+            let words: Vec<&str> = sentence.split_whitespace().take(12).collect();
+            format!("{}: {} …", page.display(), words.join(" "))
+        }));
+    }
+    assert!(
+        long.len() <= LONG_SENTENCES,
+        "{} sentences have more than {SENTENCE} words:\n{}",
+        long.len(),
+        long.join("\n")
+    );
+}
+
+/// What of a page is read as sentences: without code, comments, tables, headings and quotations. A paragraph or an item
+/// of a list ends a sentence.
+fn prose(page: &str) -> String {
+    let mut text = String::new();
+    let mut is_comment = false;
+    for line in outside_of_code(page).lines() {
+        let line = line.trim();
+        is_comment |= line.starts_with("<!--");
+        let is_apart = line.is_empty() || line.starts_with(['|', '#', '>']);
+        if is_comment || is_apart || line.starts_with("- ") {
+            text += ". ";
+        }
+        if !is_comment && !is_apart {
+            // code in a line is a word
+            text += &line.split('`').step_by(2).collect::<Vec<_>>().join("x");
+            text.push(' ');
+        }
+        is_comment &= !line.ends_with("-->");
+    }
+    text
+}
+
 #[test]
 fn the_first_screen_of_the_readme_is_a_screen() {
     let readme = read("README.md");

@@ -75,7 +75,7 @@ pub fn findings(prepared: &Prepared<'_>, thorough: bool) -> Findings {
     let Ok(report) = lynkeus::certify(prepared.study()) else {
         return found;
     };
-    found.gain = report.to_json()["gain"].take();
+    found.gain = report.entries()["gain"].take();
     let theorem = report.theorem.as_ref();
     found.contradicts = report.certificate.verdict() == Standing::Refuted
         && theorem.is_some_and(|theorem| theorem.verdict() == Standing::Proved);

@@ -1,6 +1,7 @@
 //! The one error type of this crate: what was expected, what was found, where, and what to do.
 
 use std::fmt;
+use std::panic::Location;
 use std::sync::Arc;
 
 use crate::visible;
@@ -29,20 +30,24 @@ pub struct Error {
     message: String,
     hint: Option<String>,
     source: Option<Arc<dyn std::error::Error + Send + Sync>>,
+    origin: &'static Location<'static>,
 }
 
 impl Error {
     /// An error in what the user gave.
+    #[track_caller]
     pub fn input(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Input, message.into())
     }
 
     /// A well-posed question whose answer is no.
+    #[track_caller]
     pub fn refused(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Refused, message.into())
     }
 
     /// What ended the work before there was an answer: a limit, or else a refusal.
+    #[track_caller]
     pub fn ended(spent: lynkeus_expr::Spent) -> Self {
         let kind = match spent.is_limit() {
             true => ErrorKind::Ended,
@@ -53,10 +58,12 @@ impl Error {
 
     /// An error in what the user gave, in the words of the error that tells it; that error
     /// is the [source](std::error::Error::source).
+    #[track_caller]
     pub fn from_source(source: impl std::error::Error + Send + Sync + 'static) -> Self {
         Self::input(source.to_string()).caused_by(source)
     }
 
+    #[track_caller]
     fn new(kind: ErrorKind, message: String) -> Self {
         Self {
             kind,
@@ -64,6 +71,7 @@ impl Error {
             message,
             hint: None,
             source: None,
+            origin: Location::caller(),
         }
     }
 
@@ -117,10 +125,32 @@ impl Error {
         &self.message
     }
 
+    /// What the message is about, as the reference of messages has it: see [`code`].
+    pub fn code(&self) -> String {
+        code(self.origin)
+    }
+
     /// What to do about it, when something is known.
     pub fn remedy(&self) -> Option<&str> {
         self.hint.as_deref()
     }
+}
+
+/// The code of a message that the sources have there: `study/sensors` for `lynkeus-study/src/sensors.rs`. A file is one
+/// subject, so its messages are about one.
+pub fn code(origin: &Location<'_>) -> String {
+    let path = origin.file().replace('\\', "/");
+    let (before, file) = path.rsplit_once("/src/").unwrap_or(("", &path));
+    let before = before.rsplit('/').next().unwrap_or_default();
+    // a package has its version behind its name
+    let name = match before.rsplit_once('-') {
+        Some((name, version)) if version.starts_with(|c: char| c.is_ascii_digit()) => name,
+        _ => before,
+    };
+    let name = name.strip_prefix("lynkeus-").unwrap_or(name);
+    let file = file.strip_suffix(".rs").unwrap_or(file);
+    let file = file.strip_suffix("/mod").unwrap_or(file);
+    format!("{name}/{file}")
 }
 
 impl fmt::Display for Error {
@@ -150,6 +180,13 @@ mod tests {
     use lynkeus_expr::MissingInput;
 
     use super::*;
+
+    #[test]
+    fn a_code_names_the_subject() {
+        assert_eq!(Error::input("no").hint("yes").code(), "answer/error");
+        let made = |text: &str| Error::input(text);
+        assert_eq!(made("no").code(), "answer/error");
+    }
 
     #[test]
     fn the_source_is_kept_through_place_and_hint() {

@@ -13,4 +13,4 @@ pub mod near;
 pub mod visible;
 
 pub use document::Document;
-pub use error::{Error, ErrorKind};
+pub use error::{Error, ErrorKind, code};

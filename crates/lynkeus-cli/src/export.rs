@@ -1,12 +1,12 @@
 //! `lynkeus export`: an estimator as source code, or a plant for simulators.
 
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use lynkeus::{Error, ExportOptions, FmiVersion, Precision, Subject, Target};
 
+use super::ending::Ending;
 use super::inputs::Source;
 use super::output;
 use super::save::Results;
@@ -87,7 +87,7 @@ pub(super) struct Options {
 }
 
 /// Everything is made before the first file is written.
-pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Error> {
+pub(super) fn export(source: &Source, options: &Options) -> Result<Ending, Error> {
     let wanted = ExportOptions {
         to: options.target()?,
         subject: options.system.map(Subject::from),
@@ -120,7 +120,7 @@ pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Err
         let names: Vec<&str> = made.files.iter().map(|file| file.name.as_str()).collect();
         output::note(&format!("{}: {}", folder.display(), names.join(", ")));
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(Ending::Done)
 }
 
 /// The words for targets, with what each writes.

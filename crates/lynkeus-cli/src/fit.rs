@@ -1,10 +1,10 @@
 //! `lynkeus fit`.
 
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use clap::Args;
 
+use super::ending::Ending;
 use super::files;
 use super::inputs::{self, Source};
 use super::limits::{self, Limits};
@@ -44,7 +44,7 @@ pub(super) struct Options {
 }
 
 /// Everything is computed before the first file is written.
-pub(super) fn fit(path: &Path, options: &Options, limits: &Limits) -> Result<ExitCode, Error> {
+pub(super) fn fit(path: &Path, options: &Options, limits: &Limits) -> Result<Ending, Error> {
     if options.write && is_standard(path) {
         return Err(Error::input("--write needs a study that is a file"));
     }

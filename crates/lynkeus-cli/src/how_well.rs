@@ -1,13 +1,13 @@
 //! `lynkeus check --how-well`.
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 
 use lynkeus::Error;
 use lynkeus::precision::{self, Candidates};
 
+use super::ending::Ending;
 use super::inputs::Source;
 use super::options::Output;
 use super::progress::Alive;
@@ -50,7 +50,7 @@ impl Options {
 }
 
 /// Everything is computed before the first file is written.
-pub(super) fn how_well(source: &Source, options: &Options, json: bool) -> Result<ExitCode, Error> {
+pub(super) fn how_well(source: &Source, options: &Options, json: bool) -> Result<Ending, Error> {
     let output = Output {
         output: options.output.clone(),
         plot: options.plot.clone(),

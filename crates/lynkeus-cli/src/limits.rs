@@ -1,6 +1,5 @@
 //! `--time-limit` and `--memory-limit`.
 
-use std::process::ExitCode;
 use std::time::Duration;
 
 use cap::Cap;
@@ -9,15 +8,19 @@ use clap::Args;
 use lynkeus::expr::{Budget, Memory};
 use lynkeus::{Study, interrupt};
 
-/// The exit code of work that a limit ended.
-pub(super) const ENDED: u8 = 3;
+use super::ending::Ending;
 
 /// The time of `design` and `certify` where none is given.
 const PROOF: Duration = Duration::from_secs(60);
 
-/// Counts what is in use, for the limit of memory.
+/// Counts what is in use, for the limit of memory: here, and in the Python package, which has this command inside.
 #[global_allocator]
 static ALLOCATOR: Cap<std::alloc::System> = Cap::new(std::alloc::System, usize::MAX);
+
+/// Bytes that are in use.
+pub fn allocated() -> usize {
+    ALLOCATOR.allocated()
+}
 
 /// When a command stops: what is done by then is told.
 #[derive(Debug, Args)]
@@ -35,7 +38,7 @@ impl Limits {
     pub(super) fn budget(&self) -> Budget {
         let memory = Memory {
             limit: self.memory_limit.saturating_mul(1 << 20),
-            used: || ALLOCATOR.allocated(),
+            used: allocated,
             before: 0,
         };
         Budget::new(self.time_limit, Some(memory)).stopped_by(interrupt::flag())
@@ -49,9 +52,9 @@ impl Limits {
 }
 
 /// The exit code of a command that a limit may have ended.
-pub(super) fn code(study: &Study, code: ExitCode) -> ExitCode {
+pub(super) fn code(study: &Study, code: Ending) -> Ending {
     match study.budget.marked() {
-        Some(_) => ExitCode::from(ENDED),
+        Some(_) => Ending::Limit,
         None => code,
     }
 }

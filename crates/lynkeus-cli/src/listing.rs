@@ -12,8 +12,8 @@ const HEAD: &str = "# Commands
 Every command with its arguments and options, as the program declares them; a test keeps this page equal to the program.
 Names of keys are those of [study files](study.md), and `--json` follows [a schema](answers.schema.json).
 
-The exit code is 0 when the command is done, 1 when the answer is no (a condition refuted, an estimate that diverged or is not
-credible, a picture with nothing to draw), 2 when the input cannot be used, and 3 when a [limit](observability.md#limits) of time or memory ended it.
+The exit code is 0 when the command is done and 2 when the input cannot be used. It is 1 when the answer is no: a condition refuted, an estimate that diverged or is not
+credible, a picture with nothing to draw. It is 3 when a [limit](observability.md#limits) of time or memory ended the command.
 
 Lynkeus writes all outputs or none, and never overwrites an input. Each output is written beside its place and renamed, so that
 a reader never sees half of it. `-` is standard input (a study, a log) or standard output (any one output). Where a picture cannot be drawn, the other

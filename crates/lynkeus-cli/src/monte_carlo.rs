@@ -1,9 +1,8 @@
 //! `lynkeus simulate --runs`.
 
-use std::process::ExitCode;
-
 use lynkeus::Error;
 
+use super::ending::Ending;
 use super::inputs::Source;
 use super::limits;
 use super::options::Output;
@@ -11,11 +10,7 @@ use super::progress::Progress;
 use super::save::Results;
 
 /// Everything is computed before the first file is written.
-pub(super) fn monte_carlo(
-    source: &Source,
-    output: &Output,
-    runs: usize,
-) -> Result<ExitCode, Error> {
+pub(super) fn monte_carlo(source: &Source, output: &Output, runs: usize) -> Result<Ending, Error> {
     source.files().asked(output).check()?;
     let study = &source.study;
     let mut progress = Progress::new("simulating", output.quiet);

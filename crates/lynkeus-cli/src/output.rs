@@ -2,11 +2,12 @@
 
 use std::io::{self, Read, Write};
 use std::path::Path;
-use std::process::ExitCode;
 
 use lynkeus::model::Diagnostic;
 use lynkeus::{Answer, Error, Series, table, visible};
 use serde_json::Value;
+
+use super::ending::Ending;
 
 /// Columns as a CSV file, or as a Parquet file if it is called so.
 pub(super) fn table(
@@ -71,13 +72,13 @@ pub(super) fn remarks(answer: &dyn Answer, quiet: bool) {
 }
 
 /// Tells what speaks against an answer; the exit code says the same.
-pub(super) fn verdict(answer: &dyn Answer) -> ExitCode {
+pub(super) fn verdict(answer: &dyn Answer) -> Ending {
     if let Some(refusal) = answer.refusal() {
         complain(&refusal);
     }
     match answer.is_positive() {
-        true => ExitCode::SUCCESS,
-        false => ExitCode::from(1),
+        true => Ending::Done,
+        false => Ending::No,
     }
 }
 

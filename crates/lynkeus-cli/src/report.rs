@@ -1,11 +1,11 @@
 //! `lynkeus report`: a study as one page.
 
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use clap::Args;
 use lynkeus::{Error, ReportOptions};
 
+use super::ending::Ending;
 use super::inputs::{self, Source};
 use super::progress::Progress;
 use super::save::Results;
@@ -28,7 +28,7 @@ pub(super) fn report(
     source: &Source,
     log: Option<&Path>,
     options: &Options,
-) -> Result<ExitCode, Error> {
+) -> Result<Ending, Error> {
     let path = &options.output;
     let files = source.files().reads("the log", log);
     files.writes("-o", Some(path)).check()?;
@@ -49,10 +49,10 @@ pub(super) fn report(
     results.put(path, page.html)?;
     results.keep()?;
     let code = match &page.refusal {
-        None => ExitCode::SUCCESS,
+        None => Ending::Done,
         Some(refusal) => {
             output::complain(refusal);
-            ExitCode::from(1)
+            Ending::No
         }
     };
     Ok(limits::code(&source.study, code))

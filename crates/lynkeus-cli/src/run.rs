@@ -1,10 +1,10 @@
 //! The subcommands.
 
 use std::path::Path;
-use std::process::ExitCode;
 
 use lynkeus::{Answer, CheckOptions, Checkpoint, Error, Outcome};
 
+use super::ending::Ending;
 use super::inputs::{self, Source};
 use super::options::Output;
 use super::progress::{Alive, Progress};
@@ -16,7 +16,7 @@ pub(super) fn check(
     options: &CheckOptions,
     singular: Option<&Path>,
     json: bool,
-) -> Result<ExitCode, Error> {
+) -> Result<Ending, Error> {
     let files = source.files().draws("--singular", singular);
     files.prints_json(json).check()?;
     let alive = Alive::new("examining");
@@ -35,7 +35,7 @@ pub(super) fn check(
     results.tell(&report, &output)
 }
 
-pub(super) fn design(source: &Source, file: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
+pub(super) fn design(source: &Source, file: Option<&Path>, json: bool) -> Result<Ending, Error> {
     source.files().writes("-o", file).check()?;
     let alive = Alive::new("designing");
     let report = lynkeus::design(&source.study);
@@ -43,7 +43,7 @@ pub(super) fn design(source: &Source, file: Option<&Path>, json: bool) -> Result
     tell(file, json, &report?)
 }
 
-pub(super) fn certify(source: &Source, file: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
+pub(super) fn certify(source: &Source, file: Option<&Path>, json: bool) -> Result<Ending, Error> {
     source.files().writes("-o", file).check()?;
     let alive = Alive::new("certifying");
     let report = lynkeus::certify(&source.study);
@@ -52,7 +52,7 @@ pub(super) fn certify(source: &Source, file: Option<&Path>, json: bool) -> Resul
 }
 
 /// A report as text or as JSON, to a file or to standard output.
-fn tell(file: Option<&Path>, json: bool, answer: &dyn Answer) -> Result<ExitCode, Error> {
+fn tell(file: Option<&Path>, json: bool, answer: &dyn Answer) -> Result<Ending, Error> {
     let mut results = Results::default();
     match file {
         None => results.answer(json, answer),
@@ -67,7 +67,7 @@ pub(super) fn simulate(
     source: &Source,
     output: &Output,
     log: Option<&Path>,
-) -> Result<ExitCode, Error> {
+) -> Result<Ending, Error> {
     let files = source.files().writes("--log", log);
     files.asked(output).check()?;
     let mut progress = Progress::new("simulating", output.quiet);
@@ -82,7 +82,7 @@ pub(super) fn simulate(
     Ok(limits::code(&source.study, code))
 }
 
-pub(super) fn open_run(source: &Source, log: &Path, output: &Output) -> Result<ExitCode, Error> {
+pub(super) fn open_run(source: &Source, log: &Path, output: &Output) -> Result<Ending, Error> {
     let files = source.files().reads("the log", Some(log));
     files.asked(output).check()?;
     let study = &source.study;
@@ -100,7 +100,7 @@ pub(super) fn estimate(
     log: &Path,
     output: &Output,
     checkpoint: Option<&Path>,
-) -> Result<ExitCode, Error> {
+) -> Result<Ending, Error> {
     if checkpoint.is_some_and(is_standard) {
         let message = "--checkpoint needs a file, found -, which is standard output";
         return Err(Error::input(message).hint("name a file after --checkpoint"));
@@ -138,7 +138,7 @@ pub(super) fn compare(
     source: &Source,
     log: Option<&Path>,
     output: &Output,
-) -> Result<ExitCode, Error> {
+) -> Result<Ending, Error> {
     let files = source.files().reads("the log", log);
     files.asked(output).check()?;
     let table = log.map(|log| inputs::log(&source.study, log)).transpose()?;
@@ -151,7 +151,7 @@ pub(super) fn compare(
 
 /// Everything is computed before the first file is written. Where nothing is asked for, and where
 /// all that is asked for is a picture that cannot be drawn, the columns are printed.
-fn finish(asked: &Output, outcome: &Outcome, mut results: Results) -> Result<ExitCode, Error> {
+fn finish(asked: &Output, outcome: &Outcome, mut results: Results) -> Result<Ending, Error> {
     output::remarks(outcome, asked.quiet);
     let columns = outcome.columns();
     let mut shown = asked.json;

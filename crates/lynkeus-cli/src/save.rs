@@ -7,11 +7,11 @@
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use lynkeus::{Answer, Error, interrupt};
 use tempfile::{NamedTempFile, SpooledTempFile};
 
+use super::ending::Ending;
 use super::options::Output;
 use super::{output, signals};
 
@@ -135,7 +135,7 @@ impl Results {
     ///
     /// # Errors
     /// As [`keep`](Self::keep).
-    pub fn tell(mut self, answer: &dyn Answer, asked: &Output) -> Result<ExitCode, Error> {
+    pub fn tell(mut self, answer: &dyn Answer, asked: &Output) -> Result<Ending, Error> {
         output::remarks(answer, asked.quiet);
         self.files(answer, asked.plot.as_deref(), asked.output.as_deref())?;
         self.answer(asked.json, answer);

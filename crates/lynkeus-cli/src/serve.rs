@@ -1,7 +1,6 @@
 //! `serve`: the estimator beside a plant.
 
 use std::io;
-use std::process::ExitCode;
 use std::sync::Arc;
 use std::thread;
 
@@ -10,6 +9,7 @@ use clap::{Args, ValueEnum};
 use lynkeus::{Answer, Error, Study, interrupt};
 use lynkeus_serve::{Board, Engine, Format, Reader, http, mqtt};
 
+use super::ending::Ending;
 use super::inputs::Source;
 use super::output;
 
@@ -42,7 +42,7 @@ impl From<Messages> for Format {
     }
 }
 
-pub(super) fn serve(source: &Source, options: &Options) -> Result<ExitCode, Error> {
+pub(super) fn serve(source: &Source, options: &Options) -> Result<Ending, Error> {
     let study = &source.study;
     let settings = &study.serve;
     if options.stdio.is_none() && settings.mqtt.is_none() {
@@ -104,7 +104,7 @@ pub(super) fn serve(source: &Source, options: &Options) -> Result<ExitCode, Erro
         )?,
         (None, None) => {}
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(Ending::Done)
 }
 
 /// Finds in a thread of its own what is proved of a study's observer, for the page.

@@ -5,7 +5,6 @@
 //! so that a shell sees what happened.
 
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, Mutex};
 use std::thread;
@@ -13,6 +12,8 @@ use std::time::Duration;
 
 use lynkeus::interrupt;
 use signal_hook::{consts, flag, low_level};
+
+use super::ending::Ending;
 
 /// How long a run may take to end by itself.
 const GRACE: Duration = Duration::from_millis(500);
@@ -105,9 +106,9 @@ fn received() -> Option<i32> {
 }
 
 /// Ends the program as the signal would have, if there was one; else nothing happens.
-pub(super) fn end() -> ExitCode {
+pub(super) fn end() -> Ending {
     let Some(signal) = received() else {
-        return ExitCode::from(2);
+        return Ending::Input;
     };
     let name = low_level::signal_name(signal).unwrap_or("a signal");
     let done = match super::progress::done_so_far() {

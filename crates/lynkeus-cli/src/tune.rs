@@ -1,10 +1,10 @@
 //! `lynkeus tune`.
 
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use clap::Args;
 
+use super::ending::Ending;
 use super::files;
 use super::inputs::{self, Source};
 use super::limits::{self, Limits};
@@ -38,7 +38,7 @@ pub(super) struct Options {
 }
 
 /// Everything is computed before the first file is written.
-pub(super) fn tune(path: &Path, options: &Options, limits: &Limits) -> Result<ExitCode, Error> {
+pub(super) fn tune(path: &Path, options: &Options, limits: &Limits) -> Result<Ending, Error> {
     if options.write && is_standard(path) {
         return Err(Error::input("--write needs a study that is a file"));
     }
@@ -77,5 +77,5 @@ pub(super) fn tune(path: &Path, options: &Options, limits: &Limits) -> Result<Ex
     let asked = options.write.then_some((path, &changes[..]));
     written::show(&sweep, asked, options.json, &mut results);
     results.keep()?;
-    Ok(limits::code(&source.study, ExitCode::SUCCESS))
+    Ok(limits::code(&source.study, Ending::Done))
 }

@@ -5,7 +5,7 @@ use lynkeus_answer::document::Line;
 #[cfg(feature = "plot")]
 use lynkeus_plot::Figure;
 use lynkeus_table::Instant;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use crate::course::corrections::Corrections;
 use crate::{Error, Series};
@@ -24,8 +24,18 @@ pub trait Answer: Send {
     /// What is told, as the command prints it.
     fn document(&self) -> Document;
 
-    /// For programs, as the command's `--json`.
-    fn to_json(&self) -> Value;
+    /// What it holds, by the names of its report.
+    fn entries(&self) -> Value;
+
+    /// For programs, as the command's `--json`: the version that answers, then the entries.
+    fn to_json(&self) -> Value {
+        let mut object = Map::from_iter([("lynkeus".to_owned(), env!("CARGO_PKG_VERSION").into())]);
+        match self.entries() {
+            Value::Object(entries) => object.extend(entries),
+            other => return other,
+        }
+        object.into()
+    }
 
     /// Its columns under their headers.
     fn columns(&self) -> Vec<(String, Series)> {

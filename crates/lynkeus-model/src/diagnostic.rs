@@ -1,6 +1,7 @@
 //! Positions in a source text, problems found at them, and the refusals that users read.
 
 use std::fmt;
+use std::panic::Location;
 use std::path::PathBuf;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
@@ -56,17 +57,20 @@ pub(crate) struct Details {
     pub message: String,
     pub label: Option<String>,
     pub hint: Option<String>,
+    pub origin: &'static Location<'static>,
 }
 
 pub(crate) type Result<T> = std::result::Result<T, Problem>;
 
 impl Problem {
+    #[track_caller]
     pub(crate) fn new(span: Span, message: impl Into<String>) -> Self {
         Self(Box::new(Details {
             span,
             message: message.into(),
             label: None,
             hint: None,
+            origin: Location::caller(),
         }))
     }
 
@@ -143,6 +147,8 @@ struct Excerpt {
     cut: bool,
     /// told as a warning
     is_warning: bool,
+    /// where the sources have the message
+    origin: &'static Location<'static>,
 }
 
 impl Diagnostic {
@@ -167,6 +173,7 @@ impl Diagnostic {
                 source,
                 line_start..line_end,
                 start..end.max(start),
+                problem.origin,
             )),
         }
     }
@@ -176,6 +183,11 @@ impl Diagnostic {
         let mut warning = Self::new(problem, file, source);
         warning.excerpt.is_warning = true;
         warning
+    }
+
+    /// Where the sources have the message.
+    pub fn origin(&self) -> &'static Location<'static> {
+        self.excerpt.origin
     }
 
     /// `file:line:column: message (hint)` on one line.
@@ -230,7 +242,12 @@ impl std::error::Error for Diagnostic {}
 
 impl Excerpt {
     /// The line, or a window of it around the marked bytes where it is long.
-    fn new(source: &str, line: std::ops::Range<usize>, marked: std::ops::Range<usize>) -> Self {
+    fn new(
+        source: &str,
+        line: std::ops::Range<usize>,
+        marked: std::ops::Range<usize>,
+        origin: &'static Location<'static>,
+    ) -> Self {
         let marked_end = marked.end.min(line.end).min(marked.start + WINDOW);
         let from = source.floor_char_boundary(marked.start.saturating_sub(WINDOW).max(line.start));
         let to = source.floor_char_boundary((marked_end + WINDOW).min(line.end));
@@ -241,6 +258,7 @@ impl Excerpt {
             marked: marked.start - from..marked_end - from,
             cut: from > line.start || to < line.end,
             is_warning: false,
+            origin,
         }
     }
 }

@@ -1,6 +1,5 @@
 //! Work away from the interpreter: without its lock, ended by Ctrl-C and by limits.
 
-use std::alloc::System;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -8,9 +7,9 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread::{self, Builder};
 use std::time::Duration;
 
-use cap::Cap;
 use lynkeus::Error;
 use lynkeus::expr::{Budget, Memory};
+use lynkeus_cli::allocated;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
@@ -24,10 +23,6 @@ const STACK: usize = 8 << 20;
 
 /// MiB that a call may take where nothing else is said, as many as the command's.
 pub const MEMORY: f64 = 2048.0;
-
-/// Counts what is in use, for the limit of memory.
-#[global_allocator]
-static ALLOCATOR: Cap<System> = Cap::new(System, usize::MAX);
 
 /// What a call may take, and whom it tells: `lynkeus._progress.Terms`.
 #[derive(FromPyObject)]
@@ -67,8 +62,8 @@ impl<'py> Terms<'py> {
         let memory = Memory {
             // a limit beyond all memory is none
             limit: (self.memory_limit * f64::from(1 << 20)) as usize,
-            used: || ALLOCATOR.allocated(),
-            before: ALLOCATOR.allocated(),
+            used: allocated,
+            before: allocated(),
         };
         Ok(Budget::new(time, Some(memory)))
     }

@@ -15,6 +15,13 @@ mod log;
 mod sections;
 mod study;
 
+/// Runs a command line as the program `lynkeus` does; its exit code.
+#[pyo3::pyfunction]
+fn command(py: pyo3::Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
+    let words = std::iter::once("lynkeus".into()).chain(arguments);
+    py.detach(|| lynkeus_cli::run(words) as u8)
+}
+
 /// The module `lynkeus._lynkeus`.
 #[pyo3::pymodule]
 mod _lynkeus {
@@ -22,6 +29,11 @@ mod _lynkeus {
     use crate::answer::Answer;
     #[pymodule_export]
     const MEMORY: f64 = crate::away::MEMORY;
+    #[pymodule_export]
+    #[allow(non_upper_case_globals, reason = "the name that Python gives it")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+    #[pymodule_export]
+    use crate::command;
     #[pymodule_export]
     use crate::estimator::Estimator;
     #[pymodule_export]

@@ -63,6 +63,7 @@ impl<'a> Section<'a> {
     }
 
     /// The refusal of the table as a whole.
+    #[track_caller]
     pub fn refuse(&self, why: &str) -> Error {
         Error::input(format!("{}: {why}", self.name)).at(&self.source.file)
     }
@@ -87,6 +88,7 @@ pub(crate) struct Entry<'a> {
 
 impl<'a> Entry<'a> {
     /// The refusal of this value: `expected` completes "must be …".
+    #[track_caller]
     pub fn wrong(&self, expected: &str) -> Error {
         Error::input(format!(
             "{} must be {expected}, found {}",
@@ -97,6 +99,7 @@ impl<'a> Entry<'a> {
     }
 
     /// The refusal of this key as such.
+    #[track_caller]
     pub fn refuse_key(&self, why: &str) -> Error {
         Error::input(format!("{} {why}", self.key)).at(self.source.place(&self.key_span))
     }

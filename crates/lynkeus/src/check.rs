@@ -325,8 +325,8 @@ impl Answer for Report {
         document
     }
 
-    fn to_json(&self) -> Value {
-        Self::to_json(self)
+    fn entries(&self) -> Value {
+        Self::entries(self)
     }
 
     fn is_positive(&self) -> bool {

@@ -63,7 +63,7 @@ pub(crate) struct Report<'a> {
 impl DesignReport {
     /// The report for machines; `gain` is by state, then by measured output, and null for a
     /// correction that is no constant gain: then `injection` has its derivatives.
-    pub fn to_json(&self) -> Value {
+    pub fn entries(&self) -> Value {
         let Design {
             observer,
             examination,
@@ -127,7 +127,7 @@ impl Answer for DesignReport {
         document
     }
 
-    fn to_json(&self) -> Value {
-        Self::to_json(self)
+    fn entries(&self) -> Value {
+        Self::entries(self)
     }
 }

@@ -130,7 +130,7 @@ pub mod monte_carlo {
     };
 }
 
-pub use lynkeus_answer::{Document, Error, ErrorKind, document, near, visible};
+pub use lynkeus_answer::{Document, Error, ErrorKind, code, document, near, visible};
 pub use lynkeus_export::curly::c::Precision;
 pub use lynkeus_export::curly::fmu::Version as FmiVersion;
 pub use lynkeus_study::{Records, Study, schema};

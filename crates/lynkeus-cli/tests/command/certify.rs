@@ -114,7 +114,7 @@ fn the_column_of_the_paper_fails_lemma_1_in_a_direction() {
         lemma.unwrap(),
         &["in the direction", "·x[4]", "·x[6]", "whatever ρ is"],
     );
-    let report = report.to_json();
+    let report = report.entries();
     // not the guarantee is refuted, but one hypothesis of the theorem
     let certificate = &report["certificate"];
     well_formed(certificate, "undecided");

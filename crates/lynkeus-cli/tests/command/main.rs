@@ -34,6 +34,7 @@ mod live;
 mod log_columns;
 mod logs;
 mod long;
+mod lsp;
 mod manifold;
 mod mentioned;
 mod messages;

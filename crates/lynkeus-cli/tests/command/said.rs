@@ -13,8 +13,11 @@ const DIGITS: usize = 5;
 pub fn said(folder: &Folder, name: &str, arguments: &[&str]) {
     let ended = folder.run(arguments);
     let mut text = format!("$ lynkeus {}\n{}", arguments.join(" "), ended.out);
-    if !ended.err.is_empty() {
-        text += &format!("--- standard error\n{}", ended.err);
+    // progress is of a machine that is slow today
+    let said = ended.err.split_inclusive('\n');
+    let said: String = said.filter(|line| !line.ends_with(" s so far\n")).collect();
+    if !said.is_empty() {
+        text += &format!("--- standard error\n{said}");
     }
     if ended.code != 0 {
         text += &format!("--- exit code {}\n", ended.code);
@@ -52,8 +55,7 @@ fn redacted(text: &str) -> String {
     let mut out = String::new();
     let mut has_times = false;
     let text = text.replace(version, "lynkeus [VERSION]");
-    // progress is of a machine that is slow today
-    for line in text.lines().filter(|line| !line.ends_with(" s so far")) {
+    for line in text.lines() {
         has_times = !line.is_empty() && (has_times || line.ends_with("µs/sample"));
         // the last column, which is of this machine
         let line = match line.rsplit_once(' ') {

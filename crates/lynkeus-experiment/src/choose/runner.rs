@@ -234,7 +234,7 @@ mod tests {
         let outcome = outcome.unwrap();
         let columns = outcome.columns().into_iter();
         let columns = columns.map(|(name, values)| (name, values.to_vec()));
-        format!("{:?} {}", columns.collect::<Vec<_>>(), outcome.to_json())
+        format!("{:?} {}", columns.collect::<Vec<_>>(), outcome.entries())
     }
 
     fn go(_: f64) -> ControlFlow<()> {

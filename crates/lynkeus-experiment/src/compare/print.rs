@@ -100,7 +100,7 @@ impl<'a> From<&'a Run> for Figures<'a> {
 impl Comparison {
     /// For machines.
     #[must_use]
-    pub fn to_json(&self) -> Value {
+    pub fn entries(&self) -> Value {
         json!(ComparisonReport {
             plant: &self.plant,
             against: self.against,
@@ -162,8 +162,8 @@ impl Answer for Comparison {
         document
     }
 
-    fn to_json(&self) -> Value {
-        Self::to_json(self)
+    fn entries(&self) -> Value {
+        Self::entries(self)
     }
 
     fn is_positive(&self) -> bool {

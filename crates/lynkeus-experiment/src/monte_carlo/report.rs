@@ -205,7 +205,7 @@ impl MonteCarlo {
 
     /// For machines.
     #[must_use]
-    pub fn to_json(&self) -> Value {
+    pub fn entries(&self) -> Value {
         let quantities = self.quantities.iter();
         json!(MonteCarloReport {
             plant: &self.plant,
@@ -277,8 +277,8 @@ impl Answer for MonteCarlo {
         document
     }
 
-    fn to_json(&self) -> Value {
-        Self::to_json(self)
+    fn entries(&self) -> Value {
+        Self::entries(self)
     }
 
     fn columns(&self) -> Vec<(String, Series)> {

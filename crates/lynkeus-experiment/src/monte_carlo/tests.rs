@@ -304,7 +304,7 @@ fn runs_that_do_not_reach_their_end_are_counted() {
         "{refusal}"
     );
     assert!(found.to_string().contains("not in these figures"));
-    assert_eq!(found.to_json()["failed"]["count"], failed.len());
+    assert_eq!(found.entries()["failed"]["count"], failed.len());
 }
 
 /// y = x, x' = k·v: the observer, which has k = 1, settles at k times the true v = 1. Beyond 1.2, a tenth of
@@ -341,7 +341,7 @@ fn estimates_that_are_not_credible_are_told() {
             .to_string()
             .contains("in these figures, but not credible: seeds")
     );
-    assert_eq!(found.to_json()["not_credible"]["count"], told.len());
+    assert_eq!(found.entries()["not_credible"]["count"], told.len());
 }
 
 /// The rate of a noisy position, in widths of a range that it is thousands of times too noisy for: with fixed

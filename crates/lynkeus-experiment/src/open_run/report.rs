@@ -127,7 +127,7 @@ impl Answer for OpenRun {
         document
     }
 
-    fn to_json(&self) -> Value {
+    fn entries(&self) -> Value {
         let columns = self.columns().into_iter();
         let errors = self.compared().map(|(variable, misfit)| {
             let entry = MisfitEntry {

@@ -98,7 +98,7 @@ impl Sweep {
     }
 
     /// The sweep for machines.
-    pub fn to_json(&self) -> Value {
+    pub fn entries(&self) -> Value {
         let axes = || self.axes.iter();
         json!(SweepReport {
             plant: &self.plant,
@@ -180,8 +180,8 @@ impl Answer for Sweep {
         document
     }
 
-    fn to_json(&self) -> Value {
-        Self::to_json(self)
+    fn entries(&self) -> Value {
+        Self::entries(self)
     }
 
     fn columns(&self) -> Vec<(String, Series)> {

@@ -99,7 +99,7 @@ struct ConstantEntry {
 impl CertifyReport {
     /// The report for machines: the gain by state, then by measured output, or what takes
     /// its place, and the certificate.
-    pub fn to_json(&self) -> Value {
+    pub fn entries(&self) -> Value {
         json!(Report {
             plant: &self.plant,
             family: self.design.examination.family.name(),

@@ -147,7 +147,7 @@ struct Blind<'a> {
 
 impl Report {
     /// The report for machines.
-    pub fn to_json(&self) -> Value {
+    pub fn entries(&self) -> Value {
         let answer = &self.answer;
         let quantities = || answer.quantities.iter().map(|(asked, _)| asked);
         let said = self.uniform.as_ref().and_then(Uniform::said);

@@ -121,7 +121,7 @@ struct PortionErrors {
 
 impl Fit {
     /// The fit for machines.
-    pub fn to_json(&self) -> Value {
+    pub fn entries(&self) -> Value {
         let count = self.unknowns.len() as f64;
         let criterion = |each: f64| finite(2.0 * self.nll + each * count);
         let names = self.uncertainty.free.iter();

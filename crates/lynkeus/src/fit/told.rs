@@ -32,8 +32,8 @@ impl Answer for Fit {
         document
     }
 
-    fn to_json(&self) -> Value {
-        Self::to_json(self)
+    fn entries(&self) -> Value {
+        Self::entries(self)
     }
 
     fn columns(&self) -> Vec<(String, Series)> {

@@ -117,7 +117,7 @@ struct SensorSet<'a> {
 
 impl Report {
     /// The report as one JSON object; what is not seen is `null`.
-    pub fn to_json(&self) -> Value {
+    pub fn entries(&self) -> Value {
         let last = self.last();
         let scales = self.names.iter().cloned().zip(self.scales.iter().copied());
         let sensors = self.sensors.iter().enumerate().map(|(i, s)| SensorUsed {

@@ -37,7 +37,7 @@ fn what_nothing_shows_is_not_seen_and_the_sensor_for_it_is_found() {
     assert_eq!(report.names, ["level", "warmth", "leak"]);
     assert!(!report.is_positive());
     assert!(report.last().unwrap().present[1].is_infinite());
-    let json = report.to_json();
+    let json = report.entries();
     assert!(json["standard_error"]["warmth"].is_null());
     assert!(json["standard_error"]["leak"].as_f64().unwrap() > 0.0);
     assert_eq!(json["ranked"][0], "warmth");

@@ -1,7 +1,7 @@
 //! What a page is made of: nothing in it is fetched, and no name becomes markup.
 
 use super::browser::{browsed, sound};
-use super::{data, node, page};
+use super::{data, node, page, unproved};
 use crate::Folder;
 use crate::export::has;
 
@@ -129,7 +129,7 @@ end '</script><script>alert(1)</script>';
 
 #[test]
 fn names_do_not_break_a_page() {
-    let (folder, plain) = (hostile(), Folder::new());
+    let (folder, plain) = (hostile(), unproved());
     let page_text = page(&folder, &["study.toml"]);
     let own = markup(&page_text);
     let all = tags(&own);
@@ -153,7 +153,7 @@ fn names_do_not_break_a_page() {
 /// A page goes to others: it names files, no folder of this machine.
 #[test]
 fn no_folder_is_told() {
-    let folder = Folder::new();
+    let folder = unproved();
     let place = folder.path.path().to_str().unwrap().to_owned();
     let text = folder.read("two_tanks.mo");
     let unread = "  parameter Real unread = 1;\n  input";

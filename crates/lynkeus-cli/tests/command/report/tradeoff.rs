@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::browser::{browsed, sound};
-use super::{data, estimated, example, page, scaled_noise};
+use super::{data, estimated, example, page, scaled_noise, unproved};
 use crate::{Folder, csv};
 
 /// The figures that a page draws, by name.
@@ -76,7 +76,7 @@ fn its_figures_are_those_of_tune() {
 /// A figure for which there is nothing is no column.
 #[test]
 fn on_a_log_it_has_what_a_log_can_tell() {
-    let folder = Folder::new();
+    let folder = unproved();
     let page = page(&folder, &["study.toml", "log.csv"]);
     let table = page.split("<section id=\"tradeoff\">").nth(1).unwrap();
     let table = table.split("</section>").next().unwrap();

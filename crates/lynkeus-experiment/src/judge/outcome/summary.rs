@@ -83,7 +83,7 @@ struct ParticleCounts {
 
 impl Outcome {
     /// The run in figures, as the command's `--json` prints it.
-    pub fn to_json(&self) -> Value {
+    pub fn entries(&self) -> Value {
         let estimated = || {
             let quantities = self.quantities.iter();
             quantities.filter_map(|q| Some((q, q.estimate.as_ref()?)))
