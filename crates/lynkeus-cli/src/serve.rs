@@ -2,10 +2,11 @@
 
 use std::io;
 use std::sync::Arc;
+use std::thread;
 
 use clap::{Args, ValueEnum};
 
-use lynkeus::{Error, interrupt};
+use lynkeus::{Answer, Error, Study, interrupt};
 use lynkeus_serve::{Board, Engine, Format, Reader, http, mqtt};
 
 use super::ending::Ending;
@@ -79,6 +80,7 @@ pub(super) fn serve(source: &Source, options: &Options) -> Result<Ending, Error>
             let listening = http::listen(&address.text, token, Arc::clone(&board));
             let own = listening.map_err(|error| address.blame(error))?;
             output::note(&format!("the page is at http://{own}/"));
+            prove(study.clone(), Arc::clone(&board));
             Some(board)
         }
     };
@@ -103,4 +105,14 @@ pub(super) fn serve(source: &Source, options: &Options) -> Result<Ending, Error>
         (None, None) => {}
     }
     Ok(Ending::Done)
+}
+
+/// Finds in a thread of its own what is proved of a study's observer, for the page.
+fn prove(study: Study, board: Arc<Board>) {
+    thread::spawn(move || {
+        // what the command would refuse to prove is not known
+        if let Ok(report) = lynkeus::certify(&study) {
+            board.is_proved(report.document().to_html());
+        }
+    });
 }

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use lynkeus::explain;
+use lynkeus::run::filter::{Innovation, Reading};
 use lynkeus::run::{Late, Revised, is_of_row};
 use lynkeus::stream::Stream;
 use lynkeus::table::Instant;
@@ -35,6 +36,8 @@ pub struct Line {
     pub notes: Vec<String>,
     /// it was told so before: its row came once more
     pub is_repeated: bool,
+    /// by sensor, reading less expectation and the deviation of that; none where it was not judged
+    pub innovations: Vec<Option<(f64, f64)>>,
 }
 
 /// A row that was told, and may be told again.
@@ -281,6 +284,10 @@ impl Asset {
             innovations: late.innovations().to_vec(),
         });
         let mut told = vec![];
+        let judged = |innovation: &Innovation| match innovation.reading {
+            Reading::Missing | Reading::AtLimit => None,
+            Reading::Taken | Reading::Rejected => Some((innovation.value, innovation.deviation)),
+        };
         for revised in changed {
             let Revised {
                 t,
@@ -320,7 +327,7 @@ impl Asset {
                 // it was told so long ago that nobody asks
                 None => continue,
             }
-            told.push(place);
+            told.push((place, innovations.iter().map(judged).collect()));
         }
         let doubts = self.doubts();
         let notes = |place: usize| match jumped {
@@ -329,9 +336,12 @@ impl Asset {
             }
             _ => vec![],
         };
-        let rows = told.iter().filter_map(|place| {
-            let row = self.published.get(*place)?;
-            Some(self.line(row, doubts.clone(), notes(*place)))
+        let rows = told.into_iter().filter_map(|(place, innovations)| {
+            let row = self.published.get(place)?;
+            Some(Line {
+                innovations,
+                ..self.line(row, doubts.clone(), notes(place))
+            })
         });
         rows.collect()
     }
@@ -372,6 +382,7 @@ impl Asset {
             revision: row.revision,
             notes,
             is_repeated: false,
+            innovations: vec![],
         }
     }
 

@@ -3,14 +3,16 @@
 use std::collections::VecDeque;
 use std::fmt::Write;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 use lynkeus::stream::Stream;
 use lynkeus::table::exact;
 
 use crate::asset::Line;
+use crate::engine::Arrival;
 use crate::json;
+use crate::row::Stamp;
 
 /// Lines that are kept for those who come later, of all assets together and of one.
 const KEPT: usize = 60_000;
@@ -26,6 +28,7 @@ pub struct Board {
     stream: Arc<Stream>,
     names: Vec<String>,
     inner: Mutex<Inner>,
+    proved: OnceLock<String>,
     /// lines of an asset that are kept
     kept: usize,
 }
@@ -41,26 +44,37 @@ struct Inner {
 #[derive(Clone, Debug, Default)]
 struct Latest {
     line: Option<Line>,
-    /// as JSON, the newest last
-    lines: VecDeque<Arc<str>>,
+    /// the newest last
+    lines: VecDeque<Shown>,
+    /// as they came, the newest last
+    rows: VecDeque<(Stamp, Vec<f64>)>,
     came: Option<Instant>,
-    rows: u64,
+    count: u64,
     revisions: u64,
+}
+
+/// A line for those who look.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    /// as JSON
+    pub line: Arc<str>,
+    /// its innovations by sensor, as JSON; none where nothing was judged
+    pub innovations: Option<Arc<str>>,
 }
 
 /// What a listener hears of an asset.
 #[derive(Debug)]
 pub struct Heard {
     /// the lines that are kept, the newest last
-    pub before: Vec<Arc<str>>,
+    pub before: Vec<Shown>,
     /// each as it is told
-    pub lines: Receiver<Arc<str>>,
+    pub lines: Receiver<Shown>,
 }
 
 #[derive(Debug)]
 struct Listener {
     asset: usize,
-    lines: SyncSender<Arc<str>>,
+    lines: SyncSender<Shown>,
 }
 
 impl Board {
@@ -74,6 +88,7 @@ impl Board {
                 assets,
                 ..Inner::default()
             }),
+            proved: OnceLock::new(),
             names,
             stream,
         }
@@ -91,12 +106,13 @@ impl Board {
 
     /// The study.
     #[must_use]
-    pub fn stream(&self) -> &Stream {
+    pub fn stream(&self) -> &Arc<Stream> {
         &self.stream
     }
 
-    /// Takes the lines that answer a row.
-    pub fn told(&self, asset: usize, lines: &[Line]) {
+    /// Takes a row and the lines that answer it.
+    pub fn told(&self, row: &Arrival, lines: &[Line]) {
+        let asset = row.asset;
         let name = self.names.get(asset).map_or("", String::as_str);
         let mut inner = self.lock();
         let Inner {
@@ -105,21 +121,30 @@ impl Board {
         let Some(latest) = assets.get_mut(asset) else {
             return;
         };
-        latest.rows += 1;
+        latest.count += 1;
         latest.came = Some(Instant::now());
+        if lines.iter().any(|line| !line.is_repeated) {
+            latest.rows.push_back((row.stamp, row.values.clone()));
+            if latest.rows.len() > self.kept {
+                latest.rows.pop_front();
+            }
+        }
         for line in lines.iter().filter(|line| !line.is_repeated) {
             latest.revisions += u64::from(line.revision > 0);
             let mut text = String::new();
             json::write(line, name, &self.stream, &mut text);
-            let text: Arc<str> = Arc::from(text.trim_end());
-            latest.lines.push_back(Arc::clone(&text));
+            let text = Shown {
+                line: Arc::from(text.trim_end()),
+                innovations: json::innovations(line, &self.stream).map(Arc::from),
+            };
+            latest.lines.push_back(text.clone());
             if latest.lines.len() > self.kept {
                 latest.lines.pop_front();
             }
             listeners.retain(|listener| {
                 listener.asset != asset
                     || !matches!(
-                        listener.lines.try_send(Arc::clone(&text)),
+                        listener.lines.try_send(text.clone()),
                         Err(TrySendError::Full(_) | TrySendError::Disconnected(_))
                     )
             });
@@ -128,6 +153,26 @@ impl Board {
         if let Some(line) = lines.last() {
             latest.line = Some(line.clone());
         }
+    }
+
+    /// The last rows of an asset, as they came.
+    #[must_use]
+    pub fn rows(&self, asset: usize) -> Vec<(Stamp, Vec<f64>)> {
+        let inner = self.lock();
+        let own = inner.assets.get(asset);
+        own.map_or(vec![], |own| own.rows.iter().cloned().collect())
+    }
+
+    /// What is proved of the observer, as HTML.
+    pub fn is_proved(&self, text: String) {
+        // it is found once
+        let _ = self.proved.set(text);
+    }
+
+    /// The same, once it is known.
+    #[must_use]
+    pub fn proved(&self) -> Option<&str> {
+        self.proved.get().map(String::as_str)
     }
 
     /// A row, or a line that was none, was refused.
@@ -158,7 +203,7 @@ impl Board {
         let all = self.names.iter().zip(&inner.assets).enumerate();
         let lines = all.filter(|(place, _)| only.is_none_or(|only| only == *place));
         let lines = lines.filter_map(|(_, (name, latest))| {
-            let line = latest.lines.back()?;
+            let line = &latest.lines.back()?.line;
             Some(format!("{}:{line}", serde_json::Value::from(name.as_str())))
         });
         let lines: Vec<String> = lines.collect();
@@ -198,7 +243,7 @@ impl Board {
             "rows_total",
             "counter",
             "Rows that were answered.",
-            of_each(&|l| Some(l.rows.to_string())),
+            of_each(&|l| Some(l.count.to_string())),
         );
         family(
             "revisions_total",

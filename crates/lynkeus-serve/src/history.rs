@@ -339,6 +339,7 @@ mod tests {
             revision: 2,
             notes: vec![],
             is_repeated: false,
+            innovations: vec![],
         }
     }
 

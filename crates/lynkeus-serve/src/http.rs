@@ -1,19 +1,21 @@
 //! A page, its events, the last estimates and counters, over HTTP: to look at, never to change anything.
 //!
-//! One request of a connection, `GET` alone, a few fixed paths: there is nothing that leads to a file.
+//! One request of a connection, a few fixed paths, `GET` alone but for a trial of another tuning, which is a copy:
+//! there is nothing that leads to a file.
 
 use std::io::{self, Read, Write};
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::RecvTimeoutError;
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use lynkeus::{Error, report_parts as parts};
+use lynkeus::{Error, report_parts as parts, tune, visible};
 use serde_json::json;
 
-use crate::board::{Board, Heard};
+use crate::board::{Board, Heard, Shown};
+use crate::sandbox;
 
 /// Bytes of a request, at most.
 const LONGEST: usize = 8 << 10;
@@ -41,6 +43,8 @@ struct Server {
     board: Arc<Board>,
     token: Option<String>,
     open: AtomicUsize,
+    /// whoever tries another tuning has it
+    trial: Mutex<()>,
 }
 
 /// Answers at this address, from threads of its own, until the program ends; the address, with its port.
@@ -68,6 +72,7 @@ pub fn listen(
         board,
         token,
         open: AtomicUsize::new(0),
+        trial: Mutex::new(()),
     });
     thread::spawn(move || {
         for connection in listener.incoming().flatten() {
@@ -107,12 +112,17 @@ impl Server {
                 "a token is needed\n",
             );
         }
-        if !request.is_get {
+        let is_trial = request.path == "/try";
+        if request.is_get == is_trial {
             return send(
                 &mut to,
                 "405 Method Not Allowed",
                 "text/plain",
-                "GET alone\n",
+                if is_trial {
+                    "POST alone\n"
+                } else {
+                    "GET alone\n"
+                },
             );
         }
         let asset = request.asked("asset").unwrap_or_default();
@@ -130,8 +140,18 @@ impl Server {
                 let body = self.board.estimates(only);
                 send(&mut to, "200 OK", "application/json", &body)
             }
+            "/proved" => match self.board.proved() {
+                Some(text) => send(&mut to, "200 OK", "text/html; charset=utf-8", text),
+                None => send(&mut to, "404 Not Found", "text/plain", "not known so far\n"),
+            },
+            "/try" => {
+                let (status, body) = self.trial(&request, place);
+                send(&mut to, status, "application/json", &body)
+            }
             "/events" => match place {
-                Some(place) => self.events(&mut to, place),
+                Some(place) => {
+                    self.events(&mut to, place, request.asked("with") == Some("innovations"))
+                }
                 None => send(&mut to, "404 Not Found", "text/plain", "no such asset\n"),
             },
             _ => send(&mut to, "404 Not Found", "text/plain", "nothing is here\n"),
@@ -163,24 +183,53 @@ impl Server {
             json!({
                 "name": told.name, "header": told.header, "deviation": told.deviation,
                 "unit": told.unit, "description": told.description,
+                // an end that is infinite is none
+                "range": [told.range.0, told.range.1],
             })
         });
+        let sensors = stream.channels.iter().filter(|channel| channel.is_sensor);
         let data = json!({
             "time": stream.told_time,
             "assets": self.board.names(),
             "told": told.collect::<Vec<_>>(),
+            "sensors": sensors.map(|sensor| &sensor.name).collect::<Vec<_>>(),
+            "keys": tune::usual(stream.study()),
         });
         // no text of a study ends the element
         let data = data.to_string().replace('<', "\\u003c");
         let (style, plot_style, script) = (parts::STYLE, parts::PLOT_STYLE, SCRIPT);
         let (plot, license) = (parts::PLOT, parts::PLOT_LICENSE);
         format!(
-            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>Estimates</title>\n<style>\n{plot_style}\n{style}\n</style>\n</head>\n<body>\n<h1>Estimates</h1>\n<p class=\"lead\"><select id=\"asset\"></select> <span id=\"verdict\" class=\"verdict\">…</span> <span id=\"status\">connecting</span></p>\n<ul id=\"notes\"></ul>\n<div id=\"charts\"></div>\n<script type=\"application/json\" id=\"data\">{data}</script>\n<script>\n/*\n{license}*/\n{plot}\n</script>\n<script>\n{script}\n</script>\n</body>\n</html>\n"
+            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>Estimates</title>\n<style>\n{plot_style}\n{style}\n</style>\n</head>\n<body>\n<h1>Estimates</h1>\n<p class=\"lead\"><select id=\"asset\"></select> <span id=\"verdict\" class=\"verdict\">…</span> <span id=\"status\">connecting</span></p>\n<ul id=\"notes\"></ul>\n<div class=\"wide\"><table id=\"now\"></table></div>\n<div id=\"charts\"></div>\n<h2>Innovations</h2>\n<p>Reading less expectation, in its standard deviations: of a sound estimate 95 of 100 are within \u{b1} 2.</p>\n<div id=\"innovations\"></div>\n<h2>Another tuning</h2>\n<form id=\"trial\"><select id=\"key\"></select> <input id=\"value\" type=\"number\" step=\"any\" min=\"0\" value=\"2\"> <button>Try on the last rows</button> <span id=\"tried\"></span></form>\n<div id=\"trials\"></div>\n<h2>What is proved</h2>\n<div id=\"proved\">not known so far</div>\n<script type=\"application/json\" id=\"data\">{data}</script>\n<script>\n/*\n{license}*/\n{plot}\n</script>\n<script>\n{script}\n</script>\n</body>\n</html>\n"
         )
     }
 
+    /// What another tuning would have told.
+    fn trial(&self, request: &Request, asset: Option<usize>) -> (&'static str, String) {
+        let refuse = |why: &str| ("400 Bad Request", format!("{}\n", json!({ "error": why })));
+        let Some(asset) = asset else {
+            return refuse("no such asset");
+        };
+        let value = request.asked("value").and_then(|value| value.parse().ok());
+        let value = value.filter(|value: &f64| value.is_finite() && *value > 0.0);
+        let (Some(key), Some(value)) = (request.asked("key"), value) else {
+            return refuse("expected a `key` of [tune] and a `value` > 0");
+        };
+        // a design may take all there is of a processor
+        let Ok(_own) = self.trial.try_lock() else {
+            return (
+                "503 Service Unavailable",
+                "{\"error\":\"another trial is under way\"}\n".to_owned(),
+            );
+        };
+        match sandbox::tried(self.board.stream(), self.board.rows(asset), (key, value)) {
+            Ok(found) => ("200 OK", format!("{found}\n")),
+            Err(error) => refuse(&visible::line(error.message())),
+        }
+    }
+
     /// Server-sent events: the lines that are kept, then each as it is told.
-    fn events(&self, to: &mut TcpStream, asset: usize) -> io::Result<()> {
+    fn events(&self, to: &mut TcpStream, asset: usize, with_innovations: bool) -> io::Result<()> {
         let Some(Heard { before, lines }) = self.board.listen(asset) else {
             return send(
                 to,
@@ -191,13 +240,20 @@ impl Server {
         };
         let head = format!("HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\n{COMMON}\r\n");
         let mut text = head + "retry: 2000\n\n";
-        for line in before {
-            text += &format!("data: {line}\n\n");
+        let event = |shown: Shown| {
+            let Shown { line, innovations } = shown;
+            match innovations.filter(|_| with_innovations) {
+                Some(own) => format!("data: {line}\n\nevent: innovations\ndata: {own}\n\n"),
+                None => format!("data: {line}\n\n"),
+            }
+        };
+        for shown in before {
+            text += &event(shown);
         }
         to.write_all(text.as_bytes())?;
         loop {
             match lines.recv_timeout(BEAT) {
-                Ok(line) => to.write_all(format!("data: {line}\n\n").as_bytes())?,
+                Ok(shown) => to.write_all(event(shown).as_bytes())?,
                 Err(RecvTimeoutError::Timeout) => to.write_all(b":\n\n")?,
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }

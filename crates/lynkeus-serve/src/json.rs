@@ -100,11 +100,7 @@ fn field(message: &Map<String, Value>, key: &str) -> Field {
 /// Appends what is told of a row, with the end of its line.
 pub fn write(line: &Line, asset: &str, stream: &Stream, to: &mut String) {
     to.push('{');
-    key(&stream.told_time, to);
-    match line.stamp {
-        Stamp::Number(t) => to.push_str(&exact(t)),
-        date @ Stamp::Date(_) => text(&date.to_string(), to),
-    }
+    time(line, stream, to);
     if !asset.is_empty() {
         to.push(',');
         key(ASSET, to);
@@ -142,6 +138,41 @@ pub fn write(line: &Line, asset: &str, stream: &Stream, to: &mut String) {
         to.push(']');
     }
     to.push_str("}\n");
+}
+
+/// The innovations of a line under the names of the sensors, with its time: each with its deviation. None where there
+/// is none.
+#[must_use]
+pub fn innovations(line: &Line, stream: &Stream) -> Option<String> {
+    line.innovations.iter().find(|found| found.is_some())?;
+    let mut to = String::from("{");
+    time(line, stream, &mut to);
+    to.push_str(",\"innovations\":{");
+    let sensors = stream.channels.iter().filter(|channel| channel.is_sensor);
+    let mut is_first = true;
+    for (channel, found) in sensors.zip(&line.innovations) {
+        let Some((value, deviation)) = found else {
+            continue;
+        };
+        if !value.is_finite() || !deviation.is_finite() {
+            continue;
+        }
+        to.push_str(if is_first { "" } else { "," });
+        is_first = false;
+        key(&channel.name, &mut to);
+        // a string takes what is written
+        let _ = write!(to, "[{},{}]", exact(*value), exact(*deviation));
+    }
+    to.push_str("}}");
+    Some(to)
+}
+
+fn time(line: &Line, stream: &Stream, to: &mut String) {
+    key(&stream.told_time, to);
+    match line.stamp {
+        Stamp::Number(t) => to.push_str(&exact(t)),
+        date @ Stamp::Date(_) => text(&date.to_string(), to),
+    }
 }
 
 /// Appends why line `number` was not used.

@@ -22,13 +22,14 @@ pub mod json;
 pub mod mqtt;
 mod parquet;
 mod row;
+mod sandbox;
 mod sensor;
 mod state;
 pub mod stdio;
 
 pub use asset::Line;
 pub use assets::{Named, assets};
-pub use board::{Board, Heard};
+pub use board::{Board, Heard, Shown};
 pub use engine::{Answer, Arrival, Engine, Refusal};
 pub use row::{Reader, Stamp};
 pub use stdio::{Format, serve};

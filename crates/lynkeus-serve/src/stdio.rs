@@ -211,7 +211,7 @@ impl Service<'_> {
                 Asked::Row(place, asker) => {
                     if let Some(answer) = answers.get_mut(place) {
                         if let (Some(board), Ok(lines)) = (self.board, &*answer) {
-                            board.told(rows[place].asset, lines);
+                            board.told(&rows[place], lines);
                         }
                         let answer = std::mem::replace(answer, Ok(vec![]));
                         self.write(answer, (rows[place].stamp, &asker), &mut to);

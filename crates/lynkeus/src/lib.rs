@@ -119,6 +119,7 @@ pub mod report_parts {
 
 /// Values of keys, tried: which is best.
 pub mod tune {
+    pub use lynkeus_experiment::tune::axis::{changed, usual};
     pub use lynkeus_experiment::tune::{Axis, Change, Foretold, Measure, Peak, Row, Sweep, tune};
 }
 

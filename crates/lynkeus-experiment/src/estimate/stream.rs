@@ -217,6 +217,12 @@ impl Stream {
         self.study.estimate.strict
     }
 
+    /// The study.
+    #[must_use]
+    pub fn study(&self) -> &Study {
+        &self.study
+    }
+
     /// The file of the study, for messages.
     #[must_use]
     pub fn file(&self) -> &str {

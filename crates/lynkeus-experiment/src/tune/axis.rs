@@ -259,6 +259,30 @@ pub fn grid(study: &Study, axes: &[Axis]) -> Result<Vec<(Vec<f64>, Study)>, Erro
     Ok(grid)
 }
 
+/// A study with another value at a key of `[tune]`: of a number the value itself, of lists and tables a factor of all
+/// their numbers.
+///
+/// # Errors
+/// No family that the study allows has the key, or the study does not say it.
+pub fn changed(study: &Study, key: &str, value: f64) -> Result<Study, Error> {
+    let mut study = study.clone();
+    let (text, place) = (key.to_owned(), None);
+    study.tune.keys = vec![(Name { text, place }, Values::Listed(vec![value]))];
+    let axes = axes(&study)?;
+    let found = grid(&study, &axes)?.into_iter().next();
+    let none = || Error::input(format!("no study has {value} at \"{key}\""));
+    found.map(|(_, study)| study).ok_or_else(none)
+}
+
+/// The keys that are changed first: what a filter weighs readings by, or how fast an observer is.
+#[must_use]
+pub fn usual(study: &Study) -> Vec<&'static str> {
+    match study.observer.families().all(|family| family.is_filter()) {
+        true => vec!["process_noise", "noise"],
+        false => speed(study).into_iter().collect(),
+    }
+}
+
 fn axis(study: &Study, name: &Name, values: &Values) -> Result<Axis, Error> {
     let refuse = |why: String| study.refuse_swept(name, &why);
     let swept = study.swept_key(name)?;

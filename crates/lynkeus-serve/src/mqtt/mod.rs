@@ -400,7 +400,7 @@ impl Service<'_> {
                 match answer {
                     Ok(lines) => {
                         if let Some(board) = self.board {
-                            board.told(row.asset, &lines);
+                            board.told(row, &lines);
                         }
                         for line in &lines {
                             publish(

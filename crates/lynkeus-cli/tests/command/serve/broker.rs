@@ -155,7 +155,7 @@ impl Client {
             heard,
             before: VecDeque::new(),
         };
-        assert_eq!(client.hear().as_deref(), Some("ready"));
+        client.is_back();
         client
     }
 
@@ -172,14 +172,23 @@ impl Client {
     /// Waits until the broker has all that was published.
     pub fn sent(&mut self) {
         self.send("?\n");
+        self.wait_for("there");
+    }
+
+    /// Waits until it is connected again.
+    pub fn is_back(&mut self) {
+        self.wait_for("ready");
+    }
+
+    /// Waits for a line of its own; what it hears meanwhile is kept.
+    fn wait_for(&mut self, words: &str) {
         while let Ok(line) = self.heard.recv_timeout(LIMIT) {
-            match line == "there" {
+            match line == words {
                 true => return,
-                // for those who hear later
                 false => self.before.push_back(line),
             }
         }
-        panic!("the broker does not take what is published");
+        panic!("the client does not say \"{words}\"");
     }
 
     fn send(&mut self, line: &str) {

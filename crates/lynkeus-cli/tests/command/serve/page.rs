@@ -146,6 +146,61 @@ fn a_wrong_token_gets_nothing() {
     );
 }
 
+/// A trial is a copy: what the estimator tells is as it was.
+#[test]
+fn a_trial_of_another_tuning_changes_nothing() {
+    let port = port();
+    let folder = folder_with(port, "token = \"s3cret\"");
+    let rows = rows(44, 30, true);
+    let mut serving = Serving::new(&folder, "json", "");
+    serving.send(&json(&rows[..20]));
+    let mut told: Vec<Value> = (0..20)
+        .map(|_| serde_json::from_str(&serving.answer().unwrap()).unwrap())
+        .collect();
+    let post = |query: &str| {
+        let request =
+            format!("POST /try?{query} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
+        asked(port, request.as_bytes())
+    };
+    assert!(post("asset=&key=noise&value=2").starts_with("HTTP/1.1 401 "));
+    assert!(
+        get(port, "/try?token=s3cret&asset=&key=noise&value=2", "").starts_with("HTTP/1.1 405 ")
+    );
+    let found: Value =
+        serde_json::from_str(body(&post("token=s3cret&asset=&key=noise&value=2"))).unwrap();
+    // as a study with that noise gives it
+    let other = folder_with(port, "");
+    other.change("study.toml", "y = 0.1, a = 0.1", "y = 0.2, a = 0.2");
+    for (folder, name) in [(&folder, "present"), (&other, "tried")] {
+        let expected = estimated(folder, &rows[..20]);
+        for (row, x) in rows
+            .iter()
+            .zip(found[name]["level_hat"].as_array().unwrap())
+        {
+            assert_eq!(
+                expected[&row.t.to_bits()]["level_hat"],
+                x.as_f64().unwrap().to_bits(),
+                "{name}"
+            );
+        }
+    }
+    for wrong in [
+        "asset=&key=noise",
+        "asset=&key=noise&value=nan",
+        "asset=b&key=noise&value=1",
+        "asset=&key=..%2Fx&value=1",
+        "asset=&key=theta&value=2",
+    ] {
+        let answer = post(&format!("token=s3cret&{wrong}"));
+        assert!(answer.starts_with("HTTP/1.1 400 "), "{wrong}: {answer}");
+    }
+    serving.send(&json(&rows[20..]));
+    told.extend(
+        (20..30).map(|_| -> Value { serde_json::from_str(&serving.answer().unwrap()).unwrap() }),
+    );
+    assert!(last(&told) == estimated(&folder, &rows));
+}
+
 /// Sizes, names, bytes and paths that nobody should send.
 #[test]
 fn hostile_requests_change_nothing() {
