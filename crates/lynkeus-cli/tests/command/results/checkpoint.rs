@@ -109,13 +109,13 @@ fn killed(folder: &Folder, later: Duration) -> bool {
 #[track_caller]
 fn goes_on(prepare: impl Fn(&Folder)) {
     let was_killed = LONG.into_iter().any(|long| went_on(&slow(long, &prepare)));
-    assert!(was_killed, "too fast to be killed");
+    assert!(was_killed, "too fast to be killed with something kept");
 }
 
-/// False where it ended before it was killed as often as wanted.
+/// False where it ended before it was killed as often as wanted, or had kept nothing by then.
 #[track_caller]
 fn went_on(Slow { folder, whole, .. }: &Slow) -> bool {
-    for later in [0, 37, 120, 60] {
+    for later in [0, 37, 210, 90] {
         if !killed(folder, Duration::from_millis(later)) {
             return false;
         }
@@ -130,12 +130,11 @@ fn went_on(Slow { folder, whole, .. }: &Slow) -> bool {
     std::fs::write(folder.path.path().join(CHECKPOINT), torn).unwrap();
     let ended = folder.run(&ARGUMENTS);
     assert_eq!(ended.code, 0, "{}", ended.err);
-    assert!(ended.err.contains("went on after row"), "{}", ended.err);
     assert!(folder.read("e.csv") == *whole, "another result");
     for file in [CHECKPOINT, JUDGED] {
         assert!(!folder.files().contains(&file.to_owned()), "{file}");
     }
-    true
+    ended.err.contains("went on after row")
 }
 
 const FILTER: &str =
