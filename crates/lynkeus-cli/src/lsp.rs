@@ -166,7 +166,8 @@ impl Sheets {
         let found = self.0.iter().enumerate().find_map(|(file, sheet)| {
             let rest = place.strip_prefix(sheet.name.as_str())?;
             let mut numbers = rest.strip_prefix(':')?.split(':');
-            let mut next = || numbers.next()?.parse::<usize>().ok();
+            // they count from 1
+            let mut next = || numbers.next()?.parse::<usize>().ok()?.checked_sub(1);
             Some((file, sheet.word(next()?, next()?)))
         });
         found.unwrap_or((0, 0..0))
@@ -181,12 +182,12 @@ impl Sheets {
 }
 
 impl Sheet {
-    /// The bytes of the word or text that begins there; line and column, in characters, count from 1.
+    /// The bytes of the word or text that begins there; line and column, in characters, count from 0.
     fn word(&self, line: usize, column: usize) -> Range<usize> {
         let mut lines = self.text.split_inclusive('\n');
-        let before: usize = lines.by_ref().take(line - 1).map(str::len).sum();
+        let before: usize = lines.by_ref().take(line).map(str::len).sum();
         let line = lines.next().unwrap_or_default().trim_end();
-        let within: usize = line.chars().take(column - 1).map(char::len_utf8).sum();
+        let within: usize = line.chars().take(column).map(char::len_utf8).sum();
         let rest = &line[within..];
         let length = match rest.chars().next() {
             Some(quote @ ('"' | '\'')) => rest[1..].find(quote).map(|end| end + 2),
@@ -202,7 +203,7 @@ impl Sheet {
         let named = lines.find(|(_, line)| line.trim_start().starts_with("plant"));
         named.map_or(0..0, |(number, line)| {
             let value = line.find(['"', '\'']).unwrap_or_default();
-            self.word(number + 1, line[..value].chars().count() + 1)
+            self.word(number, line[..value].chars().count())
         })
     }
 }

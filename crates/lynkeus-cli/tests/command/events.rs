@@ -17,7 +17,8 @@ equation
 end Ball;
 ";
 
-const THERMOSTAT: &str = "model Thermostat
+/// A heater with a hysteresis, of a power that has to be found.
+pub(crate) const THERMOSTAT: &str = "model Thermostat
   Real T(start = 18);
   Real heat(start = 8);
   Boolean on(start = true);

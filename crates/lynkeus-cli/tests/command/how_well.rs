@@ -148,24 +148,7 @@ fn disturbances_that_are_not_counted_are_named() {
 #[test]
 fn what_is_known_goes_through_events() {
     let folder = Folder::empty();
-    folder.write(
-        "m.mo",
-        "model Thermostat
-  Real T(start = 18);
-  Real heat(start = 8);
-  Boolean on(start = true);
-  output Real y = T;
-equation
-  der(T) = (if on then heat else 0) - 0.5*(T - 12);
-  der(heat) = 0;
-  when T >= 21 then
-    on = false;
-  elsewhen T <= 19 then
-    on = true;
-  end when;
-end Thermostat;
-",
-    );
+    folder.write("m.mo", crate::events::THERMOSTAT);
     let study = "plant = \"m.mo\"\nsensors = { noise = { y = 0.3 } }\n[simulate]\nuntil = 5\noutput_step = 0.05\n";
     folder.write("s.toml", study);
     let ended = folder.run(&["check", "s.toml", "--how-well", "--json"]);

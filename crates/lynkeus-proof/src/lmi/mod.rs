@@ -192,8 +192,7 @@ impl Problem {
     /// # Errors
     /// [`Failure`].
     pub fn inside(&self) -> Result<DVector<f64>, Failure> {
-        let enough = |s: f64, gap: f64| gap < INSIDE * s.abs() || gap < 1e-2 * MARGIN;
-        self.relaxed(enough, |_, _, _| false)
+        self.relaxed(is_well_inside, |_, _, _| false)
     }
 
     /// A point inside, taken as soon as one is met with some margin, and given up where none is likely to
@@ -202,8 +201,7 @@ impl Problem {
     /// # Errors
     /// [`Failure`]; [`Failure::Infeasible`] where the search gave up, too.
     pub fn inside_soon(&self) -> Result<DVector<f64>, Failure> {
-        let enough = |s: f64, gap: f64| gap < INSIDE * s.abs() || gap < 1e-2 * MARGIN;
-        self.relaxed(enough, |s, gap, steps| {
+        self.relaxed(is_well_inside, |s, gap, steps| {
             let is_there = s < -MARGIN.max(gap);
             let is_hopeless = s > HOPELESS * gap && steps > PATIENCE;
             is_there || is_hopeless
@@ -264,6 +262,11 @@ impl Problem {
             false => Err(self.failure()),
         }
     }
+}
+
+/// Whether no point can be much further inside than one that holds every inequality relaxed by s.
+fn is_well_inside(s: f64, gap: f64) -> bool {
+    gap < INSIDE * s.abs() || gap < 1e-2 * MARGIN
 }
 
 #[cfg(test)]
