@@ -6,6 +6,7 @@ use std::thread;
 
 use clap::{Args, ValueEnum};
 
+use lynkeus::study::ServeSettings;
 use lynkeus::{Answer, Error, Study, interrupt};
 use lynkeus_serve::{Board, Engine, Format, Reader, http, mqtt};
 
@@ -16,7 +17,7 @@ use super::output;
 /// How a study is served.
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// Rows come on standard input and estimates go to standard output, written in this; without it they come and go as `mqtt` in [serve] says
+    /// Rows come on standard input and estimates go to standard output, written in this; without it they come and go as `mqtt` or `opcua` in [serve] says
     #[arg(long, value_enum, value_name = "FORMAT")]
     stdio: Option<Messages>,
     /// No notes on standard error, only warnings
@@ -45,11 +46,8 @@ impl From<Messages> for Format {
 pub(super) fn serve(source: &Source, options: &Options) -> Result<Ending, Error> {
     let study = &source.study;
     let settings = &study.serve;
-    if options.stdio.is_none() && settings.mqtt.is_none() {
-        let error = Error::input("no rows would come").at(&study.file);
-        return Err(error.hint(
-            "add `--stdio json` (or influx), or `mqtt` with a broker to [serve] of the study",
-        ));
+    if options.stdio.is_none() {
+        has_one_way(study)?;
     }
     let files = source
         .files()
@@ -102,9 +100,52 @@ pub(super) fn serve(source: &Source, options: &Options) -> Result<Ending, Error>
             &interrupt::interrupted,
             &mut output::note,
         )?,
-        (None, None) => {}
+        (None, None) => nodes(&mut engine, door, settings)?,
     }
     Ok(Ending::Done)
+}
+
+/// Without standard input rows come one way.
+fn has_one_way(study: &Study) -> Result<(), Error> {
+    match (&study.serve.mqtt, &study.serve.opcua) {
+        (None, None) => {
+            let error = Error::input("no rows would come").at(&study.file);
+            Err(error.hint(
+                "add `--stdio json` (or influx), or `mqtt` with a broker or `opcua` with a server to [serve] of the study",
+            ))
+        }
+        (Some(_), Some(opcua)) => {
+            let error = Error::input("rows would come from two sides: [serve] has `mqtt` and `opcua`");
+            Err(opcua.url.blame(error.hint(
+                "leave one out; a second service with a study of its own can pass values on",
+            )))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Between nodes of a server, where this program can do that.
+fn nodes(
+    engine: &mut Engine,
+    door: (Reader, Option<&Board>),
+    settings: &ServeSettings,
+) -> Result<(), Error> {
+    let Some(settings) = &settings.opcua else {
+        return Ok(());
+    };
+    #[cfg(feature = "opcua")]
+    {
+        let (is_over, note) = (&interrupt::interrupted, &mut output::note);
+        lynkeus_serve::opcua::serve(engine, door, settings, is_over, note)
+    }
+    #[cfg(not(feature = "opcua"))]
+    {
+        let _ = (engine, door);
+        let error = Error::input("this program was built without OPC UA");
+        Err(settings.url.blame(error.hint(
+            "build it with `cargo install lynkeus-cli --features opcua`, or let Telegraf or Node-RED bring the values",
+        )))
+    }
 }
 
 /// Finds in a thread of its own what is proved of a study's observer, for the page.

@@ -4,7 +4,7 @@
 //! `state`, takes them to the estimators of their assets, and answers each with lines: the estimate at the row, and
 //! corrections of what was told before where a row came late. What it answered is on the disk, so that it goes on
 //! after `kill -9` as if nothing had been. [`stdio`] is the loop between standard input and output,
-//! [`mqtt`] the one between topics of a broker.
+//! [`mqtt`] the one between topics of a broker, `opcua` (a feature) the one between nodes of a server.
 //!
 //! It knows studies as [`Stream`](lynkeus::stream::Stream) has them, and no family, plant or file of one.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
@@ -19,7 +19,10 @@ mod history;
 pub mod http;
 pub mod influx;
 pub mod json;
+mod live;
 pub mod mqtt;
+#[cfg(feature = "opcua")]
+pub mod opcua;
 mod parquet;
 mod row;
 mod sandbox;

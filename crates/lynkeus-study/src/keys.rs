@@ -625,7 +625,7 @@ pub(super) const ESTIMATE: [KeySpec; 12] = [
 ];
 
 /// `[serve]`
-pub(super) const SERVE: [KeySpec; 8] = [
+pub(super) const SERVE: [KeySpec; 9] = [
     KeySpec {
         name: "wait",
         shape: Shape::NotNegative,
@@ -676,6 +676,69 @@ pub(super) const SERVE: [KeySpec; 8] = [
         shape: Shape::Section(&[&MQTT]),
         default: "none",
         meaning: "the MQTT broker from which rows come and to which estimates go ([serve](serve.md#mqtt))",
+    },
+    KeySpec {
+        name: "opcua",
+        shape: Shape::Section(&[&OPCUA]),
+        default: "none",
+        meaning: "the OPC UA server whose nodes are read and written ([serve](serve.md#opc-ua))",
+    },
+];
+
+/// `opcua` in `[serve]`
+pub(super) const OPCUA: [KeySpec; 8] = [
+    KeySpec {
+        name: "url",
+        shape: Shape::Text,
+        default: REQUIRED,
+        meaning: "where the server is: `\"opc.tcp://host:4840\"`, with the path that it may have",
+    },
+    KeySpec {
+        name: "nodes",
+        shape: Shape::As("table: column = node", &Shape::Table(&Shape::Text)),
+        default: REQUIRED,
+        meaning: "the nodes that are read, by the names that columns have in a log: `level = \"ns=2;s=Tank.Level\"`. With `assets`, `{asset}` in a node is the asset's name",
+    },
+    KeySpec {
+        name: "write",
+        shape: Shape::As("table: estimate = node", &Shape::Table(&Shape::Text)),
+        default: "none: nothing is written",
+        meaning: "the nodes that are written, by the names in the answers of `serve`: `upper_hat = \"ns=2;s=Tank.Upper\"`",
+    },
+    KeySpec {
+        name: "interval",
+        shape: Shape::Positive,
+        default: "0.5",
+        meaning: "seconds between what the server sends; every change in between is in it",
+    },
+    KeySpec {
+        name: "user",
+        shape: Shape::Text,
+        default: "none: anonymous",
+        meaning: "who this is to the server",
+    },
+    KeySpec {
+        name: "password",
+        shape: Shape::Text,
+        default: "the variable `LYNKEUS_OPCUA_PASSWORD` of the environment, if there is one",
+        meaning: "the user's password",
+    },
+    KeySpec {
+        name: "security",
+        shape: Shape::Word(&[
+            "None",
+            "Basic256Sha256",
+            "Aes128_Sha256_RsaOaep",
+            "Aes256_Sha256_RsaPss",
+        ]),
+        default: "`\"None\"`",
+        meaning: "the security policy; with any but `None` messages are signed and encrypted",
+    },
+    KeySpec {
+        name: "pki",
+        shape: Shape::As("path, from the study's folder", &Shape::Text),
+        default: "`\"pki\"`",
+        meaning: "folder of certificates, where `security` needs them: `own/cert.der` and `private/private.pem` of this client (made if they are not there), `trusted/` for the server's",
     },
 ];
 

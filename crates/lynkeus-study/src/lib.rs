@@ -58,7 +58,7 @@ pub use manifold::ManifoldSettings;
 pub use observer::ObserverSettings;
 pub use schema::schema;
 pub use sensors::{Late, Noise, Screen, Sensors, bias_of};
-pub use serve::{MqttSettings, MqttVersion, ServeSettings};
+pub use serve::{MqttSettings, MqttVersion, OpcuaSettings, ServeSettings};
 pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
 pub use tune::{Scale, Swept, TuneSettings, Values};

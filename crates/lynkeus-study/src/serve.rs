@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::Name;
-use super::keys::{MQTT, SERVE};
+use super::keys::{MQTT, OPCUA, SERVE};
 use super::section::Entry;
 use lynkeus_answer::Error;
 
@@ -26,6 +26,29 @@ pub struct ServeSettings {
     pub token: Option<Name>,
     /// The broker from which rows come, and to which estimates go.
     pub mqtt: Option<MqttSettings>,
+    /// The server of OPC UA whose nodes are read and written.
+    pub opcua: Option<OpcuaSettings>,
+}
+
+/// A server of OPC UA, and what is read and written there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OpcuaSettings {
+    /// Where it is: `opc.tcp://host:port`.
+    pub url: Name,
+    /// By column of a row, the node of its values.
+    pub nodes: Vec<(Name, Name)>,
+    /// By name in an answer, the node that gets it.
+    pub write: Vec<(Name, Name)>,
+    /// Seconds between what the server sends.
+    pub interval: f64,
+    /// Who this is.
+    pub user: Option<Name>,
+    /// What the server asks for beside it.
+    pub password: Option<Name>,
+    /// The name of the security policy.
+    pub security: &'static str,
+    /// The folder of the certificates.
+    pub pki: PathBuf,
 }
 
 /// A broker, and what is read and published there.
@@ -80,6 +103,9 @@ impl ServeSettings {
         for path in paths.into_iter().chain(mqtt).flatten() {
             *path = folder.join(&*path);
         }
+        if let Some(opcua) = &mut self.opcua {
+            opcua.pki = folder.join(&opcua.pki);
+        }
     }
 }
 
@@ -94,7 +120,44 @@ pub(super) fn read(entry: Entry<'_>) -> Result<ServeSettings, Error> {
         http: section.optional("http", Entry::name)?,
         token: section.optional("token", Entry::name)?,
         mqtt: section.optional("mqtt", mqtt)?,
+        opcua: section.optional("opcua", opcua)?,
     })
+}
+
+fn opcua(entry: Entry<'_>) -> Result<OpcuaSettings, Error> {
+    let no_url = entry.refuse_key("needs `url`, such as \"opc.tcp://localhost:4840\"");
+    let no_nodes =
+        entry.refuse_key("needs `nodes`, such as `nodes = { level = \"ns=2;s=Tank.Level\" }`");
+    let mut section = entry.section("opcua in [serve]", &OPCUA)?;
+    let policies = [
+        "None",
+        "Basic256Sha256",
+        "Aes128_Sha256_RsaOaep",
+        "Aes256_Sha256_RsaPss",
+    ]
+    .map(|name| (name, name));
+    let nodes = section.optional("nodes", names)?.unwrap_or_default();
+    if nodes.is_empty() {
+        return Err(no_nodes);
+    }
+    Ok(OpcuaSettings {
+        url: section.optional("url", Entry::name)?.ok_or(no_url)?,
+        nodes,
+        write: section.optional("write", names)?.unwrap_or_default(),
+        interval: section.optional("interval", Entry::positive)?.unwrap_or(0.5),
+        user: section.optional("user", Entry::name)?,
+        password: section.optional("password", Entry::name)?,
+        security: section
+            .optional("security", |e| e.choice(&policies))?
+            .unwrap_or("None"),
+        pki: section.optional("pki", path)?.unwrap_or("pki".into()),
+    })
+}
+
+/// A table of names by names.
+fn names(entry: Entry<'_>) -> Result<Vec<(Name, Name)>, Error> {
+    let pairs = entry.pairs()?.into_iter();
+    pairs.map(|(key, text)| Ok((key, text.name()?))).collect()
 }
 
 fn mqtt(entry: Entry<'_>) -> Result<MqttSettings, Error> {
@@ -103,12 +166,7 @@ fn mqtt(entry: Entry<'_>) -> Result<MqttSettings, Error> {
     let mut section = entry.section("mqtt in [serve]", &MQTT)?;
     let versions = [("3.1.1", MqttVersion::V3), ("5", MqttVersion::V5)];
     let version = section.optional("version", |e| e.choice(&versions))?;
-    let topics = section.optional("topics", |e| {
-        let pairs = e.pairs()?.into_iter();
-        pairs
-            .map(|(column, topic)| Ok((column, topic.name()?)))
-            .collect()
-    })?;
+    let topics = section.optional("topics", names)?;
     let settings = MqttSettings {
         url: section.optional("url", Entry::name)?.ok_or(refusal)?,
         version: version.unwrap_or_default(),

@@ -24,11 +24,12 @@ use crate::board::Board;
 use crate::engine::{Arrival, BATCH, Engine, Refusal};
 use crate::history::now;
 use crate::json;
+use crate::live::{Firsts, tell_refusal};
 use crate::row::Reader;
 use link::{KEEP_ALIVE, Link, Place};
 use outbox::Outbox;
 use packet::{Hello, Packet, Publish, Welcome};
-use topics::{Firsts, Part, Topics};
+use topics::{Part, Topics};
 
 /// What a broker says of a service, under `status`.
 const ON: &str = "online";
@@ -50,8 +51,6 @@ const LAST: Duration = Duration::from_millis(300);
 const AGAIN: Duration = Duration::from_secs(1);
 /// Messages that wait to be taken; more are left out where the broker keeps none.
 const MOST: usize = 1 << 16;
-/// Refusals that are told one by one, and then only each such multiple.
-const TOLD: u64 = 16;
 
 /// A message that waits to be taken.
 struct Inbound {
@@ -478,17 +477,7 @@ impl Service<'_> {
             if message.values.iter().all(|value| value.is_nan()) && is_part {
                 continue;
             }
-            let mut row = self.engine.arrival(&message)?;
-            if self.engine.has_begun(row.asset) {
-                self.firsts.forget(row.asset);
-            } else if !begun.contains(&row.asset) {
-                match self.firsts.take(row.asset, &message, self.engine) {
-                    Some((stamp, values)) => (row.stamp, row.values) = (stamp, values),
-                    None => continue,
-                }
-                begun.push(row.asset);
-            }
-            rows.push(row);
+            rows.extend(self.firsts.row(&message, self.engine, begun)?);
         }
         Ok(rows)
     }
@@ -523,16 +512,4 @@ fn publish(
         payload,
         retain: settings.retain,
     });
-}
-
-/// Why a message was not used; where there are many, now and then.
-fn tell_refusal((count, board): (u64, Option<&Board>), why: &str, tell: &mut dyn FnMut(&str)) {
-    if let Some(board) = board {
-        board.refused();
-    }
-    if count <= TOLD {
-        tell(why);
-    } else if count.is_power_of_two() {
-        tell(&format!("{why} ({count} such messages so far)"));
-    }
 }

@@ -1,7 +1,5 @@
 //! Topics, and what a message under one says.
 
-use std::collections::HashMap;
-
 use lynkeus::Error;
 use lynkeus::study::{MqttSettings, Name};
 use lynkeus::table::Instant;
@@ -229,57 +227,5 @@ pub(super) fn checked(pattern: &Name, engine: &Engine) -> Result<(), Error> {
             Err(pattern.blame(Error::input(text)))
         }
         _ => Ok(()),
-    }
-}
-
-/// Values before the first row of an asset, until there are enough for one.
-#[derive(Debug, Default)]
-pub(super) struct Firsts(HashMap<usize, Held>);
-
-/// By channel, the last value and when it was sampled.
-type Held = Vec<Option<(f64, Stamp)>>;
-
-impl Firsts {
-    /// The first row of an asset, once there is enough for it: the newest time that a value has, the last values of
-    /// known inputs, and of the sensors at whose first reading the estimate starts, and what else was read at that time.
-    pub fn take(
-        &mut self,
-        asset: usize,
-        message: &json::Message,
-        engine: &Engine,
-    ) -> Option<(Stamp, Vec<f64>)> {
-        let stream = engine.stream(asset)?;
-        let nothing = || vec![None; message.values.len()];
-        let held = self.0.entry(asset).or_insert_with(nothing);
-        for (own, value) in held.iter_mut().zip(&message.values) {
-            let is_older =
-                own.is_some_and(|(_, stamp): (f64, Stamp)| message.stamp.is_before(stamp));
-            if value.is_finite() && !is_older {
-                *own = Some((*value, message.stamp));
-            }
-        }
-        let stamps = held.iter().flatten().map(|(_, stamp)| *stamp);
-        let newest = stamps.reduce(|newest, stamp| match newest.is_before(stamp) {
-            true => stamp,
-            false => newest,
-        })?;
-        let channels = stream.channels.iter().enumerate();
-        let values = held.iter().zip(channels).map(|(held, (place, channel))| {
-            let is_held = !channel.is_sensor || stream.starts().contains(&place);
-            let counts = |(_, stamp): &(f64, Stamp)| is_held || *stamp == newest;
-            held.filter(counts).map_or(f64::NAN, |(value, _)| value)
-        });
-        let values: Vec<f64> = values.collect();
-        if !stream.lacking(&values).is_empty() {
-            return None;
-        }
-        Some((newest, values))
-    }
-
-    /// The asset has begun.
-    pub fn forget(&mut self, asset: usize) {
-        if !self.0.is_empty() {
-            self.0.remove(&asset);
-        }
     }
 }

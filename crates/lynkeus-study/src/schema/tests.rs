@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::*;
 use crate::keys::{
-    CERTIFY, COMPARE, ESTIMATE, FIT, GENERATOR, INTEGRATOR, KEYS, LOG, MANIFOLD, MQTT, PLOT,
+    CERTIFY, COMPARE, ESTIMATE, FIT, GENERATOR, INTEGRATOR, KEYS, LOG, MANIFOLD, MQTT, OPCUA, PLOT,
     SENSORS, SERVE, SIMULATE, TUNE,
 };
 
@@ -61,7 +61,7 @@ fn the_schema_is_the_committed_one() {
 fn the_page_of_studies_shows_the_keys() {
     let path = document("study.md");
     let mut page = fs::read_to_string(&path).unwrap();
-    let tables: [(&str, &[KeySpec]); 16] = [
+    let tables: [(&str, &[KeySpec]); 17] = [
         ("\n## Top level\n", &KEYS),
         ("\n## `[sensors]`\n", &SENSORS),
         ("\n## `[manifold]`\n", &MANIFOLD),
@@ -77,6 +77,7 @@ fn the_page_of_studies_shows_the_keys() {
         ("\n## `[compare]`\n", &COMPARE),
         ("\n## `[serve]`\n", &SERVE),
         ("\n### A broker\n", &MQTT),
+        ("\n### A server of OPC UA\n", &OPCUA),
         ("\n## `[plot]`\n", &PLOT),
     ];
     for (heading, keys) in tables {

@@ -7,6 +7,8 @@ mod kept;
 mod many;
 mod metrics;
 mod mqtt;
+#[cfg(feature = "opcua")]
+mod opcua;
 mod order;
 mod page;
 mod process;
