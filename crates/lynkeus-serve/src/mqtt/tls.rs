@@ -55,7 +55,7 @@ fn roots(ca: Option<&Path>) -> Result<RootCertStore, String> {
     match (taken, ca) {
         (0, Some(path)) => Err(format!("{}: no certificate in it", path.display())),
         (0, None) => {
-            Err("the system trusts nobody: name a file of certificates as `ca`".to_owned())
+            Err("the system has no trusted certificates: name a file of certificates as `ca`".to_owned())
         }
         _ => Ok(roots),
     }
