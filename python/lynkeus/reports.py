@@ -165,7 +165,7 @@ class OneToOne(Record):
     detail: str
     """why"""
     alike: list[Point] | None
-    """two points that the outputs do not tell apart, where there are such"""
+    """two points that the outputs do not distinguish, if there are any"""
 
 
 class Blind(Record):
@@ -804,7 +804,7 @@ class ParticleCounts(Record):
     updates: int
     """updates by readings"""
     resampled: int
-    """times that they were drawn anew"""
+    """number of resamplings"""
     lowest_ess: float | None
     """the least number that counted after an update, (Σw)²/Σw²"""
     starved: int
