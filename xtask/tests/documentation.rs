@@ -170,9 +170,9 @@ fn words_are_in_a_dictionary_or_in_that_of_the_field() {
 
 /// Words of letters alone: no code, formula, link, abbreviation or name with capitals inside.
 fn plain_words(text: &str) -> impl Iterator<Item = &str> {
-    let outside_of_code = text.split('`').step_by(2);
+    let prose = text.split('`').step_by(2).flat_map(outside_of_links);
     let joined = |c: char| c.is_alphanumeric() || !c.is_ascii() || "_'/.=^".contains(c);
-    let tokens = outside_of_code.flat_map(move |part| part.split(move |c: char| !joined(c)));
+    let tokens = prose.flat_map(move |part| part.split(move |c: char| !joined(c)));
     tokens
         .map(|token| token.trim_matches(|c| "'./".contains(c)))
         .map(|token| token.trim_end_matches("'s"))
@@ -180,6 +180,15 @@ fn plain_words(text: &str) -> impl Iterator<Item = &str> {
             token.len() > 2 && token.chars().all(|c| c.is_ascii_alphabetic() || c == '\'')
         })
         .filter(|token| token.chars().skip(1).all(|c| !c.is_ascii_uppercase()))
+}
+
+/// A text without the targets of `[text](target)`.
+fn outside_of_links(text: &str) -> impl Iterator<Item = &str> {
+    let pieces = text.split("](").enumerate();
+    pieces.map(|(place, piece)| match piece.split_once(')') {
+        Some((_, rest)) if place > 0 => rest,
+        _ => piece,
+    })
 }
 
 /// Those that the spelling checker does not know; nothing where it, or a dictionary, is missing.
