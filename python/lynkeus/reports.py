@@ -1193,7 +1193,8 @@ class NextExperiment(Record):
     relative_sd: float | None
     """its relative standard error"""
     factor: float | None
-    """the same over that of the value that is known worst now; ``None`` where the logs do not determine all values"""
+    """the same over that of the value that is known worst now; ``None`` where the logs do not determine all
+    values"""
     volume: float | None
     """the D criterion: volume of the ellipsoid of errors over what it is now"""
     trace: float | None
