@@ -319,7 +319,11 @@ fn a_frozen_sensor_is_told_and_nothing_else_is() {
                 );
                 let from = found[0]["from"].as_f64().unwrap();
                 assert!((from - 300.0 * STEP).abs() < 1e-9, "{from}");
-                assert!(ended.err.contains("the sensor y is frozen at"), "{}", ended.err);
+                assert!(
+                    ended.err.contains("the sensor y is frozen at"),
+                    "{}",
+                    ended.err
+                );
             }
             "clipped at 0.8" => {
                 assert!(
