@@ -40,9 +40,12 @@ pub fn check(list: &Path) -> Result<(), String> {
     }
     fs::write(list, &text).map_err(|error| format!("cannot write {}: {error}", list.display()))?;
     let allowed = allowed(DENY);
+    for (licence, names) in &mut packages {
+        names.retain(|name| !is_excepted(name, licence, DENY));
+    }
     let mut refused = packages
         .iter()
-        .filter(|(licence, _)| !holds(licence, &allowed));
+        .filter(|(licence, names)| !names.is_empty() && !holds(licence, &allowed));
     match refused.next() {
         None => Ok(()),
         Some((licence, names)) => Err(format!(
@@ -57,6 +60,12 @@ fn allowed(deny: &str) -> Vec<&str> {
     let list = deny.split_once("allow = [").map_or("", |(_, rest)| rest);
     let list = list.split(']').next().unwrap_or_default();
     list.split('"').skip(1).step_by(2).collect()
+}
+
+/// Whether a package, named with its version, may have a licence that others may not.
+fn is_excepted(named: &str, licence: &str, deny: &str) -> bool {
+    let name = named.split(' ').next().unwrap_or_default();
+    deny.contains(&format!("crate = \"{name}\", allow = [\"{licence}\"]"))
 }
 
 /// Whether an expression of SPDX can be met by licences that are allowed. A slash is an old OR.
