@@ -115,7 +115,8 @@ fn has_one_way(study: &Study) -> Result<(), Error> {
             ))
         }
         (Some(_), Some(opcua)) => {
-            let error = Error::input("rows would come from two sides: [serve] has `mqtt` and `opcua`");
+            let error =
+                Error::input("rows would come from two sides: [serve] has `mqtt` and `opcua`");
             Err(opcua.url.blame(error.hint(
                 "leave one out; a second service with a study of its own can pass values on",
             )))

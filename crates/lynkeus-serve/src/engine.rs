@@ -56,6 +56,8 @@ pub struct Engine {
     history: Option<History>,
     /// what the user should know of how it began
     notes: Vec<String>,
+    /// what the user should know since
+    news: Vec<String>,
 }
 
 /// What became of a row: lines, or why there are none.
@@ -98,6 +100,7 @@ impl Engine {
             day: i128::MIN,
             history: None,
             notes: vec![],
+            news: vec![],
         }
     }
 
@@ -256,6 +259,13 @@ impl Engine {
         }
     }
 
+    /// What the user should know since this was asked last.
+    pub fn news(&mut self) -> Vec<String> {
+        let failures = self.history.as_mut().map(History::failures);
+        self.news.extend(failures.into_iter().flatten());
+        std::mem::take(&mut self.news)
+    }
+
     /// Writes a part of it where it is time to write it anew.
     fn renew(&mut self) {
         let day = self.history.as_ref().map_or(i128::MIN, History::day);
@@ -267,7 +277,11 @@ impl Engine {
             return;
         };
         // where it failed it goes on with the longer file, and tries again later
-        let is_there = state.settle().unwrap_or(false);
+        let is_there = state.settle().unwrap_or_else(|error| {
+            let text = format!("the state is not written anew: {error}; it grows until it is");
+            self.news.push(text);
+            false
+        });
         if day != self.day {
             state.make_due();
         }

@@ -45,8 +45,8 @@ pub(crate) struct History {
     since: u64,
     /// days are to become Parquet
     is_parquet: bool,
-    /// makes them so
-    worker: Option<JoinHandle<()>>,
+    /// makes them so, and says what it could not
+    worker: Option<JoinHandle<Vec<String>>>,
 }
 
 /// The present, in nanoseconds since 1970.
@@ -113,8 +113,7 @@ impl History {
 
     /// Days before this one are over for good: they become Parquet, in a thread.
     pub fn is_over(&mut self, day: i128) {
-        let is_busy = |worker: &JoinHandle<()>| !worker.is_finished();
-        if !self.is_parquet || self.worker.as_ref().is_some_and(is_busy) {
+        if !self.is_parquet || self.worker.is_some() {
             return;
         }
         let days = (day - LONG_AGO..day).map(|day| (self.draft(day), self.path(day)));
@@ -123,11 +122,27 @@ impl History {
             return;
         }
         self.worker = Some(thread::spawn(move || {
-            for (draft, path) in drafts {
-                // what cannot be written stays as it is, and is tried again
-                let _ = close(&draft, &path);
-            }
+            let closed = drafts.into_iter().map(|(draft, path)| {
+                let done = close(&draft, &path);
+                done.err().map(|error| {
+                    format!(
+                        "{} is not Parquet yet: {error}; it stays as it is, and is tried again after the next day",
+                        draft.display()
+                    )
+                })
+            });
+            closed.flatten().collect()
         }));
+    }
+
+    /// What could not be made Parquet, once it is known.
+    pub fn failures(&mut self) -> Vec<String> {
+        match self.worker.take_if(|worker| worker.is_finished()) {
+            None => vec![],
+            Some(worker) => worker.join().unwrap_or_else(|_| {
+                vec!["a day of the history could not be made Parquet".to_owned()]
+            }),
+        }
     }
 
     /// Takes lines of the `sequence`-th row, which came at `came`; what could not be written waits.
@@ -428,6 +443,25 @@ mod tests {
             "{:?}",
             files(folder.path())
         );
+    }
+
+    #[test]
+    fn a_day_that_does_not_become_parquet_is_said() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut history = history(folder.path(), "h-%Y-%m-%d.parquet", None);
+        history.add(&[line(Stamp::Number(1.0), 1.0)], "a", (20_000 * DAY, 1));
+        history.flush().unwrap();
+        // somebody's folder has its name
+        std::fs::create_dir(folder.path().join("h-2024-10-04.parquet")).unwrap();
+        history.is_over(20_001);
+        let mut said = vec![];
+        while said.is_empty() && history.worker.is_some() {
+            said = history.failures();
+        }
+        assert_eq!(said.len(), 1);
+        assert!(said[0].contains("h-2024-10-04.parquet.csv is not Parquet yet"));
+        assert!(history.failures().is_empty());
+        assert!(folder.path().join("h-2024-10-04.parquet.csv").exists());
     }
 
     /// A kill may come between the new file and the end of the old one.

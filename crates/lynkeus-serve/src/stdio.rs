@@ -169,6 +169,9 @@ impl Service<'_> {
                 });
             }
             let answer = self.answer(batch);
+            for text in self.engine.news() {
+                (self.tell)(&text);
+            }
             match output
                 .write_all(answer.as_bytes())
                 .and_then(|()| output.flush())

@@ -144,7 +144,9 @@ fn opcua(entry: Entry<'_>) -> Result<OpcuaSettings, Error> {
         url: section.optional("url", Entry::name)?.ok_or(no_url)?,
         nodes,
         write: section.optional("write", names)?.unwrap_or_default(),
-        interval: section.optional("interval", Entry::positive)?.unwrap_or(0.5),
+        interval: section
+            .optional("interval", Entry::positive)?
+            .unwrap_or(0.5),
         user: section.optional("user", Entry::name)?,
         password: section.optional("password", Entry::name)?,
         security: section

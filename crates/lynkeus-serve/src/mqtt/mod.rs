@@ -301,6 +301,9 @@ impl Service<'_> {
             let takes = !self.inbox.is_empty() && !self.outbox.is_full() && !is_paused;
             if takes {
                 self.take();
+                for text in self.engine.news() {
+                    (self.tell)(&text);
+                }
             }
             self.outbox.write(&mut link.to);
             link.flush()?;

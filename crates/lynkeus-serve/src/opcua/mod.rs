@@ -250,6 +250,9 @@ impl Service<'_> {
                         }
                     }
                     self.take(&changes, is_over);
+                    for text in self.engine.news() {
+                        (self.tell)(&text);
+                    }
                 }
                 Err(RecvTimeoutError::Timeout) => {}
                 // it says why where it is joined

@@ -7,6 +7,7 @@ mod kept;
 mod many;
 mod metrics;
 mod mqtt;
+mod node_red;
 #[cfg(feature = "opcua")]
 mod opcua;
 mod order;

@@ -290,6 +290,59 @@ fn a_level_of_a_topic_is_the_name_of_an_asset() {
     );
 }
 
+/// A fleet on two machines: each has its part of the topics and of the table, and a restart of one is nothing to the other.
+#[test]
+fn two_services_divide_a_fleet_by_its_topics() {
+    let Some(broker) = Broker::new("") else {
+        return;
+    };
+    let part = |name: &str, assets: &str| {
+        let folder = folder(
+            "ekf",
+            &format!(
+                "[estimate]\nsd = true\n[serve]\nassets = \"assets.csv\"\nstate = \"all.state\"\n[serve.mqtt]\nurl = \"mqtt://localhost:{0}\"\nclient = \"{name}-{0}\"\nrows = \"{name}/{{asset}}/rows\"\npublish = \"estimates/{{asset}}\"",
+                broker.port
+            ),
+        );
+        folder.write("assets.csv", &format!("asset\n{assets}"));
+        folder
+    };
+    let (west, east) = (part("west", "w1\nw2\n"), part("east", "e1\n"));
+    let mut client = Client::new(&west, broker.port, "estimates/+", None);
+    let mut first = Serving::begin(&west, &[], "");
+    let second = Serving::begin(&east, &[], "");
+    first.wait_for("is connected");
+    second.wait_for("is connected");
+    let assets = ["west/w1", "west/w2", "east/e1"];
+    let all: Vec<Vec<Row>> = (0..3).map(|seed| rows(80 + seed, 20, true)).collect();
+    let mut found: BTreeMap<String, BTreeMap<u64, Told>> = BTreeMap::new();
+    let mut next = 0;
+    for half in [0..10, 10..20] {
+        for (k, (asset, rows)) in half.flat_map(|k| assets.iter().zip(&all).map(move |x| (k, x))) {
+            client.publish(&format!("{asset}/rows"), rows[k].json().trim());
+        }
+        next += 30;
+        while found.values().map(BTreeMap::len).sum::<usize>() < next {
+            let line: Value = serde_json::from_str(&client.hear().unwrap()).unwrap();
+            let own = found.entry(line["asset"].as_str().unwrap().to_owned());
+            let t = line["t"].as_f64().unwrap().to_bits();
+            own.or_default().insert(t, told(&line));
+        }
+        if next == 30 {
+            first.kill();
+            first = Serving::begin(&west, &[], "");
+            first.wait_for("is connected");
+        }
+    }
+    let alone = folder("ekf", "[estimate]\nsd = true");
+    for (asset, rows) in assets.iter().zip(&all) {
+        let name = asset.split('/').next_back().unwrap();
+        assert!(found[name] == estimated(&alone, rows), "{asset}");
+    }
+    assert!(!first.stop().err.contains("no asset"));
+    assert!(!second.stop().err.contains("no asset"));
+}
+
 /// Sizes, names, bytes and topics that nobody should send.
 #[test]
 fn a_thousand_hostile_messages_change_nothing() {
