@@ -134,7 +134,15 @@ fn long_tests() -> Result<(), String> {
     let mut tests = cargo(&TESTS);
     run(tests
         .args(["--release", "--", "--ignored"])
-        .env(package::ALL, "1"))
+        .env(package::ALL, "1"))?;
+    begins("the tests with OPC UA, which most programs are built without");
+    let server = python::environment(".venv-opcua", include_str!("../opcua-requirements.txt"));
+    let mut tests = cargo(&["test", "--package", "lynkeus-cli", "--features", "opcua"]);
+    tests.args(["--test", "command", "serve::opcua"]);
+    if let Some(path) = found(server, "the tests with an OPC UA server")? {
+        tests.env("LYNKEUS_OPCUA_PYTHON", path);
+    }
+    run(&mut tests)
 }
 
 /// An interpreter for something; none where that is skipped, with a word.
