@@ -758,6 +758,40 @@ class ServeMqtt(TypedDict):
     """whether the broker keeps the last estimate for those who subscribe later (true, false; default: false)"""
 
 
+class ServeOpcua(TypedDict):
+    """the OPC UA server whose nodes are read and written (serve) (table; default: none)"""
+
+    url: str
+    """where the server is: `"opc.tcp://host:4840"`, with the path that it may have (text; default: required)"""
+
+    nodes: Mapping[str, str]
+    """the nodes that are read, by the names that columns have in a log: `level = "ns=2;s=Tank.Level"`. With
+    `assets`, `{asset}` in a node is the asset's name (table: column = node; default: required)"""
+
+    write: NotRequired[Mapping[str, str]]
+    """the nodes that are written, by the names in the answers of `serve`: `upper_hat = "ns=2;s=Tank.Upper"`
+    (table: estimate = node; default: none: nothing is written)"""
+
+    interval: NotRequired[Number]
+    """seconds between what the server sends; every change in between is in it (number > 0; default: 0.5)"""
+
+    user: NotRequired[str]
+    """who this is to the server (text; default: none: anonymous)"""
+
+    password: NotRequired[str]
+    """the user's password (text; default: the variable `LYNKEUS_OPCUA_PASSWORD` of the environment, if there
+    is one)"""
+
+    security: NotRequired[Literal["None", "Basic256Sha256", "Aes128_Sha256_RsaOaep", "Aes256_Sha256_RsaPss"]]
+    """the security policy; with any but `None` messages are signed and encrypted (`"None"`,
+    `"Basic256Sha256"`, `"Aes128_Sha256_RsaOaep"`, `"Aes256_Sha256_RsaPss"`; default: `"None"`)"""
+
+    pki: NotRequired[str]
+    """folder of certificates, where `security` needs them: `own/cert.der` and `private/private.pem` of this
+    client (made if they are not there), `trusted/` for the server's (path, from the study's folder;
+    default: `"pki"`)"""
+
+
 class ServeSection(TypedDict, total=False):
     """how the estimator runs beside a plant (serve) (table; default: none)"""
 
@@ -790,6 +824,9 @@ class ServeSection(TypedDict, total=False):
 
     mqtt: ServeMqtt | None
     """the MQTT broker from which rows come and to which estimates go (serve) (table; default: none)"""
+
+    opcua: ServeOpcua | None
+    """the OPC UA server whose nodes are read and written (serve) (table; default: none)"""
 
 
 class PlotSection(TypedDict, total=False):
