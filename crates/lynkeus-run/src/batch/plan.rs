@@ -9,6 +9,7 @@ use crate::closed_loop::Loop;
 use crate::integrator::{APART, check_interval, fixed_steps, pieces};
 use crate::lanes::{Engine, have_functions};
 use crate::noise::Sensors;
+use crate::steps::{Halves, Layout, is_fused};
 use crate::run::{Itinerary, Stop};
 use crate::{Events, Method, Noise, Result, Simulation, Step};
 
@@ -167,7 +168,14 @@ fn program<const L: usize>(clock: &mut Loop) -> Result<Option<Program<L>>> {
     };
     let (observer_names, estimates) = clock.estimate(system.start());
     Ok(Some(Program {
-        step: Divided::new(&graph, &of_step, &next, own.clone(), states + disturbances)?,
+        step: Divided::of(
+            &graph,
+            &of_step,
+            &next,
+            own.clone(),
+            states + disturbances,
+            is_fused(),
+        )?,
         row: Divided::new(&graph, inputs, row, own, columns)?,
         states,
         disturbances,
@@ -210,13 +218,32 @@ impl<const L: usize> Divided<L> {
         own: Range<usize>,
         spacing: usize,
     ) -> Result<Self, MissingInput> {
-        let common = [&inputs[..own.start], &inputs[own.end..]].concat();
-        let divided = g.hoisted(outputs, &common);
-        let shared = divided.values.len();
-        let common = Tape::new(g, &common, &divided.values)?;
+        Self::of(g, inputs, outputs, own, spacing, false)
+    }
+
+    /// As [`Divided::new`], products and sums rounded once if `is_fused`.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn of(
+        g: &Graph,
+        inputs: &[Node],
+        outputs: &[Node],
+        own: Range<usize>,
+        spacing: usize,
+        is_fused: bool,
+    ) -> Result<Self, MissingInput> {
         let own_inputs = own.len();
-        let own = [&divided.symbols, &inputs[own]].concat();
-        let own = Tape::new(g, &own, &divided.roots)?;
+        let layout = Layout {
+            common: [&inputs[..own.start], &inputs[own.end..]].concat(),
+            before: &[],
+            behind: &inputs[own],
+        };
+        let Halves {
+            common,
+            own,
+            shared,
+        } = Halves::new(g, outputs, &layout, is_fused)?;
         let sweeping = |own: &Tape| Function::sweeping(own, shared, spacing);
         Ok(Self {
             common: Engine::new(&common, Function::compile),
@@ -270,6 +297,43 @@ impl<const L: usize> Divided<L> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::steps::{Sizes, Steps};
+
+    /// A step of a batch is that of a run alone, fused or not.
+    #[test]
+    fn a_step_in_lanes_is_a_step_alone() {
+        const LANES: usize = 4;
+        let g = Graph::new();
+        let [t, x, v, w, mode, h] = ["t", "x", "v", "w", "m", "h"].map(|name| g.symbol(name));
+        let inputs = [t, x, v, w, mode, h].map(|e| e.node());
+        let k = t * t * mode + h * t;
+        let next = [x + h * v * k - w * x, v - h * x * (x * v - k * w) + x * v];
+        let next = next.map(|e| e.node());
+        let sizes = Sizes {
+            states: 2,
+            signals: 1,
+            inputs: 5,
+        };
+        for is_fused in [false, true] {
+            let halves = Steps::halves(&g, &inputs, &next, sizes, is_fused).unwrap();
+            let mut code =
+                Divided::<LANES>::of(&g, &inputs, &next, 1..4, 3, is_fused).unwrap();
+            assert!(!code.has_functions && code.shared == halves.shared);
+            let mut table = vec![[0.0; LANES]; code.shared * LANES];
+            code.share(&[[0.3; LANES], [1.1; LANES], [0.01; LANES]], &mut table);
+            let own = [[0.3, 0.4, 0.5, 0.6], [-1.5, 2.0, 0.1, 7.0], [0.9; LANES]];
+            let mut found = [[0.0; LANES]; 2];
+            code.sweep(1, &table[..code.shared], &own, &mut found);
+            for lane in 0..LANES {
+                let mut alone = [0.0; 2];
+                let known = [0.0, 0.0, 0.0, own[2][lane], 1.1];
+                let start = [own[0][lane], own[1][lane]];
+                let mut steps = Steps::interpreted(&halves, sizes);
+                steps.advance(&known, &[[0.3, 0.01]], &start, &mut alone);
+                assert_eq!(found.map(|values| values[lane]), alone, "{is_fused}");
+            }
+        }
+    }
 
     #[test]
     fn what_depends_on_time_alone_is_computed_once() {
