@@ -48,5 +48,7 @@ mod registers;
 mod schedule;
 #[cfg(target_arch = "x86_64")]
 mod vectors;
+#[cfg(target_arch = "x86_64")]
+mod woven;
 
 pub use function::{Buffer, Function, widest};

@@ -29,6 +29,9 @@ pub(crate) struct Halves {
     pub own: Tape,
     /// number of these values
     pub shared: usize,
+    /// inputs before, the common ones, these values, inputs behind → these values for the common inputs, then the outputs
+    pub both: Tape,
+    pub direct: Tape,
 }
 
 /// How inputs stand in the two parts.
@@ -58,7 +61,12 @@ impl Halves {
             true => Tape::fused,
             false => Tape::new,
         };
+        let both = [layout.before, &layout.common, &divided.symbols, layout.behind].concat();
+        let results = [&divided.values[..], &divided.roots].concat();
+        let direct = [layout.before, &layout.common, layout.behind].concat();
         Ok(Self {
+            both: tape(g, &both, &results)?,
+            direct: tape(g, &direct, outputs)?,
             common: tape(g, &layout.common, &divided.values)?,
             own: tape(g, &own, &divided.roots)?,
             shared: divided.values.len(),
@@ -93,6 +101,13 @@ enum Code {
     Native {
         common: Function<1>,
         own: Function<1>,
+    },
+    Woven {
+        common: Function<1>,
+        both: Function<1>,
+    },
+    Direct {
+        step: Function<1>,
     },
     Interpreted {
         common: Box<Evaluator>,
@@ -147,6 +162,23 @@ impl Steps {
 
     /// As machine code, where it can be made.
     pub fn compiled(halves: &Halves, sizes: Sizes) -> Option<Self> {
+        let how = std::env::var("LYNKEUS_STEPS").unwrap_or_default();
+        if how == "3" {
+            let spacing = 2 + halves.shared + sizes.states;
+            let shared = sizes.modes().len() + sizes.signals;
+            let code = Code::Woven {
+                common: Function::sweeping(&halves.common, sizes.modes().len(), spacing)?,
+                both: Function::stepping(&halves.both, shared)?,
+            };
+            return Some(Self::new(code, halves, sizes));
+        }
+        if how == "1" {
+            let shared = sizes.modes().len() + sizes.signals;
+            let code = Code::Direct {
+                step: Function::stepping(&halves.direct, shared)?,
+            };
+            return Some(Self::new(code, halves, sizes));
+        }
         let spacing = halves.shared + sizes.states;
         let code = Code::Native {
             common: Function::sweeping(&halves.common, sizes.modes().len(), spacing)?,
@@ -165,11 +197,16 @@ impl Steps {
     }
 
     fn new(code: Code, halves: &Halves, sizes: Sizes) -> Self {
-        let block = halves.shared + sizes.states;
+        let shared = match code {
+            Code::Direct { .. } => 2,
+            Code::Woven { .. } => halves.shared + 2,
+            _ => halves.shared,
+        };
+        let block = shared + sizes.states;
         let ahead = (CACHE / (8 * block.max(1))).clamp(1, AHEAD);
         Self {
             code,
-            shared: halves.shared,
+            shared,
             states: sizes.states,
             signals: sizes.signals(),
             modes: sizes.modes(),
@@ -204,6 +241,26 @@ impl Steps {
                     common.sweep(count, modes.as_chunks().0, &self.times, blocks);
                 }
                 own.steps(count, signals.as_chunks().0, blocks);
+            }
+            Code::Direct { step } => {
+                let size = self.shared + self.states;
+                for (block, times) in blocks.chunks_exact_mut(size).zip(self.times.chunks(2)) {
+                    block[..2].copy_from_slice(times);
+                }
+                let first = signals.as_ptr();
+                let all = unsafe { std::slice::from_raw_parts(first, signals.len() + modes.len()) };
+                step.steps(count, all.as_chunks().0, blocks);
+            }
+            Code::Woven { common, both } => {
+                let size = self.shared + self.states;
+                let first = signals.as_ptr();
+                let all = unsafe { std::slice::from_raw_parts(first, signals.len() + modes.len()) };
+                common.sweep(1, modes.as_chunks().0, &self.times[..2], &mut blocks[2..]);
+                let last = &self.times[self.times.len() - 2..];
+                for (block, times) in blocks.chunks_exact_mut(size).zip(self.times[2..].chunks(2).chain([last])) {
+                    block[..2].copy_from_slice(times);
+                }
+                both.steps(count, all.as_chunks().0, blocks);
             }
             Code::Interpreted {
                 common,
