@@ -198,6 +198,7 @@ pub(crate) fn factor<'g>(graph: &'g Graph, matrix: &[Term<'g>], n: usize) -> Vec
         let noise = n as f64 * f64::EPSILON * diagonal.abs();
         let is_there = noise.less(pivot);
         let root = is_there.select(pivot.sqrt(), nothing);
+        let over = 1.0 / root;
         lower[j * n + j] = Some(root);
         for i in j + 1..n {
             let rest = match (matrix[i * n + j], known(&lower, i)) {
@@ -205,7 +206,7 @@ pub(crate) fn factor<'g>(graph: &'g Graph, matrix: &[Term<'g>], n: usize) -> Vec
                 (None, Some(known)) => Some(-known),
                 (entry, None) => entry,
             };
-            lower[i * n + j] = rest.map(|rest| is_there.select(rest / root, nothing));
+            lower[i * n + j] = rest.map(|rest| is_there.select(rest * over, nothing));
         }
     }
     lower
@@ -243,7 +244,7 @@ pub(crate) fn reflected<'g>(
         let turned = |is: Expr<'g>, value: Expr<'g>| is.select(-value, value);
         let head = is_above.map_or(norm, |is| turned(is, norm));
         let first = pivot.map_or(-head, |pivot| pivot - head);
-        let beta = is_there.select(-head * first, graph.constant(1.0));
+        let over = 1.0 / is_there.select(-head * first, graph.constant(1.0));
         rows[k * n + k] = Some(first);
         let reflector = column(rows);
         let sums: Vec<Term<'g>> = (k + 1..n)
@@ -254,7 +255,7 @@ pub(crate) fn reflected<'g>(
             })
             .collect();
         for (r, v) in reflector {
-            let factor = v / beta;
+            let factor = v * over;
             for (j, part) in (k + 1..n).zip(&sums) {
                 let Some(part) = part.map(|part| factor * part) else {
                     continue;
@@ -336,8 +337,8 @@ pub(crate) fn corrected<'g>(
         };
         let before = alpha;
         alpha = alpha + v * v;
-        let left = (before / alpha).sqrt();
-        let taken = v / (before.sqrt() * alpha.sqrt());
+        let over = 1.0 / (before.sqrt() * alpha.sqrt());
+        let (left, taken) = (before * over, v * over);
         for i in j..n {
             let entry = &mut root[i * n + j];
             let own = *entry;
@@ -349,7 +350,8 @@ pub(crate) fn corrected<'g>(
             gain[i] = sum(gain[i], own.map(|own| own * v));
         }
     }
-    let moved = gain.iter().map(|k| k.map(|k| k / variance * innovation));
+    let over = 1.0 / variance;
+    let moved = gain.iter().map(|k| k.map(|k| k * over * innovation));
     Corrected {
         x: x.iter()
             .zip(moved)
