@@ -132,7 +132,7 @@ mod tests {
         let g = Graph::new();
         let [x, y, z] = ["x", "y", "z"].map(|name| g.symbol(name));
         let inputs = [x, y, z].map(|e| e.node());
-        let (a, b, c) = (1.0 + 1e-9, 1.0 - 3e-9, -1.0);
+        let (a, b, c) = (1.0_f64 + 1e-9, 1.0 - 3e-9, -1.0_f64);
         let product = x * y;
         let square = z.powi(2);
         let cases = [
@@ -167,7 +167,7 @@ mod tests {
         let shared = x * y;
         let outputs = [shared + (x + z) * z, shared + z].map(|e| e.node());
         let tape = Tape::fused(&g, &inputs, &outputs).unwrap();
-        let (a, b, c) = (1.0 + 1e-9, 1.0 - 3e-9, -1.0);
+        let (a, b, c) = (1.0_f64 + 1e-9, 1.0 - 3e-9, -1.0_f64);
         let mut found = [0.0; 2];
         tape.evaluator().eval(&[a, b, c], &mut found);
         assert_eq!(found, [(a + c).mul_add(c, a * b), a * b + c]);

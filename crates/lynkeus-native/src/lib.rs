@@ -48,7 +48,5 @@ mod registers;
 mod schedule;
 #[cfg(target_arch = "x86_64")]
 mod vectors;
-#[cfg(target_arch = "x86_64")]
-mod woven;
 
 pub use function::{Buffer, Function, widest};

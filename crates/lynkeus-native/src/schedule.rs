@@ -7,7 +7,6 @@ use std::collections::BinaryHeap;
 use lynkeus_expr::{Binary, Unary};
 
 use crate::record::{Id, Program, Value};
-use crate::woven::{aside, woven};
 
 /// Operations that begin in a cycle.
 const WIDTH: u32 = 4;
@@ -61,16 +60,10 @@ pub(crate) fn scheduled(
 ) -> Program {
     let mut scheduler = Scheduler::new(program, registers);
     let is_ordered = is_single && scheduler.is_deep();
-    let is_aside = match is_ordered {
-        true => aside(program, &is_call),
-        false => vec![false; program.values.len()],
-    };
-    let (mut section, mut calls) = (vec![], vec![]);
+    let mut section = vec![];
     for id in called_early(program, &scheduler.is_needed, &is_call) {
         let value = program.values[id as usize];
-        if is_aside[id as usize] {
-            calls.push(id);
-        } else if matches!(value, Value::Input(_) | Value::Constant(_)) || !is_ordered {
+        if matches!(value, Value::Input(_) | Value::Constant(_)) || !is_ordered {
             scheduler.is_begun[id as usize] = true;
             scheduler.order.push(id);
         } else if is_call(value) {
@@ -81,9 +74,6 @@ pub(crate) fn scheduled(
         }
     }
     scheduler.run(&section);
-    if !calls.is_empty() {
-        scheduler.order = woven(program, &scheduler.order, &calls, &is_call);
-    }
     scheduler.result()
 }
 

@@ -8,7 +8,7 @@ use lynkeus_native::Function;
 
 use crate::classical::{Term, classical_step};
 use crate::equations::Equations;
-use crate::steps::{Halves, Sizes, Steps, is_fused};
+use crate::steps::{Steps, is_fused};
 use crate::{Place, Slopes};
 
 /// What evaluates systems. All give the same values to the bit, so that it is a matter of speed.
@@ -60,7 +60,7 @@ pub(crate) struct Routine {
     outputs: Vec<Node>,
     tape: Tape,
     native: OnceLock<Option<Function<1>>>,
-    halves: OnceLock<Option<Halves>>,
+    of_step: OnceLock<Option<Tape>>,
     steps: OnceLock<Option<Steps>>,
     slopes: OnceLock<Option<Arc<Routine>>>,
     /// where its values stand in a Jacobian, if they do
@@ -90,7 +90,7 @@ impl Routine {
             outputs,
             tape,
             native: OnceLock::new(),
-            halves: OnceLock::new(),
+            of_step: OnceLock::new(),
             steps: OnceLock::new(),
             slopes: OnceLock::new(),
             places: places.into(),
@@ -124,27 +124,17 @@ impl Routine {
         self.native.get_or_init(compile).as_ref()
     }
 
-    /// Where x' stands among the outputs.
-    pub fn sizes(&self) -> Sizes {
-        Sizes {
-            states: self.outputs.len(),
-            signals: self.equations.signals.len(),
-            inputs: self.tape.inputs(),
-        }
-    }
-
-    /// A step of x' in two parts.
-    fn halves(&self) -> Option<&Halves> {
+    fn of_step(&self) -> Option<&Tape> {
         let make = || {
             let graph = self.equations.graph();
             let (inputs, next) = self.step_in(&graph)?;
-            Steps::halves(&graph, &inputs, &next, self.sizes(), is_fused()).ok()
+            Steps::tape(&graph, &inputs, &next, is_fused()).ok()
         };
-        self.halves.get_or_init(make).as_ref()
+        self.of_step.get_or_init(make).as_ref()
     }
 
     fn steps(&self) -> Option<&Steps> {
-        let compile = || Steps::compiled(self.halves()?, self.sizes());
+        let compile = || Steps::compiled(self.of_step()?);
         self.steps.get_or_init(compile).as_ref()
     }
 
@@ -295,15 +285,15 @@ impl Runner {
         let mut compiled = self.steps.ready_for(count, PATIENCE, || routine.steps());
         if compiled.is_none() && is_fused() {
             if fused.is_none() {
-                let interpreted = |halves| Box::new(Steps::interpreted(halves, routine.sizes()));
-                *fused = routine.halves().map(interpreted);
+                let interpreted = |tape| Box::new(Steps::interpreted(tape));
+                *fused = routine.of_step().map(interpreted);
             }
             compiled = fused.as_deref_mut();
         }
         let Some(code) = compiled else {
             return false;
         };
-        code.advance(inputs, steps, x, next);
+        code.advance(&inputs[1 + x.len()..], steps, x, next);
         true
     }
 }
@@ -327,15 +317,9 @@ mod tests {
         .map(|e| e.node());
         let tape = Tape::new(&g, &inputs, &slopes).unwrap();
         let (of_step, next) = step_of(&g, &inputs, &slopes);
-        let sizes = Sizes {
-            states: 2,
-            signals: 1,
-            inputs: 5,
-        };
-        let steps: Vec<[f64; 2]> = (0..37)
-            .map(|k| [0.01 * f64::from(k), 0.01 + 1e-4 * f64::from(k % 5)])
+        let steps: Vec<[f64; 2]> = (0..150)
+            .map(|k| [0.01 * f64::from(k), 0.01 + 1e-4 * f64::from(k % 5 - 2)])
             .collect();
-        let known = [f64::NAN, f64::NAN, f64::NAN, 0.7, 1.3];
         let start = [0.8, -0.4];
         let mut evaluator = tape.evaluator();
         let mut f = crate::Function::new(2, |t, x: &[f64], dx: &mut [f64]| {
@@ -346,15 +330,14 @@ mod tests {
             rk4.step(&mut f, *t, *h, &mut x).unwrap();
         }
         let ends = [false, true].map(|is_fused| {
-            let halves = Steps::halves(&g, &of_step, &next, sizes, is_fused).unwrap();
-            assert!(halves.shared > 0);
+            let tape = Steps::tape(&g, &of_step, &next, is_fused).unwrap();
             let end = |mut code: Steps| {
                 let mut end = [0.0; 2];
-                code.advance(&known, &steps, &start, &mut end);
+                code.advance(&[0.7, 1.3], &steps, &start, &mut end);
                 end
             };
-            let interpreted = end(Steps::interpreted(&halves, sizes));
-            if let Some(code) = Steps::compiled(&halves, sizes) {
+            let interpreted = end(Steps::interpreted(&tape));
+            if let Some(code) = Steps::compiled(&tape) {
                 assert_eq!(end(code), interpreted);
             }
             interpreted

@@ -9,7 +9,7 @@ use crate::closed_loop::Loop;
 use crate::integrator::{APART, check_interval, fixed_steps, pieces};
 use crate::lanes::{Engine, have_functions};
 use crate::noise::Sensors;
-use crate::steps::{Halves, Layout, is_fused};
+use crate::steps::{is_fused, tape};
 use crate::run::{Itinerary, Stop};
 use crate::{Events, Method, Noise, Result, Simulation, Step};
 
@@ -168,14 +168,7 @@ fn program<const L: usize>(clock: &mut Loop) -> Result<Option<Program<L>>> {
     };
     let (observer_names, estimates) = clock.estimate(system.start());
     Ok(Some(Program {
-        step: Divided::of(
-            &graph,
-            &of_step,
-            &next,
-            own.clone(),
-            states + disturbances,
-            is_fused(),
-        )?,
+        step: Divided::of_step(&graph, &of_step, &next, own.clone(), states + disturbances)?,
         row: Divided::new(&graph, inputs, row, own, columns)?,
         states,
         disturbances,
@@ -197,8 +190,9 @@ pub(crate) struct Divided<const L: usize> {
     own: Engine<L>,
     /// number of values that all trajectories share
     pub shared: usize,
-    /// whether there is a function that lanes round in their own way
-    pub has_functions: bool,
+    /// whether a run alone has the same bits: nothing is fused with what all share, there is no function that lanes
+    /// round in their own way
+    pub is_rounded_alike: bool,
     own_inputs: usize,
     outputs: usize,
     /// from the outputs of one group of lanes to those of the next
@@ -218,38 +212,43 @@ impl<const L: usize> Divided<L> {
         own: Range<usize>,
         spacing: usize,
     ) -> Result<Self, MissingInput> {
-        Self::of(g, inputs, outputs, own, spacing, false)
+        Self::made(g, (inputs, outputs), own, spacing, false)
     }
 
-    /// As [`Divided::new`], products and sums rounded once if `is_fused`.
+    /// As [`Divided::new`], of a step that rounds a product and a sum once where [steps](crate::fuse_steps) do.
     ///
     /// # Errors
     /// As there.
-    pub fn of(
+    pub fn of_step(
         g: &Graph,
         inputs: &[Node],
         outputs: &[Node],
         own: Range<usize>,
         spacing: usize,
+    ) -> Result<Self, MissingInput> {
+        Self::made(g, (inputs, outputs), own, spacing, is_fused())
+    }
+
+    fn made(
+        g: &Graph,
+        (inputs, outputs): (&[Node], &[Node]),
+        own: Range<usize>,
+        spacing: usize,
         is_fused: bool,
     ) -> Result<Self, MissingInput> {
+        let common = [&inputs[..own.start], &inputs[own.end..]].concat();
+        let divided = g.hoisted(outputs, &common);
+        let shared = divided.values.len();
+        let common = tape(g, &common, &divided.values, is_fused)?;
         let own_inputs = own.len();
-        let layout = Layout {
-            common: [&inputs[..own.start], &inputs[own.end..]].concat(),
-            before: &[],
-            behind: &inputs[own],
-        };
-        let Halves {
-            common,
-            own,
-            shared,
-        } = Halves::new(g, outputs, &layout, is_fused)?;
+        let own = [&divided.symbols, &inputs[own]].concat();
+        let own = tape(g, &own, &divided.roots, is_fused)?;
         let sweeping = |own: &Tape| Function::sweeping(own, shared, spacing);
         Ok(Self {
             common: Engine::new(&common, Function::compile),
             own: Engine::new(&own, sweeping),
             shared,
-            has_functions: have_functions(g, outputs),
+            is_rounded_alike: !is_fused && !have_functions(g, outputs),
             own_inputs,
             outputs: outputs.len(),
             spacing,
@@ -297,43 +296,6 @@ impl<const L: usize> Divided<L> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::steps::{Sizes, Steps};
-
-    /// A step of a batch is that of a run alone, fused or not.
-    #[test]
-    fn a_step_in_lanes_is_a_step_alone() {
-        const LANES: usize = 4;
-        let g = Graph::new();
-        let [t, x, v, w, mode, h] = ["t", "x", "v", "w", "m", "h"].map(|name| g.symbol(name));
-        let inputs = [t, x, v, w, mode, h].map(|e| e.node());
-        let k = t * t * mode + h * t;
-        let next = [x + h * v * k - w * x, v - h * x * (x * v - k * w) + x * v];
-        let next = next.map(|e| e.node());
-        let sizes = Sizes {
-            states: 2,
-            signals: 1,
-            inputs: 5,
-        };
-        for is_fused in [false, true] {
-            let halves = Steps::halves(&g, &inputs, &next, sizes, is_fused).unwrap();
-            let mut code =
-                Divided::<LANES>::of(&g, &inputs, &next, 1..4, 3, is_fused).unwrap();
-            assert!(!code.has_functions && code.shared == halves.shared);
-            let mut table = vec![[0.0; LANES]; code.shared * LANES];
-            code.share(&[[0.3; LANES], [1.1; LANES], [0.01; LANES]], &mut table);
-            let own = [[0.3, 0.4, 0.5, 0.6], [-1.5, 2.0, 0.1, 7.0], [0.9; LANES]];
-            let mut found = [[0.0; LANES]; 2];
-            code.sweep(1, &table[..code.shared], &own, &mut found);
-            for lane in 0..LANES {
-                let mut alone = [0.0; 2];
-                let known = [0.0, 0.0, 0.0, own[2][lane], 1.1];
-                let start = [own[0][lane], own[1][lane]];
-                let mut steps = Steps::interpreted(&halves, sizes);
-                steps.advance(&known, &[[0.3, 0.01]], &start, &mut alone);
-                assert_eq!(found.map(|values| values[lane]), alone, "{is_fused}");
-            }
-        }
-    }
 
     #[test]
     fn what_depends_on_time_alone_is_computed_once() {
@@ -346,7 +308,7 @@ mod tests {
         let tape = Tape::new(&g, &inputs, &outputs).unwrap();
         let mut code = Divided::<LANES>::new(&g, &inputs, &outputs, 1..3, 2).unwrap();
         // u and eᵘ
-        assert!(code.shared == 2 && code.has_functions);
+        assert!(code.shared == 2 && !code.is_rounded_alike);
         let mut table = [[0.0; LANES]; 2 * LANES];
         code.share(&[[0.7, 0.8, 0.9, 1.0]], &mut table);
         let own = [[0.3, 0.4, 0.5, 0.6], [-1.5; LANES]];
