@@ -71,8 +71,7 @@ fn binary(graph: &Graph, op: Binary, a: Node, b: Node, f: Expr<'_>) -> Variation
         Binary::Add => (graph.constant(1.0), graph.constant(1.0)),
         Binary::Sub => (graph.constant(1.0), graph.constant(-1.0)),
         Binary::Mul => (y, x),
-        // one division for both
-        Binary::Div => (1.0 / y, -(f * (1.0 / y))),
+        Binary::Div => (1.0 / y, -(f / y)),
         Binary::Pow => (y * x.pow(y - 1.0), f * x.ln()),
         Binary::Atan2 => {
             let norm = x.powi(2) + y.powi(2);

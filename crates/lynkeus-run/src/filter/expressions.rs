@@ -198,7 +198,6 @@ pub(crate) fn factor<'g>(graph: &'g Graph, matrix: &[Term<'g>], n: usize) -> Vec
         let noise = n as f64 * f64::EPSILON * diagonal.abs();
         let is_there = noise.less(pivot);
         let root = is_there.select(pivot.sqrt(), nothing);
-        let over = 1.0 / root;
         lower[j * n + j] = Some(root);
         for i in j + 1..n {
             let rest = match (matrix[i * n + j], known(&lower, i)) {
@@ -206,7 +205,7 @@ pub(crate) fn factor<'g>(graph: &'g Graph, matrix: &[Term<'g>], n: usize) -> Vec
                 (None, Some(known)) => Some(-known),
                 (entry, None) => entry,
             };
-            lower[i * n + j] = rest.map(|rest| is_there.select(rest * over, nothing));
+            lower[i * n + j] = rest.map(|rest| is_there.select(rest / root, nothing));
         }
     }
     lower
@@ -244,7 +243,7 @@ pub(crate) fn reflected<'g>(
         let turned = |is: Expr<'g>, value: Expr<'g>| is.select(-value, value);
         let head = is_above.map_or(norm, |is| turned(is, norm));
         let first = pivot.map_or(-head, |pivot| pivot - head);
-        let over = 1.0 / is_there.select(-head * first, graph.constant(1.0));
+        let beta = is_there.select(-head * first, graph.constant(1.0));
         rows[k * n + k] = Some(first);
         let reflector = column(rows);
         let sums: Vec<Term<'g>> = (k + 1..n)
@@ -255,7 +254,7 @@ pub(crate) fn reflected<'g>(
             })
             .collect();
         for (r, v) in reflector {
-            let factor = v * over;
+            let factor = v / beta;
             for (j, part) in (k + 1..n).zip(&sums) {
                 let Some(part) = part.map(|part| factor * part) else {
                     continue;
@@ -337,8 +336,8 @@ pub(crate) fn corrected<'g>(
         };
         let before = alpha;
         alpha = alpha + v * v;
-        let over = 1.0 / (before.sqrt() * alpha.sqrt());
-        let (left, taken) = (before * over, v * over);
+        let left = (before / alpha).sqrt();
+        let taken = v / (before.sqrt() * alpha.sqrt());
         for i in j..n {
             let entry = &mut root[i * n + j];
             let own = *entry;
@@ -350,8 +349,7 @@ pub(crate) fn corrected<'g>(
             gain[i] = sum(gain[i], own.map(|own| own * v));
         }
     }
-    let over = 1.0 / variance;
-    let moved = gain.iter().map(|k| k.map(|k| k * over * innovation));
+    let moved = gain.iter().map(|k| k.map(|k| k / variance * innovation));
     Corrected {
         x: x.iter()
             .zip(moved)

@@ -108,11 +108,13 @@ impl Root {
             alpha += v * v;
             let root_before = std::mem::replace(&mut root, alpha.sqrt());
             // what is left of the column, and what the later ones take
-            let over = 1.0 / (root_before * root);
-            let [left, taken] = match (before > 0.0, alpha > 0.0) {
-                (true, _) => [before * over, v * over],
-                (false, true) => [0.0; 2],
-                (false, false) => [1.0, 0.0],
+            let left = match alpha > 0.0 {
+                true => (before / alpha).sqrt(),
+                false => 1.0,
+            };
+            let taken = match before > 0.0 {
+                true => v / (root_before * root),
+                false => 0.0,
             };
             let column = self.entries[j * (n + 1)..].iter_mut().step_by(n);
             for (s, sum) in column.zip(&mut gain[j..]) {
@@ -121,8 +123,7 @@ impl Root {
                 *sum += own * v;
             }
         }
-        let over = 1.0 / variance;
-        gain.iter_mut().for_each(|k| *k *= over);
+        gain.iter_mut().for_each(|k| *k /= variance);
         true
     }
 
@@ -174,7 +175,7 @@ fn triangularise(rows: &mut [f64], n: usize, sums: &mut [f64]) {
         let head = if pivot > 0.0 { -norm } else { norm };
         // the reflector v = (pivot − head, the rest), H = I − v vᵀ/β
         let v0 = pivot - head;
-        let over = 1.0 / (-head * v0);
+        let beta = -head * v0;
         rows[k * n + k] = v0;
         sums[k + 1..].fill(0.0);
         for row in rows.chunks_exact(n).skip(k).filter(|row| row[k] != 0.0) {
@@ -183,7 +184,7 @@ fn triangularise(rows: &mut [f64], n: usize, sums: &mut [f64]) {
             }
         }
         for row in rows.chunks_exact_mut(n).skip(k) {
-            let factor = std::mem::take(&mut row[k]) * over;
+            let factor = std::mem::take(&mut row[k]) / beta;
             if factor == 0.0 {
                 continue;
             }
@@ -236,7 +237,6 @@ impl Factor {
                 continue;
             }
             let root = pivot.sqrt();
-            let over = 1.0 / root;
             lower[j * n + j] = root;
             for i in j + 1..n {
                 let begin = firsts[i].max(firsts[j]) & !3;
@@ -245,7 +245,7 @@ impl Factor {
                 }
                 let [own, other] = [i, j].map(|k| &lower[k * n + begin..k * n + j]);
                 let known = dot(own, other);
-                lower[i * n + j] = (matrix[i * n + j] - known) * over;
+                lower[i * n + j] = (matrix[i * n + j] - known) / root;
             }
         }
         lower
