@@ -17,13 +17,7 @@ pub trait Algebra {
     /// A function of two values.
     fn binary(&self, op: Binary, x: &Self::Value, y: &Self::Value) -> Self::Value;
     /// A product and a sum at once; where values are no rounded numbers, one after the other.
-    fn fused(
-        &self,
-        op: Fused,
-        x: &Self::Value,
-        y: &Self::Value,
-        z: &Self::Value,
-    ) -> Self::Value {
+    fn fused(&self, op: Fused, x: &Self::Value, y: &Self::Value, z: &Self::Value) -> Self::Value {
         let product = self.binary(Binary::Mul, x, y);
         match op {
             Fused::Add => self.binary(Binary::Add, &product, z),

@@ -145,7 +145,11 @@ mod tests {
             // read by something else, too
             ((product + z) * product, (a * b + c) * (a * b), 3),
             // read by two sums
-            ((product + z) * (product - x), a.mul_add(b, c) * a.mul_add(b, -a), 3),
+            (
+                (product + z) * (product - x),
+                a.mul_add(b, c) * a.mul_add(b, -a),
+                3,
+            ),
             // of two products the one that is made of more
             (x * z + (x + z) * y, (a + c).mul_add(b, a * c), 3),
             (product + product, a * b + a * b, 2),
@@ -154,7 +158,11 @@ mod tests {
             let tape = Tape::fused(&g, &inputs, &[expression.node()]).unwrap();
             let mut found = [0.0];
             tape.evaluator().eval(&[a, b, c], &mut found);
-            assert_eq!((found[0], tape.len()), (expected, instructions), "{expression:?}");
+            assert_eq!(
+                (found[0], tape.len()),
+                (expected, instructions),
+                "{expression:?}"
+            );
         }
     }
 

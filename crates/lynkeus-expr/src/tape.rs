@@ -256,9 +256,11 @@ impl<'g> Compiler<'g> {
         let from: Vec<Register> = arguments.iter().map(|a| self.register[a]).collect();
         let fused = self.fusion.sum(node);
         let instruction = match op {
-            _ if let Some((op, _)) = fused => {
-                Instruction::Fused(op, self.result(node, &arguments), [from[0], from[1], from[2]])
-            }
+            _ if let Some((op, _)) = fused => Instruction::Fused(
+                op,
+                self.result(node, &arguments),
+                [from[0], from[1], from[2]],
+            ),
             Op::System(_) => {
                 // results must not land on arguments: arguments are released after
                 self.code.room = self.code.room.max(from.len());

@@ -268,7 +268,14 @@ impl Assembler {
     }
 
     /// A product and a sum with one rounding; the destination is an operand, too.
-    pub fn fuse(&mut self, op: Fused, factors: Factors, to: Register, second: Register, last: Operand) {
+    pub fn fuse(
+        &mut self,
+        op: Fused,
+        factors: Factors,
+        to: Register,
+        second: Register,
+        last: Operand,
+    ) {
         let sign = match op {
             Fused::Add => 0,
             Fused::Sub => 2,

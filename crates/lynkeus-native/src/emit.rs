@@ -174,8 +174,11 @@ impl<const LANES: usize> Emitter<'_, LANES> {
                 Some(to) => (to, second),
                 None => (self.result_apart(id), second),
             };
-            self.assembler.copy(to, if other == first { second } else { first });
-            return self.assembler.fuse(op, Factors::FirstSecond, to, other, term);
+            self.assembler
+                .copy(to, if other == first { second } else { first });
+            return self
+                .assembler
+                .fuse(op, Factors::FirstSecond, to, other, term);
         }
         let term = self.register(z);
         let last = self.operand(y);
@@ -187,17 +190,22 @@ impl<const LANES: usize> Emitter<'_, LANES> {
         let to = found.unwrap_or_else(|| self.result_apart(id));
         let other = Operand::Register(term);
         match last {
-            _ if to == term => self.assembler.fuse(op, Factors::SecondLast, to, first, last),
+            _ if to == term => self
+                .assembler
+                .fuse(op, Factors::SecondLast, to, first, last),
             Operand::Register(second) if to == second => {
-                self.assembler.fuse(op, Factors::FirstSecond, to, first, other);
+                self.assembler
+                    .fuse(op, Factors::FirstSecond, to, first, other);
             }
             Operand::Register(second) if to == first => {
-                self.assembler.fuse(op, Factors::FirstSecond, to, second, other);
+                self.assembler
+                    .fuse(op, Factors::FirstSecond, to, second, other);
             }
             _ if to == first => self.assembler.fuse(op, Factors::FirstLast, to, term, last),
             _ => {
                 self.assembler.copy(to, term);
-                self.assembler.fuse(op, Factors::SecondLast, to, first, last);
+                self.assembler
+                    .fuse(op, Factors::SecondLast, to, first, last);
             }
         }
     }

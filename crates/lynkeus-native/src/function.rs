@@ -206,12 +206,7 @@ impl<const LANES: usize> Function<LANES> {
     ///
     /// # Panics
     /// If the slices are too short for so many steps, and of code that was not compiled for them.
-    pub fn steps(
-        &mut self,
-        count: usize,
-        shared: &[[f64; LANES]],
-        values: &mut [[f64; LANES]],
-    ) {
+    pub fn steps(&mut self, count: usize, shared: &[[f64; LANES]], values: &mut [[f64; LANES]]) {
         let compiled = &*self.compiled;
         let own = compiled.inputs - compiled.shared;
         if count == 0 {

@@ -169,12 +169,20 @@ impl Algebra for Recorder {
         for factor in &mut factors {
             if let (Some(x), Fused::Add | Fused::From) = (self.negated(*factor), op) {
                 *factor = x;
-                op = if op == Fused::Add { Fused::From } else { Fused::Add };
+                op = if op == Fused::Add {
+                    Fused::From
+                } else {
+                    Fused::Add
+                };
             }
         }
         if let (Some(z), Fused::Add | Fused::Sub) = (self.negated(term), op) {
             term = z;
-            op = if op == Fused::Add { Fused::Sub } else { Fused::Add };
+            op = if op == Fused::Add {
+                Fused::Sub
+            } else {
+                Fused::Add
+            };
         }
         let [x, y] = factors;
         self.push(Value::Fused(op, [x, y, term]))

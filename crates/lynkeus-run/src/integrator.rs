@@ -513,12 +513,7 @@ impl Rk4 {
 
     /// Steps that f has as one function. What is not finite stays so from step to step, each of which adds to a
     /// state: then `x` stays, and false is said.
-    fn steps_at_once(
-        &mut self,
-        f: &mut impl Dynamics,
-        steps: &[[f64; 2]],
-        x: &mut [f64],
-    ) -> bool {
+    fn steps_at_once(&mut self, f: &mut impl Dynamics, steps: &[[f64; 2]], x: &mut [f64]) -> bool {
         let are_made = f.steps(steps, x, &mut self.stage) && are_finite(&self.stage);
         if are_made {
             x.copy_from_slice(&self.stage);

@@ -281,7 +281,11 @@ impl Runner {
         next: &mut [f64],
     ) -> bool {
         let Self { routine, fused, .. } = self;
-        let count = steps.len();
+        let count = match steps.len() {
+            // those that are not done at once come again one by one
+            2.. if !is_fused() => 0,
+            count => count,
+        };
         let mut compiled = self.steps.ready_for(count, PATIENCE, || routine.steps());
         if compiled.is_none() && is_fused() {
             if fused.is_none() {

@@ -100,10 +100,9 @@ impl Steps {
     pub fn advance(&mut self, w: &[f64], steps: &[[f64; 2]], x: &[f64], next: &mut [f64]) {
         let size = 2 + self.states;
         let together = self.blocks.values().len() / size - 1;
-        next.copy_from_slice(x);
-        for steps in steps.chunks(together) {
+        for (k, steps) in steps.chunks(together).enumerate() {
             let blocks = self.blocks.values_mut().as_flattened_mut();
-            blocks[2..size].copy_from_slice(next);
+            blocks[2..size].copy_from_slice(if k == 0 { x } else { &*next });
             for (block, step) in blocks.chunks_exact_mut(size).zip(steps) {
                 block[..2].copy_from_slice(step);
             }

@@ -9,8 +9,8 @@ use crate::closed_loop::Loop;
 use crate::integrator::{APART, check_interval, fixed_steps, pieces};
 use crate::lanes::{Engine, have_functions};
 use crate::noise::Sensors;
-use crate::steps::{is_fused, tape};
 use crate::run::{Itinerary, Stop};
+use crate::steps::{is_fused, tape};
 use crate::{Events, Method, Noise, Result, Simulation, Step};
 
 /// What all trajectories do next.
