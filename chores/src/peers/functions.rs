@@ -24,7 +24,7 @@ pub(super) fn peers(programs: &Programs) -> Result<Vec<Peer>, String> {
             in_c("functions-avx2", &["-O3", "-mavx2", "-mfma"])?,
         ),
         (
-            "libm, one by one",
+            "C, one by one",
             compiled("functions.c", "functions", &one_by_one)?,
         ),
     ];
