@@ -69,8 +69,8 @@ pub(crate) struct Adaptive {
 }
 
 /// Progress of one call.
-struct Leg<'a, 'f, D: Dynamics> {
-    f: &'a mut Filippov<'f, D>,
+struct Leg<'a, 'f> {
+    f: &'a mut Filippov<'f>,
     t: f64,
     to: f64,
     x: &'a mut [f64],
@@ -112,7 +112,7 @@ impl Adaptive {
     /// the budget. Where an error ends it early, `x` is the last state reached.
     pub(crate) fn advance(
         &mut self,
-        f: &mut Filippov<'_, impl Dynamics>,
+        f: &mut Filippov<'_>,
         from: f64,
         to: f64,
         x: &mut [f64],
@@ -134,7 +134,7 @@ impl Adaptive {
     }
 
     /// True every so often, where the other method is the better one.
-    fn should_change(&mut self, leg: &mut Leg<'_, '_, impl Dynamics>, step: f64) -> bool {
+    fn should_change(&mut self, leg: &mut Leg<'_, '_>, step: f64) -> bool {
         self.since_look += 1;
         if !self.may_change || self.since_look < LOOK_EVERY {
             return false;
@@ -154,7 +154,7 @@ impl Adaptive {
     /// Steps of one of the methods; false where the other one fits better from there.
     fn run<M: OneStep>(
         &mut self,
-        leg: &mut Leg<'_, '_, impl Dynamics>,
+        leg: &mut Leg<'_, '_>,
         of: fn(&mut Self) -> &mut Option<Box<M>>,
     ) -> Result<bool> {
         let new = || Box::new(M::new(leg.x.len()));
@@ -165,11 +165,7 @@ impl Adaptive {
         is_done
     }
 
-    fn steps(
-        &mut self,
-        method: &mut impl OneStep,
-        leg: &mut Leg<'_, '_, impl Dynamics>,
-    ) -> Result<bool> {
+    fn steps(&mut self, method: &mut impl OneStep, leg: &mut Leg<'_, '_>) -> Result<bool> {
         let tolerances = self.tolerances;
         if !self.is_implicit {
             self.next = self.next.min(leg.to - leg.t);
@@ -201,11 +197,7 @@ impl Adaptive {
     }
 
     /// Shortens the proposed step until it is accepted, and proposes the next one.
-    fn accepted_step(
-        &mut self,
-        method: &mut impl OneStep,
-        leg: &mut Leg<'_, '_, impl Dynamics>,
-    ) -> Result<f64> {
+    fn accepted_step(&mut self, method: &mut impl OneStep, leg: &mut Leg<'_, '_>) -> Result<f64> {
         loop {
             let proposed = self.next;
             let step = leg.step(proposed);
@@ -230,7 +222,7 @@ impl Adaptive {
     fn up_to_event(
         &mut self,
         method: &mut impl OneStep,
-        leg: &mut Leg<'_, '_, impl Dynamics>,
+        leg: &mut Leg<'_, '_>,
         step: f64,
     ) -> Result<f64> {
         let (t, start, reached) = (leg.t, leg.x.to_vec(), method.reached().to_vec());
@@ -241,7 +233,7 @@ impl Adaptive {
         };
         let ahead = method.ahead(leg.f, &span);
         let (tolerances, mut has_tried) = (self.tolerances, false);
-        let attempt = |f: &mut Filippov<'_, _>, step: f64| {
+        let attempt = |f: &mut Filippov<'_>, step: f64| {
             has_tried = true;
             method.restart(true);
             let tried = method.begin(f, t, &start)
@@ -266,7 +258,7 @@ impl Adaptive {
     }
 
     /// Pays for one step.
-    fn spend(&mut self, leg: &mut Leg<'_, '_, impl Dynamics>) -> Result<()> {
+    fn spend(&mut self, leg: &mut Leg<'_, '_>) -> Result<()> {
         if leg.f.is_over() {
             return Err(Error::Cancelled { time: leg.t });
         }
@@ -287,15 +279,15 @@ impl Adaptive {
     /// makes a step of another length from the same start, and `ahead` is what comes first in it.
     /// None where nothing comes. A step that leads up to it where something bends, or where none
     /// across the surface is accurate.
-    fn crossing<D: Dynamics>(
+    fn crossing(
         &mut self,
-        leg: &mut Leg<'_, '_, D>,
+        leg: &mut Leg<'_, '_>,
         span: &Span<'_>,
         ahead: Ahead,
-        mut attempt: impl FnMut(&mut Filippov<'_, D>, f64) -> Option<Vec<f64>>,
+        mut attempt: impl FnMut(&mut Filippov<'_>, f64) -> Option<Vec<f64>>,
     ) -> Result<Option<Reach>> {
         let (t, step) = (span.from.0, span.step);
-        let reach = |f: &mut Filippov<'_, D>, step: f64, x: Vec<f64>| {
+        let reach = |f: &mut Filippov<'_>, step: f64, x: Vec<f64>| {
             let margins = f.margins(t + step, &x);
             Reach { step, x, margins }
         };
@@ -374,7 +366,7 @@ impl Persist for Adaptive {
     }
 }
 
-impl<D: Dynamics> Leg<'_, '_, D> {
+impl Leg<'_, '_> {
     /// Steps end here: what is left is below the resolution of time.
     fn at_the_end(&self) -> bool {
         self.to - self.t <= resolution(self.to)

@@ -65,6 +65,9 @@ pub trait Dynamics {
         Ok(None)
     }
 
+    /// The state has jumped to x at t: what is held from before is held anew.
+    fn restart(&mut self, _t: f64, _x: &[f64]) {}
+
     /// After an event at (t, x), the state is now `jumped`, the derivatives were and are `rates`: what
     /// follows deviations of the state takes them along.
     ///

@@ -115,7 +115,7 @@ impl Integrator {
     /// [`Error::Diverged`] where a fixed step is too large.
     pub fn advance(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         from: f64,
         to: f64,
         x: &mut [f64],
@@ -126,7 +126,7 @@ impl Integrator {
     }
 
     /// Blames a fixed step that is too large for a value that is not finite.
-    fn explained(&self, error: Error, f: &impl Dynamics, x: &[f64]) -> Error {
+    fn explained(&self, error: Error, f: &dyn Dynamics, x: &[f64]) -> Error {
         match (error, self.hint()) {
             (Error::NotFinite { time, .. }, hint) if !hint.is_empty() => {
                 diverged(time, &f.names(), x, largest(x), hint)
@@ -135,7 +135,7 @@ impl Integrator {
         }
     }
 
-    fn segments(&mut self, f: &mut impl Dynamics, from: f64, to: f64, x: &mut [f64]) -> Result<()> {
+    fn segments(&mut self, f: &mut dyn Dynamics, from: f64, to: f64, x: &mut [f64]) -> Result<()> {
         self.instants.clear();
         if let Some(events) = f.events() {
             events.instants(from, to, &mut self.instants)?;
@@ -157,7 +157,7 @@ impl Integrator {
                 }
                 Stepper::Fixed(fixed) => {
                     let memory = &mut self.sides.memory;
-                    occur(f, memory, (start, end - start), x, &[], |_, _| ())?;
+                    occur(f, memory, (start, end - start), x, &[])?;
                     fixed.advance(f, memory, (start, end), whole, x)?;
                 }
             }
@@ -172,7 +172,7 @@ impl Integrator {
     /// Runge–Kutta method. Whether there is one within a time.
     pub(crate) fn anticipate(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         (t, within): (f64, f64),
         x: &mut [f64],
     ) -> Result<bool> {
@@ -228,7 +228,7 @@ impl Persist for Integrator {
 impl Fixed {
     fn advance(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         memory: &mut Memory,
         (from, to): (f64, f64),
         whole: f64,
@@ -253,7 +253,7 @@ impl Fixed {
     /// with smaller steps, since the Jacobian may have grown meanwhile.
     fn auto(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         memory: &mut Memory,
         (from, to): (f64, f64),
         x: &mut [f64],
@@ -291,7 +291,7 @@ impl Fixed {
     /// So many equal steps, with events where there are clauses.
     fn steps(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         memory: &mut Memory,
         (from, to): (f64, f64),
         steps: usize,
@@ -312,7 +312,7 @@ impl Fixed {
 }
 
 /// A step beside the fastest mode at (t, x).
-fn advice(f: &mut impl Dynamics, t: f64, x: &[f64], used: f64) -> StepAdvice {
+fn advice(f: &mut dyn Dynamics, t: f64, x: &[f64], used: f64) -> StepAdvice {
     let spectral_radius = spectral_radius(f, t, x);
     let needed = AUTO_PRODUCT / spectral_radius;
     StepAdvice {
@@ -412,7 +412,7 @@ const HALVINGS: usize = 50;
 const MOST_PARTS: usize = 10_000;
 
 /// Relations change all along a step.
-fn endless(f: &impl Dynamics, time: f64) -> Error {
+fn endless(f: &dyn Dynamics, time: f64) -> Error {
     Error::EndlessEvents {
         time,
         line: f.clauses().map_or(0, |clauses| clauses.first_line()),
@@ -445,7 +445,7 @@ impl Rk4 {
     ///
     /// # Panics
     /// If `f` or `x` has another dimension.
-    pub fn step(&mut self, f: &mut impl Dynamics, t: f64, h: f64, x: &mut [f64]) -> Result<()> {
+    pub fn step(&mut self, f: &mut dyn Dynamics, t: f64, h: f64, x: &mut [f64]) -> Result<()> {
         if self.steps_at_once(f, &[[t, h]], x) {
             return Ok(());
         }
@@ -471,7 +471,7 @@ impl Rk4 {
     /// As [`Rk4::step`].
     pub fn advance(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         from: f64,
         to: f64,
         steps: usize,
@@ -498,7 +498,7 @@ impl Rk4 {
     /// As [`Rk4::advance`] over steps, the time and the length of each.
     fn one_by_one(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         steps: &[[f64; 2]],
         x: &mut [f64],
     ) -> Result<()> {
@@ -513,7 +513,7 @@ impl Rk4 {
 
     /// Steps that f has as one function. What is not finite stays so from step to step, each of which adds to a
     /// state: then `x` stays, and false is said.
-    fn steps_at_once(&mut self, f: &mut impl Dynamics, steps: &[[f64; 2]], x: &mut [f64]) -> bool {
+    fn steps_at_once(&mut self, f: &mut dyn Dynamics, steps: &[[f64; 2]], x: &mut [f64]) -> bool {
         let are_made = f.steps(steps, x, &mut self.stage) && are_finite(&self.stage);
         if are_made {
             x.copy_from_slice(&self.stage);
@@ -527,7 +527,7 @@ impl Rk4 {
     /// state that a jump has sent back is followed by shorter steps until it has left.
     fn step_with_events(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         memory: &mut Memory,
         (from, to): (f64, f64),
         x: &mut [f64],
@@ -572,7 +572,7 @@ impl Rk4 {
             }
             let (length, flipped) = self.first_change(f, (t, h), &start, &was, x)?;
             t = if length == whole { to } else { t + length };
-            if occur(f, memory, (t, to - from), x, &flipped, |_, _| ())? {
+            if occur(f, memory, (t, to - from), x, &flipped)? {
                 sent_back = self.sent_back(f, t, x, &flipped);
             }
         }
@@ -583,7 +583,7 @@ impl Rk4 {
     /// `were`, about the shortest: its length, with `x` at its end and the relations that have changed.
     fn first_change(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         (t, h): (f64, f64),
         start: &[f64],
         were: &[Seen],
@@ -617,7 +617,7 @@ impl Rk4 {
     /// there is one within a time.
     fn anticipate(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         memory: &mut Memory,
         (t, within): (f64, f64),
         x: &mut [f64],
@@ -634,7 +634,7 @@ impl Rk4 {
                 continue;
             }
             let (length, flipped) = self.first_change(f, (t, h), &start, &were, x)?;
-            if !occur(f, memory, (t + length, within), x, &flipped, |_, _| ())? {
+            if !occur(f, memory, (t + length, within), x, &flipped)? {
                 break;
             }
             self.step(f, t + length, -length, x)?;
@@ -647,7 +647,7 @@ impl Rk4 {
     /// The relation that still holds behind an event and is left from there.
     fn sent_back(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         t: f64,
         x: &[f64],
         flipped: &[usize],
@@ -667,7 +667,7 @@ impl Rk4 {
     /// That clauses which came ever sooner still hold.
     fn check(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         memory: &mut Memory,
         t: f64,
         x: &[f64],
@@ -691,7 +691,7 @@ impl Rk4 {
     }
 
     /// Finds the stage whose derivative is not finite.
-    fn blame(&mut self, f: &mut impl Dynamics, t: f64, h: f64, x: &[f64]) -> Error {
+    fn blame(&mut self, f: &mut dyn Dynamics, t: f64, h: f64, x: &[f64]) -> Error {
         let bad = |k: &Vec<f64>| !are_finite(k);
         let stage = self.k.iter().position(bad).unwrap_or(0);
         self.place(stage, h, x);

@@ -20,7 +20,7 @@ const ITERATIONS: (usize, usize) = (40, 16);
 impl Slopes {
     /// Looks at f: at its own derivatives where it knows them and they have values, else at
     /// differences. Not finite where f is not.
-    pub(crate) fn look(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) {
+    pub(crate) fn look(&mut self, f: &mut dyn Dynamics, t: f64, x: &[f64]) {
         if !(f.slopes(t, x, self) && self.are_finite()) {
             self.differences(f, t, x, |k| rounding(x[k]));
         }
@@ -30,7 +30,7 @@ impl Slopes {
     /// has no value ahead.
     pub(crate) fn differences(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         t: f64,
         x: &[f64],
         size: impl Fn(usize) -> f64,
@@ -81,7 +81,7 @@ fn rounding(x: f64) -> f64 {
 /// differences, and its radius from Gelfand's formula ρ = lim ‖Jᵏ‖^(1/k), which needs
 /// no eigenvalue iteration and takes strongly non-normal matrices (high gain) as well
 /// as complex pairs. Not finite where the derivative is not.
-pub fn spectral_radius(f: &mut impl Dynamics, t: f64, x: &[f64]) -> f64 {
+pub fn spectral_radius(f: &mut dyn Dynamics, t: f64, x: &[f64]) -> f64 {
     fastest(f, t, x, None).radius
 }
 
@@ -97,7 +97,7 @@ pub struct Fastest {
 
 /// As [`spectral_radius`]; with sizes of the states, where f knows its slopes and one is not finite, as
 /// that of a root at 0, by secants over a hundredth of each (of 1 where none is given).
-pub(crate) fn fastest(f: &mut impl Dynamics, t: f64, x: &[f64], sizes: Option<&[f64]>) -> Fastest {
+pub(crate) fn fastest(f: &mut dyn Dynamics, t: f64, x: &[f64], sizes: Option<&[f64]>) -> Fastest {
     let (n, mut slopes) = (x.len(), Slopes::default());
     let is_known = n > 0 && f.slopes(t, x, &mut slopes);
     let is_steep = is_known && !slopes.are_finite();
@@ -137,7 +137,7 @@ fn gelfand(mut power: DMatrix<f64>) -> f64 {
 }
 
 /// The power method by differences in the direction of v.
-fn power(f: &mut impl Dynamics, t: f64, x: &[f64]) -> f64 {
+fn power(f: &mut dyn Dynamics, t: f64, x: &[f64]) -> f64 {
     let n = x.len();
     let (mut base, mut moved) = (vec![0.0; n], vec![0.0; n]);
     f.derivatives(t, x, &mut base);

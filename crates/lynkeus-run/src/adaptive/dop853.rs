@@ -268,7 +268,7 @@ impl OneStep for Dop853 {
     /// Every step begins with nothing but its state.
     fn restart(&mut self, _careful: bool) {}
 
-    fn begin(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) -> bool {
+    fn begin(&mut self, f: &mut dyn Dynamics, t: f64, x: &[f64]) -> bool {
         (self.is_retry, self.bad) = (false, None);
         f.derivatives(t, x, &mut self.slopes[0]);
         are_finite(&self.slopes[0])
@@ -284,7 +284,7 @@ impl OneStep for Dop853 {
 
     fn attempt(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         (t, x): (f64, &[f64]),
         h: f64,
         tolerances: &Tolerances,
@@ -317,7 +317,7 @@ impl OneStep for Dop853 {
     /// Section II.4 of the book.
     fn first_step(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         (t, x): (f64, &[f64]),
         span: f64,
         tolerances: &Tolerances,
@@ -348,7 +348,7 @@ impl OneStep for Dop853 {
         first.max(2.0 * resolution(t)).min(span)
     }
 
-    fn ahead<D: Dynamics>(&mut self, f: &mut Filippov<'_, D>, span: &Span<'_>) -> Option<Ahead> {
+    fn ahead(&mut self, f: &mut Filippov<'_>, span: &Span<'_>) -> Option<Ahead> {
         if !f.is_near(span, |state| self.fastest(state)) {
             return None;
         }
@@ -392,7 +392,7 @@ impl Dop853 {
     /// where it is not finite.
     fn look(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         (t, x): (f64, &[f64]),
         h: f64,
         (place, c, row): (usize, f64, Row),
@@ -406,7 +406,7 @@ impl Dop853 {
     }
 
     /// Finds what is between the ends of the step tried last; false where a derivative is not finite.
-    fn look_inside(&mut self, f: &mut impl Dynamics, at: (f64, &[f64]), h: f64) -> bool {
+    fn look_inside(&mut self, f: &mut dyn Dynamics, at: (f64, &[f64]), h: f64) -> bool {
         f.derivatives(at.0 + h, &self.reached, &mut self.slopes[STAGES]);
         let further = (STAGES + 1..).zip(C_BETWEEN.into_iter().zip(A_BETWEEN));
         let mut looks = further.map(|(place, (c, row))| self.look(f, at, h, (place, c, row)));

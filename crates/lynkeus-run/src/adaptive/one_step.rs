@@ -13,12 +13,12 @@ pub(super) trait OneStep {
     fn restart(&mut self, careful: bool);
 
     /// Takes the derivative at the start of a step; false where it is not finite.
-    fn begin(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) -> bool;
+    fn begin(&mut self, f: &mut dyn Dynamics, t: f64, x: &[f64]) -> bool;
 
     /// A first step for an interval of length `span`, after [`OneStep::begin`].
     fn first_step(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         at: (f64, &[f64]),
         span: f64,
         tolerances: &Tolerances,
@@ -32,7 +32,7 @@ pub(super) trait OneStep {
     /// derivative; else the step to go on with.
     fn attempt(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         at: (f64, &[f64]),
         h: f64,
         tolerances: &Tolerances,
@@ -46,5 +46,5 @@ pub(super) trait OneStep {
 
     /// What comes first in the step tried last; none where a first look shows that it does not
     /// matter.
-    fn ahead<D: Dynamics>(&mut self, f: &mut Filippov<'_, D>, span: &Span<'_>) -> Option<Ahead>;
+    fn ahead(&mut self, f: &mut Filippov<'_>, span: &Span<'_>) -> Option<Ahead>;
 }

@@ -133,7 +133,7 @@ impl OneStep for Radau {
         self.last = None;
     }
 
-    fn begin(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) -> bool {
+    fn begin(&mut self, f: &mut dyn Dynamics, t: f64, x: &[f64]) -> bool {
         self.bad = None;
         if !self.has_begun {
             f.derivatives(t, x, self.f0.as_mut_slice());
@@ -145,7 +145,7 @@ impl OneStep for Radau {
     /// From the size of the derivative.
     fn first_step(
         &mut self,
-        _f: &mut impl Dynamics,
+        _f: &mut dyn Dynamics,
         (_t, x): (f64, &[f64]),
         span: f64,
         tolerances: &Tolerances,
@@ -157,7 +157,7 @@ impl OneStep for Radau {
 
     fn attempt(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         at: (f64, &[f64]),
         h: f64,
         tolerances: &Tolerances,
@@ -178,7 +178,7 @@ impl OneStep for Radau {
         self.bad.as_ref()
     }
 
-    fn ahead<D: Dynamics>(&mut self, f: &mut Filippov<'_, D>, span: &Span<'_>) -> Option<Ahead> {
+    fn ahead(&mut self, f: &mut Filippov<'_>, span: &Span<'_>) -> Option<Ahead> {
         let ahead = f.ahead(span, |state| self.between(state, span.from.1[state]));
         (ahead != Ahead::Nothing).then_some(ahead)
     }
@@ -200,7 +200,7 @@ impl Radau {
     /// The step to retry with.
     fn tried(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         (t, x): (f64, &[f64]),
         h: f64,
         relative: f64,
@@ -253,7 +253,7 @@ impl Radau {
     /// Factors of E₁ and E₂ for this step, kept ones where they fit.
     fn factors_for(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         t: f64,
         x: &[f64],
         h: f64,
@@ -283,7 +283,7 @@ impl Radau {
     /// The local error relative to the tolerance.
     fn error(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         (t, x): (f64, &[f64]),
         factors: &StageFactors,
     ) -> f64 {
@@ -323,7 +323,7 @@ impl Radau {
     }
 
     /// Moves to the end of the step; false where the derivative there is not finite.
-    fn accept(&mut self, f: &mut impl Dynamics, (t, x): (f64, &[f64]), h: f64, error: f64) -> bool {
+    fn accept(&mut self, f: &mut dyn Dynamics, (t, x): (f64, &[f64]), h: f64, error: f64) -> bool {
         self.place(x, 2);
         f.derivatives(t + h, self.stage.as_slice(), self.f0.as_mut_slice());
         if !are_finite(self.f0.as_slice()) {
@@ -363,7 +363,7 @@ impl Radau {
     /// The factor on the step to retry with.
     fn newton(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut dyn Dynamics,
         (t, x): (f64, &[f64]),
         factors: &StageFactors,
         relative: f64,
@@ -405,7 +405,7 @@ impl Radau {
     }
 
     /// K = f at the stages; false where it is not finite.
-    fn evaluate_stages(&mut self, f: &mut impl Dynamics, (t, x): (f64, &[f64]), h: f64) -> bool {
+    fn evaluate_stages(&mut self, f: &mut dyn Dynamics, (t, x): (f64, &[f64]), h: f64) -> bool {
         for (stage, c) in C.iter().enumerate() {
             self.place(x, stage);
             let t = t + c * h;

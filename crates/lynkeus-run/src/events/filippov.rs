@@ -132,8 +132,8 @@ pub(crate) struct Span<'a> {
 }
 
 /// A system on known sides of its surfaces.
-pub(crate) struct Filippov<'a, D: Dynamics> {
-    inner: &'a mut D,
+pub(crate) struct Filippov<'a> {
+    inner: &'a mut dyn Dynamics,
     at: &'a mut Sides,
     /// length of the interval
     length: f64,
@@ -151,9 +151,14 @@ pub(crate) struct Filippov<'a, D: Dynamics> {
     seen: Vec<Seen>,
 }
 
-impl<'a, D: Dynamics> Filippov<'a, D> {
+impl<'a> Filippov<'a> {
     /// At the start of an interval of the given length; decides on which sides it starts.
-    pub fn new(inner: &'a mut D, at: &'a mut Sides, (t, x): (f64, &[f64]), length: f64) -> Self {
+    pub fn new(
+        inner: &'a mut dyn Dynamics,
+        at: &'a mut Sides,
+        (t, x): (f64, &[f64]),
+        length: f64,
+    ) -> Self {
         let guards = inner.events().and_then(|events| events.guards());
         let surfaces = guards.iter().flat_map(|guards| &guards.surfaces);
         let counting = surfaces.clone().enumerate().filter(|(_, s)| s.counts);
@@ -369,9 +374,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
         flipped: &[usize],
     ) -> Result<bool> {
         let length = self.length;
-        let jumped = occur(self, memory, (t, length), x, flipped, |own, x| {
-            own.start(t, x);
-        })?;
+        let jumped = occur(self, memory, (t, length), x, flipped)?;
         if let (false, true, Some(clauses)) = (jumped, memory.suspects(), self.inner.clauses()) {
             self.inner.watch(t, x, &mut self.seen);
             let largest = |relation: usize| self.at.largest[self.plain + relation];
@@ -665,7 +668,7 @@ impl<'a, D: Dynamics> Filippov<'a, D> {
     }
 }
 
-impl<D: Dynamics> Drop for Filippov<'_, D> {
+impl Drop for Filippov<'_> {
     fn drop(&mut self) {
         if !self.is_plain() {
             tell(self.inner, None);
@@ -673,7 +676,7 @@ impl<D: Dynamics> Drop for Filippov<'_, D> {
     }
 }
 
-impl<D: Dynamics> Dynamics for Filippov<'_, D> {
+impl Dynamics for Filippov<'_> {
     fn dimension(&self) -> usize {
         self.inner.dimension()
     }
@@ -710,6 +713,10 @@ impl<D: Dynamics> Dynamics for Filippov<'_, D> {
         self.inner.happen(t, x, memory)
     }
 
+    fn restart(&mut self, t: f64, x: &[f64]) {
+        self.start(t, x);
+    }
+
     fn settle(
         &mut self,
         at: (f64, &[f64]),
@@ -739,7 +746,7 @@ fn side_of(value: f64) -> f64 {
 }
 
 /// Tells a system on which sides of its surfaces it is; with none that it is where the state says.
-fn tell(system: &mut impl Dynamics, sides: Option<&[f64]>) {
+fn tell(system: &mut dyn Dynamics, sides: Option<&[f64]>) {
     if let Some(events) = system.events() {
         events.hold(sides);
     }

@@ -9,14 +9,13 @@ use crate::{Dynamics, Error, Result};
 const GRAZING: f64 = 1e-9;
 
 /// The event at `t`, in an interval of some length: `before` is the derivative that led to it, and `flipped` are
-/// the relations that changed. `restart` tells the system that its state has jumped. Whether it has.
-pub(crate) fn occur<D: Dynamics>(
-    f: &mut D,
+/// the relations that changed. Whether the state has jumped.
+pub(crate) fn occur(
+    f: &mut dyn Dynamics,
     memory: &mut Memory,
     (t, length): (f64, f64),
     x: &mut [f64],
     flipped: &[usize],
-    restart: impl FnOnce(&mut D, &[f64]),
 ) -> Result<bool> {
     let Some(clauses) = f.clauses() else {
         return Ok(false);
@@ -75,7 +74,7 @@ pub(crate) fn occur<D: Dynamics>(
         rate: f.rates(t, &old, &before)[relation],
         late: late[relation],
     });
-    restart(f, x);
+    f.restart(t, x);
     let mut after = vec![0.0; x.len()];
     f.derivatives(t, x, &mut after);
     let line = match condition {
