@@ -17,9 +17,10 @@ use opcua::client::{
 };
 use opcua::crypto::SecurityPolicy;
 use opcua::types::{
-    AttributeId, DataChangeFilter, DataChangeTrigger, DataValue, DateTime, EndpointDescription,
-    ExtensionObject, MessageSecurityMode, MonitoredItemCreateRequest, MonitoringMode,
-    MonitoringParameters, NodeId, ReadValueId, StatusCode, TimestampsToReturn, Variant, WriteValue,
+    AttributeId, DataChangeFilter, DataChangeTrigger, DataTypeId, DataValue, DateTime,
+    EndpointDescription, ExtensionObject, MessageSecurityMode, MonitoredItemCreateRequest,
+    MonitoringMode, MonitoringParameters, NodeId, ReadValueId, StatusCode, TimestampsToReturn,
+    Variant, WriteValue,
 };
 use tokio::sync::Notify;
 use tokio::time::{sleep, timeout};
@@ -178,6 +179,7 @@ fn client(settings: &OpcuaSettings) -> Result<Client, String> {
         .pki_dir(&settings.pki)
         .create_sample_keypair(is_secret)
         .trust_server_certs(false)
+        .recreate_subscriptions(false)
         .session_retry_limit(-1)
         .session_retry_initial(SOON)
         .session_retry_max(AT_MOST)
@@ -269,16 +271,26 @@ async fn session(
     let url = &asked.settings.url.text;
     let (session, events) = connected(client, &asked.settings).await?;
     let mut events = pin!(events.enter());
-    let mut work = tokio::spawn(work(
-        Arc::clone(&session),
-        Arc::clone(asked),
-        teller.clone(),
-        Arc::clone(outgoing),
-    ));
+    let begin = || {
+        tokio::spawn(work(
+            Arc::clone(&session),
+            Arc::clone(asked),
+            teller.clone(),
+            Arc::clone(outgoing),
+        ))
+    };
+    let mut work = begin();
+    let mut has_begun = false;
     while !stop.load(Ordering::Relaxed) {
         tokio::select! {
             event = events.try_next() => match event {
                 Ok(Some(SessionPollResult::Reconnected(mode))) => {
+                    if has_begun && matches!(mode, SessionConnectMode::NewSession(_)) {
+                        // it knows of no subscription
+                        work.abort();
+                        work = begin();
+                    }
+                    has_begun = true;
                     let rest = match (*was_there, mode) {
                         (false, _) => "",
                         (true, SessionConnectMode::ReactivatedSession(_)) => " again",
@@ -424,32 +436,29 @@ impl Kind {
     }
 }
 
-/// What the nodes that are written hold now.
+/// What the nodes that are written take, by their type.
 async fn kinds(session: &Session, nodes: &[NodeId]) -> Result<Vec<Kind>, Ended> {
     if nodes.is_empty() {
         return Ok(vec![]);
     }
-    let all: Vec<_> = nodes.iter().cloned().map(ReadValueId::new_value).collect();
+    let all = nodes.iter().cloned();
+    let all: Vec<_> = all
+        .map(|node| ReadValueId::new(node, AttributeId::DataType))
+        .collect();
     let read = session.read(&all, TimestampsToReturn::Neither, 0.0).await;
     let values = read.map_err(|error| ended(error.status()))?;
     let kinds = nodes.iter().zip(values).map(|(node, value)| {
-        if let Some(code) = value.status.filter(|code| {
-            [
-                StatusCode::BadNodeIdUnknown,
-                StatusCode::BadNodeIdInvalid,
-                StatusCode::BadAttributeIdInvalid,
-            ]
-            .contains(code)
-        }) {
+        let code = value.status.unwrap_or(StatusCode::Good);
+        let Some(Variant::NodeId(kind)) = value.value.filter(|_| code.is_good()) else {
             return Err(Ended::Unwanted(format!("the node {node}: {}", said(code))));
-        }
-        let holds = match value.value {
-            None | Some(Variant::Empty | Variant::Double(_)) => Holds::Double,
-            Some(Variant::Float(_)) => Holds::Float,
-            Some(Variant::Boolean(_)) => Holds::Boolean,
-            Some(other) => {
+        };
+        let holds = match kind.as_data_type_id() {
+            Ok(DataTypeId::Double) => Holds::Double,
+            Ok(DataTypeId::Float) => Holds::Float,
+            Ok(DataTypeId::Boolean) => Holds::Boolean,
+            _ => {
                 return Err(Ended::Unwanted(format!(
-                    "the node {node} holds {other:?}: expected a Double, a Float or a Boolean"
+                    "the node {node} holds values of type {kind}: expected a Double, a Float or a Boolean"
                 )));
             }
         };

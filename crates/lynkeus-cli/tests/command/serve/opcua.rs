@@ -133,7 +133,7 @@ fn expected(folder: &Folder, rows: &[Row]) -> BTreeMap<String, Vec<u64>> {
         .quantities
         .iter()
         .filter_map(|quantity| Some([quantity.estimate.as_ref()?, quantity.deviation.as_ref()?]));
-    let columns: Vec<&Vec<f64>> = told.flatten().collect();
+    let columns: Vec<Vec<f64>> = told.flatten().map(|x| x.iter().collect()).collect();
     let row = |k: usize| columns.iter().map(|x| x[k].to_bits()).collect();
     let all = rows.iter().enumerate();
     all.map(|(k, own)| (date(own.t), row(k))).collect()
@@ -269,7 +269,11 @@ fn what_no_server_has_is_refused() {
     let port = port();
     for (from, to, words) in [
         ("ns=2;s=y", "y", "expected \"ns=2;s=Tank.Level\""),
-        ("{ y =", "{ z =", "no row of this study has such a column"),
+        (
+            "{ y = \"ns",
+            "{ z = \"ns",
+            "no row of this study has such a column",
+        ),
         ("level_hat", "lvl_hat", "no answer of this study has it"),
         ("ns=2;s=a\"", "ns=2;s={asset}\"", "names no `assets`"),
         ("interval = 0.05", "interval = 0", "a number > 0"),
