@@ -35,6 +35,7 @@ use experiment::{Ahead, Candidate};
 pub(crate) use json::FitReport;
 use known::Exact;
 use lynkeus_experiment::crew::{Watch, every};
+use lynkeus_experiment::{Doubt, DoubtLevel};
 use lynkeus_experiment::prepare::{self, Prepared};
 use posed::Posed;
 use problem::{Point, Problem, Steps, Term};
@@ -82,6 +83,8 @@ pub struct Fit {
     /// where that is asked
     pub(crate) ahead: Option<Ahead>,
     pub(crate) errors: Vec<Errors>,
+    /// what the readings say against the values
+    pub doubts: Vec<Doubt>,
     /// what speaks against the values
     pub warnings: Vec<String>,
     /// what the user should know
@@ -233,7 +236,11 @@ impl Work<'_> {
         let Some(doubt) = self.doubt(&ends[0])? else {
             return Ok(ends);
         };
-        let from = starts::best(&mut self.problem, &begin.z, settings.seed)?;
+        let mut from = starts::best(&mut self.problem, &begin.z, settings.seed)?;
+        if self.problem.has_knees() && ends[0].point.value.is_finite() {
+            let aside = starts::aside(&mut self.problem, &ends[0].point)?;
+            from.extend(aside.map(|point| point.z));
+        }
         if from.is_empty() {
             return Ok(ends);
         }
@@ -278,7 +285,10 @@ impl Work<'_> {
             )));
         }
         let values = self.problem.values(&end.point.z);
-        let (errors, _) = errors::errors(&mut self.problem, None, &self.outputs, &values)?;
+        let (errors, rows) = errors::errors(&mut self.problem, None, &self.outputs, &values)?;
+        if let Some(doubt) = rows.doubts(self.problem.logs).first() {
+            return Ok(Some(format!("the first search ended where {}", doubt.text)));
+        }
         let coloured = errors.iter().find(|own| own.are_coloured());
         Ok(coloured.map(|own| {
             format!(
@@ -548,6 +558,13 @@ impl Work<'_> {
         let (errors, rows) =
             errors::errors(&mut self.problem, alone.as_mut(), &self.outputs, &values)?;
         self.warn_of_certain(&rows);
+        // of other values than those that were looked for nobody needs to be told
+        let doubts = match found.is_converged {
+            true => rows.doubts(self.problem.logs),
+            false => vec![],
+        };
+        let warned = doubts.iter().filter(|d| d.level < DoubtLevel::Refusal);
+        self.warnings.extend(warned.map(|d| d.text.clone()));
         let coloured = errors.iter().filter(|own| own.are_coloured());
         let coloured: Vec<&str> = coloured.map(|own| own.output.as_str()).collect();
         if !coloured.is_empty() && !is_ended {
@@ -578,6 +595,7 @@ impl Work<'_> {
             exact: self.exact,
             ahead,
             errors,
+            doubts,
             warnings: self.warnings,
             notes: self.notes,
             rows,

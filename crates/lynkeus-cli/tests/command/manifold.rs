@@ -169,7 +169,11 @@ fn a_picture_lifts_the_pen_at_a_new_turn() {
 /// angle for its error.
 #[test]
 fn an_attitude_is_found_from_far_off() {
-    for (family, more) in [("ekf", ""), ("ukf", "alpha = 0.2")] {
+    for (family, more) in [
+        ("ekf", ""),
+        ("ukf", "alpha = 0.2"),
+        ("mhe", "horizon = 3"),
+    ] {
         let folder = attitude(family, more);
         folder.change("s.toml", "sd = true", "sd = true\nsmooth = true");
         let run = folder.run(&[
@@ -326,7 +330,7 @@ fn what_is_no_angle_and_no_rotation_is_refused() {
     for (file, from, to, command, parts) in rotors {
         refused(&with(rotor("ekf", ""), file, from, to), command, parts);
     }
-    let bodies: [Refused<'_>; 9] = [
+    let bodies: [Refused<'_>; 8] = [
         (
             "m.mo",
             "(start = {2, 0, 0, 0})",
@@ -390,13 +394,6 @@ fn what_is_no_angle_and_no_rotation_is_refused() {
             check,
             &["s.toml:18:24", "entry 2 of \"b\""],
         ),
-        (
-            "s.toml",
-            "family = \"ekf\"",
-            "family = \"mhe\"",
-            simulate,
-            &["family = \"mhe\" does not take the quaternion q", "\"ukf\""],
-        ),
     ];
     for (file, from, to, command, parts) in bodies {
         refused(&with(attitude("ekf", ""), file, from, to), command, parts);
@@ -437,7 +434,7 @@ pub(crate) fn tracked(family: &str) -> Folder {
 
 #[test]
 fn a_quaternion_that_is_read_may_have_either_sign() {
-    for family in ["ekf", "ukf"] {
+    for family in ["ekf", "ukf", "mhe"] {
         let folder = tracked(family);
         let run = folder.run(&["simulate", "s.toml", "--log", "log.csv", "-q"]);
         assert_eq!(run.code, 0, "{family}: {}", run.err);
