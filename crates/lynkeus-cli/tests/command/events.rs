@@ -1,5 +1,7 @@
 //! Plants whose state jumps: `when` clauses, from the study to the answer.
 
+mod suites;
+
 use crate::{Ended, Folder};
 
 const BALL: &str = "model Ball
