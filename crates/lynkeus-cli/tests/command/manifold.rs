@@ -219,6 +219,30 @@ fn an_attitude_is_found_from_far_off() {
     }
 }
 
+/// An ensemble of attitudes from a third of a turn off is where the filter is, and as sure.
+#[test]
+fn an_ensemble_moves_rotations_about_their_mean() {
+    let mut found = vec![];
+    for (family, more) in [
+        ("ekf", ""),
+        ("particle", "proposal = \"ensemble\"\nparticles = 400"),
+    ] {
+        let folder = attitude(family, more);
+        folder.change("s.toml", "q = [0.5, 0.5, 0.5, 0.5]", "q = [1, 0.2, -0.2, 0.3]");
+        folder.change("s.toml", "q = 4.0", "q = 0.2");
+        folder.change("s.toml", "until = 30", "until = 10");
+        let run = folder.run(&["simulate", "s.toml", "-o", "sim.csv", "--json"]);
+        assert_eq!(run.code, 0, "{family}: {}", run.err);
+        let error = &run.json()["errors"]["q"];
+        found.push(["rms_last_half", "rms_in_sd"].map(|key| error[key].as_f64().unwrap()));
+    }
+    let [[filter, _], [ensemble, in_sd]] = found[..] else {
+        panic!("two")
+    };
+    assert!(ensemble < 1.2 * filter, "{ensemble} beside {filter}");
+    assert!((0.5..1.5).contains(&in_sd), "{in_sd}");
+}
+
 #[test]
 fn what_is_known_is_known_up_to_a_turn() {
     let told = rotor("ekf", "").run(&["check", "s.toml"]).out;
