@@ -41,8 +41,9 @@ pub(crate) fn occur<D: Dynamics>(
         f.watch(t, x, &mut now);
         for (r, held) in left {
             // what a correction has taken back did not happen
-            if now[r].holds == held && !causes.contains(&r) {
-                late[r] = (now[r].value / rates[r]).clamp(0.0, length);
+            let seen = now.get(r).filter(|seen| seen.holds == held);
+            if let (Some(seen), false) = (seen, causes.contains(&r)) {
+                late[r] = (seen.value / rates[r]).clamp(0.0, length);
                 causes.push(r);
             }
         }
