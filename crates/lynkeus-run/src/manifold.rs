@@ -373,7 +373,10 @@ mod tests {
         one().transport_in_world(&from, &to, &mut column, 1);
         one().as_vectors(&to, &mut column, 1);
         let off = column.iter().zip([4.0, 0.0, 0.0, -1.0, 0.0]);
-        assert!(off.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-15, "{column:?}");
+        assert!(
+            off.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-15,
+            "{column:?}"
+        );
     }
 
     /// ⊞ undoes ⊟, for steps of up to half a turn and whichever of the two quaternions stands for the rotation; what

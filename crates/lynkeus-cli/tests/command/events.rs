@@ -295,7 +295,14 @@ fn refused(folder: &Folder, arguments: &[&str], told: &str) {
 fn what_does_not_follow_events_says_so_with_the_line() {
     let line = "the state of 'Ball' jumps at events (`when` of line 9)";
     let folder = ball("");
-    let observer = ["export", "study.toml", "--system", "observer", "--to", "fmu"];
+    let observer = [
+        "export",
+        "study.toml",
+        "--system",
+        "observer",
+        "--to",
+        "fmu",
+    ];
     refused(&folder, &[&observer[..], &["-o", "out"]].concat(), line);
     folder.change("study.toml", "\"ekf\"", "\"mhe\"");
     let told = format!("family = \"mhe\": {line}");

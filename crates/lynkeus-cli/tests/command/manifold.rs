@@ -169,11 +169,7 @@ fn a_picture_lifts_the_pen_at_a_new_turn() {
 /// angle for its error.
 #[test]
 fn an_attitude_is_found_from_far_off() {
-    for (family, more) in [
-        ("ekf", ""),
-        ("ukf", "alpha = 0.2"),
-        ("mhe", "horizon = 3"),
-    ] {
+    for (family, more) in [("ekf", ""), ("ukf", "alpha = 0.2"), ("mhe", "horizon = 3")] {
         let folder = attitude(family, more);
         folder.change("s.toml", "sd = true", "sd = true\nsmooth = true");
         let run = folder.run(&[
@@ -228,7 +224,11 @@ fn an_ensemble_moves_rotations_about_their_mean() {
         ("particle", "proposal = \"ensemble\"\nparticles = 400"),
     ] {
         let folder = attitude(family, more);
-        folder.change("s.toml", "q = [0.5, 0.5, 0.5, 0.5]", "q = [1, 0.2, -0.2, 0.3]");
+        folder.change(
+            "s.toml",
+            "q = [0.5, 0.5, 0.5, 0.5]",
+            "q = [1, 0.2, -0.2, 0.3]",
+        );
         folder.change("s.toml", "q = 4.0", "q = 0.2");
         folder.change("s.toml", "until = 30", "until = 10");
         let run = folder.run(&["simulate", "s.toml", "-o", "sim.csv", "--json"]);

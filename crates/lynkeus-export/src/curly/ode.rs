@@ -133,10 +133,7 @@ pub(super) fn sources(ode: &Ode<'_>) -> Result<Sources, Refusal> {
     machine.events(system, &arguments, ode.method)?;
     machine.integrate(system);
     let holds = ode.holds();
-    machine.add(&remembering(
-        &chosen(ADVANCE, &holds),
-        system.has_clauses(),
-    ));
+    machine.add(&remembering(&chosen(ADVANCE, &holds), system.has_clauses()));
     if system.has_clauses() {
         machine.add(&chosen(OWN_EVENTS, &holds));
     }
@@ -230,7 +227,11 @@ fn header(ode: &Ode<'_>, arguments: &Arguments, machine: &Machine) -> File {
         m = ode.inputs.len(),
         p = ode.outputs.len(),
         codes = codes.collect::<String>(),
-        memory = if ode.system.has_clauses() { ", double *m" } else { "" },
+        memory = if ode.system.has_clauses() {
+            ", double *m"
+        } else {
+            ""
+        },
         events = ode.events(machine),
     );
     File {

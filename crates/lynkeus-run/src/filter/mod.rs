@@ -284,7 +284,8 @@ impl Filter {
 
     /// Where it is, in case that a sum is none of its states. A window brings its states to where they are itself.
     fn before(&self) -> Option<Vec<f64>> {
-        let is_sum = !self.manifold.is_straight() && !matches!(self.engine, Engine::MovingHorizon(_));
+        let is_sum =
+            !self.manifold.is_straight() && !matches!(self.engine, Engine::MovingHorizon(_));
         is_sum.then(|| self.belief.x.clone())
     }
 

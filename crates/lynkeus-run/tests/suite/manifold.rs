@@ -535,7 +535,9 @@ fn a_window_of_rotations_ends_in_the_minimum() {
         method: Method::Rk4(Step::Substeps(40)),
         ..EstimatorSettings::default()
     };
-    let mut window = Blueprint::filter(model, settings, exact).estimator().unwrap();
+    let mut window = Blueprint::filter(model, settings, exact)
+        .estimator()
+        .unwrap();
     for k in 0..6 {
         let signals = [&readings[k][..], &rates[k]].concat();
         let estimate = window.push(0.4 * k as f64, &signals).unwrap();
@@ -543,7 +545,10 @@ fn a_window_of_rotations_ends_in_the_minimum() {
         let off = angle_between(q, attitudes[k]);
         assert!(off < 1e-6, "row {k}: {off}");
         for (found, expected) in estimate[4..].iter().zip(offsets[k]) {
-            assert!((found - expected).abs() < 1e-6, "row {k}: {found} {expected}");
+            assert!(
+                (found - expected).abs() < 1e-6,
+                "row {k}: {found} {expected}"
+            );
         }
     }
     // the smoother that is linearised about the minimum is at it
@@ -586,7 +591,10 @@ fn a_window_of_rotations_goes_on() {
             61.. => assert_eq!(restored.push(t, &signals).unwrap(), estimate),
             _ => {}
         }
-        truth.push((flight.q, angle_between(std::array::from_fn(|i| estimate[i]), flight.q)));
+        truth.push((
+            flight.q,
+            angle_between(std::array::from_fn(|i| estimate[i]), flight.q),
+        ));
         flight.go(&w);
     }
     let smoothed = window.smoothed(None, true).unwrap();

@@ -33,7 +33,10 @@ pub(crate) fn plant(study: &Study, options: &ExportOptions) -> Result<Export, Er
     let Settled { mut made, notes } = match system.modes() > 0 || system.has_instants() {
         true => Settled {
             made: drawn(&valued)?,
-            notes: vec!["parameters are numbers: what happens at times and at events has to be known".to_owned()],
+            notes: vec![
+                "parameters are numbers: what happens at times and at events has to be known"
+                    .to_owned(),
+            ],
         },
         false => settled(study, &valued, drawn)?,
     };

@@ -7,7 +7,10 @@ use crate::Folder;
 fn simulated(model: &str, simulate: &str) -> String {
     let folder = Folder::empty();
     folder.write("m.mo", model);
-    folder.write("s.toml", &format!("plant = \"m.mo\"\n[simulate]\n{simulate}"));
+    folder.write(
+        "s.toml",
+        &format!("plant = \"m.mo\"\n[simulate]\n{simulate}"),
+    );
     let run = folder.run(&["simulate", "s.toml", "-q", "-o", "sim.csv"]);
     assert_eq!(run.code, 0, "{}", run.err);
     folder.read("sim.csv")
@@ -17,7 +20,10 @@ fn near(found: &[f64], expected: impl IntoIterator<Item = f64>, most: f64) {
     let expected: Vec<f64> = expected.into_iter().collect();
     assert_eq!(found.len(), expected.len());
     for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
-        assert!((found - expected).abs() <= most, "row {k}: {found} for {expected}");
+        assert!(
+            (found - expected).abs() <= most,
+            "row {k}: {found} for {expected}"
+        );
     }
 }
 

@@ -255,9 +255,8 @@ fn what_is_folded_has_branches_too() {
         "x + acos(cos(x))",
     ] {
         for start in [-1, 1] {
-            let text = format!(
-                "Real x(start={start}, min=-1.2, max=1.2); output Real y = {output};"
-            );
+            let text =
+                format!("Real x(start={start}, min=-1.2, max=1.2); output Real y = {output};");
             let plant = plant(&text, "der(x) = 0;");
             let answer = judged(&plant, &Question::default(), ["x", "", ""]);
             assert_eq!(answer.partial.len(), 1, "{output} from {start}");
