@@ -165,7 +165,7 @@ class OneToOne(Record):
     detail: str
     """why"""
     alike: list[Point] | None
-    """two points that the outputs do not tell apart, where there are such"""
+    """two points that the outputs do not distinguish, if there are any"""
 
 
 class Blind(Record):
@@ -745,7 +745,7 @@ class Frozen(Record):
     output: str
     """the measured output"""
     value: float
-    """the number at which it hangs"""
+    """the number that it repeats"""
     to: float
     """time of the last of the equal readings"""
     rows: int
@@ -804,7 +804,7 @@ class ParticleCounts(Record):
     updates: int
     """updates by readings"""
     resampled: int
-    """times that they were drawn anew"""
+    """number of resamplings"""
     lowest_ess: float | None
     """the least number that counted after an update, (Σw)²/Σw²"""
     starved: int
@@ -1193,7 +1193,8 @@ class NextExperiment(Record):
     relative_sd: float | None
     """its relative standard error"""
     factor: float | None
-    """the same over that of the value that is known worst now; ``None`` where the logs do not tell all values"""
+    """the same over that of the value that is known worst now; ``None`` where the logs do not determine all
+    values"""
     volume: float | None
     """the D criterion: volume of the ellipsoid of errors over what it is now"""
     trace: float | None
@@ -1201,7 +1202,7 @@ class NextExperiment(Record):
     sd: Named[float | None]
     """the standard error of each value, by what ``correlation`` calls it"""
     determines: list[str]
-    """what the logs do not tell, and would with this one"""
+    """what the logs do not determine, and would with this one"""
     undetermined: list[str]
     """what they would not tell even so"""
 
@@ -1242,7 +1243,7 @@ class FitEntries:
     optima: list[FittedOptimum]
     """different ends of the searches that converged, the best first"""
     undetermined: list[str]
-    """what the logs do not tell"""
+    """what the logs do not determine"""
     combinations: list[str]
     """combinations of the parameters that the outputs tell nevertheless"""
     errors: Named[FittedErrors]

@@ -53,15 +53,14 @@ class SensorsSection(TypedDict, total=False):
     """what is measured, what is unknown, how noisy (table; default: none)"""
 
     limits: Mapping[str, Numbers] | None
-    """the range that a sensor can show. `simulate` shows no more than that, and `certify` proves nothing
-    where readings may leave it. A reading at an end only says "at most" or "at least": the filters take it
-    as a censored one, and `--how-well` counts what a clipped reading tells (Fisher's information); the
-    other families take it as it stands, and a note says how often (table: output = `[lowest, highest]`;
-    default: none)"""
+    """the range that a sensor can show. `simulate` clips readings to it, and `certify` proves nothing where
+    readings may leave it. A reading at an end only says "at most" or "at least": the filters treat it as
+    censored, and `--how-well` counts the information of a clipped reading (Fisher's); the other families
+    use it unchanged, and a note counts such readings (table: output = `[lowest, highest]`; default: none)"""
 
     measured: Names | None
-    """what the sensors see. The order counts: the first entry of `theta`, `S`, … belongs to the chain of the
-    first measured output (list of outputs; default: every output of the model)"""
+    """the outputs with a sensor. The order counts: the first entry of `theta`, `S`, … belongs to the chain of
+    the first measured output (list of outputs; default: every output of the model)"""
 
     unknown: Names | None
     """inputs that nobody measures, estimated along with the state; and parameters, estimated as constants
@@ -77,42 +76,42 @@ class SensorsSection(TypedDict, total=False):
     number, text `"5%"`, or `{ uniform = number }`; default: no noise)"""
 
     input_noise: Mapping[str, Number | str | SensorsInputNoise] | None
-    """how wrong the reading of a known input is, as `noise` says it of an output: the plant has the input,
-    the observer reads it with an error that is another one in each row and stays until the next (noisy
-    inputs). Counted by the filters, their smoothers, `sd`, `fit` and `--how-well`; `simulate` draws it
-    (table: known input = number, text `"5%"`, or `{ uniform = number }`; default: no noise)"""
+    """error of the reading of a known input, given as in `noise`: the plant gets the input, the observer
+    reads it with an error that each row draws again and holds until the next (noisy inputs). Counted by
+    the filters, their smoothers, `sd`, `fit` and `--how-well`; `simulate` draws it (table: known input =
+    number, text `"5%"`, or `{ uniform = number }`; default: no noise)"""
 
     correlation: Mapping[str, Mapping[str, Number]] | None
-    """how the noises of two outputs go together, between −1 and 1: `{ left = { right = 0.6 } }`, each pair
+    """correlation of the noises of two outputs, between −1 and 1: `{ left = { right = 0.6 } }`, each pair
     once. Both have a standard deviation in `noise`. Counted by the filters, their smoothers, `fit` and
     `--how-well`; `simulate` draws it (table: output = table: another output = number; default: independent
     noises)"""
 
     bias: Mapping[str, Number] | None
-    """a constant offset of a sensor that is estimated along, y = h + b or f(u − b): a state `NAME_bias` that
-    starts at 0. The number is its standard deviation there, which the filters take; it wanders where
-    `[process_noise]` has a density for it (table: output or known input = number; default: none)"""
+    """a constant offset of a sensor, estimated along with the state, y = h + b or f(u − b): a state
+    `NAME_bias` that starts at 0. The number is its standard deviation there, for the filters; with a
+    density in `[process_noise]` it wanders (table: output or known input = number; default: none)"""
 
     plausible: Mapping[str, Numbers] | None
-    """a cell of a log outside of this range is no reading; a note says how many there are (table: output =
+    """a cell of a log outside of this range is no reading; a note counts such cells (table: output =
     `[lowest, highest]`; default: none)"""
 
     repeats: Mapping[str, Literal["missing"]] | None
-    """a cell of a log that equals the one before is no reading: a sensor that samples more slowly than the
-    log was held (table: output = `"missing"`; default: every cell is a reading)"""
+    """a cell of a log that equals the one before is no reading: the logger held the value of a slower sensor
+    (table: output = `"missing"`; default: every cell is a reading)"""
 
     frozen: Mapping[str, Whole] | None
-    """more equal cells of a log in a row than this are no readings from there on, until they change: the
-    sensor is stuck (table: output = whole number; default: none)"""
+    """after so many equal cells in a row, further ones are no readings until the value changes: the sensor is
+    frozen (table: output = whole number; default: none)"""
 
     delay: Mapping[str, Number] | None
-    """how much later than its sample is taken a reading comes, in the plant's unit of time: the reading in a
-    row at t is of t less this (late readings) (table: output = number; default: none)"""
+    """delay of a reading after its sample, in the plant's unit of time: the reading in a row at t is of t
+    minus this (late readings) (table: output = number; default: none)"""
 
     taken_at: Mapping[str, str] | None
-    """the column of a log, or an expression of columns, that has the time at which the sample was taken whose
-    result is the reading in that row: an assay that comes hours later (late readings) (table: output =
-    column; default: none)"""
+    """the column of a log, or an expression of columns, with the time at which the sample of the row's
+    reading was taken, as of an assay that comes hours later (late readings) (table: output = column;
+    default: none)"""
 
 
 #: spectral density (variance per unit of time) of white noise on a state's derivative; for an unknown input,
@@ -127,13 +126,13 @@ ParametersSection: TypeAlias = Mapping[str, Number | None]
 
 
 class ManifoldSection(TypedDict, total=False):
-    """which states and outputs are angles or rotations; the filters take them as such (table; default: none)"""
+    """which states and outputs are angles or rotations, for the filters (table; default: none)"""
 
     circle: Names | None
-    """angles in radians, of which a full turn changes nothing: θ and θ + 2π are one. Innovations and errors
-    are wrapped, the box has no ends there, and estimates are shown in the declared range (`min` and `max`,
-    or `[box]`) where that is one turn, else unwrapped. An output that turns with such a state is one as
-    well (list of states and outputs; default: none)"""
+    """angles in radians: θ and θ + 2π are the same. Innovations and errors are wrapped, the box has no ends
+    there, and estimates are shown in the declared range (`min` and `max`, or `[box]`) if that is one turn,
+    else unwrapped. An output that turns with such a state is an angle as well (list of states and outputs;
+    default: none)"""
 
     quaternion: Names | None
     """attitudes: arrays `Real q[4]` of states, a unit quaternion with the scalar first, whose equation is q'
@@ -326,24 +325,24 @@ class ObserverSection(TypedDict, total=False):
 
     gate_patience: Whole | None
     """ekf, ukf, mhe, particle: after so many rejections of a sensor in a row, at least half of which moved,
-    its next reading is believed (whole number ≥ 1; default: 10)"""
+    its next reading is accepted (whole number ≥ 1; default: 10)"""
 
     bounds: Literal["project"] | None
-    """ekf, ukf: "project": the estimate is kept in the declared ranges `[min, max]`: after each prediction
-    and correction it is put to the nearest place inside by the covariance's metric, so that what is
-    correlated moves along; the covariance stays ("project"; default: none)"""
+    """ekf, ukf: "project" keeps the estimate in the declared ranges `[min, max]`: each prediction and
+    correction moves it to the nearest point inside in the metric of the covariance, so that correlated
+    quantities move along; the covariance stays ("project"; default: none)"""
 
     iterations: Whole | None
-    """ekf: how often the readings of a sample are linearised, at most: about the prediction, then about the
-    estimate that they give, until it stays (the iterated extended Kalman filter): for a start that is far
-    off, where what the sensors show is not linear (whole number ≥ 1; default: 1; 20 with a quaternion)"""
+    """ekf: how often, at most, the readings of a sample are linearised: about the prediction, then about the
+    resulting estimate, until it stays (the iterated extended Kalman filter); for a start that is far off,
+    with nonlinear sensors (whole number ≥ 1; default: 1; 20 with a quaternion)"""
 
     kappa: Number | None
     """ukf: κ, with n + κ above 0; the defaults make the cubature filter (number; default: 0)"""
 
     horizon: Whole | None
-    """mhe: samples over which the states are estimated anew at each sample, within `[min, max]` (whole number
-    ≥ 1; default: 10)"""
+    """mhe: number of samples in the window that is estimated at each sample, within `[min, max]` (whole
+    number ≥ 1; default: 10)"""
 
     particles: Whole | None
     """particle: how many; the error that they add falls with the root of their number (whole number ≥ 2;
@@ -361,8 +360,8 @@ class ObserverSection(TypedDict, total=False):
     which makes up for their small number (number; default: 1)"""
 
     resample_below: Number | None
-    """particle: particles are drawn anew where their effective number falls below this share of them; 1:
-    after every reading (number in [0.0, 1.0]; default: 0.5)"""
+    """particle: particles are resampled when their effective number falls below this share of them; 1: after
+    every reading (number in [0.0, 1.0]; default: 0.5)"""
 
     seed: Whole | None
     """particle: of the random numbers: the same seed gives the same digits, on any number of threads (whole
@@ -375,7 +374,7 @@ BoxSection: TypeAlias = Mapping[str, Number | Numbers | None]
 
 
 class CertifySection(TypedDict, total=False):
-    """what a guarantee takes for granted (table; default: none)"""
+    """assumptions of a guarantee (table; default: none)"""
 
     tube: Number | None
     """every state stays within this distance of its start value, too (number > 0; default: none)"""
@@ -390,7 +389,7 @@ class CertifySection(TypedDict, total=False):
 
 
 class SimulateSection(TypedDict, total=False):
-    """how the plant and its observer are run together (table; default: none)"""
+    """how the plant and its observer are simulated (table; default: none)"""
 
     until: Number | None
     """the last instant (number > `start`; default: required)"""
@@ -506,26 +505,25 @@ class EstimateSection(TypedDict, total=False):
     default: false)"""
 
     lag: Whole | None
-    """also `<name>_smooth`, the estimate given so many later rows: causal with that delay (whole number ≥ 1;
-    default: none)"""
+    """also `<name>_smooth`, the estimate that uses so many later rows: causal with that delay (whole number ≥
+    1; default: none)"""
 
     sd: bool | None
     """also `<name>_sd`, the standard deviation of each estimate; with `smooth` or `lag` also
     `<name>_smooth_sd` (true, false; default: false)"""
 
     innovations: bool | None
-    """also `<name>_innovation` and `<name>_innovation_sd` of each measured output: its reading less what was
-    expected of it, and the standard deviation of that (what they are judged by) (true, false; default:
-    false)"""
+    """also `<name>_innovation` and `<name>_innovation_sd` of each measured output: its reading minus the
+    prediction, and the standard deviation of that (how they are judged) (true, false; default: false)"""
 
     ess: bool | None
     """also `ess` of a particle filter: how many particles count after each row, (Σw)²/Σw² (true, false;
     default: false)"""
 
     between_samples: Literal["hold", "predict", "linear"] | None
-    """what the observer sees between two rows: the latest row, as a live observer would; what the model makes
-    of the latest reading (`w' = L_f h(x̂)`, the inter-sample predictor); or the straight line to the next,
-    which looks ahead one sample (`"hold"`, `"predict"`, `"linear"`; default: `"hold"`)"""
+    """what the observer uses between two rows: the latest row, as a live observer does; the model's
+    prediction from the latest reading (`w' = L_f h(x̂)`, the inter-sample predictor); or the straight line
+    to the next, which looks ahead one sample (`"hold"`, `"predict"`, `"linear"`; default: `"hold"`)"""
 
     time: str | None
     """`time` of `[log]` (text; default: that of [`log]`)"""
@@ -581,7 +579,7 @@ TuneKeys = TypedDict(
 
 
 class TuneSection(TypedDict, total=False):
-    """which keys are swept, and what a value is judged by (table; default: none)"""
+    """which keys are swept, and how a value is judged (table; default: none)"""
 
     keys: Mapping[str, Numbers | TuneKeys | Mapping[str, Numbers | TuneKeys]] | None
     """what is swept; several keys make a grid. The values of a key that is a list, of `process_noise` and of
@@ -627,8 +625,8 @@ class FitCandidates(TypedDict, total=False):
     """A value of ``candidates`` in ``[fit]``."""
 
     sensors: Mapping[str, Number | str | FitCandidatesSensors]
-    """sensors that there are in this experiment beside `measured`, with their noise (table: output or state =
-    noise, as in `noise` of `[sensors]`; default: none)"""
+    """sensors of this experiment besides `measured`, with their noise (table: output or state = noise, as in
+    `noise` of `[sensors]`; default: none)"""
 
     inputs: Mapping[str, Number | str]
     """known inputs; they are held from one row to the next (table: name = number, or Modelica expression of
@@ -643,38 +641,38 @@ class FitCandidates(TypedDict, total=False):
 
 
 class FitSection(TypedDict, total=False):
-    """which parameters and noises are found from logs (fit) (table; default: none)"""
+    """which parameters and noises are estimated from logs (fit) (table; default: none)"""
 
     parameters: Names | None
-    """parameters of the plant that are found, within the model's `min` and `max` or `bounds` (list of
+    """parameters of the plant to estimate, within the model's `min` and `max` or `bounds` (list of
     parameters; default: none)"""
 
     log: Names | None
-    """those that are searched as logarithms: their ranges must be positive. Noises and densities always are
-    (list of parameters; default: none)"""
+    """those to search as logarithms: their ranges must be positive. Noises and densities always are (list of
+    parameters; default: none)"""
 
     noise: bool | Names | Mapping[str, bool | str] | None
-    """measured outputs whose noise is found; the search starts at `noise` of `[sensors]`, or at the scatter
-    of the readings. In a table, a name says whose value the standard deviation is: `{ y = "s", z = "s" }`
-    for a parameter that two sensors share; or a variable that computes it, of states and inputs, too
-    (true, list of names, or table: output = true, parameter or variable; default: none)"""
+    """measured outputs whose noise is estimated; the search starts at `noise` of `[sensors]`, or at the
+    scatter of the readings. In a table, a name says whose value the standard deviation is: `{ y = "s", z =
+    "s" }` for a parameter that two sensors share; or a variable that computes it, of states and inputs,
+    too (true, list of names, or table: output = true, parameter or variable; default: none)"""
 
     process_noise: bool | Names | None
-    """states and unknown inputs whose spectral density is found; `true`: those with a density above 0 in
-    `[process_noise]`, where the search starts. What is neither found nor declared is 0 (true, or list of
-    names; default: none)"""
+    """states and unknown inputs whose spectral density is estimated; `true`: those with a density above 0 in
+    `[process_noise]`, where the search starts. A density neither estimated nor declared is 0 (true, or
+    list of names; default: none)"""
 
     initial: Names | None
-    """states whose start is found, one for each log; their `initial_variance` counts as 0 (list of states;
-    default: none)"""
+    """states whose start is estimated, one for each log; their `initial_variance` counts as 0 (list of
+    states; default: none)"""
 
     bounds: Mapping[str, Numbers] | None
-    """ranges of what is found, by the name of a parameter or a state, or `"noise.level"`,
+    """ranges of the estimated values, by the name of a parameter or a state, or `"noise.level"`,
     `"process_noise.x"`, `"initial.x"` (table: name = `[least, greatest]`; default: `min` and `max` of the
     model)"""
 
     priors: Mapping[str, FitPriors] | None
-    """what was known before: a normal distribution under the same names (table: name = table; default: none)"""
+    """prior knowledge: a normal distribution under the same names (table: name = table; default: none)"""
 
     objective: Literal["innovations", "simulation"] | None
     """the likelihood of the filter's innovations, or of the errors of the plant alone: then all errors are
@@ -690,12 +688,12 @@ class FitSection(TypedDict, total=False):
     """seed of those points (whole number ≥ 0; default: 0)"""
 
     held_out: Number | None
-    """share at the end of each log that is not fitted, but predicted and told beside (number between 0 and 1;
-    default: none)"""
+    """share at the end of each log that is predicted, not fitted, and reported separately (number between 0
+    and 1; default: none)"""
 
     candidates: Mapping[str, FitCandidates] | None
-    """experiments of which `--next-experiment` tells how much better the values would be known, under names
-    of your own (table: name = table; default: see the next experiment)"""
+    """experiments that `--next-experiment` compares, under names of your choice (table: name = table;
+    default: see the next experiment)"""
 
 
 class CompareSection(TypedDict, total=False):
@@ -710,22 +708,22 @@ class ServeMqtt(TypedDict):
     """the MQTT broker from which rows come and to which estimates go (serve) (table; default: none)"""
 
     url: str
-    """where the broker is: `"mqtt://host:1883"`, or `"mqtts://host:8883"` for an encrypted connection (text;
-    default: required)"""
+    """address of the broker: `"mqtt://host:1883"`, or `"mqtts://host:8883"` for an encrypted connection
+    (text; default: required)"""
 
     version: NotRequired[Literal["3.1.1", "5"]]
-    """the version of MQTT that is spoken (`"3.1.1"`, `"5"`; default: `"3.1.1"`)"""
+    """version of MQTT (`"3.1.1"`, `"5"`; default: `"3.1.1"`)"""
 
     user: NotRequired[str]
-    """who this is to the broker (text; default: none)"""
+    """name of the user at the broker (text; default: none)"""
 
     password: NotRequired[str]
     """the user's password (text; default: the variable `LYNKEUS_MQTT_PASSWORD` of the environment, if there
     is one)"""
 
     ca: NotRequired[str]
-    """PEM file of the certificates that vouch for the broker's (path, from the study's folder; default: those
-    whom the system trusts)"""
+    """PEM file of the authorities' certificates for the broker's (path, from the study's folder; default:
+    those of the system)"""
 
     cert: NotRequired[str]
     """PEM file of this client's certificate, where the broker asks for one (path, from the study's folder;
@@ -735,8 +733,8 @@ class ServeMqtt(TypedDict):
     """PEM file of the private key of `cert` (path, from the study's folder; default: none)"""
 
     client: NotRequired[str]
-    """by this name the broker knows the service again; two with one name end each other's connection (text;
-    default: `lynkeus-` and the name of the study's file)"""
+    """the client's name at the broker, the same at each start; two clients with one name close each other's
+    connection (text; default: `lynkeus-` and the name of the study's file)"""
 
     topics: NotRequired[Mapping[str, str]]
     """the topics of single values, by the names that columns have in a log. With `assets` a level `{asset}`
@@ -764,34 +762,31 @@ class ServeSection(TypedDict, total=False):
     """how the estimator runs beside a plant (serve) (table; default: none)"""
 
     wait: Number | None
-    """how much older than the newest row a row may be when it comes, in units of the plant's time: it is put
-    in its place, and what was told before is corrected (number ≥ 0; default: 0: rows come in the order of
-    their times)"""
+    """how late a row may come after newer ones, in the plant's unit of time: it is put in its place, and the
+    estimates since are corrected (number ≥ 0; default: 0: rows come in the order of their times)"""
 
     state: str | None
-    """the file that keeps where the estimator is: a row is in it before it is answered, and the next start
-    goes on from there, whatever ended the one before (path, from the study's folder; default: none: it
-    begins anew)"""
+    """the file that stores the estimator's state: a row is in it before it is answered, and after any end the
+    next start continues from there (path, from the study's folder; default: none: each start is a new one)"""
 
     history: str | None
-    """CSV or Parquet files of what was told, one for each day: `"tank-%Y-%m-%d.csv"` (path with `%Y`, `%m`
-    and `%d`, from the study's folder; default: none)"""
+    """CSV or Parquet files of the published estimates, one for each day: `"tank-%Y-%m-%d.csv"` (path with
+    `%Y`, `%m` and `%d`, from the study's folder; default: none)"""
 
     keep_days: Whole | None
-    """so many days of the history are kept (whole number ≥ 1; default: all)"""
+    """number of days for which the history is kept (whole number ≥ 1; default: all)"""
 
     assets: str | None
-    """the CSV file of many plants of this study: their names under `asset`, and in the other columns
-    parameters in which they differ (path, from the study's folder; default: one plant, and messages
-    without a name)"""
+    """the CSV file of many plants of this study: their names under `asset`, and their own parameters in the
+    other columns (path, from the study's folder; default: one plant, and messages without a name)"""
 
     http: str | None
-    """where a page with the estimates, their events, `/estimates` and `/metrics` are: `"127.0.0.1:8080"`
-    (address and port; default: none)"""
+    """address of the page with the estimates, of their events, `/estimates` and `/metrics`:
+    `"127.0.0.1:8080"` (address and port; default: none)"""
 
     token: str | None
-    """what a request has to say, as `Authorization: Bearer …` or `?token=…` (text; default: none: this
-    machine alone may look)"""
+    """token that a request must carry, as `Authorization: Bearer …` or `?token=…` (text; default: none: only
+    this machine has access)"""
 
     mqtt: ServeMqtt | None
     """the MQTT broker from which rows come and to which estimates go (serve) (table; default: none)"""
@@ -812,8 +807,8 @@ class Sections(TypedDict, total=False):
     """What :class:`lynkeus.Study` takes beside its model."""
 
     measured: Names | None
-    """what the sensors see. The order counts: the first entry of `theta`, `S`, … belongs to the chain of the
-    first measured output (list of outputs; default: every output of the model)"""
+    """the outputs with a sensor. The order counts: the first entry of `theta`, `S`, … belongs to the chain of
+    the first measured output (list of outputs; default: every output of the model)"""
 
     unknown: Names | None
     """inputs that nobody measures, estimated along with the state; and parameters, estimated as constants
@@ -829,11 +824,10 @@ class Sections(TypedDict, total=False):
     number, text `"5%"`, or `{ uniform = number }`; default: no noise)"""
 
     limits: Mapping[str, Numbers] | None
-    """the range that a sensor can show. `simulate` shows no more than that, and `certify` proves nothing
-    where readings may leave it. A reading at an end only says "at most" or "at least": the filters take it
-    as a censored one, and `--how-well` counts what a clipped reading tells (Fisher's information); the
-    other families take it as it stands, and a note says how often (table: output = `[lowest, highest]`;
-    default: none)"""
+    """the range that a sensor can show. `simulate` clips readings to it, and `certify` proves nothing where
+    readings may leave it. A reading at an end only says "at most" or "at least": the filters treat it as
+    censored, and `--how-well` counts the information of a clipped reading (Fisher's); the other families
+    use it unchanged, and a note counts such readings (table: output = `[lowest, highest]`; default: none)"""
 
     sensors: SensorsSection | None
     """what is measured, what is unknown, how noisy (table; default: none)"""
@@ -848,7 +842,7 @@ class Sections(TypedDict, total=False):
     """values that replace those of the plant (table: name = number; default: none)"""
 
     manifold: ManifoldSection | None
-    """which states and outputs are angles or rotations; the filters take them as such (table; default: none)"""
+    """which states and outputs are angles or rotations, for the filters (table; default: none)"""
 
     observer: ObserverSection | Family | None
     """the observer family and its tuning"""
@@ -858,10 +852,10 @@ class Sections(TypedDict, total=False):
     default: none)"""
 
     certify: CertifySection | None
-    """what a guarantee takes for granted (table; default: none)"""
+    """assumptions of a guarantee (table; default: none)"""
 
     simulate: SimulateSection | None
-    """how the plant and its observer are run together (table; default: none)"""
+    """how the plant and its observer are simulated (table; default: none)"""
 
     log: LogSection | None
     """what the columns of a log are (table; default: none)"""
@@ -870,10 +864,10 @@ class Sections(TypedDict, total=False):
     """how a log is replayed (table; default: none)"""
 
     tune: TuneSection | None
-    """which keys are swept, and what a value is judged by (table; default: none)"""
+    """which keys are swept, and how a value is judged (table; default: none)"""
 
     fit: FitSection | None
-    """which parameters and noises are found from logs (fit) (table; default: none)"""
+    """which parameters and noises are estimated from logs (fit) (table; default: none)"""
 
     compare: CompareSection | Names | None
     """which families are compared (table; default: none)"""
@@ -885,12 +879,11 @@ class Sections(TypedDict, total=False):
     """what is drawn (table; default: none)"""
 
     tables: Literal["linear", "monotone"] | None
-    """what the plant's tables are between their points: straight lines, or monotone cubics, whose slopes do
-    not jump (`"linear"`, `"monotone"`; default: `"linear"`)"""
+    """how the plant's tables are interpolated: by straight lines, or monotone cubics, whose slopes do not
+    jump (`"linear"`, `"monotone"`; default: `"linear"`)"""
 
     delay_states: Whole | None
-    """states that hold the last of what the plant delays, for each `delay`: at most 10 (whole number ≥ 1;
-    default: 6)"""
+    """states that represent each `delay` of the plant; at most 10 (whole number ≥ 1; default: 6)"""
 
 
 class Changes(Sections, total=False):

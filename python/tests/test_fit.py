@@ -139,12 +139,12 @@ def test_what_the_log_does_not_tell_is_told() -> None:
     )
     t = np.arange(50) * 0.1
     log = {"t": t, "y": 4 * np.exp(-0.5 * t) + np.random.default_rng(4).normal(scale=0.02, size=50)}
-    with pytest.warns(lynkeus.NotCredible, match="the logs do not tell a, b"):
+    with pytest.warns(lynkeus.NotCredible, match="the logs do not determine a, b"):
         found = study.fit(log)
     assert not found.is_credible and found.undetermined == ["a", "b"]
     assert isinstance(found.refusal, lynkeus.RefusedError)
     for one in (found, pickle.loads(pickle.dumps(found))):
-        with pytest.raises(lynkeus.RefusedError, match="the logs do not tell a, b"):
+        with pytest.raises(lynkeus.RefusedError, match="the logs do not determine a, b"):
             one.study()
 
 

@@ -1,9 +1,12 @@
 //! The project's own chores, run as `cargo xtask <task>`.
 
+mod audit;
+mod bill;
 mod licences;
 mod package;
 mod release;
 mod tutorial;
+mod workflow;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -19,8 +22,8 @@ usage: cargo xtask <task>
   package   build the Python package as a wheel, install it into .venv-package and try it there
   ci        format check, lints, documentation, then `test`
   site      build the documentation site into target/site, every link checked
-  release-check  make what is published and try it as users have it: packages, audit, wheel, binary,
-            shells, or only the parts that are named
+  release-check  make what is published and try it as users have it: packages, audit, bill, workflow,
+            wheel, binary, shells, or only the parts that are named
 
 and, built with --release first (`chores` runs their own tests, which `test` leaves out):
 
@@ -138,11 +141,7 @@ fn long_tests() -> Result<(), String> {
 fn found(interpreter: Result<PathBuf, String>, what: &str) -> Result<Option<PathBuf>, String> {
     match interpreter {
         Ok(path) => Ok(Some(path)),
-        Err(reason) if is_ci() => Err(format!("{what} cannot run: {reason}")),
-        Err(reason) => {
-            eprintln!("skipped: {what}: {reason}");
-            Ok(None)
-        }
+        Err(reason) => skipped(format!("{what}: {reason}")).map(|()| None),
     }
 }
 
@@ -158,6 +157,15 @@ fn ci() -> Result<(), String> {
     ]))?;
     run(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))?;
     test(false)
+}
+
+/// Leaves something out that is missing, with a word; where everything has to be there that is a failure.
+fn skipped(missing: String) -> Result<(), String> {
+    if is_ci() {
+        return Err(missing);
+    }
+    eprintln!("skipped: {missing}");
+    Ok(())
 }
 
 /// True on machines that promise to have everything: there, a skip is a failure.

@@ -1,5 +1,5 @@
 //! What a release is made of, made and tried as users have it: packages, a wheel, a static program, licences and known
-//! holes, what shells and manuals are given.
+//! holes, a bill of materials, the workflow, what shells and manuals are given.
 
 use std::env::{consts, join_paths, split_paths, var_os};
 use std::ffi::OsString;
@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use xtask::process::{begins, cargo, root, run, target};
 use xtask::python;
 
-use crate::{is_ci, licences, tutorial};
+use crate::{audit, bill, tutorial, workflow};
 
 /// What makes and judges wheels, pinned.
 const REQUIREMENTS: &str = include_str!("../release-requirements.txt");
@@ -29,9 +29,11 @@ const MANYLINUX: &str = "manylinux_2_28";
 type Part = fn() -> Result<(), String>;
 
 /// The parts by their words.
-const PARTS: [(&str, Part); 5] = [
+const PARTS: [(&str, Part); 7] = [
     ("packages", packages),
     ("audit", audit),
+    ("bill", bill),
+    ("workflow", workflow),
     ("wheel", wheel),
     ("binary", binary),
     ("shells", shells),
@@ -64,65 +66,19 @@ fn packages() -> Result<(), String> {
     run(&mut package)
 }
 
-/// Licences, sources and known holes of what is used; a bill of materials.
+/// Licences, sources and known holes of what is used.
 fn audit() -> Result<(), String> {
-    let list = emptied("audit")?.join("licences.txt");
-    licences::check(&list)?;
-    begins(&format!(
-        "release: licences are allowed: {}",
-        list.display()
-    ));
-    let python = environment()?;
-    for list in ["python", "docs", "xtask"] {
-        audited(&python, &format!("{list}/requirements.txt"))?;
-    }
-    if has_subcommand("cyclonedx")? {
-        let manifest = "crates/lynkeus-cli/Cargo.toml";
-        let options = ["--format", "json", "--override-filename", "sbom"];
-        run(cargo(&["cyclonedx", "--manifest-path", manifest]).args(options))?;
-    }
-    match has_subcommand("deny")? {
-        true => run(&mut cargo(&["deny", "check", "--hide-inclusion-graph"])),
-        false => Ok(()),
-    }
+    audit::check(&environment()?, &emptied("audit")?)
 }
 
-/// Asks the package index for known holes of what a list pins. A package about which it says nothing is a failure where
-/// everything has to be there.
-fn audited(python: &Path, list: &str) -> Result<(), String> {
-    let mut asked = Command::new(python);
-    asked
-        .args(["-m", "pip_audit", "--strict", "--progress-spinner", "off"])
-        .args(["--no-deps", "--disable-pip", "--requirement", list]);
-    let found = asked.current_dir(root()).output();
-    let found = found.map_err(|error| format!("cannot start pip-audit: {error}"))?;
-    let said = [found.stdout, found.stderr].concat();
-    let said = String::from_utf8_lossy(&said);
-    let has_holes = said.contains("known vulnerabilit") && !said.contains("No known");
-    match found.status.success() {
-        true => Ok(()),
-        false if has_holes || is_ci() => Err(format!("pip-audit of {list}: {said}")),
-        false => {
-            let last = said.lines().last().unwrap_or_default();
-            eprintln!("skipped: pip-audit of {list}: {last}");
-            Ok(())
-        }
-    }
+/// A bill of materials of the command.
+fn bill() -> Result<(), String> {
+    bill::check(&emptied("bill")?)
 }
 
-/// Whether cargo has that command; a release needs it.
-fn has_subcommand(name: &str) -> Result<bool, String> {
-    let mut asked = cargo(&[name, "--version"]);
-    let status = asked.stdout(Stdio::null()).stderr(Stdio::null()).status();
-    let missing = format!("cargo has no {name}: `cargo install cargo-{name} --locked`");
-    match status.is_ok_and(|status| status.success()) {
-        true => Ok(true),
-        false if is_ci() => Err(missing),
-        false => {
-            eprintln!("skipped: {missing}");
-            Ok(false)
-        }
-    }
+/// The workflow of the forge.
+fn workflow() -> Result<(), String> {
+    workflow::check(&environment()?, &emptied("workflow")?)
 }
 
 /// Builds the wheel as it is published, has it judged, and types the tutorial where there is no Rust.

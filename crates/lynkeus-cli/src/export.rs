@@ -14,11 +14,11 @@ use super::save::Results;
 /// [`Subject`] in the words of the command line.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum System {
-    /// The observer or filter with its samples
+    /// The observer or filter, fed with samples
     Estimator,
     /// The model alone
     Plant,
-    /// The observer in continuous time, its measurements as inputs
+    /// The observer in continuous time, with measurements as inputs
     Observer,
 }
 
@@ -56,32 +56,32 @@ pub(super) enum Numbers {
 
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// What to write
+    /// Language or format to write
     #[arg(long, value_parser = targets(), value_name = "WHAT")]
     to: Target,
-    /// The folder for the files; one that is not empty only with --force
+    /// Folder for the files; must be new or empty without --force
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Replace files of the same names
     #[arg(long)]
     force: bool,
-    /// The type of numbers
+    /// Type of numbers
     #[arg(long, value_enum, default_value_t, value_name = "TYPE")]
     precision: Numbers,
-    /// Longest step of the integration, in the unit of time, instead of the study's
+    /// Longest step of the integration, in the unit of time (default: the study's)
     #[arg(long, value_name = "STEP")]
     step: Option<f64>,
-    /// With --to c, js, rust or st: θ, or what stands for it, may be changed while the estimator runs; an FMU has it
-    /// anyway
+    /// With --to c, js, rust or st: make θ, or its equivalent, adjustable while the estimator runs (always so in an
+    /// FMU)
     #[arg(long)]
     tunable: bool,
-    /// With --to fmu: the version of the standard
+    /// With --to fmu: version of the standard
     #[arg(long, value_enum, default_value_t, value_name = "VERSION")]
     fmi: Fmi,
-    /// With --to fmu: what is exported; by default the estimator of a study, the plant of a model
+    /// With --to fmu: system to export (default: the estimator of a study, the plant of a model)
     #[arg(long, value_enum, value_name = "WHAT")]
     system: Option<System>,
-    /// No notes
+    /// Print no notes
     #[arg(short, long)]
     quiet: bool,
 }

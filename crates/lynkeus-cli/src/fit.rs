@@ -17,16 +17,16 @@ use lynkeus::{Answer, Error, FitOptions};
 /// What it is fitted to and where the answer goes.
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// The logs (CSV or Parquet; "-": standard input)
+    /// Logs (CSV or Parquet; "-": standard input)
     #[arg(required = true, value_name = "LOG.csv")]
     logs: Vec<PathBuf>,
-    /// Write the values found into the study; everything else in it stays as it is
+    /// Write the fitted values into the study, and change nothing else in it
     #[arg(long)]
     write: bool,
-    /// Intervals by profile likelihood: the other values are searched anew along each
+    /// Compute intervals by profile likelihood: optimise the other values along each one
     #[arg(long)]
     profiles: bool,
-    /// How well the values would be known with one more log: by another sensor, sampling or input
+    /// Predict the standard errors with one more log: with another sensor, sampling or input
     #[arg(long)]
     next_experiment: bool,
     /// Write the innovations of every row as CSV ("-": standard output)
@@ -38,7 +38,7 @@ pub(super) struct Options {
     /// Print one JSON object instead of a table
     #[arg(long)]
     json: bool,
-    /// No progress bar and no notes
+    /// Print no progress bar and no notes
     #[arg(short, long)]
     quiet: bool,
 }

@@ -16,13 +16,13 @@ use super::save::Results;
 /// How well, where the answer goes, and which sensors to try.
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// How well: standard errors along the simulated run, for its noise and sampling
+    /// Compute standard errors along the simulated run, for its noise and sampling
     #[arg(long)]
     how_well: bool,
-    /// Which sensors help most: tries every output of the model, or with `all` every state as well
+    /// Rank further sensors, every output of the model or with `all` also every state
     #[arg(long, value_name = "WHICH", num_args = 0..=1, default_missing_value = "outputs")]
     sensors: Option<Which>,
-    /// Longest horizon, in the plant's unit of time, instead of the whole run
+    /// Longest horizon, in the plant's unit of time (default: the whole run)
     #[arg(long, value_name = "TIME")]
     horizon: Option<f64>,
     /// Draw a bar for every state and the errors over the horizon ("-": standard output)

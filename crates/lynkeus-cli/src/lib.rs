@@ -39,13 +39,13 @@ pub use ending::Ending;
 use limits::Limits;
 pub use limits::allocated;
 
-/// Estimates what nobody measures: hidden states and unknown inputs, from a plant's equations and a few sensors.
+/// Estimate hidden states and unknown inputs from a plant's equations and a few sensors.
 #[derive(Debug, Parser)]
 #[command(name = "lynkeus", version, after_help = EXAMPLES)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// What evaluates the equations; all give the same digits, it is a matter of speed
+    /// How to evaluate the equations; the results are the same, the speed differs
     #[arg(long, global = true, value_enum, default_value_t, value_name = "WHICH")]
     backend: Engine,
 }
@@ -53,12 +53,12 @@ struct Cli {
 /// [`Backend`] in the words of the command line.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 enum Engine {
-    /// The interpreter, and machine code for what is evaluated often
+    /// The interpreter, and machine code for frequent evaluations
     #[default]
     Auto,
     /// The interpreter alone
     Interpreter,
-    /// Machine code from the first evaluation on, wherever it can be made
+    /// Machine code from the first evaluation on, where possible
     Native,
 }
 
@@ -90,33 +90,33 @@ Examples:
   lynkeus export model.mo --to fmu -o plant
   lynkeus report study.toml log.csv -o report.html
 
-A file called - is standard input or output.
+The file name - means standard input or output.
 
-Exit codes: 0 done, 1 the answer is no (a condition refuted, a divergence, an estimate that is not
-credible: the table is written all the same; a picture with nothing to draw), 2 bad input, 3 a limit ended it.";
+Exit codes: 0 done; 1 the answer is no (a refuted condition, a divergence, an estimate that is not
+credible, whose table is still written; a picture with nothing to draw); 2 bad input; 3 a limit of time or memory.";
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// What can be estimated from these sensors, by which observer, and what fails where
+    /// Decide what these sensors can estimate, by which observer, and which conditions fail where
     Check {
-        /// The study (TOML; "-": standard input), or a model (.mo, .jl): then every output is measured and every input known
+        /// Study (TOML; "-": standard input), or a model (.mo, .jl) with every output measured and every input known
         study: PathBuf,
-        /// Which model, where a bare file holds several
+        /// Choose the model in a file that holds several
         #[arg(long, value_name = "NAME")]
         model: Option<String>,
-        /// Take the parameters as unknown constants and ask for them too
+        /// Include the parameters as unknown constants
         #[arg(long)]
         parameters: bool,
-        /// Decide on an expression as well, e.g. "k1*k2" (may be given several times)
+        /// Also decide on an expression, e.g. "k1*k2" (repeatable)
         #[arg(long, value_name = "EXPRESSION")]
         about: Vec<String>,
-        /// Draw where in the box of two states the outputs' derivatives do not tell states apart
+        /// Draw where, in the box of two states, the outputs' derivatives do not distinguish states
         #[arg(long, value_name = "FILE.svg")]
         singular: Option<PathBuf>,
         /// Print one JSON object
         #[arg(long)]
         json: bool,
-        /// Print what is wrong with the study and its model as diagnostics of the Language Server Protocol, for editors
+        /// Print errors and warnings as diagnostics of the Language Server Protocol, for editors
         #[arg(long, conflicts_with_all = ["json", "about", "singular", "how_well"])]
         lsp: bool,
         #[command(flatten)]
@@ -124,70 +124,70 @@ enum Command {
         #[command(flatten)]
         how_well: how_well::Options,
     },
-    /// Gains, matrices and parameters of the observer
+    /// Compute gains, matrices and parameters of the observer
     Design {
-        /// The study (TOML; "-": standard input)
+        /// Study (TOML; "-": standard input)
         study: PathBuf,
-        /// Save the text (or the JSON) instead of printing it
+        /// Write the text (or the JSON) to a file
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
-        /// One JSON object
+        /// Print one JSON object
         #[arg(long)]
         json: bool,
         #[command(flatten)]
         limits: Limits,
     },
-    /// Proves, refutes or leaves undecided that the observer converges, with rate and bounds
+    /// Prove or refute that the observer converges, with rate and bounds; the verdict may be undecided
     Certify {
-        /// The study (TOML; "-": standard input)
+        /// Study (TOML; "-": standard input)
         study: PathBuf,
-        /// Save the text (or the JSON) instead of printing it
+        /// Write the text (or the JSON) to a file
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
-        /// One JSON object
+        /// Print one JSON object
         #[arg(long)]
         json: bool,
         #[command(flatten)]
         limits: Limits,
     },
-    /// Run the plant and its observer together, with noise; many times with --runs; the plant alone on a log's inputs with --inputs
+    /// Simulate the plant and its observer with noise; many runs with --runs; the plant alone on a log's inputs with --inputs
     Simulate {
-        /// The study (TOML; "-": standard input)
+        /// Study (TOML; "-": standard input)
         study: PathBuf,
         #[command(flatten)]
         output: Output,
-        /// Seed of the noise, instead of the study's
+        /// Seed of the noise (default: the study's)
         #[arg(long, value_name = "N")]
         seed: Option<u64>,
-        /// Also write what a logger would have seen (t, measured outputs, inputs), ready for `estimate`
+        /// Also write the log of a data logger (t, measured outputs, inputs), for `estimate`
         #[arg(long, value_name = "FILE.csv")]
         log: Option<PathBuf>,
-        /// The plant alone instead, without observer and noise: from row to row of this log under its inputs, with the errors of its outputs beside the log's readings
+        /// Simulate the plant alone, without observer and noise, under the inputs of this log; compare its outputs with the log's readings
         #[arg(long, value_name = "LOG", conflicts_with_all = ["log", "runs", "seed"])]
         inputs: Option<PathBuf>,
-        /// Run it N times with the seeds S, S+1, … (S: the study's, or --seed), on all processors: means, quantiles and the worst. Run k is what --seed S+k gives alone (fixed steps: but for the rounding of exp, sin and the like); `spread` of [simulate] moves starts and parameters
+        /// Run N simulations with the seeds S, S+1, … (S: the study's, or --seed) on all processors: means, quantiles and the worst. Run k equals that of --seed S+k (with fixed steps up to the rounding of exp, sin and the like); `spread` of [simulate] varies starts and parameters
         #[arg(long, value_name = "N", conflicts_with = "log", value_parser = runs)]
         runs: Option<usize>,
         #[command(flatten)]
         limits: Limits,
     },
-    /// Replay a measured log through the observer
+    /// Run the observer on a measured log
     Estimate {
-        /// The study (TOML; "-": standard input)
+        /// Study (TOML; "-": standard input)
         study: PathBuf,
-        /// The log (CSV with a header; a time column and the measured outputs and known inputs by name; "-": standard input)
+        /// Log (CSV with a header, or Parquet): a time column, the measured outputs and the known inputs by name ("-": standard input)
         log: PathBuf,
         #[command(flatten)]
         output: Output,
-        /// Keep the replay in this file while it runs: the same command goes on there after it was killed or a limit ended it. Removed once the result is written
+        /// Save progress in this file: after a kill or a limit the same command continues there. It is removed when the result is written
         #[arg(long, value_name = "FILE")]
         checkpoint: Option<PathBuf>,
         #[command(flatten)]
         limits: Limits,
     },
-    /// Find parameters, noises and starts from logs, by their likelihood, and say what the logs cannot tell
+    /// Estimate parameters, noises and starts from logs by maximum likelihood, and list what the logs do not determine
     Fit {
-        /// The study with its [fit] (TOML; "-": standard input)
+        /// Study with [fit] (TOML; "-": standard input)
         study: PathBuf,
         #[command(flatten)]
         options: fit::Options,
@@ -196,18 +196,18 @@ enum Command {
     },
     /// Sweep the tuning, in simulation or on a log, and find the knee of the trade-off
     Tune {
-        /// The study (TOML; "-": standard input)
+        /// Study (TOML; "-": standard input)
         study: PathBuf,
         #[command(flatten)]
         options: tune::Options,
         #[command(flatten)]
         limits: Limits,
     },
-    /// Run several families on the same data: one table of errors, peaks, settling and cost
+    /// Run several families on the same data, and tabulate errors, peaks, settling and cost
     Compare {
-        /// The study (TOML; "-": standard input)
+        /// Study (TOML; "-": standard input)
         study: PathBuf,
-        /// A log (CSV or Parquet); without one the study's simulation
+        /// Log (CSV or Parquet; default: the study's simulation)
         log: Option<PathBuf>,
         /// Draw the estimates of each family
         #[arg(long, value_name = "FILE.svg")]
@@ -215,17 +215,17 @@ enum Command {
         /// Print one JSON object
         #[arg(long)]
         json: bool,
-        /// No progress bar
+        /// Print no progress bar
         #[arg(short, long)]
         quiet: bool,
         #[command(flatten)]
         limits: Limits,
     },
-    /// The estimator as source code for other machines, with its fixed steps; a plant for simulators
+    /// Export the estimator as source code with fixed steps for other machines, or the plant for simulators
     Export {
-        /// The study (TOML; "-": standard input), or a model (.mo, .jl): then the plant, with --to fmu
+        /// Study (TOML; "-": standard input), or a model (.mo, .jl), whose plant --to fmu exports
         study: PathBuf,
-        /// Which model, where a bare file holds several
+        /// Choose the model in a file that holds several
         #[arg(long, value_name = "NAME")]
         model: Option<String>,
         #[command(flatten)]
@@ -233,38 +233,38 @@ enum Command {
         #[command(flatten)]
         limits: Limits,
     },
-    /// One self-contained page: what can be known, the design, its certificate, and estimates with sliders
+    /// Write one self-contained page: observability, the design, its certificate, and estimates with sliders
     Report {
-        /// The study (TOML; "-": standard input)
+        /// Study (TOML; "-": standard input)
         study: PathBuf,
-        /// A log (CSV or Parquet); without one the study's simulation
+        /// Log (CSV or Parquet; default: the study's simulation)
         log: Option<PathBuf>,
         #[command(flatten)]
         options: report::Options,
         #[command(flatten)]
         limits: Limits,
     },
-    /// The estimator beside a plant: rows in, estimates out, for as long as the plant runs
+    /// Run the estimator beside a plant: read rows, write estimates, until it is stopped
     #[cfg(feature = "serve")]
     Serve {
-        /// The study (TOML), with [serve]
+        /// Study with [serve] (TOML)
         study: PathBuf,
         #[command(flatten)]
         options: serve::Options,
         #[command(flatten)]
         limits: Limits,
     },
-    /// The JSON Schema of a study, for editors that complete and check TOML
+    /// Print the JSON Schema of a study, for editors that complete and check TOML
     Schema,
-    /// A script that lets a shell complete commands, options and files
+    /// Print a script with which a shell completes commands, options and files
     Completions {
-        /// The shell
+        /// Shell
         #[arg(value_enum)]
         shell: clap_complete::Shell,
     },
-    /// The manual page of lynkeus or of one of its commands, as roff for man(1)
+    /// Print the manual page of lynkeus or of one of its commands, as roff for man(1)
     Man {
-        /// The command; without it lynkeus itself
+        /// Command (default: lynkeus itself)
         command: Option<String>,
     },
 }

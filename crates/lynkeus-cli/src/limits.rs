@@ -22,13 +22,13 @@ pub fn allocated() -> usize {
     ALLOCATOR.allocated()
 }
 
-/// When a command stops: what is done by then is told.
+/// When a command stops: it reports what is done by then.
 #[derive(Debug, Args)]
 pub(super) struct Limits {
-    /// Stop after this time, with what is done by then (`design` and `certify`: after a minute)
+    /// Stop after this time and report what is done (default for `design` and `certify`: a minute)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     time_limit: Option<Duration>,
-    /// Stop where more memory would be used, with what is done by then
+    /// Stop before using more memory and report what is done
     #[arg(long, value_name = "MIB", default_value_t = 2048)]
     memory_limit: usize,
 }

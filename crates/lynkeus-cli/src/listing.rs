@@ -9,15 +9,19 @@ use crate::Cli;
 
 const HEAD: &str = "# Commands
 
-Every command with its arguments and options, as the program declares them; a test keeps this page equal to the program.
-Names of keys are those of [study files](study.md), and `--json` follows [a schema](answers.schema.json).
+Every command with its arguments and options. The program's own declarations generate this page.
+Keys are those of [study files](study.md), and `--json` follows [a schema](answers.schema.json).
 
-The exit code is 0 when the command is done and 2 when the input cannot be used. It is 1 when the answer is no: a condition refuted, an estimate that diverged or is not
-credible, a picture with nothing to draw. It is 3 when a [limit](observability.md#limits) of time or memory ended the command.
+| exit code | meaning |
+|---|---|
+| 0 | done |
+| 1 | the answer is no: a condition is refuted, an estimate diverged or is not credible, a picture has nothing to draw |
+| 2 | the input cannot be used |
+| 3 | a [limit](observability.md#limits) of time or memory ended the command |
 
-Lynkeus writes all outputs or none, and never overwrites an input. Each output is written beside its place and renamed, so that
-a reader never sees half of it. `-` is standard input (a study, a log) or standard output (any one output). Where a picture cannot be drawn, the other
-outputs are written and the exit code is 1.
+Lynkeus writes all outputs or none, and never overwrites an input. It writes each output to a temporary file and renames it, so that
+no reader sees half of it. `-` is standard input (a study, a log) or standard output (any one output). If a picture cannot be drawn, Lynkeus writes the other
+outputs and ends with exit code 1.
 ";
 
 #[test]

@@ -13,10 +13,10 @@ pub(super) struct Output {
     /// Draw the result
     #[arg(long, value_name = "FILE.svg")]
     pub plot: Option<PathBuf>,
-    /// Print one JSON object that sums the result up
+    /// Print one JSON object with the summary
     #[arg(long)]
     pub json: bool,
-    /// No progress bar and no notes
+    /// Print no progress bar and no notes
     #[arg(short, long)]
     pub quiet: bool,
 }

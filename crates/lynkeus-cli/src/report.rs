@@ -13,13 +13,13 @@ use super::{limits, output};
 
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// The page ("-": standard output)
+    /// Write the page here ("-": standard output)
     #[arg(short, long, value_name = "FILE.html")]
     output: PathBuf,
-    /// Longest step of the integration, in the unit of time, instead of the study's
+    /// Longest step of the integration, in the unit of time (default: the study's)
     #[arg(long, value_name = "STEP")]
     step: Option<f64>,
-    /// No progress bar and no notes
+    /// Print no progress bar and no notes
     #[arg(short, long)]
     quiet: bool,
 }

@@ -16,10 +16,10 @@ use super::output;
 /// How a study is served.
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// Rows come on standard input and estimates go to standard output, written in this; without it they come and go as `mqtt` in [serve] says
+    /// Read rows from standard input and write estimates to standard output in this format (default: as `mqtt` in [serve] says)
     #[arg(long, value_enum, value_name = "FORMAT")]
     stdio: Option<Messages>,
-    /// No notes on standard error, only warnings
+    /// Print warnings only, no notes
     #[arg(short, long)]
     quiet: bool,
 }

@@ -17,22 +17,22 @@ use lynkeus::Error;
 /// On what it is judged and where the answer goes.
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// Judge by this log instead of by simulation: by held-out samples, or a filter's likelihood
+    /// Judge on this log, not in simulation: by held-out samples, or by a filter's likelihood
     #[arg(long, value_name = "LOG.csv")]
     log: Option<PathBuf>,
     /// Write the figures of every value as CSV ("-": standard output)
     #[arg(short, long, value_name = "FILE.csv")]
     output: Option<PathBuf>,
-    /// Draw the figures over the values, with the knee marked
+    /// Draw the figures over the values, and mark the knee
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// Print one JSON object instead of a table
     #[arg(long)]
     json: bool,
-    /// Write the knee's value into the study; everything else in it stays as it is
+    /// Write the knee's value into the study, and change nothing else in it
     #[arg(long)]
     write: bool,
-    /// No progress bar and no notes
+    /// Print no progress bar and no notes
     #[arg(short, long)]
     quiet: bool,
 }

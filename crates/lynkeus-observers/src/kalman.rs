@@ -284,7 +284,7 @@ const GATE_PATIENCE: KeySpec = KeySpec {
     name: "gate_patience",
     shape: Shape::Whole(1),
     default: "10",
-    meaning: "after so many rejections of a sensor in a row, at least half of which moved, its next reading is believed",
+    meaning: "after so many rejections of a sensor in a row, at least half of which moved, its next reading is accepted",
 };
 
 /// Those of every filter.
@@ -295,7 +295,7 @@ const BOUNDS: [KeySpec; 1] = [KeySpec {
     name: "bounds",
     shape: Shape::As("\"project\"", &Shape::Word(&["project"])),
     default: "none",
-    meaning: "\"project\": the estimate is kept in the declared ranges `[min, max]`: after each prediction and correction it is put to the nearest place inside by the covariance's metric, so that what is correlated moves along; the covariance stays",
+    meaning: "\"project\" keeps the estimate in the declared ranges `[min, max]`: each prediction and correction moves it to the nearest point inside in the metric of the covariance, so that correlated quantities move along; the covariance stays",
 }];
 
 /// That of the filter that linearises what the sensors show.
@@ -303,7 +303,7 @@ const ITERATIONS: [KeySpec; 1] = [KeySpec {
     name: "iterations",
     shape: Shape::Whole(1),
     default: "1; 20 with a quaternion",
-    meaning: "how often the readings of a sample are linearised, at most: about the prediction, then about the estimate that they give, until it stays (the iterated extended Kalman filter): for a start that is far off, where what the sensors show is not linear",
+    meaning: "how often, at most, the readings of a sample are linearised: about the prediction, then about the resulting estimate, until it stays (the iterated extended Kalman filter); for a start that is far off, with nonlinear sensors",
 }];
 
 /// Those where a sum of states is none.
@@ -339,7 +339,7 @@ const WINDOW: [KeySpec; 1] = [KeySpec {
     name: "horizon",
     shape: Shape::Whole(1),
     default: "10",
-    meaning: "samples over which the states are estimated anew at each sample, within `[min, max]`",
+    meaning: "number of samples in the window that is estimated at each sample, within `[min, max]`",
 }];
 
 /// Whole numbers up to here are those of a study.
@@ -372,7 +372,7 @@ const DRAWN: [KeySpec; 5] = [
             most: 1.0,
         },
         default: "0.5",
-        meaning: "particles are drawn anew where their effective number falls below this share of them; 1: after every reading",
+        meaning: "particles are resampled when their effective number falls below this share of them; 1: after every reading",
     },
     KeySpec {
         name: "seed",

@@ -404,8 +404,7 @@ impl Asset {
             }
             if let Some(run) = sensor.hangs(channel) {
                 doubts.is_credible = false;
-                let text =
-                    format!("{name} hangs: {run} equal readings, which its noise would not let it");
+                let text = format!("{name} is frozen: {run} equal readings, although it has noise");
                 doubts.notes.push(text);
             }
             if consistency.contradicts(self.stream.by) {

@@ -186,7 +186,7 @@ impl Engine {
             );
             return Err(Error::input(message)
                 .at(path.display())
-                .hint("go back to the study that made it, or move the file away and begin anew"));
+                .hint("go back to the study that made it, or move the file away and start again"));
         }
         Ok(asset.load(&mut from, sequence))
     }

@@ -118,7 +118,7 @@ impl Sensor {
         y
     }
 
-    /// For how many readings it hangs, which its noise would not let it; none where it does not.
+    /// For how many readings it hangs, although it has noise; none where it does not.
     pub fn hangs(&self, channel: &Channel) -> Option<u64> {
         let is_noisy = channel.noise.is_some_and(|noise| noise.size() > 0.0);
         let is_end = |(low, high): (f64, f64)| self.value <= low || self.value >= high;

@@ -254,7 +254,7 @@ impl State {
     pub fn damaged(path: &Path) -> Error {
         Error::input("the state is damaged, or of another version")
             .at(path.display())
-            .hint("go back to a copy of it, or move it away and begin anew")
+            .hint("go back to a copy of it, or move it away and start again")
     }
 }
 

@@ -178,7 +178,7 @@ pub enum Reason {
     PairsApart(usize),
     /// two points have the same values: exactly, or to twelve digits
     Alike(bool),
-    /// whether points far apart are told apart is not decided
+    /// whether the outputs distinguish points far apart is not decided
     FarApart,
     /// what breaks a form
     Misfit(Box<Misfit>),

@@ -35,13 +35,13 @@ pub(super) const KEYS: [KeySpec; 5] = [
         name: "tables",
         shape: Shape::Word(&["linear", "monotone"]),
         default: "`\"linear\"`",
-        meaning: "what the plant's [tables](modelica.md#tables) are between their points: straight lines, or monotone cubics, whose slopes do not jump",
+        meaning: "how the plant's [tables](modelica.md#tables) are interpolated: by straight lines, or monotone cubics, whose slopes do not jump",
     },
     KeySpec {
         name: "delay_states",
         shape: Shape::Whole(1),
         default: "6",
-        meaning: "states that hold the last of what the plant [delays](modelica.md#delays), for each `delay`: at most 10",
+        meaning: "states that represent each [`delay`](modelica.md#delays) of the plant; at most 10",
     },
 ];
 
@@ -63,7 +63,7 @@ pub(super) const SECTIONS: [KeySpec; 14] = [
         name: "manifold",
         shape: Shape::Section(&[&MANIFOLD]),
         default: "none",
-        meaning: "which states and outputs are angles or rotations; the [filters](ekf.md) take them as such",
+        meaning: "which states and outputs are angles or rotations, for the [filters](ekf.md)",
     },
     KeySpec {
         name: "observer",
@@ -87,13 +87,13 @@ pub(super) const SECTIONS: [KeySpec; 14] = [
         name: "certify",
         shape: Shape::Section(&[&CERTIFY]),
         default: "none",
-        meaning: "what a guarantee takes for granted",
+        meaning: "assumptions of a guarantee",
     },
     KeySpec {
         name: "simulate",
         shape: Shape::Section(&[&SIMULATE, &INTEGRATOR]),
         default: "none",
-        meaning: "how the plant and its observer are run together",
+        meaning: "how the plant and its observer are simulated",
     },
     KeySpec {
         name: "log",
@@ -111,13 +111,13 @@ pub(super) const SECTIONS: [KeySpec; 14] = [
         name: "tune",
         shape: Shape::Section(&[&TUNE]),
         default: "none",
-        meaning: "which keys are swept, and what a value is judged by",
+        meaning: "which keys are swept, and how a value is judged",
     },
     KeySpec {
         name: "fit",
         shape: Shape::Section(&[&FIT]),
         default: "none",
-        meaning: "which parameters and noises are found from logs ([fit](fit.md))",
+        meaning: "which parameters and noises are estimated from logs ([fit](fit.md))",
     },
     KeySpec {
         name: "compare",
@@ -151,13 +151,13 @@ pub(super) const SENSORS: [KeySpec; 13] = [
             &Shape::Table(&Shape::List(&Shape::Number)),
         ),
         default: "none",
-        meaning: "the range that a sensor can show. `simulate` shows no more than that, and `certify` proves nothing where readings may leave it. A reading at an end only says \"at most\" or \"at least\": the [filters](ekf.md) take it as a censored one, and `--how-well` counts what a clipped reading tells (Fisher's information); the other families take it as it stands, and a note says how often",
+        meaning: "the range that a sensor can show. `simulate` clips readings to it, and `certify` proves nothing where readings may leave it. A reading at an end only says \"at most\" or \"at least\": the [filters](ekf.md) treat it as censored, and `--how-well` counts the information of a clipped reading (Fisher's); the other families use it unchanged, and a note counts such readings",
     },
     KeySpec {
         name: "measured",
         shape: Shape::As("list of outputs", &Shape::NAMES),
         default: "every output of the model",
-        meaning: "what the sensors see. The order counts: the first entry of `theta`, `S`, … belongs to the chain of the first measured output",
+        meaning: "the outputs with a sensor. The order counts: the first entry of `theta`, `S`, … belongs to the chain of the first measured output",
     },
     KeySpec {
         name: "unknown",
@@ -187,7 +187,7 @@ pub(super) const SENSORS: [KeySpec; 13] = [
             &Shape::Table(&LEVEL),
         ),
         default: "no noise",
-        meaning: "how wrong the reading of a known input is, as `noise` says it of an output: the plant has the input, the observer reads it with an error that is another one in each row and stays until the next ([noisy inputs](#noisy-inputs-and-correlated-sensors)). Counted by the [filters](ekf.md), their smoothers, `sd`, `fit` and `--how-well`; `simulate` draws it",
+        meaning: "error of the reading of a known input, given as in `noise`: the plant gets the input, the observer reads it with an error that each row draws again and holds until the next ([noisy inputs](#noisy-inputs-and-correlated-sensors)). Counted by the [filters](ekf.md), their smoothers, `sd`, `fit` and `--how-well`; `simulate` draws it",
     },
     KeySpec {
         name: "correlation",
@@ -196,7 +196,7 @@ pub(super) const SENSORS: [KeySpec; 13] = [
             &Shape::Table(&Shape::Table(&Shape::Number)),
         ),
         default: "independent noises",
-        meaning: "how the noises of two outputs go together, between −1 and 1: `{ left = { right = 0.6 } }`, each pair once. Both have a standard deviation in `noise`. Counted by the [filters](ekf.md), their smoothers, `fit` and `--how-well`; `simulate` draws it",
+        meaning: "correlation of the noises of two outputs, between −1 and 1: `{ left = { right = 0.6 } }`, each pair once. Both have a standard deviation in `noise`. Counted by the [filters](ekf.md), their smoothers, `fit` and `--how-well`; `simulate` draws it",
     },
     KeySpec {
         name: "bias",
@@ -205,7 +205,7 @@ pub(super) const SENSORS: [KeySpec; 13] = [
             &Shape::Table(&Shape::Positive),
         ),
         default: "none",
-        meaning: "a constant offset of a sensor that is estimated along, y = h + b or f(u − b): a state `NAME_bias` that starts at 0. The number is its standard deviation there, which the [filters](ekf.md) take; it wanders where `[process_noise]` has a density for it",
+        meaning: "a constant offset of a sensor, estimated along with the state, y = h + b or f(u − b): a state `NAME_bias` that starts at 0. The number is its standard deviation there, for the [filters](ekf.md); with a density in `[process_noise]` it wanders",
     },
     KeySpec {
         name: "plausible",
@@ -214,7 +214,7 @@ pub(super) const SENSORS: [KeySpec; 13] = [
             &Shape::Table(&Shape::List(&Shape::Number)),
         ),
         default: "none",
-        meaning: "a cell of a log outside of this range is no reading; a note says how many there are",
+        meaning: "a cell of a log outside of this range is no reading; a note counts such cells",
     },
     KeySpec {
         name: "repeats",
@@ -223,7 +223,7 @@ pub(super) const SENSORS: [KeySpec; 13] = [
             &Shape::Table(&Shape::Word(&["missing"])),
         ),
         default: "every cell is a reading",
-        meaning: "a cell of a log that equals the one before is no reading: a sensor that samples more slowly than the log was held",
+        meaning: "a cell of a log that equals the one before is no reading: the logger held the value of a slower sensor",
     },
     KeySpec {
         name: "frozen",
@@ -232,19 +232,19 @@ pub(super) const SENSORS: [KeySpec; 13] = [
             &Shape::Table(&Shape::Whole(1)),
         ),
         default: "none",
-        meaning: "more equal cells of a log in a row than this are no readings from there on, until they change: the sensor is stuck",
+        meaning: "after so many equal cells in a row, further ones are no readings until the value changes: the sensor is frozen",
     },
     KeySpec {
         name: "delay",
         shape: Shape::As("table: output = number", &Shape::Table(&Shape::NotNegative)),
         default: "none",
-        meaning: "how much later than its sample is taken a reading comes, in the plant's unit of time: the reading in a row at t is of t less this ([late readings](#late-readings))",
+        meaning: "delay of a reading after its sample, in the plant's unit of time: the reading in a row at t is of t minus this ([late readings](#late-readings))",
     },
     KeySpec {
         name: "taken_at",
         shape: Shape::As("table: output = column", &Shape::Table(&Shape::Text)),
         default: "none",
-        meaning: "the column of a log, or an expression of columns, that has the time at which the sample was taken whose result is the reading in that row: an assay that comes hours later ([late readings](#late-readings))",
+        meaning: "the column of a log, or an expression of columns, with the time at which the sample of the row's reading was taken, as of an assay that comes hours later ([late readings](#late-readings))",
     },
 ];
 
@@ -262,7 +262,7 @@ pub(super) const MANIFOLD: [KeySpec; 2] = [
         name: "circle",
         shape: Shape::As("list of states and outputs", &Shape::NAMES),
         default: "none",
-        meaning: "angles in radians, of which a full turn changes nothing: θ and θ + 2π are one. Innovations and errors are wrapped, the box has no ends there, and estimates are shown in the declared range (`min` and `max`, or `[box]`) where that is one turn, else unwrapped. An output that turns with such a state is one as well",
+        meaning: "angles in radians: θ and θ + 2π are the same. Innovations and errors are wrapped, the box has no ends there, and estimates are shown in the declared range (`min` and `max`, or `[box]`) if that is one turn, else unwrapped. An output that turns with such a state is an angle as well",
     },
     KeySpec {
         name: "quaternion",
@@ -560,7 +560,7 @@ pub(super) const ESTIMATE: [KeySpec; 12] = [
         name: "lag",
         shape: Shape::Whole(1),
         default: "none",
-        meaning: "also `<name>_smooth`, the estimate given so many later rows: causal with that delay",
+        meaning: "also `<name>_smooth`, the estimate that uses so many later rows: causal with that delay",
     },
     KeySpec {
         name: "sd",
@@ -572,7 +572,7 @@ pub(super) const ESTIMATE: [KeySpec; 12] = [
         name: "innovations",
         shape: Shape::Flag,
         default: "false",
-        meaning: "also `<name>_innovation` and `<name>_innovation_sd` of each measured output: its reading less what was expected of it, and the standard deviation of that ([what they are judged by](credibility.md))",
+        meaning: "also `<name>_innovation` and `<name>_innovation_sd` of each measured output: its reading minus the prediction, and the standard deviation of that ([how they are judged](credibility.md))",
     },
     KeySpec {
         name: "ess",
@@ -584,7 +584,7 @@ pub(super) const ESTIMATE: [KeySpec; 12] = [
         name: "between_samples",
         shape: Shape::Word(&["hold", "predict", "linear"]),
         default: "`\"hold\"`",
-        meaning: "what the observer sees between two rows: the latest row, as a live observer would; what the model makes of the latest reading (`w' = L_f h(x̂)`, the inter-sample predictor); or the straight line to the next, which looks ahead one sample",
+        meaning: "what the observer uses between two rows: the latest row, as a live observer does; the model's prediction from the latest reading (`w' = L_f h(x̂)`, the inter-sample predictor); or the straight line to the next, which looks ahead one sample",
     },
     KeySpec {
         name: "time",
@@ -630,13 +630,13 @@ pub(super) const SERVE: [KeySpec; 8] = [
         name: "wait",
         shape: Shape::NotNegative,
         default: "0: rows come in the order of their times",
-        meaning: "how much older than the newest row a row may be when it comes, in units of the plant's time: it is put in its place, and what was told before is corrected",
+        meaning: "how late a row may come after newer ones, in the plant's unit of time: it is put in its place, and the estimates since are corrected",
     },
     KeySpec {
         name: "state",
         shape: Shape::As("path, from the study's folder", &Shape::Text),
-        default: "none: it begins anew",
-        meaning: "the file that keeps where the estimator is: a row is in it before it is answered, and the next start goes on from there, whatever ended the one before",
+        default: "none: each start is a new one",
+        meaning: "the file that stores the estimator's state: a row is in it before it is answered, and after any end the next start continues from there",
     },
     KeySpec {
         name: "history",
@@ -645,31 +645,31 @@ pub(super) const SERVE: [KeySpec; 8] = [
             &Shape::Text,
         ),
         default: "none",
-        meaning: "CSV or Parquet files of what was told, one for each day: `\"tank-%Y-%m-%d.csv\"`",
+        meaning: "CSV or Parquet files of the published estimates, one for each day: `\"tank-%Y-%m-%d.csv\"`",
     },
     KeySpec {
         name: "keep_days",
         shape: Shape::Whole(1),
         default: "all",
-        meaning: "so many days of the history are kept",
+        meaning: "number of days for which the history is kept",
     },
     KeySpec {
         name: "assets",
         shape: Shape::As("path, from the study's folder", &Shape::Text),
         default: "one plant, and messages without a name",
-        meaning: "the CSV file of many plants of this study: their names under `asset`, and in the other columns parameters in which they differ",
+        meaning: "the CSV file of many plants of this study: their names under `asset`, and their own parameters in the other columns",
     },
     KeySpec {
         name: "http",
         shape: Shape::As("address and port", &Shape::Text),
         default: "none",
-        meaning: "where a page with the estimates, their events, `/estimates` and `/metrics` are: `\"127.0.0.1:8080\"`",
+        meaning: "address of the page with the estimates, of their events, `/estimates` and `/metrics`: `\"127.0.0.1:8080\"`",
     },
     KeySpec {
         name: "token",
         shape: Shape::Text,
-        default: "none: this machine alone may look",
-        meaning: "what a request has to say, as `Authorization: Bearer …` or `?token=…`",
+        default: "none: only this machine has access",
+        meaning: "token that a request must carry, as `Authorization: Bearer …` or `?token=…`",
     },
     KeySpec {
         name: "mqtt",
@@ -685,19 +685,19 @@ pub(super) const MQTT: [KeySpec; 14] = [
         name: "url",
         shape: Shape::Text,
         default: REQUIRED,
-        meaning: "where the broker is: `\"mqtt://host:1883\"`, or `\"mqtts://host:8883\"` for an encrypted connection",
+        meaning: "address of the broker: `\"mqtt://host:1883\"`, or `\"mqtts://host:8883\"` for an encrypted connection",
     },
     KeySpec {
         name: "version",
         shape: Shape::Word(&["3.1.1", "5"]),
         default: "`\"3.1.1\"`",
-        meaning: "the version of MQTT that is spoken",
+        meaning: "version of MQTT",
     },
     KeySpec {
         name: "user",
         shape: Shape::Text,
         default: "none",
-        meaning: "who this is to the broker",
+        meaning: "name of the user at the broker",
     },
     KeySpec {
         name: "password",
@@ -708,8 +708,8 @@ pub(super) const MQTT: [KeySpec; 14] = [
     KeySpec {
         name: "ca",
         shape: Shape::As("path, from the study's folder", &Shape::Text),
-        default: "those whom the system trusts",
-        meaning: "PEM file of the certificates that vouch for the broker's",
+        default: "those of the system",
+        meaning: "PEM file of the authorities' certificates for the broker's",
     },
     KeySpec {
         name: "cert",
@@ -727,7 +727,7 @@ pub(super) const MQTT: [KeySpec; 14] = [
         name: "client",
         shape: Shape::Text,
         default: "`lynkeus-` and the name of the study's file",
-        meaning: "by this name the broker knows the service again; two with one name end each other's connection",
+        meaning: "the client's name at the broker, the same at each start; two clients with one name close each other's connection",
     },
     KeySpec {
         name: "topics",

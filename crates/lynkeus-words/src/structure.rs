@@ -140,7 +140,7 @@ impl Words for Reason {
                 let reserve = if *exactly { "" } else { " to twelve digits" };
                 format!("two points of the box have the same values{reserve}")
             }
-            Self::FarApart => "whether points far apart are told apart is not decided".into(),
+            Self::FarApart => "whether the outputs distinguish points far apart is not decided".into(),
         }
     }
 }

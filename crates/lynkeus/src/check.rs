@@ -180,7 +180,7 @@ fn account(declared: &Declared) -> Account {
         .leaves(screens, "they are of logs")
         .leaves(
             late,
-            "what can be known does not depend on when it is told: a late reading counts at the time of its sample",
+            "what can be known does not depend on when a reading arrives: a late reading counts at the time of its sample",
         )
         .counts(ranges)
         .counts(input_derivatives)
@@ -434,7 +434,7 @@ impl Report {
             (
                 open,
                 "whether the outputs tell ".to_owned(),
-                format!(" is not decided; {family} gives an estimate all the same"),
+                format!(" is not decided; {family} still gives an estimate"),
             ),
         ] {
             if !names.is_empty() {

@@ -75,7 +75,7 @@ pub struct Fit {
     pub is_converged: bool,
     pub(crate) uncertainty: Uncertainty,
     pub(crate) optima: Vec<Optimum>,
-    /// what the logs do not tell
+    /// what the logs do not determine
     pub undetermined: Vec<String>,
     /// what is not told may be so because events on which it has a say do not happen at these values
     pub(crate) has_events: bool,
@@ -109,7 +109,7 @@ pub(crate) struct Optimum {
 ///
 /// # Errors
 /// A `[fit]` that does not fit the study, logs without the columns that it reads, bounds that exclude the start, a
-/// likelihood that has no value at any start. What the logs do not tell is an answer: [`Fit::undetermined`].
+/// likelihood that has no value at any start. What the logs do not determine is an answer: [`Fit::undetermined`].
 pub fn fit(
     study: &Study,
     tables: &[Table],
@@ -428,7 +428,7 @@ impl Work<'_> {
             .hint("start nearer to the plant, by [parameters] and `initial`, or try more `starts` in [fit] with narrower `bounds`")
     }
 
-    /// What the logs do not tell, before any search.
+    /// What the logs do not determine, before any search.
     fn untold(self, plant: &str, begin: Point, flat: &[usize]) -> Result<Fit, Error> {
         let undetermined: Vec<String> = flat
             .iter()

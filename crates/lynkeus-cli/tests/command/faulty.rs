@@ -254,7 +254,7 @@ const NOT_CREDIBLE: [(&str, &str, &str); 4] = [
     ("triangular", "frozen for 2 s", "the innovations of y"),
     ("triangular", "5 % outliers of ±3", "the innovations of y"),
     ("triangular", "clipped at 0.8", "the innovations of y"),
-    ("ekf", "clipped at 0.8", "y hangs in"),
+    ("ekf", "clipped at 0.8", "y is frozen in"),
 ];
 
 fn is_not_credible(name: &str, fault: &str, message: &str) -> bool {
@@ -319,7 +319,11 @@ fn a_frozen_sensor_is_told_and_nothing_else_is() {
                 );
                 let from = found[0]["from"].as_f64().unwrap();
                 assert!((from - 300.0 * STEP).abs() < 1e-9, "{from}");
-                assert!(ended.err.contains("the sensor y hangs at"), "{}", ended.err);
+                assert!(
+                    ended.err.contains("the sensor y is frozen at"),
+                    "{}",
+                    ended.err
+                );
             }
             "clipped at 0.8" => {
                 assert!(

@@ -258,7 +258,9 @@ fn what_no_output_reads_is_told_before_the_search() {
     assert_eq!(number(&answer["parameters"]["k"]["value"]), 0.5);
     assert!(answer["parameters"]["idle"]["sd"].is_null());
     assert!(
-        ended.err.contains("the logs do not tell idle; leave one"),
+        ended
+            .err
+            .contains("the logs do not determine idle; leave one"),
         "{}",
         ended.err
     );

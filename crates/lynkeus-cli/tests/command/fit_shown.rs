@@ -53,7 +53,7 @@ fn a_report_tells_the_fit() {
         &study.replace("[\"k\", \"g\"]", "[\"k\", \"idle\"]"),
     );
     let untold = page("idle.toml", &["log.csv"]);
-    assert!(untold.contains("the logs do not tell idle; leave one"));
+    assert!(untold.contains("the logs do not determine idle; leave one"));
     folder.write("plain.toml", study.split("[fit]").next().unwrap());
     assert!(!page("plain.toml", &["log.csv"]).contains(section));
     folder.write(

@@ -179,7 +179,7 @@ fn what_is_not_told_may_be_made_known() {
     let text = folder.run(&["fit", "study.toml", "log.csv", "--next-experiment"]);
     assert_eq!(text.code, 1);
     assert!(
-        text.out.contains("these logs do not tell all values"),
+        text.out.contains("these logs do not determine all values"),
         "{}",
         text.out
     );
@@ -188,7 +188,7 @@ fn what_is_not_told_may_be_made_known() {
     let long = study + "[fit.candidates.long]\nduration = 30\n";
     folder.write("study.toml", &long);
     let text = folder.run(&["fit", "study.toml", "log.csv", "--next-experiment"]);
-    let vain = "none of them makes known what the logs do not tell";
+    let vain = "none of them makes known what the logs do not determine";
     assert!(text.out.contains(vain), "{}", text.out);
 }
 

@@ -176,7 +176,7 @@ impl Checkpoint {
         };
         Err(Error::input(format!("the checkpoint is {of}"))
             .at(self.path.display())
-            .hint("name another file, or remove this one to begin anew"))
+            .hint("name another file, or remove this one to start again"))
     }
 
     fn foreign(&self) -> Error {

@@ -29,7 +29,7 @@ pub enum Kind {
     Innovations,
     /// The gate rejects readings.
     Rejected,
-    /// A sensor hangs.
+    /// A sensor is frozen.
     Frozen,
     /// A single reading moves the estimate by many of its deviations.
     Jump,
@@ -69,16 +69,16 @@ impl Kind {
     pub(crate) fn hint(self) -> &'static str {
         match self {
             Self::Range => {
-                "see whether `lynkeus certify` proves this tuning, try another `theta` or `clamp = true`, compare the model with the log; if the plant really goes there, declare a wider min and max (the result is written all the same)"
+                "see whether `lynkeus certify` proves this tuning, try another `theta` or `clamp = true`, compare the model with the log; if the plant really goes there, declare a wider min and max (the result is still written)"
             }
             Self::Frozen => {
-                "mend the sensor, or declare its range (`limits` of [sensors]) if that is what its readings show (the result is written all the same)"
+                "repair the sensor, or declare its range (`limits` of [sensors]) if that is what its readings show (the result is still written)"
             }
             Self::Particles => {
-                "take more `particles`, proposal = \"auxiliary\", a larger `initial_variance` or densities under [process_noise], or a noise that explains the readings (the result is written all the same)"
+                "take more `particles`, proposal = \"auxiliary\", a larger `initial_variance` or densities under [process_noise], or a noise that explains the readings (the result is still written)"
             }
             _ => {
-                "declare larger densities under [process_noise] for what the model does not know, or a larger noise of the sensor; compare units, signs and columns of the log with the model (the result is written all the same)"
+                "declare larger densities under [process_noise] for what the model does not know, or a larger noise of the sensor; compare units, signs and columns of the log with the model (the result is still written)"
             }
         }
     }

@@ -26,7 +26,7 @@ const LOOKED_AT: usize = 20_000;
 pub struct Frozen {
     /// the measured output
     pub output: String,
-    /// the number at which it hangs
+    /// the number that it repeats
     pub value: f64,
     /// time of the first of the equal readings
     pub from: f64,
@@ -264,7 +264,7 @@ impl Frozen {
             false => "it is frozen",
         };
         format!(
-            "the sensor {} hangs at {} from t = {} to {} ({} rows), which its noise would not let it: {cause}; a family without `gate` believes it",
+            "the sensor {} is frozen at {} from t = {} to {} ({} rows), although it has noise: {cause}; a family without `gate` believes it",
             self.output,
             figures(self.value, 6),
             instant(self.from),

@@ -67,7 +67,7 @@ fn hanging(evidence: &Evidence<'_>) -> Vec<Doubt> {
         let first = own().next()?;
         let text = match share >= HANGS {
             true => format!(
-                "{} hangs in {} of its readings",
+                "{} is frozen in {} of its readings",
                 sensor.name,
                 percent(share)
             ),

@@ -214,7 +214,7 @@ impl Choice {
         Some(match self.is_asked_for {
             true => format!("no speed of {family} is proposed by a sweep: {spent}"),
             false => format!(
-                "which family is taken hangs on a limit of time or memory, which ended work on one that comes before {family}: without it, it may be another. Raise the limit, or name the family with `family` in [observer]"
+                "which family is taken depends on a limit of time or memory, which ended work on one that comes before {family}: without it, it may be another. Raise the limit, or name the family with `family` in [observer]"
             ),
         })
     }
@@ -234,7 +234,7 @@ impl Choice {
             false => "no family with a theorem is taken",
         };
         format!(
-            "{none}: {family} estimates all the same and says how sure it is, but nothing is proved of its error: no rate, no bound, and from a start far off it may diverge"
+            "{none}: {family} gives an estimate with its standard deviation, but nothing is proved of its error: no rate, no bound, and from a start far off it may diverge"
         )
     }
 }

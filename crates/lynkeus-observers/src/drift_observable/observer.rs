@@ -67,7 +67,7 @@ pub(super) fn design(
         node: solution.rcond,
         alarm_below: ALARM,
         meaning: format!(
-            "{matrix} is close to singular: the outputs and their derivatives hardly tell the states apart here, and the correction is large or withdrawn"
+            "{matrix} is close to singular: the outputs and their derivatives hardly distinguish the states here, and the correction is large or withdrawn"
         ),
         matrix: Some(matrix),
     });

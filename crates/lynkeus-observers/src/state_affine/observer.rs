@@ -162,7 +162,7 @@ fn monitor(factor: &Factor<'_>, alarm_below: f64) -> Option<Monitor> {
         name: "excitation".into(),
         node: bound.node(),
         alarm_below,
-        meaning: "excitation is lost: the inputs and the estimate do not move enough to tell every state apart (A4), so some states are not corrected any more".into(),
+        meaning: "excitation is lost: the inputs and the estimate do not move enough to distinguish every state (A4), so some states are not corrected any more".into(),
         matrix: None,
     })
 }

@@ -54,9 +54,10 @@ fn roots(ca: Option<&Path>) -> Result<RootCertStore, String> {
     let (taken, _) = roots.add_parsable_certificates(found);
     match (taken, ca) {
         (0, Some(path)) => Err(format!("{}: no certificate in it", path.display())),
-        (0, None) => {
-            Err("the system trusts nobody: name a file of certificates as `ca`".to_owned())
-        }
+        (0, None) => Err(
+            "the system has no trusted certificates: name a file of certificates as `ca`"
+                .to_owned(),
+        ),
         _ => Ok(roots),
     }
 }

@@ -95,13 +95,13 @@ pub(crate) const FIT: [KeySpec; 12] = [
         name: "parameters",
         shape: Shape::As("list of parameters", &Shape::NAMES),
         default: "none",
-        meaning: "parameters of the plant that are found, within the model's `min` and `max` or `bounds`",
+        meaning: "parameters of the plant to estimate, within the model's `min` and `max` or `bounds`",
     },
     KeySpec {
         name: "log",
         shape: Shape::As("list of parameters", &Shape::NAMES),
         default: "none",
-        meaning: "those that are searched as logarithms: their ranges must be positive. Noises and densities always are",
+        meaning: "those to search as logarithms: their ranges must be positive. Noises and densities always are",
     },
     KeySpec {
         name: "noise",
@@ -110,19 +110,19 @@ pub(crate) const FIT: [KeySpec; 12] = [
             &Shape::Either(&[Shape::Flag, Shape::NAMES, Shape::Table(&NOISE_OF)]),
         ),
         default: "none",
-        meaning: "measured outputs whose noise is found; the search starts at `noise` of `[sensors]`, or at the scatter of the readings. In a table, a name says whose value the standard deviation is: `{ y = \"s\", z = \"s\" }` for a parameter that two sensors share; or a variable that computes it, of states and inputs, too",
+        meaning: "measured outputs whose noise is estimated; the search starts at `noise` of `[sensors]`, or at the scatter of the readings. In a table, a name says whose value the standard deviation is: `{ y = \"s\", z = \"s\" }` for a parameter that two sensors share; or a variable that computes it, of states and inputs, too",
     },
     KeySpec {
         name: "process_noise",
         shape: CHOSEN,
         default: "none",
-        meaning: "states and unknown inputs whose spectral density is found; `true`: those with a density above 0 in `[process_noise]`, where the search starts. What is neither found nor declared is 0",
+        meaning: "states and unknown inputs whose spectral density is estimated; `true`: those with a density above 0 in `[process_noise]`, where the search starts. A density neither estimated nor declared is 0",
     },
     KeySpec {
         name: "initial",
         shape: Shape::As("list of states", &Shape::NAMES),
         default: "none",
-        meaning: "states whose start is found, one for each log; their `initial_variance` counts as 0",
+        meaning: "states whose start is estimated, one for each log; their `initial_variance` counts as 0",
     },
     KeySpec {
         name: "bounds",
@@ -131,13 +131,13 @@ pub(crate) const FIT: [KeySpec; 12] = [
             &Shape::Table(&Shape::List(&Shape::Number)),
         ),
         default: "`min` and `max` of the model",
-        meaning: "ranges of what is found, by the name of a parameter or a state, or `\"noise.level\"`, `\"process_noise.x\"`, `\"initial.x\"`",
+        meaning: "ranges of the estimated values, by the name of a parameter or a state, or `\"noise.level\"`, `\"process_noise.x\"`, `\"initial.x\"`",
     },
     KeySpec {
         name: "priors",
         shape: Shape::Table(&Shape::Section(&[&PRIOR])),
         default: "none",
-        meaning: "what was known before: a normal distribution under the same names",
+        meaning: "prior knowledge: a normal distribution under the same names",
     },
     KeySpec {
         name: "objective",
@@ -161,13 +161,13 @@ pub(crate) const FIT: [KeySpec; 12] = [
         name: "held_out",
         shape: Shape::Share,
         default: "none",
-        meaning: "share at the end of each log that is not fitted, but predicted and told beside",
+        meaning: "share at the end of each log that is predicted, not fitted, and reported separately",
     },
     KeySpec {
         name: "candidates",
         shape: Shape::Table(&Shape::Section(&[&CANDIDATE])),
         default: "see [the next experiment](fit.md#the-next-experiment)",
-        meaning: "experiments of which `--next-experiment` tells how much better the values would be known, under names of your own",
+        meaning: "experiments that `--next-experiment` compares, under names of your choice",
     },
 ];
 
@@ -180,7 +180,7 @@ pub(crate) const CANDIDATE: [KeySpec; 4] = [
             &Shape::Table(&LEVEL),
         ),
         default: "none",
-        meaning: "sensors that there are in this experiment beside `measured`, with their noise",
+        meaning: "sensors of this experiment besides `measured`, with their noise",
     },
     KeySpec {
         name: "inputs",

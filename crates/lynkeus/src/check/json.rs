@@ -129,7 +129,7 @@ struct OneToOne {
     verdict: Verdict,
     /// why
     detail: String,
-    /// two points that the outputs do not tell apart, where there are such
+    /// two points that the outputs do not distinguish, if there are any
     alike: Option<Vec<Point>>,
 }
 

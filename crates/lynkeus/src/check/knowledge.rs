@@ -302,7 +302,7 @@ impl Known {
                 "known everywhere while inputs are constant (proved on the box), and for almost every other input".to_owned()
             }
             Known::Locally { constant } => format!(
-                "known locally: neighbouring states are told apart everywhere{} (proved on the box), states far apart may not be",
+                "known locally: the outputs distinguish neighbouring states everywhere{} (proved on the box), states far apart may not be",
                 if *constant { " while inputs are constant" } else { "" }
             ),
             Known::AlmostEverywhere => {

@@ -54,7 +54,7 @@ pub(crate) struct NextExperiment {
     pub worst: Option<String>,
     /// its relative standard error
     pub relative_sd: Option<f64>,
-    /// the same over that of the value that is known worst now; none where the logs do not tell all values
+    /// the same over that of the value that is known worst now; none where the logs do not determine all values
     pub factor: Option<f64>,
     /// the D criterion: volume of the ellipsoid of errors over what it is now
     pub volume: Option<f64>,
@@ -62,7 +62,7 @@ pub(crate) struct NextExperiment {
     pub trace: Option<f64>,
     /// the standard error of each value, by what `correlation` calls it
     pub sd: Named<Option<f64>>,
-    /// what the logs do not tell, and would with this one
+    /// what the logs do not determine, and would with this one
     pub determines: Vec<String>,
     /// what they would not tell even so
     pub undetermined: Vec<String>,

@@ -71,7 +71,7 @@ pub struct LogInnovations {
 /// Makes −log L of logs a function of what `[fit]` names.
 ///
 /// # Errors
-/// As [`fit`](super::fit), but for a start without a value, and for what the logs do not tell.
+/// As [`fit`](super::fit), but for a start without a value, and for what the logs do not determine.
 pub fn likelihood(study: &Study, tables: &[Table]) -> Result<LikelihoodFunction, Error> {
     let (study, mut notes) = posed::with_filter(study)?;
     let plant = prepare::plant(&study)?;

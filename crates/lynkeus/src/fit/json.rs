@@ -49,7 +49,7 @@ pub(crate) struct FitReport<'a> {
     correlation: Correlation,
     /// different ends of the searches that converged, the best first
     optima: Vec<FittedOptimum>,
-    /// what the logs do not tell
+    /// what the logs do not determine
     undetermined: &'a [String],
     /// combinations of the parameters that the outputs tell nevertheless
     combinations: Vec<&'a str>,

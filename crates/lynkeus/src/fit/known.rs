@@ -157,7 +157,7 @@ const ASIDE: [f64; 2] = [0.03, -0.02];
 /// The same where a threshold may not be met there.
 const FARTHER: [f64; 6] = [0.03, -0.02, 0.1, -0.1, 0.3, -0.3];
 
-/// The unknowns that the logs do not tell: at the start, and at two places beside it; more where events decide.
+/// The unknowns that the logs do not determine: at the start, and at two places beside it; more where events decide.
 ///
 /// # Errors
 /// As [`Problem::at`].

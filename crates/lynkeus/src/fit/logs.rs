@@ -141,7 +141,7 @@ impl FittedLog {
             (gap[1] - gap[0]) / interval,
             number(interval)
         );
-        let hint = "give what is before and after as two logs: each starts anew";
+        let hint = "give what is before and after as two logs: each has a start of its own";
         Some(Error::input(message).at(&self.place).hint(hint))
     }
 }

@@ -75,7 +75,7 @@ impl Fit {
         Panel {
             name: format!("{}_profile", unknown.label()),
             caption: format!(
-                "{}: rise of \u{2212}log L, by its value; the others are searched anew",
+                "{}: rise of \u{2212}log L, by its value; the others are optimised",
                 unknown.label()
             ),
             curves: vec![

@@ -76,13 +76,13 @@ impl Answer for Fit {
             let names = self.undetermined.join(", ");
             if self.has_events {
                 let message = format!(
-                    "at these values the logs do not tell {names}: events in which they have a say do not happen"
+                    "at these values the logs do not determine {names}: events in which they have a say do not happen"
                 );
                 return at(Error::refused(message).hint(
                     "start nearer, by [parameters], or try more `starts` in [fit] within `bounds`",
                 ));
             }
-            let message = format!("the logs do not tell {names}");
+            let message = format!("the logs do not determine {names}");
             return at(Error::refused(message).hint(self.remedy()));
         }
         if let Some(spent) = self.ended {
@@ -136,12 +136,12 @@ impl Fit {
         document.part();
         if !self.undetermined.is_empty() {
             document.line(format!(
-                "the logs do not tell: {}",
+                "the logs do not determine: {}",
                 self.undetermined.join(", ")
             ));
         } else {
             document.line(format!(
-                "the outputs alone do not tell {}: what is said of the start or by priors fixes it",
+                "the outputs alone do not determine {}: what is said of the start or by priors fixes it",
                 self.exact.hidden.join(", ")
             ));
         }
@@ -256,7 +256,7 @@ impl Fit {
             Some((name, share)) => {
                 format!("with these logs {name} is known to ±{}", percent(*share))
             }
-            None => "these logs do not tell all values".to_owned(),
+            None => "these logs do not determine all values".to_owned(),
         };
         document.part().line(format!("the next experiment: {now}"));
         let titles = [
@@ -285,7 +285,7 @@ impl Fit {
         document.table(Table::new(titles).with(rows));
         let is_vain = ahead.tried.iter().all(|next| next.determines.is_empty());
         if !self.undetermined.is_empty() && is_vain {
-            document.line("none of them makes known what the logs do not tell");
+            document.line("none of them makes known what the logs do not determine");
         }
     }
 

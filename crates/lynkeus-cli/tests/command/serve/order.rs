@@ -129,7 +129,7 @@ fn silence_hanging_and_jumps_are_told() {
     assert_eq!(lines[59]["notes"], Value::Null);
     assert!(notes(74).contains("a: no reading for 15"), "{}", notes(74));
     assert!(
-        notes(94).contains("y hangs: 20 equal readings"),
+        notes(94).contains("y is frozen: 20 equal readings"),
         "{}",
         notes(94)
     );

@@ -26,7 +26,7 @@ pub(super) fn refuse(study: &Study, kind: &FilterKind) -> Result<(), Error> {
     if !matches!(kind, FilterKind::Particles(_)) || study.estimate.smoothing.is_none() {
         return Ok(());
     }
-    let message = "family = \"particle\" has no smoother, and `smooth` or `lag` of [estimate] asks for one: drawn anew again and again, particles have few different pasts";
+    let message = "family = \"particle\" has no smoother, and `smooth` or `lag` of [estimate] asks for one: after repeated resampling particles have few different pasts";
     Err(Error::input(message)
         .at(&study.file)
         .hint("leave the key out, or take family = \"ekf\", \"ukf\" or \"mhe\""))
@@ -47,7 +47,7 @@ pub(super) fn tell(
     course.particles = Some((settings.count, told));
     if told.updates > 0 && settings.inflation.is_none() {
         course.notes.push(format!(
-            "particles: drawn anew {} times in {} updates; at least {} of {} counted",
+            "particles: resampled {} times in {} updates; at least {} of {} counted",
             told.resampled,
             told.updates,
             figures(told.lowest, 3),
@@ -116,7 +116,7 @@ fn never_renewed(prepared: &Prepared<'_>, design: &Design, densities: &[f64]) ->
         stays(i) && !state.discrete && densities[i] == 0.0 && filter.initial_variance[i] > 0.0
     })?;
     Some(format!(
-        "{} is a constant without process noise: each time that particles are drawn anew fewer different values of it are left; give it a small density under [process_noise]",
+        "{} is a constant without process noise: each resampling leaves fewer different values of it; give it a small density under [process_noise]",
         states[place].name
     ))
 }

@@ -71,7 +71,7 @@ struct ParticleCounts {
     particles: usize,
     /// updates by readings
     updates: usize,
-    /// times that they were drawn anew
+    /// number of resamplings
     resampled: usize,
     /// the least number that counted after an update, (Σw)²/Σw²
     lowest_ess: Option<f64>,
