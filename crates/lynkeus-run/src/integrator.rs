@@ -144,7 +144,6 @@ impl Integrator {
             adaptive.grant(self.instants.len());
         }
         let whole = to - from;
-        self.sides.memory.enter(from, to);
         for (start, end) in pieces(from, to, &mut self.instants, APART) {
             if let Some(events) = f.events() {
                 events.enter(start + 0.5 * (end - start));

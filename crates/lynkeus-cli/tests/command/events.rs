@@ -1,6 +1,5 @@
 //! Plants whose state jumps: `when` clauses, from the study to the answer.
 
-mod rows;
 mod suites;
 
 use crate::{Ended, Folder};

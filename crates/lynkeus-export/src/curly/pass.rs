@@ -66,8 +66,9 @@ pub(super) fn integrated_point(flow: &System) -> String {
     };
     exchanged(&text, |word| match word {
         "DIMENSION" => Some("STATES".to_owned()),
-        "integrate" | "leap" | "look" | "first_change" | "carry_jump" | "occur" | "pass"
-        | "any_of" | "is_at_end" | "leave" | "return_to" => Some(format!("{word}_point")),
+        "integrate" | "leap" | "look" | "first_change" | "carry_jump" | "occur" | "pass" => {
+            Some(format!("{word}_point"))
+        }
         _ => None,
     })
 }

@@ -181,60 +181,6 @@ static double first_change(field f, double t, double h, const real *w, const rea
 }
 //?
 
-//? watched
-
-/* Whether one of the relations has changed. */
-static truth any_of(const truth *flipped)
-{
-    for (int r = 0; r < RELATIONS; r++) {
-        if (flipped[r]) {
-            return 1;
-        }
-    }
-    return 0;
-}
-
-/* Whether t is the end of the interval, as near as makes no difference. */
-static truth is_at_end(double t, const double *m)
-{
-    const double size = t < 0.0 ? -t : t;
-    const double left = m[UNTIL] - t;
-    return left >= 0.0 && left <= 1e-9 * (m[UNTIL] - m[FROM]) + 1.7763568394002505e-15 * size ? 1 : 0;
-}
-
-/* Keeps for the next interval which relations have changed, and whether they hold. */
-static void leave(double t, const real *w, const real *z, const truth *flipped, double *m)
-{
-    real holds[RELATIONS_ROOM];
-    real quantities[RELATIONS_ROOM];
-    relations((real)t, z, w, holds, quantities);
-    for (int r = 0; r < RELATIONS; r++) {
-        if (flipped[r]) {
-            m[LEFT + r] = holds[r] > R(0.5) ? 1.0 : -1.0;
-        }
-    }
-}
-
-/* What was kept are causes now, but for what a correction has taken back. */
-static void return_to(double t, double length, const real *w, const real *z, const real *dx, double *m, truth *causes, real *late)
-{
-    real holds[RELATIONS_ROOM];
-    real quantities[RELATIONS_ROOM];
-    real rates[RELATIONS_ROOM];
-    relations((real)t, z, w, holds, quantities);
-    speeds(t, z, w, dx, rates);
-    for (int r = 0; r < RELATIONS; r++) {
-        const truth is_same_side = (m[LEFT + r] > 0.0 && holds[r] > R(0.5)) || (m[LEFT + r] < 0.0 && holds[r] < R(0.5)) ? 1 : 0;
-        m[LEFT + r] = 0.0;
-        if (is_same_side && !causes[r]) {
-            const real ago = quantities[r] / rates[r];
-            causes[r] = 1;
-            late[r] = ago < R(0.0) ? R(0.0) : (ago > (real)length ? (real)length : ago);
-        }
-    }
-}
-//?
-
 /* The event at t, in an interval of some length, after relations have changed. 0 where it has no end or no value;
    1: nothing has happened; 2: the state has jumped. */
 static int occur(field f, double t, double length, const real *w, const truth *flipped, real *z, double *m)
@@ -248,14 +194,6 @@ static int occur(field f, double t, double length, const real *w, const truth *f
     const truth is_known = m[STARTED] > 0.0 && m[HAS_LAST] > 0.0 ? 1 : 0;
     int relation = RELATIONS;
     truth is_own = 0;
-//? watched
-    truth is_left = 0;
-    /* what is at the end of the interval comes at the start of the next one */
-    if (any_of(flipped) && is_at_end(t, m)) {
-        leave(t, w, z, flipped, m);
-        return 1;
-    }
-//?
     for (int i = 0; i < DIMENSION; i++) {
         old[i] = z[i];
     }
@@ -264,16 +202,6 @@ static int occur(field f, double t, double length, const real *w, const truth *f
         late[r] = R(0.0);
     }
     f((real)t, z, w, before);
-//? watched
-    for (int r = 0; r < RELATIONS; r++) {
-        if (m[LEFT + r] > 0.0 || m[LEFT + r] < 0.0) {
-            is_left = 1;
-        }
-    }
-    if (is_left) {
-        return_to(t, length, w, z, before, m, causes, late);
-    }
-//?
     m[HAS_LAST] = 0.0;
     if (is_known) {
         if (!rebase(t, length, w, z, before, m, causes, late)) {
@@ -407,8 +335,6 @@ static truth integrate(field f, double from, double to, int steps, const real *w
     for (int r = 0; r < RELATIONS; r++) {
         flipped[r] = 0;
     }
-    m[FROM] = from;
-    m[UNTIL] = to;
 //? timers
     (void)steps;
     double start = from;
