@@ -523,10 +523,8 @@ fn a_window_of_rotations_ends_in_the_minimum() {
         low: f64::NEG_INFINITY,
         high: f64::INFINITY,
     };
-    let model = NoisyModel {
-        ranges: vec![anywhere; 7],
-        ..shaken([0.5; 4], [4.0, 0.04], [0.1, 0.01])
-    };
+    let mut model = shaken([0.5; 4], [4.0, 0.04], [0.1, 0.01]);
+    model.ranges = vec![anywhere; 7];
     let settings = FilterSettings {
         keep_history: true,
         ..FilterSettings::of(FilterKind::MovingHorizon(10))
@@ -566,10 +564,8 @@ fn a_window_of_rotations_goes_on() {
         high: f64::INFINITY,
     };
     let new = || {
-        let model = NoisyModel {
-            ranges: vec![anywhere; 7],
-            ..body([0.5; 4], [4.0, 0.01])
-        };
+        let mut model = body([0.5; 4], [4.0, 0.01]);
+        model.ranges = vec![anywhere; 7];
         estimator(model, FilterKind::MovingHorizon(4), true)
     };
     let (mut window, mut restored) = (new(), new());
