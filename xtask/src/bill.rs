@@ -2,36 +2,43 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use xtask::process::{begins, cargo, root, run};
+use xtask::process::{begins, cargo, run};
 
 use crate::audit::has_subcommand;
 
 /// The crate of the command.
 const COMMAND: &str = "lynkeus-cli";
 
-/// Writes the bill beside its name, and compares it with what cargo links.
+/// How the tool is asked to call what it writes, to which it adds the format.
+const NAME: &str = "bill-of-materials";
+const FILE: &str = "bill-of-materials.json";
+
+/// Writes the bill into the folder, and compares it with what cargo links.
 ///
 /// # Errors
-/// What stands in one of the two only, or what cannot be run.
+/// What is linked and is not in the bill, or what cannot be run.
 pub fn check(folder: &Path) -> Result<(), String> {
     if !has_subcommand("cyclonedx")? {
         return Ok(());
     }
-    // cargo-cyclonedx writes beside the manifest
-    let crate_folder = root().join("crates").join(COMMAND);
-    let manifest = crate_folder.join("Cargo.toml");
-    let mut bill = cargo(&["cyclonedx", "--format", "json", "--all", "--target", "all"]);
-    bill.args(["--override-filename", "bill", "--manifest-path"]);
-    run(bill.arg(manifest))?;
-    let written = crate_folder.join("bill.json");
-    let text = fs::read_to_string(&written)
-        .map_err(|error| format!("cannot read {}: {error}", written.display()))?;
+    let mut bill = cargo(&["cyclonedx", "--format", "json", "--spec-version", "1.5"]);
+    bill.args(["--all", "--target", "all", "--override-filename", NAME]);
+    run(&mut bill)?;
+    // it writes one beside the manifest of every member
+    let members = members()?;
+    let own = members.iter().find(|member| member.ends_with(COMMAND));
+    let own = own.ok_or_else(|| format!("the workspace has no {COMMAND}"))?;
+    let text = fs::read_to_string(own.join(FILE)).map_err(|error| format!("no bill: {error}"));
+    for member in &members {
+        // a member that has none is no fault
+        let _ = fs::remove_file(member.join(FILE));
+    }
+    let text = text?;
     let kept = folder.join("lynkeus.cdx.json");
-    fs::rename(&written, &kept)
-        .map_err(|error| format!("cannot write {}: {error}", kept.display()))?;
+    fs::write(&kept, &text).map_err(|error| format!("cannot write {}: {error}", kept.display()))?;
     let listed = listed(&text)?;
     let linked = linked()?;
     if let Some(missing) = linked.difference(&listed).next() {
@@ -43,6 +50,19 @@ pub fn check(folder: &Path) -> Result<(), String> {
         kept.display()
     ));
     Ok(())
+}
+
+/// The folders of the workspace's crates.
+fn members() -> Result<Vec<PathBuf>, String> {
+    let mut asked = cargo(&["metadata", "--format-version", "1", "--no-deps", "--locked"]);
+    let found = asked.output();
+    let found = found.map_err(|error| format!("cannot ask cargo for the members: {error}"))?;
+    let found: Value = serde_json::from_slice(&found.stdout)
+        .map_err(|error| format!("cannot read what cargo says of the members: {error}"))?;
+    let packages = found["packages"].as_array().into_iter().flatten();
+    let manifests = packages.filter_map(|package| package["manifest_path"].as_str());
+    let folders = manifests.filter_map(|manifest| Path::new(manifest).parent());
+    Ok(folders.map(Path::to_path_buf).collect())
 }
 
 /// Name and version of every component.
