@@ -207,11 +207,16 @@ impl Mhe {
                 }
                 _ => share *= 0.5,
             }
-            let Some(best) = &best else { break };
-            if share < SHORTEST {
-                break;
+            let Some(from) = &best else { break };
+            match (share < SHORTEST, self.manifold.is_straight()) {
+                (false, _) => self.go(from, share),
+                (true, true) => break,
+                // Steps are as the sine of the angle that is left: beyond a quarter of a turn they grow on the way.
+                (true, false) => {
+                    self.go(from, 1.0);
+                    (best, share) = (None, 1.0);
+                }
             }
-            self.go(best, share);
         }
         match best {
             Some(best) => Ok(self.settle(best, false)),
