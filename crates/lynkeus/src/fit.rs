@@ -236,11 +236,7 @@ impl Work<'_> {
         let Some(doubt) = self.doubt(&ends[0])? else {
             return Ok(ends);
         };
-        let mut from = starts::best(&mut self.problem, &begin.z, settings.seed)?;
-        if self.problem.has_knees() && ends[0].point.value.is_finite() {
-            let aside = starts::aside(&mut self.problem, &ends[0].point)?;
-            from.extend(aside.map(|point| point.z));
-        }
+        let from = starts::best(&mut self.problem, &begin.z, settings.seed)?;
         if from.is_empty() {
             return Ok(ends);
         }

@@ -2,8 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::problem::{Point, Problem};
-use super::unknown::Unknown;
+use super::problem::Problem;
 use crate::Error;
 
 /// How far searches of noises, and of logarithms without bounds, start from the study's own values: a factor of 10;
@@ -57,60 +56,6 @@ pub(super) fn spread(
         })
     });
     std::iter::once(begin.clone()).chain(further).collect()
-}
-
-/// How far, as a share of its range or of itself, a value is looked at on either side: this, and each time half of it.
-const ASIDE: f64 = 0.4;
-const HALVES: i32 = 8;
-
-/// Rounds over all values.
-const ROUNDS: usize = 6;
-
-/// What wins no more than this is no way out.
-const GAIN: f64 = 0.1;
-
-/// From a point to the lowest of places along one value after the other, round after round as long as that wins: out of
-/// the valleys that events make, since an event between two other readings is seen by no gradient. None where it wins
-/// nothing.
-///
-/// # Errors
-/// As [`Problem::at`].
-pub(super) fn aside(problem: &mut Problem<'_>, from: &Point) -> Result<Option<Point>, Error> {
-    let ranges = problem.ranges();
-    let mut best = from.clone();
-    for _ in 0..ROUNDS {
-        let before = best.value;
-        for (i, &(low, high)) in ranges.iter().enumerate() {
-            let z = best.z[i];
-            let reach = ASIDE * reach(&problem.unknowns[i], z, high - low);
-            let steps = (0..HALVES).map(|k| reach * 0.5_f64.powi(k));
-            let places = steps.flat_map(|step| [z - step, z + step]);
-            for place in places.filter(|place| (low..=high).contains(place)) {
-                let mut there = best.z.clone();
-                there[i] = place;
-                let there = problem.at(there)?;
-                if there.value < best.value {
-                    best = there;
-                }
-            }
-        }
-        // the other values have a say in where this one is best
-        if best.value > before - GAIN {
-            break;
-        }
-    }
-    Ok((best.value < from.value - GAIN).then_some(best))
-}
-
-/// The width of a range that has one, else the size of a value.
-fn reach(unknown: &Unknown, z: f64, width: f64) -> f64 {
-    let is_bounded = width.is_finite() && !unknown.kind.is_noise();
-    match (is_bounded, unknown.is_log) {
-        (_, true) => APART.ln(),
-        (true, _) => width,
-        (false, false) if z == 0.0 => 1.0,
-        (false, false) => z.abs(),
-    }
 }
 
 /// Points that are looked at where nobody says how many searches there are, and those of them that are searched from.
