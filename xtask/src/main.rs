@@ -40,7 +40,7 @@ and, built with --release first (`chores` runs their own tests, which `test` lea
   exercise  random operations on estimators of every kind: no panic, always finite or an error, a
             restored snapshot equal to the bit; [--seed N] [--count N] [--seconds N]
   bench-peers  ours beside C by hand, numba, JAX, diffrax, CasADi, SciPy and FilterPy: the tables of
-            BENCHMARKS.md; [--rounds N] [--table steps|filters]; needs gcc and `cargo build --release`
+            BENCHMARKS.md; [--rounds N] [--table steps|filters|functions]; needs gcc and `cargo build --release`
   bench-runs   10,000 runs of the column with noise beside JAX: clock, processor time and memory;
             [--runs N] [--rounds N]; needs `cargo build --release`
   bench-rows   10,000,000 rows of a log, CSV to CSV, beside C: the same figures;

@@ -5,7 +5,9 @@
 
 mod chain;
 mod clock;
+mod elementary;
 mod filters;
+mod functions;
 mod lanes;
 mod log;
 mod machine;
@@ -28,14 +30,14 @@ use programs::Programs;
 /// # Errors
 /// A peer that cannot be built or fails, or that does other work than the rest.
 pub fn bench(arguments: &[String]) -> Result<(), String> {
-    let (mut rounds, mut tables) = (5, vec!["steps", "filters"]);
+    let (mut rounds, mut tables) = (5, vec!["steps", "filters", "functions"]);
     options::read(arguments, |pair| match pair.key {
         "--rounds" => pair.number().map(|number| rounds = number),
         "--table" => {
             tables.retain(|table| *table == pair.value);
             match tables.len() {
                 1 => Ok(()),
-                _ => Err("--table: expected steps or filters".to_owned()),
+                _ => Err("--table: expected steps, filters or functions".to_owned()),
             }
         }
         _ => pair.refuse("--rounds or --table"),
@@ -43,17 +45,18 @@ pub fn bench(arguments: &[String]) -> Result<(), String> {
     let programs = Programs::new()?;
     let head = machine::described(&programs.python);
     for name in tables {
-        let is_of_steps = name == "steps";
-        let mut peers = match is_of_steps {
-            true => steps::peers(&programs)?,
-            false => filters::peers(&programs)?,
+        let mut peers = match name {
+            "steps" => steps::peers(&programs)?,
+            "filters" => filters::peers(&programs)?,
+            _ => functions::peers(&programs)?,
         };
         measure(&mut peers, rounds)?;
         agree(&peers)?;
         agree_about(&peers, filters::WAYS, filters::BETWEEN_WAYS)?;
-        let table = match is_of_steps {
-            true => steps::table(&peers),
-            false => filters::table(&peers),
+        let table = match name {
+            "steps" => steps::table(&peers),
+            "filters" => filters::table(&peers),
+            _ => functions::table(&peers),
         };
         write(
             &format!("bench-peers --table {name}"),

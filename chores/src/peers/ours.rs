@@ -4,11 +4,13 @@ use std::io::Write as _;
 use std::ops::ControlFlow;
 
 use lynkeus::Study;
-use lynkeus::run::Backend;
+use lynkeus::run::{Backend, fuse_steps};
+use lynkeus_native as native;
 use serde_json::{Value, json};
 
 use super::chain;
 use super::clock::Clock;
+use super::elementary;
 use super::lanes;
 use xtask::process::root;
 
@@ -31,7 +33,17 @@ pub fn print(what: &str) -> Result<(), String> {
     let found = match what {
         "interpreter" => study_alone(Backend::Interpreter)?,
         "native" => study_alone(Backend::Native)?,
-        "lanes" => {
+        "fused" => {
+            fuse_steps(true);
+            study_alone(Backend::Native)?
+        }
+        "functions" => match native::widest() {
+            8 => elementary::measure::<8>(),
+            _ => elementary::measure::<4>(),
+        },
+        "functions-avx2" => elementary::measure::<4>(),
+        "lanes" | "lanes-fused" => {
+            fuse_steps(what == "lanes-fused");
             let run = |own: bool| lanes::run(own).map_err(|error| error.to_string());
             let [one, own] = [run(false)?, run(true)?];
             json!({
@@ -40,7 +52,10 @@ pub fn print(what: &str) -> Result<(), String> {
             })
         }
         "filters" => chain::filters().map_err(|error| error.to_string())?,
-        _ => return Err("expected interpreter, native, lanes or filters".to_owned()),
+        _ => {
+            let known = "interpreter, native, fused, lanes, lanes-fused, functions, functions-avx2 or filters";
+            return Err(format!("expected {known}"));
+        }
     };
     writeln!(std::io::stdout(), "{found}").map_err(|error| error.to_string())
 }

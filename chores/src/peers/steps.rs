@@ -6,7 +6,7 @@ use super::peer::{Peer, compiled, short};
 use super::programs::Programs;
 
 /// What a compiler needs to know for the widest vectors of this machine: by itself it takes narrower ones.
-const WIDE: [&str; 3] = ["-O3", "-march=native", "-mprefer-vector-width=512"];
+pub(super) const WIDE: [&str; 3] = ["-O3", "-march=native", "-mprefer-vector-width=512"];
 
 /// Columns of the table: the key of the JSON, what it says, and how many of its unit a second has.
 const FIGURES: [(&str, &str, f64); 4] = [
@@ -29,8 +29,10 @@ pub(super) fn peers(programs: &Programs) -> Result<Vec<Peer>, String> {
     let own = ["-DOWN", "-lmvec"];
     let all = [
         ("Lynkeus, machine code", ours("native")),
+        ("Lynkeus, machine code, fused", ours("fused")),
         ("Lynkeus, interpreter", ours("interpreter")),
         ("Lynkeus, lanes", ours("lanes")),
+        ("Lynkeus, lanes, fused", ours("lanes-fused")),
         ("C, -O2", alone("lee", &["-O2", "-ffp-contract=off"])?),
         (
             "C, -O3 -march=native",

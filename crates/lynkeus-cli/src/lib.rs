@@ -29,7 +29,7 @@ use std::path::PathBuf;
 
 use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 
-use lynkeus::run::Backend;
+use lynkeus::run::{Backend, fuse_steps};
 use lynkeus::{CheckOptions, Error, interrupt};
 
 use inputs::Source;
@@ -48,6 +48,10 @@ struct Cli {
     /// How to evaluate the equations; the results are the same, the speed differs
     #[arg(long, global = true, value_enum, default_value_t, value_name = "WHICH")]
     backend: Engine,
+    /// Use fused multiply-add in Runge–Kutta steps of fixed length,
+    /// except in filters: faster, the last digits differ, the same with every backend
+    #[arg(long, global = true)]
+    fuse: bool,
 }
 
 /// [`Backend`] in the words of the command line.
@@ -274,6 +278,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Ending {
     let cli = Cli::parse_from(arguments);
     signals::watch();
     Backend::from(cli.backend).choose();
+    fuse_steps(cli.fuse);
     match execute(cli.command) {
         Ok(_) if interrupt::interrupted() => signals::end(),
         Ok(ending) => ending,

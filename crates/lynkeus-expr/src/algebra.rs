@@ -1,6 +1,6 @@
 //! What a tape needs of the things it computes with.
 
-use crate::{Binary, Implicit, Unary};
+use crate::{Binary, Fused, Implicit, Unary};
 
 /// A set of values closed under every operation of a graph. A tape evaluated
 /// over an algebra gives bounds, Taylor coefficients or new nodes with the one
@@ -16,6 +16,15 @@ pub trait Algebra {
     fn powi(&self, x: &Self::Value, n: i32) -> Self::Value;
     /// A function of two values.
     fn binary(&self, op: Binary, x: &Self::Value, y: &Self::Value) -> Self::Value;
+    /// A product and a sum at once; where values are no rounded numbers, one after the other.
+    fn fused(&self, op: Fused, x: &Self::Value, y: &Self::Value, z: &Self::Value) -> Self::Value {
+        let product = self.binary(Binary::Mul, x, y);
+        match op {
+            Fused::Add => self.binary(Binary::Add, &product, z),
+            Fused::Sub => self.binary(Binary::Sub, &product, z),
+            Fused::From => self.binary(Binary::Sub, z, &product),
+        }
+    }
     /// `if condition then x else y`.
     fn select(&self, condition: &Self::Value, x: &Self::Value, y: &Self::Value) -> Self::Value;
     /// (x with A x = b, reciprocal condition estimate of A); `a` is n×n row by row.

@@ -3,7 +3,7 @@
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-use crate::{Binary, Interval, Node, Unary};
+use crate::{Binary, Fused, Interval, Node, Unary};
 
 pub(crate) type Register = u32;
 
@@ -19,6 +19,7 @@ pub(crate) enum Instruction {
     Powi(i32, Register, Register),
     Binary(Binary, Register, Register, Register),
     Select(Register, Register, Register, Register),
+    Fused(Fused, Register, [Register; 3]),
     /// index among the tape's linear systems and implicit functions
     Solve(u32),
 }

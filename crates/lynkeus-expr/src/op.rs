@@ -120,6 +120,17 @@ impl Binary {
     }
 }
 
+/// A product and a sum that are rounded once, of the two that a [tape](crate::Tape::fused) has.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Fused {
+    /// x·y + z
+    Add,
+    /// x·y − z
+    Sub,
+    /// z − x·y
+    From,
+}
+
 /// What a node of a [`Graph`](crate::Graph) is.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Op {

@@ -1,6 +1,6 @@
 //! The operations over `f64`: the meaning every other algebra has to agree with.
 
-use crate::{Algebra, Binary, Implicit, Unary, linear};
+use crate::{Algebra, Binary, Fused, Implicit, Unary, linear};
 
 /// −1, 0 or 1 by the sign of `x`; NaN stays NaN, and ±0 gives ±0.
 pub fn sign(x: f64) -> f64 {
@@ -100,6 +100,14 @@ impl Algebra for Reals {
             Binary::Equal => truth(x == y),
             Binary::And => truth(x != 0.0 && y != 0.0),
             Binary::Or => truth(x != 0.0 || y != 0.0),
+        }
+    }
+
+    fn fused(&self, op: Fused, &x: &f64, &y: &f64, &z: &f64) -> f64 {
+        match op {
+            Fused::Add => x.mul_add(y, z),
+            Fused::Sub => x.mul_add(y, -z),
+            Fused::From => (-x).mul_add(y, z),
         }
     }
 

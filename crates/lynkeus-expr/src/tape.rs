@@ -5,6 +5,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use crate::code::{Code, Instruction, Register, System, SystemSlots, Tape};
+use crate::fuse::Fusion;
 use crate::{Algebra, Binary, Graph, Node, Op, Reals};
 
 /// An expression depends on a symbol that is not among the inputs.
@@ -21,7 +22,25 @@ impl Tape {
     /// # Errors
     /// [`MissingInput`] where an output depends on another symbol.
     pub fn new(graph: &Graph, inputs: &[Node], outputs: &[Node]) -> Result<Self, MissingInput> {
-        let code = Compiler::new(graph, inputs, outputs)?.run(outputs);
+        Self::compiled(graph, inputs, outputs, Fusion::default())
+    }
+
+    /// As [`Tape::new`], but a product that nothing reads but sums is part of these: it is not rounded by itself
+    /// ([`Algebra::fused`]).
+    ///
+    /// # Errors
+    /// As [`Tape::new`].
+    pub fn fused(graph: &Graph, inputs: &[Node], outputs: &[Node]) -> Result<Self, MissingInput> {
+        Self::compiled(graph, inputs, outputs, Fusion::new(graph, outputs))
+    }
+
+    fn compiled(
+        graph: &Graph,
+        inputs: &[Node],
+        outputs: &[Node],
+        fusion: Fusion,
+    ) -> Result<Self, MissingInput> {
+        let code = Compiler::new(graph, inputs, outputs, fusion)?.run(outputs);
         Ok(Self {
             code: Arc::new(code),
         })
@@ -142,14 +161,22 @@ struct Compiler<'g> {
     /// how many uses of a node are still to come
     uses: HashMap<Node, usize>,
     free: Vec<Register>,
+    fusion: Fusion,
     code: Code,
 }
 
 impl<'g> Compiler<'g> {
-    pub fn new(graph: &'g Graph, inputs: &[Node], outputs: &[Node]) -> Result<Self, MissingInput> {
-        let nodes = graph.reachable(outputs);
+    pub fn new(
+        graph: &'g Graph,
+        inputs: &[Node],
+        outputs: &[Node],
+        fusion: Fusion,
+    ) -> Result<Self, MissingInput> {
+        let mut nodes = graph.reachable(outputs);
+        nodes.retain(|node| !fusion.is_part(*node));
         let mut compiler = Self {
             graph,
+            fusion,
             register: inputs.iter().copied().zip(0..).collect(),
             uses: HashMap::new(),
             free: vec![],
@@ -191,13 +218,21 @@ impl<'g> Compiler<'g> {
 
     fn count_uses(&mut self, outputs: &[Node]) {
         for &node in &self.nodes {
-            for argument in self.graph.arguments(node) {
+            for argument in self.arguments(node) {
                 *self.uses.entry(argument).or_default() += 1;
             }
         }
         for &output in outputs {
             // never released: one use that does not come
             *self.uses.entry(output).or_default() += 1;
+        }
+    }
+
+    /// What the instruction of a node reads.
+    fn arguments(&self, node: Node) -> Vec<Node> {
+        match self.fusion.sum(node) {
+            Some((_, arguments)) => arguments.to_vec(),
+            None => self.graph.arguments(node),
         }
     }
 
@@ -217,9 +252,15 @@ impl<'g> Compiler<'g> {
         if let Op::Entry(solve, entry) = op {
             return self.emit_entry(node, solve, entry);
         }
-        let arguments = self.graph.arguments(node);
+        let arguments = self.arguments(node);
         let from: Vec<Register> = arguments.iter().map(|a| self.register[a]).collect();
+        let fused = self.fusion.sum(node);
         let instruction = match op {
+            _ if let Some((op, _)) = fused => Instruction::Fused(
+                op,
+                self.result(node, &arguments),
+                [from[0], from[1], from[2]],
+            ),
             Op::System(_) => {
                 // results must not land on arguments: arguments are released after
                 self.code.room = self.code.room.max(from.len());
@@ -326,6 +367,10 @@ impl Code {
             }
             Instruction::Select(to, c, x, y) => {
                 r[to as usize] = algebra.select(&r[c as usize], &r[x as usize], &r[y as usize]);
+            }
+            Instruction::Fused(op, to, [x, y, z]) => {
+                let [x, y, z] = [x, y, z].map(|from| &r[from as usize]);
+                r[to as usize] = algebra.fused(op, x, y, z);
             }
             Instruction::Solve(index) => self.solve(algebra, r, index),
         }

@@ -2,6 +2,8 @@
 //! Developer's Manual, volume 2): VEX, and EVEX where there is AVX-512. How many numbers a register holds
 //! is data; instructions of both widths are written by the same lines.
 
+use lynkeus_expr::Fused;
+
 /// A vector register, 0 to 15, to 31 with AVX-512.
 pub(crate) type Register = u8;
 
@@ -68,6 +70,15 @@ pub(crate) enum Opcode {
 
 const PACKED: u8 = 1;
 const SCALAR: u8 = 3;
+
+/// Which operands of [`Assembler::fuse`] are factors: of the destination, the second and the last one, those that the
+/// digits name; the other one is the term.
+#[derive(Clone, Copy)]
+pub(crate) enum Factors {
+    FirstLast = 0x98,
+    FirstSecond = 0xa8,
+    SecondLast = 0xb8,
+}
 
 /// How an instruction is encoded.
 #[derive(Clone, Copy)]
@@ -191,7 +202,9 @@ impl Assembler {
     }
 
     fn vex(&mut self, form: Form, reg: u8, second: u8, rm: u8) {
-        let last = (!second & 15) << 3 | form.length << 2 | form.pp;
+        // what this map has here takes numbers of 64 bits
+        let width = u8::from(form.map == OF_38) << 7;
+        let last = width | (!second & 15) << 3 | form.length << 2 | form.pp;
         if form.map == OF && rm < 8 {
             self.bytes.extend([0xc5, inverted(reg, 3, 7) | last]);
         } else {
@@ -252,6 +265,25 @@ impl Assembler {
             }
             _ => self.write(form, to, x, y),
         }
+    }
+
+    /// A product and a sum with one rounding; the destination is an operand, too.
+    pub fn fuse(
+        &mut self,
+        op: Fused,
+        factors: Factors,
+        to: Register,
+        second: Register,
+        last: Operand,
+    ) {
+        let sign = match op {
+            Fused::Add => 0,
+            Fused::Sub => 2,
+            Fused::From => 4,
+        };
+        let opcode = factors as u8 + sign + u8::from(self.lanes == 1);
+        let form = self.form(PACKED, OF_38, opcode, self.lanes);
+        self.write(form, to, second, last);
     }
 
     /// All bits where the relation holds, else none.

@@ -1,9 +1,9 @@
 //! From a program to machine code, in one pass: what each operation becomes. Most are a few
 //! instructions, with the meaning that they have over `f64`; the others are [called](library).
 
-use lynkeus_expr::{Binary, Unary};
+use lynkeus_expr::{Binary, Fused, Unary};
 
-use crate::assemble::{Assembler, Mask, Opcode, Operand, Register, Relation};
+use crate::assemble::{Assembler, Factors, Mask, Opcode, Operand, Register, Relation};
 use crate::library;
 use crate::record::{Id, Program, Value};
 use crate::registers::{Emitter, TEMPORARY};
@@ -66,6 +66,7 @@ impl<const LANES: usize> Emitter<'_, LANES> {
                 Some(function) => self.call(id, function, &[x, y]),
                 None => self.binary(id, op, x, y),
             },
+            Value::Fused(op, arguments) => self.fused(id, op, arguments),
             Value::Select(c, x, y) => self.select(id, c, x, y),
             Value::Choice(relation, compared, x, y) => {
                 let relation = match relation {
@@ -158,6 +159,55 @@ impl<const LANES: usize> Emitter<'_, LANES> {
         let second = self.operand(y);
         let to = self.result(id, &[x, y]);
         self.assembler.apply(op, to, first, second);
+    }
+
+    /// The result takes the place of an argument, of one that is not needed again where there is one. What is not in a
+    /// register may be the last operand.
+    fn fused(&mut self, id: Id, op: Fused, [x, y, z]: [Id; 3]) {
+        let (x, y) = if self.is_elsewhere(x) { (y, x) } else { (x, y) };
+        let first = self.register(x);
+        if self.is_elsewhere(z) {
+            let second = self.register(y);
+            let term = self.operand(z);
+            let (to, other) = match self.result_in(id, &[x, y, z], &[first, second]) {
+                Some(to) if to == second => (to, first),
+                Some(to) => (to, second),
+                None => (self.result_apart(id), second),
+            };
+            self.assembler
+                .copy(to, if other == first { second } else { first });
+            return self
+                .assembler
+                .fuse(op, Factors::FirstSecond, to, other, term);
+        }
+        let term = self.register(z);
+        let last = self.operand(y);
+        let dying: &[Register] = match last {
+            Operand::Register(second) => &[term, first, second],
+            Operand::Memory(_) => &[term, first],
+        };
+        let found = self.result_in(id, &[x, y, z], dying);
+        let to = found.unwrap_or_else(|| self.result_apart(id));
+        let other = Operand::Register(term);
+        match last {
+            _ if to == term => self
+                .assembler
+                .fuse(op, Factors::SecondLast, to, first, last),
+            Operand::Register(second) if to == second => {
+                self.assembler
+                    .fuse(op, Factors::FirstSecond, to, first, other);
+            }
+            Operand::Register(second) if to == first => {
+                self.assembler
+                    .fuse(op, Factors::FirstSecond, to, second, other);
+            }
+            _ if to == first => self.assembler.fuse(op, Factors::FirstLast, to, term, last),
+            _ => {
+                self.assembler.copy(to, term);
+                self.assembler
+                    .fuse(op, Factors::SecondLast, to, first, last);
+            }
+        }
     }
 
     /// The truth value of the first mask.

@@ -40,10 +40,20 @@ struct Compiled {
     outputs: usize,
     /// number of first inputs that groups have in common
     shared: usize,
-    /// from the outputs of one group to those of the next; none of code for one group
-    spacing: Option<usize>,
+    course: Course,
     #[cfg(target_arch = "x86_64")]
     code: Mmap,
+}
+
+/// How code goes on to the next group.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Course {
+    /// not at all
+    Alone,
+    /// so many values from the outputs of one group to those of the next
+    Groups(usize),
+    /// outputs are the last inputs of the next group
+    Steps,
 }
 
 impl<const LANES: usize> Function<LANES> {
@@ -51,7 +61,7 @@ impl<const LANES: usize> Function<LANES> {
     /// x86-64 with AVX2 and FMA; for 8 lanes also AVX-512 with F, DQ and VL), where the system does not let programs make code, for tapes with
     /// operations that are not compiled, and for other numbers of lanes.
     pub fn compile(tape: &Tape) -> Option<Self> {
-        Self::of(tape, 0, None)
+        Self::of(tape, 0, Course::Alone)
     }
 
     /// Compiles a tape that goes over many groups of lanes: the first `shared` inputs are common to
@@ -61,45 +71,58 @@ impl<const LANES: usize> Function<LANES> {
         if shared > tape.inputs() || spacing < tape.outputs() {
             return None;
         }
-        Self::of(tape, shared, Some(spacing))
+        Self::of(tape, shared, Course::Groups(spacing))
+    }
+
+    /// Compiles a tape that takes some values from step to step: its last inputs are the outputs of the step before.
+    /// The first `shared` inputs are common to all steps, those between are each step's own. None as of
+    /// [`Function::compile`], and where there are more outputs than inputs that are not shared.
+    pub fn stepping(tape: &Tape, shared: usize) -> Option<Self> {
+        let own = tape.inputs().checked_sub(shared)?;
+        (tape.outputs() <= own).then(|| Self::of(tape, shared, Course::Steps))?
     }
 
     /// As [`Function::compile`], for a processor without AVX-512: to compare.
     pub fn compile_for_avx2(tape: &Tape) -> Option<Self> {
         let is_compiled_for = matches!(LANES, 1 | 4) && is_supported();
-        Self::made(tape, 0, None, is_compiled_for, false)
+        Self::made(tape, 0, Course::Alone, is_compiled_for, false)
     }
 
-    fn of(tape: &Tape, shared: usize, spacing: Option<usize>) -> Option<Self> {
+    fn of(tape: &Tape, shared: usize, course: Course) -> Option<Self> {
         let is_extended = LANES != 4 && is_extended();
         let is_compiled_for = match LANES {
             1 | 4 => is_supported(),
             8 => is_extended,
             _ => false,
         };
-        Self::made(tape, shared, spacing, is_compiled_for, is_extended)
+        Self::made(tape, shared, course, is_compiled_for, is_extended)
     }
 
     fn made(
         tape: &Tape,
         shared: usize,
-        spacing: Option<usize>,
+        course: Course,
         is_compiled_for: bool,
         is_extended: bool,
     ) -> Option<Self> {
         if !is_compiled_for || tape.len() > LARGEST {
             return None;
         }
-        Self::compiled(&Program::record(tape)?, shared, spacing, is_extended)
+        Self::compiled(&Program::record(tape)?, shared, course, is_extended)
     }
 
     #[cfg(target_arch = "x86_64")]
     fn compiled(
         program: &Program,
         shared: usize,
-        spacing: Option<usize>,
+        course: Course,
         is_extended: bool,
     ) -> Option<Self> {
+        let spacing = match course {
+            Course::Alone => None,
+            Course::Groups(spacing) => Some(spacing),
+            Course::Steps => Some(program.inputs - shared),
+        };
         let registers = registers(is_extended);
         let program = &scheduled(program, registers, LANES == 1, calls::<LANES>);
         let emitter = emit::<LANES>(program, shared, spacing, is_extended);
@@ -117,14 +140,14 @@ impl<const LANES: usize> Function<LANES> {
             inputs: program.inputs,
             outputs: program.outputs.len(),
             shared,
-            spacing,
+            course,
             code: memory::executable(&emitter.assembler.bytes)?,
         });
         Some(Self { compiled, frame })
     }
 
     #[cfg(not(target_arch = "x86_64"))]
-    fn compiled(_: &Program, _: usize, _: Option<usize>, _: bool) -> Option<Self> {
+    fn compiled(_: &Program, _: usize, _: Course, _: bool) -> Option<Self> {
         None
     }
 
@@ -143,8 +166,8 @@ impl<const LANES: usize> Function<LANES> {
     /// stand one group after the other.
     ///
     /// # Panics
-    /// If the slices are too short for so many groups, and for more than one group of code that was
-    /// compiled for one.
+    /// If the slices are too short for so many groups, for more than one group of code that was
+    /// compiled for one, and of code for steps.
     pub fn sweep(
         &mut self,
         groups: usize,
@@ -157,21 +180,49 @@ impl<const LANES: usize> Function<LANES> {
         let Some(before) = groups.checked_sub(1) else {
             return;
         };
-        assert!(
-            before == 0 || compiled.spacing.is_some(),
-            "code for one group"
-        );
+        let spacing = match compiled.course {
+            Course::Groups(spacing) => Some(spacing),
+            Course::Alone if before == 0 => Some(0),
+            Course::Alone | Course::Steps => None,
+        };
+        let spacing = spacing.expect("code for groups, or for one");
         assert_eq!(shared.len(), compiled.shared, "one value per shared input");
         assert!(inputs.len() >= groups * own, "inputs of every group");
-        let needed = before * compiled.spacing.unwrap_or(0) + compiled.outputs;
+        let needed = before * spacing + compiled.outputs;
         assert!(outputs.len() >= needed, "outputs of every group");
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the code was emitted for these numbers of inputs, outputs and places of the
         // frame, of LANES numbers each, and there is room for so many groups, of which code
         // without spacing has one
         unsafe {
+            let (inputs, outputs) = (inputs.as_ptr(), outputs.as_mut_ptr());
             let frame = self.frame.values_mut();
             memory::run(&compiled.code, inputs, outputs, frame, shared, groups);
+        }
+    }
+
+    /// So many steps: `values` are the own inputs of each, one after the other, and of one more step, whose last ones
+    /// are where the last step ends. Of every step but the first one the last inputs are written.
+    ///
+    /// # Panics
+    /// If the slices are too short for so many steps, and of code that was not compiled for them.
+    pub fn steps(&mut self, count: usize, shared: &[[f64; LANES]], values: &mut [[f64; LANES]]) {
+        let compiled = &*self.compiled;
+        let own = compiled.inputs - compiled.shared;
+        if count == 0 {
+            return;
+        }
+        assert_eq!(compiled.course, Course::Steps, "code for steps");
+        assert_eq!(shared.len(), compiled.shared, "one value per shared input");
+        assert!(values.len() >= (count + 1) * own, "inputs of every step");
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: the code was emitted for these numbers of inputs, outputs and places of the frame, of LANES numbers
+        // each; a step reads its own inputs and writes to those of the next one, for which there is room
+        unsafe {
+            let first = values.as_mut_ptr();
+            let outputs = first.add(2 * own - compiled.outputs);
+            let frame = self.frame.values_mut();
+            memory::run(&compiled.code, first, outputs, frame, shared, count);
         }
     }
 }

@@ -22,8 +22,8 @@ pub(crate) fn executable(bytes: &[u8]) -> Option<Mmap> {
 /// these places, group by group.
 pub(crate) unsafe fn run<const LANES: usize>(
     code: &Mmap,
-    inputs: &[[f64; LANES]],
-    outputs: &mut [[f64; LANES]],
+    inputs: *const [f64; LANES],
+    outputs: *mut [f64; LANES],
     frame: &mut [[f64; LANES]],
     shared: &[[f64; LANES]],
     groups: usize,
@@ -33,8 +33,8 @@ pub(crate) unsafe fn run<const LANES: usize>(
     // SAFETY: the places are large enough, by the caller's promise
     unsafe {
         entry(
-            inputs.as_ptr().cast(),
-            outputs.as_mut_ptr().cast(),
+            inputs.cast(),
+            outputs.cast(),
             frame.as_mut_ptr().cast(),
             shared.as_ptr().cast(),
             groups,

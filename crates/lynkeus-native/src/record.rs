@@ -3,7 +3,7 @@
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 
-use lynkeus_expr::{Algebra, Binary, Implicit, Tape, Unary};
+use lynkeus_expr::{Algebra, Binary, Fused, Implicit, Tape, Unary};
 
 /// A value: its place in [`Program::values`].
 pub(crate) type Id = u32;
@@ -15,6 +15,7 @@ pub(crate) enum Value {
     Constant(f64),
     Unary(Unary, Id),
     Binary(Binary, Id, Id),
+    Fused(Fused, [Id; 3]),
     Select(Id, Id, Id),
     /// the third where this relation of the first two holds, else the fourth
     Choice(Binary, [Id; 2], Id, Id),
@@ -40,6 +41,7 @@ impl Value {
         match self {
             Self::Unary(op, a) => Self::Unary(op, to(a)),
             Self::Binary(op, a, b) => Self::Binary(op, to(a), to(b)),
+            Self::Fused(op, arguments) => Self::Fused(op, arguments.map(to)),
             Self::Select(c, a, b) => Self::Select(to(c), to(a), to(b)),
             Self::Choice(op, [a, b], x, y) => Self::Choice(op, [to(a), to(b)], to(x), to(y)),
             Self::Input(_) | Self::Constant(_) | Self::Solve(_) | Self::Entry(..) => self,
@@ -72,6 +74,7 @@ impl Program {
             Value::Input(_) | Value::Constant(_) | Value::Entry(..) => {}
             Value::Unary(_, a) => give(a),
             Value::Binary(_, a, b) => [a, b].into_iter().for_each(give),
+            Value::Fused(_, arguments) => arguments.into_iter().for_each(give),
             Value::Select(c, a, b) => [c, a, b].into_iter().for_each(give),
             Value::Choice(_, [a, b], x, y) => [a, b, x, y].into_iter().for_each(give),
             Value::Solve(system) => {
@@ -158,6 +161,31 @@ impl Algebra for Recorder {
             _ => (op, *x, *y),
         };
         self.push(Value::Binary(op, x, y))
+    }
+
+    /// A sign of a factor or of the term is one of the operation, to the bit.
+    fn fused(&self, op: Fused, x: &Id, y: &Id, z: &Id) -> Id {
+        let (mut op, mut factors, mut term) = (op, [*x, *y], *z);
+        for factor in &mut factors {
+            if let (Some(x), Fused::Add | Fused::From) = (self.negated(*factor), op) {
+                *factor = x;
+                op = if op == Fused::Add {
+                    Fused::From
+                } else {
+                    Fused::Add
+                };
+            }
+        }
+        if let (Some(z), Fused::Add | Fused::Sub) = (self.negated(term), op) {
+            term = z;
+            op = if op == Fused::Add {
+                Fused::Sub
+            } else {
+                Fused::Add
+            };
+        }
+        let [x, y] = factors;
+        self.push(Value::Fused(op, [x, y, term]))
     }
 
     /// A relation needs not be a number first.

@@ -250,6 +250,24 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
         register
     }
 
+    /// As [`Emitter::result`], in the first of these registers that an argument gives back, if one does.
+    pub fn result_in(&mut self, id: Id, arguments: &[Id], from: &[Register]) -> Option<Register> {
+        self.consume(id, arguments);
+        let is_free = |register: &&Register| self.holds[**register as usize].is_none();
+        let register = *from.iter().find(is_free)?;
+        self.pinned = 0;
+        self.settle(id, register);
+        Some(register)
+    }
+
+    /// After [`Emitter::result_in`] found none: a register that no argument is in.
+    pub fn result_apart(&mut self, id: Id) -> Register {
+        let register = self.vacant();
+        self.pinned = 0;
+        self.settle(id, register);
+        register
+    }
+
     pub fn settle(&mut self, id: Id, register: Register) {
         self.holds[register as usize] = Some(id);
         self.homes[id as usize].register = Some(register);

@@ -27,7 +27,7 @@ fn latency(value: Value) -> u32 {
         Value::Unary(Unary::Neg | Unary::Abs, _) => 1,
         Value::Unary(Unary::Sqrt, _) => 20,
         Value::Unary(..) => 8,
-        Value::Binary(Binary::Add | Binary::Sub | Binary::Mul, ..) => 4,
+        Value::Binary(Binary::Add | Binary::Sub | Binary::Mul, ..) | Value::Fused(..) => 4,
         Value::Binary(Binary::Div, ..) => 14,
         Value::Binary(..) | Value::Select(..) | Value::Choice(..) => 6,
         Value::Solve(_) => 50,

@@ -329,8 +329,8 @@ impl Dynamics for Loop {
         !self.joined.is_held() && self.joined.slopes(t, x, slopes)
     }
 
-    fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
-        self.joined.step(t, h, x, next)
+    fn steps(&mut self, steps: &[[f64; 2]], x: &[f64], next: &mut [f64]) -> bool {
+        self.joined.steps(steps, x, next)
     }
 
     fn events(&mut self) -> Option<&mut dyn Events> {

@@ -23,9 +23,9 @@ pub trait Dynamics {
         false
     }
 
-    /// Takes `x` at `t` to `next` at `t + h` by the classical Runge–Kutta method, where that is
-    /// known as one function; false where it is not, and nothing is done.
-    fn step(&mut self, _t: f64, _h: f64, _x: &[f64], _next: &mut [f64]) -> bool {
+    /// Takes `x` to `next` over steps of the classical Runge–Kutta method, the time and the length of each, where
+    /// that is known as one function; false where it is not, and nothing is done.
+    fn steps(&mut self, _steps: &[[f64; 2]], _x: &[f64], _next: &mut [f64]) -> bool {
         false
     }
 

@@ -397,6 +397,9 @@ pub struct Rk4 {
     stage: Vec<f64>,
 }
 
+/// Most steps that are taken before somebody is asked whether to go on.
+const TOGETHER: usize = 64;
+
 /// Where step `i` of `steps` equal ones begins.
 pub(crate) fn instant(from: f64, to: f64, steps: usize, i: usize) -> f64 {
     from + (to - from) * (i as f64 / steps as f64)
@@ -443,8 +446,7 @@ impl Rk4 {
     /// # Panics
     /// If `f` or `x` has another dimension.
     pub fn step(&mut self, f: &mut impl Dynamics, t: f64, h: f64, x: &mut [f64]) -> Result<()> {
-        if f.step(t, h, x, &mut self.stage) && are_finite(&self.stage) {
-            x.copy_from_slice(&self.stage);
+        if self.steps_at_once(f, &[[t, h]], x) {
             return Ok(());
         }
         for (stage, (c, _)) in STAGES.iter().enumerate() {
@@ -475,16 +477,48 @@ impl Rk4 {
         steps: usize,
         x: &mut [f64],
     ) -> Result<()> {
-        let mut t = from;
-        for i in 0..steps {
-            let next = instant(from, to, steps, i + 1);
-            if f.is_over() {
-                return Err(Error::Cancelled { time: t });
+        let (mut time, mut some) = (from, [[0.0; 2]; TOGETHER]);
+        for first in (0..steps).step_by(TOGETHER) {
+            let some = &mut some[..TOGETHER.min(steps - first)];
+            for (i, step) in (first + 1..).zip(&mut *some) {
+                let next = instant(from, to, steps, i);
+                *step = [time, next - time];
+                time = next;
             }
-            self.step(f, t, next - t, x)?;
-            t = next;
+            if f.is_over() {
+                return Err(Error::Cancelled { time: some[0][0] });
+            }
+            if !self.steps_at_once(f, some, x) {
+                self.one_by_one(f, some, x)?;
+            }
         }
         Ok(())
+    }
+
+    /// As [`Rk4::advance`] over steps, the time and the length of each.
+    fn one_by_one(
+        &mut self,
+        f: &mut impl Dynamics,
+        steps: &[[f64; 2]],
+        x: &mut [f64],
+    ) -> Result<()> {
+        for &[time, length] in steps {
+            if f.is_over() {
+                return Err(Error::Cancelled { time });
+            }
+            self.step(f, time, length, x)?;
+        }
+        Ok(())
+    }
+
+    /// Steps that f has as one function. What is not finite stays so from step to step, each of which adds to a
+    /// state: then `x` stays, and false is said.
+    fn steps_at_once(&mut self, f: &mut impl Dynamics, steps: &[[f64; 2]], x: &mut [f64]) -> bool {
+        let are_made = f.steps(steps, x, &mut self.stage) && are_finite(&self.stage);
+        if are_made {
+            x.copy_from_slice(&self.stage);
+        }
+        are_made
     }
 
     /// One step with events in it. Where a relation of a clause is another one at the end of it, steps of

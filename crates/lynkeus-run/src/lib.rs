@@ -120,6 +120,7 @@ mod simulation;
 mod slopes;
 mod snapshot;
 mod spread;
+mod steps;
 mod system;
 mod trajectory;
 
@@ -147,5 +148,6 @@ pub use simulation::Simulation;
 pub use slopes::{Place, Slopes};
 pub use snapshot::{Digest, SnapshotFault};
 pub use spread::Lag;
+pub use steps::fuse_steps;
 pub use system::{Evaluation, Expressions, Parts, System};
 pub use trajectory::{Column, Role, Trajectory};

@@ -585,12 +585,9 @@ impl Dynamics for Evaluation {
         both.derivatives.slopes(inputs, x.len(), slopes)
     }
 
-    fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
-        if self.is_held || self.line.is_some() {
-            return false;
-        }
-        let (both, inputs) = self.at(t, x);
-        both.derivatives.step(inputs, h, next)
+    fn steps(&mut self, steps: &[[f64; 2]], x: &[f64], next: &mut [f64]) -> bool {
+        let stays = !self.is_held && self.line.is_none();
+        stays && self.free.derivatives.steps(&self.inputs, steps, x, next)
     }
 
     fn events(&mut self) -> Option<&mut dyn Events> {

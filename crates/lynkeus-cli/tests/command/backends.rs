@@ -16,7 +16,7 @@ fn both_backends_write_the_same() {
         for path in files.map(|file| file.unwrap().path()) {
             let is_study = path.extension().is_some_and(|e| e == "toml");
             if is_study && read_to_string(&path).unwrap().contains("[simulate]") {
-                compare(&Folder::empty(), path.to_str().unwrap());
+                compare(&Folder::empty(), path.to_str().unwrap(), &[]);
                 compared += 1;
             }
         }
@@ -32,15 +32,19 @@ fn both_backends_write_the_same() {
         "until = 10",
         "until = 10\nmethod = \"rk4\"\nstep = 1e-3",
     );
-    compare(&folder, "study.toml");
+    let apart = compare(&folder, "study.toml", &[]);
+    let fused = compare(&folder, "study.toml", &["--fuse"]);
+    assert!(apart != fused && apart.lines().count() == fused.lines().count());
 }
 
-fn compare(folder: &Folder, study: &str) {
+fn compare(folder: &Folder, study: &str, options: &[&str]) -> String {
     let [interpreted, native] = ["interpreter", "native"].map(|backend| {
-        let done = folder.run(&["simulate", study, "-o", "o.csv", "-q", "--backend", backend]);
+        let command = ["simulate", study, "-o", "o.csv", "-q", "--backend", backend];
+        let done = folder.run(&[&command, options].concat());
         // one of the papers' observers does not work at all, and its table is written all the same
         assert!(done.code < 2, "{study}: {}", done.err);
         folder.read("o.csv")
     });
     assert!(interpreted == native, "{study} differs");
+    native
 }

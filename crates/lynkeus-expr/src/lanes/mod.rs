@@ -34,7 +34,7 @@ pub use circular::{acos, asin, atan, atan2, cos, sin, tan};
 pub use exponential::{cosh, exp, ln, pow, sinh, tanh};
 pub use vector::{Portable, Vector};
 
-use crate::{Algebra, Binary, Implicit, Reals, Unary};
+use crate::{Algebra, Binary, Fused, Implicit, Reals, Unary};
 
 /// A function of one number, lane by lane; none where the library's operation is used as it is.
 #[inline(always)]
@@ -96,6 +96,10 @@ impl<const N: usize> Algebra for Lanes<N> {
             Some(function) => function(Portable(*x), Portable(*y)).0,
             None => from_fn(|i| Reals.binary(op, &x[i], &y[i])),
         }
+    }
+
+    fn fused(&self, op: Fused, x: &[f64; N], y: &[f64; N], z: &[f64; N]) -> [f64; N] {
+        from_fn(|i| Reals.fused(op, &x[i], &y[i], &z[i]))
     }
 
     fn select(&self, condition: &[f64; N], x: &[f64; N], y: &[f64; N]) -> [f64; N] {

@@ -87,7 +87,7 @@ impl Batch {
     }
 
     /// Whether each run is that of [`Simulation::run`] to the bit: no function is used that lanes round
-    /// in their own way.
+    /// in their own way, and no product and sum are fused, which a run alone does beyond what all runs share.
     #[must_use]
     pub fn is_exact(&self) -> bool {
         self.work.is_exact()
@@ -224,7 +224,7 @@ impl<const L: usize> Blocks<L> {
 
 impl<const L: usize> Work for Blocks<L> {
     fn is_exact(&self) -> bool {
-        !self.program.step.has_functions && !self.program.row.has_functions
+        self.program.step.is_rounded_alike && self.program.row.is_rounded_alike
     }
 
     fn run(

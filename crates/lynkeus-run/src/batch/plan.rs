@@ -10,6 +10,7 @@ use crate::integrator::{APART, check_interval, fixed_steps, pieces};
 use crate::lanes::{Engine, have_functions};
 use crate::noise::Sensors;
 use crate::run::{Itinerary, Stop};
+use crate::steps::{is_fused, tape};
 use crate::{Events, Method, Noise, Result, Simulation, Step};
 
 /// What all trajectories do next.
@@ -167,7 +168,7 @@ fn program<const L: usize>(clock: &mut Loop) -> Result<Option<Program<L>>> {
     };
     let (observer_names, estimates) = clock.estimate(system.start());
     Ok(Some(Program {
-        step: Divided::new(&graph, &of_step, &next, own.clone(), states + disturbances)?,
+        step: Divided::of_step(&graph, &of_step, &next, own.clone(), states + disturbances)?,
         row: Divided::new(&graph, inputs, row, own, columns)?,
         states,
         disturbances,
@@ -189,8 +190,9 @@ pub(crate) struct Divided<const L: usize> {
     own: Engine<L>,
     /// number of values that all trajectories share
     pub shared: usize,
-    /// whether there is a function that lanes round in their own way
-    pub has_functions: bool,
+    /// whether a run alone has the same bits: nothing is fused with what all share, there is no function that lanes
+    /// round in their own way
+    pub is_rounded_alike: bool,
     own_inputs: usize,
     outputs: usize,
     /// from the outputs of one group of lanes to those of the next
@@ -210,19 +212,43 @@ impl<const L: usize> Divided<L> {
         own: Range<usize>,
         spacing: usize,
     ) -> Result<Self, MissingInput> {
+        Self::made(g, (inputs, outputs), own, spacing, false)
+    }
+
+    /// As [`Divided::new`], of a step that rounds a product and a sum once where [steps](crate::fuse_steps) do.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn of_step(
+        g: &Graph,
+        inputs: &[Node],
+        outputs: &[Node],
+        own: Range<usize>,
+        spacing: usize,
+    ) -> Result<Self, MissingInput> {
+        Self::made(g, (inputs, outputs), own, spacing, is_fused())
+    }
+
+    fn made(
+        g: &Graph,
+        (inputs, outputs): (&[Node], &[Node]),
+        own: Range<usize>,
+        spacing: usize,
+        is_fused: bool,
+    ) -> Result<Self, MissingInput> {
         let common = [&inputs[..own.start], &inputs[own.end..]].concat();
         let divided = g.hoisted(outputs, &common);
         let shared = divided.values.len();
-        let common = Tape::new(g, &common, &divided.values)?;
+        let common = tape(g, &common, &divided.values, is_fused)?;
         let own_inputs = own.len();
         let own = [&divided.symbols, &inputs[own]].concat();
-        let own = Tape::new(g, &own, &divided.roots)?;
+        let own = tape(g, &own, &divided.roots, is_fused)?;
         let sweeping = |own: &Tape| Function::sweeping(own, shared, spacing);
         Ok(Self {
             common: Engine::new(&common, Function::compile),
             own: Engine::new(&own, sweeping),
             shared,
-            has_functions: have_functions(g, outputs),
+            is_rounded_alike: !is_fused && !have_functions(g, outputs),
             own_inputs,
             outputs: outputs.len(),
             spacing,
@@ -282,7 +308,7 @@ mod tests {
         let tape = Tape::new(&g, &inputs, &outputs).unwrap();
         let mut code = Divided::<LANES>::new(&g, &inputs, &outputs, 1..3, 2).unwrap();
         // u and eᵘ
-        assert!(code.shared == 2 && code.has_functions);
+        assert!(code.shared == 2 && !code.is_rounded_alike);
         let mut table = [[0.0; LANES]; 2 * LANES];
         code.share(&[[0.7, 0.8, 0.9, 1.0]], &mut table);
         let own = [[0.3, 0.4, 0.5, 0.6], [-1.5; LANES]];

@@ -240,8 +240,8 @@ impl Dynamics for Variational<'_> {
         }
     }
 
-    fn step(&mut self, t: f64, h: f64, z: &[f64], next: &mut [f64]) -> bool {
-        let Some(first) = &mut self.first else {
+    fn steps(&mut self, steps: &[[f64; 2]], z: &[f64], next: &mut [f64]) -> bool {
+        let (Some(first), &[[t, h]]) = (&mut self.first, steps) else {
             return false;
         };
         let noise = &*self.equation.noise;
