@@ -1226,6 +1226,10 @@ class FitEntries:
     """the Bayesian one, 2·nll + k·log(readings)"""
     converged: bool
     """whether nothing is left to gain nearby"""
+    credible: bool
+    """whether nothing speaks against the values"""
+    doubts: list[Doubt]
+    """what the readings say against them, what weighs most first"""
     readings: int
     """readings that were fitted"""
     evaluations: int

@@ -491,7 +491,8 @@ class Fit(reports.FitEntries, Table):
 
     @property
     def is_credible(self) -> bool:
-        """Whether the search converged and the logs tell every value; else :attr:`refusal` says what is missing."""
+        """Whether the search converged, the logs determine every value and no reading contradicts them; else
+        :attr:`refusal` says why not."""
         return self.refusal is None
 
     @cached_property

@@ -19,6 +19,7 @@ from conftest import ALL, ROOT
 from test_fmu import run, table
 
 fmpy = pytest.importorskip("fmpy")
+pytest.importorskip("fmpy.fmi1")
 fmi2 = pytest.importorskip("fmpy.fmi2")
 fmi3 = pytest.importorskip("fmpy.fmi3")
 validation = pytest.importorskip("fmpy.validation")
@@ -400,3 +401,127 @@ def test_plant_and_observer_run_together_as_simulate_runs_them(
     plant.close()
     observer.close()
     check_derivatives(tmp_path / "o" / "fmu" / f"{observer.model.modelExchange.modelIdentifier}.fmu")
+
+
+EVENTS = {
+    "ball": (
+        """
+model Ball
+  parameter Real e = 0.8;
+  Real h(start = 1);
+  Real v(start = 0);
+  discrete Integer n(start = 0);
+  output Real y = h;
+equation
+  der(h) = v;
+  der(v) = -9.81;
+  when h <= 0 then
+    reinit(v, -e*pre(v));
+    n = pre(n) + 1;
+  end when;
+end Ball;
+""",
+        ["h", "v", "n"],
+        2.3,
+    ),
+    "thermostat": (
+        """
+model Thermostat
+  input Real cold(start = 12);
+  Real T(start = 18);
+  Boolean on(start = true);
+  output Real y = T;
+equation
+  der(T) = (if on then 8 else 0) - 0.5*(T - cold);
+  when T >= 21 then
+    on = false;
+  elsewhen T <= 19 then
+    on = true;
+  end when;
+end Thermostat;
+""",
+        ["T", "on"],
+        5.0,
+    ),
+    "dosed": (
+        """
+model Dosed
+  Real c(start = 1);
+  Real dose(start = 0.5);
+  Integer given(start = 0);
+  output Real y = c + given;
+equation
+  der(c) = -0.7*c;
+  when sample(0.3, 0.5) then
+    reinit(c, pre(c) + pre(dose));
+    given = pre(given) + 1;
+  end when;
+  when time >= 1.1 then
+    dose = 0.1;
+  end when;
+end Dosed;
+""",
+        ["c", "dose", "given"],
+        3.0,
+    ),
+    "nothing": (
+        """
+model Nothing
+  Real x(start = 1);
+  Real low(start = 2);
+  output Real y = x;
+equation
+  der(x) = -x;
+  when initial() then
+    low = 3;
+  end when;
+end Nothing;
+""",
+        ["x", "low"],
+        1.0,
+    ),
+}
+"""Plants whose state jumps: where it leads itself, by an input beside, by the clock alone, at the start alone."""
+
+
+@pytest.mark.parametrize(("name", "version"), [(name, version) for name in EVENTS for version in (2, 3)])
+def test_a_plant_jumps_as_simulate_has_it(command: Path, tmp_path: Path, name: str, version: int) -> None:
+    text, columns, end = EVENTS[name]
+    (tmp_path / "m.mo").write_text(text)
+    rows = 40
+    step = end / rows
+    study = f'plant = "m.mo"\n[simulate]\nuntil = {end}\noutput_step = {step}\nrtol = 1e-11\n'
+    (tmp_path / "s.toml").write_text(study)
+    run(command, tmp_path, "simulate", "s.toml", "-q", "-o", "run.csv")
+    expected = table(tmp_path / "run.csv")
+    file = export(
+        command, tmp_path, Path("s.toml"), "--system", "plant", "--fmi", str(version), "--step", str(step / 50)
+    )
+    told = fmpy.read_model_description(str(file))
+    jumping = name in ("ball", "thermostat")
+    assert (told.numberOfEventIndicators > 0) == jumping
+    for kind in ("CoSimulation", "ModelExchange"):
+        result = fmpy.simulate_fmu(
+            str(file),
+            fmi_type=kind,
+            stop_time=end,
+            output_interval=step,
+            output=columns,
+            relative_tolerance=1e-10,
+        )
+        for column in columns:
+            # of several rows of one time the first is before the event
+            found = [result[column][np.abs(result["time"] - t) < 1e-9][0] for t in expected["t"]]
+            # what jumps within rounding of a row may be on either side there
+            wrong = np.abs(found - expected[column]) > 1e-6 * np.max(np.abs(expected[column]))
+            assert not wrong[1:].any(), (kind, column, found, expected[column])
+
+
+def test_events_without_end_end_the_run(command: Path, tmp_path: Path) -> None:
+    """The bounces accumulate at 4.06 s. In model exchange the importer looks for them."""
+    (tmp_path / "m.mo").write_text(EVENTS["ball"][0])
+    file = export(command, tmp_path, Path("m.mo"), "--step", "0.01")
+    with pytest.raises(fmpy.fmi1.FMICallException, match="fmi3DoStep failed with status 3"):
+        fmpy.simulate_fmu(str(file), fmi_type="CoSimulation", stop_time=6.0, output_interval=0.1)
+    result = fmpy.simulate_fmu(str(file), fmi_type="CoSimulation", stop_time=4.0, output_interval=0.1)
+    assert result["time"][-1] > 3.9

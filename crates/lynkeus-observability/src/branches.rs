@@ -1,5 +1,5 @@
-//! Branch by branch: `if`, `abs`, `min`, `max`, `sign` and `floor` choose, and a rank at one point says nothing of another
-//! branch.
+//! Branch by branch: `if`, `abs`, `min`, `max`, `sign`, `floor`, √x² and asin∘sin choose, and a rank at one point says
+//! nothing of another branch.
 //!
 //! Branches are found at points spread over the box, at the model's own time and at others where choices read it, and
 //! each is analysed. What the outputs tell in one and not in another is known on a part of the box, or at some times. What they tell
@@ -132,7 +132,10 @@ impl Choices {
             Op::Binary(Binary::Less | Binary::LessEq | Binary::Equal, a, b) => {
                 (node, graph.binary(Binary::Sub, a, b))
             }
-            _ => return,
+            _ => match folded(graph, node) {
+                Some(Folded { guard, .. }) => (graph.unary(Unary::Sign, guard), guard),
+                None => return,
+            },
         };
         if graph.symbols_of(&[guard]).is_empty() {
             return;
@@ -206,6 +209,27 @@ impl Choices {
         }
         !choices.is_empty()
     }
+}
+
+/// What is `of`, up to a sign that changes with its guard's and to a shift.
+pub(crate) struct Folded {
+    pub of: Node,
+    pub guard: Node,
+}
+
+/// √z², and the inverse of sine or cosine of itself.
+pub(crate) fn folded(graph: &Graph, node: Node) -> Option<Folded> {
+    let Op::Unary(outer, argument) = graph.op(node) else {
+        return None;
+    };
+    let (of, guard) = match (outer, graph.op(argument)) {
+        (Unary::Sqrt, Op::Powi(z, 2)) => (z, z),
+        (Unary::Sqrt, Op::Binary(Binary::Mul, z, other)) if z == other => (z, z),
+        (Unary::Asin, Op::Unary(Unary::Sin, z)) => (z, graph.unary(Unary::Cos, z)),
+        (Unary::Acos, Op::Unary(Unary::Cos, z)) => (z, graph.unary(Unary::Sin, z)),
+        _ => return None,
+    };
+    Some(Folded { of, guard })
 }
 
 /// The values of the marks at points.

@@ -2,7 +2,8 @@
 //!
 //! What is hidden within each branch may show all the same: one branch tells p + q and another p − q. What nobody
 //! could tell who sees every choice, can switch it as he likes and measures the guards as well is hidden for certain.
-//! So each choice becomes a known signal c: `if` is c·a + (1 − c)·b, |a| is (1 − 2c)·a, a step is c itself. The
+//! So each choice becomes a known signal c: `if` is c·a + (1 − c)·b, |a| is (1 − 2c)·a, a step is c itself, and so is the
+//! shift of asin∘sin. The
 //! outputs' series with generic signals see exactly the span of all d(L_f L_g … h) with branches f, g, … in any order (Wang
 //! and Sontag, *Orders of input/output differential equations and state-space dimensions*, SIAM J. Control Optim. 33
 //! (1995)): what that leaves is a set of directions that every branch carries on, those that were never looked at
@@ -13,7 +14,7 @@ use std::collections::HashMap;
 use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
 use lynkeus_model::{Home, Plant, Variable};
 
-use crate::branches::{Choices, Reference, value};
+use crate::branches::{Choices, Folded, Reference, folded, value};
 
 /// A plant whose choices are inputs, and what is measured of it.
 pub(crate) struct Switched {
@@ -138,7 +139,18 @@ impl Signals {
             }
             Op::Binary(Binary::Equal, ..) => self.of(graph, node),
             Op::Select(c, a, b) => mixed(self.condition(graph, c, images), a, b),
-            _ => return None,
+            _ => {
+                let Folded { of, guard } = folded(graph, node)?;
+                let sign = sign(guard);
+                match graph.op(node) {
+                    Op::Unary(Unary::Sqrt, _) => (sign * image(of)).node(),
+                    _ => {
+                        let side = graph.expr(graph.unary(Unary::Sign, guard));
+                        let shift = (graph.expr(node) - side * graph.expr(of)).node();
+                        (sign * image(of) + graph.expr(self.of(graph, shift))).node()
+                    }
+                }
+            }
         })
     }
 

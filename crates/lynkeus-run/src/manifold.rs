@@ -135,6 +135,60 @@ impl Manifold {
         }
     }
 
+    /// Deviations that are told in the plane that touches at one place, told in that which touches at another, to first
+    /// order about that: with c the vector of the rotation between them θ becomes J(c)θ, J the right Jacobian.
+    pub(crate) fn recharted(&self, from: &[f64], to: &[f64], matrix: &mut [f64], width: usize) {
+        for place in &self.rotations {
+            let (q, p) = (rotation(from, *place), rotation(to, *place));
+            let way = logarithm(times(conjugate(q), p));
+            columns(matrix, *place, width, |column| {
+                tangent(p, right_jacobian(way, vector(q, column)))
+            });
+        }
+    }
+
+    /// The same of a place: the x = from + δ in the plane at `from` becomes the to + J(c)(δ − c) in that at `to`.
+    pub(crate) fn recentred(&self, from: &[f64], to: &[f64], x: &mut [f64]) {
+        for place in &self.rotations {
+            let (q, p) = (rotation(from, *place), rotation(to, *place));
+            let way = logarithm(times(conjugate(q), p));
+            let told = rotation(x, *place);
+            let δ = vector(q, std::array::from_fn(|i| told[i] - q[i]));
+            let δ = right_jacobian(way, std::array::from_fn(|i| δ[i] - way[i]));
+            let δ = tangent(p, δ);
+            for (i, x) in x[*place..place + 4].iter_mut().enumerate() {
+                *x = p[i] + δ[i];
+            }
+        }
+    }
+
+    /// The rows of a matrix that belong to a quaternion carried to another place, their axes those of the world: what
+    /// turns q before it turns q⊗p.
+    pub(crate) fn transport_in_world(
+        &self,
+        from: &[f64],
+        to: &[f64],
+        matrix: &mut [f64],
+        width: usize,
+    ) {
+        for place in &self.rotations {
+            let way = times(conjugate(rotation(from, *place)), rotation(to, *place));
+            columns(matrix, *place, width, |column| times(column, way));
+        }
+    }
+
+    /// The rows of a matrix that belong to a quaternion, tangent at x, as those of the vector of a rotation: three of
+    /// them, after one of zeros.
+    pub(crate) fn as_vectors(&self, x: &[f64], matrix: &mut [f64], width: usize) {
+        for place in &self.rotations {
+            let q = rotation(x, *place);
+            columns(matrix, *place, width, |column| {
+                let [x, y, z] = vector(q, column);
+                [0.0, x, y, z]
+            });
+        }
+    }
+
     /// The same rows carried from where they are tangent to another place.
     pub(crate) fn transport(&self, from: &[f64], to: &[f64], matrix: &mut [f64], width: usize) {
         for place in &self.rotations {
@@ -180,6 +234,50 @@ fn times([a, b, c, d]: [f64; 4], [w, x, y, z]: [f64; 4]) -> [f64; 4] {
         a * y - b * z + c * w + d * x,
         a * z + b * y - c * x + d * w,
     ]
+}
+
+/// The vector of the rotation about the body's axes that a step from q is, where that is tangent.
+fn vector(q: [f64; 4], step: [f64; 4]) -> [f64; 3] {
+    let [_, x, y, z] = times(conjugate(q), step);
+    [2.0 * x, 2.0 * y, 2.0 * z]
+}
+
+/// The step from q that such a vector is.
+fn tangent(q: [f64; 4], [x, y, z]: [f64; 3]) -> [f64; 4] {
+    times(q, [0.0, 0.5 * x, 0.5 * y, 0.5 * z])
+}
+
+/// The vector of a rotation, of at most half a turn.
+fn logarithm([w, x, y, z]: [f64; 4]) -> [f64; 3] {
+    let sine = (x * x + y * y + z * z).sqrt();
+    let share = match sine > 0.0 {
+        true => 2.0 * sine.atan2(w.abs()) / sine,
+        false => 2.0,
+    };
+    // of the two that are one rotation the nearer to none
+    let share = if w < 0.0 { -share } else { share };
+    [x, y, z].map(|x| share * x)
+}
+
+/// J(c)v with exp(c + ε) = exp(c)·exp(J(c)ε) to first order (J. Solà, J. Deray, D. Atchuthan, *A micro Lie theory for
+/// state estimation in robotics*, 2018, equation 143).
+fn right_jacobian(c: [f64; 3], v: [f64; 3]) -> [f64; 3] {
+    let square = c.iter().map(|x| x * x).sum::<f64>();
+    let angle = square.sqrt();
+    let (once, twice) = match angle > 1e-3 {
+        true => (
+            (1.0 - angle.cos()) / square,
+            (angle - angle.sin()) / (square * angle),
+        ),
+        false => (0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0),
+    };
+    let across = cross(c, v);
+    let again = cross(c, across);
+    std::array::from_fn(|i| v[i] - once * across[i] + twice * again[i])
+}
+
+fn cross([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    [b * z - c * y, c * x - a * z, a * y - b * x]
 }
 
 /// From q along the sphere, by a step that is tangent there.
@@ -234,6 +332,51 @@ mod tests {
         assert!((angle_between(q, turned) - 0.2).abs() < 1e-15);
         assert!((angle_between(q, turned.map(|x| -3.0 * x)) - 0.2).abs() < 1e-15);
         assert!((angle_between(q, [-root, 0.0, 0.0, root]) - PI).abs() < 1e-15);
+    }
+
+    /// The derivative of exp(−c)·exp(c + εv) by differences, for ways short and long; and what is told elsewhere leads to
+    /// the same place.
+    #[test]
+    fn what_is_told_elsewhere_follows_the_right_jacobian() {
+        let unit = [1.0, 0.0, 0.0, 0.0];
+        for size in [0.0, 1e-5, 9e-4, 1.1e-3, 0.4, 2.5] {
+            let c = [0.48, -0.6, 0.64].map(|x| size * x);
+            let v = [0.3, 0.5, -0.2];
+            let h = 1e-5;
+            let there = |h: f64| turned(unit, std::array::from_fn(|i| c[i] + h * v[i]));
+            let way = |h: f64| logarithm(times(conjugate(there(0.0)), there(h)));
+            let (more, less) = (way(h), way(-h));
+            let own = right_jacobian(c, v);
+            for i in 0..3 {
+                let found = (more[i] - less[i]) / (2.0 * h);
+                assert!((own[i] - found).abs() < 1e-9, "{size}: {own:?} {found}");
+            }
+        }
+        let from = [&[9.0][..], &turned(unit, [0.3, -1.0, 0.2])].concat();
+        let near = turned(rotation(&from, 1), [0.5, 0.2, -0.9]);
+        let to = [&[9.0][..], &near].concat();
+        // a place near the new one is itself, whatever plane it is told in
+        let place = turned(near, [1e-5, -2e-5, 3e-5]);
+        let mut told = [&[7.0][..], &place.map(|x| -x)].concat();
+        one().flatten(&from, &mut told);
+        one().recentred(&from, &to, &mut told);
+        one().retract(&to, &mut told);
+        assert!(angle_between(rotation(&told, 1), place) < 1e-9 && told[0] == 7.0);
+    }
+
+    /// By hand: from the unit quaternion to a quarter of a turn about z the world's x is the body's −y.
+    #[test]
+    fn what_is_fixed_in_the_world_turns_in_the_body() {
+        let root = 0.5_f64.sqrt();
+        let (from, to) = ([0.0, 1.0, 0.0, 0.0, 0.0], [0.0, root, 0.0, 0.0, root]);
+        let mut column = [4.0, 0.0, 0.5, 0.0, 0.0];
+        one().transport_in_world(&from, &to, &mut column, 1);
+        one().as_vectors(&to, &mut column, 1);
+        let off = column.iter().zip([4.0, 0.0, 0.0, -1.0, 0.0]);
+        assert!(
+            off.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-15,
+            "{column:?}"
+        );
     }
 
     /// ⊞ undoes ⊟, for steps of up to half a turn and whichever of the two quaternions stands for the rotation; what

@@ -36,6 +36,7 @@ pub(crate) use json::FitReport;
 use known::Exact;
 use lynkeus_experiment::crew::{Watch, every};
 use lynkeus_experiment::prepare::{self, Prepared};
+use lynkeus_experiment::{Doubt, DoubtLevel};
 use posed::Posed;
 use problem::{Point, Problem, Steps, Term};
 use search::{Found, search};
@@ -82,6 +83,8 @@ pub struct Fit {
     /// where that is asked
     pub(crate) ahead: Option<Ahead>,
     pub(crate) errors: Vec<Errors>,
+    /// what the readings say against the values
+    pub doubts: Vec<Doubt>,
     /// what speaks against the values
     pub warnings: Vec<String>,
     /// what the user should know
@@ -278,7 +281,10 @@ impl Work<'_> {
             )));
         }
         let values = self.problem.values(&end.point.z);
-        let (errors, _) = errors::errors(&mut self.problem, None, &self.outputs, &values)?;
+        let (errors, rows) = errors::errors(&mut self.problem, None, &self.outputs, &values)?;
+        if let Some(doubt) = rows.doubts(self.problem.logs).first() {
+            return Ok(Some(format!("the first search ended where {}", doubt.text)));
+        }
         let coloured = errors.iter().find(|own| own.are_coloured());
         Ok(coloured.map(|own| {
             format!(
@@ -548,6 +554,13 @@ impl Work<'_> {
         let (errors, rows) =
             errors::errors(&mut self.problem, alone.as_mut(), &self.outputs, &values)?;
         self.warn_of_certain(&rows);
+        // of other values than those that were looked for nobody needs to be told
+        let doubts = match found.is_converged {
+            true => rows.doubts(self.problem.logs),
+            false => vec![],
+        };
+        let warned = doubts.iter().filter(|d| d.level < DoubtLevel::Refusal);
+        self.warnings.extend(warned.map(|d| d.text.clone()));
         let coloured = errors.iter().filter(|own| own.are_coloured());
         let coloured: Vec<&str> = coloured.map(|own| own.output.as_str()).collect();
         if !coloured.is_empty() && !is_ended {
@@ -578,6 +591,7 @@ impl Work<'_> {
             exact: self.exact,
             ahead,
             errors,
+            doubts,
             warnings: self.warnings,
             notes: self.notes,
             rows,

@@ -171,7 +171,12 @@ fn from_far_off_no_filter_is_worse_than_one_by_hand() {
             [rms(angles), rms(&angles[angles.len() / 2..])]
         };
         let study = folder.read("s.toml");
-        for family in ["\"ekf\"\niterations = 1", "\"ekf\"", "\"ukf\"\nalpha = 0.2"] {
+        for family in [
+            "\"ekf\"\niterations = 1",
+            "\"ekf\"",
+            "\"ukf\"\nalpha = 0.2",
+            "\"mhe\"\nhorizon = 3",
+        ] {
             folder.write("s.toml", &study.replace("\"ekf\"", family));
             let run = folder.run(&["estimate", "s.toml", "log.csv", "-q", "-o", "out.csv"]);
             assert_eq!(run.code, 0, "{}", run.err);

@@ -1,5 +1,7 @@
 //! Plants whose state jumps: `when` clauses, from the study to the answer.
 
+mod suites;
+
 use crate::{Ended, Folder};
 
 const BALL: &str = "model Ball
@@ -292,8 +294,15 @@ fn refused(folder: &Folder, arguments: &[&str], told: &str) {
 fn what_does_not_follow_events_says_so_with_the_line() {
     let line = "the state of 'Ball' jumps at events (`when` of line 9)";
     let folder = ball("");
-    let plant = ["export", "study.toml", "--system", "plant", "--to", "fmu"];
-    refused(&folder, &[&plant[..], &["-o", "out.fmu"]].concat(), line);
+    let observer = [
+        "export",
+        "study.toml",
+        "--system",
+        "observer",
+        "--to",
+        "fmu",
+    ];
+    refused(&folder, &[&observer[..], &["-o", "out"]].concat(), line);
     folder.change("study.toml", "\"ekf\"", "\"mhe\"");
     let told = format!("family = \"mhe\": {line}");
     refused(&folder, &["estimate", "study.toml", "log.csv"], &told);

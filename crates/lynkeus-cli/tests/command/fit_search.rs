@@ -205,3 +205,67 @@ fn a_profile_does_not_stay_where_a_noise_is_nothing() {
         assert!((rise - 1.92).abs() < 0.02, "{edge}: {rise}");
     }
 }
+
+/// Values of a model that does not hold: a decay, fitted to one that swings ten deviations of the noise about it.
+#[test]
+fn values_that_the_readings_contradict_are_not_credible() {
+    let folder = Folder::empty();
+    folder.write(
+        "m.mo",
+        "model Decay
+  parameter Real k = 0.4;
+  Real x(start = 1, fixed = true);
+  output Real y = x;
+equation
+  der(x) = -k*x;
+end Decay;
+",
+    );
+    let study = "plant = \"m.mo\"\n[parameters]\nk = 0.4\n[sensors]\nnoise = { y = 0.01 }\n[observer]\nfamily = \"ekf\"\ninitial_variance = { x = 1e-4 }\n[fit]\nparameters = [\"k\"]\n";
+    folder.write("s.toml", study);
+    let log = |swing: f64| {
+        let rows = (0..100).map(|i| {
+            let t = 0.1 * f64::from(i);
+            let noise = 0.01 * (1.7 * f64::from(i * i)).sin();
+            format!(
+                "{t},{}\n",
+                (-0.5 * t).exp() + swing * (2.0 * t).sin() + noise
+            )
+        });
+        format!("t,y\n{}", rows.collect::<String>())
+    };
+    folder.write("log.csv", &log(0.1));
+    let arguments = ["fit", "s.toml", "log.csv", "--json", "--write"];
+    let run = folder.run(&arguments);
+    assert_eq!(run.code, 1, "{}\n{}", run.out, run.err);
+    let told = run.json();
+    assert_eq!(
+        (&told["converged"], &told["credible"]),
+        (&true.into(), &false.into())
+    );
+    assert!(
+        told["doubts"][0]["text"].as_str().unwrap().contains("of y"),
+        "{told}"
+    );
+    assert!(
+        run.err
+            .contains("the values are not credible: the innovations of y"),
+        "{}",
+        run.err
+    );
+    assert_eq!(folder.read("s.toml"), study);
+    let said = folder.run(&arguments[..3]).out;
+    assert!(
+        said.lines()
+            .next()
+            .unwrap()
+            .contains("not credible: the innovations of y"),
+        "{said}"
+    );
+    // without the swing they are
+    folder.write("log.csv", &log(0.0));
+    let run = folder.run(&arguments);
+    assert_eq!(run.code, 0, "{}\n{}", run.out, run.err);
+    assert_eq!(run.json()["credible"], true);
+    assert_ne!(folder.read("s.toml"), study);
+}

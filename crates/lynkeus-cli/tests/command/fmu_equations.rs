@@ -190,7 +190,9 @@ fn parameters_of_the_equations_can_be_set() {
     );
     let (description, notes) = export(&folder, "bent.mo", "vat_plant", &["--step", "0.1"]);
     assert!(
-        notes.contains("parameters are numbers: what happens at times has to be known"),
+        notes.contains(
+            "parameters are numbers: what happens at times and at events has to be known"
+        ),
         "{notes}"
     );
     assert!(!description.contains("causality=\"parameter\""));

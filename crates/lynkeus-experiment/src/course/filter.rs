@@ -183,7 +183,6 @@ pub(crate) fn blueprint(
     };
     refuse_longer_lag(study, &tuning.kind)?;
     refuse_smoothed_bounds(study, tuning)?;
-    refuse_rotations(prepared, &tuning.kind)?;
     particles::refuse(study, &tuning.kind)?;
     let model = model(prepared, design, tuning, samples, notes)?;
     let kept = FilterSettings {
@@ -234,21 +233,6 @@ fn refuse_smoothed_bounds(study: &Study, tuning: &FilterTuning) -> Result<(), Er
     Err(Error::input(message).at(&study.file).hint(
         "take family = \"mhe\", whose smoother keeps to the ranges, or leave one of the keys out",
     ))
-}
-
-/// The steps of a window are sums.
-fn refuse_rotations(prepared: &Prepared<'_>, kind: &FilterKind) -> Result<(), Error> {
-    let states = &prepared.augmented().states;
-    let (Some((_, name)), FilterKind::MovingHorizon(_)) = (manifold::firsts(states).next(), kind)
-    else {
-        return Ok(());
-    };
-    let message = format!(
-        "family = \"mhe\" does not take the quaternion {name}: its steps are sums, and those of rotations are none"
-    );
-    Err(Error::input(message)
-        .at(&prepared.study().file)
-        .hint("take family = \"ekf\" or \"ukf\""))
 }
 
 /// A window has no row older than its horizon.

@@ -28,6 +28,7 @@ pub(crate) use innovations::{InnovationCounts, innovations};
 pub(crate) use ranges::{RUN_AWAY, Screen};
 pub(crate) use residuals::residuals;
 pub(crate) use sensors::Judged;
+pub use sensors::contradicted;
 
 use crate::Error;
 use crate::course::doubt::{Doubt, Kind, Level};

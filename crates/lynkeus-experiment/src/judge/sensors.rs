@@ -1,7 +1,7 @@
 //! Readings beside what was expected of them.
 
 use lynkeus_run::credible::{By, CLIP, ENOUGH, FEW};
-use lynkeus_run::filter::SensorHealth;
+use lynkeus_run::filter::{Reading, SensorHealth};
 
 use super::quantile::{largest_sum, smallest_sum};
 use crate::course::doubt::{Doubt, Kind, Level, times};
@@ -73,6 +73,22 @@ fn doubt(sensor: &Judged<'_>, kind: Kind, level: Level, text: String) -> Option<
         name: sensor.name.to_owned(),
         text,
         level,
+    })
+}
+
+/// What the readings of an output say against what was expected of them, as along a filter: their times with their
+/// innovations in deviations.
+pub fn contradicted(name: &str, readings: impl IntoIterator<Item = (f64, f64)>) -> Option<Doubt> {
+    let mut trace = Trace::default();
+    for (t, z) in readings {
+        trace.take(t, Reading::Taken, z);
+    }
+    contradiction(&Judged {
+        name,
+        trace: &trace,
+        late: None,
+        by: By::Filter,
+        is_declared: true,
     })
 }
 

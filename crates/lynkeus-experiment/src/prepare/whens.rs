@@ -31,6 +31,6 @@ fn refused(study: &Study, plant: &Plant, line: usize, what: &str) -> Error {
     let message = format!(
         "{what}: the state of '{model}' jumps at events (`when` of line {line}), which this does not follow"
     );
-    let hint = "`simulate`, and `estimate` and `export` with family = \"ekf\" or \"ukf\", follow them, smoothers too, and so does `fit`; `estimate` with \"particle\" as well";
+    let hint = "`simulate`, and `estimate` and `export` with family = \"ekf\" or \"ukf\", follow them, smoothers too, and so do `fit` and `export --system plant`; `estimate` with \"particle\" as well";
     Error::refused(message).at(&study.file).hint(hint)
 }

@@ -95,6 +95,8 @@ pub(super) enum Role {
     Derivative {
         of: usize,
     },
+    /// passes zero where a state may jump
+    Indicator,
 }
 
 /// What every `modelDescription.xml` has.
@@ -109,6 +111,8 @@ pub(super) struct Description<'a> {
     pub categories: &'a [&'static str],
     /// in the order of their value references
     pub variables: &'a [Variable<'a>],
+    /// how many of these are event indicators
+    pub indicators: usize,
     /// the elements of the interfaces that are offered
     pub interface: String,
     /// what `ModelStructure` holds
@@ -126,6 +130,10 @@ impl Description<'_> {
             Version::Two => ("2.0", "guid"),
             Version::Three => ("3.0", "instantiationToken"),
         };
+        let indicators = match (version, self.indicators) {
+            (Version::Two, count) if count > 0 => format!(" numberOfEventIndicators=\"{count}\""),
+            _ => String::new(),
+        };
         let experiment = self.experiment.map(experiment).unwrap_or_default();
         let categories = self.categories.iter();
         let categories: String = categories
@@ -140,7 +148,7 @@ impl Description<'_> {
         format!(
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
              <fmiModelDescription fmiVersion=\"{edition}\" modelName=\"{}\" {token_name}=\"{token}\" \
-             description=\"{}\" generationTool=\"lynkeus {}\" variableNamingConvention=\"flat\">\n\
+             description=\"{}\" generationTool=\"lynkeus {}\" variableNamingConvention=\"flat\"{indicators}>\n\
              {}{units}  <LogCategories>\n{categories}  </LogCategories>\n{experiment}\
              \x20 <ModelVariables>\n{written}  </ModelVariables>\n\
              \x20 <ModelStructure>\n{}  </ModelStructure>\n\
@@ -201,13 +209,13 @@ impl Variable<'_> {
             Role::Signal | Role::Input => "input",
             Role::Estimate | Role::State { is_output: true } => "output",
             Role::Start | Role::Tunable => "parameter",
-            Role::State { is_output: false } | Role::Derivative { .. } => "local",
+            Role::State { is_output: false } | Role::Derivative { .. } | Role::Indicator => "local",
         }
     }
 
     fn variability(&self) -> &'static str {
         match self.role {
-            Role::Time | Role::Estimate => "continuous",
+            Role::Time | Role::Estimate | Role::Indicator => "continuous",
             Role::Input | Role::State { .. } | Role::Derivative { .. } => "continuous",
             // a sample, which nobody should draw lines between
             Role::Signal => "discrete",
@@ -240,7 +248,9 @@ impl Variable<'_> {
             Role::Signal | Role::Start | Role::Tunable | Role::Input | Role::State { .. } => {
                 format!(" start=\"{}\"", number(self.quantity.start))
             }
-            Role::Time | Role::Estimate | Role::Derivative { .. } => String::new(),
+            Role::Time | Role::Estimate | Role::Derivative { .. } | Role::Indicator => {
+                String::new()
+            }
         }
     }
 

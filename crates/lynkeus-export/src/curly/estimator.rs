@@ -136,7 +136,7 @@ impl Machine {
         let field = match errors {
             None => {
                 self.flow(system, &arguments)?;
-                self.integrate(n);
+                self.integrate(system);
                 "flow"
             }
             Some(errors) => {

@@ -103,7 +103,9 @@ impl Machine {
             let initial = timers().map(|timer| usize::from(timer.is_initial));
             self.tables += &places("timer_is_initial", initial);
             self.tables += &times("timer_firsts", timers().map(|timer| timer.first));
-            self.tables += &times("timer_steps", timers().map(|timer| timer.step));
+            // that of the start has no next one
+            let steps = timers().map(|timer| if timer.is_initial { 0.0 } else { timer.step });
+            self.tables += &times("timer_steps", steps);
             self.tables += &times("timer_scales", timers().map(|timer| timer.scale));
         }
     }

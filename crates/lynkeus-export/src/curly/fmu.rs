@@ -206,6 +206,7 @@ fn description(component: &Component<'_>, version: Version, token: &str) -> Stri
         experiment: component.experiment,
         categories: &["logStatusError"],
         variables: &variables,
+        indicators: 0,
         interface: interface(component, version),
         structure: structure(&variables, version),
     }

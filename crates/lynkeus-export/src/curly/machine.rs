@@ -5,7 +5,7 @@ use lynkeus_expr::Node;
 use lynkeus_run::{Expressions, Level, Linearised, Method, Step, System};
 
 use super::draft::{Arguments, Target, draft, places, table};
-use super::pass::{INTEGRATE, integrated, remembering};
+use super::pass::{integrated, integrated_alone, remembering};
 use super::syntax::Type;
 use super::template::{chosen, exchanged, mentions, parts};
 use crate::code::Solver;
@@ -72,10 +72,10 @@ impl Machine {
     }
 
     /// The classical Runge-Kutta method for x' that [`Machine::flow`] writes.
-    pub fn integrate(&mut self, dimension: usize) {
-        self.size("DIMENSION", dimension);
+    pub fn integrate(&mut self, flow: &System) {
+        self.size("DIMENSION", flow.states().len());
         self.add(FIELD);
-        self.add(INTEGRATE);
+        self.add(&integrated_alone(flow));
     }
 
     pub fn size(&mut self, name: impl Into<String>, value: usize) {

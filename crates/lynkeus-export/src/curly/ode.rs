@@ -12,20 +12,23 @@ use super::device::Entry;
 use super::draft::{Arguments, Target, draft};
 use super::fmu::{EXCHANGE, archive, reasons};
 use super::machine::{Machine, code, refuse_jumps};
-use super::template::exchanged;
+use super::pass::{holds, remembering};
+use super::template::{chosen, exchanged};
 use crate::code::Solver;
 use crate::{Code, Refusal};
 
 const ADVANCE: &str = include_str!("runtime/ode.c");
 const INTERFACE: &str = include_str!("runtime/ode_interface.c");
+const OWN_EVENTS: &str = include_str!("runtime/ode_events.c");
 
-/// What `advance` can say, from 1 on.
-pub(super) const CODES: [(&str, &str); 2] = [
+/// What `advance` can say, from 1 on; the last of what jumps at events.
+const CODES: [(&str, &str); 3] = [
     (
         "INTERVAL",
         "time runs backward, or the interval takes more than a million steps",
     ),
     ("NOT_FINITE", "the equations have no value there"),
+    ("EVENTS", "events follow each other without end"),
 ];
 
 /// A system with what is said of its variables.
@@ -47,8 +50,25 @@ pub struct Ode<'a> {
     pub states: &'a [State],
     /// the outputs, in the order of the system; states that are outputs are not among them
     pub outputs: &'a [Quantity],
+    /// what passes zero where a state may jump, in the order of the system's relations
+    pub indicators: &'a [Quantity],
     /// lines for people
     pub about: &'a [String],
+}
+
+impl Ode<'_> {
+    /// Facts that pieces of the runtime ask for.
+    fn holds(&self) -> Vec<&'static str> {
+        let mut facts = holds(self.system);
+        facts.extend(self.system.has_clauses().then_some("events"));
+        facts
+    }
+
+    /// What `advance` can say.
+    fn codes(&self) -> impl Iterator<Item = (usize, (&'static str, &'static str))> {
+        let count = CODES.len() - usize::from(!self.system.has_clauses());
+        (1..).zip(CODES).take(count)
+    }
 }
 
 /// A state.
@@ -110,10 +130,15 @@ pub(super) fn sources(ode: &Ode<'_>) -> Result<Sources, Refusal> {
         &[dx, y],
     )?);
     machine.steps(ode.method)?;
-    machine.integrate(n);
-    machine.add(ADVANCE);
+    machine.events(system, &arguments, ode.method)?;
+    machine.integrate(system);
+    let holds = ode.holds();
+    machine.add(&remembering(&chosen(ADVANCE, &holds), system.has_clauses()));
+    if system.has_clauses() {
+        machine.add(&chosen(OWN_EVENTS, &holds));
+    }
     Ok(Sources {
-        files: [header(ode, &arguments), source(ode, &machine)],
+        files: [header(ode, &arguments, &machine), source(ode, &machine)],
         dependencies: all.dependencies(),
     })
 }
@@ -140,14 +165,41 @@ fn entry(quantity: &Quantity) -> Entry {
     }
 }
 
-fn header(ode: &Ode<'_>, arguments: &Arguments) -> File {
+impl Ode<'_> {
+    /// What a header says of events.
+    fn events(&self, machine: &Machine) -> String {
+        if !self.system.has_clauses() {
+            return String::new();
+        }
+        let name = prefix(self.name);
+        let capitals = name.to_ascii_uppercase();
+        let size = |word: &str| {
+            let mut sizes = machine.sizes.iter();
+            sizes.find(|(own, _)| own == word).map_or(0, |own| own.1)
+        };
+        format!(
+            "/* What is remembered of events: m, and of each relation its side. */\n\
+             #define {capitals}_MEMORY {}\n#define {capitals}_RELATIONS {}\n\
+             void {name}_begin(double *m, double *sides);\n\n\
+             /* What is due at t takes effect; 0, or one of the codes above. */\n\
+             int {name}_event(double t, const double *u, double *x, double *m, double *sides);\n\n\
+             /* What passes zero, and a little beyond, where a relation changes; sizes are those of the states. */\n\
+             void {name}_indicators(double t, const double *x, const double *u, const double *sizes, const double *sides, double *z);\n\n\
+             /* The next instant at which the clock has an event: 1 where there is one. */\n\
+             int {name}_next_instant(const double *m, double *next);\n\n",
+            size("MEMORY"),
+            size("RELATIONS"),
+        )
+    }
+}
+
+fn header(ode: &Ode<'_>, arguments: &Arguments, machine: &Machine) -> File {
     let name = prefix(ode.name);
     let capitals = name.to_ascii_uppercase();
     let outputs: Vec<Entry> = ode.outputs.iter().map(entry).collect();
-    let codes = CODES
-        .iter()
-        .enumerate()
-        .map(|(k, (code, about))| format!("#define {capitals}_{code} {} /* {about} */\n", k + 1));
+    let codes = ode.codes();
+    let codes =
+        codes.map(|(k, (code, about))| format!("#define {capitals}_{code} {k} /* {about} */\n"));
     let text = format!(
         "{title}#ifndef {capitals}_H\n#define {capitals}_H\n\n\
          #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
@@ -163,7 +215,7 @@ fn header(ode: &Ode<'_>, arguments: &Arguments) -> File {
          /* How x' and y change along the direction v: of time, the states, the inputs. */\n\
          void {name}_along(double t, const double *x, const double *u, const double *v, double *dx, double *y);\n\n\
          /* From one time to another while the inputs stay; 0, or one of the codes above. */\n\
-         int {name}_advance(double from, double to, const double *u, double *x);\n\n\
+         int {name}_advance(double from, double to, const double *u, double *x{memory});\n\n{events}\
          #ifdef __cplusplus\n}}\n#endif\n\n#endif\n",
         title = title(&format!("{name}.h"), ode.about),
         states = listed(&arguments.x),
@@ -175,6 +227,12 @@ fn header(ode: &Ode<'_>, arguments: &Arguments) -> File {
         m = ode.inputs.len(),
         p = ode.outputs.len(),
         codes = codes.collect::<String>(),
+        memory = if ode.system.has_clauses() {
+            ", double *m"
+        } else {
+            ""
+        },
+        events = ode.events(machine),
     );
     File {
         name: format!("{name}.h"),
@@ -186,12 +244,13 @@ fn source(ode: &Ode<'_>, machine: &Machine) -> File {
     let name = prefix(ode.name);
     let capitals = name.to_ascii_uppercase();
     let draft = exchanged(&machine.text(), |word| {
-        let is_code = CODES.iter().any(|(code, _)| *code == word);
+        let is_code = ode.codes().any(|(_, (code, _))| code == word);
         is_code.then(|| format!("{capitals}_{word}"))
     });
     let starts = ode.states.iter().enumerate();
     let starts = starts.map(|(i, s)| format!("    x[{i}] = {:?};\n", s.quantity.start));
-    let interface = INTERFACE
+    let interface = chosen(INTERFACE, &ode.holds());
+    let interface = remembering(&interface, ode.system.has_clauses())
         .replace("@NAME@", &name)
         .replace("@STARTS@", &starts.collect::<String>());
     let text = format!(
@@ -265,6 +324,7 @@ impl Exchange<'_> {
         }));
         variables.extend(ode.outputs.iter().map(|q| variable(q, Role::Estimate)));
         variables.extend(ode.parameters.iter().map(|q| variable(q, Role::Tunable)));
+        variables.extend(ode.indicators.iter().map(|q| variable(q, Role::Indicator)));
         Description {
             model: ode.name,
             title: ode.title,
@@ -272,6 +332,7 @@ impl Exchange<'_> {
             experiment: self.experiment,
             categories: &["logStatusError", "logStatusDiscard"],
             variables: &variables,
+            indicators: ode.indicators.len(),
             interface: interface(&self.identifier(), version),
             structure: structure.text(version),
         }
@@ -297,11 +358,16 @@ impl Exchange<'_> {
             ("@TOKEN@", token.to_owned()),
             ("@FIRST_GIVEN@", listed(given.collect())),
             ("@NOMINALS@", listed(nominals.collect())),
-            ("@REASONS@", reasons((1..).zip(CODES.map(|code| code.1)))),
+            (
+                "@REASONS@",
+                reasons(ode.codes().map(|(k, (_, about))| (k, about))),
+            ),
         ];
+        let mut holds = ode.holds();
+        holds.push(EXCHANGE);
         let file = version.wrapper();
         format!("/* {file}: {name} as a functional mock-up unit. */\n")
-            + &version.wrapped(CORE, &[EXCHANGE], &places)
+            + &version.wrapped(CORE, &holds, &places)
     }
 }
 
@@ -400,6 +466,16 @@ impl Structure<'_> {
             .collect()
     }
 
+    /// What passes zero where a state may jump.
+    fn indicators(&self) -> String {
+        let first = self.state(2 * self.ode.states.len() + self.ode.outputs.len());
+        let first = first + self.ode.parameters.len();
+        let references = first..first + self.ode.indicators.len();
+        references
+            .map(|reference| format!("    <EventIndicator valueReference=\"{reference}\"/>\n"))
+            .collect()
+    }
+
     /// While it runs, what does not move counts as known; at the start everything that can be set is told.
     fn text(&self, version: Version) -> String {
         let (n, all) = (self.ode.states.len(), self.dependencies.len());
@@ -424,6 +500,7 @@ impl Structure<'_> {
                 computed("Output", n..all, moving),
                 computed("ContinuousStateDerivative", 0..n, moving),
                 computed("InitialUnknown", 0..all, usize::MAX),
+                self.indicators(),
             ]
             .concat(),
         }

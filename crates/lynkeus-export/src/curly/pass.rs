@@ -43,7 +43,15 @@ pub(super) fn integrated(flow: &System, more: &[&'static str]) -> String {
     }
 }
 
-/// How a flow is integrated from a point, x alone.
+/// How a flow is integrated, x alone.
+pub(super) fn integrated_alone(flow: &System) -> String {
+    match flow.has_clauses() {
+        true => chosen(PASS, &holds(flow)),
+        false => INTEGRATE.to_owned(),
+    }
+}
+
+/// How a flow is integrated from a point, x alone, beside what is carried along another one.
 pub(super) fn integrated_point(flow: &System) -> String {
     let text = match flow.has_clauses() {
         true => {

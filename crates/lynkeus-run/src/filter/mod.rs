@@ -170,9 +170,6 @@ impl Filter {
         let n = flow.states().len();
         settings.check(n, model.ranges.len())?;
         let manifold = model.manifold.clone();
-        if settings.is_window() && !manifold.is_straight() {
-            return Err(Error::setting("states", "no quaternion in a window", "one"));
-        }
         if flow.has_clauses() && settings.is_window() {
             let expected = "no window of samples for a plant whose state jumps (`when`)";
             return Err(Error::setting("filter", expected, "one"));
@@ -285,9 +282,11 @@ impl Filter {
         }
     }
 
-    /// Where it is, in case that a sum is none of its states.
+    /// Where it is, in case that a sum is none of its states. A window brings its states to where they are itself.
     fn before(&self) -> Option<Vec<f64>> {
-        (!self.manifold.is_straight()).then(|| self.belief.x.clone())
+        let is_sum =
+            !self.manifold.is_straight() && !matches!(self.engine, Engine::MovingHorizon(_));
+        is_sum.then(|| self.belief.x.clone())
     }
 
     /// What was added to the states since then as their own way, with all that is known about it.
@@ -455,6 +454,7 @@ impl Runner for Filter {
         }
         history.steps.push(Step {
             transition,
+            touched: None,
             belief: self.belief.clone(),
             corrections,
         });

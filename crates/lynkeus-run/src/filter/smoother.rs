@@ -36,6 +36,8 @@ impl Correction {
 pub(crate) struct Step {
     /// Φ from the sample before; none at the first and at repeated times
     pub transition: Option<Profile>,
+    /// where the planes touch in which all of it is told of quaternions, if not at x̂⁺
+    pub touched: Option<Vec<f64>>,
     /// x̂⁺, P⁺
     pub belief: Belief,
     pub corrections: Vec<Correction>,
@@ -73,6 +75,7 @@ impl Step {
         let none = vec![0.0; n];
         Self {
             transition: None,
+            touched: None,
             belief: Belief::new(&none, &none),
             corrections: vec![],
         }
@@ -84,7 +87,7 @@ impl Step {
         let n = x.len();
         let shift = root.covariance_times(&adjoint.vector);
         let mut estimate: Vec<f64> = x.iter().zip(&shift).map(|(x, s)| x - s).collect();
-        manifold.retract(x, &mut estimate);
+        manifold.retract(self.touched.as_ref().unwrap_or(x), &mut estimate);
         // without Λ there is nothing to tell
         let told = if adjoint.matrix.is_empty() { 0 } else { n };
         let deviations = (0..told).map(|i| {
@@ -117,6 +120,10 @@ impl Step {
         self.belief.walk(walk)?;
         let transition = &mut self.transition;
         walk.optional(transition, |walk, transition| transition.walk(walk, n))?;
+        walk.optional(&mut self.touched, |walk, touched| {
+            touched.resize(n, 0.0);
+            walk.numbers(touched)
+        })?;
         let count = walk.length(self.corrections.len())?;
         self.corrections.resize_with(count, Correction::default);
         let mut corrections = self.corrections.iter_mut();

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use lynkeus_expr::{Expr, Graph};
 use lynkeus_run::filter::{
-    FilterKind, FilterSettings, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
+    FilterKind, FilterSettings, Limits, NoisyModel, NoisyPlant, Sensor, SigmaPoints,
 };
 use lynkeus_run::manifold::{angle_between, turned, unit, wrapped};
 use lynkeus_run::{Blueprint, Estimator, EstimatorSettings, Level, Manifold, Method, Step};
@@ -129,6 +129,11 @@ const DENSITIES: [f64; 2] = [1e-4, 1e-6];
 
 /// A body with a gyroscope of unknown offset, which sees two vectors of the world.
 fn body(start: [f64; 4], variances: [f64; 2]) -> NoisyModel {
+    shaken(start, variances, DENSITIES)
+}
+
+/// The same, moved by other noises.
+fn shaken(start: [f64; 4], variances: [f64; 2], densities: [f64; 2]) -> NoisyModel {
     let g = Graph::new();
     let time = g.symbol("time");
     let q = ["q1", "q2", "q3", "q4"].map(|name| g.symbol(name));
@@ -168,7 +173,7 @@ fn body(start: [f64; 4], variances: [f64; 2]) -> NoisyModel {
         .flat_map(|v| rows.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2]));
     let names = q.iter().chain(&b).enumerate();
     let states = names.map(|(i, x)| (format!("x{i}"), x.node(), *start.get(i).unwrap_or(&0.0)));
-    let [of_q, of_b] = DENSITIES;
+    let [of_q, of_b] = densities;
     let model = NoisyModel::new(&NoisyPlant {
         graph: &g,
         time: time.node(),
@@ -475,11 +480,127 @@ fn a_snapshot_goes_on() {
             .restore(&snapshot)
             .is_err()
     );
-    // a window's steps are sums
-    let window = FilterSettings::of(FilterKind::MovingHorizon(5));
-    assert!(
-        Blueprint::filter(model(), window, run())
-            .estimator()
-            .is_err()
-    );
+}
+
+/// As long as its window has all rows, a moving horizon ends where least squares do over all of them: attitudes and
+/// offsets of the newest row, from 120° off, each 0.2 rad moved between two rows (SciPy's `least_squares` in vectors of
+/// rotation; W by C. F. Van Loan's exponential at the minimum itself).
+#[test]
+fn a_window_of_rotations_ends_in_the_minimum() {
+    let rates = [
+        [0.0, 0.18, -0.16],
+        [-0.53, -0.27, -0.59],
+        [0.04, 0.8, -0.3],
+        [-0.37, 0.29, 0.21],
+        [0.06, -0.56, -0.02],
+        [0.42, -0.81, -0.27],
+    ];
+    let readings = [
+        [0.032, 0.116, 0.883, 0.353, -0.371, -0.865],
+        [-0.13, 0.131, 0.938, 0.483, 0.067, -0.892],
+        [-0.221, -0.17, 1.04, 0.44, 0.497, -0.719],
+        [-0.776, -0.287, 0.552, 0.871, 0.61, -0.125],
+        [-0.77, -0.295, 0.395, 0.826, 0.532, -0.067],
+        [-0.781, -0.164, 0.571, 0.922, 0.348, -0.118],
+    ];
+    let attitudes = [
+        [0.9544918686, 0.0639121574, -0.0095548958, 0.2911515289],
+        [0.9911524151, 0.0563329274, 0.0239003908, -0.1177805703],
+        [0.905945636, -0.0362501305, 0.112462512, -0.4065717847],
+        [0.794891435, 0.0459624947, 0.4664297425, -0.3853288866],
+        [0.7795919695, 0.0438386185, 0.5135836252, -0.3557336033],
+        [0.8535082549, 0.0377718639, 0.4567060854, -0.2480251935],
+    ];
+    let offsets = [
+        [0.0, 0.0, 0.0],
+        [0.0237354419, 0.0055850789, 0.1955305527],
+        [0.0167707304, -0.067078205, 0.2917174688],
+        [0.0671433008, -0.2064901807, 0.2153145828],
+        [0.0321536231, -0.1707424724, 0.2063206758],
+        [0.0607264347, -0.1694874575, 0.1041843763],
+    ];
+    let anywhere = Limits {
+        low: f64::NEG_INFINITY,
+        high: f64::INFINITY,
+    };
+    let mut model = shaken([0.5; 4], [4.0, 0.04], [0.1, 0.01]);
+    model.ranges = vec![anywhere; 7];
+    let settings = FilterSettings {
+        keep_history: true,
+        ..FilterSettings::of(FilterKind::MovingHorizon(10))
+    };
+    let exact = EstimatorSettings {
+        method: Method::Rk4(Step::Substeps(40)),
+        ..EstimatorSettings::default()
+    };
+    let mut window = Blueprint::filter(model, settings, exact)
+        .estimator()
+        .unwrap();
+    for k in 0..6 {
+        let signals = [&readings[k][..], &rates[k]].concat();
+        let estimate = window.push(0.4 * k as f64, &signals).unwrap();
+        let q = std::array::from_fn(|i| estimate[i]);
+        let off = angle_between(q, attitudes[k]);
+        assert!(off < 1e-6, "row {k}: {off}");
+        for (found, expected) in estimate[4..].iter().zip(offsets[k]) {
+            assert!(
+                (found - expected).abs() < 1e-6,
+                "row {k}: {found} {expected}"
+            );
+        }
+    }
+    // the smoother that is linearised about the minimum is at it
+    let smoothed = window.smoothed(None, true).unwrap();
+    let newest = smoothed.last().unwrap();
+    let q = std::array::from_fn(|i| newest.estimate[i]);
+    assert!(smoothed.len() == 6 && angle_between(q, attitudes[5]) < 1e-6);
+}
+
+/// A window shorter than the log, which smooths and goes on from a snapshot to the bit.
+#[test]
+fn a_window_of_rotations_goes_on() {
+    let anywhere = Limits {
+        low: f64::NEG_INFINITY,
+        high: f64::INFINITY,
+    };
+    let new = || {
+        let mut model = body([0.5; 4], [4.0, 0.01]);
+        model.ranges = vec![anywhere; 7];
+        estimator(model, FilterKind::MovingHorizon(4), true)
+    };
+    let (mut window, mut restored) = (new(), new());
+    let mut flight = Flight {
+        normal: Normal(5),
+        q: [1.0, 0.0, 0.0, 0.0],
+        b: Vector3::new(0.05, -0.03, 0.02),
+    };
+    let mut truth = vec![];
+    for k in 0..120 {
+        let t = STEP * f64::from(k);
+        let w = Flight::rates(t);
+        let signals = [flight.readings().as_slice(), w.as_slice()].concat();
+        let estimate = window.push(t, &signals).unwrap().to_vec();
+        let length: f64 = estimate[..4].iter().map(|x| x * x).sum();
+        assert!((length - 1.0).abs() < 1e-14);
+        match k {
+            60 => restored.restore(&window.snapshot()).unwrap(),
+            61.. => assert_eq!(restored.push(t, &signals).unwrap(), estimate),
+            _ => {}
+        }
+        truth.push((
+            flight.q,
+            angle_between(std::array::from_fn(|i| estimate[i]), flight.q),
+        ));
+        flight.go(&w);
+    }
+    let smoothed = window.smoothed(None, true).unwrap();
+    assert_eq!(restored.smoothed(None, true).unwrap(), smoothed);
+    let mut squares = [0.0; 2];
+    for (row, (q, angle)) in smoothed.iter().zip(&truth) {
+        let found = std::array::from_fn(|i| row.estimate[i]);
+        squares[0] += angle_between(found, *q).powi(2);
+        squares[1] += angle.powi(2);
+    }
+    assert!(squares[0] < squares[1], "{squares:?}");
+    assert!(window.health().unsolved == 0);
 }

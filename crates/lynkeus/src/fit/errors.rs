@@ -2,9 +2,12 @@
 
 use lynkeus_expr::Budget;
 
+use super::logs::FittedLog;
 use super::problem::{Problem, Rows as Which};
 use crate::Error;
+use lynkeus_experiment::judge::contradicted;
 use lynkeus_experiment::tune::whiteness::{Whiteness, whiteness};
+use lynkeus_experiment::{Doubt, DoubtLevel};
 
 /// How well the readings of a sensor are predicted, in root mean square over all logs.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,6 +60,38 @@ pub(crate) struct Innovations {
     pub deviation: Vec<f64>,
     /// reading − what the plant alone does
     pub free_run: Vec<f64>,
+}
+
+impl Rows {
+    /// What the readings that were fitted say against the values, as `estimate` judges a filter: of each output what
+    /// weighs most in any of the logs, and no more than a note nowhere.
+    pub fn doubts(&self, logs: &[FittedLog]) -> Vec<Doubt> {
+        let own = |column: &Innovations| {
+            let mut heaviest: Option<Doubt> = None;
+            let mut first = 0;
+            for (log, place) in logs.iter().zip(1..) {
+                let fitted = first..first + log.fitted;
+                first += log.time.len();
+                let readings = fitted.map(|row| {
+                    let z = column.innovation[row] / column.deviation[row];
+                    (self.at[row].1, z)
+                });
+                let found = contradicted(&column.output, readings);
+                let heavier = |d: &Doubt| heaviest.as_ref().is_none_or(|h| d.level > h.level);
+                let Some(mut doubt) = found.filter(heavier) else {
+                    continue;
+                };
+                if logs.len() > 1 {
+                    doubt.text += &format!(" (log {place})");
+                }
+                heaviest = Some(doubt);
+            }
+            heaviest.filter(|doubt| doubt.level > DoubtLevel::Note)
+        };
+        let mut doubts: Vec<Doubt> = self.columns.iter().filter_map(own).collect();
+        doubts.sort_by_key(|doubt| std::cmp::Reverse(doubt.level));
+        doubts
+    }
 }
 
 #[derive(Clone, Copy, Default)]

@@ -8,6 +8,7 @@ use super::experiment::NextExperiment;
 use super::uncertainty::Known;
 use super::unknown::{Kind, Unknown};
 use super::{Fit, Optimum};
+use crate::{Answer, Doubt};
 use lynkeus_experiment::entries::{Named, finite};
 
 /// The answer of `fit`.
@@ -28,6 +29,10 @@ pub(crate) struct FitReport<'a> {
     bic: Option<f64>,
     /// whether nothing is left to gain nearby
     converged: bool,
+    /// whether nothing speaks against the values
+    credible: bool,
+    /// what the readings say against them, what weighs most first
+    doubts: &'a [Doubt],
     /// readings that were fitted
     readings: usize,
     /// how often −log L was computed
@@ -143,6 +148,8 @@ impl Fit {
             aic: criterion(2.0),
             bic: criterion((self.readings as f64).ln()),
             converged: self.is_converged,
+            credible: self.refusal().is_none(),
+            doubts: &self.doubts,
             readings: self.readings,
             evaluations: self.evaluations,
             parameters: self.of(|kind| matches!(kind, Kind::Parameter)),

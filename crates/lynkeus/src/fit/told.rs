@@ -1,7 +1,7 @@
 //! A fit in words.
 
 use lynkeus_answer::Document;
-use lynkeus_answer::document::{Cell, Table};
+use lynkeus_answer::document::{Cell, Line, Table};
 use lynkeus_words::{Words, counted, short};
 use serde_json::Value;
 
@@ -11,18 +11,26 @@ use super::uncertainty::Known;
 use super::unknown::{Kind, Scale, Unknown};
 use crate::{Answer, Error, Series};
 use lynkeus_experiment::rewrite::{Assignment, Change, rewritten};
+use lynkeus_experiment::{Doubt, DoubtLevel};
 
 lynkeus_experiment::displayed!(Fit);
 
 impl Answer for Fit {
     fn document(&self) -> Document {
         let readings = counted(self.readings, "reading");
-        let mut document = Document::new(format!(
+        let title = Line::from(format!(
             "{}: {} fitted to {readings} of {}",
             self.plant,
             counted(self.unknowns.len(), "value"),
             self.logs.join(", ")
         ));
+        let mut document = Document::new(match self.contradiction() {
+            Some(doubt) => {
+                let title = title.and("; ").decided("not credible");
+                title.and(format!(": {}", doubt.text))
+            }
+            None => title,
+        });
         self.tell_undetermined(&mut document);
         document.part().table(self.table());
         self.tell_quality(&mut document);
@@ -85,6 +93,12 @@ impl Answer for Fit {
             return at(Error::refused(message)
                 .hint("more `starts` in [fit], a better start or narrower `bounds` may help"));
         }
+        if let Some(doubt) = self.contradiction() {
+            let message = format!("the values are not credible: {}", doubt.text);
+            return at(Error::refused(message).hint(
+                "try more `starts` in [fit], or a start nearer to the plant by [parameters]; if that ends here, too, the model or what is declared of its noises is wrong: let them be found (`noise`, `process_noise` of [fit]), compare units and columns of the log with the model",
+            ));
+        }
         None
     }
 
@@ -98,6 +112,12 @@ impl Answer for Fit {
 }
 
 impl Fit {
+    /// What readings say against the values that were found, where they refuse them.
+    fn contradiction(&self) -> Option<&Doubt> {
+        let refusal = self.doubts.iter().find(|d| d.level == DoubtLevel::Refusal);
+        refusal.filter(|_| self.undetermined.is_empty())
+    }
+
     fn remedy(&self) -> String {
         let known = self.combinations();
         let combinations = match known.is_empty() {

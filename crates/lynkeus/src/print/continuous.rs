@@ -24,17 +24,19 @@ use settable::{Settled, settled};
 pub(crate) fn plant(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let version = version(study, options)?;
     let valued = prepare::plant(study)?;
-    prepare::whens::refuse(study, &valued, "export")?;
     let drawn = |plant: &Plant| plant_as(study, plant, version, options);
     if valued.parameters.is_empty() {
         return Ok(drawn(&valued)?.exported());
     }
     let system = Equations::of_plant(study, &valued)?.system()?;
-    // which is known of times alone where they are numbers
+    // which is known of times and events alone where they are numbers
     let Settled { mut made, notes } = match system.modes() > 0 || system.has_instants() {
         true => Settled {
             made: drawn(&valued)?,
-            notes: vec!["parameters are numbers: what happens at times has to be known".to_owned()],
+            notes: vec![
+                "parameters are numbers: what happens at times and at events has to be known"
+                    .to_owned(),
+            ],
         },
         false => settled(study, &valued, drawn)?,
     };

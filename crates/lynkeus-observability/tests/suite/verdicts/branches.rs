@@ -245,6 +245,31 @@ fn what_every_branch_hides_alike_is_hidden() {
     assert_eq!(run.told("a b"), "");
 }
 
+/// √x² shows x + |x| on one side alone, asin∘sin where the cosine is positive; from the other side no less is known of it.
+#[test]
+fn what_is_folded_has_branches_too() {
+    for output in [
+        "x + sqrt(x^2)",
+        "x + sqrt(x*x)",
+        "x + asin(sin(x + 1.6))",
+        "x + acos(cos(x))",
+    ] {
+        for start in [-1, 1] {
+            let text =
+                format!("Real x(start={start}, min=-1.2, max=1.2); output Real y = {output};");
+            let plant = plant(&text, "der(x) = 0;");
+            let answer = judged(&plant, &Question::default(), ["x", "", ""]);
+            assert_eq!(answer.partial.len(), 1, "{output} from {start}");
+        }
+    }
+    // what no side shows is hidden on both
+    let plant = plant(
+        "parameter Real k1=1.2; parameter Real k2=0.9; Real x(start=-1, min=-2, max=2); output Real y = x;",
+        "der(x) = k1*k2*sqrt(x^2);",
+    );
+    judged(&plant, &question(), ["x", "k1 k2", ""]);
+}
+
 /// The smaller of two states shows one of them at a time.
 #[test]
 fn the_smaller_of_two_states_is_known() {

@@ -12,6 +12,7 @@
 
 mod quadratic;
 
+use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -19,10 +20,11 @@ use super::belief::{Belief, confine};
 use super::censored::Believed;
 use super::model::NoisyModel;
 use super::profile::Profile;
-use super::root::dot;
+use super::root::{Root, dot};
 use super::sensing::Sensing;
 use super::smoother::{History, Step};
 use super::transition::{Propagation, Stage};
+use crate::manifold::Manifold;
 use crate::noise::Limits;
 use crate::runner::Sample;
 use crate::snapshot::{Damaged, Persist, Walk};
@@ -35,6 +37,8 @@ const STEPS: usize = 40;
 const SHORTEST: f64 = 1.0 / 64.0;
 /// A step smaller than this, in standard deviations, is the last.
 const SMALL: f64 = 1e-6;
+/// A rotation of so many radians is none.
+const LEAST_TURN: f64 = 1e-9;
 /// Below this a step that is no longer half of the one before is the integration's own error.
 const NOISE: f64 = 1e-3;
 
@@ -44,8 +48,11 @@ pub(crate) struct Mhe {
     inputs: usize,
     sensors: usize,
     bounds: Vec<Limits>,
-    /// what was known before the first row of the window
+    manifold: Manifold,
+    /// what was known before the first row of the window,
     prior: Belief,
+    /// and where it was linearised
+    about: Vec<f64>,
     rows: VecDeque<Row>,
     /// what a smoother needs is kept
     keep: bool,
@@ -58,6 +65,7 @@ pub(crate) struct Mhe {
 impl Persist for Mhe {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.prior.walk(walk)?;
+        walk.numbers(&mut self.about)?;
         let states = self.bounds.len();
         let count = walk.length(self.rows.len())?;
         self.rows.resize_with(count, Row::default);
@@ -74,12 +82,25 @@ impl Mhe {
             return Err(Error::setting("horizon", "at least 1 sample", 0));
         }
         let flow = model.flow.system();
+        let prior = Belief::on(&model.manifold, flow.start(), &model.initial_variance);
+        let mut bounds = model.ranges.clone();
+        // a sum that stands for a rotation may be longer than 1
+        for place in &model.manifold.rotations {
+            if let Some(own) = bounds.get_mut(*place..place + 4) {
+                own.fill(Limits {
+                    low: f64::NEG_INFINITY,
+                    high: f64::INFINITY,
+                });
+            }
+        }
         Ok(Self {
             length,
             inputs: flow.signals().len(),
             sensors: model.sensors.len(),
-            bounds: model.ranges.clone(),
-            prior: Belief::new(flow.start(), &model.initial_variance),
+            bounds,
+            manifold: model.manifold.clone(),
+            about: prior.x.clone(),
+            prior,
             rows: VecDeque::new(),
             keep,
             window: vec![],
@@ -98,12 +119,28 @@ impl Mhe {
         let problem = self.linearise(&mut propagation.clone(), &mut sensing.clone());
         let problem = problem.ok()?;
         let pins: Vec<Vec<Pin>> = self.rows.iter().map(|row| row.met.clone()).collect();
-        let passes = problem.forward(&pins);
-        let mut steps: Vec<Step> = passes.into_iter().map(Pass::kept).collect();
+        let passes = problem.forward(&pins).into_iter().zip(&self.rows);
+        let steps = passes.map(|(pass, row)| pass.kept(self.touched(&row.guess)));
+        let mut steps: Vec<Step> = steps.collect();
         if let (Some(first), Some(row)) = (steps.first_mut(), self.rows.front()) {
-            first.transition.clone_from(&row.entered);
+            first.transition = self.retold(row.entered.clone(), &self.about, &row.guess);
         }
         Some(steps)
+    }
+
+    /// Φ to a row that was told about one guess, told about another.
+    fn retold(&self, entered: Option<Profile>, from: &[f64], to: &[f64]) -> Option<Profile> {
+        let mut entered = entered?;
+        if !self.manifold.is_straight() {
+            let entries = entered.entries_mut();
+            self.manifold.recharted(from, to, entries, to.len());
+        }
+        Some(entered)
+    }
+
+    /// Where the planes touch in which something is told, where there are planes.
+    fn touched(&self, guess: &[f64]) -> Option<Vec<f64>> {
+        (!self.manifold.is_straight()).then(|| guess.to_vec())
     }
 
     /// How many samples before the newest a window reaches.
@@ -116,11 +153,15 @@ impl Mhe {
     fn shorten(&mut self, solved: GaussNewtonStep) {
         let passes = solved.solution.passes.unwrap_or(solved.free);
         let (mut passes, mut rows) = (passes.into_iter(), solved.rows.into_iter().skip(1));
+        let mut from = solved.from.into_iter();
         let (Some(first), Some(second), Some(linear)) = (passes.next(), passes.next(), rows.next())
         else {
             return;
         };
-        let mut step = first.leaving();
+        let (Some(about), Some(next)) = (from.next(), from.next()) else {
+            return;
+        };
+        let mut step = first.leaving(self.touched(&about));
         let met = !self.rows[0].met.is_empty();
         let free = Pass {
             after: first.unpinned(),
@@ -130,12 +171,14 @@ impl Mhe {
             false => second.before,
             true => carried(linear.stage.as_ref(), &self.prior, Some(&free)).0,
         };
+        let before = std::mem::replace(&mut self.about, next);
         let left = self.rows.pop_front();
         if let Some(first) = self.rows.front_mut() {
             first.stage = None;
         }
         if self.keep {
-            step.transition = left.and_then(|row| row.entered);
+            let entered = left.and_then(|row| row.entered);
+            step.transition = self.retold(entered, &before, &about);
             self.left = Some(step);
             self.rows[0].entered = second.transition.map(Arc::unwrap_or_clone);
         }
@@ -164,11 +207,16 @@ impl Mhe {
                 }
                 _ => share *= 0.5,
             }
-            let Some(best) = &best else { break };
-            if share < SHORTEST {
-                break;
+            let Some(from) = &best else { break };
+            match (share < SHORTEST, self.manifold.is_straight()) {
+                (false, _) => self.go(from, share),
+                (true, true) => break,
+                // Steps are as the sine of the angle that is left: beyond a quarter of a turn they grow on the way.
+                (true, false) => {
+                    self.go(from, 1.0);
+                    (best, share) = (None, 1.0);
+                }
             }
-            self.go(best, share);
         }
         match best {
             Some(best) => Ok(self.settle(best, false)),
@@ -189,13 +237,9 @@ impl Mhe {
         let problem = self.linearise(propagation, sensing)?;
         let solution = problem.solve(met);
         let Problem { rows, free, .. } = problem;
-        let mut step = 0.0_f64;
-        for ((row, x), pass) in self.rows.iter().zip(&solution.x).zip(&free) {
-            for (i, (old, new)) in row.guess.iter().zip(x).enumerate() {
-                let deviation = pass.before.root.deviation(i).max(f64::MIN_POSITIVE);
-                step = step.max((new - old).abs() / deviation);
-            }
-        }
+        let steps = self.rows.iter().zip(&solution.x).zip(&free);
+        let steps = steps.map(|((row, x), pass)| self.largest(&row.guess, x, &pass.before.root));
+        let step = steps.fold(0.0, f64::max);
         Ok(GaussNewtonStep {
             from: self.rows.iter().map(|row| row.guess.clone()).collect(),
             step,
@@ -203,6 +247,25 @@ impl Mhe {
             rows,
             free,
         })
+    }
+
+    /// The largest step of a state of a row, in deviations; of a quaternion those about the body's axes.
+    fn largest(&self, guess: &[f64], x: &[f64], root: &Root) -> f64 {
+        let n = guess.len();
+        let mut step: Vec<f64> = x.iter().zip(guess).map(|(new, old)| new - old).collect();
+        let mut root = Cow::Borrowed(root);
+        let mut least = vec![f64::MIN_POSITIVE; n];
+        if !self.manifold.is_straight() {
+            self.manifold.as_vectors(guess, &mut step, 1);
+            let own = root.to_mut();
+            self.manifold.as_vectors(guess, &mut own.entries, n);
+            for place in &self.manifold.rotations {
+                least[*place..place + 4].fill(LEAST_TURN);
+            }
+        }
+        let steps = step.iter().zip(least).enumerate();
+        let steps = steps.map(|(i, (step, least))| step.abs() / root.deviation(i).max(least));
+        steps.fold(0.0, f64::max)
     }
 
     /// A share of a step from where it was tried.
@@ -216,6 +279,7 @@ impl Mhe {
                     false => *to,
                 };
             }
+            self.manifold.retract(from, &mut row.guess);
             confine(&mut row.guess, &self.bounds);
             row.met.clone_from(met);
             row.stage = None;
@@ -241,27 +305,60 @@ impl Mhe {
         sensing: &mut Sensing,
     ) -> Result<Problem<'_>> {
         let count = self.rows.len();
+        let prior = self.prior_of_window();
         let mut rows: Vec<Linear> = Vec::with_capacity(count);
         let mut free: Vec<Pass> = Vec::with_capacity(count);
         for (k, row) in self.rows.iter().enumerate() {
             let stage = match (k.checked_sub(1).map(|k| &self.rows[k]), free.last()) {
-                (Some(from), Some(last)) if row.t > from.t => Some(match &row.stage {
-                    Some(stage) => Arc::clone(stage),
-                    None => Arc::new(between(propagation, from, row, last)?),
-                }),
+                (Some(from), Some(last)) => self.way(propagation, from, row, last)?,
                 _ => None,
             };
-            let before = carried(stage.as_ref(), &self.prior, free.last());
+            let before = carried(stage.as_ref(), &prior, free.last());
             let seen = seen(sensing, row)?;
             free.push(corrected(&seen, None, &[], before));
             rows.push(Linear { stage, seen });
         }
         Ok(Problem {
-            prior: &self.prior,
+            prior,
             bounds: &self.bounds,
             rows,
             free,
         })
+    }
+
+    /// The way from one row to the next; none where they are of one instant and told alike.
+    fn way(
+        &self,
+        propagation: &mut Propagation,
+        from: &Row,
+        to: &Row,
+        last: &Pass,
+    ) -> Result<Option<Arc<Stage>>> {
+        let is_straight = self.manifold.is_straight();
+        let stage = match (&to.stage, to.t > from.t) {
+            (Some(stage), true) => return Ok(Some(Arc::clone(stage))),
+            (None, true) => between(propagation, from, to, last)?,
+            (_, false) if is_straight => return Ok(None),
+            (_, false) => Stage::none(&from.guess),
+        };
+        Ok(Some(Arc::new(match is_straight {
+            true => stage,
+            false => stage.told_at(&self.manifold, &to.guess),
+        })))
+    }
+
+    /// What was known before the window, told about the first row's guess.
+    fn prior_of_window(&self) -> Cow<'_, Belief> {
+        let (manifold, about) = (&self.manifold, &self.about);
+        let mut prior = Cow::Borrowed(&self.prior);
+        if let (false, Some(row)) = (manifold.is_straight(), self.rows.front()) {
+            let Belief { x, root } = prior.to_mut();
+            let n = x.len();
+            manifold.recentred(about, &row.guess, x);
+            manifold.recharted(about, &row.guess, &mut root.entries, n);
+            root.restore();
+        }
+        prior
     }
 
     /// The new row's readings are judged by what the filter expects, then the window is solved.
@@ -301,6 +398,11 @@ impl Mhe {
         // reading it would leave no variance, and a gate that keeps every later reading out.
         let newest = solved.free.last().map(|pass| &pass.after.root);
         belief.root.clone_from(newest.unwrap_or(&self.prior.root));
+        if let (false, Some(from)) = (self.manifold.is_straight(), solved.from.last()) {
+            let (n, entries) = (belief.x.len(), &mut belief.root.entries);
+            self.manifold.recharted(from, &belief.x, entries, n);
+            belief.root.restore();
+        }
         if self.keep {
             let guesses = self.rows.iter().flat_map(|row| &row.guess);
             self.window = guesses.copied().collect();
@@ -396,11 +498,20 @@ impl Row {
 pub(crate) fn seen(sensing: &mut Sensing, row: &Row) -> Result<Vec<Seen>> {
     let map = &mut sensing.output_map;
     let h = map.linearise(row.t, &row.guess, &row.inputs)?.to_vec();
+    // an angle or a quaternion that is read may be a turn, or a sign, off the guess by now
+    let mut all = vec![f64::NAN; h.len()];
+    for believed in &row.readings {
+        all[believed.sensor] = believed.reading;
+    }
+    let signed = sensing.manifold.signed(&all, &h);
     let seen = |believed: &Believed| {
         let mut slopes = vec![0.0; row.guess.len()];
         map.write_slopes(believed.sensor, &mut slopes);
         let offset = h[believed.sensor] - dot(&slopes, &row.guess);
-        let (value, variance) = believed.about(h[believed.sensor])?;
+        let predicted = h[believed.sensor];
+        let mut own = *believed;
+        own.reading = (sensing.manifold).lifted(own.sensor, signed[own.sensor], predicted);
+        let (value, variance) = own.about(predicted)?;
         Some(Seen {
             value: value - offset,
             variance,

@@ -7,6 +7,7 @@
 //! minimum as one likes, whatever the bounds: each of its steps is a smoother in which every bounded
 //! state is drawn to a value with some variance. Sets then go on from what it ends with.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::filter::belief::{Belief, confine};
@@ -30,7 +31,7 @@ const SHORT: f64 = 0.995;
 
 /// The problem.
 pub(crate) struct Problem<'a> {
-    pub prior: &'a Belief,
+    pub prior: Cow<'a, Belief>,
     pub bounds: &'a [Limits],
     pub rows: Vec<Linear>,
     /// without bounds
@@ -96,7 +97,7 @@ impl Problem<'_> {
     pub fn forward(&self, pins: &[Vec<Pin>]) -> Vec<Pass> {
         let mut passes: Vec<Pass> = vec![];
         for ((linear, free), pins) in self.rows.iter().zip(&self.free).zip(pins) {
-            let before = carried(linear.stage.as_ref(), self.prior, passes.last());
+            let before = carried(linear.stage.as_ref(), &self.prior, passes.last());
             let free = Some(&free.before.root);
             passes.push(corrected(&linear.seen, free, pins, before));
         }
@@ -362,11 +363,12 @@ impl Pass {
     }
 
     /// What a smoother keeps of a row that stays in the window: the bounds that it meets are
-    /// exact readings.
-    pub fn kept(self) -> Step {
+    /// exact readings. It is told in planes that touch there, where there are any.
+    pub fn kept(self, touched: Option<Vec<f64>>) -> Step {
         let pins = self.pins.into_iter().flatten();
         Step {
             transition: self.transition.map(Arc::unwrap_or_clone),
+            touched,
             belief: self.after,
             corrections: self.readings.into_iter().chain(pins).collect(),
         }
@@ -374,9 +376,10 @@ impl Pass {
 
     /// The same of a row that leaves the window: the bounds that it met have moved the estimate,
     /// and told no more than that.
-    pub fn leaving(&self) -> Step {
+    pub fn leaving(&self, touched: Option<Vec<f64>>) -> Step {
         Step {
             transition: self.transition.as_deref().cloned(),
+            touched,
             belief: self.unpinned(),
             corrections: self.readings.clone(),
         }

@@ -86,15 +86,8 @@ impl ParticleFilter {
         let n = flow.states().len();
         settings.check(n, model.ranges.len())?;
         particles.check(&model.sensors)?;
-        if particles.inflation.is_some() {
-            let refused =
-                |what: &str, found: &str| Err(Error::setting(what, "none in an ensemble", found));
-            if !model.manifold.is_straight() {
-                return refused("quaternion", "one");
-            }
-            if flow.has_clauses() {
-                return refused("event", "`when`");
-            }
+        if particles.inflation.is_some() && flow.has_clauses() {
+            return Err(Error::setting("event", "none in an ensemble", "`when`"));
         }
         let (start, root) = model.start();
         let mut own = Self {
@@ -157,14 +150,29 @@ impl ParticleFilter {
     fn move_together(&mut self, taken: &[Believed], inflation: f64) -> f64 {
         self.round += 1;
         let mut random = stream(self.settings.seed, self.round, 0);
+        let n = self.estimate.len();
+        // sums of rotations are told in the plane at their mean
+        let about = (!self.manifold.is_straight()).then(|| {
+            let Cloud { x, share, .. } = &self.cloud;
+            self.moments.condense(x, share, &self.manifold, n);
+            self.moments.mean.clone()
+        });
+        let particles = self.cloud.x.chunks_exact_mut(n);
+        if let Some(about) = &about {
+            particles.for_each(|x| self.manifold.flatten(about, x));
+        }
         let mut ensemble = Ensemble {
             x: &mut self.cloud.x,
-            n: self.estimate.len(),
+            n,
             shown: &mut self.shown,
             m: self.sensors.len(),
         };
         let log_likelihood = ensemble.take(taken, &self.moments.expected);
         ensemble.spread(inflation, &mut random);
+        let particles = self.cloud.x.chunks_exact_mut(n);
+        if let Some(about) = &about {
+            particles.for_each(|x| self.manifold.retract(about, x));
+        }
         log_likelihood
     }
 

@@ -13,6 +13,7 @@ use super::profile::Profile;
 use super::root::{Factor, Root, dot};
 use crate::Evaluation;
 use crate::events::Memory;
+use crate::manifold::Manifold;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{EstimatorSettings, Linearised, Method, Result, Step};
 use joint::Joint;
@@ -252,6 +253,33 @@ impl Stage {
         let count = if is_disturbed { states * states } else { 0 };
         self.noise.resize(count, 0.0);
         walk.numbers(&mut self.noise)
+    }
+
+    /// No way at all.
+    pub fn none(x: &[f64]) -> Self {
+        Self {
+            about: x.to_vec(),
+            end: x.to_vec(),
+            transition: Arc::new(Profile::identity(x.len())),
+            noise: vec![],
+        }
+    }
+
+    /// The same with the next sample's quaternions told in the plane that touches at `to`. What came with the state
+    /// keeps its axes in the world, as it turns before what noise adds does; that comes from the right.
+    pub fn told_at(mut self, manifold: &Manifold, to: &[f64]) -> Self {
+        let n = to.len();
+        manifold.normalise(&mut self.end);
+        let from = self.end.clone();
+        let entries = Arc::make_mut(&mut self.transition).entries_mut();
+        manifold.project(&from, entries, n);
+        manifold.transport_in_world(&from, to, entries, n);
+        for row in self.noise.chunks_exact_mut(n.max(1)) {
+            manifold.project(&from, row, 1);
+            manifold.recharted(&from, to, row, 1);
+        }
+        manifold.flatten(to, &mut self.end);
+        self
     }
 
     /// What is believed at the next sample.

@@ -4,9 +4,9 @@ use lynkeus_export::curly::c::File;
 use lynkeus_export::curly::fmu::{Quantity, Version};
 use lynkeus_export::curly::{Exchange, Ode, State};
 use lynkeus_expr::{Budget, Graph, Node};
-use lynkeus_model::{Plant, Variable};
+use lynkeus_model::{Plant, Variable, Whens};
 use lynkeus_observers::Observer;
-use lynkeus_run::{Method, System};
+use lynkeus_run::{Method, Parts, System};
 
 use super::rate::rate;
 use super::{experiment, packed, quantity, time, units};
@@ -34,6 +34,8 @@ pub(crate) struct Equations<'a> {
     parameters: Vec<(Quantity, Node)>,
     /// but for states that are outputs
     outputs: Vec<(Quantity, Node)>,
+    /// by which the states jump
+    whens: Option<&'a Whens>,
     headers: Headers,
 }
 
@@ -64,6 +66,7 @@ impl<'a> Equations<'a> {
         let starts = starts(plant, given.unwrap_or_default())?;
         let mut made = Self::none(study, plant, plant.time, "plant");
         made.title = format!("The plant {}", plant.name);
+        made.whens = Some(&plant.whens);
         for parameter in &plant.parameters {
             made.headers.take(&parameter.variable.name);
         }
@@ -149,6 +152,7 @@ impl<'a> Equations<'a> {
             inputs: vec![],
             parameters: vec![],
             outputs: vec![],
+            whens: None,
             headers,
         }
     }
@@ -238,14 +242,15 @@ impl<'a> Equations<'a> {
         let parameters = parameters.map(|(told, symbol)| (told.name.clone(), *symbol));
         let outputs = self.outputs.iter();
         let outputs = outputs.map(|(told, node)| (told.name.clone(), *node));
-        System::new(
-            self.graph,
-            self.time,
-            &states,
-            &inputs.chain(parameters).collect::<Vec<_>>(),
-            &derivatives,
-            &outputs.collect::<Vec<_>>(),
-        )
+        System::of(&Parts {
+            graph: self.graph,
+            time: self.time,
+            states: &states,
+            signals: &inputs.chain(parameters).collect::<Vec<_>>(),
+            derivatives: &derivatives,
+            outputs: &outputs.collect::<Vec<_>>(),
+            whens: self.whens,
+        })
         .map_err(explain)
     }
 
@@ -285,6 +290,8 @@ impl<'a> Equations<'a> {
         let (parameters, outputs) = (quantities(&self.parameters), quantities(&self.outputs));
         let states: Vec<State> = self.states.iter().map(|e| e.state.clone()).collect();
         let own = states.iter().flat_map(|s| [&s.quantity, &s.derivative]);
+        let (indicators, told) = self.indicators(system);
+        notes.extend(told);
         let exchange = Exchange {
             ode: &Ode {
                 name: &self.name,
@@ -295,6 +302,7 @@ impl<'a> Equations<'a> {
                 parameters: &parameters,
                 states: &states,
                 outputs: &outputs,
+                indicators: &indicators,
                 about,
             },
             units: &units(
@@ -317,6 +325,30 @@ impl<'a> Equations<'a> {
             version,
             budget: self.study.budget.clone(),
         })
+    }
+}
+
+impl Equations<'_> {
+    /// What passes zero where a state may jump, and what is to be said of their names.
+    fn indicators(&self, system: &System) -> (Vec<Quantity>, Vec<String>) {
+        let Some(whens) = system.whens() else {
+            return (vec![], vec![]);
+        };
+        let mut headers = self.headers.clone();
+        let known = headers.notes.len();
+        let graph = &system.expressions().graph;
+        let relations = whens.relations.iter().zip(1..);
+        let indicators = relations.map(|(relation, k)| {
+            let relation = graph.render(*relation, 60);
+            let what = format!("what passes zero where {relation} changes");
+            Quantity {
+                name: headers.free(&format!("event {k}"), &what),
+                description: what,
+                ..Quantity::default()
+            }
+        });
+        let indicators = indicators.collect();
+        (indicators, headers.notes.split_off(known))
     }
 }
 

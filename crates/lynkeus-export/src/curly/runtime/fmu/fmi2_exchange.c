@@ -11,13 +11,19 @@ typedef struct {
 MODE(EnterEventMode, RUNNING, RUNNING)
 MODE(EnterContinuousTimeMode, RUNNING, RUNNING)
 
-/* Outputs follow what is set at once: in event mode there is nothing to do. */
+/* Outputs follow what is set at once. */
 API fmi2Status FULL(fmi2NewDiscreteStates)(void *instance, events *found)
 {
     const events none = {0, 0, 0, 0, 0, 0.0};
     OPEN(RUNNING)
     *found = none;
+//? events
+    ONLY(m->is_exchange)
+    return told(m, react(&m->at, &found->has_values, &found->has_next, &found->next));
+//?
+//? !events
     return fmi2OK;
+//?
 }
 
 API fmi2Status FULL(fmi2CompletedIntegratorStep)(
@@ -64,8 +70,8 @@ API fmi2Status FULL(fmi2GetNominalsOfContinuousStates)(void *instance, double *v
 
 API fmi2Status FULL(fmi2GetEventIndicators)(void *instance, double *values, size_t count)
 {
-    (void)values;
-    return absent(instance, count);
+    OPEN(SINCE)
+    return told(m, read_indicators(&m->at, values, count));
 }
 
 API fmi2Status FULL(fmi2GetDirectionalDerivative)(

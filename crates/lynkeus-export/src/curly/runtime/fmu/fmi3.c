@@ -236,18 +236,30 @@ API fmi3Status FULL(fmi3DeserializeFMUState)(void *instance, const uint8_t *byte
     return told(instance, taken(bytes, size, kept));
 }
 
-/* Outputs follow what is set at once: in event mode there is nothing to do. */
+/* Outputs follow what is set at once. */
 API fmi3Status FULL(fmi3UpdateDiscreteStates)(
     void *instance, bool *is_unfinished, bool *is_over, bool *has_nominals, bool *has_values, bool *has_next,
     double *next)
 {
     OPEN(RUNNING)
+//? !events
     (void)next;
+//?
     *is_unfinished = false;
     *is_over = false;
     *has_nominals = false;
     *has_values = false;
     *has_next = false;
+//? events
+    if (m->is_exchange) {
+        int is_changed = 0;
+        int is_timed = 0;
+        const int code = react(&m->at, &is_changed, &is_timed, next);
+        *has_values = is_changed != 0;
+        *has_next = is_timed != 0;
+        return told(m, code);
+    }
+//?
     return fmi3OK;
 }
 

@@ -52,14 +52,14 @@ API fmi3Status FULL(fmi3GetNumberOfContinuousStates)(void *instance, size_t *cou
 API fmi3Status FULL(fmi3GetNumberOfEventIndicators)(void *instance, size_t *count)
 {
     (void)instance;
-    *count = 0;
+    *count = INDICATORS;
     return fmi3OK;
 }
 
 API fmi3Status FULL(fmi3GetEventIndicators)(void *instance, double *values, size_t count)
 {
-    (void)values;
-    return absent(instance, count);
+    OPEN(SINCE)
+    return told(m, read_indicators(&m->at, values, count));
 }
 
 API fmi3Status FULL(fmi3GetDirectionalDerivative)(

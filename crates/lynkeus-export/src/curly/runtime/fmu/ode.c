@@ -1,4 +1,5 @@
-/* Value references: time, the inputs, the states, their derivatives, the outputs, the parameters. */
+/* Value references: time, the inputs, the states, their derivatives, the outputs, the parameters, what passes zero
+   where a state may jump. */
 enum {
     INPUTS = @CAPITALS@_INPUTS,
     PARAMETERS = @CAPITALS@_PARAMETERS,
@@ -9,7 +10,14 @@ enum {
     FIRST_DERIVATIVE = FIRST_STATE + STATES,
     FIRST_OUTPUT = FIRST_DERIVATIVE + STATES,
     FIRST_PARAMETER = FIRST_OUTPUT + OUTPUTS,
-    VALUES = FIRST_PARAMETER + PARAMETERS,
+//? events
+    INDICATORS = @CAPITALS@_RELATIONS,
+//?
+//? !events
+    INDICATORS = 0,
+//?
+    FIRST_INDICATOR = FIRST_PARAMETER + PARAMETERS,
+    VALUES = FIRST_INDICATOR + INDICATORS,
     GIVEN = INPUTS + PARAMETERS
 };
 
@@ -24,6 +32,10 @@ typedef struct {
     double states[STATES];
     double derivatives[STATES];
     double outputs[OUTPUTS + 1];
+//? events
+    double memory[@CAPITALS@_MEMORY]; /* of events */
+    double sides[INDICATORS + 1];
+//?
     int is_settled; /* whether derivatives and outputs are those of the values above */
     int mode;       /* one of the modes above */
 } course;
@@ -33,6 +45,9 @@ static void begin(course *c)
     memset(c, 0, sizeof *c);
     c->mode = INSTANTIATED;
     @NAME@_init(c->states);
+//? events
+    @NAME@_begin(c->memory, c->sides);
+//?
     for (int i = 0; i < GIVEN; i++) {
         c->given[i] = first_given[i];
     }
@@ -55,7 +70,12 @@ static int step(course *c, double from, double to)
     if (!(fabs(from - c->time) <= 1e-6 * fabs(to - from) + 1e-15 * (fabs(from) + fabs(to)))) {
         return NOT_HERE;
     }
+//? events
+    code = @NAME@_advance(from, to, c->given, c->states, c->memory);
+//?
+//? !events
     code = @NAME@_advance(from, to, c->given, c->states);
+//?
     if (code == 0) {
         c->time = to;
         c->is_settled = 0;
@@ -68,6 +88,14 @@ static int read_value(course *c, uint32_t reference, double *value)
     if (reference >= VALUES) {
         return NO_VALUE;
     }
+//? events
+    if (reference >= FIRST_INDICATOR) {
+        double values[INDICATORS + 1];
+        @NAME@_indicators(c->time, c->states, c->given, nominals, c->sides, values);
+        *value = values[reference - FIRST_INDICATOR];
+        return isfinite(*value) ? 0 : @CAPITALS@_NOT_FINITE;
+    }
+//?
     if (reference >= FIRST_PARAMETER) {
         *value = c->given[INPUTS + reference - FIRST_PARAMETER];
         return 0;
@@ -95,7 +123,8 @@ static int refusal(const course *c, uint32_t reference, double value)
     if (reference >= VALUES) {
         return NO_VALUE;
     }
-    if ((reference >= FIRST_DERIVATIVE && reference < FIRST_PARAMETER) || reference < FIRST_INPUT) {
+    if ((reference >= FIRST_DERIVATIVE && reference < FIRST_PARAMETER) || reference < FIRST_INPUT
+        || reference >= FIRST_INDICATOR) {
         return NOT_SETTABLE;
     }
     return reference >= FIRST_STATE && reference < FIRST_DERIVATIVE && (c->mode & BEFORE) == 0 ? NOT_NOW : 0;
@@ -147,6 +176,31 @@ static int read_nominals(double *values, size_t count)
     }
     return count == STATES ? 0 : NO_VALUE;
 }
+
+/* What passes zero where a state may jump. */
+static int read_indicators(course *c, double *values, size_t count)
+{
+    int code = count == INDICATORS ? 0 : NO_VALUE;
+    for (size_t i = 0; i < count && code == 0; i++) {
+        code = read_value(c, (uint32_t)(FIRST_INDICATOR + i), &values[i]);
+    }
+    return code;
+}
+//? events
+
+/* What is due takes effect: whether states have changed, and when the clock has an event next. */
+static int react(course *c, int *has_values, int *has_next, double *next)
+{
+    double before[STATES];
+    int code = 0;
+    memcpy(before, c->states, sizeof before);
+    code = @NAME@_event(c->time, c->given, c->states, c->memory, c->sides);
+    c->is_settled = 0;
+    *has_values = memcmp(before, c->states, sizeof before) != 0;
+    *has_next = @NAME@_next_instant(c->memory, next);
+    return code;
+}
+//?
 
 static void set_time(course *c, double time)
 {
