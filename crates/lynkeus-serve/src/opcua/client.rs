@@ -148,12 +148,12 @@ async fn follow(
     let url = &asked.settings.url.text;
     let mut client = client(&asked.settings)?;
     let mut wait = SOON;
-    let mut was_there = false;
+    let is_there = Arc::new(AtomicBool::new(false));
     while !stop.load(Ordering::Relaxed) {
-        let done = session(&mut client, (asked, outgoing), teller, &mut was_there, stop).await;
+        let done = session(&mut client, (asked, outgoing), teller, &is_there, stop).await;
         let why = match done {
             Ok(()) => return Ok(()),
-            Err(Ended::Unwanted(why)) if !was_there => return Err(why),
+            Err(Ended::Unwanted(why)) if !is_there.load(Ordering::Relaxed) => return Err(why),
             Err(Ended::Unwanted(why) | Ended::Lost(why)) => why,
         };
         teller.note(format!(
@@ -265,7 +265,7 @@ async fn session(
     client: &mut Client,
     (asked, outgoing): (&Arc<Asked>, &Arc<Outgoing>),
     teller: &Teller,
-    was_there: &mut bool,
+    is_there: &Arc<AtomicBool>,
     stop: &AtomicBool,
 ) -> Result<(), Ended> {
     let url = &asked.settings.url.text;
@@ -277,6 +277,7 @@ async fn session(
             Arc::clone(asked),
             teller.clone(),
             Arc::clone(outgoing),
+            Arc::clone(is_there),
         ))
     };
     let mut work = begin();
@@ -291,19 +292,18 @@ async fn session(
                         work = begin();
                     }
                     has_begun = true;
-                    let rest = match (*was_there, mode) {
+                    let rest = match (is_there.load(Ordering::Relaxed), mode) {
                         (false, _) => "",
                         (true, SessionConnectMode::ReactivatedSession(_)) => " again",
                         (true, SessionConnectMode::NewSession(_)) =>
                             " again, in a new session: what changed meanwhile is lost but for the last value",
                     };
                     teller.note(format!("{url} is connected{rest}"));
-                    *was_there = true;
                 }
                 Ok(Some(SessionPollResult::ConnectionLost(code))) => {
                     teller.note(format!("no connection to {url}: {}; it is tried again", said(code)));
                 }
-                Ok(Some(SessionPollResult::ReconnectFailed(code))) if !*was_there => {
+                Ok(Some(SessionPollResult::ReconnectFailed(code))) if !has_begun => {
                     work.abort();
                     return Err(ended(code));
                 }
@@ -343,6 +343,7 @@ async fn work(
     asked: Arc<Asked>,
     teller: Teller,
     outgoing: Arc<Outgoing>,
+    is_there: Arc<AtomicBool>,
 ) -> Ended {
     session.wait_for_connection().await;
     let mut kinds = match kinds(&session, &asked.written).await {
@@ -352,6 +353,8 @@ async fn work(
     if let Err(why) = subscribe(&session, &asked, &teller).await {
         return why;
     }
+    // what the server does not want from here on, it may want later
+    is_there.store(true, Ordering::Relaxed);
     let mut refused: Vec<Option<StatusCode>> = vec![None; asked.written.len()];
     loop {
         outgoing.news.notified().await;
