@@ -8,7 +8,7 @@ use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use futures_util::TryStreamExt;
+use futures_util::{TryStream, TryStreamExt};
 use lynkeus::study::OpcuaSettings;
 use opcua::client::transport::TcpConnector;
 use opcua::client::{
@@ -25,7 +25,6 @@ use opcua::types::{
 use tokio::sync::Notify;
 use tokio::time::{sleep, timeout};
 
-use super::Change;
 use crate::history::now;
 
 /// The variable of the environment with the password, where the study has none.
@@ -43,6 +42,8 @@ const PATIENCE: Duration = Duration::from_secs(10);
 const LOOK: Duration = Duration::from_millis(50);
 /// How long what was written last may take to arrive at the end.
 const LAST: Duration = Duration::from_millis(300);
+/// How long a server may take to say good-bye.
+const GOOD_BYE: Duration = Duration::from_secs(1);
 /// Ticks of OPC UA, of 100 ns, before 1970.
 const TICKS_TO_1970: i64 = 116_444_736_000_000_000;
 
@@ -51,6 +52,17 @@ pub(super) struct Asked {
     pub settings: OpcuaSettings,
     pub read: Vec<NodeId>,
     pub written: Vec<NodeId>,
+}
+
+/// A change of a node's value.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Change {
+    /// its place among the nodes that are read
+    pub node: usize,
+    /// none where the quality is not good
+    pub value: Option<f64>,
+    /// at the source, in nanoseconds since 1970
+    pub at: i128,
 }
 
 /// What comes.
@@ -320,21 +332,30 @@ async fn session(
             done = &mut work => {
                 let failed = |_| Ended::Lost("the session failed".to_owned());
                 let why = done.unwrap_or_else(failed);
-                let _ = timeout(PATIENCE, session.disconnect()).await;
+                part(&session, events.as_mut(), Duration::ZERO).await;
                 return Err(why);
             }
             () = sleep(LOOK) => {}
         }
     }
     // what was written last may still be on its way
+    part(&session, events.as_mut(), LAST).await;
+    work.abort();
+    Ok(())
+}
+
+/// Ends a session after a while; nothing is sent or read unless its events are followed.
+async fn part(
+    session: &Session,
+    mut events: impl TryStream<Ok = SessionPollResult, Error = StatusCode> + Unpin,
+    after: Duration,
+) {
     let last = async {
-        sleep(LAST).await;
-        work.abort();
+        sleep(after).await;
         session.disconnect().await
     };
     let rest = async { while let Ok(Some(_)) = events.try_next().await {} };
-    let _ = timeout(2 * LAST + PATIENCE / 10, async { tokio::join!(last, rest) }).await;
-    Ok(())
+    let _ = timeout(after + GOOD_BYE, async { tokio::join!(last, rest) }).await;
 }
 
 /// Subscribes, then writes what there is to write; ends where the server does not want that.

@@ -25,7 +25,7 @@ use crate::engine::{Arrival, BATCH, Engine, Refusal};
 use crate::json::Message;
 use crate::live::{Firsts, tell_refusal};
 use crate::row::{Field, Reader, Stamp};
-use client::{News, Outgoing, Written};
+use client::{Change, News, Outgoing, Written};
 
 /// In a node it stands for the name of an asset.
 const ASSET: &str = "{asset}";
@@ -51,17 +51,6 @@ enum Shown {
     Estimate(usize),
     Deviation(usize),
     Credible,
-}
-
-/// A change of a node's value.
-#[derive(Clone, Copy, Debug)]
-struct Change {
-    /// its place among the nodes that are read
-    node: usize,
-    /// none where the quality is not good
-    value: Option<f64>,
-    /// at the source, in nanoseconds since 1970
-    at: i128,
 }
 
 struct Service<'s> {

@@ -234,16 +234,19 @@ fn identities_in_disguise() {
     ] {
         let model = |text: &str| {
             plant(
-                "parameter Real d; parameter Real q; Real x(start = 0.5); Real z(start = 0.4); output Real y = x; output Real v = z; output Real r = q;",
+                // where all of them are identities: √x² is x for x > 0 alone
+                "parameter Real d; parameter Real q; Real x(start = 0.5, min = 0.1, max = 1); Real z(start = 0.4, min = 0.1, max = 0.9); output Real y = x; output Real v = z; output Real r = q;",
                 &format!("der(x) = -x + d*({text}); der(z) = -z;"),
             )
         };
         let answer = analyse(&model(zero), &question()).unwrap();
-        assert_eq!(
-            answer.verdict("d"),
-            Some(Verdict::Unobservable),
-            "{zero}: {answer:?}"
-        );
+        // two branches, of which the box has one; that the other is outside of it is not proved
+        let is_folded = ["sqrt(x^2) - x", "asin(sin(z)) - z", "acos(cos(z)) - z"].contains(&zero);
+        let expected = match is_folded {
+            true => Verdict::Undecided,
+            false => Verdict::Unobservable,
+        };
+        assert_eq!(answer.verdict("d"), Some(expected), "{zero}: {answer:?}");
         let answer = analyse(&model(&format!("{zero} + x")), &question()).unwrap();
         assert_eq!(answer.verdict("d"), Some(Verdict::Observable), "{zero} + x");
     }
