@@ -228,6 +228,11 @@ fn ended(code: StatusCode) -> Ended {
     }
 }
 
+/// A security policy by the name that the standard gives it; the library has hyphens.
+fn policy(name: &str) -> SecurityPolicy {
+    SecurityPolicy::from_str(&name.replace('_', "-")).unwrap_or(SecurityPolicy::None)
+}
+
 /// A session that begins once its events are asked for.
 async fn connected(
     client: &mut Client,
@@ -245,7 +250,7 @@ async fn connected(
         "None" => MessageSecurityMode::None,
         _ => MessageSecurityMode::SignAndEncrypt,
     };
-    let policy = SecurityPolicy::from_str(settings.security).unwrap_or(SecurityPolicy::None);
+    let policy = policy(settings.security);
     let url = settings.url.text.as_str();
     let endpoints = timeout(PATIENCE, client.get_server_endpoints_from_url(url)).await;
     let endpoints = endpoints.map_err(|_| Ended::Lost("nobody answers".to_owned()))?;
@@ -596,5 +601,23 @@ impl Told {
             value,
             at: at.unwrap_or_else(now),
         }));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_policies_of_a_study_are_known() {
+        for name in [
+            "None",
+            "Basic256Sha256",
+            "Aes128_Sha256_RsaOaep",
+            "Aes256_Sha256_RsaPss",
+        ] {
+            let uri = policy(name).to_uri();
+            assert_eq!(uri.rsplit('#').next(), Some(name));
+        }
     }
 }
