@@ -1,5 +1,6 @@
 //! Plants whose state jumps: `when` clauses, from the study to the answer.
 
+mod rows;
 mod suites;
 
 use crate::{Ended, Folder};
