@@ -183,3 +183,52 @@ fn side_of(range: Interval) -> Option<bool> {
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use lynkeus_expr::Tape;
+    use lynkeus_model::LoadOptions;
+
+    use super::*;
+
+    /// What is made of a function is that function on the box, whichever turn this lies in.
+    #[test]
+    fn what_is_made_on_a_box_has_the_same_values() {
+        let functions = [
+            ("asin(sin(z))", [1.6, 4.7]),
+            ("asin(sin(z))", [-4.6, -1.6]),
+            ("asin(sin(z))", [4.8, 7.8]),
+            ("asin(sin(z))", [-1.5, 1.5]),
+            ("acos(cos(z))", [0.1, 3.1]),
+            ("acos(cos(z))", [3.2, 6.2]),
+            ("acos(cos(z))", [-3.1, -0.1]),
+            ("acos(cos(z))", [-6.2, -3.2]),
+            ("sqrt(z*z)", [-3.0, 0.0]),
+            ("abs(z - 1)", [-3.0, 1.0]),
+            ("sign(z)*z", [-3.0, -0.1]),
+            ("floor(z)*z", [-1.9, -1.1]),
+            ("min(z, 2) + max(z, -1)", [-1.0, 2.0]),
+            ("if z > 0 and not z < 1 then z else 0", [1.0, 3.0]),
+            ("if z == 5 then 0 else z", [1.0, 3.0]),
+        ];
+        for (function, [low, high]) in functions {
+            let text = format!(
+                "model M\n Real z(min={low:?}, max={high:?}, start={high:?});\n output Real y = {function};\nequation\n der(z) = 0;\nend M;"
+            );
+            let plant = Plant::from_modelica(&text, "m.mo", &LoadOptions::default()).unwrap();
+            let output = plant.outputs[0].node;
+            let settled = Settled::new(&plant, &Question::default(), &[output]);
+            assert!(!settled.made.is_empty(), "{function}");
+            let roots = [output, settled.roots[0]];
+            assert_ne!(roots[0], roots[1], "{function}");
+            let tape = Tape::new(&plant.graph, &[plant.states[0].node], &roots).unwrap();
+            for share in [0.1, 0.3, 0.5, 0.7, 0.9] {
+                let mut values = [0.0; 2];
+                tape.evaluator()
+                    .eval(&[low + share * (high - low)], &mut values);
+                let [own, made] = values;
+                assert!((own - made).abs() < 1e-12, "{function}: {own} {made}");
+            }
+        }
+    }
+}
