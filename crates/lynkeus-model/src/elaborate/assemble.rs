@@ -105,6 +105,7 @@ fn unknowns(
                 rank: rank(symbols, declaration),
                 start,
                 range,
+                is_truth: declaration.type_name == TypeName::Boolean,
             });
         }
     }
