@@ -342,10 +342,18 @@ fn what_does_not_follow_events_says_so_with_the_line() {
     folder.change("study.toml", "\"ekf\"", "\"mhe\"");
     let told = format!("family = \"mhe\": {line}");
     refused(&folder, &["estimate", "study.toml", "log.csv"], &told);
-    folder.change("study.toml", "\"mhe\"", "\"particle\"\nproposal = \"ensemble\"");
+    folder.change(
+        "study.toml",
+        "\"mhe\"",
+        "\"particle\"\nproposal = \"ensemble\"",
+    );
     let told = "proposal = \"ensemble\": the state of 'Ball' jumps at events (`when` of line 9)";
     refused(&folder, &["estimate", "study.toml", "log.csv"], told);
-    folder.change("study.toml", "\"particle\"\nproposal = \"ensemble\"", "\"ekf\"");
+    folder.change(
+        "study.toml",
+        "\"particle\"\nproposal = \"ensemble\"",
+        "\"ekf\"",
+    );
     let ended = folder.run(&["compare", "study.toml", "log.csv", "--json"]);
     let rows = &ended.json()["families"];
     let families: Vec<&str> = rows

@@ -42,8 +42,6 @@ pub(crate) struct Unknown {
     pub start: f64,
     /// where it may lie
     pub range: Interval,
-    /// a Boolean: no search finds it
-    pub is_truth: bool,
 }
 
 impl Unknown {

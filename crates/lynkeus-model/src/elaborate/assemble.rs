@@ -105,7 +105,6 @@ fn unknowns(
                 rank: rank(symbols, declaration),
                 start,
                 range,
-                is_truth: declaration.type_name == TypeName::Boolean,
             });
         }
     }

@@ -59,7 +59,6 @@ impl Delayed {
             rank: 40,
             start: 0.0,
             range: Interval::ENTIRE,
-            is_truth: false,
         })
     }
 

@@ -4,10 +4,10 @@ use lynkeus_observers::Design;
 use lynkeus_run::filter::{FilterKind, Health};
 use lynkeus_words::figures;
 
+use crate::Error;
 use crate::course::Course;
 use crate::course::doubt::{Doubt, Kind, Level};
 use crate::prepare::Prepared;
-use crate::Error;
 
 /// Updates in a row after which hardly more than one particle counted: what is told of the estimate is then one of them.
 const LOST: usize = 10;

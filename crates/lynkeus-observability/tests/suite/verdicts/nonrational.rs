@@ -241,6 +241,8 @@ fn identities_in_disguise() {
         };
         let answer = analyse(&model(zero), &question()).unwrap();
         // of two branches, the box has one
+        let found = answer.verdict("d");
+        assert_eq!(found, Some(Verdict::Unobservable), "{zero}: {answer:?}");
         let answer = analyse(&model(&format!("{zero} + x")), &question()).unwrap();
         assert_eq!(answer.verdict("d"), Some(Verdict::Observable), "{zero} + x");
     }
