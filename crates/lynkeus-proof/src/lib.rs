@@ -54,6 +54,7 @@ pub mod metzler;
 pub mod riccati;
 pub mod search;
 pub mod spectrum;
+pub mod tube;
 mod vertices;
 
 pub use vertices::{Bounds, varying, vertices};
