@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::excited::ExcitationEntry;
 use super::sampled::SampledEntry;
-use super::tube::TubeEntry;
+use super::tube::told::TubeEntry;
 use super::{CertifyReport, Excited, Strays, bounds};
 use lynkeus_experiment::entries::{Condition, Named, Range, Verdict, finite, sides};
 use lynkeus_experiment::judge::interval::SamplingLimits;

@@ -2,8 +2,6 @@
 
 use std::ops::ControlFlow;
 
-use lynkeus_answer::Document;
-use lynkeus_answer::document::{Line, Table};
 use lynkeus_expr::{Budget, Interval, Node, Tape};
 use lynkeus_model::{Home, Variable};
 use lynkeus_proof::tube::{End, Problem, Segment, reach};
@@ -12,16 +10,23 @@ use lynkeus_study::Name;
 use serde::Serialize;
 
 use crate::Error;
-use lynkeus_experiment::entries::{Named, Range, Verdict};
+#[cfg(test)]
+use lynkeus_experiment::entries::Named;
 use lynkeus_experiment::prepare::Prepared;
 use lynkeus_experiment::prepare::systems::starts;
 use lynkeus_experiment::words::{explain, number};
+pub use seen::Row;
+use seen::Seen;
+use told::outward;
 
-/// Rows of the tube that are kept.
-const ROWS: usize = 200;
+mod seen;
+pub(crate) mod told;
 
 /// Segments of a tube from one point, with which the search for a counterexample ends.
 const SEGMENTS: usize = 2000;
+
+/// How often the start set is halved.
+const HALVINGS: usize = 8;
 
 /// Corners of the start set that are tried.
 const CORNERS: usize = 16;
@@ -51,7 +56,7 @@ pub struct Tube {
     /// ranges of the states at the end of it
     pub end: Ranges,
     /// the tube: from when, to when, and where each state is between
-    pub rows: Vec<(f64, f64, Vec<Interval>)>,
+    pub rows: Vec<Row>,
     /// why it is not proved
     pub obstacle: Option<String>,
     /// a run that leaves the box
@@ -78,6 +83,13 @@ pub struct Witness {
 
 fn by_name<S: serde::Serializer>(values: &[(String, f64)], to: S) -> Result<S::Ok, S::Error> {
     to.collect_map(values.iter().map(|(name, value)| (name, value)))
+}
+
+/// A tube that was followed to its end.
+struct Followed {
+    seen: Seen,
+    /// why it proves nothing of the box
+    obstacle: Option<String>,
 }
 
 /// The plant, what is known of it, and where it has to stay.
@@ -245,49 +257,48 @@ impl Question {
         if tube.obstacle.is_some() {
             return tube;
         }
-        let end = self.followed(&mut tube, budget);
-        if tube.obstacle.is_none() && end == End::Reached {
-            tube.verdict = Standing::Proved;
-        } else if let Some(witness) = self.leaves(budget) {
-            tube.verdict = Standing::Refuted;
-            tube.witness = Some(witness);
+        let whole = self.followed(&self.problem, false, budget);
+        let mut seen = whole.seen;
+        match whole.obstacle {
+            None => tube.verdict = Standing::Proved,
+            Some(obstacle) => {
+                if let Some(witness) = self.leaves(budget) {
+                    (tube.verdict, tube.witness) = (Standing::Refuted, Some(witness));
+                } else if let Some(parts) = self.in_parts(budget) {
+                    (tube.verdict, seen) = (Standing::Proved, parts);
+                }
+                tube.obstacle = Some(obstacle).filter(|_| tube.verdict == Standing::Undecided);
+            }
         }
+        seen.cut();
+        tube.reached = seen.reached;
+        tube.range = named(&self.states, &seen.range());
+        tube.end = named(&self.states, &seen.end);
+        tube.rows = seen.rows;
         tube
     }
 
-    /// Goes along the tube; where it is not inside the box is an obstacle.
-    fn followed(&self, tube: &mut Tube, budget: &Budget) -> End {
-        let mut obstacle = self.outside(&self.problem.start).map(|i| {
-            let found = self.problem.start[i];
-            self.beyond(i, self.problem.from, found)
-        });
-        let mut rows = vec![];
-        let mut last = self.problem.start.clone();
-        let (end, reached) = reach(
-            &self.problem,
-            self.until,
-            budget,
-            &mut |segment: &Segment| {
-                let range = segment.range();
-                if obstacle.is_none() {
-                    let i = self.outside(&range);
-                    obstacle = i.map(|i| self.beyond(i, segment.from(), range[i]));
-                }
-                rows.push((segment.from(), segment.to(), range));
-                last = segment.end();
-                ControlFlow::Continue(())
-            },
-        );
-        for (_, _, ranges) in &rows {
-            for ((_, all), range) in tube.range.iter_mut().zip(ranges) {
-                *all = all.hull(*range);
+    /// Goes along a tube to its end, or only as far as it is inside the box; where it is not is an obstacle.
+    fn followed(&self, problem: &Problem, inside: bool, budget: &Budget) -> Followed {
+        let mut seen = Seen::new(problem, self.until);
+        let outside = |time: f64, ranges: &[Interval]| {
+            let i = self.outside(ranges)?;
+            Some(self.beyond(i, time, ranges[i]))
+        };
+        let mut obstacle = outside(problem.from, &problem.start);
+        let (end, reached) = reach(problem, self.until, budget, &mut |segment: &Segment| {
+            let range = segment.range();
+            if obstacle.is_none() {
+                obstacle = outside(segment.from(), &range);
             }
-        }
-        for ((_, all), range) in tube.end.iter_mut().zip(&last) {
-            *all = *range;
-        }
-        tube.reached = reached;
-        tube.rows = thinned(rows);
+            seen.add(segment.from(), segment.to(), &range);
+            seen.end = segment.end();
+            match inside && obstacle.is_some() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        });
+        seen.reached = reached;
         let ended = match end {
             End::Reached | End::Stopped => None,
             End::Stuck => Some(format!(
@@ -296,8 +307,49 @@ impl Question {
             )),
             End::Spent(spent) => Some(format!("it had come to {}: {spent}", number(reached))),
         };
-        tube.obstacle = obstacle.or(ended);
-        end
+        let obstacle = obstacle.or(ended);
+        Followed { seen, obstacle }
+    }
+
+    /// The tubes of halves of the start set, halves of these, and so on, if all are proved: a smaller part
+    /// has a narrower tube.
+    fn in_parts(&self, budget: &Budget) -> Option<Seen> {
+        let mut open: Vec<(Problem, usize)> = self.halves(&self.problem, HALVINGS)?.into();
+        let mut all: Option<Seen> = None;
+        while let Some((problem, left)) = open.pop() {
+            let found = self.followed(&problem, true, budget);
+            if found.obstacle.is_some() {
+                open.extend(self.halves(&problem, left)?);
+            } else if let Some(all) = &mut all {
+                all.join(&found.seen);
+            } else {
+                all = Some(found.seen);
+            }
+        }
+        all
+    }
+
+    /// Both halves along the side that is widest beside the whole; none where so much was halved.
+    fn halves(&self, problem: &Problem, left: usize) -> Option<[(Problem, usize); 2]> {
+        let left = left.checked_sub(1)?;
+        let widths = |problem: &Problem| -> Vec<f64> {
+            let ranges = problem.start.iter().chain(&problem.constants);
+            ranges.map(|range| range.width()).collect()
+        };
+        let all = widths(&self.problem).into_iter().zip(widths(problem));
+        let shares = all.map(|(whole, part)| if whole > 0.0 { part / whole } else { 0.0 });
+        let widest = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0));
+        let (place, share) = shares.enumerate().max_by(widest)?;
+        let half = |upper: bool| {
+            let mut part = problem.clone();
+            let ranges = part.start.iter_mut().chain(&mut part.constants);
+            for range in ranges.skip(place).take(1) {
+                let (low, high) = range.bisect();
+                *range = if upper { high } else { low };
+            }
+            (part, left)
+        };
+        (share > 0.0).then(|| [half(true), half(false)])
     }
 
     /// The first state that may be outside of its side.
@@ -453,200 +505,4 @@ fn refuse_others<'v>(
         names.join(", ")
     );
     Err(name.blame(Error::input(message)))
-}
-
-/// No more rows than are kept: hulls of neighbours.
-fn thinned(rows: Vec<(f64, f64, Vec<Interval>)>) -> Vec<(f64, f64, Vec<Interval>)> {
-    let group = rows.len().div_ceil(ROWS).max(1);
-    let hull = |rows: &[(f64, f64, Vec<Interval>)]| {
-        let (first, others) = rows.split_first()?;
-        let mut all = first.clone();
-        for (_, to, ranges) in others {
-            all.1 = *to;
-            for (all, range) in all.2.iter_mut().zip(ranges) {
-                *all = all.hull(*range);
-            }
-        }
-        Some(all)
-    };
-    rows.chunks(group).filter_map(hull).collect()
-}
-
-/// Four significant digits that hold all of the range.
-fn outward(range: Interval) -> String {
-    let digits = |x: f64, up: bool| {
-        if x == 0.0 || !x.is_finite() {
-            return number(x);
-        }
-        let unit = 10_f64.powi(x.abs().log10().floor() as i32 - 3);
-        let near = (x / unit).round();
-        let text = number(near * unit);
-        let shown: f64 = text.parse().unwrap_or(f64::NAN);
-        let step = if up { 1.0 } else { -1.0 };
-        match (up && shown < x) || (!up && shown > x) {
-            true => number((near + step) * unit),
-            false => text,
-        }
-    };
-    format!(
-        "[{}, {}]",
-        digits(range.lo(), false),
-        digits(range.hi(), true)
-    )
-}
-
-fn listed(ranges: &[(String, Interval)]) -> String {
-    let range = |(name, range): &(String, Interval)| match range.is_point() {
-        true => format!("{name} = {}", number(range.lo())),
-        false => format!("{name} in {}", outward(*range)),
-    };
-    ranges.iter().map(range).collect::<Vec<_>>().join(", ")
-}
-
-impl Tube {
-    /// The clause of the first line.
-    pub(super) fn clause(&self) -> String {
-        let until = number(self.until);
-        match self.verdict {
-            Standing::Proved => {
-                format!("the plant stays in the box from these starts until {until} (proved)")
-            }
-            Standing::Refuted => "the plant leaves the box from some of these starts".to_owned(),
-            Standing::Undecided => format!(
-                "whether the plant stays in the box from these starts until {until} is undecided"
-            ),
-        }
-    }
-
-    /// The part of the answer about it.
-    pub(super) fn tell(&self, document: &mut Document) {
-        let heading = format!("the plant stays in the box until {}: ", number(self.until));
-        document.heading(Line::from(heading).decided(self.verdict.word()));
-        document.item(format!(
-            "from {} at {}",
-            listed(&self.start),
-            number(self.from)
-        ));
-        if !self.constants.is_empty() {
-            document.item(format!("with constant {}", listed(&self.constants)));
-        }
-        if !self.inputs.is_empty() {
-            document.item(format!("however these vary: {}", listed(&self.inputs)));
-        }
-        if let Some(witness) = &self.witness {
-            let at = witness.at.iter().map(|(name, x)| format!("{name} = {x:?}"));
-            document.item(format!(
-                "with {} it is outside of it for certain at {}: {} in {}",
-                at.collect::<Vec<_>>().join(", "),
-                number(witness.time),
-                witness.state,
-                outward(
-                    Interval::new(witness.value[0], witness.value[1]).unwrap_or(Interval::UNKNOWN)
-                )
-            ));
-        }
-        document.items(self.obstacle.iter().map(String::as_str));
-        if self.reached > self.from {
-            let rows = self
-                .range
-                .iter()
-                .zip(&self.end)
-                .map(|((name, all), (_, end))| {
-                    vec![
-                        name.as_str().into(),
-                        outward(*all).into(),
-                        outward(*end).into(),
-                    ]
-                });
-            let (all, end) = (
-                format!("until {}", number(self.reached)),
-                format!("at {}", number(self.reached)),
-            );
-            document.table(Table::plain(["state", all.as_str(), end.as_str()]).with(rows));
-        }
-        document.notes(self.notes.iter().cloned());
-    }
-}
-
-/// What is proved of the plant's way from a set of starts.
-#[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema), schemars(rename = "Tube"))]
-pub(super) struct TubeEntry {
-    /// whether it stays in the box until the time asked for
-    verdict: Verdict,
-    /// when it starts
-    from: f64,
-    /// until when it is asked
-    until: f64,
-    /// until when the ranges are proved
-    reached: f64,
-    /// ranges of the states at the start
-    start: Named<Range>,
-    /// ranges of unknown inputs that stay constant
-    constants: Named<Range>,
-    /// ranges of inputs that may vary as they like
-    inputs: Named<Range>,
-    /// ranges of the states over all of the time that is reached
-    range: Named<Range>,
-    /// ranges of the states at the end of it
-    end: Named<Range>,
-    /// where the states are from one time to the next
-    rows: Vec<TubeRow>,
-    /// why it is not proved
-    obstacle: Option<String>,
-    /// a run that leaves the box for certain
-    witness: Option<Witness>,
-    /// what it leaves aside
-    notes: Vec<String>,
-}
-
-/// A part of a tube.
-#[derive(Debug, Serialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-struct TubeRow {
-    /// from when
-    from: f64,
-    /// to when
-    to: f64,
-    /// ranges of the states
-    range: Named<Range>,
-}
-
-fn ends(range: Interval) -> Range {
-    [range.lo(), range.hi()].map(lynkeus_experiment::entries::finite)
-}
-
-fn entries(ranges: &[(String, Interval)]) -> Named<Range> {
-    ranges
-        .iter()
-        .map(|(name, range)| (name.clone(), ends(*range)))
-        .collect()
-}
-
-impl From<&Tube> for TubeEntry {
-    fn from(tube: &Tube) -> Self {
-        let row = |(from, to, ranges): &(f64, f64, Vec<Interval>)| {
-            let names = tube.start.iter().map(|(name, _)| name.clone());
-            TubeRow {
-                from: *from,
-                to: *to,
-                range: names.zip(ranges.iter().map(|r| ends(*r))).collect(),
-            }
-        };
-        Self {
-            verdict: tube.verdict.into(),
-            from: tube.from,
-            until: tube.until,
-            reached: tube.reached,
-            start: entries(&tube.start),
-            constants: entries(&tube.constants),
-            inputs: entries(&tube.inputs),
-            range: entries(&tube.range),
-            end: entries(&tube.end),
-            rows: tube.rows.iter().map(row).collect(),
-            obstacle: tube.obstacle.clone(),
-            witness: tube.witness.clone(),
-            notes: tube.notes.clone(),
-        }
-    }
 }
