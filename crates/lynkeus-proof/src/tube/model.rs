@@ -153,7 +153,10 @@ impl Model {
             + self.entries() as f64 * other.entries() as f64 * f64::MIN_POSITIVE;
         let lost = dropped(self, other, ring, degree);
         let left_out = own * other.rest + its * self.rest + self.rest * other.rest;
-        let rest = match own == 0.0 && self.rest == 0.0 || its == 0.0 && other.rest == 0.0 {
+        let is_zero = own == 0.0 && self.rest == 0.0 || its == 0.0 && other.rest == 0.0;
+        let rest = match is_zero {
+            // zero times what may have no value may have none
+            true if self.rest.is_infinite() || other.rest.is_infinite() => f64::INFINITY,
             true => 0.0,
             false => raised(lost + rounding + left_out + f64::MIN_POSITIVE, 8),
         };

@@ -40,10 +40,11 @@ impl Zonotope {
         };
         let image = |column: &Vec<f64>| W.iter().map(|row| along(row, column)).collect();
         let mut columns: Vec<Vec<f64>> = self.columns.iter().map(image).collect();
+        let long = d.iter().fold(0.0_f64, |a, b| a.max(*b));
         // Σᵢ |Wₖⱼ Gⱼᵢ| ≤ |Lₖⱼ|, of which each product and sum takes a share
         let rounding = |k: usize| {
             let size: f64 = L[k].iter().map(|l| l.abs()).sum();
-            let tiny = (n * (self.columns.len() + 1)) as f64 * f64::MIN_POSITIVE;
+            let tiny = (n * (self.columns.len() + 1)) as f64 * f64::MIN_POSITIVE * (1.0 + long);
             raised((n as f64 + 4.0) * f64::EPSILON * size, n) + tiny
         };
         let mut rest: Vec<f64> = (0..n).map(|k| raised(around[k] + rounding(k), 2)).collect();

@@ -422,6 +422,10 @@ fn where_solutions_end() {
         end == End::Stuck && time < 1.9 && time > 1.0,
         "{end:?} {time}"
     );
+    // nothing times what has no value has none
+    let hidden: &Right = &|g, x| vec![g.constant(0.0) + (x[0] - x[0]) * (1.0 / x[0])];
+    let (end, ..) = attack("0/x", &problem(hidden, &[(-0.1, 0.1)], &[], &[]), 1.0, 0);
+    assert_eq!(end, End::Stuck);
     let singular: &Right = &|_, x| vec![1.0 / x[0]];
     let (end, time, _) = attack("1/x", &problem(singular, &[(-0.1, 0.1)], &[], &[]), 1.0, 0);
     assert_eq!((end, time), (End::Stuck, 0.0));
