@@ -388,11 +388,11 @@ impl Question {
         let places = middle.chain(corners);
         places
             .flat_map(|corner| inputs.iter().map(move |end| (corner, *end)))
-            .find_map(|(corner, end)| self.from_point(corner, end, budget))
+            .find_map(|(corner, end)| self.run_from(corner, end, budget))
     }
 
     /// From the middle or a corner of the start set, with inputs in the middle or at an end.
-    fn from_point(
+    fn run_from(
         &self,
         corner: Option<usize>,
         end: Option<bool>,
