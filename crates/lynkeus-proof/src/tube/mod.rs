@@ -27,25 +27,10 @@ mod zonotope;
 
 use std::ops::ControlFlow;
 
-use lynkeus_expr::{Budget, Interval, Spent, Tape};
+use lynkeus_expr::{Budget, Spent};
 
-pub use step::Segment;
 use step::Stepper;
-
-/// What is integrated: from where, with which constants and inputs.
-#[derive(Clone, Debug)]
-pub struct Problem {
-    /// x': its inputs are the states, time, the constants, the inputs, in this order
-    pub right: Tape,
-    /// when it starts
-    pub from: f64,
-    /// x(t₀), one range per state
-    pub start: Vec<Interval>,
-    /// p, one range per constant: the same unknown number for all times
-    pub constants: Vec<Interval>,
-    /// u, one range per input: any measurable function of time within it
-    pub inputs: Vec<Interval>,
-}
+pub use step::{Problem, Segment};
 
 /// Why a tube ends.
 #[derive(Clone, Copy, Debug, PartialEq)]

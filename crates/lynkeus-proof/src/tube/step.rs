@@ -2,9 +2,8 @@
 
 use std::rc::Rc;
 
-use lynkeus_expr::Interval;
+use lynkeus_expr::{Interval, Tape};
 
-use super::Problem;
 use super::algebra::Models;
 use super::model::{Model, raised};
 use super::ring::{Part, Ring};
@@ -34,6 +33,21 @@ const PIECES: usize = 6;
 
 /// Tries to find a remainder that a step keeps.
 const TRIES: usize = 8;
+
+/// What is integrated: from where, with which constants and inputs.
+#[derive(Clone, Debug)]
+pub struct Problem {
+    /// x': its inputs are the states, time, the constants, the inputs, in this order
+    pub right: Tape,
+    /// when it starts
+    pub from: f64,
+    /// x(t₀), one range per state
+    pub start: Vec<Interval>,
+    /// p, one range per constant: the same unknown number for all times
+    pub constants: Vec<Interval>,
+    /// u, one range per input: any measurable function of time within it
+    pub inputs: Vec<Interval>,
+}
 
 /// The set between steps, and how the next one is tried.
 pub(super) struct Stepper<'p> {

@@ -16,8 +16,7 @@ use lynkeus_experiment::prepare::Prepared;
 use lynkeus_experiment::prepare::systems::starts;
 use lynkeus_experiment::words::{explain, number};
 pub use seen::Row;
-use seen::Seen;
-use told::outward;
+use seen::{Seen, outward};
 
 mod seen;
 pub(crate) mod told;

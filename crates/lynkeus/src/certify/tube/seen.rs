@@ -3,6 +3,8 @@
 use lynkeus_expr::Interval;
 use lynkeus_proof::tube::Problem;
 
+use lynkeus_experiment::words::number;
+
 /// Parts of the time in which the tube is told.
 const ROWS: usize = 200;
 
@@ -78,4 +80,27 @@ fn join(all: &mut Vec<Interval>, ranges: &[Interval]) {
     for (all, range) in all.iter_mut().zip(ranges) {
         *all = all.hull(*range);
     }
+}
+
+/// Four significant digits that hold all of the range.
+pub(super) fn outward(range: Interval) -> String {
+    let digits = |x: f64, up: bool| {
+        if x == 0.0 || !x.is_finite() {
+            return number(x);
+        }
+        let unit = 10_f64.powi(x.abs().log10().floor() as i32 - 3);
+        let near = (x / unit).round();
+        let text = number(near * unit);
+        let shown: f64 = text.parse().unwrap_or(f64::NAN);
+        let step = if up { 1.0 } else { -1.0 };
+        match (up && shown < x) || (!up && shown > x) {
+            true => number((near + step) * unit),
+            false => text,
+        }
+    };
+    format!(
+        "[{}, {}]",
+        digits(range.lo(), false),
+        digits(range.hi(), true)
+    )
 }

@@ -6,32 +6,10 @@ use lynkeus_expr::Interval;
 use lynkeus_structure::Standing;
 use serde::Serialize;
 
+use super::seen::outward;
 use super::{Row, Tube, Witness};
 use lynkeus_experiment::entries::{Named, Range, Verdict, finite};
 use lynkeus_experiment::words::number;
-
-/// Four significant digits that hold all of the range.
-pub(super) fn outward(range: Interval) -> String {
-    let digits = |x: f64, up: bool| {
-        if x == 0.0 || !x.is_finite() {
-            return number(x);
-        }
-        let unit = 10_f64.powi(x.abs().log10().floor() as i32 - 3);
-        let near = (x / unit).round();
-        let text = number(near * unit);
-        let shown: f64 = text.parse().unwrap_or(f64::NAN);
-        let step = if up { 1.0 } else { -1.0 };
-        match (up && shown < x) || (!up && shown > x) {
-            true => number((near + step) * unit),
-            false => text,
-        }
-    };
-    format!(
-        "[{}, {}]",
-        digits(range.lo(), false),
-        digits(range.hi(), true)
-    )
-}
 
 fn listed(ranges: &[(String, Interval)]) -> String {
     let range = |(name, range): &(String, Interval)| match range.is_point() {
@@ -43,7 +21,7 @@ fn listed(ranges: &[(String, Interval)]) -> String {
 
 impl Tube {
     /// The clause of the first line.
-    pub(in crate::certify) fn clause(&self) -> String {
+    pub(crate) fn clause(&self) -> String {
         let until = number(self.until);
         match self.verdict {
             Standing::Proved => {
@@ -57,7 +35,7 @@ impl Tube {
     }
 
     /// The part of the answer about it.
-    pub(in crate::certify) fn tell(&self, document: &mut Document) {
+    pub(crate) fn tell(&self, document: &mut Document) {
         let heading = format!("the plant stays in the box until {}: ", number(self.until));
         document.heading(Line::from(heading).decided(self.verdict.word()));
         document.item(format!(
