@@ -17,7 +17,7 @@
 //!
 //! Between steps the set is p₀(s) + G ξ, a polynomial and a zonotope, ξ ∈ [−1, 1]ᵐ. A step takes
 //! d ∘ q for Gξ, with d the sums of G's rows; what comes back linear in q is multiplied to G, all
-//! else becomes new columns ([`zonotope`]).
+//! else becomes new columns (`zonotope.rs`).
 
 mod algebra;
 mod model;

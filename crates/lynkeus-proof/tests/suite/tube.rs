@@ -139,13 +139,12 @@ impl<'p> Integrator<'p> {
     fn step(&mut self, t: f64, x: &mut [f64], h: f64) {
         let n = x.len();
         for (stage, share) in [0.0, 0.5, 0.5, 1.0].into_iter().enumerate() {
-            for i in 0..n {
-                let before = if stage == 0 {
-                    0.0
-                } else {
-                    self.stages[stage - 1][i]
+            for (i, x) in x.iter().enumerate() {
+                let before = match stage {
+                    0 => 0.0,
+                    _ => self.stages[stage - 1][i],
                 };
-                self.arguments[i] = x[i] + share * h * before;
+                self.arguments[i] = x + share * h * before;
             }
             self.arguments[n] = t + share * h;
             self.right.eval(&self.arguments, &mut self.stages[stage]);
@@ -161,7 +160,7 @@ fn outside(x: &[f64], ranges: &[Interval], slack: f64) -> bool {
     let off = |(x, range): (&f64, &Interval)| {
         let slack = slack * (1.0 + x.abs());
         // not written with ≤: a run that is no number is outside
-        !(*x >= range.lo() - slack && *x <= range.hi() + slack) || !range.is_bounded()
+        !(range.is_bounded() && *x >= range.lo() - slack && *x <= range.hi() + slack)
     };
     x.iter().zip(ranges).any(off)
 }
