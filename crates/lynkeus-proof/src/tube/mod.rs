@@ -74,7 +74,7 @@ pub enum End {
 /// assert_eq!((end, time), (End::Reached, 1.0));
 /// // between e⁻¹ − 0.1(1 − e⁻¹) and 2e⁻¹ + 0.1(1 − e⁻¹)
 /// let last = last.unwrap();
-/// assert!(last.lo() > 0.30 && last.lo() < 0.3047 && last.hi() > 0.7989 && last.hi() < 0.803);
+/// assert!(last.lo() > 0.29 && last.lo() < 0.3046 && last.hi() > 0.7990 && last.hi() < 0.81);
 /// # Ok::<(), lynkeus_expr::MissingInput>(())
 /// ```
 pub fn reach(
