@@ -58,9 +58,12 @@ impl Models<'_> {
         let range = self.range(x).hull(centre);
         let all = coefficients(range, power + 1);
         let last = all.get(power + 1).copied().unwrap_or(Interval::ZERO);
-        // a function that has no value somewhere in the range has no coefficients there either
-        if !range.is_bounded() || !all.iter().all(|c| c.is_bounded()) {
+        if !range.is_bounded() {
             return Model::unknown(self.ring);
+        }
+        // where derivatives have no bounds, the values may have; where these have none, nothing has
+        if !all.iter().all(|c| c.is_bounded()) {
+            return self.within(all[0]);
         }
         let series = coefficients(centre, power);
         let mut offset = x.clone();
@@ -193,9 +196,12 @@ impl Algebra for Models<'_> {
     }
 
     fn powi(&self, x: &Model, n: i32) -> Model {
+        // the power 0 of what has no value has none
+        if !x.rest.is_finite() {
+            return Model::unknown(self.ring);
+        }
         if n < 0 {
-            let power = self.powi(x, n.saturating_neg());
-            return self.quotient(&self.number(1.0), &power);
+            return self.expanded(x, &|jets, t| jets.powi(t, n));
         }
         let (mut square, mut left) = (x.clone(), n);
         let mut power = self.number(1.0);

@@ -23,6 +23,8 @@ mod algebra;
 mod model;
 mod ring;
 mod step;
+#[cfg(test)]
+mod tests;
 mod zonotope;
 
 use std::ops::ControlFlow;
@@ -85,10 +87,11 @@ pub fn reach(
 ) -> (End, f64) {
     let mut stepper = Stepper::new(problem, until);
     while stepper.time() < until {
+        let found = stepper.step(budget);
         if let Some(spent) = budget.spent() {
             return (End::Spent(spent), stepper.time());
         }
-        let Some(segment) = stepper.step() else {
+        let Some(segment) = found else {
             return (End::Stuck, stepper.time());
         };
         let stop = see(&segment).is_break();

@@ -147,9 +147,11 @@ impl Model {
             }
         }
         let (own, its) = (self.norm(), other.norm());
+        // infinite where a coefficient overflows
+        let whole = own * its;
         // a coefficient gets at most one term from each coefficient of either factor
         let terms = self.entries().min(other.entries());
-        let rounding = raised((terms as f64 + 1.0) * f64::EPSILON * own * its, 4)
+        let rounding = raised((terms as f64 + 1.0) * f64::EPSILON * whole, 4)
             + self.entries() as f64 * other.entries() as f64 * f64::MIN_POSITIVE;
         let lost = dropped(self, other, ring, degree);
         let left_out = own * other.rest + its * self.rest + self.rest * other.rest;
@@ -228,8 +230,10 @@ impl Model {
         }
     }
 
-    /// All its values where the first symbols have these values, for a model without τ.
+    /// All its values where the first symbols of the start set have these values, for a model
+    /// without τ.
     pub fn range_at(&self, ring: &Ring, symbols: &[f64]) -> Interval {
+        let symbols = &symbols[..symbols.len().min(ring.start())];
         let value = |i: usize| {
             let powers = ring.exponents(i).iter().enumerate();
             let factor = |(j, &power): (usize, &u8)| match symbols.get(j) {
@@ -254,6 +258,9 @@ impl Model {
         let (mut low, mut high) = (0.0, 0.0);
         for (k, row) in self.coefficients.chunks(ring.len()).enumerate() {
             for (i, c) in row.iter().enumerate().skip(usize::from(k == 0)) {
+                if c.is_nan() {
+                    return Interval::UNKNOWN;
+                }
                 if *c != 0.0 {
                     let (least, most) = match ring.is_even(i) {
                         true => (c.min(0.0), c.max(0.0)),

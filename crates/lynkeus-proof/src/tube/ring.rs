@@ -38,7 +38,9 @@ impl Ring {
     /// For so many symbols of the start set and so many of the remainder: of the highest order with
     /// a bearable number of monomials.
     pub fn new(start: usize, remainder: usize) -> Self {
-        let count = |order| (1..=order).fold(1, |count, k| count * (start + k) / k);
+        let count = |order: usize| {
+            (1..=order).fold(1_usize, |count, k| count.saturating_mul(start + k) / k)
+        };
         let fits = |order: &usize| count(*order) <= MOST;
         let order = match start {
             0 => 1,
@@ -47,7 +49,8 @@ impl Ring {
         Self::of_order(start, remainder, order)
     }
 
-    fn of_order(start: usize, remainder: usize, order: usize) -> Self {
+    /// Of a given order.
+    pub fn of_order(start: usize, remainder: usize, order: usize) -> Self {
         let heavy = order.saturating_sub(1).max(1);
         let symbols: Vec<usize> = (0..start + remainder)
             .map(|i| if i < start { 1 } else { heavy })
@@ -89,6 +92,11 @@ impl Ring {
     /// Number of monomials.
     pub fn len(&self) -> usize {
         self.monomials.len()
+    }
+
+    /// Number of symbols of the start set.
+    pub fn start(&self) -> usize {
+        self.start
     }
 
     /// The highest weight.

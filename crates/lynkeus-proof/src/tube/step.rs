@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use lynkeus_expr::{Interval, Tape};
+use lynkeus_expr::{Budget, Interval, Tape};
 
 use super::algebra::Models;
 use super::model::{Model, raised};
@@ -134,15 +134,18 @@ impl<'p> Stepper<'p> {
         self.set = set;
     }
 
-    /// The longest next part that is proved, if there is one.
-    pub fn step(&mut self) -> Option<Segment> {
+    /// The longest next part that is proved, if there is one that is found within the budget.
+    pub fn step(&mut self, budget: &Budget) -> Option<Segment> {
         let span = self.until - self.problem.from;
+        if !span.is_finite() {
+            return None;
+        }
         let reach = self.set.zonotope.reach();
         let start = self.start(&reach)?;
         let is_driven = self.inputs.iter().any(|u| u.rest > 0.0);
         let most = CONTRACTION[usize::from(is_driven)];
         let mut step = self.set.step;
-        while step >= SHORTEST * span {
+        while step >= SHORTEST * span && budget.spent().is_none() {
             let left = self.until - self.set.time;
             let to = match step >= 0.99 * left {
                 true => self.until,
@@ -347,7 +350,8 @@ impl Segment {
     }
 
     /// Where the states of the solutions are when it ends that started where the symbols of the wide
-    /// ranges, those of the start first, then of the constants, have these values between −1 and 1.
+    /// ranges, those of the start first, then of the constants, have these values between −1 and 1; values beyond these symbols
+    /// stand for nothing.
     pub fn end_from(&self, symbols: &[f64]) -> Vec<Interval> {
         self.last
             .iter()
@@ -381,5 +385,171 @@ impl Segment {
             zonotope: self.zonotope.through(&L, &self.reach, &around),
             step: self.next,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use lynkeus_expr::{Expr, Graph, Node};
+
+    use super::super::{End, reach};
+    use super::*;
+
+    type Right = dyn for<'g> Fn(&'g Graph, &[Expr<'g>]) -> Vec<Expr<'g>>;
+
+    fn interval(low: f64, high: f64) -> Interval {
+        Interval::new(low, high).unwrap()
+    }
+
+    /// A plant of states, time and inputs from t = 0.
+    fn plant(right: &Right, start: &[(f64, f64)], inputs: &[(f64, f64)]) -> Problem {
+        let g = Graph::new();
+        let count = start.len() + 1 + inputs.len();
+        let v: Vec<Expr<'_>> = (0..count).map(|i| g.symbol(&format!("v{i}"))).collect();
+        let nodes = |all: &[Expr<'_>]| all.iter().map(|e| e.node()).collect::<Vec<Node>>();
+        let ranges = |all: &[(f64, f64)]| all.iter().map(|&(a, b)| interval(a, b)).collect();
+        Problem {
+            right: Tape::new(&g, &nodes(&v), &nodes(&right(&g, &v))).unwrap(),
+            from: 0.0,
+            start: ranges(start),
+            constants: vec![],
+            inputs: ranges(inputs),
+        }
+    }
+
+    /// Every segment holds what the exact solution x(s, t) does, s in [−1, 1] being where the first
+    /// state starts; where the tube ends.
+    fn followed(problem: &Problem, until: f64, x: &dyn Fn(f64, f64) -> f64) -> Vec<Interval> {
+        let mut last = vec![];
+        let (end, _) = reach(problem, until, &Budget::default(), &mut |segment| {
+            for k in 0..=10 {
+                let s = f64::from(k) / 5.0 - 1.0;
+                for share in [0.01, 0.3, 0.7, 1.0] {
+                    let t = segment.from + share * (segment.to - segment.from);
+                    let (value, range) = (x(s, t), segment.range()[0].inflate(1e-12));
+                    assert!(range.contains(value), "{t}: {value} is not in {range}");
+                }
+                let (value, t) = (x(s, segment.to), segment.to);
+                for range in [segment.end()[0], segment.end_from(&[s])[0]] {
+                    let range = range.inflate(1e-12);
+                    assert!(range.contains(value), "{t}: {value} is not in {range}");
+                }
+            }
+            last = segment.end();
+            ControlFlow::Continue(())
+        });
+        assert_eq!(end, End::Reached);
+        last
+    }
+
+    /// x' = 10x + u: over a whole second the integral makes every remainder larger.
+    #[test]
+    fn no_remainder_is_taken_that_the_integral_does_not_keep_inside() {
+        let right: &Right = &|_, v| vec![10.0 * v[0] + v[2]];
+        let problem = plant(right, &[(0.0, 0.0)], &[(-0.1, 0.1)]);
+        let stepper = Stepper::new(&problem, 1.0);
+        let start = stepper.start(&[0.0]).unwrap();
+        for (length, is_proved) in [(1.0, false), (0.2, false), (0.02, true)] {
+            let length = Interval::point(length);
+            let proposal = stepper.proposed(&start, length);
+            let found = stepper.proved(&start, &proposal, length);
+            assert_eq!(found.is_some(), is_proved, "{length}");
+        }
+    }
+
+    /// An unstable state whose remainder is small beside that of another one, which does not grow.
+    #[test]
+    fn a_remainder_that_grows_beside_a_large_one() {
+        let right: &Right = &|_, v| vec![512.0 * (v[0] - 1.0) + v[3], v[4]];
+        let inputs = [(-1e-9, 1e-9), (-1.0, 1.0)];
+        let problem = plant(right, &[(1.0, 1.0), (0.0, 0.0)], &inputs);
+        let grown = |_: f64, t: f64| 1.0 + 1e-9 * (512.0 * t).exp_m1() / 512.0;
+        followed(&problem, 0.04, &grown);
+    }
+
+    /// x' = 2x above one and −1 below, from both sides of it.
+    #[test]
+    fn starts_on_both_sides_of_a_jump() {
+        let right: &Right = &|g, v| {
+            let above = g.constant(1.0).less(v[0]);
+            vec![above.select(2.0 * v[0], g.constant(-1.0))]
+        };
+        let problem = plant(right, &[(0.9, 1.1)], &[]);
+        let solution = |s: f64, t: f64| match 1.0 + 0.1 * s {
+            x if x > 1.0 => x * (2.0 * t).exp(),
+            x => x - t,
+        };
+        let last = followed(&problem, 0.3, &solution);
+        assert!(last[0].width() < 3.0, "{last:?}");
+    }
+
+    /// x' = 1 − 2·(x > 0) comes to zero and slides along it.
+    #[test]
+    fn sliding_along_a_jump() {
+        let right: &Right = &|g, v| {
+            let above = g.constant(0.0).less(v[0]);
+            vec![above.select(g.constant(-1.0), g.constant(1.0))]
+        };
+        let problem = plant(right, &[(0.1, 0.3)], &[]);
+        let slides = |s: f64, t: f64| (0.2 + 0.1 * s - t).max(0.0);
+        followed(&problem, 0.5, &slides);
+        let rises = |s: f64, t: f64| (0.1 * s - 0.2 + t).min(0.0);
+        followed(&plant(right, &[(-0.3, -0.1)], &[]), 0.5, &rises);
+    }
+
+    /// Monomials of both kinds of symbols, powers of the remainder's and the rest become a box.
+    #[test]
+    fn what_is_mixed_at_the_end_of_a_step_counts() {
+        let ring = Rc::new(Ring::of_order(1, 1, 2));
+        let zonotope = Zonotope::origin(1).through(&[vec![0.0]], &[0.0], &[0.5]);
+        for i in 0..ring.len() {
+            let mut model = Model::constant(&ring, 0.0);
+            model.coefficients[i] = 1.0;
+            model.rest = 0.25;
+            let set = Segment {
+                ring: Rc::clone(&ring),
+                from: 0.0,
+                to: 1.0,
+                flow: vec![model.clone()],
+                last: vec![model],
+                reach: zonotope.reach(),
+                zonotope: zonotope.clone(),
+                next: 1.0,
+            }
+            .into_end();
+            let polynomial = set.polynomial[0].norm();
+            let beside = set.zonotope.reach()[0];
+            let is_of_the_start = ring.part(i) == Part::Start;
+            assert_eq!(polynomial > 0.0, is_of_the_start);
+            let needed = if is_of_the_start { 0.25 } else { 1.25 };
+            assert!(beside >= needed && beside < needed + 1e-12, "{beside}");
+        }
+    }
+
+    /// Time itself, from a time that is not zero, to the very end.
+    #[test]
+    fn time_goes_on_from_the_start() {
+        let right: &Right = &|_, v| vec![v[1].cos() + 0.0 * v[0]];
+        let mut problem = plant(right, &[(-0.1, 0.1)], &[]);
+        problem.from = 2.3;
+        let solution = |s: f64, t: f64| 0.1 * s + t.sin() - 2.3_f64.sin();
+        let last = followed(&problem, 7.7, &solution);
+        assert!(last[0].width() < 0.2 + 1e-7, "{last:?}");
+    }
+
+    #[test]
+    fn limits_end_a_tube() {
+        let right: &Right = &|_, v| vec![-v[0]];
+        let problem = plant(right, &[(1.0, 2.0)], &[]);
+        let forever = reach(&problem, f64::INFINITY, &Budget::default(), &mut |_| {
+            ControlFlow::Continue(())
+        });
+        assert_eq!(forever, (End::Stuck, 0.0));
+        let budget = Budget::new(None, None);
+        budget.cancel();
+        let cancelled = reach(&problem, 1.0, &budget, &mut |_| ControlFlow::Continue(()));
+        assert_eq!(cancelled, (End::Spent(lynkeus_expr::Spent::Cancelled), 0.0));
     }
 }
