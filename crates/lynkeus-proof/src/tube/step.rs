@@ -543,7 +543,8 @@ mod tests {
     fn limits_end_a_tube() {
         let right: &Right = &|_, v| vec![-v[0]];
         let problem = plant(right, &[(1.0, 2.0)], &[]);
-        let forever = reach(&problem, f64::INFINITY, &Budget::default(), &mut |_| {
+        let budget = Budget::new(Some(std::time::Duration::from_secs(10)), None);
+        let forever = reach(&problem, f64::INFINITY, &budget, &mut |_| {
             ControlFlow::Continue(())
         });
         assert_eq!(forever, (End::Stuck, 0.0));
