@@ -15,8 +15,9 @@ use super::{ErrorModel, Proof, prove};
 use crate::definite::is_positive_definite;
 use crate::matrix::{IntervalMatrix, points, product, square};
 
-/// Parts of the box that are examined, at most.
-const PARTS: usize = 12_000;
+/// Parts of the box that are examined for one P, at most, and for all of a search.
+const PARTS: usize = 6_000;
+const ALL_PARTS: usize = 16_000;
 /// Numbers of which every combination of ends is examined on a part.
 const ENDS: usize = 6;
 /// Corners of the box that P is sought for at first, at most.
@@ -63,12 +64,28 @@ pub struct Together {
 /// Whether P > 0 and He(P A(ξ)) + 2·rate·P < 0 for every ξ of the box. Nothing but P, the rate and
 /// interval arithmetic decides.
 pub fn holds_together(field: &Field<'_>, P: &DMatrix<f64>, rate: f64, budget: &Budget) -> Covered {
+    let mut left = PARTS;
+    covered(field, (P, rate), &mut left, budget)
+}
+
+/// The same, with so many parts left to examine.
+fn covered(
+    field: &Field<'_>,
+    (P, rate): (&DMatrix<f64>, f64),
+    left: &mut usize,
+    budget: &Budget,
+) -> Covered {
     let Some(form) = Form::new(P, rate) else {
         return Covered::Not(middle(&field.sides));
     };
     let mut open = vec![field.sides.clone()];
     let mut parts = 0;
+    let least = left.saturating_sub(PARTS);
     while let Some(part) = open.pop() {
+        if *left == least || budget.spent().is_some() {
+            return Covered::Unknown;
+        }
+        *left -= 1;
         if form.falls(&(field.on)(&part)) {
             parts += 1;
             continue;
@@ -82,9 +99,6 @@ pub fn holds_together(field: &Field<'_>, P: &DMatrix<f64>, rate: f64, budget: &B
         if along.is_some_and(|along| form.falls_along(&center, &along, &part)) {
             parts += 1;
             continue;
-        }
-        if parts + open.len() >= PARTS || budget.spent().is_some() {
-            return Covered::Unknown;
         }
         match form.halves(field, &part) {
             Some(halves) => open.extend(halves),
@@ -222,8 +236,7 @@ impl Form {
         };
         let narrowed = (0..part.len()).filter_map(|side| {
             let halves = cut(side)?;
-            let width = halves.iter().map(|half| self.spread(field, half));
-            Some((width.fold(0.0, f64::max), halves))
+            Some((self.spread(field, &halves[0]), halves))
         });
         let least = narrowed.min_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(least.1)
@@ -256,6 +269,8 @@ struct Search<'a> {
     budget: &'a Budget,
     /// A at points of the box
     models: Vec<ErrorModel>,
+    /// parts that may still be examined
+    left: usize,
 }
 
 impl<'a> Search<'a> {
@@ -265,6 +280,7 @@ impl<'a> Search<'a> {
             scale,
             budget,
             models: vec![],
+            left: ALL_PARTS,
         };
         let middle = middle(&field.sides);
         search.add(&middle);
@@ -309,8 +325,11 @@ impl<'a> Search<'a> {
 
     fn prove_by(&mut self, rate: f64, faster: f64) -> Option<Together> {
         for _ in 0..ADDED {
+            if self.left == 0 {
+                return None;
+            }
             let found = prove(&self.models, self.scale, faster, self.budget)?;
-            match holds_together(self.field, &found.P, rate, self.budget) {
+            match covered(self.field, (&found.P, rate), &mut self.left, self.budget) {
                 Covered::By(parts) => {
                     let multipliers = vec![];
                     let proof = Proof {
@@ -388,7 +407,10 @@ mod tests {
         };
         let budget = Budget::default();
         let found = fastest_together(&field, &[1.0, 1.0], 1.0, &budget).unwrap();
-        assert!(found.proof.rate > (1.0 - ACCURACY) * (1.0 - 0.03), "{found:?}");
+        assert!(
+            found.proof.rate > (1.0 - ACCURACY) * (1.0 - 0.03),
+            "{found:?}"
+        );
         let P = &found.proof.P;
         assert!((P[(0, 0)] - P[(1, 1)]).abs() < 0.2 * P[(0, 0)], "{P}");
         assert_eq!(
