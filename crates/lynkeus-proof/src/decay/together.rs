@@ -16,8 +16,8 @@ use crate::definite::is_positive_definite;
 use crate::matrix::{IntervalMatrix, points, product, square};
 
 /// Parts of the box that are examined for one P, at most, and for all of a search.
-const PARTS: usize = 6_000;
-const ALL_PARTS: usize = 16_000;
+const PARTS: usize = 12_000;
+const ALL_PARTS: usize = 32_000;
 /// Numbers of which every combination of ends is examined on a part.
 const ENDS: usize = 6;
 /// Corners of the box that P is sought for at first, at most.
@@ -149,16 +149,18 @@ impl Form {
         })
     }
 
-    /// Whether it is negative definite for every A between these.
-    fn falls(&self, A: &IntervalMatrix) -> bool {
+    /// The lower triangle of −He(TᵀPAT) less another form.
+    fn lower(&self, A: &IntervalMatrix, less: &IntervalMatrix) -> IntervalMatrix {
         let [left, right] = &self.sides;
         let middle = product(&product(left, A), right);
-        let n = middle.len();
-        let entry = |i: usize, j: usize| -(middle[i][j] + middle[j][i] + self.decay[i][j]);
-        let rows: IntervalMatrix = (0..n)
-            .map(|i| (0..=i).map(|j| entry(i, j)).collect())
-            .collect();
-        is_positive_definite(&rows)
+        let entry = |i: usize, j: usize| -(middle[i][j] + middle[j][i] + less[i][j]);
+        let row = |i: usize| (0..=i).map(|j| entry(i, j)).collect();
+        (0..middle.len()).map(row).collect()
+    }
+
+    /// Whether it is negative definite for every A between these.
+    fn falls(&self, A: &IntervalMatrix) -> bool {
+        is_positive_definite(&self.lower(A, &self.decay))
     }
 
     /// Whether it is so for every A on a part, from A in its middle and A's derivatives on all of it:
@@ -192,22 +194,30 @@ impl Form {
                 }
             }
         }
-        (0..1_usize << ends.len()).all(|choice| {
-            let mut A = rest.clone();
-            for (bit, &k) in ends.iter().enumerate() {
-                let δ = around(&part[k]);
+        let whole = self.lower(&rest, &self.decay);
+        let still = square(n, |_, _| Interval::ZERO);
+        let along: Vec<(Interval, IntervalMatrix)> = ends
+            .iter()
+            .map(|&k| {
+                let plane = square(n, |i, j| Interval::point(slopes[k][i][j].midpoint()));
+                (around(&part[k]), self.lower(&plane, &still))
+            })
+            .collect();
+        (0..1_usize << along.len()).all(|choice| {
+            let mut rows = whole.clone();
+            for (bit, (δ, plane)) in along.iter().enumerate() {
                 let end = Interval::point(if choice >> bit & 1 == 0 {
                     δ.lo()
                 } else {
                     δ.hi()
                 });
-                for i in 0..n {
-                    for j in 0..n {
-                        A[i][j] = A[i][j] + end * Interval::point(slopes[k][i][j].midpoint());
+                for (row, plane) in rows.iter_mut().zip(plane) {
+                    for (entry, slope) in row.iter_mut().zip(plane) {
+                        *entry = *entry + end * *slope;
                     }
                 }
             }
-            self.falls(&A)
+            is_positive_definite(&rows)
         })
     }
 
