@@ -119,8 +119,12 @@ fn certified(
     };
     let together = match found {
         None if system.is_bounded() && !sample.unstable => {
-            let claim = (claim, sample.limit);
-            together::together(augmented, observer, &system, claim, &search)?
+            let rate = match claim {
+                Claim::Fastest => None,
+                Claim::At(rate) => Some(rate),
+            };
+            let rate = (rate, sample.limit);
+            together::together(augmented, observer, &system, rate, &search)?
         }
         _ => None,
     };

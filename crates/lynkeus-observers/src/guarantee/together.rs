@@ -12,7 +12,6 @@ use lynkeus_proof::decay::{Field, Together, fastest_together, prove_together};
 use lynkeus_proof::matrix::{IntervalMatrix, square};
 use lynkeus_structure::{AugmentedPlant, Innovation, Region, regularity};
 
-use super::Claim;
 use super::error_system::{Apart, ErrorSystem};
 use crate::Observer;
 
@@ -30,12 +29,12 @@ struct Joint {
     size: usize,
 }
 
-/// A proof that takes the slopes together, where their ranges apart have none.
+/// A proof that takes the slopes together, of decay at a rate or at the fastest one up to a limit.
 pub(super) fn together(
     augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     system: &ErrorSystem,
-    (claim, limit): (Claim, f64),
+    (rate, limit): (Option<f64>, f64),
     budget: &Budget,
 ) -> Result<Option<Together>, MissingInput> {
     let Some(joint) = Joint::new(augmented, observer, &system.region)? else {
@@ -48,9 +47,9 @@ pub(super) fn together(
         slopes: joint.slopes.is_some().then_some(&slopes),
         sides: joint.sides.clone(),
     };
-    Ok(match claim {
-        Claim::Fastest => fastest_together(&field, &system.scale, limit, budget),
-        Claim::At(rate) => prove_together(&field, &system.scale, (rate, limit), budget),
+    Ok(match rate {
+        None => fastest_together(&field, &system.scale, limit, budget),
+        Some(rate) => prove_together(&field, &system.scale, (rate, limit), budget),
     })
 }
 

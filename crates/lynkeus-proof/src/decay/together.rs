@@ -31,12 +31,15 @@ const ACCURACY: f64 = 0.03;
 /// Rates below this share of the limit count as none.
 const NEGLIGIBLE: f64 = 1e-3;
 
+/// What encloses something on a part of a box.
+type Enclosed<'a, T> = &'a dyn Fn(&[Interval]) -> T;
+
 /// A as a function of a point of a box.
 pub struct Field<'a> {
     /// encloses A on a part of the box
-    pub on: &'a dyn Fn(&[Interval]) -> IntervalMatrix,
+    pub on: Enclosed<'a, IntervalMatrix>,
     /// encloses the derivatives of A in each number there; none where A may jump
-    pub slopes: Option<&'a dyn Fn(&[Interval]) -> Vec<IntervalMatrix>>,
+    pub slopes: Option<Enclosed<'a, Vec<IntervalMatrix>>>,
     /// the box
     pub sides: Vec<Interval>,
 }
