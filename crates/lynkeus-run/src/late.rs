@@ -6,6 +6,7 @@ use std::ops::Deref;
 use crate::filter::Innovation;
 use crate::runner::no_number;
 use crate::snapshot::{self, Damaged, Walk};
+use crate::standing::Standing;
 use crate::{Digest, Error, Estimator, Result, SnapshotFault};
 
 /// Times that differ by less than so many roundings are one: t − delay does not meet the row that is meant to the bit.
@@ -93,6 +94,28 @@ pub struct Revised {
     pub deviations: Option<Vec<f64>>,
     /// what became of its readings, as [`Estimator::innovations`]
     pub innovations: Vec<Innovation>,
+}
+
+/// Where a [`Late`] stands, by name, with the rows that it keeps: what one with other numbers goes on from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Handover {
+    /// where the estimator stood before the rows; none before the first of all
+    pub standing: Option<Standing>,
+    /// names of the signals
+    pub signals: Vec<String>,
+    /// in the order of time
+    pub rows: Vec<HandoverRow>,
+}
+
+/// What was read at a time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HandoverRow {
+    /// when
+    pub t: f64,
+    /// by signal, NaN where nothing was read; none of a prediction
+    pub signals: Vec<f64>,
+    /// it is not only that of a sample that came late
+    pub is_own: bool,
 }
 
 impl Late {
@@ -370,6 +393,87 @@ impl Late {
             restored.estimator.restore(snapshot)?;
         }
         *self = restored;
+        Ok(())
+    }
+
+    /// Where it stands before the rows that it keeps, and these: what [`take_over`](Self::take_over) of another one takes.
+    #[must_use]
+    pub fn handover(&self) -> Handover {
+        let first = self.rows.front().and_then(|row| row.image.as_ref());
+        let standing = match first {
+            None => self.estimator.standing(),
+            Some(image) => {
+                let mut before = self.estimator.clone();
+                before.go_back(image);
+                before.standing()
+            }
+        };
+        let rows = self.rows.iter().map(|row| HandoverRow {
+            t: row.t,
+            signals: row.signals.clone(),
+            is_own: row.is_own,
+        });
+        Handover {
+            standing,
+            signals: self.estimator.signals().to_vec(),
+            rows: rows.collect(),
+        }
+    }
+
+    /// Goes on, before its first row, from where another one stands that has the same states and other numbers, as
+    /// [`Estimator::resume`]; the rows that the other one keeps are gone over again, so that what comes late finds its
+    /// place among them. Where it fails nothing changes.
+    ///
+    /// # Errors
+    /// As [`Estimator::resume`], and of the rows as [`Estimator::push`].
+    pub fn take_over(&mut self, from: &Handover) -> Result<()> {
+        let mut own = self.clone();
+        if let Some(standing) = &from.standing {
+            own.estimator.resume(standing)?;
+            own.is_whole = false;
+            if own.keeps() {
+                own.rows.push_back(Row {
+                    image: Some(own.estimator.image()),
+                    ..Row::new(standing.time, vec![], false)
+                });
+            }
+        }
+        let names = own.estimator.signals();
+        let places = names
+            .iter()
+            .map(|name| from.signals.iter().position(|known| known == name));
+        let places: Vec<Option<usize>> = places.collect();
+        let of = |row: &HandoverRow| {
+            let value = |place: &Option<usize>| {
+                let value = place.and_then(|place| row.signals.get(place));
+                value.copied().unwrap_or(f64::NAN)
+            };
+            let signals = match row.signals.is_empty() {
+                true => vec![],
+                false => places.iter().map(value).collect(),
+            };
+            Row::new(row.t, signals, row.is_own)
+        };
+        let mut rows: Vec<Row> = from.rows.iter().map(of).collect();
+        let newest = rows.last().map(|row| row.t);
+        if own.keeps() {
+            if let Some(newest) = newest {
+                own.take(rows, newest)?;
+                own.forget(newest - own.wait);
+            }
+        } else {
+            if own.estimator.time().is_none() {
+                own.begin(&mut rows);
+            }
+            for row in &rows {
+                match row.signals.is_empty() {
+                    true => own.estimator.predict(row.t)?,
+                    false => own.estimator.push(row.t, &row.signals)?,
+                };
+            }
+        }
+        own.revised.clear();
+        *self = own;
         Ok(())
     }
 

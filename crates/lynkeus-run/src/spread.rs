@@ -164,7 +164,7 @@ impl NoisyPlant<'_> {
 #[derive(Clone, Debug)]
 pub(crate) struct Spread {
     pub propagation: Propagation,
-    belief: Belief,
+    pub belief: Belief,
     /// the covariance from an exact start, where readings are judged
     settled: Option<Root>,
     jacobians: Jacobians<Jacobian>,
@@ -172,7 +172,7 @@ pub(crate) struct Spread {
     values: Vec<f64>,
     sensors: Vec<Sensor>,
     /// so many states before the measurements are drawn anew in every row
-    drawn: usize,
+    pub drawn: usize,
     expected: OutputMap,
     /// of the last readings; empty where they are not judged
     pub innovations: Vec<Innovation>,
