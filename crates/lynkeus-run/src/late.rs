@@ -1,7 +1,7 @@
 //! Readings that come late, put in their place while an estimator runs.
 
 use std::collections::VecDeque;
-use std::ops::Deref;
+use std::ops::{Deref, Range};
 
 use crate::filter::Innovation;
 use crate::runner::no_number;
@@ -81,6 +81,13 @@ struct Row {
     is_own: bool,
     /// the estimator before it
     image: Option<Vec<u64>>,
+}
+
+/// A row that comes.
+struct Arrived {
+    row: Row,
+    /// signals of which it knows better than what is there, also where nothing was read
+    replaced: Range<usize>,
 }
 
 /// What an estimator makes of a row that it goes over again.
@@ -205,23 +212,53 @@ impl Late {
         if !self.keeps() {
             return self.estimator.push(t, signals);
         }
+        self.check(t, signals)?;
+        self.arrive(self.taken(t, signals, false), t)
+    }
+
+    /// As [`push`](Self::push) of several rows at once, whose readings take the place of those that were there at their
+    /// times: one that turns out to be none is taken back.
+    ///
+    /// # Errors
+    /// As [`push`](Self::push), and [`Error::Setting`] where nothing is waited for.
+    pub fn correct(&mut self, rows: &[(f64, Vec<f64>)]) -> Result<&[f64]> {
+        self.revised.clear();
+        if !self.keeps() {
+            return Err(Error::setting("the time to wait", "one > 0", self.wait));
+        }
+        let mut arrived = vec![];
+        let mut newest = f64::NEG_INFINITY;
+        for (t, signals) in rows {
+            self.check(*t, signals)?;
+            arrived.append(&mut self.taken(*t, signals, true));
+            newest = newest.max(*t);
+        }
+        arrived.sort_by(|a, b| a.row.t.total_cmp(&b.row.t));
+        self.arrive(arrived, newest)
+    }
+
+    fn check(&self, t: f64, signals: &[f64]) -> Result<()> {
         let names = self.estimator.signals();
         if signals.len() != names.len() {
             let expected = format!("{}: {}", names.len(), names.join(", "));
             return Err(Error::setting("number of signals", expected, signals.len()));
         }
-        if !t.is_finite() {
-            return Err(no_number("t", t));
+        match t.is_finite() {
+            true => Ok(()),
+            false => Err(no_number("t", t)),
         }
+    }
+
+    /// Takes rows in the order of time, of which the newest came at `t`.
+    fn arrive(&mut self, arrived: Vec<Arrived>, t: f64) -> Result<&[f64]> {
         let came = self.estimator.time().unwrap_or(t).max(t);
-        let arrived = self.taken(t, signals);
         let oldest = came - self.wait;
         let first = self.rows.front().filter(|_| !self.is_whole);
         let is_old = |row: &&Row| {
             let is_before = |t: f64| row.t < t && !is_of_row(row.t, t, came);
             is_before(oldest) || first.is_some_and(|first| is_before(first.t))
         };
-        if let Some(old) = arrived.iter().find(is_old) {
+        if let Some(old) = arrived.iter().map(|arrived| &arrived.row).find(is_old) {
             self.too_late += 1;
             let time = old.t;
             return Err(Error::TooLate { time, oldest });
@@ -242,25 +279,31 @@ impl Late {
     }
 
     /// The rows that such a row stands for, in order: itself, and those of samples that were taken before it.
-    fn taken(&self, t: f64, signals: &[f64]) -> Vec<Row> {
+    fn taken(&self, t: f64, signals: &[f64], replaces: bool) -> Vec<Arrived> {
         let mut own = Row::new(t, signals.to_vec(), true);
         let mut rows = vec![];
         for (sensor, delay) in self.delays.iter().enumerate() {
-            if *delay > 0.0 && signals[sensor].is_finite() {
+            if *delay > 0.0 && (signals[sensor].is_finite() || replaces) {
                 let mut alone = vec![f64::NAN; signals.len()];
                 std::mem::swap(&mut alone[sensor], &mut own.signals[sensor]);
-                rows.push(Row::new(t - delay, alone, false));
+                rows.push(Arrived {
+                    row: Row::new(t - delay, alone, false),
+                    replaced: if replaces { sensor..sensor + 1 } else { 0..0 },
+                });
             }
         }
-        rows.push(own);
-        rows.sort_by(|a, b| a.t.total_cmp(&b.t));
+        rows.push(Arrived {
+            row: own,
+            replaced: if replaces { 0..self.delays.len() } else { 0..0 },
+        });
+        rows.sort_by(|a, b| a.row.t.total_cmp(&b.row.t));
         rows
     }
 
     /// Puts what arrived, in order, where it belongs, and goes over all that is after it.
-    fn take(&mut self, arrived: Vec<Row>, came: f64) -> Result<()> {
+    fn take(&mut self, arrived: Vec<Arrived>, came: f64) -> Result<()> {
         let reached = |row: &Row, t: f64| row.t < t && !is_of_row(t, row.t, came);
-        let first = arrived.first().map_or(came, |row| row.t);
+        let first = arrived.first().map_or(came, |arrived| arrived.row.t);
         let mut from = self.rows.partition_point(|row| reached(row, first));
         if from < self.rows.len() {
             let mut back = self.rows.range(..=from);
@@ -271,16 +314,21 @@ impl Late {
         }
         let old = self.rows.range(from..);
         let mut again: Vec<Row> = old.map(Row::without_image).collect();
-        for row in arrived {
+        for Arrived { row, replaced } in arrived {
             let place = again.partition_point(|known| reached(known, row.t));
-            match again
-                .get_mut(place)
-                .filter(|known| is_of_row(row.t, known.t, came))
-            {
-                Some(known) => known.join(&row),
+            let known = again.get_mut(place);
+            match known.filter(|known| is_of_row(row.t, known.t, came)) {
+                Some(known) => {
+                    known.join(&row);
+                    // of a sensor whose samples come late this row says nothing
+                    let replaced =
+                        replaced.filter(|sensor| !row.is_own || self.delays[*sensor] == 0.0);
+                    replaced.for_each(|sensor| known.signals[sensor] = row.signals[sensor]);
+                }
                 None => again.insert(place, row),
             }
         }
+        again.retain(Row::is_there);
         if self.estimator.time().is_none() {
             self.begin(&mut again);
         }
@@ -458,7 +506,11 @@ impl Late {
         let newest = rows.last().map(|row| row.t);
         if own.keeps() {
             if let Some(newest) = newest {
-                own.take(rows, newest)?;
+                let arrived = rows.into_iter().map(|row| Arrived {
+                    row,
+                    replaced: 0..0,
+                });
+                own.take(arrived.collect(), newest)?;
                 own.forget(newest - own.wait);
             }
         } else {
@@ -510,6 +562,11 @@ impl Row {
             is_own,
             image: None,
         }
+    }
+
+    /// Whether there is something to go over; a prediction has no signals.
+    fn is_there(&self) -> bool {
+        self.is_own || self.signals.is_empty() || self.signals.iter().any(|y| y.is_finite())
     }
 
     fn without_image(&self) -> Self {

@@ -82,10 +82,10 @@ impl Sampled {
         }
     }
 
-    /// States that are no readings, nor drawn anew in every row.
+    /// States that are neither readings nor there for the errors alone.
     fn own(&self) -> usize {
-        let drawn = self.spread.as_ref().map_or(0, |spread| spread.drawn);
-        self.x.len() - self.sensors - drawn
+        let all = self.x.len() - self.sensors;
+        self.spread.as_ref().map_or(all, |spread| spread.own)
     }
 
     fn told(&self) -> usize {

@@ -172,7 +172,9 @@ pub(crate) struct Spread {
     values: Vec<f64>,
     sensors: Vec<Sensor>,
     /// so many states before the measurements are drawn anew in every row
-    pub drawn: usize,
+    drawn: usize,
+    /// so many states before these are the observer's
+    pub own: usize,
     expected: OutputMap,
     /// of the last readings; empty where they are not judged
     pub innovations: Vec<Innovation>,
@@ -206,6 +208,9 @@ impl Spread {
             values: vec![0.0; flow.outputs().len()],
             sensors: model.sensors.clone(),
             drawn: model.drawn,
+            own: model
+                .lag
+                .unwrap_or(flow.states().len() - model.sensors.len() - model.drawn),
             expected: OutputMap::new(&model.output_map),
             innovations: vec![Innovation::default(); judged],
             deviations: vec![0.0; model.estimates],

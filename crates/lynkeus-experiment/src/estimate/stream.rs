@@ -119,7 +119,7 @@ impl Stream {
     ///
     /// # Errors
     /// As [`estimator`](crate::estimator), but for readings that come late; and what a line cannot tell: rotations, a time that is an
-    /// expression, cells that are no readings because of the ones before, where rows may come late.
+    /// expression.
     pub fn new(study: &Study) -> Result<Self, Error> {
         let mut study = study.clone();
         // what is followed for `estimate` is told here
@@ -410,15 +410,5 @@ fn refuse_untold(study: &Study, plant: &Plant) -> Result<(), Error> {
         );
         return Err(time.blame(Error::input(message)));
     }
-    let looks_back = |(_, screen): &&(Name, Screen)| !matches!(screen, Screen::Plausible(..));
-    let mut screens = study.sensors.screens.iter();
-    match screens.find(looks_back).filter(|_| study.serve.wait > 0.0) {
-        None => Ok(()),
-        Some((name, _)) => Err(name.blame(
-            Error::input(format!(
-                "`repeats` and `frozen` of [sensors] look at the reading before, and with `wait` of [serve] rows of {name} may come in another order"
-            ))
-            .hint("leave out one of the two"),
-        )),
-    }
+    Ok(())
 }

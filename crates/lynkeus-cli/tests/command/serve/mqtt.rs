@@ -499,6 +499,14 @@ fn settings_of_a_broker_that_are_none_are_refused() {
             "0 or 1",
         ),
         (
+            "url = \"mqtt://localhost\"\nrows = \"r\"\npublish = \"r\"",
+            "what is published under \"r\" would come back as a row",
+        ),
+        (
+            "url = \"mqtt://localhost\"\nrows = \"r\"\n[serve.opcua]\nurl = \"opc.tcp://localhost\"\nnodes = { y = \"i=1\" }\ninterval = 5000",
+            "interval must be a number in [1e-2, 3600], found 5000",
+        ),
+        (
             "url = \"mqtt://localhost\"\nrows = \"r\"\nversion = \"4\"",
             "\"3.1.1\", \"5\"",
         ),

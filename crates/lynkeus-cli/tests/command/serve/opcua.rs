@@ -311,3 +311,75 @@ fn what_no_server_has_is_refused() {
         assert!(ended.err.contains(words), "{to}: {}", ended.err);
     }
 }
+
+/// Kills at any moment: what the state has goes on, and what the source sends again counts once.
+fn killed(kills: usize, seed: u64) {
+    let port = port();
+    let folder = folder_at(port);
+    let Some(mut server) = Server::new(&folder, port) else {
+        return;
+    };
+    let rows = rows(seed, 4 * (kills + 1), true);
+    let expected = expected(&folder, &rows);
+    let mut random = Normal(seed);
+    let parts: Vec<&[Row]> = rows.chunks(4).collect();
+    for (round, part) in parts.iter().enumerate() {
+        let mut serving = Serving::begin(&folder, &[], "");
+        serving.wait_for("is connected");
+        if round == 0 {
+            for change in changes(&rows[0]) {
+                server.set(change, "0");
+            }
+            wait_until("no first row", || history(&folder).len() == 1);
+        }
+        let before = round.checked_sub(1).map_or(&[][..], |before| parts[before]);
+        for change in before.iter().chain(*part).flat_map(changes) {
+            server.set(change, "0");
+        }
+        let wait = 300.0 * random.uniform();
+        thread::sleep(Duration::from_millis(wait as u64));
+        serving.kill();
+        server.has_all();
+    }
+    let serving = Serving::begin(&folder, &[], "");
+    serving.wait_for("is connected");
+    let last = &rows[rows.len() - 8..];
+    wait_until("the history is not what is expected", || {
+        for change in last.iter().flat_map(changes) {
+            server.set(change, "0");
+        }
+        server.has_all();
+        thread::sleep(Duration::from_millis(500));
+        history(&folder) == expected
+    });
+    serving.stop();
+    let text: String = folder
+        .files()
+        .iter()
+        .filter(|name| name.starts_with("tank-"))
+        .map(|name| folder.read(name))
+        .collect();
+    let told = text
+        .lines()
+        .filter(|line| line.starts_with('2'))
+        .map(|line| {
+            let (rest, revision) = line.rsplit_once(',').unwrap();
+            format!("{} {revision}", rest.split(',').next().unwrap())
+        });
+    let mut told: Vec<String> = told.collect();
+    let count = told.len();
+    told.sort();
+    told.dedup();
+    assert_eq!(count, told.len());
+}
+
+#[test]
+fn a_kill_takes_nothing_twice() {
+    killed(3, 73);
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn two_hundred_kills_take_nothing_twice() {
+    killed(200, 74);
+}
