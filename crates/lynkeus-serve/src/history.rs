@@ -357,7 +357,7 @@ impl History {
 
     /// Leaves its files as a kill does after the thread is done.
     #[cfg(test)]
-    pub fn kill(mut self) {
+    pub fn kill(&mut self) {
         if let Some(worker) = self.worker.take() {
             let _ = worker.join();
         }

@@ -64,7 +64,7 @@ fn killed(mut engine: Engine) {
     if let Some(state) = engine.state.take() {
         state.kill();
     }
-    if let Some(history) = engine.history.take() {
+    if let Some(history) = &mut engine.history {
         history.kill();
     }
 }
@@ -152,6 +152,7 @@ fn run(ending: &str, kill: Kill) -> (Vec<(String, Vec<Told>)>, Vec<Told>) {
     let day = (midnight + DAY).div_euclid(DAY);
     let mut left = engine.history.take().unwrap();
     engine.state.take().unwrap().kill();
+    left.kill();
     left.is_over(day);
     left.kill();
     (history(path), answers)
@@ -171,7 +172,7 @@ fn nothing_is_lost_or_twice_over_midnight() {
             .flat_map(|(_, lines)| lines.clone())
             .collect();
         assert_eq!(all, answers);
-        // six, two, then four alone with three corrections after the late one, then six
+        // six, two, then four alone with four corrections after the late one, then six
         assert_eq!(expected[0].1.len(), 8);
         assert_eq!(expected[1].1.len(), 4 + 4 + 6);
         assert_eq!(

@@ -133,7 +133,11 @@ fn a_state_of_another_plant_is_refused_and_left_alone() {
     served(&folder, "json", &json(&rows));
     let before = std::fs::read(folder.path.path().join("tank.state")).unwrap();
     let study = folder.read("study.toml");
-    folder.write("tank.mo", &PLANT.replace('q', "r"));
+    let other = ["Real q", "= q;", "0.1*q", "0.4*q", "der(q)"];
+    let other = other.iter().fold(PLANT.to_owned(), |plant, part| {
+        plant.replace(part, &part.replace('q', "r"))
+    });
+    folder.write("tank.mo", &other);
     folder.write("study.toml", &study.replace("q =", "r ="));
     let ended = served(&folder, "json", "");
     assert_eq!(ended.code, 2);

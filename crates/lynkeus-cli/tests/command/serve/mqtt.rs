@@ -504,7 +504,7 @@ fn settings_of_a_broker_that_are_none_are_refused() {
         ),
         (
             "url = \"mqtt://localhost\"\nrows = \"r\"\n[serve.opcua]\nurl = \"opc.tcp://localhost\"\nnodes = { y = \"i=1\" }\ninterval = 5000",
-            "interval must be a number in [1e-2, 3600], found 5000",
+            "must be a number in [1e-2, 3600], found 5000",
         ),
         (
             "url = \"mqtt://localhost\"\nrows = \"r\"\nversion = \"4\"",

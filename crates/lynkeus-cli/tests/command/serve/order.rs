@@ -142,11 +142,11 @@ fn silence_hanging_and_jumps_are_told() {
 #[test]
 fn screens_look_at_the_samples_in_their_order() {
     for (seed, more) in [
-        (21, "repeats = [\"y\"]"),
+        (21, "repeats = { y = \"missing\" }"),
         (22, "frozen = { y = 2, a = 3 }"),
         (
             23,
-            "repeats = [\"y\"]\nplausible = { y = [0, 2.15] }\ndelay = { a = 1 }",
+            "repeats = { y = \"missing\" }\nplausible = { y = [0, 2.15] }\ndelay = { a = 1 }",
         ),
     ] {
         let folder = folder("ekf", WAIT);
