@@ -151,9 +151,13 @@ impl Engine {
             self.notes.push(text);
         }
         if !self.changed.is_empty() {
+            self.notes.push(self.told_changes());
+        }
+        if !self.changed.is_empty() || self.moved.contains(&None) {
             let aside = state.set_aside();
             let aside = aside.map_err(|error| State::unusable(path, &error))?;
-            self.notes.push(self.told_changes(&aside));
+            self.notes
+                .push(format!("the state before is {}", aside.display()));
         }
         self.state = Some(state);
         if let Some(history) = &mut self.history {
@@ -218,7 +222,7 @@ impl Engine {
     }
 
     /// What became of a state of another study.
-    fn told_changes(&self, aside: &Path) -> String {
+    fn told_changes(&self) -> String {
         let of = match self.has_names() {
             true => format!(" of {} of {} assets", self.changed.len(), self.assets.len()),
             false => String::new(),
@@ -227,9 +231,8 @@ impl Engine {
         let estimates = first.map_or(&[][..], |stream| &stream.estimates);
         let names: Vec<&str> = estimates.iter().map(|told| told.name.as_str()).collect();
         format!(
-            "the study has changed: the estimates{of} ({}) and what is known of their errors are taken over, whether they are credible is judged anew; the state before is {}",
-            names.join(", "),
-            aside.display()
+            "the study has changed: the estimates{of} ({}) and what is known of their errors are taken over, whether they are credible is judged anew",
+            names.join(", ")
         )
     }
 

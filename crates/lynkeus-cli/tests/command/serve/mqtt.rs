@@ -177,8 +177,8 @@ fn a_kill_loses_no_message_and_takes_none_twice() {
 
 #[test]
 #[ignore = "takes minutes"]
-fn a_hundred_kills_lose_no_message_and_take_none_twice() {
-    killed(100, 64);
+fn two_hundred_kills_lose_no_message_and_take_none_twice() {
+    killed(200, 64);
 }
 
 #[test]
