@@ -231,7 +231,7 @@ impl Engine {
         let estimates = first.map_or(&[][..], |stream| &stream.estimates);
         let names: Vec<&str> = estimates.iter().map(|told| told.name.as_str()).collect();
         format!(
-            "the study has changed: the estimates{of} ({}) and what is known of their errors are taken over, whether they are credible is judged anew",
+            "the study has changed: the estimates{of} ({}) and what is known of their errors are taken over, new rows alone say whether they are credible",
             names.join(", ")
         )
     }

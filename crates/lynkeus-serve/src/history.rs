@@ -551,9 +551,18 @@ mod tests {
         let text = std::fs::read(&draft).unwrap();
         history.is_over(20_001);
         wait(&mut history);
-        std::fs::write(&draft, text).unwrap();
+        std::fs::write(&draft, &text).unwrap();
         history.is_over(20_001);
         wait(&mut history);
         assert_eq!(files(folder.path()), ["h-2024-10-04.parquet"]);
+        // as many lines, and others
+        let other = String::from_utf8(text).unwrap().replace(",2\n", ",3\n");
+        std::fs::write(&draft, other).unwrap();
+        history.is_over(20_001);
+        wait(&mut history);
+        assert_eq!(
+            files(folder.path()),
+            ["h-2024-10-04.2.parquet", "h-2024-10-04.parquet"]
+        );
     }
 }

@@ -286,3 +286,57 @@ fn what_cannot_be_taken_over_is_refused_with_what_to_do() {
         assert!(aside(&folder).is_empty());
     }
 }
+
+/// Every line of the files of a history, but for their headers; by file.
+fn history(folder: &Folder) -> Vec<(String, Vec<String>)> {
+    let names = folder.files().into_iter();
+    let mut names: Vec<String> = names.filter(|name| name.starts_with("tank-2")).collect();
+    names.sort();
+    let lines = |name: String| {
+        let text = folder.read(&name);
+        (name, text.lines().skip(1).map(str::to_owned).collect())
+    };
+    names.into_iter().map(lines).collect()
+}
+
+/// What was told stays in the history: through a change, and through the way back to the state before.
+#[test]
+fn the_history_keeps_what_was_told() {
+    let more = format!("{KEPT}history = \"tank-%Y-%m-%d.csv\"\n");
+    let told = |folder: &Folder| -> Vec<String> {
+        let files = history(folder).into_iter();
+        files.flat_map(|(_, lines)| lines).collect()
+    };
+    let folder = folder("ekf", &more);
+    let rows = rows(65, 40, false);
+    served(&folder, "json", &json(&rows[..20]));
+    let study = folder.read("study.toml");
+    folder.change("study.toml", "y = 0.1", "y = 0.3");
+    served(&folder, "json", &json(&rows[20..30]));
+    let before = told(&folder);
+    assert_eq!(before.len(), 30);
+    let path = folder.path.path();
+    std::fs::rename(path.join(&aside(&folder)[0]), path.join("tank.state")).unwrap();
+    folder.write("study.toml", &study);
+    served(&folder, "json", &json(&rows[20..]));
+    let after = told(&folder);
+    assert_eq!(after.len(), 50);
+    assert_eq!(after[..30], before);
+}
+
+#[test]
+fn a_history_of_other_columns_has_a_file_of_its_own() {
+    let more = format!("{KEPT}history = \"tank-%Y-%m-%d.csv\"\n");
+    let folder = folder("triangular", &more);
+    let rows = rows(66, 12, false);
+    served(&folder, "json", &json(&rows[..5]));
+    folder.change("study.toml", "sd = true", "sd = false");
+    served(&folder, "json", &json(&rows[5..]));
+    let files = history(&folder);
+    let cells = |lines: &[String]| lines.iter().map(|line| line.split(',').count()).max();
+    let found = files.iter().map(|(_, lines)| (lines.len(), cells(lines)));
+    // t, two estimates with their deviations or without, credible, revision; the test may run over midnight
+    let mut found: Vec<_> = found.filter(|(count, _)| *count > 0).collect();
+    found.sort();
+    assert_eq!(found, [(5, Some(7)), (7, Some(5))], "{files:?}");
+}
