@@ -93,6 +93,9 @@ __all__ = [
     "SweptKey",
     "SweptRow",
     "Symmetry",
+    "Tube",
+    "TubeRow",
+    "TubeWitness",
     "Uniformity",
     "Verdict",
 ]
@@ -605,6 +608,71 @@ class SampledProof(Record):
     """why there is no proof, or what ended the search"""
 
 
+class TubeRow(Record):
+    """A part of a tube."""
+
+    to: float
+    """to when"""
+    range: Named[Range]
+    """ranges of the states"""
+    _ITEMS: ClassVar = {"from": float}
+
+    @property
+    def since(self) -> float:
+        """The entry ``from``: from when."""
+        found: float = self["from"]
+        return found
+
+
+class TubeWitness(Record):
+    """A run that leaves the box for certain."""
+
+    at: Named[float]
+    """where states and constants start, and what the inputs are all the time"""
+    state: str
+    """the state that is outside"""
+    time: float
+    """when"""
+    value: list[float]
+    """where it is then, for certain"""
+
+
+class Tube(Record):
+    """What is proved of the plant's way from a set of starts."""
+
+    verdict: Verdict
+    """whether it stays in the box until the time asked for"""
+    until: float
+    """until when it is asked"""
+    reached: float
+    """until when the ranges are proved"""
+    start: Named[Range]
+    """ranges of the states at the start"""
+    constants: Named[Range]
+    """ranges of unknown inputs that stay constant"""
+    inputs: Named[Range]
+    """ranges of inputs that may vary as they like"""
+    range: Named[Range]
+    """ranges of the states over all of the time that is reached"""
+    end: Named[Range]
+    """ranges of the states at the end of it"""
+    rows: list[TubeRow]
+    """where the states are from one time to the next"""
+    obstacle: str | None
+    """why it is not proved"""
+    witness: TubeWitness | None
+    """a run that leaves the box for certain"""
+    notes: list[str]
+    """what it leaves aside"""
+    _ITEMS: ClassVar = {"from": float}
+
+    @property
+    def since(self) -> float:
+        """The entry ``from``: when it starts."""
+        found: float = self["from"]
+        return found
+
+
 class ProofSummary(Record):
     """What one way of proof gives."""
 
@@ -662,6 +730,8 @@ class Proof(Record):
     sampled: SampledProof | None
     """what is proved of samples with measurements that follow the model between them (``between_samples =
     "predict"``); ``None`` where nothing is proved of sensors that are read continuously"""
+    tube: Tube | None
+    """whether the plant stays in the box from the starts of ``[certify]``; ``None`` where that is not asked"""
     notes: list[str]
     """what you should know"""
     theorem: ProofSummary | None

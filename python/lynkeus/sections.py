@@ -379,6 +379,15 @@ class CertifySection(TypedDict, total=False):
     tube: Number | None
     """every state stays within this distance of its start value, too (number > 0; default: none)"""
 
+    start: Mapping[str, Number | Numbers] | None
+    """from where the plant starts: ranges of states, and of unknown inputs that stay constant. `certify` then
+    proves or refutes that the plant stays in the box until `until`; a state that is not listed starts
+    where the simulation starts (table: name = number, or `[smallest, largest]`; default: none)"""
+
+    until: Number | None
+    """until when, in the plant's unit of time (number > `start` of `[simulate]`; default: that of
+    `[simulate]`)"""
+
     slew: Mapping[str, Number] | None
     """bounds of the rates of change of unknown inputs (table: unknown input = number > 0; default: 0:
     constant)"""

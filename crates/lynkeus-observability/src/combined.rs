@@ -7,6 +7,7 @@ use crate::analysis::in_branch;
 use crate::branches::{self, Branch, Branches, Choices};
 use crate::hidden::hide_alike;
 use crate::model::{Model, check_names, expressions, measured};
+use crate::settled::Settled;
 use crate::switched::Switched;
 use crate::{Answer, Note, Partial, Question, QuestionError, Verdict};
 
@@ -42,11 +43,32 @@ fn between_events(plant: &Plant, question: &Question) -> Result<Answer, Question
     let outputs = measured(plant, question)?;
     let about = expressions(plant, question)?;
     check_names(plant, question)?;
+    let roots = [&plant.derivatives[..], &outputs, &about].concat();
+    let mut settled = Settled::new(plant, question, &roots);
+    if settled.made.is_empty() {
+        return Ok(by_branches(plant, question, outputs, about));
+    }
+    let about = settled
+        .roots
+        .split_off(plant.derivatives.len() + outputs.len());
+    let outputs = settled.roots.split_off(plant.derivatives.len());
+    let derivatives = settled.roots;
+    let plant = Plant {
+        derivatives,
+        ..plant.clone()
+    };
+    let mut answer = by_branches(&plant, question, outputs, about);
+    answer.notes.push(Note::Settled(settled.made));
+    Ok(answer)
+}
+
+/// With the choices that are open on the box.
+fn by_branches(plant: &Plant, question: &Question, outputs: Vec<Node>, about: Vec<Node>) -> Answer {
     let own = in_branch(plant, question, (&outputs, &about), None);
     let choices = Choices::of(plant, &outputs);
     let branches = (!choices.is_empty()).then(|| choices.branches(plant, question));
     let Some(branches) = branches.flatten() else {
-        return Ok(own);
+        return own;
     };
     let combination = Combination {
         plant,
@@ -56,7 +78,7 @@ fn between_events(plant: &Plant, question: &Question) -> Result<Answer, Question
         choices,
         branches,
     };
-    Ok(combination.answer(own))
+    combination.answer(own)
 }
 
 /// A question, and the branches of its model.

@@ -42,6 +42,7 @@ pub mod precision;
 mod question;
 mod search;
 mod series;
+mod settled;
 mod switched;
 
 pub use combined::analyse;

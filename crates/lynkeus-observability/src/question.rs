@@ -118,6 +118,8 @@ pub enum Note {
         /// whether these are all that were found
         all: bool,
     },
+    /// these choices are the same on the whole declared box
+    Settled(Vec<String>),
     /// what no branch tells of these may show when the branch changes, or from what several branches tell
     WithinBranches(Vec<String>),
     /// what the flow hides of these may show when an event comes

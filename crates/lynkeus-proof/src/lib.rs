@@ -15,6 +15,7 @@
 //! | does a filter bear a Lipschitz remainder? | Newton's method | [`riccati`] |
 //! | how large are the inverses of an interval matrix? | floating point | [`inverse`] |
 //! | are all zeros of a polynomial stable? | | [`hurwitz`]: Routh's table |
+//! | where is every solution from a start set? | Picard's iteration, floating point | [`tube`]: Taylor models, zonotopes |
 //! | which eigenvalues and singular values? | bounded sweeps, floating point | [`spectrum`] |
 //!
 //! [`search`] only repeats such decisions along one number; [`vertices`] lists where convex
@@ -54,6 +55,7 @@ pub mod metzler;
 pub mod riccati;
 pub mod search;
 pub mod spectrum;
+pub mod tube;
 mod vertices;
 
 pub use vertices::{Bounds, varying, vertices};

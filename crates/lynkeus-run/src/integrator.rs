@@ -144,6 +144,7 @@ impl Integrator {
             adaptive.grant(self.instants.len());
         }
         let whole = to - from;
+        self.sides.memory.enter(from, to);
         for (start, end) in pieces(from, to, &mut self.instants, APART) {
             if let Some(events) = f.events() {
                 events.enter(start + 0.5 * (end - start));
@@ -154,11 +155,14 @@ impl Integrator {
                     let mut system = Filippov::new(f, &mut self.sides, at, end - start);
                     system.begin(start, x)?;
                     adaptive.advance(&mut system, start, end, x)?;
+                    system.end(end, x);
                 }
                 Stepper::Fixed(fixed) => {
                     let memory = &mut self.sides.memory;
-                    occur(f, memory, (start, end - start), x, &[])?;
-                    fixed.advance(f, memory, (start, end), whole, x)?;
+                    let left = memory.left();
+                    let jumped = occur(f, memory, (start, end - start), x, &[])?;
+                    let behind = jumped.then(|| sent_back(f, start, x, &left)).flatten();
+                    fixed.advance(f, memory, (start, end), (whole, behind), x)?;
                 }
             }
         }
@@ -231,18 +235,18 @@ impl Fixed {
         f: &mut dyn Dynamics,
         memory: &mut Memory,
         (from, to): (f64, f64),
-        whole: f64,
+        (whole, behind): (f64, Option<usize>),
         x: &mut [f64],
     ) -> Result<()> {
         let Some(used) = self.step.length(whole) else {
-            return self.auto(f, memory, (from, to), x);
+            return self.auto(f, memory, (from, to), behind, x);
         };
         if self.advice.is_none() {
             self.advice = Some(advice(f, from, x, used));
         }
         let steps = fixed_steps(from, to, used)?;
         self.begin.copy_from_slice(x);
-        let result = self.steps(f, memory, (from, to), steps, x);
+        let result = self.steps(f, memory, (from, to), (steps, behind), x);
         if let Err(Error::NotFinite { .. }) = result {
             self.advice = Some(advice(f, from, &self.begin, used));
         }
@@ -256,6 +260,7 @@ impl Fixed {
         f: &mut dyn Dynamics,
         memory: &mut Memory,
         (from, to): (f64, f64),
+        behind: Option<usize>,
         x: &mut [f64],
     ) -> Result<()> {
         let known = self.advice.filter(|_| self.since_look > 0);
@@ -273,7 +278,7 @@ impl Fixed {
         self.begin.copy_from_slice(x);
         let remembered = memory.clone();
         for _ in 0..RETRIES {
-            match self.steps(f, memory, (from, to), steps, x) {
+            match self.steps(f, memory, (from, to), (steps, behind), x) {
                 Ok(()) => return Ok(()),
                 Err(error @ (Error::EndlessEvents { .. } | Error::Grazing { .. })) => {
                     return Err(error);
@@ -285,16 +290,16 @@ impl Fixed {
             steps = steps.saturating_mul(4).min(MOST_STEPS);
             self.since_look = 0;
         }
-        self.steps(f, memory, (from, to), steps, x)
+        self.steps(f, memory, (from, to), (steps, behind), x)
     }
 
-    /// So many equal steps, with events where there are clauses.
+    /// So many equal steps, with events where there are clauses, after one that has sent the state back perhaps.
     fn steps(
         &mut self,
         f: &mut dyn Dynamics,
         memory: &mut Memory,
         (from, to): (f64, f64),
-        steps: usize,
+        (steps, mut behind): (usize, Option<usize>),
         x: &mut [f64],
     ) -> Result<()> {
         if f.clauses().is_none() {
@@ -305,7 +310,8 @@ impl Fixed {
             if f.is_over() {
                 return Err(Error::Cancelled { time: t });
             }
-            self.rk4.step_with_events(f, memory, (t, next), x)?;
+            self.rk4
+                .step_with_events(f, memory, (t, next), behind.take(), x)?;
         }
         Ok(())
     }
@@ -407,6 +413,26 @@ pub(crate) fn instant(from: f64, to: f64, steps: usize, i: usize) -> f64 {
 
 /// How often a step is halved on the way to an event.
 const HALVINGS: usize = 50;
+
+/// The relation that still holds behind an event and is left from there.
+fn sent_back(f: &mut dyn Dynamics, t: f64, x: &[f64], flipped: &[usize]) -> Option<usize> {
+    let mut slope = vec![0.0; x.len()];
+    f.derivatives(t, x, &mut slope);
+    let rates = f.rates(t, x, &slope);
+    let mut seen = vec![];
+    f.watch(t, x, &mut seen);
+    let leaves = |relation: &&usize| match (seen.get(**relation), rates.get(**relation)) {
+        (Some(seen), Some(rate)) => {
+            if seen.holds {
+                *rate < 0.0
+            } else {
+                *rate > 0.0
+            }
+        }
+        _ => false,
+    };
+    flipped.iter().find(leaves).copied()
+}
 
 /// Most parts of a step with events in it.
 const MOST_PARTS: usize = 10_000;
@@ -524,16 +550,16 @@ impl Rk4 {
     /// One step with events in it. Where a relation of a clause is another one at the end of it, steps of
     /// the same method from the same start, their lengths halved [`HALVINGS`] times, find the first
     /// that ends beyond the change; the clauses take effect there, and another step leads to the end. A
-    /// state that a jump has sent back is followed by shorter steps until it has left.
+    /// state that a jump has sent back, beyond a relation, is followed by shorter steps until it has left.
     fn step_with_events(
         &mut self,
         f: &mut dyn Dynamics,
         memory: &mut Memory,
         (from, to): (f64, f64),
+        mut behind: Option<usize>,
         x: &mut [f64],
     ) -> Result<()> {
         let (mut t, mut was, mut now) = (from, vec![], vec![]);
-        let mut sent_back: Option<usize> = None;
         let mut start = x.to_vec();
         let mut count = 0;
         while to - t > resolution(to) {
@@ -548,7 +574,7 @@ impl Rk4 {
             self.step(f, t, h, x)?;
             f.watch(t + h, x, &mut now);
             // there and back within one step
-            if let Some(relation) = sent_back.take() {
+            if let Some(relation) = behind.take() {
                 for _ in 0..HALVINGS {
                     if now[relation].holds != was[relation].holds {
                         break;
@@ -573,7 +599,7 @@ impl Rk4 {
             let (length, flipped) = self.first_change(f, (t, h), &start, &was, x)?;
             t = if length == whole { to } else { t + length };
             if occur(f, memory, (t, to - from), x, &flipped)? {
-                sent_back = self.sent_back(f, t, x, &flipped);
+                behind = sent_back(f, t, x, &flipped);
             }
         }
         Ok(())
@@ -622,6 +648,10 @@ impl Rk4 {
         (t, within): (f64, f64),
         x: &mut [f64],
     ) -> Result<bool> {
+        // what was at the end of the interval lies at no distance
+        if !memory.left().is_empty() {
+            return occur(f, memory, (t, within), x, &[]);
+        }
         let start = x.to_vec();
         let (mut were, mut now) = (vec![], vec![]);
         f.watch(t, x, &mut were);
@@ -642,26 +672,6 @@ impl Rk4 {
         }
         x.copy_from_slice(&start);
         Ok(false)
-    }
-
-    /// The relation that still holds behind an event and is left from there.
-    fn sent_back(
-        &mut self,
-        f: &mut dyn Dynamics,
-        t: f64,
-        x: &[f64],
-        flipped: &[usize],
-    ) -> Option<usize> {
-        let mut slope = vec![0.0; x.len()];
-        f.derivatives(t, x, &mut slope);
-        let rates = f.rates(t, x, &slope);
-        let mut seen = vec![];
-        f.watch(t, x, &mut seen);
-        let leaves = |relation: &&usize| match seen[**relation].holds {
-            true => rates[**relation] < 0.0,
-            false => rates[**relation] > 0.0,
-        };
-        flipped.iter().find(leaves).copied()
     }
 
     /// That clauses which came ever sooner still hold.

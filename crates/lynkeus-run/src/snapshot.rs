@@ -7,7 +7,7 @@ use std::fmt;
 /// What a snapshot starts with.
 const MAGIC: &[u8; 8] = b"LYNKSNAP";
 /// Raised whenever what is saved changes.
-const VERSION: u64 = 5;
+const VERSION: u64 = 6;
 /// Magic, version, fingerprint, length; the checksum comes last.
 const HEAD: usize = 32;
 const TAIL: usize = 8;

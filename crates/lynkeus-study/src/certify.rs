@@ -14,6 +14,11 @@ pub type Box = Vec<(Name, f64, f64)>;
 pub struct CertifySettings {
     /// States stay within this distance of their start values, too.
     pub tube: Option<f64>,
+    /// From where the plant starts, where it is asked whether it stays in the box: states and constant
+    /// unknown inputs.
+    pub start: Option<Box>,
+    /// Until when.
+    pub until: Option<f64>,
     /// Bounds of the rates of change of unknown inputs; one not listed is constant.
     pub slew: Vec<(Name, f64)>,
     /// Bounds of |u'|, |u''|, … of known inputs, as many as are known.
@@ -24,6 +29,8 @@ pub(super) fn read(entry: Entry<'_>) -> Result<CertifySettings, Error> {
     let mut section = entry.section("[certify]", &CERTIFY)?;
     Ok(CertifySettings {
         tube: section.optional("tube", Entry::positive)?,
+        start: section.optional("start", read_box)?,
+        until: section.optional("until", Entry::number)?,
         slew: section
             .optional("slew", |entry| {
                 let pairs = entry.pairs()?.into_iter();

@@ -314,12 +314,30 @@ pub(super) const OBSERVER: [KeySpec; 3] = [
 ];
 
 /// `[certify]`
-pub(super) const CERTIFY: [KeySpec; 3] = [
+pub(super) const CERTIFY: [KeySpec; 5] = [
     KeySpec {
         name: "tube",
         shape: Shape::Positive,
         default: "none",
         meaning: "every state stays within this distance of its start value, too",
+    },
+    KeySpec {
+        name: "start",
+        shape: Shape::As(
+            "table: name = number, or `[smallest, largest]`",
+            &Shape::Table(&Shape::Either(&[
+                Shape::Number,
+                Shape::List(&Shape::Number),
+            ])),
+        ),
+        default: "none",
+        meaning: "from where the plant starts: ranges of states, and of unknown inputs that stay constant. `certify` then proves or refutes that [the plant stays in the box](certificates.md#the-plant-stays-in-the-box) until `until`; a state that is not listed starts where the simulation starts",
+    },
+    KeySpec {
+        name: "until",
+        shape: Shape::As("number > `start` of `[simulate]`", &Shape::Number),
+        default: "that of `[simulate]`",
+        meaning: "until when, in the plant's unit of time",
     },
     KeySpec {
         name: "slew",

@@ -63,6 +63,10 @@ impl Words for Note {
                 let reserve = if *all { "" } else { ", and further ones were not" };
                 format!("{CHOICES}: {found} found at points of the box{times}, each analysed{reserve}")
             }
+            Note::Settled(made) => format!(
+                "on the whole declared box one branch is taken (proved) of {}: that one is analysed",
+                listed(made)
+            ),
             Note::WithinBranches(names) => format!(
                 "within each branch the outputs do not tell {}; the moments at which the branch changes may, or what several branches tell together",
                 names.join(", ")

@@ -21,6 +21,7 @@ mod json;
 mod print;
 mod sampled;
 mod strays;
+mod tube;
 
 pub use excited::{AtTheta, Excitation, Excited};
 pub(crate) use json::Proof;
@@ -28,6 +29,7 @@ pub(crate) use json::Proof;
 pub(crate) use json::Report as CertificateReport;
 pub(crate) use print::region;
 pub use strays::Strays;
+pub use tube::{Tube, Witness};
 
 /// The answer of `lynkeus certify`.
 #[derive(Debug)]
@@ -58,6 +60,8 @@ pub struct CertifyReport {
     pub sampled: Option<Result<SampledDecay, Said>>,
     /// α(θ) of Ltaief et al. as the study's run shows it; none for observers without that
     pub excited: Option<Excited>,
+    /// whether the plant stays in the box, from the starts that the study asks about
+    pub tube: Option<Tube>,
 }
 
 /// Proves, refutes or leaves undecided that the study's observer converges: on the
@@ -176,6 +180,10 @@ impl<'a> Task<'a> {
             sampling,
             sampled,
             excited,
+            tube: match self.explore {
+                true => Tube::of(&self.prepared, place)?,
+                false => None,
+            },
             design,
             certificate,
             notes,

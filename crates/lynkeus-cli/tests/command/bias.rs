@@ -106,6 +106,50 @@ fn an_offset_is_what_a_model_with_a_state_for_it_finds() {
     assert!((last("y_bias[2]_hat") - 0.3).abs() < 0.05);
 }
 
+/// A sensor of a state that is an output itself: its readings have the state's name, and the offset is beside it.
+#[test]
+fn a_state_that_is_read_has_an_offset_beside_it() {
+    let model = |output: &str, reading: &str| {
+        format!(
+            "model Tank\n  {output}Real x(start = 1);\n  Real v(start = 0.2);\n{reading}\n  der(v) = -0.3*v + 0.1;\nend Tank;\n"
+        )
+    };
+    let own = model("output ", "equation\n  der(x) = v - 0.5*x;");
+    let by_hand = model(
+        "",
+        "  Real x_bias(start = 0);\n  output Real y = x + x_bias;\nequation\n  der(x_bias) = 0;\n  der(x) = v - 0.5*x;",
+    );
+    let rows = (0..60).map(|k| {
+        let t = 0.1 * f64::from(k);
+        format!(
+            "{t},{}\n",
+            0.9 + 0.3 * (-0.5 * t).exp() + 0.05 * (7.0 * t).sin()
+        )
+    });
+    let rows: String = rows.collect();
+    let estimates = [(own, "x", "bias = { x = 0.5 }", ""), (by_hand, "y", "", ", x_bias = 0.25")].map(
+        |(model, header, bias, variance)| {
+            let folder = Folder::empty();
+            folder.write("plant.mo", &model);
+            folder.write(
+                "study.toml",
+                &format!("plant = \"plant.mo\"\nprocess_noise = {{ v = 0.01 }}\n[observer]\nfamily = \"ekf\"\ninitial_variance = {{ x = 0.04{variance} }}\n[sensors]\nnoise = {{ {header} = 0.05 }}\n{bias}\n"),
+            );
+            folder.write("log.csv", &format!("t,{header}\n{rows}"));
+            let checked = folder.run(&["check", "study.toml"]);
+            let told = "states observable: x, v, x_bias";
+            assert!(checked.out.contains(told), "{} {}", checked.out, checked.err);
+            estimate(&folder)
+        },
+    );
+    for name in ["x_hat", "v_hat", "x_bias_hat"] {
+        let [own, by_hand] = estimates.each_ref().map(|table| column(table, name));
+        for (own, by_hand) in own.into_iter().zip(by_hand) {
+            assert!((own - by_hand).abs() < 1e-9, "{name}: {own} {by_hand}");
+        }
+    }
+}
+
 /// Nothing tells the offset of the only sensor of an integrator from where this started.
 #[test]
 fn what_no_sensor_tells_apart_is_told() {

@@ -6,6 +6,7 @@ mod errors;
 mod excited;
 mod moving;
 mod printed;
+mod tube;
 
 use lynkeus::Study;
 use serde_json::Value;

@@ -1,5 +1,6 @@
 //! Plants whose state jumps: `when` clauses, from the study to the answer.
 
+mod rows;
 mod suites;
 
 use crate::{Ended, Folder};
@@ -247,6 +248,41 @@ fn a_thermostat_is_estimated_as_by_particles() {
     }
 }
 
+/// What a Gaussian filter loses is what readings say of whether the heater has switched: without those that come while
+/// that is open, it goes through the first switching as particles do. The jump of the covariance is not what it lacks.
+#[test]
+fn a_thermostat_is_lost_sight_of_by_readings_beside_its_switching() {
+    let rest = "initial_variance = { T = 0.25, heat = 0.64 }\n[process_noise]\nT = 0.02\nheat = 0.05\n[estimate]\nsd = true\n";
+    let rows = &OF_THERMOSTAT[..10];
+    let folder = folder(THERMOSTAT, rest, rows);
+    folder.change("study.toml", "y = 0.05", "y = 0.3");
+    let open = [6, 7, 8, 9];
+    let heat = |is_told: bool| {
+        let row = |(k, row): (usize, &Row)| match !is_told && open.contains(&k) {
+            true => format!("{},\n", row.0),
+            false => format!("{},{}\n", row.0, row.1),
+        };
+        let rows: String = rows.iter().enumerate().map(row).collect();
+        folder.write("log.csv", &format!("t,y\n{rows}"));
+        let of = |drawn: &str| {
+            folder.change("study.toml", "family = \"ekf\"", drawn);
+            let table = estimate(&folder);
+            folder.change("study.toml", drawn, "family = \"ekf\"");
+            ["heat_hat", "heat_sd"].map(|name| *column(&table, name).last().unwrap())
+        };
+        let [own, own_sd] = of("family = \"ekf\"");
+        let [mean, deviation] = of("family = \"particle\"\nparticles = 20000");
+        [(own - mean) / deviation, own_sd / deviation - 1.0]
+    };
+    let [mean, deviation] = heat(false);
+    assert!(
+        mean.abs() < 0.03 && deviation.abs() < 0.03,
+        "{mean} {deviation}"
+    );
+    let [mean, deviation] = heat(true);
+    assert!(mean < -0.3 && deviation < -0.15, "{mean} {deviation}");
+}
+
 /// Particles of this program are those of the other one, whatever the event.
 #[test]
 fn particles_go_through_events_each_by_itself() {
@@ -306,7 +342,18 @@ fn what_does_not_follow_events_says_so_with_the_line() {
     folder.change("study.toml", "\"ekf\"", "\"mhe\"");
     let told = format!("family = \"mhe\": {line}");
     refused(&folder, &["estimate", "study.toml", "log.csv"], &told);
-    folder.change("study.toml", "\"mhe\"", "\"ekf\"");
+    folder.change(
+        "study.toml",
+        "\"mhe\"",
+        "\"particle\"\nproposal = \"ensemble\"",
+    );
+    let told = "proposal = \"ensemble\": the state of 'Ball' jumps at events (`when` of line 9)";
+    refused(&folder, &["estimate", "study.toml", "log.csv"], told);
+    folder.change(
+        "study.toml",
+        "\"particle\"\nproposal = \"ensemble\"",
+        "\"ekf\"",
+    );
     let ended = folder.run(&["compare", "study.toml", "log.csv", "--json"]);
     let rows = &ended.json()["families"];
     let families: Vec<&str> = rows

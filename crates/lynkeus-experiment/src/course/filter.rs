@@ -183,7 +183,7 @@ pub(crate) fn blueprint(
     };
     refuse_longer_lag(study, &tuning.kind)?;
     refuse_smoothed_bounds(study, tuning)?;
-    particles::refuse(study, &tuning.kind)?;
+    particles::refuse(prepared, &tuning.kind)?;
     let model = model(prepared, design, tuning, samples, notes)?;
     let kept = FilterSettings {
         gate: tuning.gate,

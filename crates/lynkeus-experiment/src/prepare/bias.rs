@@ -12,8 +12,7 @@ use crate::{Error, Study, near};
 /// reads u.
 ///
 /// # Errors
-/// A name that is no output and no known input, an output that is a state itself, a state that is called as the
-/// offset would be.
+/// A name that is no output and no known input, a state that is called as the offset would be.
 pub(super) fn added(study: &Study, mut plant: Plant) -> Result<Plant, Error> {
     for (name, _) in &study.sensors.bias {
         let refuse = |message: String, hint: &str| {
@@ -41,13 +40,6 @@ pub(super) fn added(study: &Study, mut plant: Plant) -> Result<Plant, Error> {
             return Err(refuse(
                 format!("nobody reads the input {}", first.name),
                 "an offset is one of a sensor: take it out of `bias`, or out of `unknown` and `disturbances`",
-            ));
-        }
-        let is_state = |v: &&Variable| plant.states.iter().any(|s| s.name == v.name);
-        if let Some(state) = signals.iter().find(is_state) {
-            return Err(refuse(
-                format!("{} is a state of the model", state.name),
-                "give the sensor an output of its own: output Real y = x",
             ));
         }
         for signal in signals {

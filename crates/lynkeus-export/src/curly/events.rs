@@ -58,6 +58,9 @@ impl Machine {
             ("TRUTHS", conditions),
             ("NEXT", timers),
             ("LAST", states),
+            ("FROM", 1),
+            ("UNTIL", 1),
+            ("LEFT", relations),
             ("HURRY", 4 * clauses),
         ] {
             if name == "ALLOWED" {

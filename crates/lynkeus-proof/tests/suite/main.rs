@@ -3,3 +3,4 @@
 
 mod decay;
 mod falsify;
+mod tube;

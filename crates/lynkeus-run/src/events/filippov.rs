@@ -351,6 +351,15 @@ impl<'a> Filippov<'a> {
         Ok(())
     }
 
+    /// Keeps for the next interval which relations of clauses are others at the end of this one: on a surface, no step
+    /// has gone beyond it.
+    pub fn end(&mut self, t: f64, x: &[f64]) {
+        self.flipped.clear();
+        self.see(t, x);
+        let flipped = std::mem::take(&mut self.flipped);
+        self.at.memory.keep(&flipped, &self.seen);
+    }
+
     /// Whether relations of clauses have changed, or something has to be looked after.
     pub fn has_event(&self) -> bool {
         !self.flipped.is_empty() || self.at.memory.suspects()

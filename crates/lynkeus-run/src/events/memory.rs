@@ -18,6 +18,9 @@ const SOON: f64 = 1e-4;
 const AT_ONCE: usize = 200;
 const HARDLY: f64 = 1e-12;
 
+/// What happens in the last part of an interval that is no larger share of it happens at its end.
+const AT_END: f64 = 1e-9;
+
 /// A quantity that goes so far beyond where it was at the last of them, against its largest value, is
 /// not held back any more.
 const BEYOND: f64 = 1e-6;
@@ -32,6 +35,10 @@ pub struct Memory {
     pub(super) timers: Vec<usize>,
     /// the state at the end of the last interval
     pub(super) last: Vec<f64>,
+    /// the interval that is gone through
+    interval: (f64, f64),
+    /// relations that changed at the end of the last interval, and whether they held then
+    pub(super) left: Vec<(usize, bool)>,
     /// of each clause
     hurry: Vec<Hurry>,
     /// when any clause took effect last, and events in a row between which time hardly went on
@@ -80,6 +87,12 @@ impl Persist for Memory {
         count = walk.length(self.last.len())?;
         self.last.resize(count, 0.0);
         walk.numbers(&mut self.last)?;
+        count = walk.length(self.left.len())?;
+        self.left.resize(count, (0, false));
+        for (relation, held) in &mut self.left {
+            walk.count(relation)?;
+            walk.flag(held)?;
+        }
         count = walk.length(self.hurry.len())?;
         self.hurry.resize(count, Hurry::default());
         for hurry in &mut self.hurry {
@@ -135,6 +148,30 @@ impl Memory {
         timers.any(|(timer, &next)| {
             Grid::new(timer.start, timer.interval).time(next) <= t + SAME * t.abs()
         })
+    }
+
+    /// An interval begins.
+    pub(crate) fn enter(&mut self, from: f64, to: f64) {
+        self.interval = (from, to);
+    }
+
+    /// Whether a time is the end of the interval, as near as makes no difference.
+    pub(super) fn is_at_end(&self, t: f64) -> bool {
+        let (from, to) = self.interval;
+        (0.0..=AT_END * (to - from) + SAME * t.abs()).contains(&(to - t))
+    }
+
+    /// Relations have changed at the end of an interval: what comes of that is for the next one.
+    pub(super) fn keep(&mut self, flipped: &[usize], seen: &[Seen]) {
+        let held = flipped
+            .iter()
+            .filter_map(|&r| Some((r, seen.get(r)?.holds)));
+        self.left.extend(held);
+    }
+
+    /// The relations that changed at the end of the last interval, of which nothing has come yet.
+    pub(crate) fn left(&self) -> Vec<usize> {
+        self.left.iter().map(|(relation, _)| *relation).collect()
     }
 
     /// An interval is over.

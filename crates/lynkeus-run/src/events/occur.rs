@@ -8,8 +8,8 @@ use crate::{Dynamics, Error, Result};
 /// γ̇ is nothing against what it is made of.
 const GRAZING: f64 = 1e-9;
 
-/// The event at `t`, in an interval of some length: `before` is the derivative that led to it, and `flipped` are
-/// the relations that changed. Whether the state has jumped.
+/// The event at `t`, in an interval of some length: `flipped` are the relations that changed. Whether the state has
+/// jumped. What is at the end of an interval, where a row is, comes behind it: at the start of the next one.
 pub(crate) fn occur(
     f: &mut dyn Dynamics,
     memory: &mut Memory,
@@ -20,11 +20,31 @@ pub(crate) fn occur(
     let Some(clauses) = f.clauses() else {
         return Ok(false);
     };
+    if !flipped.is_empty() && memory.is_at_end(t) {
+        let mut now = vec![];
+        f.watch(t, x, &mut now);
+        memory.keep(flipped, &now);
+        return Ok(false);
+    }
     let old = x.to_vec();
     let mut before = vec![0.0; x.len()];
     f.derivatives(t, x, &mut before);
     let mut causes = flipped.to_vec();
     let mut late = vec![0.0; clauses.relations];
+    let left = std::mem::take(&mut memory.left);
+    if !left.is_empty() {
+        let rates = f.rates(t, x, &before);
+        let mut now = vec![];
+        f.watch(t, x, &mut now);
+        for (r, held) in left {
+            // what a correction has taken back did not happen
+            let seen = now.get(r).filter(|seen| seen.holds == held);
+            if let (Some(seen), false) = (seen, causes.contains(&r)) {
+                late[r] = (seen.value / rates[r]).clamp(0.0, length);
+                causes.push(r);
+            }
+        }
+    }
     // what somebody else has changed since the end of the last interval, which is looked at once
     let n = clauses.states;
     let last = std::mem::take(&mut memory.last);

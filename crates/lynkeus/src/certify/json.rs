@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::excited::ExcitationEntry;
 use super::sampled::SampledEntry;
+use super::tube::told::TubeEntry;
 use super::{CertifyReport, Excited, Strays, bounds};
 use lynkeus_experiment::entries::{Condition, Named, Range, Verdict, finite, sides};
 use lynkeus_experiment::judge::interval::SamplingLimits;
@@ -52,6 +53,8 @@ pub(crate) struct Proof<'a> {
     /// what is proved of samples with measurements that follow the model between them
     /// (`between_samples = "predict"`); null where nothing is proved of sensors that are read continuously
     sampled: Option<SampledEntry>,
+    /// whether the plant stays in the box from the starts of `[certify]`; null where that is not asked
+    tube: Option<TubeEntry>,
     /// what you should know
     notes: Vec<String>,
     /// what the family's theorem gives, where it was asked
@@ -126,6 +129,7 @@ impl<'a> From<&'a CertifyReport> for Proof<'a> {
             excitation: report.excited.as_ref().map(Excited::entry),
             sampling: report.sampling.as_ref().map(|found| found.entry(true)),
             sampled: report.sampled.as_ref().map(SampledEntry::from),
+            tube: report.tube.as_ref().map(TubeEntry::from),
             notes: both
                 .flat_map(|certificate| report.notes_of(certificate))
                 .chain(report.assumed.iter().cloned())

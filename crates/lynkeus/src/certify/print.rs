@@ -59,6 +59,9 @@ impl Answer for CertifyReport {
         if let Some(sampled) = &self.sampled {
             sampled::tell(sampled, self, &mut document);
         }
+        if let Some(tube) = &self.tube {
+            tube.tell(&mut document);
+        }
         if let Some(excited) = &self.excited {
             excited.tell(&mut document);
         }
@@ -71,7 +74,8 @@ impl Answer for CertifyReport {
     }
 
     fn is_positive(&self) -> bool {
-        !self.is_refuted()
+        let leaves = self.tube.as_ref().map(|tube| tube.verdict);
+        !self.is_refuted() && leaves != Some(Standing::Refuted)
     }
 }
 
@@ -125,7 +129,16 @@ fn but(report: &CertifyReport) -> String {
     let strays = report.strays.words(report.is_theorem(report.best()));
     let strays = strays.map(|words| format!("; but only inside the box, and {words}"));
     let sampled = sampled::also(report);
-    samples.into_iter().chain(sampled).chain(strays).collect()
+    let tube = report
+        .tube
+        .as_ref()
+        .map(|tube| format!("; {}", tube.clause()));
+    samples
+        .into_iter()
+        .chain(sampled)
+        .chain(strays)
+        .chain(tube)
+        .collect()
 }
 
 /// Bounds named in the first line.

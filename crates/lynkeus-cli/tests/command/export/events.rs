@@ -63,6 +63,23 @@ equation
 end Wheel;
 ";
 
+/// A ramp whose laps end at rows, and a clock that beats there.
+const RAMP: &str = "model Ramp
+  Real x(start = 0);
+  discrete Integer n(start = 0); discrete Real beat(start = 0);
+  output Real y = x;
+equation
+  der(x) = 1;
+  when x >= 0.75 then
+    reinit(x, 0);
+    n = pre(n) + 1;
+  end when;
+  when sample(0, 0.5) then
+    beat = x;
+  end when;
+end Ramp;
+";
+
 fn study(family: &str, sections: &str, step: &str) -> String {
     format!(
         "plant = \"m.mo\"\n{sections}[observer]\nfamily = \"{family}\"\ngate = 6\n[estimate]\nmethod = \"rk4\"\n{step}\nsd = true\n"
@@ -122,6 +139,26 @@ fn wheel(family: &str) -> Folder {
     )
 }
 
+/// What is read at the level itself moves the estimate beyond it, back, or leaves it there.
+fn ramp(family: &str, step: &str) -> Folder {
+    let rows = (0..40).map(|k: u32| {
+        let t = 0.25 * f64::from(k);
+        let level = t - 0.75 * f64::from(k.saturating_sub(1) / 3);
+        let y = match k % 9 {
+            3 | 6 => format!("{}", level + 0.04 * (1.7 * t).sin()),
+            7 => format!("{level}"),
+            _ => String::new(),
+        };
+        format!("{t},{y}\n")
+    });
+    let sections = "[sensors]\nnoise = { y = 0.05 }\n[process_noise]\nx = 0\n";
+    folder(
+        RAMP,
+        &study(family, sections, step),
+        &format!("t,y\n{}", rows.collect::<String>()),
+    )
+}
+
 #[test]
 fn events_are_those_of_estimate() {
     if !has("gcc") {
@@ -137,6 +174,8 @@ fn events_are_those_of_estimate() {
         room("ukf", "substeps = 3"),
         wheel("ekf"),
         wheel("ukf"),
+        ramp("ekf", "step = 0.0625"),
+        ramp("ukf", "step = 0.0625"),
     ];
     let looked = (0..).zip(folders).map(|(seed, folder)| {
         let looked = look(seed, folder).unwrap();

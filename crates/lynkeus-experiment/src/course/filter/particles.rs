@@ -4,10 +4,10 @@ use lynkeus_observers::Design;
 use lynkeus_run::filter::{FilterKind, Health};
 use lynkeus_words::figures;
 
+use crate::Error;
 use crate::course::Course;
 use crate::course::doubt::{Doubt, Kind, Level};
 use crate::prepare::Prepared;
-use crate::{Error, Study};
 
 /// Updates in a row after which hardly more than one particle counted: what is told of the estimate is then one of them.
 const LOST: usize = 10;
@@ -18,12 +18,27 @@ const FEW: f64 = 10.0;
 /// A share of the updates that is worth a word.
 const OFTEN: f64 = 0.05;
 
-/// That no smoother is asked for.
+/// That particles are asked for nothing that they do not have: a smoother; and as an ensemble, events.
 ///
 /// # Errors
-/// One is.
-pub(super) fn refuse(study: &Study, kind: &FilterKind) -> Result<(), Error> {
-    if !matches!(kind, FilterKind::Particles(_)) || study.estimate.smoothing.is_none() {
+/// They are.
+pub(super) fn refuse(prepared: &Prepared<'_>, kind: &FilterKind) -> Result<(), Error> {
+    let FilterKind::Particles(settings) = kind else {
+        return Ok(());
+    };
+    let study = prepared.study();
+    let clause = prepared.plant().whens.clauses.first();
+    if let (true, Some(clause)) = (settings.inflation.is_some(), clause) {
+        let message = format!(
+            "proposal = \"ensemble\": the state of '{}' jumps at events (`when` of line {}), and a correction that moves all particles together takes the mean of those on either side of one",
+            prepared.plant().name,
+            clause.line
+        );
+        return Err(Error::refused(message)
+            .at(&study.file)
+            .hint("leave `proposal` out: then particles have weights, and each goes through events of its own"));
+    }
+    if study.estimate.smoothing.is_none() {
         return Ok(());
     }
     let message = "family = \"particle\" has no smoother, and `smooth` or `lag` of [estimate] asks for one: after repeated resampling particles have few different pasts";

@@ -430,6 +430,71 @@ static int sent_back(double t, const real *x, const real *w, const real *dx, con
     }
     return found;
 }
+
+/* Whether one of the relations has changed. */
+static truth any_of(const truth *flipped)
+{
+    for (int r = 0; r < RELATIONS; r++) {
+        if (flipped[r]) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* Whether t is the end of the interval, as near as makes no difference. */
+static truth is_at_end(double t, const double *m)
+{
+    const double size = t < 0.0 ? -t : t;
+    const double left = m[UNTIL] - t;
+    return left >= 0.0 && left <= 1e-9 * (m[UNTIL] - m[FROM]) + 1.7763568394002505e-15 * size ? 1 : 0;
+}
+
+/* Whether a relation is kept for the next interval. */
+static truth is_kept(int r, const double *m)
+{
+    return m[LEFT + r] > 0.0 || m[LEFT + r] < 0.0 ? 1 : 0;
+}
+
+/* Keeps for the next interval which relations have changed, and whether they hold. */
+static void leave(double t, const real *w, const real *z, const truth *flipped, double *m)
+{
+    real holds[RELATIONS_ROOM];
+    real quantities[RELATIONS_ROOM];
+    relations((real)t, z, w, holds, quantities);
+    for (int r = 0; r < RELATIONS; r++) {
+        if (flipped[r]) {
+            m[LEFT + r] = holds[r] > R(0.5) ? 1.0 : -1.0;
+        }
+    }
+}
+
+/* What was kept are causes now, but for what a correction has taken back. */
+static void return_to(double t, double length, const real *w, const real *z, const real *dx, double *m, truth *causes, real *late)
+{
+    real holds[RELATIONS_ROOM];
+    real quantities[RELATIONS_ROOM];
+    real rates[RELATIONS_ROOM];
+    truth is_any = 0;
+    for (int r = 0; r < RELATIONS; r++) {
+        if (is_kept(r, m)) {
+            is_any = 1;
+        }
+    }
+    if (is_any) {
+        relations((real)t, z, w, holds, quantities);
+        speeds(t, z, w, dx, rates);
+        for (int r = 0; r < RELATIONS; r++) {
+            const truth is_same_side = (m[LEFT + r] > 0.0 && holds[r] > R(0.5)) || (m[LEFT + r] < 0.0 && holds[r] < R(0.5)) ? 1 : 0;
+            m[LEFT + r] = 0.0;
+            if (is_same_side && !causes[r]) {
+                const real ago = quantities[r] / rates[r];
+                causes[r] = 1;
+                late[r] = ago < R(0.0) ? R(0.0) : (ago > (real)length ? (real)length : ago);
+            }
+        }
+    }
+}
 //?
 
 /* Steps shorter than this do not move time reliably. */

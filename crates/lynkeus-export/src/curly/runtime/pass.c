@@ -194,6 +194,13 @@ static int occur(field f, double t, double length, const real *w, const truth *f
     const truth is_known = m[STARTED] > 0.0 && m[HAS_LAST] > 0.0 ? 1 : 0;
     int relation = RELATIONS;
     truth is_own = 0;
+//? watched
+    /* what is at the end of the interval comes at the start of the next one */
+    if (any_of(flipped) && is_at_end(t, m)) {
+        leave(t, w, z, flipped, m);
+        return 1;
+    }
+//?
     for (int i = 0; i < DIMENSION; i++) {
         old[i] = z[i];
     }
@@ -202,6 +209,9 @@ static int occur(field f, double t, double length, const real *w, const truth *f
         late[r] = R(0.0);
     }
     f((real)t, z, w, before);
+//? watched
+    return_to(t, length, w, z, before, m, causes, late);
+//?
     m[HAS_LAST] = 0.0;
     if (is_known) {
         if (!rebase(t, length, w, z, before, m, causes, late)) {
@@ -242,12 +252,14 @@ static int occur(field f, double t, double length, const real *w, const truth *f
     return carry_jump(relation, relation < RELATIONS ? late[relation] : R(0.0), old, t, w, before, after, jump, m, z) ? 2 : 0;
 }
 
-/* One step with events in it: steps of halved lengths find the first that ends beyond a change. 0 where events have no
-   end, or something no value. */
-static truth pass(field f, double from, double to, const real *w, real *z, double *m)
+/* One step with events in it: steps of halved lengths find the first that ends beyond a change. `sent` is a relation
+   beyond which a jump has sent the state back: it may have left and be there again within a step. 0 where events have
+   no end, or something no value. */
+static truth pass(field f, double from, double to, const real *w, int sent, real *z, double *m)
 {
 //? !watched
     (void)m;
+    (void)sent;
     return to - from > shortest(to) ? leap(f, from, to - from, w, z) : 1;
 //?
 //? watched
@@ -257,8 +269,7 @@ static truth pass(field f, double from, double to, const real *w, real *z, doubl
     real now[RELATIONS_ROOM];
     real quantities[RELATIONS_ROOM];
     truth flipped[RELATIONS_ROOM];
-    /* a relation beyond which a jump has sent the state back: it may have left and be there again within a step */
-    int behind = RELATIONS;
+    int behind = sent;
     double t = from;
     int count = 0;
     while (to - t > shortest(to)) {
@@ -335,6 +346,8 @@ static truth integrate(field f, double from, double to, int steps, const real *w
     for (int r = 0; r < RELATIONS; r++) {
         flipped[r] = 0;
     }
+    m[FROM] = from;
+    m[UNTIL] = to;
 //? timers
     (void)steps;
     double start = from;
@@ -353,15 +366,37 @@ static truth integrate(field f, double from, double to, int steps, const real *w
         const double end = to;
         const int count = steps;
 //?
-        if (occur(f, start, end - start, w, flipped, z, m) == 0) {
+//? watched
+        truth left[RELATIONS_ROOM];
+        int behind = RELATIONS;
+        for (int r = 0; r < RELATIONS; r++) {
+            left[r] = is_kept(r, m);
+        }
+//?
+        const int began = occur(f, start, end - start, w, flipped, z, m);
+        if (began == 0) {
             return 0;
         }
+//? watched
+        if (began == 2) {
+            real slope[DIMENSION];
+            f((real)start, z, w, slope);
+            behind = sent_back(start, z, w, slope, left);
+        }
+//?
         for (int step = 0; step < count; step++) {
             const double here = start + (end - start) * ((double)step / (double)count);
             const double next = start + (end - start) * ((double)(step + 1) / (double)count);
-            if (!pass(f, here, next, w, z, m)) {
+//? watched
+            if (!pass(f, here, next, w, step == 0 ? behind : RELATIONS, z, m)) {
                 return 0;
             }
+//?
+//? !watched
+            if (!pass(f, here, next, w, RELATIONS, z, m)) {
+                return 0;
+            }
+//?
         }
 //? timers
         start = end;
@@ -386,6 +421,16 @@ static truth anticipate(field f, double t, double within, const real *w, real *z
     truth flipped[RELATIONS_ROOM];
     double h = 0.125 * within;
     int tries = 0;
+    /* what was at the end of the interval lies at no distance */
+    for (int r = 0; r < RELATIONS; r++) {
+        flipped[r] = 0;
+        if (is_kept(r, m)) {
+            tries = 4;
+        }
+    }
+    if (tries > 0) {
+        return occur(f, t, within, w, flipped, z, m) == 0 ? 0 : 1;
+    }
     for (int i = 0; i < DIMENSION; i++) {
         start[i] = z[i];
     }

@@ -422,3 +422,59 @@ fn what_unknown_inputs_hide_alike_is_hidden() {
     );
     judged(&shown, &unknown, ["x z", "", "w"]);
 }
+
+/// A choice that is the same on the whole box is made: p + q·s with a factor s that is 1 or −1, by the branch. On a box
+/// that lies in both nothing is decided.
+#[test]
+fn a_choice_that_the_box_makes_hides_for_certain() {
+    for (factor, inside, across) in [
+        ("sqrt(z^2)/z", "min=0.5, max=3", "min=-1, max=3"),
+        ("abs(z)/z", "min=-3, max=-0.5", "min=-1, max=3"),
+        ("sign(z)", "min=0.5, max=3", "min=-1, max=3"),
+        (
+            "(if z < 0.2 then -1 else 1)",
+            "min=0.2, max=3",
+            "min=-1, max=3",
+        ),
+        (
+            "(if z <= 0.2 and time > 0 then -1 else 1)",
+            "min=0.3, max=3",
+            "min=-1, max=3",
+        ),
+        ("(2*floor(z) - 1)", "min=1.1, max=1.9", "min=0.1, max=1.9"),
+        (
+            "(max(z, 0)/z - min(z, 0)/z)",
+            "min=0, max=3",
+            "min=-1, max=3",
+        ),
+        ("der_of_asin(z)", "min=-1.5, max=1.5", "min=1, max=2"),
+        ("der_of_acos(z)", "min=3.2, max=6.2", "min=1, max=6"),
+    ] {
+        // the slopes of asin∘sin and acos∘cos by differences, which are exact within a branch
+        let by = |outer: &str, inner: &str| {
+            format!("(({outer}({inner}(z + 0.01)) - {outer}({inner}(z)))/0.01)")
+        };
+        let factor = match factor {
+            "der_of_asin(z)" => by("asin", "sin"),
+            "der_of_acos(z)" => by("acos", "cos"),
+            own => own.to_owned(),
+        };
+        let hidden = |range: &str| {
+            let declarations = format!(
+                "parameter Real p; parameter Real q; Real x; Real z({range}); output Real y = x; output Real w = z;"
+            );
+            let plant = plant(
+                &declarations,
+                &format!("der(x) = p + q*{factor}; der(z) = 0;"),
+            );
+            let answer = analyse(&plant, &question()).unwrap();
+            let is_told = answer
+                .notes
+                .iter()
+                .any(|note| matches!(note, Note::Settled(_)));
+            (verdicts(&answer)[1].clone(), is_told)
+        };
+        assert_eq!(hidden(inside), ("p q".to_owned(), true), "{factor}");
+        assert_eq!(hidden(across), (String::new(), false), "{factor}");
+    }
+}

@@ -77,13 +77,21 @@ impl<'a> Equations<'a> {
         }));
         for ((state, start), derivative) in plant.states.iter().zip(starts).zip(&plant.derivatives)
         {
-            let is_output = plant.outputs.iter().any(|o| o.name == state.name);
+            let is_output = plant.outputs.iter().any(|o| shows(o, state));
             made.state(ranged(state, start), is_output, [state.node, *derivative]);
             made.sized(state);
         }
-        let is_state = |name: &str| plant.states.iter().any(|state| state.name == name);
-        let own = plant.outputs.iter().filter(|o| !is_state(&o.name));
-        made.outputs.extend(own.map(|v| (ranged(v, 0.0), v.node)));
+        for output in &plant.outputs {
+            if plant.states.iter().any(|state| shows(output, state)) {
+                continue;
+            }
+            let mut told = ranged(output, 0.0);
+            if plant.states.iter().any(|state| state.name == output.name) {
+                let what = format!("the reading of {}", output.name);
+                told.name = made.headers.free(&output.name, &what);
+            }
+            made.outputs.push((told, output.node));
+        }
         let told = plant.outputs.iter().map(|output| output.node);
         let told: Vec<Node> = plant.derivatives.iter().copied().chain(told).collect();
         let read = plant.graph.symbols_of(&told);
@@ -372,6 +380,11 @@ impl Texts {
             notes,
         )
     }
+}
+
+/// Whether an output is a state itself; one with an offset of its sensor only has its name.
+fn shows(output: &Variable, state: &Variable) -> bool {
+    output.name == state.name && output.node == state.node
 }
 
 /// A variable of the plant; a range that its own start leaves is no range of a run.
