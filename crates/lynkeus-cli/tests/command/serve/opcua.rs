@@ -326,7 +326,8 @@ fn killed(kills: usize, seed: u64) {
     let rows = rows(seed, 4 * (kills + 1), true);
     let expected = expected(&folder, &rows);
     let mut random = Normal(seed);
-    // the estimate at a row is right where all rows up to it were taken; from there on the source sends again
+    // the estimate at a row is right where all rows up to it were taken; from there on the source sends again, and the row
+    // before, whose input counts from it on
     let is_wrong = |found: &BTreeMap<String, Vec<u64>>, row: &Row| {
         let at = date(row.t);
         found.get(&at) != expected.get(&at)
@@ -334,7 +335,7 @@ fn killed(kills: usize, seed: u64) {
     let left = |folder: &Folder, end: usize| {
         let found = history(folder);
         let first = rows[..end].iter().position(|row| is_wrong(&found, row));
-        first.map_or(&[][..], |first| &rows[first..end])
+        first.map_or(&[][..], |first| &rows[first.saturating_sub(1)..end])
     };
     let mut end = 4;
     for round in 0..kills {
